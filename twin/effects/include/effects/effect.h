@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// A physical effect: what an effect file must provide, and the signals it may read and change.
+//
+// One step of one robot passes its signals through the stages in the order of `Stage`; within a stage
+// the effects act in the order of the model file. An effect is immutable. What it remembers of one
+// robot lies in `state`, plain doubles owned by the plant, so that a robot can be copied and restarted.
+#ifndef EFFECTS_EFFECT_H
+#define EFFECTS_EFFECT_H
+
+#include <array>
+#include <memory>
+#include <span>
+#include <string_view>
+
+namespace twin
+{
+
+constexpr int kWheels = 4;  // front-left, front-right, rear-left, rear-right
+using Wheels = std::array<double, kWheels>;
+
+enum class Stage
+{
+    kDuty,     // the command, before it becomes a wheel speed
+    kWheel,    // the speed each wheel tends to, and how fast it gets there
+    kGround,   // the body's velocity over the floor
+    kWorld,    // contacts with robots and walls
+    kObserve,  // what motion capture reports of the pose
+    kView,     // what the camera can see
+    kDecide,   // the camera's bit
+};
+
+// What a robot's commands are. An effect lists the drives it makes sense for.
+enum class Drive : unsigned
+{
+    kDuty = 1,        // wheel duties, -1..1
+    kWheelSpeed = 2,  // measured wheel speeds
+    kTwist = 4,       // commanded body velocity
+};
+constexpr unsigned kAnyDrive = 7;
+constexpr unsigned kDutyOnly = static_cast<unsigned>(Drive::kDuty);
+
+// The signals of one robot in one step. Angles and turn rates are positive counter-clockwise.
+struct Signals
+{
+    double t_s = 0;   // start of the step, robot's clock
+    double dt_s = 0;  // length of the step
+
+    double battery_V = 0;          // pack voltage now
+    double battery_nominal_V = 0;  // pack voltage at which the base model's speeds hold
+
+    Wheels duty{};            // kDuty: command on its way to the wheels; duty drive: -1..1
+    Wheels rim_mps{};         // kWheel: rim speed at the start of the step (read only)
+    Wheels target_mps{};      // kWheel: rim speed that the wheel tends to
+    Wheels tau_s{};           // kWheel: time constant with which it gets there
+    Wheels max_decel_mps2{};  // kWheel: limit on slowing down; infinity = none
+
+    double x_m = 0, y_m = 0, theta_rad = 0;           // kGround: pose in W (read only); kObserve: pose seen
+    double vx_mps = 0, vy_mps = 0, omega_radps = 0;   // kGround: velocity, body frame
+    double observed_t_s = 0;                          // kObserve: time stamp of the pose, capture's clock
+};
+
+// One number of an effect. This table is the only place of its name, unit and bounds.
+struct Parameter
+{
+    const char *name;
+    const char *unit;      // "1" for a pure number
+    double neutral;        // value at which the effect does nothing, bit for bit
+    double default_value;  // plausible value: where a fit starts
+    double min, max;
+    const char *doc;
+};
+
+// What a person should know of an effect.
+struct Card
+{
+    const char *name;
+    Stage stage;
+    unsigned drives;          // mask of Drive
+    const char *summary;      // one sentence
+    const char *equation;     // in the symbols of the parameter table
+    const char *leaves_out;
+    const char *measure;      // which drive makes it visible
+    const char *reference;    // where the equation comes from
+};
+
+class Effect
+{
+public:
+    virtual ~Effect() = default;
+    virtual int StateSize() const { return 0; }
+    // Acts on the signals of one step; `state` holds StateSize() doubles, zero at the start.
+    virtual void Step(Signals &signals, double *state) const = 0;
+    // kObserve only: from the pose seen and its time stamp back to the robot's own.
+    virtual void Invert(Signals &) const {}
+};
+
+struct EffectSpec
+{
+    Card card;
+    std::span<const Parameter> parameters;
+    // `values` in the order of `parameters`, within bounds (checked by the model file).
+    std::unique_ptr<Effect> (*make)(std::span<const double> values);
+};
+
+// All effects in alphabetical order.
+std::span<const EffectSpec *const> Catalogue();
+// The effect of that name, or nullptr.
+const EffectSpec *FindEffect(std::string_view name);
+const char *StageName(Stage stage);
+
+}  // namespace twin
+
+#endif

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// A robot model: the numbers of a model file (TOML), checked, with a name for every one of them.
+#ifndef MODEL_FILE_MODEL_H
+#define MODEL_FILE_MODEL_H
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "effects/effect.h"
+
+namespace twin
+{
+
+enum class WheelKind { kMecanum, kDifferential, kOmni3, kNone };
+
+struct Robot
+{
+    double wheel_radius_m = 0.0325;
+    double half_wheelbase_m = 0.059;
+    double half_track_m = 0.067;
+    double body_radius_m = 0.1;
+    double mass_kg = 1.2;
+    double battery_nominal_V = 7.4;
+};
+
+// Command to velocity, before any effect.
+struct Base
+{
+    Drive drive = Drive::kDuty;
+    WheelKind wheels = WheelKind::kMecanum;
+    std::vector<double> duty_pct{0, 100};            // ascending from 0
+    std::vector<double> wheel_speed_mps{0, 0.36};    // rim speed at that duty, driving straight
+    double speed_per_input_mps = 0.0036;             // twist drive: speed of speed_input 1
+    double turn_per_input_radps = 1.0;               // twist drive: rate of turn_input 1
+    double forward_gain = 1, sideways_gain = 1, yaw_gain = 1;
+    double motor_lag_s = 0;
+    double control_period_s = 0.022;
+};
+
+struct Sensor
+{
+    double range_m = 1.1, range_std_m = 0;
+    double cone_rad = 0.855, cone_std_rad = 0;       // full opening angle
+    double target_radius_m = 0;                      // 0: only the other robot's centre is seen
+    double false_negative_rate = 0, false_positive_rate = 0;  // per frame
+    double delay_s = 0;
+    double vote_frames = 1;                          // seen if more than half of the last frames show it
+};
+
+struct Noise
+{
+    double sensor_m = 0, sensor_rad = 0;             // motion capture, white
+    double drive_mps = 0, drive_radps = 0, drive_s = 0.15;  // velocity disturbance while moving, first order
+};
+
+// Spread over robots of the factors on speed and turn rate.
+struct Idiosyncrasy
+{
+    double theta_a1_std = 0, theta_a2_std = 0;
+};
+
+// Motion capture's clock against the robot's: t_capture = t_robot + offset + rate * t_robot.
+struct Clock
+{
+    bool known = false;
+    double offset_s = 0, rate_ppm = 0;
+};
+
+struct EffectInstance
+{
+    const EffectSpec *spec;
+    std::vector<double> values;  // in the order of spec->parameters
+};
+
+// A quantity of a model under its name: "base.forward_gain", "dead_zone.width", "dead_zone#2.width".
+struct NamedValue
+{
+    std::string name, unit;
+    double value, min, max;
+};
+
+class Model
+{
+public:
+    // Reads TOML text; `origin` is named in errors. Throws std::invalid_argument in one sentence.
+    static Model FromToml(std::string_view text, const std::string &origin);
+    // Finds `name` in the working directory, then among the installed models; reads it.
+    static Model Load(const std::string &name);
+
+    std::vector<NamedValue> Values() const;
+    double Get(const std::string &name) const;
+    // Throws std::invalid_argument if the name is unknown or the value out of bounds.
+    void Set(const std::string &name, double value);
+    // Appends an effect at its neutral values. Throws if unknown or made for another drive.
+    void AddEffect(const std::string &name);
+    void RemoveEffect(size_t index);
+    // The model of one robot: its [robots.Rnn] overrides applied.
+    Model ForRobot(int robot_id) const;
+
+    Robot robot;
+    Base base;
+    Sensor sensor;
+    Noise noise;
+    Idiosyncrasy idiosyncrasy;
+    Clock clock;
+    double theta_a1 = 1, theta_a2 = 1;  // this robot's factors on speed and turn rate
+    std::vector<EffectInstance> effects;
+    std::map<int, std::map<std::string, double>> robot_overrides;
+    std::string hash;                   // of the text it was read from
+};
+
+// Path of an installed file (model, MJCF) or of one in the working directory; throws if there is none.
+std::string FindModelFile(const std::string &name);
+
+}  // namespace twin
+
+#endif

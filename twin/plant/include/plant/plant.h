@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Moves robots: commands in, poses out. Two plants share this interface, the drive chain and the effects.
+#ifndef PLANT_PLANT_H
+#define PLANT_PLANT_H
+
+#include <cstdint>
+#include <vector>
+
+#include "effects/effect.h"
+
+namespace twin
+{
+
+struct Pose2
+{
+    double x_m = 0, y_m = 0, theta_rad = 0;
+};
+
+// What a robot is told in one step. Which part counts is said by the model's drive.
+struct Command
+{
+    // Duty drive: duties -1..1. Wheel-speed drive: rad/s. Twist drive: vx_mps, vy_mps, omega_radps, 0.
+    Wheels value{};
+    double battery_V = 0;  // 0: the model's nominal voltage
+};
+
+struct RobotState
+{
+    Pose2 pose;
+    double vx_mps = 0, vy_mps = 0, omega_radps = 0;  // body frame, mean over the last step
+    Wheels rim_mps{};
+    std::array<double, 3> drive_noise{};             // velocity disturbance: forward, left, turn
+    std::vector<double> effect_state;
+};
+
+class Plant
+{
+public:
+    virtual ~Plant() = default;
+    virtual int Size() const = 0;
+    virtual void SetCommand(int robot, const Command &command) = 0;
+    // Moves all robots forward by `dt_s`.
+    virtual void Step(double dt_s) = 0;
+    virtual const RobotState &State(int robot) const = 0;
+    virtual double TimeS() const = 0;
+};
+
+}  // namespace twin
+
+#endif
