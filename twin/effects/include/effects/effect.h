@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A physical effect: what an effect file must provide, and the signals it may read and change.
 //
-// One step of one robot passes its signals through the stages in the order of `Stage`; within a stage
-// the effects act in the order of the model file. An effect is immutable. What it remembers of one
-// robot lies in `state`, plain doubles owned by the plant, so that a robot can be copied and restarted.
+// One step of one robot passes its signals through the stages in the order of `Stage`; within a
+// stage the effects act in the order of the model file. An effect is immutable. What it remembers
+// of one robot lies in `state`, plain doubles owned by the plant, so that a robot can be copied and
+// restarted.
 #ifndef EFFECTS_EFFECT_H
 #define EFFECTS_EFFECT_H
 
@@ -18,8 +19,7 @@ namespace twin
 constexpr int kWheels = 4;  // front-left, front-right, rear-left, rear-right
 using Wheels = std::array<double, kWheels>;
 
-enum class Stage
-{
+enum class Stage {
     kDuty,     // the command, before it becomes a wheel speed
     kWheel,    // the speed each wheel tends to, and how fast it gets there
     kGround,   // the body's velocity over the floor
@@ -30,8 +30,7 @@ enum class Stage
 };
 
 // What a robot's commands are. An effect lists the drives it makes sense for.
-enum class Drive : unsigned
-{
+enum class Drive : unsigned {
     kDuty = 1,        // wheel duties, -1..1
     kWheelSpeed = 2,  // measured wheel speeds
     kTwist = 4,       // commanded body velocity
@@ -54,9 +53,9 @@ struct Signals
     Wheels tau_s{};           // kWheel: time constant with which it gets there
     Wheels max_decel_mps2{};  // kWheel: limit on slowing down; infinity = none
 
-    double x_m = 0, y_m = 0, theta_rad = 0;           // kGround: pose in W (read only); kObserve: pose seen
-    double vx_mps = 0, vy_mps = 0, omega_radps = 0;   // kGround: velocity, body frame
-    double observed_t_s = 0;                          // kObserve: time stamp of the pose, capture's clock
+    double x_m = 0, y_m = 0, theta_rad = 0;  // kGround: pose in W (read only); kObserve: pose seen
+    double vx_mps = 0, vy_mps = 0, omega_radps = 0;  // kGround: velocity, body frame
+    double observed_t_s = 0;  // kObserve: time stamp of the pose, capture's clock
 };
 
 // One number of an effect. This table is the only place of its name, unit and bounds.
@@ -75,12 +74,12 @@ struct Card
 {
     const char *name;
     Stage stage;
-    unsigned drives;          // mask of Drive
-    const char *summary;      // one sentence
-    const char *equation;     // in the symbols of the parameter table
+    unsigned drives;       // mask of Drive
+    const char *summary;   // one sentence
+    const char *equation;  // in the symbols of the parameter table
     const char *leaves_out;
-    const char *measure;      // which drive makes it visible
-    const char *reference;    // where the equation comes from
+    const char *measure;    // which drive makes it visible
+    const char *reference;  // where the equation comes from
 };
 
 class Effect

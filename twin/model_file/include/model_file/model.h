@@ -30,10 +30,10 @@ struct Base
 {
     Drive drive = Drive::kDuty;
     WheelKind wheels = WheelKind::kMecanum;
-    std::vector<double> duty_pct{0, 100};            // ascending from 0
-    std::vector<double> wheel_speed_mps{0, 0.36};    // rim speed at that duty, driving straight
-    double speed_per_input_mps = 0.0036;             // twist drive: speed of speed_input 1
-    double turn_per_input_radps = 1.0;               // twist drive: rate of turn_input 1
+    std::vector<double> duty_pct{0, 100};          // ascending from 0
+    std::vector<double> wheel_speed_mps{0, 0.36};  // rim speed at that duty, driving straight
+    double speed_per_input_mps = 0.0036;           // twist drive: speed of speed_input 1
+    double turn_per_input_radps = 1.0;             // twist drive: rate of turn_input 1
     double forward_gain = 1, sideways_gain = 1, yaw_gain = 1;
     double motor_lag_s = 0;
     double control_period_s = 0.022;
@@ -42,17 +42,18 @@ struct Base
 struct Sensor
 {
     double range_m = 1.1, range_std_m = 0;
-    double cone_rad = 0.855, cone_std_rad = 0;       // full opening angle
-    double target_radius_m = 0;                      // 0: only the other robot's centre is seen
+    double cone_rad = 0.855, cone_std_rad = 0;  // full opening angle
+    double target_radius_m = 0;                 // 0: only the other robot's centre is seen
     double false_negative_rate = 0, false_positive_rate = 0;  // per frame
     double delay_s = 0;
-    double vote_frames = 1;                          // seen if more than half of the last frames show it
+    double vote_frames = 1;  // seen if more than half of the last frames show it
 };
 
 struct Noise
 {
-    double sensor_m = 0, sensor_rad = 0;             // motion capture, white
-    double drive_mps = 0, drive_radps = 0, drive_s = 0.15;  // velocity disturbance while moving, first order
+    double sensor_m = 0, sensor_rad = 0;  // motion capture, white
+    double drive_mps = 0, drive_radps = 0,
+           drive_s = 0.15;  // velocity disturbance while moving, first order
 };
 
 // Spread over robots of the factors on speed and turn rate.
@@ -74,7 +75,8 @@ struct EffectInstance
     std::vector<double> values;  // in the order of spec->parameters
 };
 
-// A quantity of a model under its name: "base.forward_gain", "dead_zone.width", "dead_zone#2.width".
+// A quantity of a model under its name: "base.forward_gain", "dead_zone.width",
+// "dead_zone#2.width".
 struct NamedValue
 {
     std::string name, unit;
@@ -108,10 +110,10 @@ public:
     double theta_a1 = 1, theta_a2 = 1;  // this robot's factors on speed and turn rate
     std::vector<EffectInstance> effects;
     std::map<int, std::map<std::string, double>> robot_overrides;
-    std::string hash;                   // of the text it was read from
 };
 
-// Path of an installed file (model, MJCF) or of one in the working directory; throws if there is none.
+// Path of an installed file (model, MJCF) or of one in the working directory; throws if there is
+// none.
 std::string FindModelFile(const std::string &name);
 
 }  // namespace twin

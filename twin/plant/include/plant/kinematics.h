@@ -16,9 +16,10 @@ struct Twist
 };
 
 // Mecanum: rim_k = vx + s_k vy + (-y_k + s_k x_k) omega, s = -,+,+,-; forward by least squares.
-// (Muir and Neuman 1987, "Kinematic modeling for feedback control of an omnidirectional wheeled robot".)
-// Differential: left and right pairs, no sideways motion. Omni3: three wheels at 60, 180 and 300
-// degrees, rolling counter-clockwise; the fourth rim is unused. None: the ideal mecanum equations.
+// (Muir and Neuman 1987, "Kinematic modeling for feedback control of an omnidirectional wheeled
+// robot".) Differential: left and right pairs, no sideways motion. Omni3: three wheels at 60, 180
+// and 300 degrees, rolling counter-clockwise; the fourth rim is unused. None: the ideal mecanum
+// equations.
 class Kinematics
 {
 public:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Moves robots: commands in, poses out. Two plants share this interface, the drive chain and the effects.
+// Moves robots: commands in, poses out. Two plants share this interface, the drive chain and the
+// effects.
 #ifndef PLANT_PLANT_H
 #define PLANT_PLANT_H
 
@@ -19,7 +20,8 @@ struct Pose2
 // What a robot is told in one step. Which part counts is said by the model's drive.
 struct Command
 {
-    // Duty drive: duties -1..1. Wheel-speed drive: rad/s. Twist drive: vx_mps, vy_mps, omega_radps, 0.
+    // Duty drive: duties -1..1. Wheel-speed drive: rad/s. Twist drive: vx_mps, vy_mps, omega_radps,
+    // 0.
     Wheels value{};
     double battery_V = 0;  // 0: the model's nominal voltage
 };
@@ -29,7 +31,7 @@ struct RobotState
     Pose2 pose;
     double vx_mps = 0, vy_mps = 0, omega_radps = 0;  // body frame, mean over the last step
     Wheels rim_mps{};
-    std::array<double, 3> drive_noise{};             // velocity disturbance: forward, left, turn
+    std::array<double, 3> drive_noise{};  // velocity disturbance: forward, left, turn
     std::vector<double> effect_state;
 };
 

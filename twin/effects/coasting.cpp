@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "coasting",
+    .stage = Stage::kWheel,
+    .drives = kDutyOnly,
+    .summary = "At zero duty the motors do not brake: the robot rolls to a stop.",
+    .equation = "u = 0: |dv/dt| <= deceleration, tau' = 0",
+    .leaves_out = "rolling on at duties that are small but not zero",
+    .measure = "stops to zero duty from several speeds",
+    .reference =
+        "Coulomb friction of an open motor; Olsson et al. 1998, Friction models and friction compensation",
+};
+
+constexpr Parameter kParameters[] = {
+    {"deceleration_mps2", "m/s^2", 20, 0.7, 0.05, 20,
+     "deceleration of a wheel's rim while its duty is zero"},
+};
+
+class Coasting final : public Effect
+{
+public:
+    explicit Coasting(std::span<const double> v) : deceleration_mps2_(v[0]) {}
+
+    void Step(Signals &s, double *) const override
+    {
+        if (deceleration_mps2_ >= kParameters[0].neutral)
+            return;
+        for (int k = 0; k < kWheels; ++k)
+        {
+            if (s.duty[k] != 0)
+                continue;
+            s.tau_s[k] = 0;
+            s.max_decel_mps2[k] = deceleration_mps2_;
+        }
+    }
+
+private:
+    double deceleration_mps2_;
+};
+
+}  // namespace
+
+extern const EffectSpec kCoasting;
+const EffectSpec kCoasting = {kCard, kParameters, Make<Coasting>};
+
+}  // namespace twin

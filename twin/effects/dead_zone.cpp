@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "dead_zone",
+    .stage = Stage::kDuty,
+    .drives = kDutyOnly,
+    .summary = "Small duties do not turn the wheels: friction holds them.",
+    .equation = "u' = sign(u) max(0, |u| - width)",
+    .leaves_out = "stick: a moving wheel stops at the same duty at which it starts",
+    .measure = "steps to several duties below 40 %, each from rest",
+    .reference =
+        "Tao and Kokotovic 1996, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, ch. 2",
+};
+
+constexpr Parameter kParameters[] = {
+    {"width", "1", 0, 0.05, 0, 0.6,
+     "duty below which a wheel stands still, as a fraction of full duty"},
+};
+
+class DeadZone final : public Effect
+{
+public:
+    explicit DeadZone(std::span<const double> v) : width_(v[0]) {}
+
+    void Step(Signals &s, double *) const override
+    {
+        for (double &u : s.duty)
+            u = std::copysign(std::max(0.0, std::abs(u) - width_), u);
+    }
+
+private:
+    double width_;
+};
+
+}  // namespace
+
+extern const EffectSpec kDeadZone;
+const EffectSpec kDeadZone = {kCard, kParameters, Make<DeadZone>};
+
+}  // namespace twin

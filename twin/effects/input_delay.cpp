@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "input_delay",
+    .stage = Stage::kDuty,
+    .drives = kAnyDrive,
+    .summary = "Commands reach the wheels late.",
+    .equation = "u'(t) = u(t - delay), averaged over the step",
+    .leaves_out = "jitter of the delay",
+    .measure = "steps from rest, with both clocks tied by a flash or a tap",
+    .reference =
+        "pure transport delay; Franklin et al. 2010, Feedback Control of Dynamic "
+        "Systems, sec. 5.6",
+};
+
+constexpr Parameter kParameters[] = {
+    {"delay_s", "s", 0, 0.02, 0, 0.3,
+     "from the time stamp of a command to its effect on the motors"},
+};
+
+// A ring of the last commands, each with the time at which it was given. Longer than the longest
+// delay at one command per 5 ms.
+constexpr int kSlots = 64;
+constexpr int kSlotSize = 1 + kWheels;
+
+class InputDelay final : public Effect
+{
+public:
+    explicit InputDelay(std::span<const double> v) : delay_s_(v[0]) {}
+
+    int StateSize() const override { return delay_s_ > 0 ? 1 + kSlots * kSlotSize : 0; }
+
+    void Step(Signals &s, double *state) const override
+    {
+        if (delay_s_ <= 0)
+            return;
+        Remember(s, state);
+        s.duty = Mean(state, s.t_s - delay_s_, s.t_s - delay_s_ + s.dt_s);
+    }
+
+private:
+    static double *Slot(double *state, int age)
+    {
+        const int count = static_cast<int>(state[0]);
+        return state + 1 + ((count - 1 - age) % kSlots) * kSlotSize;
+    }
+
+    // state[0] counts the commands; a command that repeats the last one needs no slot of its own.
+    static void Remember(const Signals &s, double *state)
+    {
+        if (state[0] > 0 && std::equal(s.duty.begin(), s.duty.end(), Slot(state, 0) + 1))
+            return;
+        state[0] += 1;
+        double *slot = Slot(state, 0);
+        slot[0] = s.t_s;
+        std::copy(s.duty.begin(), s.duty.end(), slot + 1);
+    }
+
+    // Mean of the held commands over [from_s, to_s]; zero before the first.
+    static Wheels Mean(double *state, double from_s, double to_s)
+    {
+        Wheels mean{};
+        double end_s = to_s;
+        const int kept = std::min(static_cast<int>(state[0]), kSlots);
+        for (int age = 0; age < kept && end_s > from_s; ++age)
+        {
+            const double *slot = Slot(state, age);
+            const double begin_s = std::max(slot[0], from_s);
+            if (begin_s >= end_s)
+                continue;
+            for (int k = 0; k < kWheels; ++k)
+                mean[k] += slot[1 + k] * ((end_s - begin_s) / (to_s - from_s));
+            end_s = begin_s;
+        }
+        return mean;
+    }
+
+    double delay_s_;
+};
+
+}  // namespace
+
+extern const EffectSpec kInputDelay;
+const EffectSpec kInputDelay = {kCard, kParameters, Make<InputDelay>};
+
+}  // namespace twin

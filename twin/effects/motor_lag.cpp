@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "motor_lag",
+    .stage = Stage::kWheel,
+    .drives = kAnyDrive,
+    .summary = "Wheels take longer to reach their speed than the base model says.",
+    .equation = "tau' = tau + extra; tau' dv/dt = target - v",
+    .leaves_out = "dependence on duty (lag_by_duty) and on the direction of change (coasting)",
+    .measure = "steps from rest to several duties and back",
+    .reference = "first-order motor model; Siciliano et al. 2009, Robotics, sec. 5.2",
+};
+
+constexpr Parameter kParameters[] = {
+    {"extra_s", "s", 0, 0.03, -0.5, 0.5, "added to the time constant of every wheel"},
+};
+
+class MotorLag final : public Effect
+{
+public:
+    explicit MotorLag(std::span<const double> v) : extra_s_(v[0]) {}
+
+    void Step(Signals &s, double *) const override
+    {
+        for (double &tau : s.tau_s)
+            tau = std::max(0.0, tau + extra_s_);
+    }
+
+private:
+    double extra_s_;
+};
+
+}  // namespace
+
+extern const EffectSpec kMotorLag;
+const EffectSpec kMotorLag = {kCard, kParameters, Make<MotorLag>};
+
+}  // namespace twin

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// The catalogue: every effect, in alphabetical order.
+#include "effects/effect.h"
+
+namespace twin
+{
+
+extern const EffectSpec kBatterySag, kClockOffset, kCoasting, kDeadZone, kFloorTilt, kInputDelay,
+    kLagByDuty, kMarkerOffset, kMotorLag, kReverseAsymmetry, kSpeedCurve, kWheelGain;
+
+static const EffectSpec *const kCatalogue[] = {
+    &kBatterySag, &kClockOffset,  &kCoasting, &kDeadZone,         &kFloorTilt,  &kInputDelay,
+    &kLagByDuty,  &kMarkerOffset, &kMotorLag, &kReverseAsymmetry, &kSpeedCurve, &kWheelGain,
+};
+
+std::span<const EffectSpec *const> Catalogue()
+{
+    return kCatalogue;
+}
+
+const EffectSpec *FindEffect(std::string_view name)
+{
+    for (const EffectSpec *spec : kCatalogue)
+        if (name == spec->card.name)
+            return spec;
+    return nullptr;
+}
+
+const char *StageName(Stage stage)
+{
+    switch (stage)
+    {
+        case Stage::kDuty: return "duty";
+        case Stage::kWheel: return "wheel";
+        case Stage::kGround: return "ground";
+        case Stage::kWorld: return "world";
+        case Stage::kObserve: return "observe";
+        case Stage::kView: return "view";
+        case Stage::kDecide: return "decide";
+    }
+    return "";
+}
+
+}  // namespace twin

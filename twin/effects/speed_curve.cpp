@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "speed_curve",
+    .stage = Stage::kDuty,
+    .drives = kDutyOnly,
+    .summary = "Speed is not proportional to duty: it saturates or is steeper at the top.",
+    .equation = "u' = u + u (1 - |u|) (bend + skew (1 - 2 |u|))",
+    .leaves_out = "differences between wheels and directions of rotation",
+    .measure = "steady straight drives at five or more duties",
+    .reference =
+        "cubic through 0 and full duty; compare the duty table of Hiwonder TurboPi measurements",
+};
+
+constexpr Parameter kParameters[] = {
+    {"bend", "1", 0, 0.5, -0.9, 2,
+     "rise over the straight line: half duty gives bend/4 of full speed more"},
+    {"skew", "1", 0, 0.1, -2, 2, "moves the rise towards low duties"},
+};
+
+class SpeedCurve final : public Effect
+{
+public:
+    explicit SpeedCurve(std::span<const double> v) : bend_(v[0]), skew_(v[1]) {}
+
+    void Step(Signals &s, double *) const override
+    {
+        for (double &u : s.duty)
+        {
+            const double a = std::abs(u);
+            u += u * (1 - a) * (bend_ + skew_ * (1 - 2 * a));
+        }
+    }
+
+private:
+    double bend_, skew_;
+};
+
+}  // namespace
+
+extern const EffectSpec kSpeedCurve;
+const EffectSpec kSpeedCurve = {kCard, kParameters, Make<SpeedCurve>};
+
+}  // namespace twin

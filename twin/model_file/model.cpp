@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+// Names, values and per-robot copies of a model; parse.cpp reads the file.
+#include "model_file/model.h"
+
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "fields.h"
+
+namespace twin
+{
+namespace
+{
+
+std::string FieldName(const Field &field)
+{
+    return *field.section ? std::string(field.section) + "." + field.key : field.key;
+}
+
+// "dead_zone", and "dead_zone#2" for the second of its kind.
+std::string InstanceName(const std::vector<EffectInstance> &effects, size_t index)
+{
+    const std::string name = effects[index].spec->card.name;
+    int count = 1;
+    for (size_t i = 0; i < index; ++i)
+        count += effects[i].spec == effects[index].spec;
+    return count == 1 ? name : name + "#" + std::to_string(count);
+}
+
+struct Slot
+{
+    double *value;
+    double min, max;
+    std::string unit;
+};
+
+// Calls visit(name, slot) for every quantity of the model.
+template <class Visit>
+void ForEach(Model &model, Visit visit)
+{
+    for (const Field &field : Fields())
+        visit(FieldName(field), Slot{&field.at(model), field.min, field.max, field.unit});
+    for (size_t i = 0; i < model.base.wheel_speed_mps.size(); ++i)
+        visit("base.wheel_speed_mps." + std::to_string(i),
+              Slot{&model.base.wheel_speed_mps[i], -10, 10, "m/s"});
+    for (size_t i = 0; i < model.effects.size(); ++i)
+    {
+        const std::string prefix = InstanceName(model.effects, i) + ".";
+        auto &effect = model.effects[i];
+        for (size_t k = 0; k < effect.values.size(); ++k)
+        {
+            const Parameter &p = effect.spec->parameters[k];
+            visit(prefix + p.name, Slot{&effect.values[k], p.min, p.max, p.unit});
+        }
+    }
+}
+
+}  // namespace
+
+std::vector<NamedValue> Model::Values() const
+{
+    std::vector<NamedValue> values;
+    Model copy = *this;
+    ForEach(copy, [&](const std::string &name, const Slot &slot) {
+        values.push_back({name, slot.unit, *slot.value, slot.min, slot.max});
+    });
+    return values;
+}
+
+double Model::Get(const std::string &name) const
+{
+    for (const NamedValue &value : Values())
+        if (value.name == name)
+            return value.value;
+    throw std::invalid_argument("model has no quantity '" + name + "'");
+}
+
+void Model::Set(const std::string &name, double value)
+{
+    bool found = false;
+    ForEach(*this, [&](const std::string &other, const Slot &slot) {
+        if (other != name)
+            return;
+        found = true;
+        if (!(value >= slot.min && value <= slot.max))
+        {
+            std::ostringstream text;
+            text << name << " = " << value << " " << slot.unit << " is outside " << slot.min
+                 << " to " << slot.max << " " << slot.unit;
+            throw std::invalid_argument(text.str());
+        }
+        *slot.value = value;
+    });
+    if (!found)
+        throw std::invalid_argument("model has no quantity '" + name + "'");
+}
+
+void Model::AddEffect(const std::string &name)
+{
+    const EffectSpec *spec = FindEffect(name);
+    if (!spec)
+        throw std::invalid_argument("there is no effect '" + name +
+                                    "'; `twinmill effects` lists those there are");
+    if (!(spec->card.drives & static_cast<unsigned>(base.drive)))
+        throw std::invalid_argument("effect '" + name +
+                                    "' acts on wheel duties, and this model's " +
+                                    "robot is not driven by duties");
+    EffectInstance instance{spec, {}};
+    for (const Parameter &parameter : spec->parameters)
+        instance.values.push_back(parameter.neutral);
+    effects.push_back(instance);
+}
+
+void Model::RemoveEffect(size_t index)
+{
+    if (index >= effects.size())
+        throw std::invalid_argument("model has no effect number " + std::to_string(index));
+    effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(index));
+}
+
+Model Model::ForRobot(int robot_id) const
+{
+    Model model = *this;
+    const auto found = robot_overrides.find(robot_id);
+    if (found == robot_overrides.end())
+        return model;
+    for (const Field &field : Fields())
+    {
+        const auto value = found->second.find(field.key);
+        if (field.per_robot && value != found->second.end())
+            field.at(model) = value->second;
+    }
+    return model;
+}
+
+}  // namespace twin

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plant/drive_chain.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace twin
+{
+namespace
+{
+
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+
+// Piecewise-linear table, odd in `duty` (-1..1), held beyond its end.
+double RimSpeed(const Base &base, double duty)
+{
+    const double pct = std::min(100 * std::abs(duty), base.duty_pct.back());
+    size_t i = 1;
+    while (pct > base.duty_pct[i])
+        ++i;
+    const double part = (pct - base.duty_pct[i - 1]) / (base.duty_pct[i] - base.duty_pct[i - 1]);
+    const double low = base.wheel_speed_mps[i - 1], high = base.wheel_speed_mps[i];
+    return std::copysign(low + part * (high - low), duty);
+}
+
+struct Relaxed
+{
+    double end, mean;
+};
+
+// First-order approach of `target` over `dt_s`, exact: v' = (target - v) / tau.
+Relaxed Approach(double v, double target, double tau_s, double dt_s)
+{
+    if (tau_s <= 0)
+        return {target, target};
+    const double decay = std::exp(-dt_s / tau_s);
+    return {target + (v - target) * decay, target + (v - target) * (1 - decay) * tau_s / dt_s};
+}
+
+// The same while slowing down no faster than `max_decel_mps2`: linear first, then first-order.
+Relaxed Relax(double v, double target, double tau_s, double max_decel_mps2, double dt_s)
+{
+    const bool slows = std::abs(target) < std::abs(v) || target * v < 0;
+    if (!slows || max_decel_mps2 == kNoLimit)
+        return Approach(v, target, tau_s, dt_s);
+    const double distance = std::abs(v - target) - max_decel_mps2 * tau_s;
+    const double linear_s = std::clamp(distance / max_decel_mps2, 0.0, dt_s);
+    const double rate = std::copysign(max_decel_mps2, target - v);
+    const double turned = v + rate * linear_s;
+    const double linear_mean = v + rate * linear_s / 2;
+    const double rest_s = dt_s - linear_s;
+    if (rest_s <= 0)
+        return {turned, linear_mean};
+    const Relaxed rest = Approach(turned, target, tau_s, rest_s);
+    return {rest.end, (linear_mean * linear_s + rest.mean * rest_s) / dt_s};
+}
+
+}  // namespace
+
+DriveChain::DriveChain(const Model &model)
+    : base_(model.base),
+      noise_(model.noise),
+      clock_(model.clock),
+      theta_a1_(model.theta_a1),
+      theta_a2_(model.theta_a2),
+      battery_nominal_V_(model.robot.battery_nominal_V),
+      wheel_radius_m_(model.robot.wheel_radius_m),
+      kinematics_(model.robot, model.base.wheels)
+{
+    for (const EffectInstance &instance : model.effects)
+    {
+        Bound bound{instance.spec->make(instance.values), state_size_};
+        state_size_ += bound.effect->StateSize();
+        switch (instance.spec->card.stage)
+        {
+            case Stage::kDuty: duty_.push_back(std::move(bound)); break;
+            case Stage::kWheel: wheel_.push_back(std::move(bound)); break;
+            case Stage::kGround: ground_.push_back(std::move(bound)); break;
+            case Stage::kObserve: observe_.push_back(std::move(bound)); break;
+            case Stage::kWorld:
+            case Stage::kView:
+            case Stage::kDecide: break;
+        }
+    }
+}
+
+RobotState DriveChain::Start(const Pose2 &pose) const
+{
+    RobotState state;
+    state.pose = pose;
+    state.effect_state.assign(static_cast<size_t>(state_size_), 0.0);
+    return state;
+}
+
+void DriveChain::Run(const std::vector<Bound> &stage, Signals &signals, RobotState &state) const
+{
+    for (const Bound &bound : stage)
+        bound.effect->Step(signals, state.effect_state.data() + bound.state_offset);
+}
+
+Wheels DriveChain::Target(const Wheels &command) const
+{
+    Wheels target_mps;
+    switch (base_.drive)
+    {
+        case Drive::kDuty:
+            for (int k = 0; k < kWheels; ++k)
+                target_mps[k] = RimSpeed(base_, command[k]);
+            break;
+        case Drive::kWheelSpeed:
+            for (int k = 0; k < kWheels; ++k)
+                target_mps[k] = command[k] * wheel_radius_m_;
+            break;
+        case Drive::kTwist:
+            target_mps = kinematics_.Inverse({command[0], command[1], command[2]});
+            break;
+    }
+    return target_mps;
+}
+
+Wheels DriveChain::DriveWheels(const Command &command, double t_s, double dt_s,
+                               RobotState &state) const
+{
+    Signals s;
+    s.t_s = t_s;
+    s.dt_s = dt_s;
+    s.battery_V = command.battery_V;
+    s.battery_nominal_V = battery_nominal_V_;
+    s.duty = command.value;
+    Run(duty_, s, state);
+
+    s.rim_mps = state.rim_mps;
+    s.target_mps = Target(s.duty);
+    s.tau_s.fill(base_.motor_lag_s);
+    s.max_decel_mps2.fill(kNoLimit);
+    Run(wheel_, s, state);
+
+    Wheels mean_mps;
+    for (int k = 0; k < kWheels; ++k)
+    {
+        const Relaxed rim =
+            Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k], s.max_decel_mps2[k], dt_s);
+        state.rim_mps[k] = rim.end;
+        mean_mps[k] = rim.mean;
+    }
+    return mean_mps;
+}
+
+// First-order (Ornstein-Uhlenbeck) velocity noise, mean over a step taken as its value: steps are
+// short against drive_s.
+void DriveChain::Disturb(Twist &twist, double dt_s, RobotState &state, Random &random) const
+{
+    const double keep = std::exp(-dt_s / noise_.drive_s), fresh = std::sqrt(1 - keep * keep);
+    const std::array<double, 3> std_{noise_.drive_mps, noise_.drive_mps, noise_.drive_radps};
+    for (size_t i = 0; i < 3; ++i)
+        state.drive_noise[i] = keep * state.drive_noise[i] + fresh * std_[i] * random.Normal();
+    twist.vx_mps += state.drive_noise[0];
+    twist.vy_mps += state.drive_noise[1];
+    twist.omega_radps += state.drive_noise[2];
+}
+
+Twist DriveChain::BodyTwist(const Wheels &rim_mps, double t_s, double dt_s, RobotState &state,
+                            Random *random) const
+{
+    Twist twist = kinematics_.Forward(rim_mps);
+    twist.vx_mps *= base_.forward_gain * theta_a1_;
+    twist.vy_mps *= base_.sideways_gain * theta_a1_;
+    twist.omega_radps *= base_.yaw_gain * theta_a2_;
+    const bool moves = std::any_of(rim_mps.begin(), rim_mps.end(), [](double v) { return v != 0; });
+    if (random && moves)
+        Disturb(twist, dt_s, state, *random);
+
+    Signals s;
+    s.t_s = t_s;
+    s.dt_s = dt_s;
+    s.rim_mps = rim_mps;
+    s.x_m = state.pose.x_m;
+    s.y_m = state.pose.y_m;
+    s.theta_rad = state.pose.theta_rad;
+    s.vx_mps = twist.vx_mps;
+    s.vy_mps = twist.vy_mps;
+    s.omega_radps = twist.omega_radps;
+    Run(ground_, s, state);
+    state.vx_mps = s.vx_mps;
+    state.vy_mps = s.vy_mps;
+    state.omega_radps = s.omega_radps;
+    return {s.vx_mps, s.vy_mps, s.omega_radps};
+}
+
+void DriveChain::Observe(Pose2 &pose, double &t_s) const
+{
+    Signals s;
+    s.x_m = pose.x_m;
+    s.y_m = pose.y_m;
+    s.theta_rad = pose.theta_rad;
+    s.observed_t_s = t_s;
+    for (const Bound &bound : observe_)
+        bound.effect->Step(s, nullptr);
+    pose = {s.x_m, s.y_m, s.theta_rad};
+    t_s = s.observed_t_s + clock_.offset_s + clock_.rate_ppm * 1e-6 * t_s;
+}
+
+void DriveChain::Invert(Pose2 &pose, double &t_s) const
+{
+    Signals s;
+    s.x_m = pose.x_m;
+    s.y_m = pose.y_m;
+    s.theta_rad = pose.theta_rad;
+    s.observed_t_s = (t_s - clock_.offset_s) / (1 + clock_.rate_ppm * 1e-6);
+    for (auto bound = observe_.rbegin(); bound != observe_.rend(); ++bound)
+        bound->effect->Invert(s);
+    pose = {s.x_m, s.y_m, s.theta_rad};
+    t_s = s.observed_t_s;
+}
+
+}  // namespace twin

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// The fast plant: velocities in the plane, no forces.
+#ifndef PLANT_PLANAR_PLANT_H
+#define PLANT_PLANAR_PLANT_H
+
+#include <vector>
+
+#include "plant/drive_chain.h"
+
+namespace twin
+{
+
+// Moves one robot by `dt_s`: wheels, ground velocity, then the exact arc at constant velocity.
+void PlanarStep(const DriveChain &chain, const Command &command, double t_s, double dt_s,
+                RobotState &state, Random *random);
+
+// Many robots that do not touch: bodies may be pushed apart by the swarm that owns the plant.
+class PlanarPlant : public Plant
+{
+public:
+    // One model and start pose per robot (Model::ForRobot).
+    PlanarPlant(const std::vector<Model> &models, const std::vector<Pose2> &starts, uint64_t seed);
+
+    int Size() const override { return static_cast<int>(robots_.size()); }
+    void SetCommand(int robot, const Command &command) override;
+    void Step(double dt_s) override;
+    const RobotState &State(int robot) const override;
+    double TimeS() const override { return t_s_; }
+
+    // Puts a robot elsewhere: bodies that overlap are pushed apart.
+    void Move(int robot, const Pose2 &pose);
+
+private:
+    struct Member
+    {
+        DriveChain chain;
+        Random random;
+        RobotState state;
+        Command command;
+    };
+    std::vector<Member> robots_;
+    double t_s_ = 0;
+};
+
+}  // namespace twin
+
+#endif
