@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+# The front door. `make build` installs what is missing and builds; all else builds first.
+
+PYTHON := .venv/bin/python
+CTEST := ctest --test-dir build --output-on-failure --no-tests=error --parallel $(shell nproc)
+
+.PHONY: build check check-long demo format lint clean
+
+build:
+	@tools/setup
+	@cmake --build build
+	@cmake --install build --component python --prefix "$$($(PYTHON) -c \
+	    'import sysconfig; print(sysconfig.get_path("platlib"))')" >/dev/null
+
+# All tests in C, C++ and Python, and the lint, but for the ones labelled `long`.
+check: build
+	@$(CTEST) --label-exclude '^long$$'
+
+check-long: build
+	@$(CTEST) --label-regex '^long$$'
+
+demo: build
+	@$(PYTHON) -m twinmill.tools.demo
+
+format: build
+	@tools/lint --fix
+
+lint: build
+	@tools/lint
+
+# Removes what was built; `rm -rf .venv .deps` also removes what was installed here.
+clean:
+	@rm -rf build
