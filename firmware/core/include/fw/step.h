@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+// The robot in one function: a frame and the time in, four duties and the story of the decision out.
+#ifndef FW_STEP_H
+#define FW_STEP_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "fw/blob.h"
+#include "fw/err.h"
+#include "fw/frame.h"
+#include "fw/mixing.h"
+#include "fw/table.h"
+#include "fw/threshold.h"
+#include "fw/vote.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// As in telemetry_t.
+enum fw_mode {
+    FW_MODE_STOPPED = 0,
+    FW_MODE_TABLE = 1,
+    FW_MODE_SCRIPT = 2,
+    FW_MODE_FAULT = 3,
+};
+
+// Bits of status_flags that the core sets, as in telemetry_t; the application adds its own.
+enum fw_status {
+    FW_STATUS_FRAME_STALE = 1,
+    FW_STATUS_FRAME_REJECTED = 2,
+    FW_STATUS_SPEED_CAPPED = 4,
+};
+
+struct fw_config {
+    // Size of every frame: at most FW_MAX_WIDTH_PX by FW_MAX_HEIGHT_PX, the width even.
+    int32_t width_px, height_px;
+    struct fw_color_box box;
+    // A frame shows the target if its largest blob has more pixels than this. >= 0
+    int32_t min_blob_px;
+    struct fw_vote_config vote;
+    struct fw_table table;
+    // Motors stop when the last good frame is older than this. > 0
+    int64_t frame_timeout_us;
+    // Largest duty of any wheel. [0, 100]
+    int32_t duty_cap_pct;
+};
+
+// All state of one robot, about 16 KB; any number of them may live in one process. Read freely,
+// change through the functions below.
+struct fw_ctx {
+    struct fw_config config;
+    struct fw_threshold threshold;
+    uint32_t mask[FW_MASK_WORDS];
+    struct fw_blob blob;
+    struct fw_vote vote;
+    // Frames not used, by reason.
+    uint32_t rejected_count[FW_REJECT_COUNT];
+    // What the last good frame said; nothing while has_frame is false.
+    bool has_frame;
+    bool detected_raw;
+    int32_t blob_px;
+    uint32_t frame_seq;
+    int64_t frame_utime_us;
+    bool running;
+    // Steps so far.
+    uint32_t seq;
+};
+
+// Everything telemetry_t says of the decision.
+struct fw_output {
+    int8_t wheel_duty_pct[FW_WHEEL_COUNT];
+    // One of fw_mode.
+    int8_t mode;
+    int8_t detected_raw;
+    int8_t detected;
+    int32_t blob_px;
+    int32_t speed_input_pct;
+    int32_t turn_input_milli;
+    // Counts steps from 0.
+    int32_t seq;
+    // Of the last good frame; 0 if there was none.
+    uint32_t frame_seq;
+    int64_t frame_utime_us;
+    // Bits of fw_status.
+    int32_t status_flags;
+};
+
+// 640x480, green, blob > 300 px, 6 of 10 frames, milling, 200 ms, no cap.
+struct fw_config fw_config_default(void);
+
+// Makes a robot that runs its table from the first good frame on.
+// @return FW_OK, or the code of the first entry out of range; then ctx is untouched.
+enum fw_err FW_MUST_CHECK fw_init(struct fw_ctx *ctx, const struct fw_config *config);
+
+// Selects a table. @return FW_OK or FW_ERR_INPUT_RANGE; then the old table stays.
+enum fw_err FW_MUST_CHECK fw_set_table(struct fw_ctx *ctx, const struct fw_table *table);
+
+// false: duties are zero and the mode is stopped, while frames are still looked at. true: resumes.
+void fw_set_running(struct fw_ctx *ctx, bool running);
+
+// One control step. Detects, votes, looks up, mixes, caps; zero duties without a fresh frame.
+// @param frame the newest frame, or NULL if none came since the last step; not kept.
+// @param now_us by the clock of the frames. If it steps back, old frames are forgotten.
+// @param out always written.
+void fw_step(struct fw_ctx *ctx, const struct fw_frame *frame, int64_t now_us,
+             struct fw_output *out);
+
+// The same step from the bit of a sensor that has no pixels; blob_px is then 0. If the sensor has
+// nothing new since the last step, call fw_step() with NULL.
+void fw_step_bit(struct fw_ctx *ctx, bool detected_raw, int64_t frame_utime_us, uint32_t frame_seq,
+                 int64_t now_us, struct fw_output *out);
+
+// Open loop: applies the inputs or duties given instead of the table's, through the same mixing and
+// cap, with no look at frames, votes or the watchdog. A robot that is not running stays still.
+void fw_step_script_input(struct fw_ctx *ctx, const struct fw_input *input, struct fw_output *out);
+void fw_step_script_duty(struct fw_ctx *ctx, const int8_t wheel_duty_pct[FW_WHEEL_COUNT],
+                         struct fw_output *out);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
