@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Short predictions of a measured robot: the logged commands are played into the planar plant,
+// restarted at measured poses.
+#ifndef PREDICT_PREDICT_H
+#define PREDICT_PREDICT_H
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "plant/planar_plant.h"
+
+namespace twin
+{
+
+// A measured run of one robot; the arrays belong to the caller. Times ascend.
+struct Track
+{
+    std::span<const double> command_t_s;  // (M), robot's clock
+    std::span<const double> command;      // (M, 4), in the unit of the model's drive
+    std::span<const double> battery_V;    // (M), NaN = not measured
+    std::span<const double> pose_t_s;     // (N), capture's clock
+    std::span<const double> pose;         // (N, 3): x_m, y_m, theta_rad of the marker body
+    std::span<const int64_t> segment;  // (N), -1 = unusable; poses of one segment belong together
+};
+
+// For each pose the one predicted from the pose before it: (N, 3), NaN at the start of a segment.
+std::vector<double> PredictOneStep(const Model &model, const Track &track);
+
+// For each start (W, index of a pose) the poses predicted at `ends` (W, H; ascending indices, -1 =
+// none): (W, H, 3), NaN where there is none. `starts` ascend.
+std::vector<double> PredictWindows(const Model &model, const Track &track,
+                                   std::span<const int64_t> starts, std::span<const int64_t> ends);
+
+// What motion capture would have reported had this model driven: (N, 3), each segment started at
+// its first measured pose, with the model's drive and sensor noise.
+std::vector<double> SimulateReplica(const Model &model, const Track &track, uint64_t seed);
+
+// One-step predictions for many parameter vectors, (B, N, 3), on all cores. Row b of `values` (B,
+// P) sets the quantities `names` of `model`.
+std::vector<double> PredictOneStepBatch(const Model &model, const Track &track,
+                                        const std::vector<std::string> &names,
+                                        std::span<const double> values);
+
+}  // namespace twin
+
+#endif

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+// twinmill_native: the catalogue, model files and short predictions for Python.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "predict/predict.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace twin;
+
+namespace
+{
+
+using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Indices = nb::ndarray<const int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using IndexMatrix = nb::ndarray<const int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Array = nb::ndarray<nb::numpy, double>;
+
+template <class T>
+auto Span(const T &array)
+{
+    return std::span(array.data(), array.size());
+}
+
+// Hands a vector's memory to numpy.
+Array ToNumpy(std::vector<double> &&values, std::initializer_list<size_t> shape)
+{
+    auto *owned = new std::vector<double>(std::move(values));
+    nb::capsule owner(owned,
+                      [](void *p) noexcept { delete static_cast<std::vector<double> *>(p); });
+    return Array(owned->data(), shape, owner);
+}
+
+// The arrays of a run, checked once and kept alive.
+struct PyTrack
+{
+    PyTrack(Vector command_t_s_, Matrix command_, Vector battery_V_, Vector pose_t_s_, Matrix pose_,
+            Indices segment_)
+        : command_t_s(command_t_s_),
+          battery_V(battery_V_),
+          pose_t_s(pose_t_s_),
+          command(command_),
+          pose(pose_),
+          segment(segment_)
+    {
+        const size_t m = command_t_s.size(), n = pose_t_s.size();
+        if (command.shape(0) != m || command.shape(1) != kWheels || battery_V.size() != m)
+            throw std::invalid_argument(
+                "command must be (M, 4) and battery_V (M), as long as command_t_s");
+        if (pose.shape(0) != n || pose.shape(1) != 3 || segment.size() != n)
+            throw std::invalid_argument("pose must be (N, 3) and segment (N), as long as pose_t_s");
+    }
+    Track View() const
+    {
+        return {Span(command_t_s), Span(command), Span(battery_V),
+                Span(pose_t_s),    Span(pose),    Span(segment)};
+    }
+    Vector command_t_s, battery_V, pose_t_s;
+    Matrix command, pose;
+    Indices segment;
+};
+
+nb::list CatalogueList()
+{
+    nb::list effects;
+    for (const EffectSpec *spec : Catalogue())
+    {
+        const Card &card = spec->card;
+        nb::dict entry;
+        entry["name"] = card.name;
+        entry["stage"] = StageName(card.stage);
+        entry["summary"] = card.summary;
+        entry["equation"] = card.equation;
+        entry["leaves_out"] = card.leaves_out;
+        entry["measure"] = card.measure;
+        entry["reference"] = card.reference;
+        entry["duty_only"] = card.drives == kDutyOnly;
+        nb::list parameters;
+        for (const Parameter &p : spec->parameters)
+        {
+            nb::dict row;
+            row["name"] = p.name;
+            row["unit"] = p.unit;
+            row["neutral"] = p.neutral;
+            row["default"] = p.default_value;
+            row["min"] = p.min;
+            row["max"] = p.max;
+            row["doc"] = p.doc;
+            parameters.append(row);
+        }
+        entry["parameters"] = parameters;
+        effects.append(entry);
+    }
+    return effects;
+}
+
+nb::list ValueList(const Model &model)
+{
+    nb::list values;
+    for (const NamedValue &v : model.Values())
+    {
+        nb::dict entry;
+        entry["name"] = v.name;
+        entry["unit"] = v.unit;
+        entry["value"] = v.value;
+        entry["min"] = v.min;
+        entry["max"] = v.max;
+        values.append(entry);
+    }
+    return values;
+}
+
+const char *DriveName(const Model &model)
+{
+    switch (model.base.drive)
+    {
+        case Drive::kDuty: return "duty";
+        case Drive::kWheelSpeed: return "wheel_speed";
+        case Drive::kTwist: return "twist";
+    }
+    return "";
+}
+
+Array Windows(const Model &model, const PyTrack &track, Indices starts, IndexMatrix ends)
+{
+    if (ends.shape(0) != starts.size())
+        throw std::invalid_argument("ends must have one row per start");
+    std::vector<double> predicted;
+    {
+        nb::gil_scoped_release unlocked;
+        predicted = PredictWindows(model, track.View(), Span(starts), Span(ends));
+    }
+    return ToNumpy(std::move(predicted), {starts.size(), ends.shape(1), 3});
+}
+
+Array OneStep(const Model &model, const PyTrack &track)
+{
+    return ToNumpy(PredictOneStep(model, track.View()), {track.pose_t_s.size(), 3});
+}
+
+Array OneStepBatch(const Model &model, const PyTrack &track, const std::vector<std::string> &names,
+                   Matrix values)
+{
+    if (values.shape(1) != names.size())
+        throw std::invalid_argument("values must have one column per name");
+    std::vector<double> predicted;
+    {
+        nb::gil_scoped_release unlocked;
+        predicted = PredictOneStepBatch(model, track.View(), names, Span(values));
+    }
+    return ToNumpy(std::move(predicted), {values.shape(0), track.pose_t_s.size(), 3});
+}
+
+}  // namespace
+
+NB_MODULE(twinmill_native, m)
+{
+    m.doc() = "Effects, model files and short predictions of the twin's planar plant.";
+    m.def("catalogue", &CatalogueList,
+          "All effects: cards and parameter tables, in alphabetical order.");
+    m.def("find_model_file", &FindModelFile, "name"_a,
+          "Path of a file in the working directory or among the installed models.");
+
+    nb::class_<Model>(m, "Model", "A robot model. Errors are ValueError with one sentence.")
+        .def_static(
+            "from_toml",
+            [](const std::string &text, const std::string &origin) {
+                return Model::FromToml(text, origin);
+            },
+            "text"_a, "origin"_a)
+        .def_static("load", &Model::Load, "name"_a)
+        .def("values", &ValueList, "Every quantity: name, unit, value, min, max.")
+        .def("get", &Model::Get, "name"_a)
+        .def("set", &Model::Set, "name"_a, "value"_a)
+        .def("add_effect", &Model::AddEffect, "name"_a, "Appends an effect at its neutral values.")
+        .def("remove_effect", &Model::RemoveEffect, "index"_a)
+        .def("for_robot", &Model::ForRobot, "robot_id"_a)
+        .def("copy", [](const Model &model) { return Model(model); })
+        .def_prop_ro("drive", &DriveName)
+        .def_prop_ro("clock_known", [](const Model &model) { return model.clock.known; })
+        .def_prop_ro("effects", [](const Model &model) {
+            nb::list names;
+            for (const EffectInstance &effect : model.effects)
+                names.append(effect.spec->card.name);
+            return names;
+        });
+
+    nb::class_<PyTrack>(m, "Track", "A measured run: see predict.h for shapes and units.")
+        .def(nb::init<Vector, Matrix, Vector, Vector, Matrix, Indices>(), "command_t_s"_a,
+             "command"_a, "battery_V"_a, "pose_t_s"_a, "pose"_a, "segment"_a);
+
+    m.def("one_step", &OneStep, "model"_a, "track"_a,
+          "(N, 3) poses predicted from the pose before each.");
+    m.def("one_step_batch", &OneStepBatch, "model"_a, "track"_a, "names"_a, "values"_a,
+          "(B, N, 3) one-step predictions for B rows of values.");
+    m.def("windows", &Windows, "model"_a, "track"_a, "starts"_a, "ends"_a,
+          "(W, H, 3) poses predicted at `ends` from the poses at `starts`.");
+    m.def(
+        "replica",
+        [](const Model &model, const PyTrack &track, uint64_t seed) {
+            return ToNumpy(SimulateReplica(model, track.View(), seed), {track.pose_t_s.size(), 3});
+        },
+        "model"_a, "track"_a, "seed"_a,
+        "(N, 3) poses had this model, with its noise, been driven.");
+}
