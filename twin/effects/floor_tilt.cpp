@@ -32,7 +32,7 @@ public:
 
     void Step(Signals &s, double *) const override
     {
-        if (s.vx_mps == 0 && s.vy_mps == 0 && s.omega_radps == 0)
+        if (!s.moves)
             return;
         const double heading_rad = s.theta_rad + s.omega_radps * s.dt_s / 2;
         const double c = std::cos(heading_rad), d = std::sin(heading_rad);

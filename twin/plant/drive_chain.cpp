@@ -12,6 +12,9 @@ namespace
 
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
+// A first-order approach to rest never ends: below this rim speed a wheel counts as standing.
+constexpr double kStandstill_mps = 1e-3;
+
 // Piecewise-linear table, odd in `duty` (-1..1), held beyond its end.
 double RimSpeed(const Base &base, double duty)
 {
@@ -167,14 +170,15 @@ Twist DriveChain::BodyTwist(const Wheels &rim_mps, double t_s, double dt_s, Robo
     twist.vx_mps *= base_.forward_gain * theta_a1_;
     twist.vy_mps *= base_.sideways_gain * theta_a1_;
     twist.omega_radps *= base_.yaw_gain * theta_a2_;
-    const bool moves = std::any_of(rim_mps.begin(), rim_mps.end(), [](double v) { return v != 0; });
-    if (random && moves)
-        Disturb(twist, dt_s, state, *random);
 
     Signals s;
     s.t_s = t_s;
     s.dt_s = dt_s;
     s.rim_mps = rim_mps;
+    s.moves = std::any_of(rim_mps.begin(), rim_mps.end(),
+                          [](double v) { return std::abs(v) > kStandstill_mps; });
+    if (random && s.moves)
+        Disturb(twist, dt_s, state, *random);
     s.x_m = state.pose.x_m;
     s.y_m = state.pose.y_m;
     s.theta_rad = state.pose.theta_rad;
@@ -198,7 +202,7 @@ void DriveChain::Observe(Pose2 &pose, double &t_s) const
     for (const Bound &bound : observe_)
         bound.effect->Step(s, nullptr);
     pose = {s.x_m, s.y_m, s.theta_rad};
-    t_s = s.observed_t_s + clock_.offset_s + clock_.rate_ppm * 1e-6 * t_s;
+    t_s = s.observed_t_s * (1 + clock_.rate_ppm * 1e-6) + clock_.offset_s;
 }
 
 void DriveChain::Invert(Pose2 &pose, double &t_s) const

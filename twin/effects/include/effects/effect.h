@@ -19,7 +19,8 @@ namespace twin
 constexpr int kWheels = 4;  // front-left, front-right, rear-left, rear-right
 using Wheels = std::array<double, kWheels>;
 
-enum class Stage {
+enum class Stage
+{
     kDuty,     // the command, before it becomes a wheel speed
     kWheel,    // the speed each wheel tends to, and how fast it gets there
     kGround,   // the body's velocity over the floor
@@ -30,7 +31,8 @@ enum class Stage {
 };
 
 // What a robot's commands are. An effect lists the drives it makes sense for.
-enum class Drive : unsigned {
+enum class Drive : unsigned
+{
     kDuty = 1,        // wheel duties, -1..1
     kWheelSpeed = 2,  // measured wheel speeds
     kTwist = 4,       // commanded body velocity
@@ -53,6 +55,7 @@ struct Signals
     Wheels tau_s{};           // kWheel: time constant with which it gets there
     Wheels max_decel_mps2{};  // kWheel: limit on slowing down; infinity = none
 
+    bool moves = false;                      // kGround: some wheel turns (read only)
     double x_m = 0, y_m = 0, theta_rad = 0;  // kGround: pose in W (read only); kObserve: pose seen
     double vx_mps = 0, vy_mps = 0, omega_radps = 0;  // kGround: velocity, body frame
     double observed_t_s = 0;  // kObserve: time stamp of the pose, capture's clock
