@@ -41,9 +41,9 @@ void ForEach(Model &model, Visit visit)
 {
     for (const Field &field : Fields())
         visit(FieldName(field), Slot{&field.at(model), field.min, field.max, field.unit});
-    for (size_t i = 0; i < model.base.wheel_speed_mps.size(); ++i)
+    for (size_t i = 1; i < model.base.wheel_speed_mps.size(); ++i)  // speed 0 at duty 0 is fixed
         visit("base.wheel_speed_mps." + std::to_string(i),
-              Slot{&model.base.wheel_speed_mps[i], -10, 10, "m/s"});
+              Slot{&model.base.wheel_speed_mps[i], 0, 10, "m/s"});
     for (size_t i = 0; i < model.effects.size(); ++i)
     {
         const std::string prefix = InstanceName(model.effects, i) + ".";
@@ -86,8 +86,9 @@ void Model::Set(const std::string &name, double value)
         if (!(value >= slot.min && value <= slot.max))
         {
             std::ostringstream text;
-            text << name << " = " << value << " " << slot.unit << " is outside " << slot.min
-                 << " to " << slot.max << " " << slot.unit;
+            const std::string tail = slot.unit == "1" ? "" : " " + slot.unit;
+            text << name << " = " << value << tail << " is outside " << slot.min << " to "
+                 << slot.max << tail;
             throw std::invalid_argument(text.str());
         }
         *slot.value = value;

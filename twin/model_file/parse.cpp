@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads and checks model files.
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -45,31 +44,34 @@ size_t EditDistance(std::string_view a, std::string_view b)
     return row[b.size()];
 }
 
-[[noreturn]] void FailUnknown(const std::string &origin, const std::string &where,
-                              std::string_view key, const std::set<std::string> &known)
+// `what` is "key" or the like, `where` the table that holds it.
+[[noreturn]] void FailUnknown(const std::string &origin, const std::string &what,
+                              std::string_view name, const std::string &where,
+                              const std::set<std::string> &known)
 {
     std::string nearest;
-    for (const std::string &name : known)
-        if (nearest.empty() || EditDistance(key, name) < EditDistance(key, nearest))
-            nearest = name;
-    Fail(origin, "unknown key '" + std::string(key) + "' in " + where + "; the nearest known is '" +
-                     nearest + "'");
+    for (const std::string &other : known)
+        if (nearest.empty() || EditDistance(name, other) < EditDistance(name, nearest))
+            nearest = other;
+    Fail(origin, "unknown " + what + " '" + std::string(name) + "' in " + where +
+                     "; the nearest known is '" + nearest + "'");
 }
 
 double Number(const std::string &origin, const std::string &name, const toml::node &node,
               double min, double max, const std::string &unit)
 {
     const auto value = node.value<double>();
-    if (!value)
-        Fail(origin, name + " must be a number in " + unit);
-    if (!(*value >= min && *value <= max))
-    {
-        std::ostringstream text;
-        text << name << " = " << *value << " " << unit << " is outside " << min << " to " << max
-             << " " << unit;
-        Fail(origin, text.str());
-    }
-    return *value;
+    const std::string tail = unit == "1" ? "" : " " + unit;
+    std::ostringstream text;
+    text << name;
+    if (!node.is_number() || !value)
+        text << " must be a number from ";
+    else if (!(*value >= min && *value <= max))
+        text << " = " << *value << tail << " is outside ";
+    else
+        return *value;
+    text << min << " to " << max << tail;
+    Fail(origin, text.str());
 }
 
 class Reader
@@ -89,16 +91,27 @@ public:
     }
 
 private:
+    // Every top-level name is known and of the right kind: a text, [table] or [[effect]] list.
     void CheckSections()
     {
-        std::set<std::string> known{"name",   "description", "parent", "created_by",
-                                    "robots", "effect",      "fit"};
+        const std::set<std::string> texts{"name", "description", "parent", "created_by"};
+        std::set<std::string> tables{"robots", "fit"};
         for (const Field &field : Fields())
             if (*field.section)
-                known.insert(field.section);
+                tables.insert(field.section);
+        std::set<std::string> known{"effect"};
+        known.insert(texts.begin(), texts.end());
+        known.insert(tables.begin(), tables.end());
         for (const auto &[key, node] : root_)
-            if (!known.contains(std::string(key.str())))
-                FailUnknown(origin_, "the model", key.str(), known);
+        {
+            const std::string name(key.str());
+            if (!known.contains(name))
+                FailUnknown(origin_, "key", name, "the model", known);
+            if (tables.contains(name) && !node.is_table())
+                Fail(origin_, "'" + name + "' must be a table: [" + name + "]");
+            if (name == "effect" && !node.is_array_of_tables())
+                Fail(origin_, "'effect' must be a list of tables: [[effect]]");
+        }
     }
 
     // The plain numbers, and a sub-table `std` with their uncertainties, which only people read.
@@ -122,7 +135,7 @@ private:
                 if (kSpecial.contains(path) || key == "std")
                     continue;
                 if (!known.contains(std::string(key.str())))
-                    FailUnknown(origin_, "[" + name + "]", key.str(), known);
+                    FailUnknown(origin_, "key", key.str(), "[" + name + "]", known);
                 for (const Field &field : Fields())
                     if (name == field.section && key.str() == field.key)
                         field.at(model_) =
@@ -152,7 +165,8 @@ private:
         Fail(origin_, std::string("base.") + key + " = '" + value + "' must be one of " + words);
     }
 
-    std::vector<double> ReadList(const char *key, std::vector<double> fallback)
+    std::vector<double> ReadList(const char *key, double max, const char *unit,
+                                 std::vector<double> fallback)
     {
         const auto node = root_["base"][key];
         if (!node)
@@ -162,8 +176,7 @@ private:
             Fail(origin_, std::string("base.") + key + " must be a list of numbers");
         std::vector<double> values;
         for (const auto &item : *array)
-            values.push_back(
-                Number(origin_, std::string("base.") + key, item, -1000, 1000, "its unit"));
+            values.push_back(Number(origin_, std::string("base.") + key, item, 0, max, unit));
         return values;
     }
 
@@ -179,16 +192,16 @@ private:
                                {"differential", WheelKind::kDifferential},
                                {"omni3", WheelKind::kOmni3},
                                {"none", WheelKind::kNone}});
-        base.duty_pct = ReadList("duty_pct", base.duty_pct);
-        base.wheel_speed_mps = ReadList("wheel_speed_mps", base.wheel_speed_mps);
+        base.duty_pct = ReadList("duty_pct", 100, "%", base.duty_pct);
+        base.wheel_speed_mps = ReadList("wheel_speed_mps", 10, "m/s", base.wheel_speed_mps);
         const auto &duty = base.duty_pct;
         const bool ascending =
             std::adjacent_find(duty.begin(), duty.end(), std::greater_equal<>()) == duty.end();
         if (duty.size() < 2 || duty.size() != base.wheel_speed_mps.size() || !ascending ||
-            duty[0] != 0 || duty.back() < 100)
+            duty[0] != 0 || duty.back() != 100 || base.wheel_speed_mps[0] != 0)
             Fail(origin_,
                  "base.duty_pct and base.wheel_speed_mps must be lists of the same length, duties "
-                 "ascending from 0 to 100 percent");
+                 "ascending from 0 to 100 percent, the first speed 0");
     }
 
     void ReadRobots()
@@ -202,16 +215,16 @@ private:
                 known.insert(field.key);
         for (const auto &[name, node] : *robots)
         {
-            int id = -1;
             const std::string text(name.str());
-            if (text.size() != 3 || std::sscanf(text.c_str(), "R%2d", &id) != 1 || id < 0 ||
-                !node.is_table())
-                Fail(origin_, "[robots." + text + "] must be named R00 to R99");
+            const auto digit = [&text](size_t i) { return text[i] >= '0' && text[i] <= '9'; };
+            if (text.size() != 3 || text[0] != 'R' || !digit(1) || !digit(2) || !node.is_table())
+                Fail(origin_, "[robots." + text + "] must be a table named R00 to R99");
+            const int id = 10 * (text[1] - '0') + (text[2] - '0');
             for (const auto &[key, value] : *node.as_table())
             {
                 const std::string word(key.str());
                 if (!known.contains(word))
-                    FailUnknown(origin_, "[robots." + text + "]", word, known);
+                    FailUnknown(origin_, "key", word, "[robots." + text + "]", known);
                 for (const Field &field : Fields())
                     if (field.per_robot && word == field.key)
                         model_.robot_overrides[id][word] =
@@ -229,14 +242,17 @@ private:
         for (const auto &item : *list)
         {
             const toml::table *table = item.as_table();
-            const std::string name = table ? (*table)["name"].value_or(std::string()) : "";
+            const std::string name = (*table)["name"].value_or(std::string());
+            if (name.empty())
+                Fail(origin_, "[[effect]] number " + std::to_string(model_.effects.size() + 1) +
+                                  " needs a name = \"...\"");
             const EffectSpec *spec = FindEffect(name);
             if (!spec)
             {
                 std::set<std::string> known;
                 for (const EffectSpec *other : Catalogue())
                     known.insert(other->card.name);
-                FailUnknown(origin_, "[[effect]] name", name, known);
+                FailUnknown(origin_, "effect", name, "[[effect]]", known);
             }
             try
             {
@@ -265,8 +281,8 @@ private:
         }
         for (const auto &[key, value] : table)
             if (!known.contains(std::string(key.str())))
-                FailUnknown(origin_, "effect '" + std::string(spec.card.name) + "'", key.str(),
-                            known);
+                FailUnknown(origin_, "key", key.str(),
+                            "effect '" + std::string(spec.card.name) + "'", known);
     }
 
     const toml::table &root_;
@@ -311,16 +327,20 @@ std::string FindModelFile(const std::string &name)
         return name;
     const char *from_environment = std::getenv("TWINMILL_MODELS");
     const fs::path installed = from_environment ? from_environment : TWINMILL_MODELS_DIR;
-    std::string others;
-    for (const auto &entry : fs::recursive_directory_iterator(installed))
+    std::set<std::string> others;
+    std::error_code unreadable;
+    for (const auto &entry : fs::recursive_directory_iterator(installed, unreadable))
     {
-        if (entry.path().extension() != fs::path(name).extension())
-            continue;
         if (entry.path().filename() == name)
             return entry.path().string();
-        others += (others.empty() ? "" : ", ") + entry.path().filename().string();
+        if (entry.path().extension() == fs::path(name).extension())
+            others.insert(entry.path().filename().string());
     }
-    Fail(name, "no such file here, nor among the installed models (" + others + ")");
+    std::string list;
+    for (const std::string &other : others)
+        list += (list.empty() ? "" : ", ") + other;
+    Fail(name, "no such file here, nor among the installed models (" +
+                   (list.empty() ? "none in " + installed.string() : list) + ")");
 }
 
 }  // namespace twin
