@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Events of an LCM log file, and the fixed-size messages in them as numpy arrays.
+
+Own reader of the container: LCM's drops a good event before a broken one, writes on stderr itself
+and does not say where the file breaks. Format: sync word, event number, stamp, two lengths (all
+big-endian), channel, data (LCM 1.5, lcm/eventlog.c).
+"""
+
+import struct
+from dataclasses import dataclass, field
+
+import numpy as np
+import turbopi
+
+SYNC = b"\xed\xa1\xda\x01"
+HEADER = struct.Struct(">4sqqii")
+MAX_CHANNEL = 63  # LCM_MAX_CHANNEL_NAME_LENGTH
+
+# Wire order of lcm_types/*.lcm; `hash` is LCM's fingerprint of the type.
+LAYOUT = {
+    turbopi.telemetry_t: np.dtype([
+        ("hash", "S8"), ("utime_us", ">i8"), ("frame_utime_us", ">i8"), ("robot_id", ">i4"),
+        ("seq", ">i4"), ("frame_seq", ">i4"), ("blob_px", ">i4"), ("detected_raw", "i1"),
+        ("detected", "i1"), ("mode", "i1"), ("speed_input", ">f4"), ("turn_input", ">f4"),
+        ("wheel_duty_pct", "i1", 4), ("battery_V", ">f4"), ("loop_us", ">i4"),
+        ("status_flags", ">i4")]),
+    turbopi.pose_t: np.dtype([
+        ("hash", "S8"), ("utime_us", ">i8"), ("robot_id", ">i4"), ("seq", ">i4"), ("valid", "i1"),
+        ("position_m", ">f8", 3), ("orientation_wxyz", ">f8", 4)]),
+    turbopi.drive_t: np.dtype([
+        ("hash", "S8"), ("utime_us", ">i8"), ("robot_id", ">i4"), ("kind", "i1"),
+        ("value", ">f8", 4)]),
+}
+
+
+class LogError(ValueError):
+    """A measurement cannot be used; the message is one sentence: what, value, why, what to do."""
+
+
+@dataclass
+class Events:
+    """Payloads by channel in file order, and what was wrong with the container (sentences)."""
+
+    by_channel: dict[str, list[bytes]] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+
+def split_events(data: bytes, name: str) -> Events:
+    """Cuts the bytes of a log file into events.
+
+    Args:
+        data: the whole file.
+        name: of the file, for messages.
+
+    Raises:
+        LogError: if the file holds no complete event.
+    """
+    events, position = Events(), 0
+    while position < len(data):
+        end = _event_end(data, position)
+        if end is None:
+            following = data.find(SYNC, position + 1)
+            if following < 0:
+                events.warnings.append(
+                    f"{name}: breaks off inside an event at byte {position} of {len(data)}; "
+                    "read up to there.")
+                break
+            if events.by_channel:
+                events.warnings.append(
+                    f"{name}: bytes {position} to {following} are no event; skipped.")
+            position = following
+            continue
+        channel_size = HEADER.unpack_from(data, position)[3]
+        start = position + HEADER.size
+        channel = data[start:start + channel_size].decode("utf-8", "replace")
+        events.by_channel.setdefault(channel, []).append(data[start + channel_size:end])
+        position = end
+    if not events.by_channel:
+        raise LogError(f"{name}: holds no complete LCM event in {len(data)} bytes, so it is no LCM "
+                       "log; record one with lcm-logger, or make one with `twinmill import`.")
+    return events
+
+
+def _event_end(data: bytes, position: int) -> int | None:
+    """First byte after the event at `position`, or None if no complete event is there."""
+    if position + HEADER.size > len(data):
+        return None
+    sync, _, _, channel_size, data_size = HEADER.unpack_from(data, position)
+    if sync != SYNC or not 0 < channel_size <= MAX_CHANNEL or data_size < 0:
+        return None
+    end = position + HEADER.size + channel_size + data_size
+    return end if end <= len(data) else None
+
+
+def decode(payloads: list[bytes], message: type, channel: str) -> np.ndarray:
+    """Messages of one fixed-size type as a structured array, fields as in the .lcm file.
+
+    Args:
+        payloads: (K,) encoded messages.
+        message: class generated from the .lcm file, one of LAYOUT.
+        channel: for the message of the error.
+
+    Raises:
+        LogError: if one payload is of another type.
+    """
+    layout, fingerprint = LAYOUT[message], message._get_packed_fingerprint()
+    for payload in payloads:
+        if len(payload) != layout.itemsize or payload[:8] != fingerprint:
+            raise LogError(
+                f"{channel}: a message is not of type turbopi.{message.__name__} (fingerprint "
+                f"{payload[:8].hex()}, expected {fingerprint.hex()}): the log was made with other "
+                "message types; convert it with the programs that wrote it.")
+    return np.frombuffer(b"".join(payloads), layout)
