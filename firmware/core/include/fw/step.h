@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The robot in one function: a frame and the time in, four duties and the story of the decision out.
+// The robot in one function: a frame and the time in, four duties and how they came about out.
 #ifndef FW_STEP_H
 #define FW_STEP_H
 
@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "fw/blob.h"
+#include "fw/config.h"
 #include "fw/err.h"
 #include "fw/frame.h"
 #include "fw/mixing.h"
@@ -33,20 +34,6 @@ enum fw_status {
     FW_STATUS_SPEED_CAPPED = 4,
 };
 
-struct fw_config {
-    // Size of every frame: at most FW_MAX_WIDTH_PX by FW_MAX_HEIGHT_PX, the width even.
-    int32_t width_px, height_px;
-    struct fw_color_box box;
-    // A frame shows the target if its largest blob has more pixels than this. >= 0
-    int32_t min_blob_px;
-    struct fw_vote_config vote;
-    struct fw_table table;
-    // Motors stop when the last good frame is older than this. > 0
-    int64_t frame_timeout_us;
-    // Largest duty of any wheel. [0, 100]
-    int32_t duty_cap_pct;
-};
-
 // All state of one robot, about 16 KB; any number of them may live in one process. Read freely,
 // change through the functions below.
 struct fw_ctx {
@@ -57,7 +44,7 @@ struct fw_ctx {
     struct fw_vote vote;
     // Frames not used, by reason.
     uint32_t rejected_count[FW_REJECT_COUNT];
-    // What the last good frame said; nothing while has_frame is false.
+    // What the last good frame said; all zero while has_frame is false.
     bool has_frame;
     bool detected_raw;
     int32_t blob_px;
@@ -70,25 +57,22 @@ struct fw_ctx {
 
 // Everything telemetry_t says of the decision.
 struct fw_output {
-    int8_t wheel_duty_pct[FW_WHEEL_COUNT];
-    // One of fw_mode.
-    int8_t mode;
-    int8_t detected_raw;
-    int8_t detected;
+    // Of the frame that decided; 0 if there was none.
+    int64_t frame_utime_us;
+    uint32_t frame_seq;
+    // Counts steps from 0.
+    int32_t seq;
     int32_t blob_px;
     int32_t speed_input_pct;
     int32_t turn_input_milli;
-    // Counts steps from 0.
-    int32_t seq;
-    // Of the last good frame; 0 if there was none.
-    uint32_t frame_seq;
-    int64_t frame_utime_us;
     // Bits of fw_status.
     int32_t status_flags;
+    int8_t wheel_duty_pct[FW_WHEEL_COUNT];
+    int8_t detected_raw;
+    int8_t detected;
+    // One of fw_mode.
+    int8_t mode;
 };
-
-// 640x480, green, blob > 300 px, 6 of 10 frames, milling, 200 ms, no cap.
-struct fw_config fw_config_default(void);
 
 // Makes a robot that runs its table from the first good frame on.
 // @return FW_OK, or the code of the first entry out of range; then ctx is untouched.
@@ -97,7 +81,7 @@ enum fw_err FW_MUST_CHECK fw_init(struct fw_ctx *ctx, const struct fw_config *co
 // Selects a table. @return FW_OK or FW_ERR_INPUT_RANGE; then the old table stays.
 enum fw_err FW_MUST_CHECK fw_set_table(struct fw_ctx *ctx, const struct fw_table *table);
 
-// false: duties are zero and the mode is stopped, while frames are still looked at. true: resumes.
+// false: duties are zero and the mode is stopped, while frames are still looked at; true: resumes.
 void fw_set_running(struct fw_ctx *ctx, bool running);
 
 // One control step. Detects, votes, looks up, mixes, caps; zero duties without a fresh frame.

@@ -27,8 +27,9 @@ struct fw_table {
     struct fw_input seen;
 };
 
-// @return FW_OK or FW_ERR_INPUT_RANGE.
+// @return FW_OK or FW_ERR_INPUT_RANGE; a table is in range if both inputs are.
 enum fw_err FW_MUST_CHECK fw_input_check(const struct fw_input *input);
+enum fw_err FW_MUST_CHECK fw_table_check(const struct fw_table *table);
 
 // Takes the row that the bit selects.
 struct fw_input fw_table_lookup(const struct fw_table *table, bool detected);

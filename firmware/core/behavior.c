@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// The authors' tables read (speed, direction, turn) with turn positive clockwise. Here direction 90
+// is a positive and 270 a negative speed, and turn is positive counter-clockwise.
+#include "fw/behavior.h"
+
+#include <string.h>
+
+// self_centering spins at -3 times the rate w of milling's circle while it sees nothing. Milling
+// turns at 0.5 rad/s (measured, turn input 0.5 at full speed), so -1.5 rad/s are wanted. On the
+// spot, turn input 0.3 (duty 37) gives 1.66 rad/s (measured): 0.209 m/s at the wheels with the lever
+// arm of 0.126 m, and duty 50 gives 0.282 m/s (measured), so a duty point is worth 0.0056 m/s.
+// 1.5 rad/s is 0.020 m/s less, 3.6 points; in proportion it would be 3.6 as well. Turn input 0.27
+// is duty 34. Seeing turns left (positive), so seeing nothing turns right.
+#define SELF_CENTERING_SPIN_MILLI (-270)
+
+static const struct fw_behavior behaviors[] = {
+    {.name = "diffusing",
+     .summary = "scatter: back off from a neighbour, else spin",
+     .table = {.unseen = {0, -2000}, .seen = {-50, 0}}},
+    {.name = "diffusing_v2",
+     .summary = "drive at what is seen, else spin",
+     .table = {.unseen = {0, -500}, .seen = {100, 0}}},
+    {.name = "disperse",
+     .summary = "spin away from a neighbour, else drive straight",
+     .table = {.unseen = {100, 0}, .seen = {100, 2000}}},
+    {.name = "follow_leader",
+     .summary = "drive at what is seen, else circle left until something is",
+     .table = {.unseen = {75, 500}, .seen = {75, 0}}},
+    {.name = "milling",
+     .summary = "the swarm turns in one circle",
+     .table = {.unseen = {100, -500}, .seen = {100, 500}}},
+    {.name = "milling_cmaes",
+     .summary = "milling as found by an evolution strategy",
+     .table = {.unseen = {95, 900}, .seen = {95, -200}}},
+    {.name = "milling_delay",
+     .summary = "milling as used to test the effect of delay",
+     .table = {.unseen = {100, 500}, .seen = {100, 0}}},
+    {.name = "orbit",
+     .summary = "circle a neighbour",
+     .table = {.unseen = {100, 650}, .seen = {100, -650}}},
+    {.name = "self_centering",
+     .summary = "gather: circle left when seeing, else spin right three times as fast",
+     .table = {.unseen = {0, SELF_CENTERING_SPIN_MILLI}, .seen = {100, 500}}},
+    {.name = "shell",
+     .summary = "drive at what is seen, else circle right until something is",
+     .table = {.unseen = {100, -500}, .seen = {100, 0}}},
+};
+
+static const size_t behavior_count = sizeof behaviors / sizeof behaviors[0];
+
+const struct fw_behavior *fw_behavior_find(const char *name)
+{
+    for (size_t i = 0; i < behavior_count; ++i) {
+        if (strcmp(behaviors[i].name, name) == 0) {
+            return &behaviors[i];
+        }
+    }
+    return NULL;
+}
+
+size_t fw_behavior_count(void)
+{
+    return behavior_count;
+}
+
+const struct fw_behavior *fw_behavior_at(size_t index)
+{
+    return index < behavior_count ? &behaviors[index] : NULL;
+}
