@@ -2,6 +2,7 @@
 #include "fw/config.h"
 
 #include "fw/behavior.h"
+#include "fw/mixing.h"
 
 struct fw_config fw_config_default(void)
 {

@@ -13,7 +13,7 @@
 #define BLOCK_PAIRS (FW_MASK_WORD_PX / 2)
 
 // The authors' box in 8-bit CIELAB of OpenCV (L 0..252, a 48..109, b 94..207) is loose: 30 % of
-// the RGB cube, cyan and blue-green among it. Over a grid of the cube converted to BT.601, its upper
+// the RGB cube, cyan and blue-green too. Over a grid of the cube converted to BT.601, its upper
 // limit of a is close to V <= 108. U <= 124 and Y >= 40 leave out blue-greens and what is too dark
 // to have a colour: of the RGB colours in the box below 93 % are in theirs. Grey is U = V = 128 and
 // stays 20 counts of V away. Saturated greens lie well inside: sRGB (0, 128, 0) is YUV (81, 91, 81)
