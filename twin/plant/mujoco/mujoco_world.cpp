@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mujoco_world.h"
+
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+
+#include "mecanum_collider.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr const char *kFloor = "floor";
+constexpr double kWallHalfThickness_m = 0.02, kWallHalfHeight_m = 0.15;
+
+// Friction across the grip in the contact itself. More makes MuJoCo's convex contacts lift the wheel by
+// about friction times slip speed, and the robot hops; the real drag is a force of the plant.
+constexpr double kCrossFriction = 1e-4;
+
+struct SpecDeleter
+{
+    void operator()(mjSpec *spec) const { mj_deleteSpec(spec); }
+};
+using Spec = std::unique_ptr<mjSpec, SpecDeleter>;
+
+[[noreturn]] void Fail(const std::string &mjcf, const std::string &why)
+{
+    throw std::invalid_argument(mjcf + ": " + why);
+}
+
+Spec Parse(const std::string &mjcf)
+{
+    char error[1000] = "";
+    Spec spec(mj_parseXML(mjcf.c_str(), nullptr, error, sizeof error));
+    if (!spec)
+        Fail(mjcf, std::string("is no valid MJCF: ") + error);
+    return spec;
+}
+
+mjsGeom *FindGeom(mjSpec *spec, const std::string &name)
+{
+    mjsElement *element = mjs_findElement(spec, mjOBJ_GEOM, name.c_str());
+    return element ? mjs_asGeom(element) : nullptr;
+}
+
+void CheckWheel(const std::string &mjcf, mjSpec *spec, const char *name)
+{
+    const struct
+    {
+        mjtObj type;
+        const char *word;
+    } parts[] = {{mjOBJ_JOINT, "joint"}, {mjOBJ_GEOM, "geom"}, {mjOBJ_ACTUATOR, "actuator"}};
+    for (const auto &part : parts)
+        if (!mjs_findElement(spec, part.type, name))
+            Fail(mjcf, std::string("has no ") + part.word + " \"" + name +
+                           "\"; a robot needs a joint, a geom and an actuator for each of its wheels "
+                           "fl, fr, rl, rr (see turbopi.xml)");
+    const mjsGeom *geom = FindGeom(spec, name);
+    int size = 0;
+    const double *side = mjs_getDouble(geom->userdata, &size);
+    if (geom->type != mjGEOM_CYLINDER || size != 1 || std::abs(*side) != 1)
+        Fail(mjcf, std::string("geom \"") + name +
+                       "\" must be a cylinder with user=\"1\" or user=\"-1\", the sign of its roller axis "
+                       "(1, user, 0) at the floor");
+}
+
+// The body that carries the wheels.
+mjsBody *FindBase(const std::string &mjcf, mjSpec *spec)
+{
+    for (const char *name : kWheelNames)
+        CheckWheel(mjcf, spec, name);
+    mjsBody *base = mjs_getParent(mjs_getParent(mjs_findElement(spec, mjOBJ_JOINT, "fl"))->element);
+    mjsElement *joint = mjs_firstChild(base, mjOBJ_JOINT, 0);
+    if (!joint || mjs_asJoint(joint)->type != mjJNT_FREE)
+        Fail(mjcf, "the body that carries the wheels has no free joint, so the robot cannot move");
+    return base;
+}
+
+// Everything but the robot: the file's own world if it has a floor, else the installed one.
+Spec MakeSurroundings(const std::string &mjcf, mjSpec *robot)
+{
+    Spec world;
+    if (FindGeom(robot, kFloor))
+    {
+        world.reset(mj_copySpec(robot));
+        mjs_delete(world.get(), FindBase(mjcf, world.get())->element);
+    }
+    else
+        world = Parse(FindModelFile("world.xml"));
+    world->nuser_geom = 1;
+    return world;
+}
+
+// A contact pair that grips along the rollers' axes, with the friction and softness of the wheel's geom.
+void AddWheelContact(mjSpec *world, const mjsGeom &wheel, const std::string &name)
+{
+    mjsPair *pair = mjs_addPair(world, nullptr);
+    mjs_setString(pair->geomname1, kFloor);
+    mjs_setString(pair->geomname2, name.c_str());
+    pair->condim = 3;
+    pair->friction[0] = wheel.friction[0];
+    pair->friction[1] = kCrossFriction;
+    for (int i = 0; i < mjNREF; ++i)
+        pair->solref[i] = wheel.solref[i];
+}
+
+void AddRobot(const std::string &mjcf, mjSpec *world, mjSpec *robot, int id, const Pose2 &start)
+{
+    mjsFrame *frame = mjs_addFrame(mjs_findBody(world, "world"), nullptr);
+    frame->pos[0] = start.x_m;
+    frame->pos[1] = start.y_m;
+    frame->quat[0] = std::cos(start.theta_rad / 2);
+    frame->quat[3] = std::sin(start.theta_rad / 2);
+
+    const Spec copy(mj_copySpec(robot));
+    mjsBody *base = FindBase(mjcf, copy.get());
+    if (!mjs_attach(frame->element, base->element, NameInWorld(id, "").c_str(), ""))
+        Fail(mjcf, std::string("cannot be put into the world: ") + mjs_getError(world));
+    for (const char *name : kWheelNames)
+    {
+        mjsGeom *wheel = FindGeom(world, NameInWorld(id, name));
+        wheel->contype = wheel->conaffinity = 0;  // the pair stands for it
+        AddWheelContact(world, *wheel, NameInWorld(id, name));
+    }
+}
+
+void AddWalls(mjSpec *world, double half_width_m)
+{
+    const double inner_m = half_width_m + kWallHalfThickness_m, long_m = inner_m + kWallHalfThickness_m;
+    for (int side = 0; side < 4; ++side)
+    {
+        const int across = side / 2, along = 1 - across;
+        mjsGeom *wall = mjs_addGeom(mjs_findBody(world, "world"), mjs_findDefault(world, "wall"));
+        wall->type = mjGEOM_BOX;
+        wall->contype = wall->conaffinity = 2;
+        wall->pos[across] = side % 2 ? inner_m : -inner_m;
+        wall->pos[2] = wall->size[2] = kWallHalfHeight_m;
+        wall->size[across] = kWallHalfThickness_m;
+        wall->size[along] = long_m;
+    }
+}
+
+// Attaching a body leaves the numerics of its file behind.
+void CopyRollerDrag(mjSpec *world, mjSpec *robot)
+{
+    mjsElement *from = mjs_findElement(robot, mjOBJ_NUMERIC, kRollerDrag);
+    if (!from || mjs_findElement(world, mjOBJ_NUMERIC, kRollerDrag))
+        return;
+    int size = 0;
+    const double *drag = mjs_getDouble(mjs_asNumeric(from)->data, &size);
+    mjsNumeric *to = mjs_addNumeric(world);
+    mjs_setName(to->element, kRollerDrag);
+    mjs_setDouble(to->data, drag, size);
+    to->size = size;
+}
+
+}  // namespace
+
+std::string NameInWorld(int robot, const std::string &name)
+{
+    char prefix[16];
+    std::snprintf(prefix, sizeof prefix, "r%02d_", robot);
+    return prefix + name;
+}
+
+mjModel *CompileWorld(const std::string &mjcf, const std::vector<Pose2> &starts,
+                      const MujocoOptions &options)
+{
+    InstallMecanumCollider();
+    const Spec robot = Parse(mjcf);
+    FindBase(mjcf, robot.get());
+    const Spec world = MakeSurroundings(mjcf, robot.get());
+    CopyRollerDrag(world.get(), robot.get());
+    for (size_t i = 0; i < starts.size(); ++i)
+        AddRobot(mjcf, world.get(), robot.get(), static_cast<int>(i), starts[i]);
+    if (options.arena_half_width_m)
+        AddWalls(world.get(), *options.arena_half_width_m);
+    if (!options.visuals)
+        mjs_discardVisual(world.get(), nullptr);
+    mjModel *model = mj_compile(world.get(), nullptr);
+    if (!model)
+        Fail(mjcf, std::string("does not compile with its surroundings: ") + mjs_getError(world.get()));
+    return model;
+}
+
+}  // namespace twin
