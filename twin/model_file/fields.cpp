@@ -34,6 +34,7 @@ static const Field kFields[] = {
     {"noise", "drive_mps", "m/s", 0, 1, AT(noise.drive_mps), false},
     {"noise", "drive_radps", "rad/s", 0, 10, AT(noise.drive_radps), false},
     {"noise", "drive_s", "s", 0.001, 10, AT(noise.drive_s), false},
+    {"noise", "drive_turn_s", "s", 0.001, 10, AT(noise.drive_turn_s), false},
     {"idiosyncrasy", "theta_a1_std", "1", 0, 1, AT(idiosyncrasy.theta_a1_std), false},
     {"idiosyncrasy", "theta_a2_std", "1", 0, 1, AT(idiosyncrasy.theta_a2_std), false},
     {"clock", "offset_s", "s", -10, 10, AT(clock.offset_s), false},

@@ -24,7 +24,8 @@ double RimSpeed(const Base &base, double duty)
         ++i;
     const double part = (pct - base.duty_pct[i - 1]) / (base.duty_pct[i] - base.duty_pct[i - 1]);
     const double low = base.wheel_speed_mps[i - 1], high = base.wheel_speed_mps[i];
-    return std::copysign(low + part * (high - low), duty);
+    const double rim_mps = low + part * (high - low);
+    return duty < 0 ? -rim_mps : rim_mps;
 }
 
 struct Relaxed
@@ -154,10 +155,13 @@ Wheels DriveChain::DriveWheels(const Command &command, double t_s, double dt_s,
 // short against drive_s.
 void DriveChain::Disturb(Twist &twist, double dt_s, RobotState &state, Random &random) const
 {
-    const double keep = std::exp(-dt_s / noise_.drive_s), fresh = std::sqrt(1 - keep * keep);
     const std::array<double, 3> std_{noise_.drive_mps, noise_.drive_mps, noise_.drive_radps};
+    const std::array<double, 3> memory_s{noise_.drive_s, noise_.drive_s, noise_.drive_turn_s};
     for (size_t i = 0; i < 3; ++i)
+    {
+        const double keep = std::exp(-dt_s / memory_s[i]), fresh = std::sqrt(1 - keep * keep);
         state.drive_noise[i] = keep * state.drive_noise[i] + fresh * std_[i] * random.Normal();
+    }
     twist.vx_mps += state.drive_noise[0];
     twist.vy_mps += state.drive_noise[1];
     twist.omega_radps += state.drive_noise[2];
