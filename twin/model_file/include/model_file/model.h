@@ -52,9 +52,9 @@ struct Sensor
 struct Noise
 {
     double sensor_m = 0, sensor_rad = 0;  // motion capture, white
-    double drive_mps = 0, drive_radps = 0,
-           drive_s = 0.15;
-    double drive_turn_s = 0.15;  // memory of drive_radps; drive_s is that of drive_mps  // velocity disturbance while moving, first order
+    // Velocity disturbance while moving, first order: standard deviation and memory.
+    double drive_mps = 0, drive_s = 0.15;
+    double drive_radps = 0, drive_turn_s = 0.15;
 };
 
 // Spread over robots of the factors on speed and turn rate.
