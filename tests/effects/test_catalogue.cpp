@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+// The catalogue as a whole, and what every effect in it must keep.
+#include <gtest/gtest.h>
+
+#include <random>
+#include <set>
+
+#include "drive.h"
+
+namespace twin::test
+{
+namespace
+{
+
+std::vector<double> Neutral(const EffectSpec &spec)
+{
+    std::vector<double> values;
+    for (const Parameter &p : spec.parameters)
+        values.push_back(p.neutral);
+    return values;
+}
+
+std::vector<double> Defaults(const EffectSpec &spec)
+{
+    std::vector<double> values;
+    for (const Parameter &p : spec.parameters)
+        values.push_back(p.default_value);
+    return values;
+}
+
+TEST(Catalogue, IsInAlphabeticalOrderWithoutRepeats)
+{
+    const auto all = Catalogue();
+    for (size_t i = 1; i < all.size(); ++i)
+        EXPECT_LT(std::string(all[i - 1]->card.name), all[i]->card.name);
+}
+
+TEST(Catalogue, HoldsTheFirstTwelve)
+{
+    for (const char *name : {"battery_sag", "clock_offset", "coasting", "dead_zone", "floor_tilt",
+                             "input_delay", "lag_by_duty", "marker_offset", "motor_lag",
+                             "reverse_asymmetry", "speed_curve", "wheel_gain"})
+    {
+        ASSERT_NE(FindEffect(name), nullptr) << name;
+        EXPECT_STREQ(FindEffect(name)->card.name, name);
+    }
+    EXPECT_EQ(FindEffect("no_such_effect"), nullptr);
+    EXPECT_EQ(FindEffect(""), nullptr);
+}
+
+TEST(Catalogue, NamesEveryStage)
+{
+    std::set<std::string> names;
+    for (int stage = 0; stage <= static_cast<int>(Stage::kDecide); ++stage)
+        names.insert(StageName(static_cast<Stage>(stage)));
+    EXPECT_EQ(names, (std::set<std::string>{"duty", "wheel", "ground", "world", "observe", "view",
+                                            "decide"}));
+}
+
+class EveryEffect : public testing::TestWithParam<const EffectSpec *>
+{
+};
+
+INSTANTIATE_TEST_SUITE_P(Catalogue, EveryEffect, testing::ValuesIn(Catalogue()),
+                         [](const auto &spec) { return std::string(spec.param->card.name); });
+
+TEST_P(EveryEffect, HasACompleteCard)
+{
+    const Card &card = GetParam()->card;
+    for (const char *text : {card.name, card.summary, card.equation, card.leaves_out, card.measure,
+                             card.reference, StageName(card.stage)})
+        EXPECT_FALSE(std::string(text).empty());
+    EXPECT_EQ(std::string(card.summary).back(), '.');
+    EXPECT_NE(card.drives & kAnyDrive, 0u);
+    EXPECT_EQ(card.drives & ~kAnyDrive, 0u);
+}
+
+TEST_P(EveryEffect, HasParametersWithinBounds)
+{
+    std::set<std::string> names;
+    for (const Parameter &p : GetParam()->parameters)
+    {
+        EXPECT_TRUE(names.insert(p.name).second) << p.name << " twice";
+        EXPECT_FALSE(std::string(p.unit).empty()) << p.name;
+        EXPECT_FALSE(std::string(p.doc).empty()) << p.name;
+        EXPECT_LT(p.min, p.max) << p.name;
+        EXPECT_TRUE(p.min <= p.neutral && p.neutral <= p.max) << p.name;
+        EXPECT_TRUE(p.min <= p.default_value && p.default_value <= p.max) << p.name;
+        EXPECT_NE(p.default_value, p.neutral) << p.name << ": a fit would start at nothing";
+    }
+    EXPECT_FALSE(names.empty());
+}
+
+Signals RandomSignals(std::mt19937_64 &engine, double t_s)
+{
+    std::uniform_real_distribution<double> wide(-2, 2), positive(0, 2);
+    std::bernoulli_distribution off(0.2);
+    Signals s;
+    s.t_s = t_s;
+    s.dt_s = 0.02;
+    s.battery_V = off(engine) ? 0 : 6 + positive(engine);
+    s.battery_nominal_V = 7.4;
+    for (size_t k = 0; k < kWheels; ++k)
+    {
+        s.duty[k] = off(engine) ? 0 : wide(engine) / 2;
+        s.rim_mps[k] = wide(engine);
+        s.target_mps[k] = off(engine) ? 0 : wide(engine);
+        s.tau_s[k] = off(engine) ? 0 : positive(engine);
+        s.max_decel_mps2[k] = positive(engine);
+    }
+    s.moves = !off(engine);
+    for (double *v : {&s.x_m, &s.y_m, &s.theta_rad, &s.vx_mps, &s.vy_mps, &s.omega_radps})
+        *v = wide(engine);
+    s.observed_t_s = 1e3 * wide(engine);
+    return s;
+}
+
+// No NaN occurs and zeros are positive, so that == on doubles means the same bits.
+void ExpectSame(const Signals &a, const Signals &b)
+{
+    EXPECT_EQ(a.t_s, b.t_s);
+    EXPECT_EQ(a.dt_s, b.dt_s);
+    EXPECT_EQ(a.battery_V, b.battery_V);
+    EXPECT_EQ(a.battery_nominal_V, b.battery_nominal_V);
+    EXPECT_EQ(a.duty, b.duty);
+    EXPECT_EQ(a.rim_mps, b.rim_mps);
+    EXPECT_EQ(a.target_mps, b.target_mps);
+    EXPECT_EQ(a.tau_s, b.tau_s);
+    EXPECT_EQ(a.max_decel_mps2, b.max_decel_mps2);
+    EXPECT_EQ(a.moves, b.moves);
+    EXPECT_EQ(a.x_m, b.x_m);
+    EXPECT_EQ(a.y_m, b.y_m);
+    EXPECT_EQ(a.theta_rad, b.theta_rad);
+    EXPECT_EQ(a.vx_mps, b.vx_mps);
+    EXPECT_EQ(a.vy_mps, b.vy_mps);
+    EXPECT_EQ(a.omega_radps, b.omega_radps);
+    EXPECT_EQ(a.observed_t_s, b.observed_t_s);
+}
+
+TEST_P(EveryEffect, AtNeutralLeavesTheSignalsAlone)
+{
+    const auto effect = GetParam()->make(Neutral(*GetParam()));
+    std::vector<double> state(static_cast<size_t>(effect->StateSize()), 0.0);
+    std::mt19937_64 engine(7);
+    for (int step = 0; step < 1000; ++step)
+    {
+        const Signals before = RandomSignals(engine, 0.02 * step);
+        Signals after = before;
+        effect->Step(after, state.data());
+        ExpectSame(after, before);
+        effect->Invert(after);
+        ExpectSame(after, before);
+    }
+}
+
+TEST_P(EveryEffect, ByDefaultChangesSomeSignal)
+{
+    const auto effect = GetParam()->make(Defaults(*GetParam()));
+    std::vector<double> state(static_cast<size_t>(effect->StateSize()), 0.0);
+    std::mt19937_64 engine(7);
+    int changed = 0;
+    for (int step = 0; step < 100; ++step)
+    {
+        const Signals before = RandomSignals(engine, 0.02 * step);
+        Signals after = before;
+        effect->Step(after, state.data());
+        changed += after.duty != before.duty || after.target_mps != before.target_mps ||
+                   after.tau_s != before.tau_s || after.max_decel_mps2 != before.max_decel_mps2 ||
+                   after.x_m != before.x_m || after.vx_mps != before.vx_mps ||
+                   after.observed_t_s != before.observed_t_s;
+    }
+    EXPECT_GT(changed, 10);
+}
+
+TEST_P(EveryEffect, InvertsWhatItDoesToThePoseSeenAndNothingElse)
+{
+    const bool observes = GetParam()->card.stage == Stage::kObserve;
+    const auto effect = GetParam()->make(Defaults(*GetParam()));
+    std::mt19937_64 engine(8);
+    for (int step = 0; step < 100; ++step)
+    {
+        const Signals before = RandomSignals(engine, 0);
+        Signals after = before;
+        if (observes)
+            effect->Step(after, nullptr);
+        effect->Invert(after);
+        EXPECT_NEAR(after.x_m, before.x_m, 1e-15);  // two roundings of numbers up to 2
+        EXPECT_NEAR(after.y_m, before.y_m, 1e-15);
+        EXPECT_EQ(after.theta_rad, before.theta_rad);
+        EXPECT_NEAR(after.observed_t_s, before.observed_t_s, 1e-12);  // up to 2000
+    }
+}
+
+void ExpectSame(const RobotState &a, const RobotState &b)
+{
+    EXPECT_EQ(a.pose.x_m, b.pose.x_m);
+    EXPECT_EQ(a.pose.y_m, b.pose.y_m);
+    EXPECT_EQ(a.pose.theta_rad, b.pose.theta_rad);
+    EXPECT_EQ(a.vx_mps, b.vx_mps);
+    EXPECT_EQ(a.vy_mps, b.vy_mps);
+    EXPECT_EQ(a.omega_radps, b.omega_radps);
+    EXPECT_EQ(a.rim_mps, b.rim_mps);
+    EXPECT_EQ(a.drive_noise, b.drive_noise);
+    EXPECT_EQ(a.effect_state, b.effect_state);
+}
+
+Model Noisy()
+{
+    Model model = Lagging(0.05);
+    model.noise.drive_mps = 0.01;
+    model.noise.drive_radps = 0.1;
+    return model;
+}
+
+TEST_P(EveryEffect, AtNeutralLeavesAWholeDriveAlone)
+{
+    Random random_a(1, 0, "drive_noise"), random_b(1, 0, "drive_noise");
+    Player plain(Noisy(), 0.022, {}, &random_a);
+    Player neutral(With(GetParam()->card.name, Neutral(*GetParam()), Noisy()), 0.022, {},
+                   &random_b);
+    PlayMedley(plain);
+    PlayMedley(neutral);
+    ExpectSame(plain.state, neutral.state);
+    EXPECT_EQ(plain.Seen().x_m, neutral.Seen().x_m);
+    EXPECT_EQ(plain.Seen().y_m, neutral.Seen().y_m);
+}
+
+TEST_P(EveryEffect, SameSeedSameBits)
+{
+    const Model model = With(GetParam()->card.name, Defaults(*GetParam()), Noisy());
+    Random random_a(1, 0, "drive_noise"), random_b(1, 0, "drive_noise");
+    Player a(model, 0.022, {}, &random_a), b(model, 0.022, {}, &random_b);
+    PlayMedley(a);
+    PlayMedley(b);
+    ExpectSame(a.state, b.state);
+}
+
+// Copies the state at every step in between, to a chain built anew.
+TEST_P(EveryEffect, RestartsFromACopyOfItsState)
+{
+    const Model model = With(GetParam()->card.name, Defaults(*GetParam()), Lagging(0.05));
+    const DriveChain chain(model);
+    constexpr int kSteps = 60, kSwitch = 20;
+    const auto step = [](const DriveChain &with, RobotState &state, int i) {
+        PlanarStep(with, {i < kSwitch ? Wheels{0.4, 0.9, 0.3, 0.8} : kStop, 7.0}, 0.02 * i, 0.02,
+                   state, nullptr);
+    };
+    std::vector<RobotState> path{chain.Start({})};
+    for (int i = 0; i < kSteps; ++i)
+    {
+        path.push_back(path.back());
+        step(chain, path.back(), i);
+    }
+    const DriveChain other(model);
+    for (int from = 0; from < kSteps; from += 7)
+    {
+        RobotState state = path[static_cast<size_t>(from)];
+        for (int i = from; i < kSteps; ++i)
+            step(other, state, i);
+        ExpectSame(state, path.back());
+    }
+}
+
+// On straight drives the discretisation is exact: half the step, same answer but for rounding.
+TEST_P(EveryEffect, HalfTheStepGivesTheSameAnswerOnStraightDrives)
+{
+    const Model model = With(GetParam()->card.name, Defaults(*GetParam()));
+    Player coarse(model, 0.02), fine(model, 0.01);
+    for (Player *player : {&coarse, &fine})
+        for (const Wheels &leg : {kForward, kStop, Scaled(kBack, 0.5), kStop, kStrafeLeft})
+            player->Play(leg, 0.8, 7.0);
+    EXPECT_NEAR(coarse.state.pose.x_m, fine.state.pose.x_m, 1e-12);
+    EXPECT_NEAR(coarse.state.pose.y_m, fine.state.pose.y_m, 1e-12);
+    EXPECT_NEAR(coarse.state.pose.theta_rad, fine.state.pose.theta_rad, 1e-12);
+    EXPECT_NEAR(coarse.Seen().x_m, fine.Seen().x_m, 1e-12);
+}
+
+}  // namespace
+}  // namespace twin::test
