@@ -14,6 +14,7 @@ LAGS_S = (0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.13, 0.17)
 GRID_S = 0.005  # commands are filtered on this grid, between them a straight line
 SLOPE_S = 0.03  # half width of the window in which velocities are measured
 LEVER_M = 0.1  # weighs turning (rad/s) against moving (m/s): about half a robot's length
+THIN_S = 0.025  # of so many poses one is used: closer velocities share most of their window
 BLOCKS = 10  # the log is cut into so many for the standard error
 MIN_EXPLAINED = 0.3  # below it the motion does not follow the commands at all
 
@@ -37,7 +38,7 @@ class ClockOffset:
 
 
 def estimate_offset(track: Track) -> ClockOffset:
-    """Finds the shift at which the commands best explain the measured velocities (0.5 s of work).
+    """Finds the shift at which the commands best explain the measured velocities (takes about 0.5 s).
 
     For each offset and lag, velocities (forward, left, turning) are regressed on the lagged
     commands, their square roots and their squares (signs kept), so that neither the speed curve
@@ -143,11 +144,12 @@ def _explained(gram: np.ndarray, moment: np.ndarray) -> float:
 
 
 def _body_velocity(track: Track) -> tuple[np.ndarray, np.ndarray]:
-    """(K,) s and (K, 3) forward, left, LEVER_M * turning; m/s, every second pose."""
+    """(K,) s and (K, 3) forward, left, LEVER_M * turning; m/s; thinned."""
     slope = np.column_stack([local_line(track.pose_t_s, track.pose[:, k], track.segment, SLOPE_S)[1]
                              for k in range(3)])
     cos, sin = np.cos(track.heading_smooth), np.sin(track.heading_smooth)
     velocity = np.column_stack([cos * slope[:, 0] + sin * slope[:, 1],
                                 cos * slope[:, 1] - sin * slope[:, 0], LEVER_M * slope[:, 2]])
-    known = np.flatnonzero(np.isfinite(velocity).all(axis=1))[::2]
+    every = max(1, round(THIN_S / track.timing.pose_period_s))
+    known = np.flatnonzero(np.isfinite(velocity).all(axis=1))[::every]
     return track.pose_t_s[known], velocity[known]

@@ -186,7 +186,7 @@ def _cuts(robot: RobotLog, usable: np.ndarray, limits: tuple[float, float],
                      f"then {moved_m:.3f} m away.")
         if jump[k] or lost[k]:
             keep &= (t < t[k] - MARGIN_S) | (t > t[k + 1] + MARGIN_S)
-    begins = np.concatenate([[0], np.cumsum(jump | gap)])
+    begins = np.concatenate([[0], np.cumsum(jump | gap)])[:len(index)]
     index, begins = index[keep], begins[keep]
     return index, np.diff(begins, prepend=-1) > 0
 
@@ -267,13 +267,13 @@ def _filled(t_s: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _timing(robot: RobotLog, segment: np.ndarray) -> Timing:
     pose_period_s = float(np.median(np.diff(robot.pose_t_s)))
     steps = np.diff(robot.command, axis=0)
-    spans_s = float(sum(np.ptp(robot.pose_t_s[segment == number]) + pose_period_s
-                        for number in range(segment.max() + 1)))
+    spans_s = sum(np.ptp(robot.pose_t_s[segment == number]) + pose_period_s
+                  for number in range(segment.max() + 1))
     lost = 1 - np.count_nonzero(segment >= 0) * pose_period_s / spans_s if spans_s else np.nan
     return Timing(
         pose_period_s=pose_period_s,
         command_period_s=float(np.median(np.diff(robot.command_t_s))) if len(steps) else np.nan,
-        pose_lost_share=max(0.0, lost),
+        pose_lost_share=max(0.0, float(lost)),
         command_held_share=float((steps == 0).all(axis=1).mean()) if len(steps) else np.nan)
 
 

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from twinmill.calibration.clock import estimate_offset
+from twinmill.calibration.log import LogError, read_log
+from twinmill.calibration.track import make_track
+
+LAG_S = 0.08
+
+
+@pytest.fixture
+def steps(driven):
+    """A robot with a first-order lag under random duties, its poses stamped by another clock."""
+
+    def make(offset_s):
+        rng, dt_s = np.random.default_rng(5), 1e-3
+        robot = driven(60)
+        held = rng.uniform(-1, 1, (70, 2))[(robot.command_t_s / 0.9).astype(int)]
+        time_s = np.arange(0, 60, dt_s)
+        now = held[np.searchsorted(robot.command_t_s, time_s, side="right") - 1]
+        side_mps = np.zeros((len(time_s), 2))
+        for k in range(1, len(time_s)):
+            side_mps[k] = side_mps[k - 1] + (0.36 * now[k - 1] - side_mps[k - 1]) * dt_s / LAG_S
+        theta = np.cumsum(side_mps[:, 1] - side_mps[:, 0]) * dt_s / 0.25
+        xy = np.cumsum(side_mps.mean(1) * np.exp(1j * theta)) * dt_s
+        at = np.searchsorted(time_s, robot.pose_t_s - 1e-9)
+        pose = np.column_stack([xy.real, xy.imag, theta])[at]
+        pose += rng.normal(0, [0.0003, 0.0003, 0.002], pose.shape)
+        return replace(robot, command=held[:, [0, 1, 0, 1]], pose=pose,
+                       pose_t_s=robot.pose_t_s + offset_s)
+
+    return make
+
+
+@pytest.mark.parametrize("offset_s", [-0.2, -0.03, 0.0, 0.117])
+def test_known_offset_and_lag_are_found(steps, offset_s):
+    found = estimate_offset(make_track(steps(offset_s)))
+    assert found.offset_s == pytest.approx(offset_s, abs=0.002)  # a quarter of a frame
+    assert found.lag_s == LAG_S
+    assert 0 < found.std_s < 0.002
+    assert found.explained > 0.95
+
+
+def test_recordings_on_the_same_clocks_agree(data_dir):
+    paths = sorted((data_dir / "hidden_effects").glob("case_[a-f].lcmlog"))
+    offsets_s = [estimate_offset(make_track(read_log(path).robots[3])).offset_s for path in paths]
+    assert len(paths) == 6
+    assert np.ptp(offsets_s) < 0.004  # by the description one constant; half a frame
+
+
+def test_motion_that_commands_do_not_explain_is_refused(steps):
+    robot = steps(0.0)
+    with pytest.raises(LogError, match="robot 3: the clock offset cannot be told"):
+        estimate_offset(make_track(replace(robot, command=robot.command[::-1])))
+
+
+def test_constant_commands_are_refused(driven):
+    with pytest.raises(LogError, match="never change"):
+        estimate_offset(make_track(driven()))

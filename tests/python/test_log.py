@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+import lcm
+import numpy as np
+import pytest
+import turbopi
+from twinmill.calibration.log import LogError, read_log
+
+
+def drive_and_pose(message, count=3):
+    """Events of robot 7 that drives; the last event is a pose."""
+    events = []
+    for k in range(count):
+        events.append(("R07_TELEMETRY", message("telemetry", utime_us=1000 * k, robot_id=7)))
+        events.append(("R07_POSE", message("pose", utime_us=1000 * k + 500, robot_id=7)))
+    return events
+
+
+@pytest.mark.parametrize("name", ["calibration", "case_d", "case_w"])
+def test_recording_equals_what_lcm_and_the_generated_types_decode(data_dir, name):
+    path = data_dir / "hidden_effects" / f"{name}.lcmlog"
+    duty, battery, poses = {}, {}, {}
+    for event in lcm.EventLog(str(path), "r"):
+        if event.channel == "R03_TELEMETRY":
+            told = turbopi.telemetry_t.decode(event.data)
+            duty[told.utime_us], battery[told.utime_us] = told.wheel_duty_pct, told.battery_V
+        else:
+            pose = turbopi.pose_t.decode(event.data)
+            poses[pose.utime_us] = pose
+
+    log = read_log(path)
+
+    assert list(log.robots) == [3]
+    robot = log.robots[3]
+    assert robot.command_kind == "duty"
+    stamps_us = log.t0_utime_us + np.round(robot.command_t_s * 1e6).astype(int)
+    assert stamps_us.tolist() == sorted(duty)
+    np.testing.assert_array_equal(robot.command, np.array([duty[t] for t in sorted(duty)]) / 100)
+    np.testing.assert_array_equal(robot.battery_V, [battery[t] for t in sorted(duty)])
+    valid = np.array([poses[t].valid == 1 for t in sorted(poses)])
+    np.testing.assert_array_equal(robot.valid, valid)
+    place = np.array([poses[t].position_m[:2] for t in sorted(poses)])
+    np.testing.assert_array_equal(robot.pose[valid, :2], place[valid])
+    # These poses turn about z alone, so half the heading is the angle of (w, z).
+    wz = np.array([poses[t].orientation_wxyz for t in sorted(poses)])[valid]
+    turn = np.exp(1j * (robot.pose[valid, 2] - 2 * np.arctan2(wz[:, 3], wz[:, 0])))
+    np.testing.assert_allclose(turn, 1, atol=1e-9)
+    assert np.abs(np.diff(robot.pose[valid, 2])).max() <= np.pi
+
+
+def test_truncation_at_every_byte_of_the_last_event_keeps_the_others(write_log, message, tmp_path):
+    whole = write_log(*drive_and_pose(message)).read_bytes()
+    start = whole.rfind(b"\xed\xa1\xda\x01")
+    cut_log = tmp_path / "cut.lcmlog"
+    for size in range(start, len(whole) + 1):
+        cut_log.write_bytes(whole[:size])
+        log = read_log(cut_log)
+        assert len(log.robots[7].pose_t_s) == (3 if size == len(whole) else 2)
+        broken = [w for w in log.warnings if f"byte {start} of {size}" in w]
+        assert len(broken) == (start < size < len(whole))
+
+
+def test_junk_between_events_is_skipped_and_told(write_log, message):
+    path = write_log(*drive_and_pose(message))
+    data = path.read_bytes()
+    second = data.find(b"\xed\xa1\xda\x01", 4)
+    path.write_bytes(data[:second] + b"junk" + data[second:])
+    log = read_log(path)
+    assert len(log.robots[7].pose_t_s) == 3
+    assert any(f"bytes {second} to {second + 4}" in w for w in log.warnings)
+
+
+@pytest.mark.parametrize("content", [b"", b"t_s,robot_id\n0,1\n", b"\xed\xa1\xda\x01" * 9])
+def test_other_files_are_refused(tmp_path, content):
+    (tmp_path / "a.lcmlog").write_bytes(content)
+    with pytest.raises(LogError, match=r"a\.lcmlog: .* no LCM log"):
+        read_log(tmp_path / "a.lcmlog")
+
+
+def test_missing_file_is_refused(tmp_path):
+    with pytest.raises(LogError, match="No such file"):
+        read_log(tmp_path / "none.lcmlog")
+
+
+def test_message_of_another_type_is_refused_with_channel_and_type(write_log, message):
+    path = write_log(("R07_POSE", message("drive", robot_id=7)))
+    with pytest.raises(LogError, match=r"R07_POSE.*turbopi\.pose_t"):
+        read_log(path)
+
+
+def test_log_without_robots_is_refused(write_log, message):
+    with pytest.raises(LogError, match=r"R<nn>.*SWARM_COMMAND"):
+        read_log(write_log(("SWARM_COMMAND", message("swarm_command"))))
+
+
+def test_twin_prefix_is_found_and_truth_never_read(write_log, message):
+    events = [(f"TWIN_{channel}", m) for channel, m in drive_and_pose(message)]
+    log = read_log(write_log(*events, ("TWIN_TRUTH_R07", b"anything"), ("CAMERA", b"x")))
+    assert len(log.robots[7].pose_t_s) == 3
+    assert any("TWIN_" in w for w in log.warnings)
+    assert any("CAMERA" in w and "TRUTH" not in w for w in log.warnings)
+
+
+def test_disordered_and_repeated_stamps_are_sorted_and_the_last_kept(write_log, message):
+    events = [("R07_POSE", message("pose", utime_us=t, robot_id=7, position_m=[x, 0.0, 0.0]))
+              for t, x in [(30, 3.0), (10, 1.0), (20, 2.0), (20, 2.5)]]
+    log = read_log(write_log(*events))
+    np.testing.assert_array_equal(log.robots[7].pose[:, 0], [1, 2.5, 3])
+    np.testing.assert_allclose(log.robots[7].pose_t_s, [0, 10e-6, 20e-6])
+    assert any("sorted" in w for w in log.warnings) and any("repeat" in w for w in log.warnings)
+
+
+def test_duties_beyond_full_are_clamped_and_told(write_log, message):
+    path = write_log(("R07_TELEMETRY", message("telemetry", robot_id=7,
+                                               wheel_duty_pct=[-128, 50, 101, 100])))
+    log = read_log(path)
+    np.testing.assert_array_equal(log.robots[7].command, [[-1, 0.5, 1, 1]])
+    assert any("1 commands have a duty outside" in w for w in log.warnings)
+    assert any("no poses" in w for w in log.warnings)
+
+
+def test_kinds_of_drive_must_not_mix(write_log, message):
+    path = write_log(("R07_DRIVE", message("drive", robot_id=7, kind=1)),
+                     ("R07_DRIVE", message("drive", robot_id=7, kind=2, utime_us=1)))
+    with pytest.raises(LogError, match="kinds 1, 2"):
+        read_log(path)
+
+
+def test_valid_pose_without_unit_quaternion_is_lost(write_log, message):
+    path = write_log(("R07_POSE", message("pose", robot_id=7, orientation_wxyz=[0.0] * 4)),
+                     ("R07_POSE", message("pose", robot_id=7, utime_us=9)))
+    log = read_log(path)
+    assert log.robots[7].valid.tolist() == [False, True]
+    assert np.isnan(log.robots[7].pose[0]).all()
+    assert any("1 poses are marked valid" in w for w in log.warnings)

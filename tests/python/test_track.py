@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from twinmill.calibration.log import LogError, read_log
+from twinmill.calibration.track import local_line, make_track
+
+
+@pytest.mark.parametrize("name", ["calibration", "case_s", "case_w"])
+def test_recording_is_cut_at_every_pick_up_and_between_its_runs(data_dir, name):
+    robot = read_log(data_dir / "hidden_effects" / f"{name}.lcmlog").robots[3]
+    runs = 1 + np.count_nonzero(np.diff(robot.pose_t_s) > 1)  # 3 s apart by the description
+    lost = np.flatnonzero(np.diff(robot.valid.astype(int)) < 0)  # last valid pose before each
+
+    track = make_track(robot)
+
+    assert (track.segment[~robot.valid] == -1).all()
+    assert track.segment.max() + 1 == runs + len(lost)
+    for k in lost:
+        before = track.segment[:k][track.segment[:k] >= 0].max()
+        after = track.segment[k:][track.segment[k:] >= 0].min()
+        assert after == before + 1
+    # Frames lost alone, two in a thousand by the recording's description, cut nothing.
+    assert track.timing.pose_lost_share == pytest.approx(0.002, abs=0.001)
+
+
+def test_robot_put_elsewhere_is_cut_and_margins_dropped(driven):
+    robot = driven()
+    robot.pose[600:, :2] += 0.5  # at 5 s
+    track = make_track(robot)
+    assert track.segment.max() == 1
+    used = track.pose_t_s[track.segment >= 0]
+    gap = np.argmax(np.diff(used))
+    assert used[gap:gap + 2] == pytest.approx([5 - 0.1, 5 + 0.1], abs=2.1 / 120)
+    assert any("cut at 4.99" in note and "jumps" in note for note in track.notes)
+
+
+def test_fast_but_possible_motion_is_not_cut(driven):
+    robot = driven()
+    robot.pose[:, 0] += 1.0 * robot.pose_t_s
+    assert make_track(robot).segment.tolist() == [0] * len(robot.pose_t_s)
+
+
+@pytest.mark.parametrize("length", [1, 3])
+def test_jump_and_jump_back_leaves_one_segment(driven, length):
+    robot = driven()
+    robot.pose[600:600 + length] += [0.3, 0, 2.5]
+    track = make_track(robot)
+    assert np.flatnonzero(track.segment < 0).tolist() == list(range(600, 600 + length))
+    assert track.segment.max() == 0
+
+
+def test_gap_cuts_and_short_loss_does_not(driven):
+    robot = driven()
+    robot.valid[300:303] = False
+    robot.valid[600:612] = False
+    robot.pose[~robot.valid] = np.nan
+    track = make_track(robot)
+    assert track.segment[299] == track.segment[303] == 0
+    assert track.segment[-1] == 1
+
+
+def test_slow_camera_is_not_cut_at_every_frame(driven):
+    robot = driven()
+    slow = slice(None, None, 12)  # 10 Hz
+    robot = replace(robot, pose_t_s=robot.pose_t_s[slow], pose=robot.pose[slow],
+                    z_m=robot.z_m[slow], valid=robot.valid[slow])
+    assert make_track(robot).segment.max() == 0
+
+
+def test_poses_without_known_duties_are_unusable(driven):
+    robot = driven()
+    known = (robot.command_t_s < 3) | (robot.command_t_s > 6)
+    robot = replace(robot, command_t_s=robot.command_t_s[known], command=robot.command[known],
+                    battery_V=robot.battery_V[known])
+    track = make_track(robot)
+    middle = (track.pose_t_s > 3.5) & (track.pose_t_s < 5.5)
+    assert (track.segment[middle] == -1).all()
+    assert track.segment.max() == 1
+
+
+def test_lifted_robot_is_cut(driven):
+    robot = driven()
+    robot.z_m[500:700] += 0.2
+    track = make_track(robot)
+    assert (track.segment[500:700] == -1).all() and track.segment.max() == 1
+
+
+def test_rest_lies_inside_the_stretch_of_zero_commands(driven):
+    robot = driven()
+    robot.command[(robot.command_t_s >= 2) & (robot.command_t_s < 8)] = 0
+    assert make_track(robot).rest == pytest.approx(np.array([[3.5, 7.7]]), abs=1 / 45)
+
+
+def test_local_line_gives_value_and_slope_of_a_line_exactly_at_uneven_times():
+    t = np.cumsum(np.random.default_rng(1).uniform(0.004, 0.012, 400))
+    segment = np.repeat([0, -1, 1], [200, 10, 190])
+    value, slope = local_line(t, 3 - 2 * t, segment, 0.025)
+    assert value[segment >= 0] == pytest.approx((3 - 2 * t)[segment >= 0])
+    assert slope[segment >= 0] == pytest.approx(-2)
+    assert np.isnan(value[segment < 0]).all()
+
+
+def test_smoothing_lowers_white_noise_like_a_mean_of_its_window(driven):
+    robot = driven(60)
+    robot.pose[:, 2] += np.random.default_rng(2).normal(0, 0.01, len(robot.pose))
+    track = make_track(robot)
+    left = (track.heading_smooth - 0.5 * track.pose_t_s)[10:-10]
+    # In the middle of seven even samples a line's value is their mean.
+    assert left.std() == pytest.approx(0.01 / np.sqrt(7), rel=0.1)
+
+
+def test_heading_beside_motion_is_told_with_the_angle(driven):
+    robot = driven()
+    robot.command[:] = 0.6  # straight
+    robot.pose[:] = np.column_stack([-0.3 * robot.pose_t_s] + [0 * robot.pose_t_s] * 2)
+    assert any("180 degrees" in note for note in make_track(robot).notes)
+    robot.command[:] = -0.6
+    assert not make_track(robot).notes
+
+
+def test_frozen_pose_is_told_only_while_driven(driven):
+    robot = driven()
+    robot.pose[300:420] = robot.pose[300]
+    assert any("frozen from 2.500" in note for note in make_track(robot).notes)
+    robot.command[:] = 0
+    assert not any("frozen" in note for note in make_track(robot).notes)
+
+
+def test_battery_is_interpolated_where_unknown(driven):
+    robot = driven()
+    robot.battery_V[:] = np.nan
+    assert np.isnan(make_track(robot).battery_V).all()
+    robot.battery_V[[0, -1]] = 8, 7
+    assert make_track(robot).battery_V == pytest.approx(np.linspace(8, 7, len(robot.battery_V)))
+
+
+def test_robot_without_commands_is_refused(driven):
+    with pytest.raises(LogError, match="robot 3: the log has no commands"):
+        make_track(driven(command_t_s=np.empty(0), command=np.empty((0, 4))))
+
+
+def test_commands_of_another_time_leave_nothing_usable(driven):
+    robot = driven()
+    track = make_track(replace(robot, command_t_s=robot.command_t_s + 100))
+    assert (track.segment == -1).all()
+    assert any("no stretch" in note for note in track.notes)
