@@ -13,7 +13,13 @@
 namespace twin
 {
 
-enum class WheelKind { kMecanum, kDifferential, kOmni3, kNone };
+enum class WheelKind
+{
+    kMecanum,
+    kDifferential,
+    kOmni3,
+    kNone
+};
 
 struct Robot
 {
