@@ -8,7 +8,7 @@
 // self_centering spins at -3 times the rate w of milling's circle while it sees nothing. Milling
 // turns at 0.5 rad/s (measured, turn input 0.5 at full speed), so -1.5 rad/s are wanted. On the
 // spot, turn input 0.3 (duty 37) gives 1.66 rad/s (measured): with the lever arm of 0.126 m that is
-// 0.209 m/s at the wheels, and duty 50 gives 0.282 m/s (measured), so a duty point is worth 0.0056 m/s.
+// 0.209 m/s at the wheels. Duty 50 gives 0.282 m/s (measured), so a duty point is worth 0.0056 m/s.
 // 1.5 rad/s is 0.020 m/s less, 3.6 points; in proportion it would be 3.6 as well. Turn input 0.27
 // is duty 34. Seeing turns left (positive), so seeing nothing turns right.
 #define SELF_CENTERING_SPIN_MILLI (-270)

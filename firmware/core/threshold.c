@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// A row is looked at in blocks of 32 pixels. The first pass over a block is loops over 64 bytes
-// that compilers turn into vector instructions, and ends in one question: any green? Only a block
-// that has some pays for the second pass, which packs its pixels into a word.
+// A row is read at most twice. The first pass asks, sixteen bytes at a time, whether any pair of
+// pixels has the right U and V, and most rows end there. A row that may hold the target is cut into
+// blocks of 32 pixels that are tested exactly, and blocks that have some are packed into bits.
 //
 //   bytes    Y0  U Y1  V   Y0  U Y1  V      inside each byte's own limits? 0xFF or 0
 //   pairs  [ Y0  U   Y1  V ]                pixel 0 = Y0 & U & V, pixel 1 = Y1 & U & V
+//
+// The vectors are the compiler's own (gcc and clang, x86 and ARM alike), without intrinsics.
 #include "fw/threshold.h"
 
 #include <string.h>
 
 #define BLOCK_BYTES (2 * FW_MASK_WORD_PX)
-#define BLOCK_PAIRS (FW_MASK_WORD_PX / 2)
 
 // The authors' box in 8-bit CIELAB of OpenCV (L 0..252, a 48..109, b 94..207) is loose: 30 % of
 // the RGB cube, cyan and blue-green too. Over a grid of the cube converted to BT.601, its upper
@@ -38,48 +39,60 @@ struct fw_threshold fw_threshold_make(const struct fw_color_box *box)
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "a pair has Y0 in its lowest byte");
 
-// One pair of the first pass's result. @return lowest byte not zero if U and V are inside.
-static uint32_t load_pair(const uint8_t *inside, int pair_idx, uint32_t *pair)
+#define VECTOR_BYTES 16
+typedef uint8_t byte_vector __attribute__((vector_size(VECTOR_BYTES)));
+typedef uint32_t pair_vector __attribute__((vector_size(VECTOR_BYTES)));
+
+// Four pairs of pixels: 0xFF for every byte inside its limits, else 0.
+static inline pair_vector test_bytes(const struct fw_threshold *threshold, const uint8_t *yuyv)
 {
-    memcpy(pair, inside + 4 * pair_idx, sizeof *pair);
-    return (*pair >> 8) & (*pair >> 24);
+    byte_vector low, span, bytes;
+    memcpy(&low, threshold->low, VECTOR_BYTES);
+    memcpy(&span, threshold->span, VECTOR_BYTES);
+    memcpy(&bytes, yuyv, VECTOR_BYTES);
+    return (pair_vector)(bytes - low <= span);
 }
 
-// First pass: one byte per byte. @return not zero if the block has a pixel inside the box.
-static uint32_t test_block(const struct fw_threshold *restrict threshold,
-                           const uint8_t *restrict yuyv, uint8_t *restrict inside)
+static inline bool any_set(pair_vector pairs)
 {
-    for (int i = 0; i < BLOCK_BYTES; i += 16) {
-        for (int j = 0; j < 16; ++j) {
-            const uint8_t above_low = (uint8_t)(yuyv[i + j] - threshold->low[j]);
-            inside[i + j] = above_low <= threshold->span[j] ? 0xFF : 0;
-        }
-    }
-    uint32_t any = 0;
-    for (int i = 0; i < BLOCK_PAIRS; ++i) {
-        uint32_t pair;
-        const uint32_t chroma = load_pair(inside, i, &pair);
-        any |= chroma & (pair | pair >> 16);
-    }
-    return any & 0xFF;
+    uint64_t halves[2];
+    memcpy(halves, &pairs, sizeof halves);
+    return (halves[0] | halves[1]) != 0;
 }
 
-// Second pass: one bit per pixel.
-static uint32_t pack_block(const uint8_t *inside)
+// First pass. @return false only if no pixel of the row is inside the box.
+static bool row_may_match(const struct fw_threshold *threshold, const uint8_t *yuyv, int row_bytes)
 {
-    uint32_t word = 0;
-    for (int i = 0; i < BLOCK_PAIRS; ++i) {
-        uint32_t pair;
-        const uint32_t chroma = load_pair(inside, i, &pair) & 1;
-        word |= (chroma & pair) << (2 * i) | (chroma & (pair >> 16)) << (2 * i + 1);
+    pair_vector any = {0};
+    int i = 0;
+    for (; i + VECTOR_BYTES <= row_bytes; i += VECTOR_BYTES) {
+        const pair_vector inside = test_bytes(threshold, yuyv + i);
+        any |= inside & inside >> 16;
     }
-    return word;
+    // U of the pair in its second byte, V in its fourth.
+    return i < row_bytes || any_set(any & 0xFF00);
 }
 
+// Second pass, 32 pixels. @return one bit per pixel.
 static uint32_t threshold_block(const struct fw_threshold *threshold, const uint8_t *yuyv)
 {
-    uint8_t inside[BLOCK_BYTES];
-    return test_block(threshold, yuyv, inside) ? pack_block(inside) : 0;
+    uint32_t pairs[FW_MASK_WORD_PX / 2];
+    pair_vector any = {0};
+    for (int i = 0; i < BLOCK_BYTES; i += VECTOR_BYTES) {
+        const pair_vector inside = test_bytes(threshold, yuyv + i);
+        const pair_vector chroma = inside >> 8 & inside >> 24;
+        // Pixel 0 becomes bit 0 and pixel 1 bit 1.
+        const pair_vector pixels = (chroma & inside & 1) | (chroma & inside >> 16 & 1) << 1;
+        memcpy(pairs + i / 4, &pixels, VECTOR_BYTES);
+        any |= pixels;
+    }
+    uint32_t word = 0;
+    if (any_set(any)) {
+        for (int i = 0; i < FW_MASK_WORD_PX / 2; ++i) {
+            word |= pairs[i] << (2 * i);
+        }
+    }
+    return word;
 }
 
 bool fw_threshold_row(const struct fw_threshold *threshold, const uint8_t *yuyv, int width_px,
@@ -87,6 +100,10 @@ bool fw_threshold_row(const struct fw_threshold *threshold, const uint8_t *yuyv,
 {
     const int whole_words = width_px / FW_MASK_WORD_PX;
     const int rest_px = width_px % FW_MASK_WORD_PX;
+    if (!row_may_match(threshold, yuyv, 2 * width_px)) {
+        memset(mask, 0, sizeof *mask * (size_t)(whole_words + (rest_px > 0)));
+        return false;
+    }
     uint32_t any = 0;
     for (int i = 0; i < whole_words; ++i) {
         mask[i] = threshold_block(threshold, yuyv + (size_t)i * BLOCK_BYTES);
