@@ -2,6 +2,7 @@
 """Offset between the robot's clock and the motion capture's: a start value that the fit refines."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import lfilter
@@ -38,7 +39,7 @@ class ClockOffset:
 
 
 def estimate_offset(track: Track) -> ClockOffset:
-    """Finds the shift at which the commands best explain the measured velocities (takes about 0.5 s).
+    """Finds the shift at which the commands best explain the measured velocities.
 
     For each offset and lag, velocities (forward, left, turning) are regressed on the lagged
     commands, their square roots and their squares (signs kept), so that neither the speed curve
@@ -112,7 +113,8 @@ class _Regression:
         part = (position - k)[:, None]
         rows = np.hstack([lagged[k] * (1 - part) + lagged[k + 1] * part,
                           np.ones((len(k), 1))])
-        parts = [self.block == number for number in range(BLOCKS)]
+        edges = np.searchsorted(self.block, np.arange(BLOCKS + 1))
+        parts = [slice(first, last) for first, last in pairwise(edges)]
         return (np.array([rows[p].T @ rows[p] for p in parts]),
                 np.array([rows[p].T @ self.velocity[p] for p in parts]))
 
