@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests twin/plant/mujoco. Truth: the ideal mecanum equations, Coulomb friction, Newton's law, the planar
-// plant, and the sizes of the MJCF file.
+// Tests twin/plant/mujoco. Truth: the ideal mecanum equations, Coulomb friction, Newton's law, the
+// planar plant, and the sizes of the MJCF file.
 #include "plant_mujoco/mujoco_plant.h"
 
 #include <gtest/gtest.h>
@@ -35,8 +35,8 @@ Model WheelSpeedModel()
 MujocoPlant MakePlant(const std::vector<Pose2> &starts, const MujocoOptions &options = {},
                       const Model &model = WheelSpeedModel())
 {
-    return MujocoPlant(FindModelFile("turbopi.xml"), std::vector<Model>(starts.size(), model), starts,
-                       options);
+    return MujocoPlant(FindModelFile("turbopi.xml"), std::vector<Model>(starts.size(), model),
+                       starts, options);
 }
 
 void Simulate(Plant &plant, double duration_s)
@@ -90,11 +90,11 @@ TEST_P(IdealMotion, IsReachedWithinOnePercent)
     EXPECT_LT(std::sqrt(hop_m2), 2e-6) << "the wheels hop";
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Moves, IdealMotion,
-    testing::Combine(testing::Values(0.002, 0.005),
-                     testing::Values(Twist{0.3, 0, 0}, Twist{0, 0.3, 0}, Twist{0, 0, 2},
-                                     Twist{0.2, 0.2, 0}, Twist{0.15, -0.1, 1})));
+INSTANTIATE_TEST_SUITE_P(Moves, IdealMotion,
+                         testing::Combine(testing::Values(0.002, 0.005),
+                                          testing::Values(Twist{0.3, 0, 0}, Twist{0, 0.3, 0},
+                                                          Twist{0, 0, 2}, Twist{0.2, 0.2, 0},
+                                                          Twist{0.15, -0.1, 1})));
 
 TEST(MujocoPlant, RobotAtRestStays)
 {
@@ -213,7 +213,8 @@ TEST(MujocoPlant, EightRobotsRammingAtRandomStaySane)
     for (int i = 0; i < plant.Size(); ++i)
     {
         const Pose2 &pose = plant.State(i).pose;
-        EXPECT_LT(std::max(std::abs(pose.x_m), std::abs(pose.y_m)), 0.6) << "robot " << i << " left";
+        EXPECT_LT(std::max(std::abs(pose.x_m), std::abs(pose.y_m)), 0.6)
+            << "robot " << i << " left";
         const mjtNum *up = plant.data()->xmat + 9 * mj_name2id(plant.model(), mjOBJ_BODY,
                                                                NameInWorld(i, "base").c_str());
         EXPECT_GT(up[8], std::cos(0.05)) << "robot " << i << " tipped";
@@ -242,10 +243,13 @@ TEST(MujocoPlant, AgreesWithThePlanarPlantWhenWheelsGrip)
     model.base.yaw_gain = 0.9;
     model.AddEffect("dead_zone");
     model.AddEffect("floor_tilt");
+    model.Set("dead_zone.width", 0.05);
+    model.Set("floor_tilt.drift_x_mps", 0.03);
     const std::vector<Pose2> start{{0.1, 0.2, -0.5}};
     MujocoPlant mujoco = MakePlant(start, {}, model);
     PlanarPlant planar({model}, start, 0);
-    const Wheels script[] = {{0.6, 0.6, 0.6, 0.6}, {-0.5, 0.5, 0.5, -0.5}, {0.8, 0.3, 0.8, 0.3}, {}};
+    const Wheels script[] = {
+        {0.6, 0.6, 0.6, 0.6}, {-0.5, 0.5, 0.5, -0.5}, {0.8, 0.3, 0.8, 0.3}, {}};
     double path_m = 0;
     for (const Wheels &duty : script)
     {
@@ -285,7 +289,8 @@ TEST(MujocoPlant, HeadingCountsFullTurns)
 TEST(MujocoPlant, SceneFileGivesTheSameMotionAsTheRobotAlone)
 {
     const auto drive = [](const char *mjcf) {
-        MujocoPlant plant(FindModelFile(mjcf), {2, WheelSpeedModel()}, {{0, 0, 0}, {0.5, 0, 1}}, {});
+        MujocoPlant plant(FindModelFile(mjcf), {2, WheelSpeedModel()}, {{0, 0, 0}, {0.5, 0, 1}},
+                          {});
         return RandomDrive(plant, 1);
     };
     EXPECT_EQ(drive("turbopi.xml"), drive("scene.xml"));

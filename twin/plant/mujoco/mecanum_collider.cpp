@@ -13,12 +13,13 @@ namespace
 
 mjfCollision stock_collision = nullptr;
 
-// One contact at the lowest point of the rim. Its first tangent is the axis of the roller there, so that
-// a contact pair can grip along that axis and let go across it.
+// One contact at the lowest point of the rim. Its first tangent is the axis of the roller there, so
+// that a contact pair can grip along that axis and let go across it.
 //
 //   axle a, floor normal n, rolling direction t = a x n:    tangent = (t + s l) / sqrt(2)
 //   l = a without its part along n, s = geom_user[0]
-int CollideWheel(const mjModel *m, mjData *d, mjPreContact *contact, int plane, int wheel, mjtNum margin)
+int CollideWheel(const mjModel *m, mjData *d, mjPreContact *contact, int plane, int wheel,
+                 mjtNum margin)
 {
     const mjtNum side = m->nuser_geom > 0 ? m->geom_user[m->nuser_geom * wheel] : 0;
     const mjtNum *plane_R = d->geom_xmat + 9 * plane, *wheel_R = d->geom_xmat + 9 * wheel;

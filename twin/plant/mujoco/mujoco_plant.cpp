@@ -31,12 +31,14 @@ void CheckInputs(const std::vector<Model> &models, const std::vector<Pose2> &sta
                  const MujocoOptions &options)
 {
     if (models.empty() || models.size() > 100 || models.size() != starts.size())
-        throw std::invalid_argument("mujoco plant: " + std::to_string(models.size()) + " models and " +
-                                    std::to_string(starts.size()) +
-                                    " start poses: give one of each per robot, for 1 to 100 robots");
+        throw std::invalid_argument(
+            "mujoco plant: " + std::to_string(models.size()) + " models and " +
+            std::to_string(starts.size()) +
+            " start poses: give one of each per robot, for 1 to 100 robots");
     if (!(options.timestep_s > 0 && options.timestep_s <= 0.01))
-        throw std::invalid_argument("mujoco plant: timestep_s " + std::to_string(options.timestep_s) +
-                                    " must be above 0 and at most 0.01: contacts are stiffer than that");
+        throw std::invalid_argument(
+            "mujoco plant: timestep_s " + std::to_string(options.timestep_s) +
+            " must be above 0 and at most 0.01: contacts are stiffer than that");
     for (const Model &model : models)
         if (model.base.wheels == WheelKind::kDifferential || model.base.wheels == WheelKind::kOmni3)
             throw std::invalid_argument(
@@ -103,8 +105,15 @@ MujocoPlant::Member MujocoPlant::MakeMember(int robot, const Model &model, const
                      Id(m, mjOBJ_ACTUATOR, robot, kWheelNames[k]), hub[0], hub[1],
                      m->geom_user[m->nuser_geom * geom]};
     }
-    return {std::move(chain), Random(seed, robot, "drive_noise"), state, state, {},
-            m->jnt_qposadr[joint], m->jnt_dofadr[joint], wheels, {}};
+    return {std::move(chain),
+            Random(seed, robot, "drive_noise"),
+            state,
+            state,
+            {},
+            m->jnt_qposadr[joint],
+            m->jnt_dofadr[joint],
+            wheels,
+            {}};
 }
 
 void MujocoPlant::SetCommand(int robot, const Command &command)
@@ -143,8 +152,8 @@ void MujocoPlant::Step(double dt_s)
     CheckStable();
 }
 
-// The wheels are told to turn so that, where they grip, the body moves as the drive chain says. What the
-// four wheels disagree about remains: they work against each other.
+// The wheels are told to turn so that, where they grip, the body moves as the drive chain says.
+// What the four wheels disagree about remains: they work against each other.
 void MujocoPlant::Drive(Member &member, double dt_s)
 {
     RobotState &memory = member.chain_state;
@@ -190,10 +199,9 @@ void MujocoPlant::Sense(Member &member) const
 {
     RobotState &state = member.state;
     const mjtNum *q = data_->qpos + member.qpos, *v = data_->qvel + member.dof;
-    const double yaw_rad = std::atan2(2 * (q[3] * q[6] + q[4] * q[5]),
-                                      1 - 2 * (q[5] * q[5] + q[6] * q[6]));
-    const double turned_rad =
-        std::remainder(yaw_rad - state.pose.theta_rad, 2 * std::numbers::pi);
+    const double yaw_rad =
+        std::atan2(2 * (q[3] * q[6] + q[4] * q[5]), 1 - 2 * (q[5] * q[5] + q[6] * q[6]));
+    const double turned_rad = std::remainder(yaw_rad - state.pose.theta_rad, 2 * std::numbers::pi);
     state.pose = {q[0], q[1], state.pose.theta_rad + turned_rad};
     const double c = std::cos(yaw_rad), s = std::sin(yaw_rad);
     state.vx_mps += c * v[0] + s * v[1];

@@ -15,8 +15,9 @@ namespace
 constexpr const char *kFloor = "floor";
 constexpr double kWallHalfThickness_m = 0.02, kWallHalfHeight_m = 0.15;
 
-// Friction across the grip in the contact itself. More makes MuJoCo's convex contacts lift the wheel by
-// about friction times slip speed, and the robot hops; the real drag is a force of the plant.
+// Friction across the grip in the contact itself. More makes MuJoCo's convex contacts lift the
+// wheel by about friction times slip speed, and the robot hops; the real drag is a force of the
+// plant.
 constexpr double kCrossFriction = 1e-4;
 
 struct SpecDeleter
@@ -54,16 +55,19 @@ void CheckWheel(const std::string &mjcf, mjSpec *spec, const char *name)
     } parts[] = {{mjOBJ_JOINT, "joint"}, {mjOBJ_GEOM, "geom"}, {mjOBJ_ACTUATOR, "actuator"}};
     for (const auto &part : parts)
         if (!mjs_findElement(spec, part.type, name))
-            Fail(mjcf, std::string("has no ") + part.word + " \"" + name +
-                           "\"; a robot needs a joint, a geom and an actuator for each of its wheels "
-                           "fl, fr, rl, rr (see turbopi.xml)");
+            Fail(mjcf,
+                 std::string("has no ") + part.word + " \"" + name +
+                     "\"; a robot needs a joint, a geom and an actuator for each of its wheels "
+                     "fl, fr, rl, rr (see turbopi.xml)");
     const mjsGeom *geom = FindGeom(spec, name);
     int size = 0;
     const double *side = mjs_getDouble(geom->userdata, &size);
     if (geom->type != mjGEOM_CYLINDER || size != 1 || std::abs(*side) != 1)
-        Fail(mjcf, std::string("geom \"") + name +
-                       "\" must be a cylinder with user=\"1\" or user=\"-1\", the sign of its roller axis "
-                       "(1, user, 0) at the floor");
+        Fail(
+            mjcf,
+            std::string("geom \"") + name +
+                "\" must be a cylinder with user=\"1\" or user=\"-1\", the sign of its roller axis "
+                "(1, user, 0) at the floor");
 }
 
 // The body that carries the wheels.
@@ -88,12 +92,13 @@ Spec MakeSurroundings(const std::string &mjcf, mjSpec *robot)
         mjs_delete(world.get(), FindBase(mjcf, world.get())->element);
     }
     else
-        world = Parse(FindModelFile("world.xml"));
+        world = Parse(FindModelFile("turbopi_world.xml"));
     world->nuser_geom = 1;
     return world;
 }
 
-// A contact pair that grips along the rollers' axes, with the friction and softness of the wheel's geom.
+// A contact pair that grips along the rollers' axes, with the friction and softness of the wheel's
+// geom. It takes the place of the contact that floor and wheel would have by themselves.
 void AddWheelContact(mjSpec *world, const mjsGeom &wheel, const std::string &name)
 {
     mjsPair *pair = mjs_addPair(world, nullptr);
@@ -120,15 +125,15 @@ void AddRobot(const std::string &mjcf, mjSpec *world, mjSpec *robot, int id, con
         Fail(mjcf, std::string("cannot be put into the world: ") + mjs_getError(world));
     for (const char *name : kWheelNames)
     {
-        mjsGeom *wheel = FindGeom(world, NameInWorld(id, name));
-        wheel->contype = wheel->conaffinity = 0;  // the pair stands for it
-        AddWheelContact(world, *wheel, NameInWorld(id, name));
+        const std::string wheel = NameInWorld(id, name);
+        AddWheelContact(world, *FindGeom(world, wheel), wheel);
     }
 }
 
 void AddWalls(mjSpec *world, double half_width_m)
 {
-    const double inner_m = half_width_m + kWallHalfThickness_m, long_m = inner_m + kWallHalfThickness_m;
+    const double inner_m = half_width_m + kWallHalfThickness_m,
+                 long_m = inner_m + kWallHalfThickness_m;
     for (int side = 0; side < 4; ++side)
     {
         const int across = side / 2, along = 1 - across;
@@ -181,7 +186,8 @@ mjModel *CompileWorld(const std::string &mjcf, const std::vector<Pose2> &starts,
         mjs_discardVisual(world.get(), nullptr);
     mjModel *model = mj_compile(world.get(), nullptr);
     if (!model)
-        Fail(mjcf, std::string("does not compile with its surroundings: ") + mjs_getError(world.get()));
+        Fail(mjcf,
+             std::string("does not compile with its surroundings: ") + mjs_getError(world.get()));
     return model;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The plant with forces: robots of an MJCF file in MuJoCo, driven through the same chain and effects as
-// the planar plant. Wheels slip, robots push each other, walls hold.
+// The plant with forces: robots of an MJCF file in MuJoCo, driven through the same chain and
+// effects as the planar plant. Wheels slip, robots push each other, walls hold.
 #ifndef PLANT_MUJOCO_MUJOCO_PLANT_H
 #define PLANT_MUJOCO_MUJOCO_PLANT_H
 
@@ -18,10 +18,10 @@ namespace twin
 
 struct MujocoOptions
 {
-    double timestep_s = 0.002;                 // longest physics step; 0.005 is fine for sweeps
+    double timestep_s = 0.002;                   // longest physics step; 0.005 is fine for sweeps
     std::optional<double> arena_half_width_m{};  // walls of a square arena around the origin
-    uint64_t seed = 0;                         // of the drive noise
-    bool visuals = false;                      // keep what is only looked at: for a viewer or a video
+    uint64_t seed = 0;                           // of the drive noise
+    bool visuals = false;  // keep what is only looked at: for a viewer or a video
 };
 
 // How `name` of the MJCF file is called for one robot of the world: "r03_cam".
@@ -30,9 +30,9 @@ std::string NameInWorld(int robot, const std::string &name);
 class MujocoPlant : public Plant
 {
 public:
-    // `mjcf` holds one robot, or a scene with one robot; wheels are joints, geoms and actuators named fl,
-    // fr, rl, rr. One model (Model::ForRobot) and start pose per robot. Throws std::invalid_argument in
-    // one sentence if the file or the models do not fit.
+    // `mjcf` holds one robot, or a scene with one robot; wheels are joints, geoms and actuators
+    // named fl, fr, rl, rr. One model (Model::ForRobot) and start pose per robot. Throws
+    // std::invalid_argument in one sentence if the file or the models do not fit.
     MujocoPlant(const std::string &mjcf, const std::vector<Model> &models,
                 const std::vector<Pose2> &starts, const MujocoOptions &options);
 
@@ -40,8 +40,8 @@ public:
     void SetCommand(int robot, const Command &command) override;
     // Throws std::runtime_error if the simulation became unstable.
     void Step(double dt_s) override;
-    // `rim_mps` is what wheel encoders would read: the hinges, less what gains and ground effects ask of
-    // them so that the body moves as they say.
+    // `rim_mps` is what wheel encoders would read: the hinges, less what gains and ground effects
+    // ask of them so that the body moves as they say.
     const RobotState &State(int robot) const override;
     double TimeS() const override { return data_->time; }
 
@@ -70,9 +70,9 @@ private:
         RobotState chain_state;  // the chain's own memory: its rims know nothing of contacts
         RobotState state;        // what happened
         Command command;
-        int qpos, dof;           // of the free joint
+        int qpos, dof;  // of the free joint
         std::array<Wheel, kWheels> wheels;
-        Wheels offset_mps;       // rim speed asked beyond the chain's, for gains and ground effects
+        Wheels offset_mps;  // rim speed asked beyond the chain's, for gains and ground effects
     };
     Member MakeMember(int robot, const Model &model, const Pose2 &start, uint64_t seed) const;
     void Drive(Member &member, double dt_s);
