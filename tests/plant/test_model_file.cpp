@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <set>
+#include <stdexcept>
+
+#include "model_file/model.h"
+
+namespace twin::test
+{
+namespace
+{
+
+Model Parse(const std::string &text)
+{
+    return Model::FromToml(text, "m.toml");
+}
+
+// What is wrong with the text, in the words of the error.
+std::string Complaint(const std::string &text)
+{
+    try
+    {
+        Parse(text);
+    }
+    catch (const std::invalid_argument &error)
+    {
+        return error.what();
+    }
+    return "accepted";
+}
+
+struct Bad
+{
+    const char *name, *text;
+    std::vector<std::string> says;
+};
+
+class BadModel : public testing::TestWithParam<Bad>
+{
+};
+
+TEST_P(BadModel, GetsOneSentenceThatSaysWhatIsWrong)
+{
+    const std::string complaint = Complaint(GetParam().text);
+    EXPECT_EQ(complaint.rfind("m.toml: ", 0), 0u) << complaint;
+    EXPECT_EQ(complaint.find('\n'), std::string::npos) << complaint;
+    for (const std::string &word : GetParam().says)
+        EXPECT_NE(complaint.find(word), std::string::npos) << "no " << word << " in: " << complaint;
+}
+
+const Bad kBad[] = {
+    {"UnknownKey", "[base]\nforwardgain = 1", {"'forwardgain'", "[base]", "'forward_gain'"}},
+    {"KeyOfAnotherSection", "[base]\nmass_kg = 1", {"'mass_kg'", "[base]"}},
+    {"UnknownSection", "[bas]\nforward_gain = 1", {"'bas'", "'base'"}},
+    {"SectionThatIsNoTable", "robot = 3", {"'robot'", "[robot]"}},
+    {"RobotsThatAreNoTable", "robots = 3", {"'robots'", "[robots]"}},
+    {"SectionThatIsAList", "[[base]]\nforward_gain = 1", {"'base'", "[base]"}},
+    {"EffectThatIsNoList", "[effect]\nname = \"dead_zone\"", {"'effect'", "[[effect]]"}},
+    {"EffectListOfNumbers", "effect = [1, 2]", {"'effect'", "[[effect]]"}},
+    {"UnknownEffect", "[[effect]]\nname = \"ded_zone\"", {"effect", "'ded_zone'", "'dead_zone'"}},
+    {"NamelessEffect", "[[effect]]\nwidth = 0.1", {"[[effect]]", "1", "name"}},
+    {"UnknownParameter",
+     "[[effect]]\nname = \"dead_zone\"\nwdth = 0.1",
+     {"'wdth'", "dead_zone", "'width'"}},
+    {"BelowItsBound", "[robot]\nmass_kg = -1", {"robot.mass_kg = -1 kg", "0.01 to 1000 kg"}},
+    {"AboveItsBound", "[base]\nmotor_lag_s = 2.5", {"base.motor_lag_s = 2.5 s", "0 to 2 s"}},
+    {"PureNumberOutOfBounds", "[base]\nyaw_gain = 9", {"base.yaw_gain = 9 is", "0.05 to 5"}},
+    {"ParameterOutOfBounds",
+     "[[effect]]\nname = \"input_delay\"\ndelay_s = 0.5",
+     {"input_delay.delay_s = 0.5 s", "0 to 0.3 s"}},
+    {"NotANumber", "[robot]\nmass_kg = nan", {"robot.mass_kg", "nan", "kg"}},
+    {"Infinite", "[robot]\nmass_kg = inf", {"robot.mass_kg", "inf", "kg"}},
+    {"InfiniteParameter",
+     "[[effect]]\nname = \"marker_offset\"\nx_m = -inf",
+     {"marker_offset.x_m", "-inf", "-0.5 to 0.5 m"}},
+    {"NotANumberInTheTable", "[base]\nduty_pct = [0, nan]", {"base.duty_pct", "nan"}},
+    {"TextForANumber", "[robot]\nmass_kg = \"1.2\"", {"robot.mass_kg", "number", "kg"}},
+    {"TruthForANumber", "[robot]\nmass_kg = true", {"robot.mass_kg", "number", "kg"}},
+    {"NumberForAChoice", "[base]\ndrive = 3", {"base.drive", "duty", "wheel_speed", "twist"}},
+    {"UnknownDrive", "[base]\ndrive = \"duti\"", {"base.drive", "'duti'", "duty", "twist"}},
+    {"UnknownWheels", "[base]\nwheels = \"six\"", {"base.wheels", "'six'", "mecanum", "omni3"}},
+    {"BrokenToml", "[base]\nforward_gain = 1\nyaw_gain = = 2", {"TOML", "line 3"}},
+    {"KeyTwice", "[base]\nyaw_gain = 1\nyaw_gain = 2", {"TOML", "line 3"}},
+    {"DutyNotAscending",
+     "[base]\nduty_pct = [0, 60, 40, 100]\nwheel_speed_mps = [0, 0.1, 0.2, 0.3]",
+     {"base.duty_pct", "ascending"}},
+    {"DutyTwice",
+     "[base]\nduty_pct = [0, 50, 50, 100]\nwheel_speed_mps = [0, 0.1, 0.2, 0.3]",
+     {"base.duty_pct", "ascending"}},
+    {"DutyNotFromZero",
+     "[base]\nduty_pct = [10, 100]\nwheel_speed_mps = [0, 0.3]",
+     {"base.duty_pct", "from 0"}},
+    {"DutyNotToFull",
+     "[base]\nduty_pct = [0, 80]\nwheel_speed_mps = [0, 0.3]",
+     {"base.duty_pct", "100 percent"}},
+    {"DutyAboveFull",
+     "[base]\nduty_pct = [0, 120]\nwheel_speed_mps = [0, 0.3]",
+     {"base.duty_pct = 120 %", "0 to 100 %"}},
+    {"TableOfUnequalLengths",
+     "[base]\nduty_pct = [0, 100]\nwheel_speed_mps = [0, 0.1, 0.3]",
+     {"base.wheel_speed_mps", "same length"}},
+    {"TableThatIsNoList", "[base]\nduty_pct = 100", {"base.duty_pct", "list"}},
+    {"EmptyTable", "[base]\nduty_pct = []\nwheel_speed_mps = []", {"base.duty_pct"}},
+    {"MotionAtZeroDuty", "[base]\nwheel_speed_mps = [0.1, 0.3]", {"base.wheel_speed_mps"}},
+    {"BackwardsAtForwardDuty",
+     "[base]\nwheel_speed_mps = [0, -0.3]",
+     {"base.wheel_speed_mps = -0.3 m/s", "0 to 10 m/s"}},
+    {"EffectForAnotherDrive",
+     "[base]\ndrive = \"twist\"\n[[effect]]\nname = \"dead_zone\"",
+     {"'dead_zone'", "duties"}},
+    {"RobotOfOneDigit", "[robots.R3]\nyaw_gain = 1", {"robots.R3", "R00 to R99"}},
+    {"RobotWithALetter", "[robots.R3x]\nyaw_gain = 1", {"robots.R3x", "R00 to R99"}},
+    {"RobotWithASign", "[robots.\"R+3\"]\nyaw_gain = 1", {"robots.R+3", "R00 to R99"}},
+    {"RobotInLowerCase", "[robots.r03]\nyaw_gain = 1", {"robots.r03", "R00 to R99"}},
+    {"RobotThatIsNoTable", "[robots]\nR03 = 1", {"robots.R03", "R00 to R99"}},
+    {"UnknownOverride", "[robots.R03]\nyaw_gian = 1", {"'yaw_gian'", "robots.R03", "'yaw_gain'"}},
+    {"OverrideOfTheKind", "[robots.R03]\nmass_kg = 1", {"'mass_kg'", "robots.R03"}},
+    {"OverrideOutOfBounds", "[robots.R03]\ntheta_a1 = 9", {"robots.R03.theta_a1 = 9", "0.05 to 5"}},
+};
+
+INSTANTIATE_TEST_SUITE_P(ModelFile, BadModel, testing::ValuesIn(kBad),
+                         [](const auto &bad) { return bad.param.name; });
+
+constexpr const char *kGood = R"(
+name = "test robot"
+description = "for tests"
+parent = "0123"
+created_by = "twinmill fit"
+[robot]
+mass_kg = 2
+[base]
+drive = "duty"
+wheels = "mecanum"
+duty_pct = [0, 50, 100]
+wheel_speed_mps = [0, 0.1, 0.4]
+forward_gain = 0.9
+[base.std]
+forward_gain = 0.01
+[noise]
+drive_mps = 0.01
+[clock]
+offset_s = -0.1
+[fit]
+anything = "is for people"
+[robots.R03]
+forward_gain = 0.8
+theta_a2 = 1.1
+delay_s = 0.2
+[[effect]]
+name = "dead_zone"
+width = 0.1
+std = { width = 0.01 }
+fitted_on = "a.lcmlog"
+error_before = 2.0
+error_after = 1.1
+[[effect]]
+name = "marker_offset"
+y_m = 0.02
+[[effect]]
+name = "dead_zone"
+width = 0.2
+)";
+
+TEST(ModelFile, ReadsWhatIsThereAndLeavesTheRestAtItsDefaults)
+{
+    const Model model = Parse(kGood), defaults;
+    EXPECT_EQ(model.robot.mass_kg, 2);
+    EXPECT_EQ(model.robot.wheel_radius_m, defaults.robot.wheel_radius_m);
+    EXPECT_EQ(model.base.wheel_speed_mps, (std::vector<double>{0, 0.1, 0.4}));
+    EXPECT_EQ(model.base.forward_gain, 0.9);
+    EXPECT_EQ(model.noise.drive_mps, 0.01);
+    EXPECT_TRUE(model.clock.known);
+    EXPECT_FALSE(Parse("").clock.known);
+    ASSERT_EQ(model.effects.size(), 3u);
+    EXPECT_STREQ(model.effects[1].spec->card.name, "marker_offset");
+    EXPECT_EQ(model.effects[1].values[1], 0.02);
+    EXPECT_EQ(model.effects[1].values[0], model.effects[1].spec->parameters[0].default_value);
+}
+
+TEST(ModelFile, TakesWholeNumbersForReals)
+{
+    EXPECT_EQ(Parse("[robot]\nmass_kg = 3").robot.mass_kg, 3);
+}
+
+TEST(ModelFile, NamesEveryQuantityOnceWithinItsBounds)
+{
+    std::set<std::string> names;
+    for (const NamedValue &value : Parse(kGood).Values())
+    {
+        EXPECT_TRUE(names.insert(value.name).second) << value.name << " twice";
+        EXPECT_FALSE(value.unit.empty()) << value.name;
+        EXPECT_TRUE(value.min <= value.value && value.value <= value.max) << value.name;
+    }
+    for (const char *name : {"base.forward_gain", "base.wheel_speed_mps.2", "dead_zone.width",
+                             "dead_zone#2.width", "marker_offset.y_m", "theta_a1"})
+        EXPECT_TRUE(names.contains(name)) << name;
+}
+
+TEST(ModelFile, GetsBackWhatWasSetUnderEveryName)
+{
+    Model model = Parse(kGood);
+    for (const NamedValue &value : model.Values())
+    {
+        const double middle = (value.min + value.max) / 2;
+        model.Set(value.name, middle);
+        EXPECT_EQ(model.Get(value.name), middle) << value.name;
+    }
+    EXPECT_EQ(model.effects[0].values[0], 0.3);
+    EXPECT_EQ(model.effects[2].values[0], 0.3);
+}
+
+TEST(ModelFile, SetsTheSecondOfTwoEffectsAlone)
+{
+    Model model = Parse(kGood);
+    model.Set("dead_zone#2.width", 0.25);
+    EXPECT_EQ(model.Get("dead_zone.width"), 0.1);
+    EXPECT_EQ(model.effects[2].values[0], 0.25);
+    model.RemoveEffect(0);
+    EXPECT_EQ(model.Get("dead_zone.width"), 0.25);
+    EXPECT_THROW(model.Get("dead_zone#2.width"), std::invalid_argument);
+    EXPECT_THROW(model.RemoveEffect(2), std::invalid_argument);
+}
+
+TEST(ModelFile, RefusesToSetWhatItWouldNotRead)
+{
+    Model model;
+    const double infinite = std::numeric_limits<double>::infinity();
+    for (const double bad : {-1.0, 2.5, infinite, -infinite, std::nan("")})
+        EXPECT_THROW(model.Set("base.motor_lag_s", bad), std::invalid_argument) << bad;
+    EXPECT_EQ(model.base.motor_lag_s, 0);
+    EXPECT_THROW(model.Set("base.motor_lag", 0), std::invalid_argument);
+    EXPECT_THROW(model.Get("base.motor_lag"), std::invalid_argument);
+    try
+    {
+        model.Set("base.motor_lag_s", 2.5);
+    }
+    catch (const std::invalid_argument &error)
+    {
+        EXPECT_NE(std::string(error.what()).find("2.5 s is outside 0 to 2 s"), std::string::npos)
+            << error.what();
+    }
+}
+
+TEST(ModelFile, AddsEffectsAtNeutral)
+{
+    Model model;
+    model.AddEffect("coasting");
+    EXPECT_EQ(model.effects[0].values[0], model.effects[0].spec->parameters[0].neutral);
+    EXPECT_THROW(model.AddEffect("no_such"), std::invalid_argument);
+    model.base.drive = Drive::kWheelSpeed;
+    EXPECT_THROW(model.AddEffect("coasting"), std::invalid_argument);
+    model.AddEffect("wheel_gain");
+    EXPECT_EQ(model.effects.size(), 2u);
+}
+
+TEST(ModelFile, GivesEachRobotItsOwn)
+{
+    const Model model = Parse(kGood), third = model.ForRobot(3), fourth = model.ForRobot(4);
+    EXPECT_EQ(third.base.forward_gain, 0.8);
+    EXPECT_EQ(third.theta_a2, 1.1);
+    EXPECT_EQ(third.sensor.delay_s, 0.2);
+    EXPECT_EQ(third.robot.mass_kg, 2);
+    EXPECT_EQ(third.effects.size(), 3u);
+    EXPECT_EQ(fourth.base.forward_gain, 0.9);
+    EXPECT_EQ(fourth.theta_a2, 1);
+    EXPECT_EQ(model.base.forward_gain, 0.9);
+}
+
+// A folder of installed models, for one test.
+class Installed : public testing::Test
+{
+protected:
+    void SetUp() override
+    {
+        std::filesystem::create_directories(folder_ / "kind");
+        std::ofstream(folder_ / "kind" / "first_test.toml") << "[robot]\nmass_kg = 3\n";
+        std::ofstream(folder_ / "second_test.toml") << "[robot]\nmass_kg = -3\n";
+        std::ofstream(folder_ / "scene.xml") << "<mujoco/>";
+        setenv("TWINMILL_MODELS", folder_.c_str(), 1);
+    }
+    void TearDown() override
+    {
+        unsetenv("TWINMILL_MODELS");
+        std::filesystem::remove_all(folder_);
+    }
+    std::string LoadComplaint(const std::string &name)
+    {
+        try
+        {
+            Model::Load(name);
+        }
+        catch (const std::invalid_argument &error)
+        {
+            return error.what();
+        }
+        return "accepted";
+    }
+    const std::filesystem::path folder_{
+        testing::TempDir() + "twinmill_models_" +
+        testing::UnitTest::GetInstance()->current_test_info()->name()};
+};
+
+TEST_F(Installed, ModelIsFoundByItsName)
+{
+    EXPECT_EQ(Model::Load("first_test.toml").robot.mass_kg, 3);
+}
+
+TEST_F(Installed, ModelIsFoundByItsPath)
+{
+    EXPECT_EQ(Model::Load((folder_ / "kind" / "first_test.toml").string()).robot.mass_kg, 3);
+}
+
+TEST_F(Installed, MissingModelListsThoseThereAre)
+{
+    const std::string complaint = LoadComplaint("third_test.toml");
+    EXPECT_EQ(complaint,
+              "third_test.toml: no such file here, nor among the installed models "
+              "(first_test.toml, second_test.toml)");
+}
+
+TEST_F(Installed, MissingFolderIsNoCrash)
+{
+    setenv("TWINMILL_MODELS", "/no/such/folder", 1);
+    EXPECT_EQ(LoadComplaint("third_test.toml"),
+              "third_test.toml: no such file here, nor among the installed models "
+              "(none in /no/such/folder)");
+}
+
+TEST_F(Installed, ErrorInAFileNamesTheFile)
+{
+    EXPECT_EQ(LoadComplaint("second_test.toml").rfind((folder_ / "second_test.toml").string(), 0),
+              0u);
+}
+
+}  // namespace
+}  // namespace twin::test
