@@ -347,6 +347,13 @@ TEST(MujocoPlant, SaysWhatIsWrongWithAFile)
               std::string::npos);
 }
 
+TEST(MujocoPlant, SaysThatItBecameUnstable)
+{
+    MujocoPlant plant = MakePlant({{0, 0, 0}});
+    plant.data()->qvel[0] = std::nan("");
+    EXPECT_THROW(plant.Step(kControl_s), std::runtime_error);
+}
+
 TEST(MujocoPlant, RefusesWhatItCannotSimulate)
 {
     Model differential;
