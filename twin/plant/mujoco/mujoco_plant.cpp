@@ -42,8 +42,8 @@ void CheckInputs(const std::vector<Model> &models, const std::vector<Pose2> &sta
     for (const Model &model : models)
         if (model.base.wheels == WheelKind::kDifferential || model.base.wheels == WheelKind::kOmni3)
             throw std::invalid_argument(
-                "mujoco plant: base.wheels is not \"mecanum\" or \"none\": the MJCF robot has mecanum "
-                "wheels; use the planar plant");
+                "mujoco plant: base.wheels is not \"mecanum\" or \"none\": the MJCF robot has "
+                "mecanum wheels; use the planar plant");
 }
 
 // Radius and places of the wheels as the MJCF file has them.
