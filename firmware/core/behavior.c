@@ -50,8 +50,10 @@ static const size_t behavior_count = sizeof behaviors / sizeof behaviors[0];
 
 const struct fw_behavior *fw_behavior_find(const char *name)
 {
-    for (size_t i = 0; i < behavior_count; ++i) {
-        if (strcmp(behaviors[i].name, name) == 0) {
+    for (size_t i = 0; i < behavior_count; ++i)
+    {
+        if (strcmp(behaviors[i].name, name) == 0)
+        {
             return &behaviors[i];
         }
     }

@@ -27,9 +27,11 @@ static int find_px(const uint32_t *mask, int width_px, int from_px, int set)
     const uint32_t flip = set ? 0 : UINT32_MAX;
     const int words = (width_px + FW_MASK_WORD_PX - 1) / FW_MASK_WORD_PX;
     uint32_t ahead = UINT32_MAX << (from_px % FW_MASK_WORD_PX);
-    for (int i = from_px / FW_MASK_WORD_PX; i < words; ++i) {
+    for (int i = from_px / FW_MASK_WORD_PX; i < words; ++i)
+    {
         const uint32_t word = (mask[i] ^ flip) & ahead;
-        if (word != 0) {
+        if (word != 0)
+        {
             const int px = i * FW_MASK_WORD_PX + __builtin_ctz(word);
             return px < width_px ? px : width_px;
         }
@@ -43,7 +45,8 @@ static int32_t find_runs(const uint32_t *mask, int width_px, struct fw_run *row)
 {
     int32_t count = 0;
     int begin_px = find_px(mask, width_px, 0, 1);
-    while (begin_px < width_px) {
+    while (begin_px < width_px)
+    {
         const int end_px = find_px(mask, width_px, begin_px, 0);
         row[count] = (struct fw_run){.begin_px = (uint16_t)begin_px,
                                      .end_px = (uint16_t)end_px,
@@ -58,7 +61,8 @@ static int32_t find_runs(const uint32_t *mask, int width_px, struct fw_run *row)
 
 static uint16_t find_root(struct fw_run *row, uint16_t run)
 {
-    while (row[run].parent != run) {
+    while (row[run].parent != run)
+    {
         row[run].parent = row[row[run].parent].parent;
         run = row[run].parent;
     }
@@ -70,7 +74,8 @@ static void unite(struct fw_run *row, uint16_t a, uint16_t b)
 {
     a = find_root(row, a);
     b = find_root(row, b);
-    if (a != b) {
+    if (a != b)
+    {
         row[b].parent = a;
         row[a].area_px += row[b].area_px;
     }
@@ -80,10 +85,13 @@ static void unite(struct fw_run *row, uint16_t a, uint16_t b)
 static void connect(struct fw_run *above, uint16_t above_run, struct fw_run *row, uint16_t run)
 {
     struct fw_run *blob_above = &above[find_root(above, above_run)];
-    if (blob_above->heir == NO_HEIR) {
+    if (blob_above->heir == NO_HEIR)
+    {
         blob_above->heir = run;
         row[find_root(row, run)].area_px += blob_above->area_px;
-    } else {
+    }
+    else
+    {
         unite(row, blob_above->heir, run);
     }
 }
@@ -96,19 +104,26 @@ void fw_blob_add_row(struct fw_blob *blob, const uint32_t *mask, int width_px)
 
     // Both rows are sorted: one walk finds all pairs that touch, by an edge or by a corner.
     int32_t i = 0, j = 0;
-    while (i < blob->above_count && j < count) {
-        if (above[i].begin_px <= row[j].end_px && row[j].begin_px <= above[i].end_px) {
+    while (i < blob->above_count && j < count)
+    {
+        if (above[i].begin_px <= row[j].end_px && row[j].begin_px <= above[i].end_px)
+        {
             connect(above, (uint16_t)i, row, (uint16_t)j);
         }
-        if (above[i].end_px < row[j].end_px) {
+        if (above[i].end_px < row[j].end_px)
+        {
             ++i;
-        } else {
+        }
+        else
+        {
             ++j;
         }
     }
 
-    for (j = 0; j < count; ++j) {
-        if (row[j].area_px > blob->largest_px) {
+    for (j = 0; j < count; ++j)
+    {
+        if (row[j].area_px > blob->largest_px)
+        {
             blob->largest_px = row[j].area_px;
         }
     }

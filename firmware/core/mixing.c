@@ -8,7 +8,8 @@
 static int8_t side_duty_pct(int64_t speed_pct, int64_t turn_milli)
 {
     const int64_t duty_pct = (1000 * speed_pct + FW_TURN_LEVER_PCT * turn_milli) / 1000;
-    if (duty_pct > FW_DUTY_MAX_PCT) {
+    if (duty_pct > FW_DUTY_MAX_PCT)
+    {
         return FW_DUTY_MAX_PCT;
     }
     return duty_pct < -FW_DUTY_MAX_PCT ? -FW_DUTY_MAX_PCT : (int8_t)duty_pct;

@@ -8,7 +8,8 @@
 enum fw_err fw_init(struct fw_ctx *ctx, const struct fw_config *config)
 {
     const enum fw_err err = fw_config_check(config);
-    if (err != FW_OK) {
+    if (err != FW_OK)
+    {
         return err;
     }
     memset(ctx, 0, sizeof *ctx);
@@ -21,7 +22,8 @@ enum fw_err fw_init(struct fw_ctx *ctx, const struct fw_config *config)
 enum fw_err fw_set_table(struct fw_ctx *ctx, const struct fw_table *table)
 {
     const enum fw_err err = fw_table_check(table);
-    if (err == FW_OK) {
+    if (err == FW_OK)
+    {
         ctx->config.table = *table;
     }
     return err;
@@ -37,7 +39,8 @@ void fw_set_running(struct fw_ctx *ctx, bool running)
 static void forget_old_frames(struct fw_ctx *ctx, int64_t now_us)
 {
     if (ctx->has_frame &&
-        fw_watchdog_expired(ctx->frame_utime_us, now_us, ctx->config.frame_timeout_us)) {
+        fw_watchdog_expired(ctx->frame_utime_us, now_us, ctx->config.frame_timeout_us))
+    {
         fw_vote_clear(&ctx->vote);
         ctx->has_frame = false;
         ctx->detected_raw = false;
@@ -49,10 +52,12 @@ static void forget_old_frames(struct fw_ctx *ctx, int64_t now_us)
 
 static enum fw_reject check_time(const struct fw_ctx *ctx, int64_t frame_utime_us, int64_t now_us)
 {
-    if (frame_utime_us > now_us) {
+    if (frame_utime_us > now_us)
+    {
         return FW_REJECT_FUTURE;
     }
-    if (ctx->has_frame && frame_utime_us <= ctx->frame_utime_us) {
+    if (ctx->has_frame && frame_utime_us <= ctx->frame_utime_us)
+    {
         return FW_REJECT_REPEATED;
     }
     return fw_watchdog_expired(frame_utime_us, now_us, ctx->config.frame_timeout_us)
@@ -64,11 +69,15 @@ static enum fw_reject check_time(const struct fw_ctx *ctx, int64_t frame_utime_u
 static int32_t detect(struct fw_ctx *ctx, const struct fw_frame *frame)
 {
     fw_blob_begin(&ctx->blob);
-    for (int y = 0; y < frame->height_px; ++y) {
+    for (int y = 0; y < frame->height_px; ++y)
+    {
         const uint8_t *row = frame->yuyv + (size_t)y * (size_t)frame->stride_bytes;
-        if (fw_threshold_row(&ctx->threshold, row, frame->width_px, ctx->mask)) {
+        if (fw_threshold_row(&ctx->threshold, row, frame->width_px, ctx->mask))
+        {
             fw_blob_add_row(&ctx->blob, ctx->mask, frame->width_px);
-        } else {
+        }
+        else
+        {
             fw_blob_add_empty_row(&ctx->blob);
         }
     }
@@ -104,7 +113,8 @@ static void begin_output(struct fw_ctx *ctx, struct fw_output *out)
 // Every duty that leaves the core passes here.
 static void cap_output(const struct fw_ctx *ctx, struct fw_output *out)
 {
-    if (fw_duty_cap(out->wheel_duty_pct, ctx->config.duty_cap_pct)) {
+    if (fw_duty_cap(out->wheel_duty_pct, ctx->config.duty_cap_pct))
+    {
         out->status_flags |= FW_STATUS_SPEED_CAPPED;
     }
 }
@@ -121,17 +131,21 @@ static void apply_input(const struct fw_ctx *ctx, struct fw_input input, struct 
 static void decide(struct fw_ctx *ctx, enum fw_reject reject, struct fw_output *out)
 {
     begin_output(ctx, out);
-    if (reject != FW_REJECT_NONE) {
+    if (reject != FW_REJECT_NONE)
+    {
         ++ctx->rejected_count[reject];
         out->status_flags |= FW_STATUS_FRAME_REJECTED;
     }
-    if (!ctx->has_frame) {
+    if (!ctx->has_frame)
+    {
         out->status_flags |= FW_STATUS_FRAME_STALE;
     }
-    if (!ctx->running) {
+    if (!ctx->running)
+    {
         return;
     }
-    if (!ctx->has_frame) {
+    if (!ctx->has_frame)
+    {
         out->mode = FW_MODE_FAULT;
         return;
     }
@@ -144,12 +158,15 @@ void fw_step(struct fw_ctx *ctx, const struct fw_frame *frame, int64_t now_us,
 {
     forget_old_frames(ctx, now_us);
     enum fw_reject reject = FW_REJECT_NONE;
-    if (frame != NULL) {
+    if (frame != NULL)
+    {
         reject = fw_frame_check(frame, ctx->config.width_px, ctx->config.height_px);
-        if (reject == FW_REJECT_NONE) {
+        if (reject == FW_REJECT_NONE)
+        {
             reject = check_time(ctx, frame->utime_us, now_us);
         }
-        if (reject == FW_REJECT_NONE) {
+        if (reject == FW_REJECT_NONE)
+        {
             const int32_t blob_px = detect(ctx, frame);
             accept_frame(ctx, blob_px > ctx->config.min_blob_px, blob_px, frame->seq,
                          frame->utime_us);
@@ -163,7 +180,8 @@ void fw_step_bit(struct fw_ctx *ctx, bool detected_raw, int64_t frame_utime_us, 
 {
     forget_old_frames(ctx, now_us);
     const enum fw_reject reject = check_time(ctx, frame_utime_us, now_us);
-    if (reject == FW_REJECT_NONE) {
+    if (reject == FW_REJECT_NONE)
+    {
         accept_frame(ctx, detected_raw, 0, frame_seq, frame_utime_us);
     }
     decide(ctx, reject, out);
@@ -172,7 +190,8 @@ void fw_step_bit(struct fw_ctx *ctx, bool detected_raw, int64_t frame_utime_us, 
 void fw_step_script_input(struct fw_ctx *ctx, const struct fw_input *input, struct fw_output *out)
 {
     begin_output(ctx, out);
-    if (ctx->running) {
+    if (ctx->running)
+    {
         out->mode = FW_MODE_SCRIPT;
         apply_input(ctx, *input, out);
     }
@@ -182,7 +201,8 @@ void fw_step_script_duty(struct fw_ctx *ctx, const int8_t wheel_duty_pct[FW_WHEE
                          struct fw_output *out)
 {
     begin_output(ctx, out);
-    if (ctx->running) {
+    if (ctx->running)
+    {
         out->mode = FW_MODE_SCRIPT;
         memcpy(out->wheel_duty_pct, wheel_duty_pct, sizeof out->wheel_duty_pct);
         cap_output(ctx, out);

@@ -6,7 +6,8 @@ enum fw_err fw_input_check(const struct fw_input *input)
     if (input->speed_input_pct < -FW_SPEED_INPUT_MAX_PCT ||
         input->speed_input_pct > FW_SPEED_INPUT_MAX_PCT ||
         input->turn_input_milli < -FW_TURN_INPUT_MAX_MILLI ||
-        input->turn_input_milli > FW_TURN_INPUT_MAX_MILLI) {
+        input->turn_input_milli > FW_TURN_INPUT_MAX_MILLI)
+    {
         return FW_ERR_INPUT_RANGE;
     }
     return FW_OK;

@@ -30,7 +30,8 @@ struct fw_threshold fw_threshold_make(const struct fw_color_box *box)
     const uint8_t low[4] = {box->y_min, box->u_min, box->y_min, box->v_min};
     const uint8_t high[4] = {box->y_max, box->u_max, box->y_max, box->v_max};
     struct fw_threshold threshold;
-    for (int i = 0; i < 16; ++i) {
+    for (int i = 0; i < 16; ++i)
+    {
         threshold.low[i] = low[i % 4];
         threshold.span[i] = (uint8_t)(high[i % 4] - low[i % 4]);
     }
@@ -65,7 +66,8 @@ static bool row_may_match(const struct fw_threshold *threshold, const uint8_t *y
 {
     pair_vector any = {0};
     int i = 0;
-    for (; i + VECTOR_BYTES <= row_bytes; i += VECTOR_BYTES) {
+    for (; i + VECTOR_BYTES <= row_bytes; i += VECTOR_BYTES)
+    {
         const pair_vector inside = test_bytes(threshold, yuyv + i);
         any |= inside & inside >> 16;
     }
@@ -78,7 +80,8 @@ static uint32_t threshold_block(const struct fw_threshold *threshold, const uint
 {
     uint32_t pairs[FW_MASK_WORD_PX / 2];
     pair_vector any = {0};
-    for (int i = 0; i < BLOCK_BYTES; i += VECTOR_BYTES) {
+    for (int i = 0; i < BLOCK_BYTES; i += VECTOR_BYTES)
+    {
         const pair_vector inside = test_bytes(threshold, yuyv + i);
         const pair_vector chroma = inside >> 8 & inside >> 24;
         // Pixel 0 becomes bit 0 and pixel 1 bit 1.
@@ -87,8 +90,10 @@ static uint32_t threshold_block(const struct fw_threshold *threshold, const uint
         any |= pixels;
     }
     uint32_t word = 0;
-    if (any_set(any)) {
-        for (int i = 0; i < FW_MASK_WORD_PX / 2; ++i) {
+    if (any_set(any))
+    {
+        for (int i = 0; i < FW_MASK_WORD_PX / 2; ++i)
+        {
             word |= pairs[i] << (2 * i);
         }
     }
@@ -100,17 +105,20 @@ bool fw_threshold_row(const struct fw_threshold *threshold, const uint8_t *yuyv,
 {
     const int whole_words = width_px / FW_MASK_WORD_PX;
     const int rest_px = width_px % FW_MASK_WORD_PX;
-    if (!row_may_match(threshold, yuyv, 2 * width_px)) {
+    if (!row_may_match(threshold, yuyv, 2 * width_px))
+    {
         memset(mask, 0, sizeof *mask * (size_t)(whole_words + (rest_px > 0)));
         return false;
     }
     uint32_t any = 0;
-    for (int i = 0; i < whole_words; ++i) {
+    for (int i = 0; i < whole_words; ++i)
+    {
         mask[i] = threshold_block(threshold, yuyv + (size_t)i * BLOCK_BYTES);
         any |= mask[i];
     }
     // A last block that the row does not fill is tested in a copy; bits past the row are cleared.
-    if (rest_px > 0) {
+    if (rest_px > 0)
+    {
         uint8_t padded[BLOCK_BYTES] = {0};
         memcpy(padded, yuyv + (size_t)whole_words * BLOCK_BYTES, 2 * (size_t)rest_px);
         mask[whole_words] = threshold_block(threshold, padded) & ((UINT32_C(1) << rest_px) - 1);

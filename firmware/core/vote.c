@@ -8,8 +8,8 @@ struct fw_vote_config fw_vote_config_default(void)
 
 enum fw_err fw_vote_check(const struct fw_vote_config *config)
 {
-    if (config->max_frames < 1 || config->max_frames > FW_VOTE_MAX_FRAMES ||
-        config->window_us <= 0) {
+    if (config->max_frames < 1 || config->max_frames > FW_VOTE_MAX_FRAMES || config->window_us <= 0)
+    {
         return FW_ERR_VOTE;
     }
     return FW_OK;
@@ -32,11 +32,13 @@ static void forget_oldest(struct fw_vote *vote)
 void fw_vote_push(struct fw_vote *vote, const struct fw_vote_config *config, bool bit,
                   int64_t utime_us)
 {
-    if (vote->count == config->max_frames) {
+    if (vote->count == config->max_frames)
+    {
         forget_oldest(vote);
     }
     while (vote->count > 0 && (uint64_t)utime_us - (uint64_t)vote->utime_us[vote->oldest] >=
-                                  (uint64_t)config->window_us) {
+                                  (uint64_t)config->window_us)
+    {
         forget_oldest(vote);
     }
     const int newest = (vote->oldest + vote->count) % FW_VOTE_MAX_FRAMES;

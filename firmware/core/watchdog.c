@@ -3,7 +3,8 @@
 
 bool fw_watchdog_expired(int64_t frame_utime_us, int64_t now_us, int64_t timeout_us)
 {
-    if (frame_utime_us > now_us) {
+    if (frame_utime_us > now_us)
+    {
         return true;
     }
     // The true age fits an unsigned number whatever the two times are.
@@ -13,11 +14,15 @@ bool fw_watchdog_expired(int64_t frame_utime_us, int64_t now_us, int64_t timeout
 bool fw_duty_cap(int8_t wheel_duty_pct[FW_WHEEL_COUNT], int32_t cap_pct)
 {
     bool capped = false;
-    for (int i = 0; i < FW_WHEEL_COUNT; ++i) {
-        if (wheel_duty_pct[i] > cap_pct) {
+    for (int i = 0; i < FW_WHEEL_COUNT; ++i)
+    {
+        if (wheel_duty_pct[i] > cap_pct)
+        {
             wheel_duty_pct[i] = (int8_t)cap_pct;
             capped = true;
-        } else if (wheel_duty_pct[i] < -cap_pct) {
+        }
+        else if (wheel_duty_pct[i] < -cap_pct)
+        {
             wheel_duty_pct[i] = (int8_t)-cap_pct;
             capped = true;
         }

@@ -17,7 +17,8 @@ static inline uint32_t random_next(uint32_t *state)
 
 // A YUYV image whose rows are 2 * width_px bytes of pixels and then padding. The buffer is from the
 // heap and ends with the last pixel, so that a sanitizer sees a read past it.
-struct image {
+struct image
+{
     uint8_t *yuyv;
     int width_px, height_px, stride_bytes;
     size_t length_bytes;
@@ -35,8 +36,10 @@ static inline void image_set(struct image *image, int x, int y, uint8_t luma, ui
 static inline void image_fill(struct image *image, int x0, int y0, int x1, int y1,
                               const uint8_t yuv[3])
 {
-    for (int y = y0; y < y1; ++y) {
-        for (int x = x0; x < x1; ++x) {
+    for (int y = y0; y < y1; ++y)
+    {
+        for (int x = x0; x < x1; ++x)
+        {
             image_set(image, x, y, yuv[0], yuv[1], yuv[2]);
         }
     }
@@ -49,16 +52,17 @@ static const uint8_t kGrey[3] = {126, 128, 128};
 // A grey image; whoever makes it frees yuyv.
 static inline struct image image_make(int width_px, int height_px, int padding_bytes)
 {
-    struct image image = {.width_px = width_px,
-                          .height_px = height_px,
-                          .stride_bytes = 2 * width_px + padding_bytes};
+    struct image image = {
+        .width_px = width_px, .height_px = height_px, .stride_bytes = 2 * width_px + padding_bytes};
     image.length_bytes = (size_t)(image.stride_bytes * height_px - padding_bytes);
     image.yuyv = malloc(image.length_bytes);
-    if (image.yuyv == NULL) {
+    if (image.yuyv == NULL)
+    {
         abort();
     }
     // Padding is green, so that a test fails if it is read as pixels.
-    for (size_t i = 0; i < image.length_bytes; ++i) {
+    for (size_t i = 0; i < image.length_bytes; ++i)
+    {
         image.yuyv[i] = kGreen[i % 4 == 1 ? 1 : i % 4 == 3 ? 2 : 0];
     }
     image_fill(&image, 0, 0, width_px, height_px, kGrey);

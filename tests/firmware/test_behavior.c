@@ -12,10 +12,12 @@ void tearDown(void) {}
 // Fixture
 
 // The authors' programs as published: (speed, direction in degrees, turn positive clockwise).
-struct vendor_input {
+struct vendor_input
+{
     int speed_pct, direction_deg, turn_milli;
 };
-struct vendor_behavior {
+struct vendor_behavior
+{
     const char *name;
     struct vendor_input seen, unseen;
 };
@@ -42,7 +44,8 @@ static void assert_translated(struct vendor_input vendor, struct fw_input ours, 
 
 static void test_every_published_behavior_is_there_with_its_turn_negated(void)
 {
-    for (size_t i = 0; i < sizeof published / sizeof published[0]; ++i) {
+    for (size_t i = 0; i < sizeof published / sizeof published[0]; ++i)
+    {
         const struct fw_behavior *behavior = fw_behavior_find(published[i].name);
         TEST_ASSERT_NOT_NULL_MESSAGE(behavior, published[i].name);
         assert_translated(published[i].seen, behavior->table.seen, published[i].name);
@@ -67,12 +70,14 @@ static void test_self_centering_spins_on_the_spot_against_its_circle(void)
 static void test_list_is_sorted_and_every_entry_is_found_and_in_range(void)
 {
     TEST_ASSERT_NULL(fw_behavior_at(fw_behavior_count()));
-    for (size_t i = 0; i < fw_behavior_count(); ++i) {
+    for (size_t i = 0; i < fw_behavior_count(); ++i)
+    {
         const struct fw_behavior *behavior = fw_behavior_at(i);
         TEST_ASSERT_EQUAL_PTR(behavior, fw_behavior_find(behavior->name));
         TEST_ASSERT_EQUAL_INT(FW_OK, fw_table_check(&behavior->table));
         TEST_ASSERT_TRUE(strlen(behavior->summary) > 0);
-        if (i > 0) {
+        if (i > 0)
+        {
             TEST_ASSERT_TRUE(strcmp(fw_behavior_at(i - 1)->name, behavior->name) < 0);
         }
     }

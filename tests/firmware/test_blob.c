@@ -13,7 +13,10 @@ static struct fw_blob blob;
 static uint8_t picture[MAX_H][MAX_W];
 static int stack[MAX_H * MAX_W];
 
-void setUp(void) { memset(picture, 0, sizeof picture); }
+void setUp(void)
+{
+    memset(picture, 0, sizeof picture);
+}
 void tearDown(void) {}
 
 // Fixture
@@ -22,16 +25,21 @@ static int32_t largest_by_core(int width_px, int height_px)
 {
     uint32_t mask[FW_MASK_WORDS];
     fw_blob_begin(&blob);
-    for (int y = 0; y < height_px; ++y) {
+    for (int y = 0; y < height_px; ++y)
+    {
         memset(mask, 0, sizeof mask);
         int count = 0;
-        for (int x = 0; x < width_px; ++x) {
+        for (int x = 0; x < width_px; ++x)
+        {
             mask[x / 32] |= (uint32_t)picture[y][x] << (x % 32);
             count += picture[y][x];
         }
-        if (count > 0) {
+        if (count > 0)
+        {
             fw_blob_add_row(&blob, mask, width_px);
-        } else {
+        }
+        else
+        {
             fw_blob_add_empty_row(&blob);
         }
     }
@@ -45,12 +53,16 @@ static int32_t flood(int width_px, int height_px, int x, int y)
     int depth = 0;
     stack[depth++] = y * MAX_W + x;
     picture[y][x] = 0;
-    while (depth > 0) {
+    while (depth > 0)
+    {
         const int at = stack[--depth];
         ++area_px;
-        for (int ny = at / MAX_W - 1; ny <= at / MAX_W + 1; ++ny) {
-            for (int nx = at % MAX_W - 1; nx <= at % MAX_W + 1; ++nx) {
-                if (nx >= 0 && nx < width_px && ny >= 0 && ny < height_px && picture[ny][nx]) {
+        for (int ny = at / MAX_W - 1; ny <= at / MAX_W + 1; ++ny)
+        {
+            for (int nx = at % MAX_W - 1; nx <= at % MAX_W + 1; ++nx)
+            {
+                if (nx >= 0 && nx < width_px && ny >= 0 && ny < height_px && picture[ny][nx])
+                {
                     picture[ny][nx] = 0;
                     stack[depth++] = ny * MAX_W + nx;
                 }
@@ -63,8 +75,10 @@ static int32_t flood(int width_px, int height_px, int x, int y)
 static int32_t largest_by_flood_fill(int width_px, int height_px)
 {
     int32_t largest_px = 0;
-    for (int y = 0; y < height_px; ++y) {
-        for (int x = 0; x < width_px; ++x) {
+    for (int y = 0; y < height_px; ++y)
+    {
+        for (int x = 0; x < width_px; ++x)
+        {
             const int32_t area_px = picture[y][x] ? flood(width_px, height_px, x, y) : 0;
             largest_px = area_px > largest_px ? area_px : largest_px;
         }
@@ -74,8 +88,10 @@ static int32_t largest_by_flood_fill(int width_px, int height_px)
 
 static void draw(const char *const *rows, int height_px)
 {
-    for (int y = 0; y < height_px; ++y) {
-        for (int x = 0; rows[y][x] != '\0'; ++x) {
+    for (int y = 0; y < height_px; ++y)
+    {
+        for (int x = 0; rows[y][x] != '\0'; ++x)
+        {
             picture[y][x] = rows[y][x] == '#';
         }
     }
@@ -125,12 +141,15 @@ static void test_arms_that_meet_below_count_once(void)
 static void test_random_pictures_agree_with_a_flood_fill(void)
 {
     uint32_t state = 1;
-    for (int trial = 0; trial < 3000; ++trial) {
+    for (int trial = 0; trial < 3000; ++trial)
+    {
         const int width_px = 1 + (int)(random_next(&state) % 150);
         const int height_px = 1 + (int)(random_next(&state) % 24);
         const uint32_t share = random_next(&state) % 256;
-        for (int y = 0; y < height_px; ++y) {
-            for (int x = 0; x < width_px; ++x) {
+        for (int y = 0; y < height_px; ++y)
+        {
+            for (int x = 0; x < width_px; ++x)
+            {
                 picture[y][x] = (random_next(&state) >> 24) < share;
             }
         }
@@ -142,8 +161,10 @@ static void test_random_pictures_agree_with_a_flood_fill(void)
 // Every second pixel set is the most runs that a row can hold.
 static void test_widest_row_of_single_pixels_fits(void)
 {
-    for (int y = 0; y < MAX_H; ++y) {
-        for (int x = 0; x < MAX_W; x += 2) {
+    for (int y = 0; y < MAX_H; ++y)
+    {
+        for (int x = 0; x < MAX_W; x += 2)
+        {
             picture[y][x] = 1;
         }
     }
@@ -152,8 +173,10 @@ static void test_widest_row_of_single_pixels_fits(void)
 
 static void test_checkerboard_is_one_blob(void)
 {
-    for (int y = 0; y < MAX_H; ++y) {
-        for (int x = y % 2; x < MAX_W; x += 2) {
+    for (int y = 0; y < MAX_H; ++y)
+    {
+        for (int x = y % 2; x < MAX_W; x += 2)
+        {
             picture[y][x] = 1;
         }
     }

@@ -5,7 +5,10 @@
 
 static struct fw_config config;
 
-void setUp(void) { config = fw_config_default(); }
+void setUp(void)
+{
+    config = fw_config_default();
+}
 void tearDown(void) {}
 
 // Test
@@ -25,7 +28,8 @@ static void test_default_is_the_authors_robot_and_in_range(void)
 static void test_sizes_out_of_range_are_refused(void)
 {
     const int bad[][2] = {{0, 480}, {-2, 480}, {641, 480}, {1282, 480}, {640, 0}, {640, 1025}};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i)
+    {
         config.width_px = bad[i][0];
         config.height_px = bad[i][1];
         TEST_ASSERT_EQUAL_INT(FW_ERR_FRAME_SIZE, fw_config_check(&config));
@@ -39,7 +43,8 @@ static void test_each_empty_side_of_the_box_is_refused(void)
 {
     const struct fw_color_box boxes[] = {
         {2, 1, 0, 255, 0, 255}, {0, 255, 2, 1, 0, 255}, {0, 255, 0, 255, 2, 1}};
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 3; ++i)
+    {
         config.box = boxes[i];
         TEST_ASSERT_EQUAL_INT(FW_ERR_BOX, fw_config_check(&config));
     }

@@ -12,9 +12,11 @@ void tearDown(void) {}
 
 static void test_every_code_has_its_own_text(void)
 {
-    for (int a = FW_OK; a <= FW_ERR_END; ++a) {
+    for (int a = FW_OK; a <= FW_ERR_END; ++a)
+    {
         TEST_ASSERT_TRUE(strcmp(fw_err_str((enum fw_err)a), "unknown error") != 0);
-        for (int b = FW_OK; b < a; ++b) {
+        for (int b = FW_OK; b < a; ++b)
+        {
             TEST_ASSERT_TRUE(strcmp(fw_err_str((enum fw_err)a), fw_err_str((enum fw_err)b)) != 0);
         }
     }

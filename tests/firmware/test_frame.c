@@ -68,10 +68,12 @@ static void test_hugest_stride_is_short_not_overflow(void)
 
 static void test_every_reason_has_its_own_name(void)
 {
-    for (int a = 0; a <= FW_REJECT_COUNT; ++a) {
-        for (int b = 0; b < a; ++b) {
-            TEST_ASSERT_TRUE(strcmp(fw_reject_str((enum fw_reject)a),
-                                    fw_reject_str((enum fw_reject)b)) != 0);
+    for (int a = 0; a <= FW_REJECT_COUNT; ++a)
+    {
+        for (int b = 0; b < a; ++b)
+        {
+            TEST_ASSERT_TRUE(
+                strcmp(fw_reject_str((enum fw_reject)a), fw_reject_str((enum fw_reject)b)) != 0);
         }
     }
 }

@@ -58,11 +58,14 @@ static void test_mix_truncates_the_sum_toward_zero(void)
 static void test_mix_equals_the_vendors_formula_for_all_inputs(void)
 {
     int compared = 0;
-    for (int speed_pct = -100; speed_pct <= 100; ++speed_pct) {
-        for (int turn_milli = -2000; turn_milli <= 2000; ++turn_milli) {
+    for (int speed_pct = -100; speed_pct <= 100; ++speed_pct)
+    {
+        for (int turn_milli = -2000; turn_milli <= 2000; ++turn_milli)
+        {
             const double clockwise = -turn_milli / 1000.0;
             const double vp_pct = -clockwise * (67 + 59);
-            if (126 * turn_milli % 1000 == 0) {
+            if (126 * turn_milli % 1000 == 0)
+            {
                 continue;
             }
             int8_t duty_pct[FW_WHEEL_COUNT];
@@ -80,7 +83,8 @@ static void test_mix_equals_the_vendors_formula_for_all_inputs(void)
 
 static void test_mix_whole_sums_are_exact(void)
 {
-    for (int speed_pct = -100; speed_pct <= 100; ++speed_pct) {
+    for (int speed_pct = -100; speed_pct <= 100; ++speed_pct)
+    {
         assert_sides(speed_pct, 0, speed_pct, speed_pct);
     }
     assert_sides(10, 500, -53, 73);
@@ -88,8 +92,10 @@ static void test_mix_whole_sums_are_exact(void)
 
 static void test_mix_mirrors_with_the_turn_and_negates_with_the_input(void)
 {
-    for (int speed_pct = -100; speed_pct <= 100; speed_pct += 3) {
-        for (int turn_milli = 0; turn_milli <= 2000; turn_milli += 7) {
+    for (int speed_pct = -100; speed_pct <= 100; speed_pct += 3)
+    {
+        for (int turn_milli = 0; turn_milli <= 2000; turn_milli += 7)
+        {
             int8_t duty_pct[FW_WHEEL_COUNT];
             const struct fw_input input = {speed_pct, turn_milli};
             fw_mix(&input, duty_pct);

@@ -21,7 +21,10 @@ void setUp(void)
     TEST_ASSERT_EQUAL_INT(FW_OK, fw_init(&ctx, &config));
     image = image_make(640, 480, 0);
 }
-void tearDown(void) { free(image.yuyv); }
+void tearDown(void)
+{
+    free(image.yuyv);
+}
 
 // Fixture
 
@@ -182,7 +185,8 @@ static void test_votes_from_before_a_gap_do_not_count(void)
 {
     config.vote.max_frames = 10;
     TEST_ASSERT_EQUAL_INT(FW_OK, fw_init(&ctx, &config));
-    for (int i = 1; i <= 10; ++i) {
+    for (int i = 1; i <= 10; ++i)
+    {
         fw_step_bit(&ctx, true, i * PERIOD_US, (uint32_t)i, i * PERIOD_US, &out);
     }
     TEST_ASSERT_EQUAL_INT(1, out.detected);
@@ -201,16 +205,20 @@ static void test_bit_and_pixels_take_the_same_decisions(void)
     struct image green = image_make(640, 480, 0);
     image_fill(&green, 300, 200, 340, 240, kGreen);
     uint32_t state = 5;
-    for (int i = 1; i <= 300; ++i) {
+    for (int i = 1; i <= 300; ++i)
+    {
         const int64_t now_us = (int64_t)i * PERIOD_US;
         const bool seen = random_next(&state) % 2;
         const struct fw_frame frame = frame_of(seen ? &green : &image, now_us - 100, (uint32_t)i);
         const bool missing = random_next(&state) % 2;
         struct fw_output bare_out;
         fw_step(&ctx, missing ? NULL : &frame, now_us, &out);
-        if (missing) {
+        if (missing)
+        {
             fw_step(&bare, NULL, now_us, &bare_out);
-        } else {
+        }
+        else
+        {
             fw_step_bit(&bare, seen, now_us - 100, (uint32_t)i, now_us, &bare_out);
         }
         TEST_ASSERT_EQUAL_INT(out.detected_raw ? 1600 : 0, out.blob_px);
@@ -229,20 +237,26 @@ static void test_robots_in_one_process_do_not_influence_each_other(void)
     uint8_t bit[200];
     uint32_t state = 9;
     struct fw_output expected[2][200];
-    for (int r = 0; r < 2; ++r) {
+    for (int r = 0; r < 2; ++r)
+    {
         TEST_ASSERT_EQUAL_INT(FW_OK, fw_init(&together[r], &configs[r]));
         TEST_ASSERT_EQUAL_INT(FW_OK, fw_init(&alone[r], &configs[r]));
     }
-    for (int i = 0; i < 200; ++i) {
+    for (int i = 0; i < 200; ++i)
+    {
         bit[i] = random_next(&state) % 4;
     }
-    for (int r = 0; r < 2; ++r) {
-        for (int i = 0; i < 200; ++i) {
+    for (int r = 0; r < 2; ++r)
+    {
+        for (int i = 0; i < 200; ++i)
+        {
             fw_step_bit(&alone[r], bit[i] >> r & 1, i, (uint32_t)i, i, &expected[r][i]);
         }
     }
-    for (int i = 0; i < 200; ++i) {
-        for (int r = 0; r < 2; ++r) {
+    for (int i = 0; i < 200; ++i)
+    {
+        for (int r = 0; r < 2; ++r)
+        {
             fw_step_bit(&together[r], bit[i] >> r & 1, i, (uint32_t)i, i, &out);
             TEST_ASSERT_EQUAL_MEMORY(&expected[r][i], &out, sizeof out);
         }

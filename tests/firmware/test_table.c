@@ -20,7 +20,8 @@ static void test_lookup_takes_the_row_of_the_bit(void)
 // Speed input -100..100 and turn input -2..2 are the robot's published ranges.
 static void test_check_takes_the_ends_of_the_range_and_nothing_beyond(void)
 {
-    for (int sign = -1; sign <= 1; sign += 2) {
+    for (int sign = -1; sign <= 1; sign += 2)
+    {
         const struct fw_input end = {sign * 100, sign * 2000};
         const struct fw_input fast = {sign * 101, 0}, sharp = {0, sign * 2001};
         TEST_ASSERT_EQUAL_INT(FW_OK, fw_input_check(&end));

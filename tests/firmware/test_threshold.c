@@ -34,7 +34,8 @@ static void assert_row(const struct fw_color_box *box, const uint8_t *yuyv, int 
     memset(expected, 0xA5, sizeof expected);
     memset(expected, 0, 4 * (size_t)((width_px + 31) / 32));
     bool any = false;
-    for (int x = 0; x < width_px; ++x) {
+    for (int x = 0; x < width_px; ++x)
+    {
         const uint8_t *pair = yuyv + 4 * (x / 2);
         const bool set = inside(box, pair[2 * (x % 2)], pair[1], pair[3]);
         expected[x / 32] |= (uint32_t)set << (x % 32);
@@ -50,14 +51,17 @@ static void assert_row(const struct fw_color_box *box, const uint8_t *yuyv, int 
 static void test_random_rows_agree_with_the_definition_at_every_width(void)
 {
     uint32_t state = 7;
-    for (int trial = 0; trial < 20000; ++trial) {
+    for (int trial = 0; trial < 20000; ++trial)
+    {
         int width_px = 2 * (trial + 1);
-        if (width_px > FW_MAX_WIDTH_PX) {
+        if (width_px > FW_MAX_WIDTH_PX)
+        {
             width_px = 2 * (1 + (int)(random_next(&state) % 70));
         }
         uint8_t limits[6];
         const uint8_t base = (uint8_t)(random_next(&state) % 3 * 125);
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < 3; ++i)
+        {
             limits[2 * i] = (uint8_t)(base + random_next(&state) % 3);
             limits[2 * i + 1] = (uint8_t)(limits[2 * i] + random_next(&state) % 3);
         }
@@ -66,7 +70,8 @@ static void test_random_rows_agree_with_the_definition_at_every_width(void)
         // From the heap and of the exact size, so that a sanitizer sees a read past the row.
         uint8_t *yuyv = malloc(2 * (size_t)width_px);
         TEST_ASSERT_NOT_NULL(yuyv);
-        for (int i = 0; i < 2 * width_px; ++i) {
+        for (int i = 0; i < 2 * width_px; ++i)
+        {
             yuyv[i] = (uint8_t)(base + random_next(&state) % 5);
         }
         assert_row(&box, yuyv, width_px);
@@ -77,7 +82,8 @@ static void test_random_rows_agree_with_the_definition_at_every_width(void)
 static void test_single_pixel_is_found_at_every_place(void)
 {
     const struct fw_color_box box = fw_color_box_green();
-    for (int x = 0; x < 640; ++x) {
+    for (int x = 0; x < 640; ++x)
+    {
         struct image image = image_make(640, 1, 0);
         image_set(&image, x, 0, kGreen[0], kGreen[1], kGreen[2]);
         // The pixel beside it shares the chroma but is too dark.
@@ -93,7 +99,8 @@ static void test_limits_belong_to_the_box_and_beyond_does_not(void)
     const uint8_t low[3] = {50, 70, 90}, high[3] = {60, 80, 100};
     TEST_ASSERT_TRUE(matches(&box, low));
     TEST_ASSERT_TRUE(matches(&box, high));
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 3; ++i)
+    {
         uint8_t below[3], above[3];
         memcpy(below, low, 3);
         memcpy(above, high, 3);

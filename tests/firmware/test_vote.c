@@ -6,7 +6,10 @@
 
 static struct fw_vote vote;
 
-void setUp(void) { fw_vote_clear(&vote); }
+void setUp(void)
+{
+    fw_vote_clear(&vote);
+}
 void tearDown(void) {}
 
 // Fixture
@@ -19,7 +22,9 @@ static bool majority(const struct fw_vote_config *config, const bool *bit, const
 {
     int ones = 0, count = 0;
     for (int i = newest; i >= 0 && newest - i < config->max_frames &&
-                         utime_us[newest] - utime_us[i] < config->window_us; --i) {
+                         utime_us[newest] - utime_us[i] < config->window_us;
+         --i)
+    {
         ones += bit[i];
         ++count;
     }
@@ -36,10 +41,12 @@ static void test_nothing_seen_yet_is_no(void)
 static void test_default_needs_six_of_ten(void)
 {
     const struct fw_vote_config config = fw_vote_config_default();
-    for (int i = 0; i < 10; ++i) {
+    for (int i = 0; i < 10; ++i)
+    {
         fw_vote_push(&vote, &config, false, i);
     }
-    for (int i = 10; i < 15; ++i) {
+    for (int i = 10; i < 15; ++i)
+    {
         fw_vote_push(&vote, &config, true, i);
         TEST_ASSERT_FALSE(fw_vote_result(&vote));
     }
@@ -61,7 +68,8 @@ static void test_first_frames_are_a_shorter_list(void)
 static void test_one_frame_is_no_vote_at_all(void)
 {
     const struct fw_vote_config config = {.max_frames = 1, .window_us = INT64_MAX};
-    for (int i = 0; i < 20; ++i) {
+    for (int i = 0; i < 20; ++i)
+    {
         fw_vote_push(&vote, &config, i % 3 == 0, i);
         TEST_ASSERT_EQUAL(i % 3 == 0, fw_vote_result(&vote));
     }
@@ -83,12 +91,14 @@ static void test_random_sequences_agree_with_the_definition(void)
     static bool bit[SEQUENCE];
     static int64_t utime_us[SEQUENCE];
     uint32_t state = 3;
-    for (int trial = 0; trial < 300; ++trial) {
+    for (int trial = 0; trial < 300; ++trial)
+    {
         fw_vote_clear(&vote);
         const struct fw_vote_config config = {
             .max_frames = 1 + (int32_t)(random_next(&state) % FW_VOTE_MAX_FRAMES),
             .window_us = trial % 2 == 0 ? INT64_MAX : 1 + random_next(&state) % 2000};
-        for (int i = 0; i < SEQUENCE; ++i) {
+        for (int i = 0; i < SEQUENCE; ++i)
+        {
             bit[i] = random_next(&state) % 2;
             utime_us[i] = (i > 0 ? utime_us[i - 1] : 0) + 1 + random_next(&state) % 60;
             fw_vote_push(&vote, &config, bit[i], utime_us[i]);

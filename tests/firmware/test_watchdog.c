@@ -30,12 +30,15 @@ static void test_any_two_times_can_be_compared(void)
 // All duties and all caps against the definition of a clamp.
 static void test_cap_clamps_every_duty_and_says_so(void)
 {
-    for (int cap_pct = 0; cap_pct <= 100; ++cap_pct) {
-        for (int duty_pct = -128; duty_pct <= 127; ++duty_pct) {
+    for (int cap_pct = 0; cap_pct <= 100; ++cap_pct)
+    {
+        for (int duty_pct = -128; duty_pct <= 127; ++duty_pct)
+        {
             const int clamped_pct = duty_pct > cap_pct    ? cap_pct
                                     : duty_pct < -cap_pct ? -cap_pct
                                                           : duty_pct;
-            for (int wheel = 0; wheel < FW_WHEEL_COUNT; ++wheel) {
+            for (int wheel = 0; wheel < FW_WHEEL_COUNT; ++wheel)
+            {
                 int8_t duties_pct[FW_WHEEL_COUNT] = {0};
                 duties_pct[wheel] = (int8_t)duty_pct;
                 const bool capped = fw_duty_cap(duties_pct, cap_pct);

@@ -11,7 +11,8 @@
 extern "C" {
 #endif
 
-struct fw_behavior {
+struct fw_behavior
+{
     const char *name;
     // What the swarm does, in a few words, for help texts.
     const char *summary;

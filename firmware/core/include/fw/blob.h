@@ -16,7 +16,8 @@ extern "C" {
 #define FW_MAX_RUNS_PER_ROW (FW_MAX_WIDTH_PX / 2)
 
 // Neighbouring set pixels of one row, [begin_px, end_px).
-struct fw_run {
+struct fw_run
+{
     uint16_t begin_px, end_px;
     // Union-find over the runs of one row: index of another run of the same blob, or of itself.
     uint16_t parent;
@@ -27,7 +28,8 @@ struct fw_run {
 };
 
 // Pixels that touch by an edge or a corner are connected (8-connected, as in OpenCV's contours).
-struct fw_blob {
+struct fw_blob
+{
     struct fw_run rows[2][FW_MAX_RUNS_PER_ROW];
     // Runs in the row above, and which of the two rows that is.
     int32_t above_count;

@@ -14,7 +14,8 @@
 extern "C" {
 #endif
 
-struct fw_config {
+struct fw_config
+{
     // Size of every frame: at most FW_MAX_WIDTH_PX by FW_MAX_HEIGHT_PX, the width even.
     int32_t width_px, height_px;
     struct fw_color_box box;

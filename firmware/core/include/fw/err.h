@@ -9,7 +9,8 @@ extern "C" {
 
 #define FW_MUST_CHECK __attribute__((warn_unused_result))
 
-enum fw_err {
+enum fw_err
+{
     FW_OK = 0,
     // Configuration of the core.
     FW_ERR_FRAME_SIZE,

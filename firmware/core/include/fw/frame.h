@@ -15,7 +15,8 @@ extern "C" {
 #define FW_MAX_HEIGHT_PX 1024
 
 // Two neighbouring pixels are four bytes, Y0 U Y1 V: each has its own Y, they share U and V.
-struct fw_frame {
+struct fw_frame
+{
     const uint8_t *yuyv;
     int width_px;
     int height_px;
@@ -30,7 +31,8 @@ struct fw_frame {
 };
 
 // Why a frame was not used. fw_ctx counts each.
-enum fw_reject {
+enum fw_reject
+{
     FW_REJECT_NONE = 0,
     // Not of the configured width and height, or rows overlap, or there are no bytes at all.
     FW_REJECT_SIZE,

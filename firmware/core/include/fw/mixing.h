@@ -11,7 +11,8 @@
 extern "C" {
 #endif
 
-enum fw_wheel {
+enum fw_wheel
+{
     FW_FRONT_LEFT = 0,
     FW_FRONT_RIGHT,
     FW_REAR_LEFT,

@@ -20,7 +20,8 @@ extern "C" {
 #endif
 
 // As in telemetry_t.
-enum fw_mode {
+enum fw_mode
+{
     FW_MODE_STOPPED = 0,
     FW_MODE_TABLE = 1,
     FW_MODE_SCRIPT = 2,
@@ -28,7 +29,8 @@ enum fw_mode {
 };
 
 // Bits of status_flags that the core sets, as in telemetry_t; the application adds its own.
-enum fw_status {
+enum fw_status
+{
     FW_STATUS_FRAME_STALE = 1,
     FW_STATUS_FRAME_REJECTED = 2,
     FW_STATUS_SPEED_CAPPED = 4,
@@ -36,7 +38,8 @@ enum fw_status {
 
 // All state of one robot, about 16 KB; any number of them may live in one process. Read freely,
 // change through the functions below.
-struct fw_ctx {
+struct fw_ctx
+{
     struct fw_config config;
     struct fw_threshold threshold;
     uint32_t mask[FW_MASK_WORDS];
@@ -56,7 +59,8 @@ struct fw_ctx {
 };
 
 // Everything telemetry_t says of the decision.
-struct fw_output {
+struct fw_output
+{
     // Of the frame that decided; 0 if there was none.
     int64_t frame_utime_us;
     uint32_t frame_seq;

@@ -15,14 +15,16 @@ extern "C" {
 #define FW_SPEED_INPUT_MAX_PCT 100
 #define FW_TURN_INPUT_MAX_MILLI 2000
 
-struct fw_input {
+struct fw_input
+{
     // [-100, 100], positive forward.
     int32_t speed_input_pct;
     // [-2000, 2000], positive counter-clockwise (left); 1000 is a turn input of 1.
     int32_t turn_input_milli;
 };
 
-struct fw_table {
+struct fw_table
+{
     struct fw_input unseen;
     struct fw_input seen;
 };

@@ -16,14 +16,16 @@ extern "C" {
 #define FW_MASK_WORDS (FW_MAX_WIDTH_PX / FW_MASK_WORD_PX)
 
 // Limits of the colour, both ends included; BT.601 studio range as cameras send it.
-struct fw_color_box {
+struct fw_color_box
+{
     uint8_t y_min, y_max;
     uint8_t u_min, u_max;
     uint8_t v_min, v_max;
 };
 
 // The box laid out like 16 bytes of YUYV: a byte b is inside where (uint8_t)(b - low) <= span.
-struct fw_threshold {
+struct fw_threshold
+{
     uint8_t low[16];
     uint8_t span[16];
 };

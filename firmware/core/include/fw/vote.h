@@ -16,14 +16,16 @@ extern "C" {
 
 // A frame counts while it is among the newest max_frames and exposed less than window_us before the
 // newest. Over frames alone: window_us = INT64_MAX. Over time: max_frames = FW_VOTE_MAX_FRAMES.
-struct fw_vote_config {
+struct fw_vote_config
+{
     // [1, FW_VOTE_MAX_FRAMES]
     int32_t max_frames;
     // > 0
     int64_t window_us;
 };
 
-struct fw_vote {
+struct fw_vote
+{
     int64_t utime_us[FW_VOTE_MAX_FRAMES];
     uint8_t bit[FW_VOTE_MAX_FRAMES];
     // Ring: index of the oldest, how many there are, how many of them are 1.
