@@ -53,21 +53,78 @@ TEST(InputDelay, RemembersANewCommandEveryFiveMilliseconds)
     }
 }
 
-TEST(InputDelay, DelaysEachWheelsOwnCommand)
+// Given from 0 to 20 ms, it arrives at 30 ms: the step from 20 ms on is cut there.
+TEST(InputDelay, CutsTheStepWhereACommandArrives)
 {
     const auto effect = FindEffect("input_delay")->make(std::vector<double>{0.03});
     std::vector<double> state(static_cast<size_t>(effect->StateSize()), 0.0);
-    Signals s;
-    for (int step = 0; step < 2; ++step)
+    const Wheels command{1, -1, 0.5, 0};
+    const struct
     {
-        s.t_s = 0.02 * step;
-        s.dt_s = 0.02;
-        s.duty = {1, -1, 0.5, 0};
+        double t_s, dt_s, cut_s;
+        Wheels duty;
+    } steps[] = {{0, 0.02, 0.02, {}}, {0.02, 0.02, 0.01, {}}, {0.03, 0.01, 0.01, command}};
+    for (const auto &step : steps)
+    {
+        Signals s;
+        s.t_s = step.t_s;
+        s.dt_s = step.dt_s;
+        s.duty = command;
+        effect->Step(s, state.data());
+        EXPECT_EQ(s.duty, step.duty) << step.t_s;
+        EXPECT_NEAR(s.dt_s, step.cut_s, 1e-15) << step.t_s;
+    }
+}
+
+TEST(InputDelay, TwoInARowAddUp)
+{
+    Player player(With("input_delay", {0.033}, With("input_delay", {0.05})), 0.02);
+    player.Play(kForward, 1);
+    player.Play(kStop, 0.08);
+    EXPECT_NEAR(player.state.pose.x_m, kFull_mps * 0.997, 1e-12);
+}
+
+// Rolls on at full speed for the delay, then as without it.
+TEST(InputDelay, PutsOffAStopWithoutChangingIt)
+{
+    for (const double delay_s : {0.04, 0.0421, 0.05, 0.059})
+    {
+        Player coasting(With("coasting", {0.7}, With("input_delay", {delay_s})), 0.02);
+        Player lagging(With("input_delay", {delay_s}, Lagging(0.05)), 0.02);
+        for (Player *player : {&coasting, &lagging})
+        {
+            player->Play(kForward, 2);
+            const double start_m = player->state.pose.x_m;
+            player->Play(kStop, 2);
+            const double roll_m =
+                player == &coasting ? kFull_mps * kFull_mps / (2 * 0.7) : kFull_mps * 0.05;
+            EXPECT_NEAR(player->state.pose.x_m - start_m, kFull_mps * delay_s + roll_m, 1e-12);
+        }
+    }
+}
+
+TEST(InputDelay, LeavesTheDeadZoneItsWidth)
+{
+    Player player(With("dead_zone", {0.3}, With("input_delay", {0.05})), 0.02);
+    player.Play(Scaled(kForward, 0.5), 1);
+    EXPECT_NEAR(player.state.pose.x_m, 0.2 * kFull_mps * 0.95, 1e-12);
+}
+
+// A new command every millisecond overruns what it remembers: late or early, but never lost.
+TEST(InputDelay, KeepsDrivingWhenCommandsComeTooFast)
+{
+    const auto effect = FindEffect("input_delay")->make(std::vector<double>{0.3});
+    std::vector<double> state(static_cast<size_t>(effect->StateSize()), 0.0);
+    Signals s;
+    for (int step = 0; step < 1000; ++step)
+    {
+        s.t_s = 1e-3 * step;
+        s.dt_s = 1e-3;
+        s.duty.fill(0.5 + 1e-4 * step);
         effect->Step(s, state.data());
     }
-    const Wheels half{0.5, -0.5, 0.25, 0};  // the step from 20 to 40 ms sees it from 30 ms on
-    for (size_t k = 0; k < kWheels; ++k)
-        EXPECT_NEAR(s.duty[k], half[k], 1e-12);
+    EXPECT_GT(s.duty[0], 0.5);
+    EXPECT_EQ(s.dt_s, 1e-3);
 }
 
 TEST(InputDelay, DelaysVelocityCommandsToo)

@@ -13,7 +13,7 @@ constexpr Card kCard = {
     .stage = Stage::kDuty,
     .drives = kAnyDrive,
     .summary = "Commands reach the wheels late.",
-    .equation = "u'(t) = u(t - delay), averaged over the step",
+    .equation = "u'(t) = u(t - delay)",
     .leaves_out = "jitter of the delay",
     .measure = "steps from rest, with both clocks tied by a flash or a tap",
     .reference =
@@ -27,9 +27,12 @@ constexpr Parameter kParameters[] = {
 };
 
 // A ring of the last commands, each with the time at which it was given. Longer than the longest
-// delay at one command per 5 ms.
+// delay at one command per 5 ms; at more the oldest one kept takes effect early.
 constexpr int kSlots = 64;
 constexpr int kSlotSize = 1 + kWheels;
+
+// Sums of steps and delays that differ by rounding alone are the same time.
+constexpr double kSameTime_s = 1e-9;
 
 class InputDelay final : public Effect
 {
@@ -43,7 +46,19 @@ public:
         if (delay_s_ <= 0)
             return;
         Remember(s, state);
-        s.duty = Mean(state, s.t_s - delay_s_, s.t_s - delay_s_ + s.dt_s);
+        const int kept = std::min(static_cast<int>(state[0]), kSlots);
+        for (int age = 0; age < kept; ++age)
+        {
+            const double *slot = Slot(state, age);
+            const double wait_s = slot[0] + delay_s_ - s.t_s;
+            if (wait_s <= kSameTime_s || age == kSlots - 1)
+            {
+                std::copy_n(slot + 1, kWheels, s.duty.begin());
+                return;
+            }
+            s.dt_s = std::min(s.dt_s, wait_s);
+        }
+        s.duty = {};  // none has arrived yet
     }
 
 private:
@@ -62,25 +77,6 @@ private:
         double *slot = Slot(state, 0);
         slot[0] = s.t_s;
         std::copy(s.duty.begin(), s.duty.end(), slot + 1);
-    }
-
-    // Mean of the held commands over [from_s, to_s]; zero before the first.
-    static Wheels Mean(double *state, double from_s, double to_s)
-    {
-        Wheels mean{};
-        double end_s = to_s;
-        const int kept = std::min(static_cast<int>(state[0]), kSlots);
-        for (int age = 0; age < kept && end_s > from_s; ++age)
-        {
-            const double *slot = Slot(state, age);
-            const double begin_s = std::max(slot[0], from_s);
-            if (begin_s >= end_s)
-                continue;
-            for (int k = 0; k < kWheels; ++k)
-                mean[k] += slot[1 + k] * ((end_s - begin_s) / (to_s - from_s));
-            end_s = begin_s;
-        }
-        return mean;
     }
 
     double delay_s_;

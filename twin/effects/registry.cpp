@@ -5,12 +5,13 @@
 namespace twin
 {
 
-extern const EffectSpec kBatterySag, kClockOffset, kCoasting, kDeadZone, kFloorTilt, kInputDelay,
-    kLagByDuty, kMarkerOffset, kMotorLag, kReverseAsymmetry, kSpeedCurve, kWheelGain;
+extern const EffectSpec kBatterySag, kClockOffset, kCoasting, kDeadZone, kFloorTilt, kHeadingBias,
+    kInputDelay, kLagByDuty, kMarkerOffset, kMotorLag, kReverseAsymmetry, kSpeedCurve, kWheelGain;
 
 static const EffectSpec *const kCatalogue[] = {
-    &kBatterySag, &kClockOffset,  &kCoasting, &kDeadZone,         &kFloorTilt,  &kInputDelay,
-    &kLagByDuty,  &kMarkerOffset, &kMotorLag, &kReverseAsymmetry, &kSpeedCurve, &kWheelGain,
+    &kBatterySag,       &kClockOffset, &kCoasting,  &kDeadZone,     &kFloorTilt,
+    &kHeadingBias,      &kInputDelay,  &kLagByDuty, &kMarkerOffset, &kMotorLag,
+    &kReverseAsymmetry, &kSpeedCurve,  &kWheelGain,
 };
 
 std::span<const EffectSpec *const> Catalogue()

@@ -126,27 +126,31 @@ Wheels DriveChain::Target(const Wheels &command) const
 Wheels DriveChain::DriveWheels(const Command &command, double t_s, double dt_s,
                                RobotState &state) const
 {
-    Signals s;
-    s.t_s = t_s;
-    s.dt_s = dt_s;
-    s.battery_V = command.battery_V;
-    s.battery_nominal_V = battery_nominal_V_;
-    s.duty = command.value;
-    Run(duty_, s, state);
-
-    s.rim_mps = state.rim_mps;
-    s.target_mps = Target(s.duty);
-    s.tau_s.fill(base_.motor_lag_s);
-    s.max_decel_mps2.fill(kNoLimit);
-    Run(wheel_, s, state);
-
-    Wheels mean_mps;
-    for (int k = 0; k < kWheels; ++k)
+    Wheels mean_mps{};
+    for (double done_s = 0; done_s < dt_s;)
     {
-        const Relaxed rim =
-            Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k], s.max_decel_mps2[k], dt_s);
-        state.rim_mps[k] = rim.end;
-        mean_mps[k] = rim.mean;
+        Signals s;
+        s.t_s = t_s + done_s;
+        s.dt_s = dt_s - done_s;
+        s.battery_V = command.battery_V;
+        s.battery_nominal_V = battery_nominal_V_;
+        s.duty = command.value;
+        Run(duty_, s, state);
+
+        s.rim_mps = state.rim_mps;
+        s.target_mps = Target(s.duty);
+        s.tau_s.fill(base_.motor_lag_s);
+        s.max_decel_mps2.fill(kNoLimit);
+        Run(wheel_, s, state);
+
+        for (int k = 0; k < kWheels; ++k)
+        {
+            const Relaxed rim =
+                Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k], s.max_decel_mps2[k], s.dt_s);
+            state.rim_mps[k] = rim.end;
+            mean_mps[k] += rim.mean * (s.dt_s / dt_s);
+        }
+        done_s += s.dt_s;
     }
     return mean_mps;
 }

@@ -43,8 +43,10 @@ constexpr unsigned kDutyOnly = static_cast<unsigned>(Drive::kDuty);
 // The signals of one robot in one step. Angles and turn rates are positive counter-clockwise.
 struct Signals
 {
-    double t_s = 0;   // start of the step, robot's clock
-    double dt_s = 0;  // length of the step
+    double t_s = 0;  // start of the step, robot's clock
+    // Length of the step. kDuty: an effect whose output changes within the step shortens it to end
+    // there; the plant then goes through both stages again for the rest.
+    double dt_s = 0;
 
     double battery_V = 0;          // pack voltage now
     double battery_nominal_V = 0;  // pack voltage at which the base model's speeds hold
