@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// Fits follow the slope of predictions along each parameter: it must exist, and be the same from
+// both sides.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "drive.h"
+
+namespace twin::test
+{
+namespace
+{
+
+using Seen = std::array<double, 4>;  // x, y, heading and time stamp after a medley of drives
+
+Seen SeenAt(const EffectSpec &spec, const std::vector<double> &values)
+{
+    Player player(With(spec.card.name, values, Lagging(0.05)), 0.022);
+    PlayMedley(player);
+    player.Play({0.5, 0.9, 0.5, 0.9}, 0.66, 7.0);  // seen while moving: a delay shows
+    Pose2 pose = player.state.pose;
+    double t_s = 5;
+    player.chain.Observe(pose, t_s);
+    return {pose.x_m, pose.y_m, pose.theta_rad, t_s};
+}
+
+Seen Slope(const EffectSpec &spec, std::vector<double> values, size_t k, double step)
+{
+    const Seen here = SeenAt(spec, values);
+    values[k] += step;
+    Seen slope = SeenAt(spec, values);
+    for (size_t i = 0; i < slope.size(); ++i)
+        slope[i] = (slope[i] - here[i]) / step;
+    return slope;
+}
+
+// Two slopes agree to 2 % of their largest component; at the steps taken curvature makes 1 %.
+void ExpectSame(const Seen &a, const Seen &b, const std::string &what)
+{
+    double largest = 0, difference = 0;
+    for (size_t i = 0; i < a.size(); ++i)
+    {
+        largest = std::max({largest, std::abs(a[i]), std::abs(b[i])});
+        difference = std::max(difference, std::abs(a[i] - b[i]));
+    }
+    EXPECT_GT(largest, 1e-3) << what << " does nothing";
+    EXPECT_LT(difference, 0.02 * largest) << what;
+}
+
+class Smooth : public testing::TestWithParam<const EffectSpec *>
+{
+};
+
+INSTANTIATE_TEST_SUITE_P(Catalogue, Smooth, testing::ValuesIn(Catalogue()),
+                         [](const auto &spec) { return std::string(spec.param->card.name); });
+
+TEST_P(Smooth, SlopeIsTheSameFromBothSidesAndAtTwoSteps)
+{
+    const EffectSpec &spec = *GetParam();
+    for (const double Parameter::*start : {&Parameter::default_value, &Parameter::neutral})
+    {
+        std::vector<double> values;
+        for (const Parameter &p : spec.parameters)
+            values.push_back(p.*start);
+        for (size_t k = 0; k < values.size(); ++k)
+        {
+            const Parameter &p = spec.parameters[k];
+            const double step = 1e-4 * (p.max - p.min);
+            const std::string what = std::string(p.name) + " = " + std::to_string(values[k]);
+            // At its neutral value, a bound, coasting also gives way to the lag: a jump.
+            if (p.neutral == p.max && values[k] == p.neutral)
+                continue;
+            const Seen right = Slope(spec, values, k, step);
+            ExpectSame(right, Slope(spec, values, k, step / 10), what);
+            if (values[k] - step >= p.min)
+                ExpectSame(right, Slope(spec, values, k, -step), what);
+        }
+    }
+}
+
+}  // namespace
+}  // namespace twin::test
