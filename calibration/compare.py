@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compares a model with measurements: how wrong it is, against the log's own floor, and where."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinmill.calibration.floor import Floor, measure_floor
+from twinmill.calibration.measurement import Measurement
+from twinmill.calibration.model_file import ModelFile
+from twinmill.calibration.problem import CLOCK, Scene
+from twinmill.calibration.regimes import Regime, where_it_fails
+from twinmill.calibration.solve import solve
+from twinmill.calibration.windows import CHANNELS, HORIZONS_S, Windows, rms, score
+
+GOOD, MISSING, SUSPECT = 1.15, 1.3, 0.9  # scores: stop; something is missing; floor wrong or data leaked
+
+
+@dataclass(frozen=True)
+class RobotComparison:
+    """One robot in one log.
+
+    Attributes:
+        scene: measurement, model with the clock used, noise.
+        windows: where predictions start and end.
+        errors: (W, H, 3) measured less predicted, seen from the start; m, m, rad.
+        floor: (H, 3) and its kind.
+        where: regimes.
+    """
+
+    scene: Scene
+    windows: Windows
+    errors: np.ndarray
+    floor: Floor
+    where: list[Regime]
+
+    @property
+    def score(self) -> float:
+        """Of this robot alone."""
+        return score(self.errors, self.floor.rms)
+
+    @property
+    def time_offset_s(self) -> float:
+        """Capture's clock less the robot's."""
+        return self.scene.model.get(CLOCK)
+
+    def error_rows(self) -> list[dict]:
+        """errors[] of the interface: one row per channel and horizon."""
+        found = rms(self.errors)
+        return [{"channel": channel, "unit": unit, "horizon_s": horizon_s, "rms": float(found[h, c]),
+                 "floor": float(self.floor.rms[h, c]), "ratio": float(found[h, c] / self.floor.rms[h, c])}
+                for c, (channel, unit) in enumerate(CHANNELS) for h, horizon_s in enumerate(HORIZONS_S)]
+
+    def to_json(self) -> dict:
+        """One entry of robots[]."""
+        return {"robot_id": self.scene.measurement.track.robot_id,
+                "log": self.scene.measurement.log_name, "score": self.score,
+                "floor_kind": self.floor.kind, "noise": self.scene.noise.to_json(),
+                "errors": self.error_rows(), "where": [r.to_json() for r in self.where],
+                "time_offset_s": self.time_offset_s}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All robots of all logs against one model; the robot with most windows speaks for the errors."""
+
+    model_name: str
+    robots: list[RobotComparison]
+    warnings: list[str]
+
+    @property
+    def score(self) -> float:
+        """RMS over robots."""
+        return float(np.sqrt(np.mean([r.score**2 for r in self.robots])))
+
+    @property
+    def verdict(self) -> str:
+        """What the score means, in a sentence."""
+        if self.score < SUSPECT:
+            return "Better than the log's own noise allows: the floor is wrong, or the model was fitted to noise."
+        if self.score <= GOOD:
+            return "As good as this log can tell: nothing is missing that it would show."
+        if self.score <= MISSING:
+            return "Close to what this log can tell; a small effect may be missing or parameters stale."
+        return "Something is missing in the model, or its parameters are stale."
+
+    def to_json(self) -> dict:
+        """The interface's object."""
+        main = max(self.robots, key=lambda r: len(r.windows.starts))
+        return {"model": self.model_name, **main.to_json(), "score": self.score, "verdict": self.verdict,
+                "robots": [r.to_json() for r in self.robots], "warnings": self.warnings}
+
+
+def compare_robot(scene: Scene) -> RobotComparison:
+    """Compares one robot; the scene's model, clock and noise are taken as they are."""
+    windows = Windows.of(scene.measurement.track)
+    errors = windows.errors(scene)
+    floor = measure_floor(scene, windows)
+    return RobotComparison(scene, windows, errors, floor,
+                           where_it_fails(scene, windows, errors, floor.rms))
+
+
+def compare(measurements: list[Measurement], model_file: ModelFile) -> Comparison:
+    """Compares a model with every robot of every log.
+
+    A clock offset that the model knows is used; else each log's own is estimated.
+    """
+    scenes = [Scene.of(m, model_file.model) for m in measurements]
+    for scene in scenes:
+        if scene.clock_free:
+            solve([scene], [])
+    warnings = [f"{m.label}: {w}" for m in measurements for w in m.warnings]
+    return Comparison(model_file.path.name, [compare_robot(s) for s in scenes], warnings)

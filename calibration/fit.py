@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fits the base model, and the effects it has, to measurements."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.calibration.compare import Comparison, compare_robot
+from twinmill.calibration.measurement import Measurement
+from twinmill.calibration.model_file import Fitted, ModelFile, write_child
+from twinmill.calibration.problem import CLOCK, Free, Scene, base_quantities, effect_quantities
+from twinmill.calibration.solve import Estimate, Solution, solve
+
+AGREE_SIGMA = 5.0  # clock offsets of several logs that differ by less are one
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """What a fit did.
+
+    Attributes:
+        before, after: comparisons on the same noise and floor.
+        parameters: estimates.
+        clock: offset that all logs share, or None.
+        path: of the new model.
+    """
+
+    before: Comparison
+    after: Comparison
+    parameters: list[Estimate]
+    clock: Estimate | None
+    path: Path
+
+    def to_json(self) -> dict:
+        """The interface's object."""
+        return {"model": str(self.path), "score_before": self.before.score,
+                "score_after": self.after.score,
+                "parameters": [e.to_json() for e in self.parameters],
+                "time_offset_s": self.clock.value if self.clock else None}
+
+
+def open_scenes(measurements: list[Measurement], model: native.Model) -> list[Scene]:
+    """Scenes with their clocks aligned to the model as it is."""
+    scenes = [Scene.of(m, model) for m in measurements]
+    for scene in scenes:
+        if scene.clock_free:
+            solve([scene], [])
+    return scenes
+
+
+def share_noise(source: list[Scene], scenes: list[Scene]) -> None:
+    """Judges scenes by the noise of others of the same measurements."""
+    for given, scene in zip(source, scenes, strict=True):
+        scene.noise = given.noise
+
+
+def refit(scenes: list[Scene], free: list[Free]) -> Solution:
+    """Fits twice: the second time with the noise that the first fit leaves, if that is less."""
+    solve(scenes, free)
+    for scene in scenes:
+        scene.settle_noise()
+    again = [Free(**{**vars(f), "start": scenes[0].model.get(f.name)}) for f in free]
+    return solve(scenes, again)
+
+
+def comparison(model_file: ModelFile, scenes: list[Scene]) -> Comparison:
+    """Of scenes as they stand."""
+    warnings = [f"{s.measurement.label}: {w}" for s in scenes for w in s.measurement.warnings]
+    return Comparison(model_file.path.name, [compare_robot(s) for s in scenes], warnings)
+
+
+def fit(measurements: list[Measurement], model_file: ModelFile, out: Path, command: str) -> FitResult:
+    """Fits all free quantities of the model to all measurements and writes the new model.
+
+    Raises:
+        ModelError: the new file cannot be written.
+    """
+    scenes = open_scenes(measurements, model_file.model)
+    free = base_quantities(scenes[0].model) + effect_quantities(scenes[0].model)
+    fitted = [s.with_model(model_file.model) for s in scenes]
+    solution = refit(fitted, free)
+    share_noise(fitted, scenes)
+    before, after = comparison(model_file, scenes), comparison(model_file, fitted)
+    clock = common_clock(solution)
+    model = fitted_model(model_file, solution.estimates)
+    write_child(model_file, Fitted(model, solution.estimates, [m.log_name for m in measurements],
+                                   before.score, after.score, fitted[0].noise, clock), out, command)
+    return FitResult(before, after, solution.estimates, clock, Path(out))
+
+
+def fitted_model(model_file: ModelFile, estimates: list[Estimate]) -> native.Model:
+    """The file's model with estimates put in."""
+    model = model_file.model.copy()
+    for estimate in estimates:
+        model.set(estimate.name, estimate.value)
+    return model
+
+
+def common_clock(solution: Solution) -> Estimate | None:
+    """The clock offset that the logs share; None if they have different ones, or it was known."""
+    clocks = [c for c in solution.clocks if c is not None]
+    if not clocks or len(clocks) < len(solution.clocks):
+        return None
+    values, stds = np.array([c.value for c in clocks]), np.array([c.std for c in clocks])
+    weights = 1 / stds**2
+    mean = float(np.sum(weights * values) / weights.sum())
+    if np.any(np.abs(values - mean) > AGREE_SIGMA * np.hypot(stds, 0.001)):
+        return None
+    return Estimate(CLOCK, mean, float(1 / np.sqrt(weights.sum())), "s", False, True)

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a log's motion leaves unexplained by any smooth response to its commands: its own noise.
+
+A regression with no physics names: the measured velocity on the commands' levels, each passed through a
+few first-order lags, with terms for stopping, for coupling between the axes and for the room. It is never
+shown as a model; it only tells noise from what some model could still explain.
+"""
+
+import numpy as np
+from scipy.signal import lfilter
+
+from twinmill.calibration.measurement import Measurement
+from twinmill.calibration.residual import StepGrid, rotate
+from twinmill.calibration.track import command_at
+
+LEVELS = (0.15, 0.3, 0.5, 0.65, 0.8, 0.9, 1.0)  # of the largest command
+LAGS_S = (0.0, 0.03, 0.07, 0.15)
+COAST_S = (0.07, 0.15, 0.4)
+BLOCK_S = 4.0
+RIDGE = 1e-6
+# Sums over the wheels that a mecanum base turns into forward, left and turn.
+AXES = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4
+
+
+def unexplained(measurement: Measurement, grid: StepGrid, offset_s: float) -> list[np.ndarray]:
+    """Two (S, 3) one-step errors in W: of a fit to all of the log, and of fits to the other half.
+
+    The first is too small, the second too large by the same share: their mean power is the noise's.
+    """
+    track = measurement.track
+    pose = track.pose
+    before = np.flatnonzero(track.segment >= 0)
+    previous = np.full(len(pose), -1)
+    previous[before[1:]] = before[:-1]
+    step = (pose - pose[previous])[grid.source] * grid.share[:, None]
+    heading_rad = track.heading_smooth[grid.source]
+    body = np.column_stack([*rotate(step[:, 0], step[:, 1], -heading_rad), step[:, 2]])
+    body[grid.starts] = 0
+    terms = _terms(measurement, grid, offset_s, heading_rad)
+    half = (grid.t_s // BLOCK_S).astype(int) % 2 == 0
+    within, across = np.empty_like(body), np.empty_like(body)
+    for axis in range(3):
+        x = terms[axis]
+        within[:, axis] = body[:, axis] - x @ _ridge(x, body[:, axis])
+        for test in (half, ~half):
+            across[test, axis] = body[test, axis] - x[test] @ _ridge(x[~test], body[~test, axis])
+    return [np.column_stack([*rotate(e[:, 0], e[:, 1], heading_rad), e[:, 2]]) for e in (within, across)]
+
+
+def _ridge(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    gram = x.T @ x
+    scale = np.diag(gram) + 1e-30
+    return np.linalg.solve(gram + RIDGE * np.diag(scale) + 1e-12 * scale.max() * np.eye(len(gram)), x.T @ y)
+
+
+def _terms(measurement: Measurement, grid: StepGrid, offset_s: float,
+           heading_rad: np.ndarray) -> list[np.ndarray]:
+    """For each axis the (S, P) regressors of its velocity."""
+    command = _command(measurement, grid, offset_s)
+    odd = np.stack([np.sign(command) * _hat(np.abs(command), i) for i in range(len(LEVELS))], -1)
+    odd = np.einsum("aw,swl->sal", AXES, odd)
+    slow = _lagged(odd, grid)
+    stopped = np.all(command == 0, axis=1)[:, None, None]
+    coast = np.concatenate([_lag(odd, tau_s, grid) for tau_s in COAST_S], -1) * stopped
+    linear = slow.sum(-1).reshape(len(command), -1, 3)  # lags as columns, axes last
+    even = _lagged(np.abs(command) @ AXES.T, grid)
+    voltage = command_at(grid.t_s - offset_s, measurement.track.command_t_s,
+                         np.nan_to_num(measurement.track.battery_V)[:, None])
+    voltage = voltage - voltage.mean()
+    moving = (np.abs(command).max(1) > 0)[:, None] * 1.0
+    c, s = np.cos(heading_rad)[:, None] * moving, np.sin(heading_rad)[:, None] * moving
+    per_axis = []
+    for axis in range(3):
+        own = linear[:, 2, axis:axis + 1]
+        room = {0: [c, s], 1: [-s, c], 2: [moving]}[axis]
+        per_axis.append(np.concatenate(
+            [slow[:, :, axis].reshape(len(command), -1), coast[:, axis], linear.reshape(len(command), -1),
+             even.reshape(len(command), -1), own * voltage, linear[:, 2] * linear[:, 2, [1, 2, 0]],
+             np.abs(linear[:, 2]), *room], axis=1))
+    return per_axis
+
+
+def _command(measurement: Measurement, grid: StepGrid, offset_s: float) -> np.ndarray:
+    """(S, 4) commands in force in the middle of each step, over the largest of the log."""
+    track = measurement.track
+    t_s = grid.t_s - offset_s - grid.period_s / 2
+    command = command_at(t_s, track.command_t_s, track.command)
+    if track.command_kind == "twist":
+        command = command[:, :3] @ np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-0.1, 0.1, -0.1, 0.1]])
+    return command / max(float(np.abs(command).max()), 1e-9)
+
+
+def _hat(level: np.ndarray, i: int) -> np.ndarray:
+    """Straight-line interpolation: 1 at its own level, 0 at its neighbours."""
+    nodes = (0.0, *LEVELS)
+    peak = np.zeros(len(nodes))
+    peak[i + 1] = 1
+    return np.interp(level, nodes, peak)
+
+
+def _lagged(signal: np.ndarray, grid: StepGrid) -> np.ndarray:
+    """Signal (S, ...) through each of the lags: (S, lags, ...)."""
+    return np.stack([_lag(signal, tau_s, grid) for tau_s in LAGS_S], 1)
+
+
+def _lag(signal: np.ndarray, tau_s: float, grid: StepGrid) -> np.ndarray:
+    keep = np.exp(-grid.period_s / tau_s) if tau_s > 0 else 0.0
+    return lfilter([1 - keep], [1, -keep], signal, axis=0)

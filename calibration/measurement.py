@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is compared with a model: the cleaned runs of each robot in each log."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import twinmill_native as native
+from twinmill.calibration.log import LogError, read_log
+from twinmill.calibration.track import SILENCE_S, SMOOTH_S, Track, local_line, make_track
+
+SHORTEST_LOG_S = 10.0  # below it no regime is seen twice
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One robot in one log.
+
+    Attributes:
+        log_name, log_sha256: where it comes from.
+        track: cleaned arrays.
+        played: the same for the native module; where telemetry falls silent the robot's watchdog
+            stops it, so a zero command is put in.
+        warnings: sentences of reading and cleaning.
+        recorded_utime_us: earliest stamp in the log, us since the Unix epoch.
+    """
+
+    log_name: str
+    log_sha256: str
+    track: Track
+    played: native.Track
+    warnings: list[str]
+    recorded_utime_us: int
+
+    @property
+    def label(self) -> str:
+        """Short name of log and robot."""
+        return f"{self.log_name} R{self.track.robot_id:02d}"
+
+    def with_pose(self, pose: np.ndarray) -> "Measurement":
+        """The same run with other poses (N, 3)."""
+        smooth_rad, _ = local_line(self.track.pose_t_s, pose[:, 2], self.track.segment, SMOOTH_S)
+        track = replace(self.track, pose=pose, heading_smooth=smooth_rad)
+        return replace(self, track=track, played=_played(track))
+
+
+def load_measurements(paths: list[Path]) -> list[Measurement]:
+    """Reads logs and cleans every robot in them.
+
+    Raises:
+        LogError: a log cannot be read, or is too short to judge a model by.
+    """
+    measurements = []
+    for path in paths:
+        log = read_log(path)
+        for robot in log.robots.values():
+            track = make_track(robot)
+            _check_length(path, track)
+            measurements.append(Measurement(Path(path).name, log.sha256, track, _played(track),
+                                            [*log.warnings, *track.notes], log.t0_utime_us))
+    return measurements
+
+
+def _check_length(path: Path, track: Track) -> None:
+    usable_s = np.count_nonzero(track.segment >= 0) * track.timing.pose_period_s
+    if usable_s < SHORTEST_LOG_S:
+        raise LogError(f"{path}: robot {track.robot_id} has {usable_s:.1f} s of usable poses; a model "
+                       f"cannot be judged on less than {SHORTEST_LOG_S:g} s, so record a longer run.")
+
+
+def _played(track: Track) -> native.Track:
+    t_s, command, battery_V = track.command_t_s, track.command, track.battery_V
+    if track.command_kind == "duty":
+        silent = np.flatnonzero(np.diff(t_s) > SILENCE_S)
+        t_s = np.insert(t_s, silent + 1, t_s[silent] + SILENCE_S)
+        command = np.insert(command, silent + 1, 0.0, axis=0)
+        battery_V = np.insert(battery_V, silent + 1, battery_V[silent])
+    return native.Track(*(np.ascontiguousarray(a, float) for a in
+                          (t_s, command, battery_V, track.pose_t_s, track.pose)),
+                        np.ascontiguousarray(track.segment, np.int64))

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Model files: read by the twin's own reader, written anew with what was fitted. Never changed in place."""
+
+import hashlib
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tomlkit
+import twinmill_native as native
+
+from twinmill.calibration.noise import Noise
+from twinmill.calibration.problem import catalogue, effect_names
+from twinmill.calibration.solve import Estimate
+
+
+class ModelError(ValueError):
+    """A model file that cannot be read or written; the message is one sentence."""
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """A model and the text it was read from."""
+
+    path: Path
+    text: str
+    model: native.Model
+
+    @classmethod
+    def load(cls, name: str) -> "ModelFile":
+        """Looks in the working directory, then among the installed models.
+
+        Raises:
+            ModelError: no such file, or it is no valid model.
+        """
+        try:
+            path = Path(native.find_model_file(str(name)))
+            text = path.read_text()
+            return cls(path, text, native.Model.from_toml(text, str(name)))
+        except (ValueError, OSError, UnicodeDecodeError) as error:
+            raise ModelError(str(error)) from error
+
+    @property
+    def hash(self) -> str:
+        """Of the text, as a child names its parent."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a fit found out and a new model file records.
+
+    Attributes:
+        model: with the fitted values and effects.
+        estimates: with their uncertainties.
+        logs: names of the logs fitted on.
+        score_before, score_after: on those logs.
+        noise: of the first log, or None to leave the old.
+        clock_offset_s: the logs' common clock offset, or None if they do not agree on one.
+    """
+
+    model: native.Model
+    estimates: list[Estimate]
+    logs: list[str]
+    score_before: float
+    score_after: float
+    noise: Noise | None = None
+    clock: Estimate | None = None
+    robots: dict[int, dict[str, float]] = field(default_factory=dict)
+
+
+def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> None:
+    """Writes the fitted model to a new file: whole or not at all.
+
+    Raises:
+        ModelError: the file cannot be written.
+    """
+    document = tomlkit.parse(parent.text)
+    document["parent"] = parent.hash
+    document["created_by"] = command
+    _write_base(document, fitted)
+    _write_effects(document, fitted)
+    if fitted.noise:
+        section = document.setdefault("noise", tomlkit.table())
+        section.update({k: _short(v) for k, v in fitted.noise.to_json().items()})
+    if fitted.clock:
+        section = document.setdefault("clock", tomlkit.table())
+        section["offset_s"] = _short(fitted.clock.value)
+        section["std"] = {"offset_s": _short(fitted.clock.std)}
+    document["fit"] = {"logs": fitted.logs, "score_before": _short(fitted.score_before),
+                       "score_after": _short(fitted.score_after)}
+    write_whole(Path(path), tomlkit.dumps(document))
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Writes a file through a temporary one beside it.
+
+    Raises:
+        ModelError: the folder does not exist or cannot be written.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_text(text)
+        os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise ModelError(f"{path}: cannot be written ({error.strerror}); choose another place.") from error
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+def _write_base(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
+    base = document.setdefault("base", tomlkit.table())
+    table = [v for v in fitted.model.values() if v["name"].startswith("base.wheel_speed_mps.")]
+    stds = {e.name: e.std for e in fitted.estimates if e.name.startswith("base.")}
+    for name in stds:
+        if not name.startswith("base.wheel_speed_mps."):
+            base[name.removeprefix("base.")] = _short(fitted.model.get(name))
+    if any(name.startswith("base.wheel_speed_mps.") for name in stds):
+        base["wheel_speed_mps"] = [_short(v["value"]) for v in table]
+    scalar = {n.removeprefix("base."): _short(s) for n, s in stds.items() if n.count(".") == 1}
+    if scalar:
+        base["std"] = scalar
+
+
+def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
+    entries, stds = catalogue(), {e.name: e.std for e in fitted.estimates}
+    old = list(document.get("effect", []))
+    tables = tomlkit.aot()
+    for i, instance in enumerate(effect_names(fitted.model)):
+        table = tomlkit.table() if i >= len(old) else old[i]
+        name = instance.split("#")[0]
+        table["name"] = name
+        keys = [p["name"] for p in entries[name]["parameters"]]
+        for key in keys:
+            table[key] = _short(fitted.model.get(f"{instance}.{key}"))
+        known = {key: _short(stds[f"{instance}.{key}"]) for key in keys if f"{instance}.{key}" in stds}
+        if known:
+            table["std"] = known
+            table["fitted_on"] = ", ".join(fitted.logs)
+        if i >= len(old):
+            table["error_before"] = _short(fitted.score_before)
+            table["error_after"] = _short(fitted.score_after)
+        tables.append(table)
+    if len(tables):
+        document["effect"] = tables

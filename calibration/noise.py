@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Noise of a log: white sensor noise and coloured drive noise, and the filter that whitens both.
+
+One-step errors of a right model are e_k = dt n_k + s_k - s_(k-1): s is the sensor's noise, white; n is a
+disturbance of the velocity, first order: n_(k+1) = phi n_k + sqrt(1 - phi^2) sigma_d w_k with
+phi = exp(-dt / tau). Whitened, they have unit variance and no memory.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.signal import lfilter
+from scipy.signal.windows import hann
+from twinmill.calibration.residual import StepGrid
+
+CHUNK = 256  # steps of one periodogram: 2 s at 120 Hz, a few times the disturbance's memory
+FEWEST_CHUNKS = 6
+LOWEST = 1  # first bin that the taper leaves clean of the mean
+TRANSIENT = 20  # steps after a break in which the filter settles
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """Noise of one channel: sensor (m or rad), drive (m/s or rad/s), its memory."""
+
+    sensor: float
+    drive: float
+    memory_s: float
+
+    def spectrum(self, frequency_Hz: np.ndarray, period_s: float) -> np.ndarray:
+        """Power of one-step errors per sample at these frequencies."""
+        phase = np.exp(-2j * np.pi * frequency_Hz * period_s)
+        phi = np.exp(-period_s / self.memory_s)
+        drive = (period_s * self.drive) ** 2 * (1 - phi**2) / np.abs(1 - phi * phase) ** 2
+        return self.sensor**2 * np.abs(1 - phase) ** 2 + drive
+
+    def whitening(self, period_s: float) -> tuple[np.ndarray, np.ndarray, float]:
+        """Filter (numerator, denominator) and standard deviation of what comes out of it."""
+        phi = np.exp(-period_s / self.memory_s)
+        fresh = (period_s * self.drive) ** 2 * (1 - phi**2)
+        variance = self.sensor**2
+        # Autocovariance of (1 - phi B) e, factored into the minimum-phase moving average.
+        lags = [variance * phi, -variance * (1 + phi) ** 2,
+                fresh + variance * (1 + (1 + phi) ** 2 + phi**2)]
+        roots = np.roots([*lags, lags[1], lags[0]])
+        inside = roots[np.argsort(np.abs(roots))][:2]
+        average = np.real(np.poly(inside))
+        scale = np.sqrt(lags[0] / average[2])
+        return np.array([1.0, -phi]), average, float(scale)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of a log: position and heading."""
+
+    position: ChannelNoise
+    heading: ChannelNoise
+
+    def to_json(self) -> dict:
+        """The interface's field names."""
+        return {"sensor_m": self.position.sensor, "sensor_rad": self.heading.sensor,
+                "drive_mps": self.position.drive, "drive_radps": self.heading.drive,
+                "drive_s": self.position.memory_s, "drive_turn_s": self.heading.memory_s}
+
+    def loudness(self, period_s: float) -> float:
+        """Log of the one-step variance that remains when all memory is used, summed over channels."""
+        scales = [noise.whitening(period_s)[2] for noise in (self.position, self.heading)]
+        return float(4 * np.log(scales[0]) + 2 * np.log(scales[1]))
+
+    def whiten(self, errors: np.ndarray, grid: StepGrid) -> np.ndarray:
+        """(..., S, 3) one-step errors to whitened ones; zero where the filter still settles."""
+        white = np.zeros_like(errors)
+        for channels, noise in ((slice(0, 2), self.position), (slice(2, 3), self.heading)):
+            numerator, denominator, scale = noise.whitening(grid.period_s)
+            for part in grid.slices:
+                white[..., part, channels] = lfilter(
+                    numerator, denominator, errors[..., part, channels], axis=-2) / scale
+        for start in grid.starts:
+            white[..., start:start + TRANSIENT, :] = 0
+        return white
+
+
+def fit_noise(errors: list[np.ndarray], moving: np.ndarray, grid: StepGrid) -> Noise:
+    """Estimates the noise from what a flexible model leaves.
+
+    Args:
+        errors: (S, 3) one-step errors; their mean power is taken.
+        moving: (S,) bool: the disturbance acts only then.
+        grid: of the steps.
+
+    The median over stretches of 2 s keeps passing physics (a start, a stop) out of the noise.
+    """
+    chunk = CHUNK
+    while (pieces := _pieces(grid, moving, chunk)) is None:
+        chunk //= 2
+    frequency_Hz = np.fft.rfftfreq(chunk, grid.period_s)[LOWEST:-1]
+    power = np.mean([_median_power(e, pieces, chunk) for e in errors], axis=0)
+    return Noise(_fit_channel(power[:, :2].mean(1), frequency_Hz, grid.period_s),
+                 _fit_channel(power[:, 2], frequency_Hz, grid.period_s))
+
+
+def _pieces(grid: StepGrid, moving: np.ndarray, chunk: int) -> np.ndarray | None:
+    """(C,) starts of overlapping stretches in which the robot moves; None if there are too few."""
+    starts = [at for part in grid.slices
+              for at in range(part.start + TRANSIENT, part.stop - chunk, chunk // 2)
+              if moving[at:at + chunk].mean() > 0.9]
+    return np.array(starts) if len(starts) >= FEWEST_CHUNKS or chunk <= CHUNK // 8 else None
+
+
+def _median_power(errors: np.ndarray, pieces: np.ndarray, chunk: int) -> np.ndarray:
+    """(F, 3) power per sample, median over stretches (of exponential variates: mean x ln 2)."""
+    taper = hann(chunk, sym=False)
+    index = pieces[:, None] + np.arange(chunk)
+    windows = errors[index] - errors[index].mean(1, keepdims=True)
+    power = np.abs(np.fft.rfft(windows * taper[:, None], axis=1)) ** 2 / np.sum(taper**2)
+    return np.median(power, axis=0)[LOWEST:-1] / np.log(2)
+
+
+def _fit_channel(power: np.ndarray, frequency_Hz: np.ndarray, period_s: float) -> ChannelNoise:
+    """Whittle's likelihood over sensor, drive and memory."""
+    sensor = np.sqrt(power[-len(power) // 4:].mean() / 4)
+    drive = np.sqrt(power[:len(power) // 8].mean()) / period_s / 5
+
+    def unpack(logs: np.ndarray) -> ChannelNoise:
+        return ChannelNoise(*np.exp(np.clip(logs, -25, 5)))
+
+    def cost(logs: np.ndarray) -> float:
+        model = unpack(logs).spectrum(frequency_Hz, period_s)
+        outside = np.clip(np.log(0.01) - logs[2], 0, None) + np.clip(logs[2] - np.log(2.0), 0, None)
+        return float(np.sum(np.log(model) + power / model) + 1e3 * outside**2)
+
+    starts = [np.log([sensor, drive, memory_s]) for memory_s in (0.03, 0.15, 0.6)]
+    best = min((minimize(cost, s, method="Nelder-Mead", options={"maxiter": 600, "xatol": 1e-4})
+                for s in starts), key=lambda found: found.fun)
+    return unpack(best.x)

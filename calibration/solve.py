@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fits free quantities to whitened one-step errors: robust, within bounds, with uncertainties."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from twinmill.calibration.problem import CLOCK, Free, Scene
+
+HUBER_SIGMA = 3.5
+BLOCK_S = 4.0  # errors of one block may hang together; blocks do not
+AT_BOUND = 0.01  # share of the range that counts as at the bound
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted quantity. `seen` is false where the log does not tell it and the prior holds it."""
+
+    name: str
+    value: float
+    std: float
+    unit: str
+    at_bound: bool
+    seen: bool
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return vars(self)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Result of a fit: estimates of the shared quantities, clock offsets by measurement, chi2."""
+
+    estimates: list[Estimate]
+    clocks: list[Estimate | None]
+    chi2: float
+
+
+def solve(scenes: list[Scene], free: list[Free], masks: list[np.ndarray] | None = None) -> Solution:
+    """Fits, and leaves the values in the scenes' models.
+
+    Args:
+        scenes: measurements; each with a free clock gets an offset of its own.
+        free: quantities shared by all.
+        masks: (S,) bool per scene: the steps to fit on; all if None.
+    """
+    masks = masks or [np.ones(len(s.grid.source), bool) for s in scenes]
+    system = _System(scenes, free, masks)
+    found = least_squares(system.residuals, system.start, jac=system.jacobian, loss="huber",
+                          f_scale=HUBER_SIGMA, bounds=(system.low, system.high),
+                          x_scale=np.maximum(system.step, 1e-9), xtol=1e-7, ftol=1e-9, max_nfev=40)
+    system.store(found.x)
+    return system.solution(found.x)
+
+
+class _System:
+    """The stacked residuals of all scenes, and a prior row for each unknown."""
+
+    def __init__(self, scenes: list[Scene], free: list[Free], masks: list[np.ndarray]) -> None:
+        self.scenes, self.free, self.masks = scenes, free, masks
+        self.columns = []  # per scene: places of its names in the vector of unknowns
+        unknowns = list(free)
+        for scene in scenes:
+            own = list(range(len(free)))
+            if scene.clock_free:
+                own.append(len(unknowns))
+                now = scene.model.get(CLOCK)
+                unknowns.append(Free(CLOCK, "s", now, now - 0.3, now + 0.3, 0.3, 0.002))
+            self.columns.append(own)
+        self.unknowns = unknowns
+        self.low, self.high, self.step, self.prior, centre = (
+            np.array([getattr(u, key) for u in unknowns])
+            for key in ("min", "max", "step", "prior_std", "start"))
+        margin = 1e-6 * (self.high - self.low)
+        self.centre = centre
+        self.start = np.clip(centre, self.low + margin, self.high - margin)
+
+    def _names(self, i: int) -> list[str]:
+        return [self.unknowns[c].name for c in self.columns[i]]
+
+    def _whitened(self, rows: np.ndarray) -> np.ndarray:
+        """(B, P) unknowns to (B, R) whitened errors of all scenes, then the prior's rows."""
+        parts = [scene.whitened(self._names(i), rows[:, self.columns[i]])[:, mask].reshape(
+            len(rows), -1) for i, (scene, mask) in enumerate(zip(self.scenes, self.masks, strict=True))]
+        return np.concatenate([*parts, (rows - self.centre) / self.prior], axis=1)
+
+    def residuals(self, x: np.ndarray) -> np.ndarray:
+        return self._whitened(x[None])[0]
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Central differences; at a bound the outer point is moved onto it."""
+        ahead = np.minimum(x + self.step, self.high)
+        behind = np.maximum(x - self.step, self.low)
+        rows = np.tile(x, (2 * len(x), 1))
+        for p in range(len(x)):
+            rows[2 * p, p], rows[2 * p + 1, p] = ahead[p], behind[p]
+        values = self._whitened(rows)
+        return ((values[0::2] - values[1::2]) / (ahead - behind)[:, None]).T
+
+    def store(self, x: np.ndarray) -> None:
+        for i, scene in enumerate(self.scenes):
+            for name, value in zip(self._names(i), x[self.columns[i]], strict=True):
+                scene.model.set(name, float(value))
+
+    def solution(self, x: np.ndarray) -> Solution:
+        residual = self.residuals(x)
+        std = self._standard_errors(self.jacobian(x), residual)
+        estimates = [self._estimate(u, x[p], std[p]) for p, u in enumerate(self.unknowns)]
+        shared = len(self.free)
+        clocks = [estimates[own[-1]] if len(own) > shared else None for own in self.columns]
+        data = np.clip(residual[:-len(x)], -HUBER_SIGMA, HUBER_SIGMA)
+        return Solution(estimates[:shared], clocks, float(np.mean(data**2)))
+
+    def _estimate(self, unknown: Free, value: float, std: float) -> Estimate:
+        near = AT_BOUND * (unknown.max - unknown.min)
+        at_bound = value - unknown.min < near or unknown.max - value < near
+        return Estimate(unknown.name, float(value), float(std), unknown.unit, bool(at_bound),
+                        bool(std < 0.5 * unknown.prior_std))
+
+    def _standard_errors(self, jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
+        """Sandwich over 4 s blocks (Liang and Zeger 1986): honest where errors hang together."""
+        bread = np.linalg.pinv(jacobian.T @ jacobian)
+        weight = np.minimum(1, HUBER_SIGMA / np.maximum(np.abs(residual), 1e-12))
+        pull = jacobian * (residual * weight)[:, None]
+        block = np.concatenate([np.repeat((1000 * i + s.grid.t_s[m] // BLOCK_S), 3)
+                                for i, (s, m) in enumerate(zip(self.scenes, self.masks, strict=True))])
+        _, label = np.unique(block, return_inverse=True)
+        sums = np.zeros((label.max() + 1, len(bread)))
+        np.add.at(sums, label, pull[:len(label)])
+        prior = np.diag(1 / self.prior**2)
+        covariance = bread @ (sums.T @ sums + prior) @ bread
+        return np.sqrt(np.maximum(np.diag(covariance), np.diag(bread)))
