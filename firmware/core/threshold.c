@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A row is read at most twice. The first pass asks, sixteen bytes at a time, whether any pair of
-// pixels has the right U and V, and most rows end there. A row that may hold the target is cut into
-// blocks of 32 pixels that are tested exactly, and blocks that have some are packed into bits.
+// A quick look asks, sixteen bytes at a time, whether any pair of pixels has the right U and V, and
+// most rows end there. A row that may hold the target is cut into blocks of 32 pixels; those that
+// the same look does not rule out are tested exactly and packed into one word of bits.
 //
 //   bytes    Y0  U Y1  V   Y0  U Y1  V      inside each byte's own limits? 0xFF or 0
 //   pairs  [ Y0  U   Y1  V ]                pixel 0 = Y0 & U & V, pixel 1 = Y1 & U & V
@@ -54,32 +54,31 @@ static inline pair_vector test_bytes(const struct fw_threshold *threshold, const
     return (pair_vector)(bytes - low <= span);
 }
 
-static inline bool any_set(pair_vector pairs)
-{
-    uint64_t halves[2];
-    memcpy(halves, &pairs, sizeof halves);
-    return (halves[0] | halves[1]) != 0;
-}
-
-// First pass. @return false only if no pixel of the row is inside the box.
-static bool row_may_match(const struct fw_threshold *threshold, const uint8_t *yuyv, int row_bytes)
+// The quick look. @return false only if no pixel is inside the box.
+static bool may_match(const struct fw_threshold *threshold, const uint8_t *yuyv, int length_bytes)
 {
     pair_vector any = {0};
     int i = 0;
-    for (; i + VECTOR_BYTES <= row_bytes; i += VECTOR_BYTES)
+    for (; i + VECTOR_BYTES <= length_bytes; i += VECTOR_BYTES)
     {
         const pair_vector inside = test_bytes(threshold, yuyv + i);
         any |= inside & inside >> 16;
     }
-    // U of the pair in its second byte, V in its fourth.
-    return i < row_bytes || any_set(any & 0xFF00);
+    // U of a pair is its second byte, V its fourth. Bytes that fill no vector are left to the test.
+    any &= 0xFF00;
+    uint64_t halves[2];
+    memcpy(halves, &any, sizeof halves);
+    return i < length_bytes || (halves[0] | halves[1]) != 0;
 }
 
-// Second pass, 32 pixels. @return one bit per pixel.
+// The exact test of 32 pixels. @return one bit per pixel.
 static uint32_t threshold_block(const struct fw_threshold *threshold, const uint8_t *yuyv)
 {
+    if (!may_match(threshold, yuyv, BLOCK_BYTES))
+    {
+        return 0;
+    }
     uint32_t pairs[FW_MASK_WORD_PX / 2];
-    pair_vector any = {0};
     for (int i = 0; i < BLOCK_BYTES; i += VECTOR_BYTES)
     {
         const pair_vector inside = test_bytes(threshold, yuyv + i);
@@ -87,15 +86,11 @@ static uint32_t threshold_block(const struct fw_threshold *threshold, const uint
         // Pixel 0 becomes bit 0 and pixel 1 bit 1.
         const pair_vector pixels = (chroma & inside & 1) | (chroma & inside >> 16 & 1) << 1;
         memcpy(pairs + i / 4, &pixels, VECTOR_BYTES);
-        any |= pixels;
     }
     uint32_t word = 0;
-    if (any_set(any))
+    for (int i = 0; i < FW_MASK_WORD_PX / 2; ++i)
     {
-        for (int i = 0; i < FW_MASK_WORD_PX / 2; ++i)
-        {
-            word |= pairs[i] << (2 * i);
-        }
+        word |= pairs[i] << (2 * i);
     }
     return word;
 }
@@ -105,7 +100,7 @@ bool fw_threshold_row(const struct fw_threshold *threshold, const uint8_t *yuyv,
 {
     const int whole_words = width_px / FW_MASK_WORD_PX;
     const int rest_px = width_px % FW_MASK_WORD_PX;
-    if (!row_may_match(threshold, yuyv, 2 * width_px))
+    if (!may_match(threshold, yuyv, 2 * width_px))
     {
         memset(mask, 0, sizeof *mask * (size_t)(whole_words + (rest_px > 0)));
         return false;
