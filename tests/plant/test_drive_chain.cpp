@@ -85,6 +85,30 @@ TEST(DriveChain, SlowsLinearlyFirstAndThenWithItsLag)
     }
 }
 
+// A biased heading turns the marker's lever too if it comes first: the way back is in reverse
+// order.
+TEST(DriveChain, UndoesWhatIsSeenInReverseOrder)
+{
+    for (const auto &[first, second] :
+         {std::pair{"heading_bias", "marker_offset"}, {"marker_offset", "heading_bias"}})
+    {
+        Model model;
+        model.AddEffect(first);
+        model.AddEffect(second);
+        model.Set("heading_bias.bias_rad", 0.2);
+        model.Set("marker_offset.x_m", 0.3);
+        const DriveChain chain(model);
+        Pose2 pose{1, 2, 3};
+        double t_s = 4;
+        chain.Observe(pose, t_s);
+        EXPECT_GT(std::abs(pose.x_m - 1), 0.1);
+        chain.Invert(pose, t_s);
+        EXPECT_NEAR(pose.x_m, 1, 1e-14);
+        EXPECT_NEAR(pose.y_m, 2, 1e-14);
+        EXPECT_NEAR(pose.theta_rad, 3, 1e-14);
+    }
+}
+
 // Sideways velocities of a robot that drives straight on with drive noise.
 struct NoisyDrive
 {
