@@ -64,7 +64,7 @@ double Number(const std::string &origin, const std::string &name, const toml::no
     const std::string tail = unit == "1" ? "" : " " + unit;
     std::ostringstream text;
     text << name;
-    if (!node.is_number() || !value)
+    if (!value)
         text << " must be a number from ";
     else if (!(*value >= min && *value <= max))
         text << " = " << *value << tail << " is outside ";
