@@ -3,6 +3,7 @@
 #ifndef TESTS_EFFECTS_DRIVE_H
 #define TESTS_EFFECTS_DRIVE_H
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -17,11 +18,11 @@ constexpr Wheels kTurnLeft{-1, 1, -1, 1}, kStrafeLeft{-1, 1, 1, -1};
 constexpr double kFull_mps = 0.36;          // rim speed of the default model at full duty
 constexpr double kLever_m = 0.059 + 0.067;  // its half wheelbase plus half track
 
-// `model` with one more effect.
+// `model` with one more effect; parameters without a value stay neutral.
 inline Model With(const std::string &effect, const std::vector<double> &values, Model model = {})
 {
     model.AddEffect(effect);
-    model.effects.back().values = values;
+    std::copy(values.begin(), values.end(), model.effects.back().values.begin());
     return model;
 }
 

