@@ -4,12 +4,16 @@
 from twinmill.calibration.compare import GOOD, SUSPECT, Comparison
 from twinmill.calibration.tables import main_robot, number
 
+# By what the robot was doing: what is wrong, and effects that act there.
 HINTS = {
-    "standing": "the robot is predicted to move while it stands: dead_zone, or clocks that differ",
-    "steady": "steady speeds are wrong: fit, then speed_curve or wheel_gain",
-    "starting": "starts are wrong: fit, then motor_lag or lag_by_duty",
-    "stopping": "stops are wrong: coasting",
-    "changing": "changes of command are wrong: fit, then motor_lag, lag_by_duty or input_delay",
+    "standing": ("it is predicted to move while it stands", ("dead_zone",)),
+    "steady": ("steady speeds are wrong", ("speed_curve", "wheel_gain", "reverse_asymmetry")),
+    "starting": ("starts are wrong", ("motor_lag", "lag_by_duty", "input_delay")),
+    "stopping": ("stops are wrong", ("coasting", "motor_lag")),
+    "changing": (
+        "changes of command are followed wrongly",
+        ("motor_lag", "lag_by_duty", "input_delay"),
+    ),
 }
 
 
@@ -19,9 +23,17 @@ def advice(comparison: Comparison) -> str:
         return "compare with a log that the model was not fitted on."
     if comparison.score <= GOOD:
         return "nothing to add for this log; compare with one of another day, floor or battery."
-    phases = [r for r in main_robot(comparison).where if r.group == "phase"]
+    robot = main_robot(comparison)
+    phases = [r for r in robot.where if r.group == "phase"]
     if not phases:
         return "record a longer log with starts, stops and turns, then compare again."
     worst = max(phases, key=lambda r: r.share)
-    return (f"{100 * worst.share:.0f} % of the error comes while the robot is {worst.regime} "
-            f"({number(worst.ratio)} times the floor): {HINTS[worst.regime]}.")
+    wrong, effects = HINTS[worst.regime]
+    fresh = [name for name in effects if name not in robot.scene.model.effects]
+    try_next = (
+        f"once the base is fitted, try {' or '.join(fresh)}" if fresh else "look at where it fails"
+    )
+    return (
+        f"{100 * worst.share:.0f} % of the error comes while the robot is {worst.regime} "
+        f"({number(worst.ratio)} times the floor): {wrong}; {try_next}."
+    )

@@ -16,55 +16,102 @@ from twinmill.calibration.tables import Cell, Table, number, tone
 STYLES = {"": "", "good": "bold green", "warn": "yellow", "bad": "bold red", "dim": "dim"}
 BAR = 20  # characters
 WARNINGS = 3  # in the terminal; --json has all
-PROSE = ("what it is", "meaning", "while", "unit", "stage", "")
 
 
 def comparison(result: Comparison) -> RenderableType:
     """A comparison."""
     robot = tables.main_robot(result)
-    return Group(_facts(tables.facts(result)), Text(), score_line("score", result), *_robots(result),
-                 Text(), table(tables.errors(robot)), table(tables.where(robot)),
-                 *_warnings(result.warnings), _next(result))
+    return Group(
+        _facts(tables.facts(result)),
+        Text(),
+        score_line("score", result),
+        *_robots(result),
+        Text(),
+        table(tables.errors(robot)),
+        table(tables.where(robot)),
+        *_warnings(result.warnings),
+        _next(result),
+    )
 
 
 def fit(result: FitResult) -> RenderableType:
     """A fit."""
-    return Group(_facts(tables.facts(result.before)), Text(), _change("score", result.before.score, result.after.score),
-                 score_line("", result.after, number_too=False), Text(),
-                 table(tables.parameters(result.parameters)), *_warnings(result.after.warnings),
-                 _written(result.path), _next(result.after))
+    return Group(
+        _facts(tables.facts(result.before)),
+        Text(),
+        _change("score", result.before.score, result.after.score),
+        score_line("", result.after, number_too=False),
+        Text(),
+        table(tables.parameters(result.parameters)),
+        *_warnings(result.after.warnings),
+        _written(result.path),
+        _next(result.after),
+    )
 
 
 def added(result: AddResult) -> RenderableType:
     """An added effect."""
     own = [e for e in result.parameters if e.name.startswith(f"{result.effect}.")]
     rest = len(result.parameters) - len(own)
-    return Group(_facts(tables.facts(result.before)), Text(),
-                 _change("score", result.before.score, result.after.score),
-                 _change("held out", result.heldout_refit.score, result.heldout_after.score,
-                         "without and with the effect, all refitted"),
-                 score_line("", result.after, number_too=False), Text(),
-                 table(tables.parameters(own)), Text(f"  and {rest} more refitted (--json has all).", "dim"),
-                 table(tables.held_out(result)), *_warnings(result.after.warnings),
-                 _written(result.path), _next(result.after))
+    return Group(
+        _facts(tables.facts(result.before)),
+        Text(),
+        _change("score", result.before.score, result.after.score),
+        _change(
+            "held out",
+            result.heldout_refit.score,
+            result.heldout_after.score,
+            "without and with the effect, all refitted",
+        ),
+        score_line("", result.after, number_too=False),
+        Text(),
+        table(tables.parameters(own)),
+        Text(f"  and {rest} more refitted (--json has all).", "dim"),
+        table(tables.held_out(result)),
+        *_warnings(result.after.warnings),
+        _written(result.path),
+        _next(result.after),
+    )
 
 
 def effect(entry: dict) -> RenderableType:
     """One card of the catalogue."""
-    lines = _facts([(label, entry[key]) for label, key in (
-        ("equation", "equation"), ("stage", "stage"), ("leaves out", "leaves_out"),
-        ("measure by", "measure"), ("reference", "reference"))])
-    return Group(Text.assemble((entry["name"], "bold"), f": {entry['summary']}"), Text(), lines, Text(),
-                 table(tables.effect_parameters(entry)))
+    lines = _facts(
+        [
+            (label, entry[key])
+            for label, key in (
+                ("equation", "equation"),
+                ("stage", "stage"),
+                ("leaves out", "leaves_out"),
+                ("measure by", "measure"),
+                ("reference", "reference"),
+            )
+        ]
+    )
+    return Group(
+        Text.assemble((entry["name"], "bold"), f": {entry['summary']}"),
+        Text(),
+        lines,
+        Text(),
+        table(tables.effect_parameters(entry)),
+    )
 
 
 def table(data: Table) -> RenderableType:
     """Any table."""
-    made = RichTable(title=data.title, title_justify="left", title_style="bold", caption=data.note or None,
-                     caption_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
+    made = RichTable(
+        title=data.title,
+        title_justify="left",
+        title_style="bold",
+        caption=data.note or None,
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        padding=(0, 1),
+    )
     for i, column in enumerate(data.columns):
-        left = i == 0 or column in PROSE
-        made.add_column(column, justify="left" if left else "right", no_wrap=column not in PROSE)
+        words = i in data.words
+        made.add_column(column, justify="left" if words else "right", no_wrap=not words or i == 0)
     for row in data.rows:
         made.add_row(*(_cell(cell) for cell in row))
     return made
@@ -83,8 +130,12 @@ def _cell(cell: Cell) -> Text:
     if cell.bar is None:
         return text
     filled = max(0, min(BAR, round(BAR * cell.bar)))
-    return Text.assemble(("█" * filled, STYLES[cell.tone]), ("·" * (BAR - filled), "dim"), " ",
-                         (f"{cell.text:>6}", STYLES[cell.tone]))
+    return Text.assemble(
+        ("█" * filled, STYLES[cell.tone]),
+        ("·" * (BAR - filled), "dim"),
+        " ",
+        (f"{cell.text:>6}", STYLES[cell.tone]),
+    )
 
 
 def _facts(pairs: list[tuple[str, str]]) -> RenderableType:
@@ -99,13 +150,20 @@ def _facts(pairs: list[tuple[str, str]]) -> RenderableType:
 def _robots(result: Comparison) -> list[Text]:
     if len(result.robots) == 1:
         return []
-    return [Text.assemble(f"  {r.scene.measurement.label}  ", (number(r.score), STYLES[tone(r.score)]))
-            for r in result.robots]
+    return [
+        Text.assemble(f"  {r.scene.measurement.label}  ", (number(r.score), STYLES[tone(r.score)]))
+        for r in result.robots
+    ]
 
 
 def _change(label: str, before: float, after: float, note: str = "") -> Text:
-    return Text.assemble(f"{label:<10}", (number(before), STYLES[tone(before)]), " → ",
-                         (number(after), STYLES[tone(after)]), (f"  {note}", "dim"))
+    return Text.assemble(
+        f"{label:<10}",
+        (number(before), STYLES[tone(before)]),
+        " → ",
+        (number(after), STYLES[tone(after)]),
+        (f"  {note}", "dim"),
+    )
 
 
 def _warnings(warnings: list[str]) -> list[RenderableType]:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from twinmill.calibration.add import AddResult
 from twinmill.calibration.compare import GOOD, MISSING, SUSPECT, Comparison, RobotComparison
-from twinmill.calibration.regimes import Regime
+from twinmill.calibration.regimes import HORIZON, Regime
 from twinmill.calibration.solve import Estimate
 from twinmill.calibration.windows import CHANNELS, HORIZONS_S, rms
 
@@ -19,7 +19,10 @@ FLOOR_KINDS = {
     "bootstrap": "the model's own noisy replica",
     "sensor": "sensor noise alone (too low)",
 }
-SHOWN = {"m": (1000.0, "mm"), "rad": (float(np.degrees(1)), "°")}  # unit: factor, as a person reads it
+SHOWN = {
+    "m": (1000.0, "mm"),
+    "rad": (float(np.degrees(1)), "°"),
+}  # unit: factor, as a person reads it
 WORST = 3  # regimes of a group
 
 
@@ -34,12 +37,13 @@ class Cell:
 
 @dataclass(frozen=True)
 class Table:
-    """A table: first column to the left, all others to the right; a note in words goes below."""
+    """A table. Columns whose places are in `words` stand left and may wrap; a note goes below."""
 
     title: str
     columns: list[str]
     rows: list[list[Cell]]
     note: str = ""
+    words: tuple[int, ...] = (0,)
 
 
 def number(value: float | None) -> str:
@@ -75,17 +79,30 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
     date = f"{recorded:%Y-%m-%d %H:%M} UTC" if recorded.year > 2000 else "date unknown"
     others = len(comparison.robots) - 1
     return [
-        ("log", f"{measurement.log_name}, robot {track.robot_id}"
-                + (f" (and {others} more)" if others else "")),
-        ("recorded", f"{date}, {track.pose_t_s[-1] - track.pose_t_s[0]:.0f} s, "
-                     f"{len(track.pose)} poses, driven by {track.command_kind.replace('_', ' ')}"),
+        (
+            "log",
+            f"{measurement.log_name}, robot {track.robot_id}"
+            + (f" (and {others} more)" if others else ""),
+        ),
+        (
+            "recorded",
+            f"{date}, {track.pose_t_s[-1] - track.pose_t_s[0]:.0f} s, "
+            f"{len(track.pose)} poses, driven by {track.command_kind.replace('_', ' ')}",
+        ),
         ("model", comparison.model_name),
-        ("noise", f"sensor {number(1000 * noise.position.sensor)} mm, "
-                  f"{number(np.degrees(noise.heading.sensor))}°; "
-                  f"drive {number(1000 * noise.position.drive)} mm/s for {number(noise.position.memory_s)} s, "
-                  f"{number(np.degrees(noise.heading.drive))}°/s for {number(noise.heading.memory_s)} s"),
+        (
+            "noise",
+            f"sensor {number(1000 * noise.position.sensor)} mm, "
+            f"{number(np.degrees(noise.heading.sensor))}°; "
+            f"drive {number(1000 * noise.position.drive)} mm/s for {number(noise.position.memory_s)} s, "
+            f"{number(np.degrees(noise.heading.drive))}°/s for {number(noise.heading.memory_s)} s",
+        ),
         ("floor", f"from {FLOOR_KINDS.get(robot.floor.kind, robot.floor.kind)}"),
-        ("clock", f"motion capture {number(1000 * robot.time_offset_s)} ms ahead of the robot"),
+        (
+            "clock",
+            f"motion capture {number(1000 * abs(robot.time_offset_s))} ms "
+            f"{'ahead of' if robot.time_offset_s >= 0 else 'behind'} the robot",
+        ),
     ]
 
 
@@ -100,12 +117,18 @@ def errors(robot: RobotComparison) -> Table:
         row = [Cell(f"{horizon_s:g}")]
         for c, (_, unit) in enumerate(CHANNELS):
             ratio = found[h, c] / floor[h, c]
-            row += [Cell(number(found[h, c] * SHOWN[unit][0])),
-                    Cell(number(floor[h, c] * SHOWN[unit][0]), "dim"),
-                    Cell(number(ratio), tone(max(ratio, 1.0)))]
+            row += [
+                Cell(number(found[h, c] * SHOWN[unit][0])),
+                Cell(number(floor[h, c] * SHOWN[unit][0]), "dim"),
+                Cell(number(ratio), tone(max(ratio, 1.0))),
+            ]
         rows.append(row)
-    return Table("How far predictions miss", columns, rows,
-                 "RMS error of predictions that start from measured poses; × is error over floor.")
+    return Table(
+        "How far predictions miss",
+        columns,
+        rows,
+        "RMS error of predictions that start from measured poses; × is error over floor.",
+    )
 
 
 def where(robot: RobotComparison) -> Table:
@@ -117,11 +140,21 @@ def where(robot: RobotComparison) -> Table:
     rows = []
     for group, regimes in groups.items():
         for i, r in enumerate(regimes[:WORST]):
-            rows.append([Cell("" if i else group, "dim"), Cell(r.regime),
-                         Cell(number(r.ratio), tone(max(r.ratio, 1.0)), r.ratio / worst),
-                         Cell(f"{100 * r.share:.0f} %")])
-    return Table("Where it fails", ["by", "while", "error over floor", "share of error"], rows,
-                 f"Predictions {HORIZONS_S[2]:g} s ahead; the {WORST} worst of each kind.")
+            rows.append(
+                [
+                    Cell("" if i else group, "dim"),
+                    Cell(r.regime),
+                    Cell(number(r.ratio), tone(max(r.ratio, 1.0)), r.ratio / worst),
+                    Cell(f"{100 * r.share:.0f} %"),
+                ]
+            )
+    return Table(
+        "Where it fails",
+        ["by", "while", "error over floor", "share of error"],
+        rows,
+        f"Predictions {HORIZONS_S[HORIZON]:g} s ahead; the {WORST} worst of each kind.",
+        (0, 1),
+    )
 
 
 def parameters(estimates: list[Estimate]) -> Table:
@@ -129,10 +162,21 @@ def parameters(estimates: list[Estimate]) -> Table:
     rows = []
     for e in estimates:
         remark = ("at its bound" if e.at_bound else "") if e.seen else "not told by this log"
-        rows.append([Cell(e.name, "" if e.seen else "dim"), Cell(_rounded(e.value, e.std)),
-                     Cell(f"± {number(e.std)}"), Cell("" if e.unit == "1" else e.unit),
-                     Cell(remark, "warn" if remark else "")])
-    return Table("Fitted quantities", ["quantity", "value", "std", "unit", ""], rows)
+        value, std = (
+            (_rounded(e.value, e.std), f"± {number(e.std)}") if e.seen else (number(e.value), "–")
+        )
+        rows.append(
+            [
+                Cell(e.name, "" if e.seen else "dim"),
+                Cell(value, "" if e.seen else "dim"),
+                Cell(std),
+                Cell("" if e.unit == "1" else e.unit),
+                Cell(remark, "warn" if remark else ""),
+            ]
+        )
+    return Table(
+        "Fitted quantities", ["quantity", "value", "std", "unit", ""], rows, words=(0, 3, 4)
+    )
 
 
 def _rounded(value: float, std: float) -> str:
@@ -152,21 +196,35 @@ def held_out(added: AddResult) -> Table:
         row = [Cell(f"{horizon_s:g}")]
         for c, (_, unit) in enumerate(CHANNELS):
             before, after = added.heldout_before.rms[h, c], added.heldout_after.rms[h, c]
-            row += [Cell(number(before * SHOWN[unit][0])),
-                    Cell(number(after * SHOWN[unit][0]),
-                         "good" if after < 0.95 * before else "bad" if after > 1.05 * before else "")]
+            row += [
+                Cell(number(before * SHOWN[unit][0])),
+                Cell(
+                    number(after * SHOWN[unit][0]),
+                    "good" if after < 0.95 * before else "bad" if after > 1.05 * before else "",
+                ),
+            ]
         rows.append(row)
-    return Table("Errors on data that was not fitted", columns, rows,
-                 "Fitted on one half of the log, judged on the other, both ways.")
+    return Table(
+        "Errors on data that was not fitted",
+        columns,
+        rows,
+        "Fitted on one half of the log, judged on the other, both ways.",
+    )
 
 
 def steps(scores: list[tuple[str, float]]) -> Table:
     """Score after each step of a chain, with a bar on a scale of factors."""
     widest = max(np.log(max(score, 1.0)) for _, score in scores) or 1.0
-    rows = [[Cell(label), Cell(number(score), tone(score),
-                               float(np.log(max(score, 1.0)) / widest))] for label, score in scores]
-    return Table("Score after each step", ["step", "score"], rows,
-                 "1.0 is as good as the log can tell; bars show factors.")
+    rows = [
+        [Cell(label), Cell(number(score), tone(score), float(np.log(max(score, 1.0)) / widest))]
+        for label, score in scores
+    ]
+    return Table(
+        "Score after each step",
+        ["step", "score"],
+        rows,
+        "1.0 is as good as the log can tell; bars show factors.",
+    )
 
 
 def catalogue(entries: list[dict]) -> Table:
@@ -174,12 +232,29 @@ def catalogue(entries: list[dict]) -> Table:
     order = ("duty", "wheel", "ground", "world", "observe", "view", "decide")
     ranked = sorted(entries, key=lambda e: order.index(e["stage"]))
     rows = [[Cell(e["name"]), Cell(e["stage"]), Cell(e["summary"])] for e in ranked]
-    return Table("Effects", ["effect", "stage", "what it is"], rows,
-                 "twinmill effects NAME shows one with its equation and parameters.")
+    return Table(
+        "Effects",
+        ["effect", "stage", "what it is"],
+        rows,
+        "twinmill effects NAME shows one with its equation and parameters.",
+        (0, 1, 2),
+    )
 
 
 def effect_parameters(entry: dict) -> Table:
     """Parameters of one effect."""
-    rows = [[Cell(p["name"]), *(Cell(f"{p[key]:g}") for key in ("default", "min", "max", "neutral")),
-             Cell("" if p["unit"] == "1" else p["unit"]), Cell(p["doc"])] for p in entry["parameters"]]
-    return Table("Parameters", ["parameter", "default", "min", "max", "neutral", "unit", "meaning"], rows)
+    rows = [
+        [
+            Cell(p["name"]),
+            *(Cell(f"{p[key]:g}") for key in ("default", "min", "max", "neutral")),
+            Cell("" if p["unit"] == "1" else p["unit"]),
+            Cell(p["doc"]),
+        ]
+        for p in entry["parameters"]
+    ]
+    return Table(
+        "Parameters",
+        ["parameter", "default", "min", "max", "neutral", "unit", "meaning"],
+        rows,
+        words=(0, 5, 6),
+    )

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sections of text, tables and figures to one HTML file."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from twinmill.calibration.model_file import write_whole
+from twinmill.calibration.tables import Table, Tone
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What every output carries."""
+
+    command: str
+    version: str
+    model_sha256: str
+
+    def to_json(self) -> dict:
+        """Fields of JSON output."""
+        return vars(self)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture as SVG text, and what is to be seen in it, in plain words."""
+
+    svg: str
+    title: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """One step of the work.
+
+    Attributes:
+        title: of the step.
+        score: label, number and colour of each score shown large.
+        verdict: what the score means.
+        facts: label and text.
+        figures, tables: in their order.
+        next_step: a sentence.
+        warnings: sentences.
+    """
+
+    title: str
+    score: list[tuple[str, str, Tone]]
+    verdict: str
+    facts: list[tuple[str, str]] = field(default_factory=list)
+    figures: list[Figure] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
+    next_step: str = ""
+    warnings: list[str] = field(default_factory=list)
+
+
+def write_report(folder: Path, title: str, source: Provenance, sections: list[Section]) -> Path:
+    """Writes index.html into a folder, which is made if need be.
+
+    The same input gives the same bytes: no date but the log's is in it.
+
+    Returns:
+        Path of the file.
+
+    Raises:
+        ModelError: it cannot be written.
+    """
+    environment = Environment(
+        loader=PackageLoader("twinmill.calibration.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    page = environment.get_template("report.html.j2").render(
+        title=title, source=source, sections=sections
+    )
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    path = Path(folder) / "index.html"
+    write_whole(path, page)
+    return path

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill compare`, `fit` and `add`: from logs and a model to errors, a report and a better model."""
+
+import shlex
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import RenderableType
+from twinmill.calibration import show
+from twinmill.calibration.add import AddResult, add
+from twinmill.calibration.compare import Comparison, compare
+from twinmill.calibration.fit import FitResult, fit
+from twinmill.calibration.measurement import load_measurements
+from twinmill.calibration.model_file import ModelFile
+from twinmill.calibration.report import (
+    Provenance,
+    Section,
+    added_section,
+    comparison_section,
+    fit_section,
+    write_report,
+)
+from twinmill.tools.effects import find_effect
+from twinmill.tools.output import AsJson, busy, check_new_file, check_new_folder, deliver
+
+Logs = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG...", show_default=False, help="LCM logs with commands and poses of a robot."
+    ),
+]
+Model = Annotated[
+    str,
+    typer.Option(
+        "--model", "-m", metavar="M", help="Model file, here or among the installed models."
+    ),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        help="Write an HTML report, DIR/index.html, with its pictures in it.",
+    ),
+]
+NewModel = Annotated[
+    Path,
+    typer.Option(
+        "--output", "-o", metavar="M2", show_default=False, help="The new model file (.toml)."
+    ),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace M2 if it exists.")]
+DEFAULT_MODEL = "turbopi.toml"
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the commands to the application."""
+    app.command("compare")(_compare)
+    app.command("fit")(_fit)
+    app.command("add")(_add)
+
+
+def provenance(command: str, model: ModelFile) -> Provenance:
+    """What every output carries."""
+    return Provenance(command, f"twinmill {version('twinmill')}", model.hash)
+
+
+def _compare(
+    logs: Logs, model: Model = DEFAULT_MODEL, as_json: AsJson = False, out: Out = None
+) -> Comparison:
+    """Tell how well a model predicts logs, against the log's own noise, and where it fails.
+
+    Predictions start from measured poses and are judged 0.1, 0.2, 0.5, 1 and 2 s later. A score of 1.0
+    is as good as the log can tell; above 1.3 something is missing.
+
+    Example: twinmill compare run.lcmlog --model turbopi.toml --out report
+    """
+    source = provenance(_command("compare", logs, model), model_file := _open(model, out))
+    with busy(f"comparing with {model}"):
+        result = compare(load_measurements(logs), model_file)
+    section = comparison_section(result)
+    _finish(result.to_json(), show.comparison(result), source, section, as_json, out)
+    return result
+
+
+def _fit(
+    logs: Logs,
+    output: NewModel,
+    model: Model = DEFAULT_MODEL,
+    force: Force = False,
+    as_json: AsJson = False,
+    out: Out = None,
+) -> FitResult:
+    """Fit all quantities of a model to logs; writes a new model file and leaves the old one.
+
+    Example: twinmill fit run.lcmlog --model turbopi.toml -o fitted.toml
+    """
+    source = provenance(_command("fit", logs, model, output), model_file := _open(model, out))
+    _check_output(output, model_file, force)
+    with busy(f"fitting {model}"):
+        result = fit(load_measurements(logs), model_file, output, source.command)
+    section = fit_section(result)
+    _finish(result.to_json(), show.fit(result), source, section, as_json, out)
+    return result
+
+
+def _add(
+    effect: Annotated[
+        str,
+        typer.Argument(
+            metavar="EFFECT", show_default=False, help="Its name; `twinmill effects` lists them."
+        ),
+    ],
+    logs: Logs,
+    output: NewModel,
+    model: Model = DEFAULT_MODEL,
+    force: Force = False,
+    as_json: AsJson = False,
+    out: Out = None,
+) -> AddResult:
+    """Add an effect to a model, fit it with all the rest, and judge it on data not fitted to.
+
+    Example: twinmill add coasting run.lcmlog --model fitted.toml -o better.toml
+    """
+    find_effect(effect)
+    source = provenance(
+        _command(f"add {effect}", logs, model, output), model_file := _open(model, out)
+    )
+    _check_output(output, model_file, force)
+    with busy(f"adding {effect} to {model}"):
+        result = add(effect, load_measurements(logs), model_file, output, source.command)
+    section = added_section(result)
+    _finish(result.to_json(), show.added(result), source, section, as_json, out)
+    return result
+
+
+def _command(verb: str, logs: list[Path], model: str, output: Path | None = None) -> str:
+    """The command line that does this again, without what only changes where and how it is told."""
+    words = ["twinmill", *verb.split(), *map(str, logs), "--model", model]
+    return shlex.join(words + (["-o", str(output)] if output else []))
+
+
+def _open(model: str, out: Path | None) -> ModelFile:
+    if out:
+        check_new_folder(out)
+    return ModelFile.load(model)
+
+
+def _check_output(output: Path, model_file: ModelFile, force: bool) -> None:
+    if output.resolve() == model_file.path.resolve():
+        raise ValueError(
+            f"{output}: is the model that is read, and models are never changed in place; "
+            "choose another name."
+        )
+    check_new_file(output, force)
+
+
+def _finish(
+    data: dict,
+    text: RenderableType,
+    source: Provenance,
+    section: Section,
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Report, then JSON or text."""
+    report = write_report(out, section.title, source, [section]) if out else None
+    deliver({**data, **source.to_json(), "report": str(report) if report else None}, text, as_json)
+    if report and not as_json:
+        typer.echo(f"Report: {report}")

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command `twinmill`: puts the subcommands together and tells what went wrong in one sentence."""
+
+import sys
+from importlib.metadata import version
+from typing import Annotated, Any
+
+import typer
+from twinmill.tools import calibrate, effects, import_log
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+import_log.register(app)
+calibrate.register(app)
+effects.register(app)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"twinmill {version('twinmill')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    show_version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """Compare a robot's log with its model, and make the model as good as the log can tell.
+
+    Lengths in m, angles in rad, times in s; what is printed for people says mm and degrees.
+
+    Exit codes: 0 done, 1 failed (one sentence on stderr), 2 wrong command line.
+    """
+
+
+def run(arguments: list[str]) -> Any:
+    """Runs one command line without the leading `twinmill`.
+
+    Returns:
+        What the subcommand found, or an exit code where it asked for one.
+
+    Raises:
+        ValueError, OSError: it failed, in one sentence.
+    """
+    return app(arguments, prog_name="twinmill", standalone_mode=False)
+
+
+def main() -> None:
+    """Entry point: leaves with the exit code."""
+    try:
+        result = run(sys.argv[1:] or ["--help"])
+        code = result if isinstance(result, int) else 0
+    except typer.TyperException as error:
+        code = error.exit_code
+        _complain(
+            f"{error.format_message()} (--help lists what can be given)"
+            if code == 2
+            else error.format_message()
+        )
+    except (ValueError, OSError) as error:
+        code = 1
+        _complain(str(error))
+    sys.exit(code)
+
+
+def _complain(sentence: str) -> None:
+    print(f"twinmill: {' '.join(sentence.split())}", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

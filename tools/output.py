@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What all subcommands share: the JSON object or the text, the spinner, and early checks of outputs."""
+
+import json
+import math
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console, RenderableType
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+AsJson = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object on stdout, nothing else.")
+]
+
+
+def plain(value: Any) -> Any:
+    """A value of which JSON can hold all: numbers of numpy as Python's, NaN and infinity as null."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def deliver(data: dict, text: RenderableType, as_json: bool) -> None:
+    """Prints the one or the other on stdout."""
+    if as_json:
+        print(json.dumps(plain(data), allow_nan=False))
+    else:
+        Console().print(text)
+
+
+@contextmanager
+def busy(what: str) -> Iterator[None]:
+    """Shows on stderr, if that is a terminal, what is being done and for how long."""
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        progress.add_task(what, total=None)
+        yield
+
+
+def check_new_file(path: Path, force: bool) -> None:
+    """Raises ValueError if a file could not be written here; tried before the long work."""
+    if path.is_dir():
+        raise ValueError(f"{path}: is a folder; name a file in it.")
+    if path.exists() and not force:
+        raise ValueError(f"{path}: exists; choose another name, or replace it with --force.")
+    _check_folder(path, path.parent)
+
+
+def check_new_folder(path: Path) -> None:
+    """Raises ValueError if a folder could not be made or written here."""
+    existing = path
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    _check_folder(path, existing)
+
+
+def _check_folder(path: Path, folder: Path) -> None:
+    try:
+        handle, name = tempfile.mkstemp(prefix=".twinmill.", dir=folder)
+    except OSError as error:
+        raise ValueError(
+            f"{path}: cannot be written ({error.strerror}); choose another place."
+        ) from error
+    os.close(handle)
+    os.unlink(name)
