@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// Says of a swarm what real robots and a motion capture would say, and the truth besides.
+#ifndef APP_PUBLISHER_H
+#define APP_PUBLISHER_H
+
+#include <string>
+#include <vector>
+
+#include "outlet.h"
+#include "plant/drive_chain.h"
+#include "plant/random.h"
+#include "swarm/swarm.h"
+
+namespace twin
+{
+
+class Publisher
+{
+public:
+    struct Robot
+    {
+        std::string behavior;
+        std::string config_toml;
+    };
+    // `models` and `robots` in the swarm's order; `swarm` at its start.
+    Publisher(Outlet &outlet, const Swarm &swarm, const std::vector<Model> &models,
+              std::vector<Robot> robots, const std::string &channel_prefix, double pose_rate_hz,
+              uint64_t seed);
+
+    // After Swarm::Decide(): R<nn>_TELEMETRY, and R<nn>_RUN every 5 s.
+    void PublishDecisions(const Swarm &swarm);
+    // At the start and after every Swarm::Advance(): the R<nn>_POSE and TWIN_TRUTH_R<nn> that fell
+    // due, between the poses known before and after.
+    void PublishPoses(const Swarm &swarm);
+
+private:
+    struct Member
+    {
+        Robot robot;
+        DriveChain chain;
+        Noise noise;
+        double wheel_radius_m;
+        Random random;
+        RobotState last;
+        std::string telemetry, pose, run, truth;  // channels
+    };
+    void PublishRun(int id, int64_t utime_us);
+    void PublishTelemetry(int id, const Swarm &swarm);
+    void PublishPose(int id, double t_s, const Pose2 &pose);
+    void PublishTruth(int id, double t_s, const Pose2 &pose, const RobotState &state);
+    int64_t Utime(double t_s) const;
+
+    Outlet &outlet_;
+    std::vector<Member> members_;
+    int64_t start_utime_us_, next_run_utime_us_;
+    double pose_rate_hz_, last_t_s_ = 0;
+    int32_t pose_seq_ = 0;
+};
+
+}  // namespace twin
+
+#endif

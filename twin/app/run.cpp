@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run.h"
+
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "plant_mujoco/mujoco_plant.h"
+#include "publisher.h"
+#include "summary.h"
+#include "swarm/bodies.h"
+#include "swarm/metrics.h"
+#include "swarm/robots.h"
+#include "swarm/species.h"
+
+namespace twin
+{
+namespace
+{
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kWindow_s = 10;
+// Poses between steps are interpolated: right to 0.02 mm even while a robot starts.
+constexpr double kMaxStep_s = 0.0055;
+// A fixed date, so that a log depends on nothing but its options: 2023-11-14 22:13:20 UTC.
+constexpr int64_t kLogEpoch_us = 1'700'000'000'000'000;
+
+volatile std::sig_atomic_t g_stop = 0;
+
+// What a run is made of, before it moves.
+struct Setup
+{
+    Model model;
+    std::vector<Model> robots;
+    std::vector<const fw_behavior *> behaviors;
+    int64_t start_utime_us;
+    std::string command_line;
+};
+
+int64_t StartUtimeUs(const Options &options)
+{
+    if (options.epoch_us)
+        return *options.epoch_us;
+    if (!options.UsesBus())
+        return kLogEpoch_us;
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+}
+
+Setup Prepare(const Options &options)
+{
+    Setup setup;
+    setup.model = Model::Load(options.model);
+    setup.model.base.control_period_s = options.dt_s.value_or(setup.model.base.control_period_s);
+    setup.behaviors = ParseSpecies(options.behavior, options.n);
+    const int n = static_cast<int>(setup.behaviors.size());
+    setup.robots = DrawRobots(setup.model, n, options.seed);
+    setup.start_utime_us = StartUtimeUs(options);
+    setup.command_line = CommandLine(options, setup.behaviors.size(), setup.start_utime_us);
+    return setup;
+}
+
+std::unique_ptr<Plant> MakePlant(const Options &options, const Setup &setup)
+{
+    const auto starts = StartPoses(options.start, static_cast<int>(setup.robots.size()),
+                                   options.spread_m, setup.model.robot.body_radius_m, options.seed);
+    if (options.plant == PlantKind::kPlanar)
+        return std::make_unique<PlanarBodies>(setup.robots, starts, options.seed);
+    return std::make_unique<MujocoPlant>(FindModelFile(options.mjcf), setup.robots, starts,
+                                         MujocoOptions{.seed = options.seed});
+}
+
+Swarm MakeSwarm(const Options &options, const Setup &setup, const std::optional<Script> &script)
+{
+    std::vector<fw_table> tables;
+    for (const fw_behavior *behavior : setup.behaviors)
+        tables.push_back(behavior->table);
+    Swarm swarm(MakePlant(options, setup), setup.robots, tables,
+                {options.seed, setup.start_utime_us, kMaxStep_s});
+    if (script)
+        swarm.Play(*script);
+    return swarm;
+}
+
+// The model file as it is, under comments that say how to repeat the run.
+std::vector<Publisher::Robot> DescribeRobots(const Options &options, const Setup &setup)
+{
+    std::ostringstream model_text;
+    model_text << std::ifstream(FindModelFile(options.model), std::ios::binary).rdbuf();
+    std::vector<Publisher::Robot> robots;
+    for (const fw_behavior *behavior : setup.behaviors)
+    {
+        const fw_table &table = behavior->table;
+        std::ostringstream config;
+        config << "# " << setup.command_line << "\n# seed = " << options.seed << ", table "
+               << behavior->name << ": unseen (" << table.unseen.speed_input_pct << ", "
+               << table.unseen.turn_input_milli / 1000.0 << "), seen ("
+               << table.seen.speed_input_pct << ", " << table.seen.turn_input_milli / 1000.0
+               << ")\n"
+               << model_text.str();
+        robots.push_back({behavior->name, config.str()});
+    }
+    return robots;
+}
+
+// True if there is a bus. Without one a log may do, but a person is told.
+bool OpenOutlet(const Options &options, Outlet &outlet)
+{
+    if (!options.log.empty())
+        outlet.OpenLog(options.log);
+    if (!options.UsesBus())
+        return false;
+    try
+    {
+        outlet.OpenBus(options.lcm_url.value_or(""));
+        return true;
+    }
+    catch (const std::runtime_error &error)
+    {
+        if (options.log.empty())
+            throw std::runtime_error(std::string(error.what()) +
+                                     ": give --log FILE, or the machine a route for multicast (ip "
+                                     "route add 224.0.0.0/4 dev lo)");
+        std::fprintf(stderr, "twin_run: %s: only the log is written\n", error.what());
+        return false;
+    }
+}
+
+size_t RingSize(const Setup &setup)
+{
+    size_t size = 0;
+    while (size < setup.behaviors.size() && setup.behaviors[size] == setup.behaviors.front())
+        ++size;
+    return size;
+}
+
+// Steps, publishes and measures until the time is over or a signal comes.
+class Loop
+{
+public:
+    Loop(const Options &options, const Setup &setup, std::optional<double> duration_s,
+         double realtime_factor)
+        : duration_s_(duration_s),
+          realtime_factor_(realtime_factor),
+          ring_size_(RingSize(setup)),
+          scale_{setup.model.sensor.range_m, setup.model.robot.body_radius_m},
+          show_(!options.json)
+    {
+    }
+
+    void Turn(Swarm &swarm, Publisher &publisher)
+    {
+        publisher.PublishPoses(swarm);
+        while (!g_stop && !(duration_s_ && swarm.TimeS() >= *duration_s_ - swarm.PeriodS() / 2))
+        {
+            swarm.Decide();
+            publisher.PublishDecisions(swarm);
+            for (int i = 0; i < swarm.Substeps(); ++i)
+            {
+                swarm.Advance();
+                publisher.PublishPoses(swarm);
+            }
+            Observe(swarm);
+            KeepPace(swarm.TimeS());
+        }
+        progress_.Clear();
+    }
+
+    double WallS() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
+    Metrics Mean() const { return window_.Mean(); }
+
+private:
+    void Observe(const Swarm &swarm)
+    {
+        states_.clear();
+        for (int i = 0; i < swarm.Size(); ++i)
+            states_.push_back(swarm.State(i));
+        const Metrics now = Measure(states_, ring_size_, scale_);
+        window_.Add(swarm.TimeS(), now);
+        if (show_)
+            progress_.Show(swarm.TimeS(), duration_s_, WallS(), now);
+    }
+
+    void KeepPace(double t_s) const
+    {
+        if (realtime_factor_ > 0)
+            std::this_thread::sleep_until(
+                begin_ + std::chrono::duration_cast<Clock::duration>(
+                             std::chrono::duration<double>(t_s / realtime_factor_)));
+    }
+
+    Clock::time_point begin_ = Clock::now();
+    std::optional<double> duration_s_;
+    double realtime_factor_;
+    size_t ring_size_;
+    MetricScale scale_;
+    bool show_;
+    MetricWindow window_{kWindow_s};
+    std::vector<RobotState> states_;
+    Progress progress_;
+};
+
+}  // namespace
+
+void RequestStop()
+{
+    g_stop = 1;
+}
+
+void Run(const Options &options)
+{
+    const Setup setup = Prepare(options);
+    std::optional<Script> script;
+    if (!options.script.empty())
+        script = Script::Load(options.script);
+    std::optional<double> duration_s = options.duration_s;
+    if (script && !duration_s)
+        duration_s = script->EndS();
+    const double realtime_factor =
+        options.realtime_factor.value_or(duration_s && !options.UsesBus() ? 0 : 1);
+
+    Swarm swarm = MakeSwarm(options, setup, script);
+    Outlet outlet;
+    const bool on_bus = OpenOutlet(options, outlet);
+    PrintHeader(options, swarm, on_bus, realtime_factor);
+    Publisher publisher(outlet, swarm, setup.robots, DescribeRobots(options, setup),
+                        options.channel_prefix, options.pose_rate_hz, options.seed);
+    Loop loop(options, setup, duration_s, realtime_factor);
+    loop.Turn(swarm, publisher);
+    const double wall_s = loop.WallS();
+    outlet.Finish();
+    PrintSummary(options, {setup.command_line, swarm.Size(), swarm.PeriodS(), swarm.TimeS(), wall_s,
+                           g_stop != 0, loop.Mean()});
+}
+
+}  // namespace twin

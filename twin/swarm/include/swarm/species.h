@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which robot runs which behaviour.
+#ifndef SWARM_SPECIES_H
+#define SWARM_SPECIES_H
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fw/behavior.h"
+
+namespace twin
+{
+
+// One behaviour per robot from "milling" (for all) or "milling:5,self_centering:1", in that order.
+// `n` may be left out if counts are given. Throws std::invalid_argument in one sentence if a name
+// is unknown to the firmware or the counts do not add up to n.
+std::vector<const fw_behavior *> ParseSpecies(const std::string &text, std::optional<int> n);
+
+}  // namespace twin
+
+#endif

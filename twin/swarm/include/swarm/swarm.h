@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// N robots in lockstep. One step is one control period: all sense the same instant, all decide,
+// then all move.
+#ifndef SWARM_SWARM_H
+#define SWARM_SWARM_H
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "fw/step.h"
+#include "plant/plant.h"
+#include "sensor/cone_sensor.h"
+#include "swarm/script.h"
+
+namespace twin
+{
+
+struct SwarmOptions
+{
+    uint64_t seed = 0;           // of the sensors' errors
+    int64_t start_utime_us = 0;  // the robots' clock at the start
+    // Longest step of the plant; a control period is split evenly. With motor lag, 22 ms moves a
+    // path by micrometres; shorter steps serve those who want to know poses in between.
+    double max_step_s = 0.025;
+};
+
+class Swarm
+{
+public:
+    // One model per robot (DrawRobots), in the plant's order, and one table per robot. Every
+    // decision is the firmware's. Throws std::invalid_argument if the firmware cannot drive a
+    // model.
+    Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
+          const std::vector<fw_table> &tables, const SwarmOptions &options);
+
+    // All robots play `script` instead of their tables.
+    void Play(Script script);
+
+    // Decide(), then Substeps() times Advance().
+    void Step();
+    // Senses, decides, commands.
+    void Decide();
+    // Moves on by one substep.
+    void Advance();
+    int Substeps() const { return substeps_; }
+
+    int Size() const { return static_cast<int>(members_.size()); }
+    double PeriodS() const { return period_s_; }
+    // Steps begun so far.
+    int64_t StepCount() const { return step_count_; }
+    // Time since the start: a whole number of substeps.
+    double TimeS() const;
+    // The robots' clock.
+    int64_t UtimeUs() const;
+    const RobotState &State(int robot) const { return plant_->State(robot); }
+    // What the firmware decided last.
+    const fw_output &Output(int robot) const;
+    double BatteryV(int robot) const;
+
+private:
+    struct Member
+    {
+        fw_ctx firmware;
+        fw_output output;
+        ConeSensor sensor;
+        Base base;
+        double battery_V;
+    };
+    void DecideOne(Member &member, int64_t now_us, const ScriptRow *row);
+    Command CommandFor(const Member &member) const;
+
+    std::unique_ptr<Plant> plant_;
+    std::vector<Member> members_;
+    std::vector<Pose2> poses_;
+    std::optional<Script> script_;
+    double period_s_;
+    int substeps_;
+    int64_t start_utime_us_;
+    int64_t step_count_ = 0, substep_count_ = 0;
+};
+
+}  // namespace twin
+
+#endif

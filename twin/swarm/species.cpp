@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "swarm/species.h"
+
+#include <charconv>
+#include <sstream>
+#include <stdexcept>
+
+namespace twin
+{
+namespace
+{
+
+constexpr int kMaxRobots = 100;
+
+const fw_behavior *FindBehavior(const std::string &name)
+{
+    if (const fw_behavior *found = fw_behavior_find(name.c_str()))
+        return found;
+    std::string known;
+    for (size_t i = 0; i < fw_behavior_count(); ++i)
+        known += (i ? ", " : "") + std::string(fw_behavior_at(i)->name);
+    throw std::invalid_argument("--behavior: there is no behaviour '" + name +
+                                "'; the firmware has " + known);
+}
+
+int ParseCount(const std::string &part, const std::string &digits)
+{
+    int count = 0;
+    const char *end = digits.data() + digits.size();
+    const auto [stop, error] = std::from_chars(digits.data(), end, count);
+    if (error != std::errc() || stop != end || count < 1 || count > kMaxRobots)
+        throw std::invalid_argument("--behavior: '" + part +
+                                    "' must be name:count with a count of 1 to 100");
+    return count;
+}
+
+}  // namespace
+
+std::vector<const fw_behavior *> ParseSpecies(const std::string &text, std::optional<int> n)
+{
+    std::vector<const fw_behavior *> robots;
+    if (text.find(':') == std::string::npos && text.find(',') == std::string::npos)
+    {
+        robots.assign(static_cast<size_t>(n.value_or(6)), FindBehavior(text));
+        return robots;
+    }
+    std::istringstream parts(text);
+    for (std::string part; std::getline(parts, part, ',');)
+    {
+        const size_t colon = part.find(':');
+        const std::string digits = colon == std::string::npos ? "" : part.substr(colon + 1);
+        const int count = ParseCount(part, digits);
+        robots.insert(robots.end(), static_cast<size_t>(count),
+                      FindBehavior(part.substr(0, colon)));
+    }
+    const size_t wanted = n ? static_cast<size_t>(*n) : robots.size();
+    if (robots.size() != wanted || robots.size() > kMaxRobots)
+        throw std::invalid_argument("--behavior '" + text + "' is for " +
+                                    std::to_string(robots.size()) + " robots, but there are " +
+                                    std::to_string(n.value_or(kMaxRobots)) +
+                                    (n ? " (--n): make both agree" : " at most"));
+    return robots;
+}
+
+}  // namespace twin

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "swarm/swarm.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <stdexcept>
+
+namespace twin
+{
+namespace
+{
+
+// The pack: two cells that fall from 8.2 V full to 7.0 V empty over 1.8 Ah (maker's data), feeding
+// computer and camera with 0.6 A and each motor with up to 0.17 A (maker's data, no load). The
+// current of the computer is a guess.
+constexpr double kFullPack_V = 8.2, kEmptyPack_V = 7.0, kPackCharge_As = 1.8 * 3600;
+constexpr double kComputer_A = 0.6, kMotors_A = 4 * 0.17;
+
+fw_config ConfigFor(const Sensor &sensor, const fw_table &table)
+{
+    fw_config config = fw_config_default();
+    config.table = table;
+    config.vote.max_frames = static_cast<int32_t>(std::lround(sensor.vote_frames));
+    config.vote.window_us = std::numeric_limits<int64_t>::max();
+    return config;
+}
+
+void CheckModel(const Model &model, const fw_config &config)
+{
+    if (model.base.drive == Drive::kWheelSpeed)
+        throw std::invalid_argument(
+            "the model's base.drive is 'wheel_speed', which the firmware cannot command: a swarm "
+            "needs 'duty' or 'twist'");
+    const double timeout_s = static_cast<double>(config.frame_timeout_us) * 1e-6;
+    if (model.sensor.delay_s > timeout_s)
+        throw std::invalid_argument("sensor.delay_s = " + std::to_string(model.sensor.delay_s) +
+                                    " s is above the firmware's frame time-out of " +
+                                    std::to_string(timeout_s) + " s: the robots would never move");
+}
+
+}  // namespace
+
+Swarm::Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
+             const std::vector<fw_table> &tables, const SwarmOptions &options)
+    : plant_(std::move(plant)),
+      poses_(models.size()),
+      period_s_(models.front().base.control_period_s),
+      substeps_(static_cast<int>(std::ceil(period_s_ / options.max_step_s - 1e-9))),
+      start_utime_us_(options.start_utime_us)
+{
+    for (size_t i = 0; i < models.size(); ++i)
+    {
+        const fw_config config = ConfigFor(models[i].sensor, tables[i]);
+        CheckModel(models[i], config);
+        members_.push_back({{},
+                            {},
+                            ConeSensor(models[i].sensor, static_cast<int>(i), options.seed),
+                            models[i].base,
+                            kFullPack_V});
+        if (const fw_err error = fw_init(&members_.back().firmware, &config); error != FW_OK)
+            throw std::invalid_argument(std::string("the firmware refuses its configuration: ") +
+                                        fw_err_str(error));
+    }
+}
+
+void Swarm::Play(Script script)
+{
+    if (script.has_duties() && members_.front().base.drive != Drive::kDuty)
+        throw std::invalid_argument(
+            "the script gives wheel duties, but the model's base.drive is 'twist': give "
+            "speed_input and turn_input instead");
+    script_ = std::move(script);
+}
+
+void Swarm::Step()
+{
+    Decide();
+    for (int i = 0; i < substeps_; ++i)
+        Advance();
+}
+
+void Swarm::Decide()
+{
+    for (int i = 0; i < Size(); ++i)
+        poses_[static_cast<size_t>(i)] = plant_->State(i).pose;
+    const int64_t now_us = UtimeUs();
+    const ScriptRow *row = script_ ? script_->At(TimeS()) : nullptr;
+    for (int i = 0; i < Size(); ++i)
+    {
+        Member &member = members_[static_cast<size_t>(i)];
+        DecideOne(member, now_us, row);
+        plant_->SetCommand(i, CommandFor(member));
+    }
+    ++step_count_;
+}
+
+void Swarm::DecideOne(Member &member, int64_t now_us, const ScriptRow *row)
+{
+    const auto frame = member.sensor.Expose(poses_, now_us);
+    if (script_)
+    {
+        const ScriptRow idle{};
+        const ScriptRow &now = row ? *row : idle;
+        if (script_->has_duties())
+            fw_step_script_duty(&member.firmware, now.wheel_duty_pct.data(), &member.output);
+        else
+            fw_step_script_input(&member.firmware, &now.input, &member.output);
+    }
+    else if (frame)
+        fw_step_bit(&member.firmware, frame->detected, frame->utime_us, frame->seq, now_us,
+                    &member.output);
+    else
+        fw_step(&member.firmware, nullptr, now_us, &member.output);
+
+    double duty = 0;
+    for (const int8_t pct : member.output.wheel_duty_pct)
+        duty += std::abs(pct) / 100.0 / kWheels;
+    const double charge_As = (kComputer_A + kMotors_A * duty) * period_s_;
+    member.battery_V -= (kFullPack_V - kEmptyPack_V) * charge_As / kPackCharge_As;
+}
+
+Command Swarm::CommandFor(const Member &member) const
+{
+    Command command;
+    command.battery_V = member.battery_V;
+    const fw_output &out = member.output;
+    if (member.base.drive == Drive::kTwist)
+        command.value = {out.speed_input_pct * member.base.speed_per_input_mps, 0,
+                         out.turn_input_milli / 1000.0 * member.base.turn_per_input_radps, 0};
+    else
+        for (size_t k = 0; k < kWheels; ++k)
+            command.value[k] = out.wheel_duty_pct[k] / 100.0;
+    return command;
+}
+
+void Swarm::Advance()
+{
+    plant_->Step(period_s_ / substeps_);
+    ++substep_count_;
+}
+
+double Swarm::TimeS() const
+{
+    return static_cast<double>(substep_count_) * period_s_ / substeps_;
+}
+
+int64_t Swarm::UtimeUs() const
+{
+    return start_utime_us_ + std::llround(TimeS() * 1e6);
+}
+
+const fw_output &Swarm::Output(int robot) const
+{
+    return members_[static_cast<size_t>(robot)].output;
+}
+
+double Swarm::BatteryV(int robot) const
+{
+    return members_[static_cast<size_t>(robot)].battery_V;
+}
+
+}  // namespace twin
