@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adds an effect to a model: fits it together with the base, and judges it on data it was not fitted to."""
+"""Adds an effect to a model: fitted together with the base, judged on data it was not fitted to."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from twinmill.calibration.compare import Comparison
-from twinmill.calibration.fit import common_clock, comparison, open_scenes, refit, share_noise
+from twinmill.calibration.compare import Comparison, comparison, open_scenes
+from twinmill.calibration.fit import common_clock, refit, share_noise
 from twinmill.calibration.heldout import HeldOut, held_out
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import Fitted, ModelFile, write_child
 from twinmill.calibration.problem import base_quantities, effect_names, effect_quantities
-from twinmill.calibration.solve import Estimate
+from twinmill.calibration.solve import Estimate, excited
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,9 @@ class AddResult:
 
     Attributes:
         before: comparison of the model as given; after: with the effect, all refitted.
-        heldout_before: the model as given; heldout_refit: its quantities refitted without the effect;
-            heldout_after: refitted with it.
+        heldout_before: the model as given.
+        heldout_refit: its quantities refitted without the effect.
+        heldout_after: refitted with it.
     """
 
     effect: str
@@ -34,16 +35,23 @@ class AddResult:
 
     def to_json(self) -> dict:
         """The interface's object."""
-        return {"effect": self.effect, "model": str(self.path), "score_before": self.before.score,
-                "score_after": self.after.score, "heldout_before": self.heldout_before.score,
-                "heldout_refit": self.heldout_refit.score, "heldout_after": self.heldout_after.score,
-                "parameters": [e.to_json() for e in self.parameters],
-                "heldout_errors_before": self.heldout_before.rows(),
-                "heldout_errors_after": self.heldout_after.rows()}
+        return {
+            "effect": self.effect,
+            "model": str(self.path),
+            "score_before": self.before.score,
+            "score_after": self.after.score,
+            "heldout_before": self.heldout_before.score,
+            "heldout_refit": self.heldout_refit.score,
+            "heldout_after": self.heldout_after.score,
+            "parameters": [e.to_json() for e in self.parameters],
+            "heldout_errors_before": self.heldout_before.rows(),
+            "heldout_errors_after": self.heldout_after.rows(),
+        }
 
 
-def add(effect: str, measurements: list[Measurement], model_file: ModelFile, out: Path,
-        command: str) -> AddResult:
+def add(
+    effect: str, measurements: list[Measurement], model_file: ModelFile, out: Path, command: str
+) -> AddResult:
     """Adds an effect and writes the new model.
 
     Raises:
@@ -53,21 +61,36 @@ def add(effect: str, measurements: list[Measurement], model_file: ModelFile, out
     richer = model_file.model.copy()
     richer.add_effect(effect)
     name = effect_names(richer)[-1]
-    free = base_quantities(richer) + effect_quantities(richer, fresh=name)
-    old = base_quantities(model_file.model) + effect_quantities(model_file.model)
-
-    scenes = open_scenes(measurements, model_file.model)
+    scenes = open_scenes(measurements, model_file)
+    known = effect_quantities(model_file.model)
+    old = excited(scenes, base_quantities(model_file.model), known) + known
+    fresh = [f for f in effect_quantities(richer, fresh=name) if f.name.startswith(f"{name}.")]
+    free = old + fresh
     grown = [scene.with_model(richer) for scene in scenes]
     solution = refit(grown, free)
     share_noise(grown, scenes)
     before, after = comparison(model_file, scenes), comparison(model_file, grown)
     floors = [r.floor.rms for r in after.robots]
-    held = [held_out(grown, model, quantities, floors) for model, quantities in
-            ((model_file.model, []), (model_file.model, old), (richer, free))]
+    held = [
+        held_out(grown, model, quantities, floors)
+        for model, quantities in ((model_file.model, []), (model_file.model, old), (richer, free))
+    ]
 
     for estimate in solution.estimates:
         richer.set(estimate.name, estimate.value)
-    logs = [m.log_name for m in measurements]
-    write_child(model_file, Fitted(richer, solution.estimates, logs, before.score, after.score,
-                                   grown[0].noise, common_clock(solution)), out, command)
+    logs = {m.log_name: m.log_sha256 for m in measurements}
+    write_child(
+        model_file,
+        Fitted(
+            richer,
+            solution.estimates,
+            logs,
+            before.score,
+            after.score,
+            grown[0].noise,
+            common_clock(solution),
+        ),
+        out,
+        command,
+    )
     return AddResult(name, before, after, solution.estimates, *held, Path(out))

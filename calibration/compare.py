@@ -4,7 +4,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-
 from twinmill.calibration.floor import Floor, measure_floor
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import ModelFile
@@ -13,7 +12,11 @@ from twinmill.calibration.regimes import Regime, where_it_fails
 from twinmill.calibration.solve import solve
 from twinmill.calibration.windows import CHANNELS, HORIZONS_S, Windows, rms, score
 
-GOOD, MISSING, SUSPECT = 1.15, 1.3, 0.9  # scores: stop; something is missing; floor wrong or data leaked
+GOOD, MISSING, SUSPECT = (
+    1.15,
+    1.3,
+    0.9,
+)  # scores: stop; something is missing; floor wrong or data leaked
 
 
 @dataclass(frozen=True)
@@ -47,17 +50,31 @@ class RobotComparison:
     def error_rows(self) -> list[dict]:
         """errors[] of the interface: one row per channel and horizon."""
         found = rms(self.errors)
-        return [{"channel": channel, "unit": unit, "horizon_s": horizon_s, "rms": float(found[h, c]),
-                 "floor": float(self.floor.rms[h, c]), "ratio": float(found[h, c] / self.floor.rms[h, c])}
-                for c, (channel, unit) in enumerate(CHANNELS) for h, horizon_s in enumerate(HORIZONS_S)]
+        return [
+            {
+                "channel": channel,
+                "unit": unit,
+                "horizon_s": horizon_s,
+                "rms": float(found[h, c]),
+                "floor": float(self.floor.rms[h, c]),
+                "ratio": float(found[h, c] / self.floor.rms[h, c]),
+            }
+            for c, (channel, unit) in enumerate(CHANNELS)
+            for h, horizon_s in enumerate(HORIZONS_S)
+        ]
 
     def to_json(self) -> dict:
         """One entry of robots[]."""
-        return {"robot_id": self.scene.measurement.track.robot_id,
-                "log": self.scene.measurement.log_name, "score": self.score,
-                "floor_kind": self.floor.kind, "noise": self.scene.noise.to_json(),
-                "errors": self.error_rows(), "where": [r.to_json() for r in self.where],
-                "time_offset_s": self.time_offset_s}
+        return {
+            "robot_id": self.scene.measurement.track.robot_id,
+            "log": self.scene.measurement.log_name,
+            "score": self.score,
+            "floor_kind": self.floor.kind,
+            "noise": self.scene.noise.to_json(),
+            "errors": self.error_rows(),
+            "where": [r.to_json() for r in self.where],
+            "time_offset_s": self.time_offset_s,
+        }
 
 
 @dataclass(frozen=True)
@@ -87,8 +104,14 @@ class Comparison:
     def to_json(self) -> dict:
         """The interface's object."""
         main = max(self.robots, key=lambda r: len(r.windows.starts))
-        return {"model": self.model_name, **main.to_json(), "score": self.score, "verdict": self.verdict,
-                "robots": [r.to_json() for r in self.robots], "warnings": self.warnings}
+        return {
+            "model": self.model_name,
+            **main.to_json(),
+            "score": self.score,
+            "verdict": self.verdict,
+            "robots": [r.to_json() for r in self.robots],
+            "warnings": self.warnings,
+        }
 
 
 def compare_robot(scene: Scene) -> RobotComparison:
@@ -96,8 +119,32 @@ def compare_robot(scene: Scene) -> RobotComparison:
     windows = Windows.of(scene.measurement.track)
     errors = windows.errors(scene)
     floor = measure_floor(scene, windows)
-    return RobotComparison(scene, windows, errors, floor,
-                           where_it_fails(scene, windows, errors, floor.rms))
+    return RobotComparison(
+        scene, windows, errors, floor, where_it_fails(scene, windows, errors, floor.rms)
+    )
+
+
+def open_scenes(measurements: list[Measurement], model_file: ModelFile) -> list[Scene]:
+    """Scenes of the model as it is, each with its clock aligned.
+
+    A clock offset that another log told is kept: only so can a delay be told from it. One that this
+    very log told, with whatever model that was, is found anew.
+    """
+    scenes = []
+    for measurement in measurements:
+        other = model_file.model.clock_known and measurement.log_sha256 not in model_file.clock_logs
+        scene = Scene.of(measurement, model_file.model, clock_free=not other)
+        if scene.clock_free:
+            solve([scene], [])
+            scene.settle_noise()
+        scenes.append(scene)
+    return scenes
+
+
+def comparison(model_file: ModelFile, scenes: list[Scene]) -> Comparison:
+    """Of scenes as they stand."""
+    warnings = [f"{s.measurement.label}: {w}" for s in scenes for w in s.measurement.warnings]
+    return Comparison(model_file.path.name, [compare_robot(s) for s in scenes], warnings)
 
 
 def compare(measurements: list[Measurement], model_file: ModelFile) -> Comparison:
@@ -105,9 +152,4 @@ def compare(measurements: list[Measurement], model_file: ModelFile) -> Compariso
 
     A clock offset that the model knows is used; else each log's own is estimated.
     """
-    scenes = [Scene.of(m, model_file.model) for m in measurements]
-    for scene in scenes:
-        if scene.clock_free:
-            solve([scene], [])
-    warnings = [f"{m.label}: {w}" for m in measurements for w in m.warnings]
-    return Comparison(model_file.path.name, [compare_robot(s) for s in scenes], warnings)
+    return comparison(model_file, open_scenes(measurements, model_file))

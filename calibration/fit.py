@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits the base model, and the effects it has, to measurements."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import twinmill_native as native
-
-from twinmill.calibration.compare import Comparison, compare_robot
+from twinmill.calibration.compare import Comparison, comparison, open_scenes
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import Fitted, ModelFile, write_child
 from twinmill.calibration.problem import CLOCK, Free, Scene, base_quantities, effect_quantities
-from twinmill.calibration.solve import Estimate, Solution, solve
+from twinmill.calibration.solve import Estimate, Solution, excited, solve
 
 AGREE_SIGMA = 5.0  # clock offsets of several logs that differ by less are one
 
@@ -35,19 +34,13 @@ class FitResult:
 
     def to_json(self) -> dict:
         """The interface's object."""
-        return {"model": str(self.path), "score_before": self.before.score,
-                "score_after": self.after.score,
-                "parameters": [e.to_json() for e in self.parameters],
-                "time_offset_s": self.clock.value if self.clock else None}
-
-
-def open_scenes(measurements: list[Measurement], model: native.Model) -> list[Scene]:
-    """Scenes with their clocks aligned to the model as it is."""
-    scenes = [Scene.of(m, model) for m in measurements]
-    for scene in scenes:
-        if scene.clock_free:
-            solve([scene], [])
-    return scenes
+        return {
+            "model": str(self.path),
+            "score_before": self.before.score,
+            "score_after": self.after.score,
+            "parameters": [e.to_json() for e in self.parameters],
+            "time_offset_s": self.clock.value if self.clock else None,
+        }
 
 
 def share_noise(source: list[Scene], scenes: list[Scene]) -> None:
@@ -57,36 +50,54 @@ def share_noise(source: list[Scene], scenes: list[Scene]) -> None:
 
 
 def refit(scenes: list[Scene], free: list[Free]) -> Solution:
-    """Fits twice: the second time with the noise that the first fit leaves, if that is less."""
-    solve(scenes, free)
+    """Fits twice: the second time with the noise that the first fit leaves, if that is less.
+
+    Where much stays unexplained, the errors tell less than they seem to: the prior is then given as
+    much more weight as they are too large.
+    """
+    excess = np.sqrt(max(1.0, solve(scenes, free).chi2))
     for scene in scenes:
         scene.settle_noise()
-    again = [Free(**{**vars(f), "start": scenes[0].model.get(f.name)}) for f in free]
-    return solve(scenes, again)
+    return solve(
+        scenes,
+        [
+            replace(f, prior_std=f.prior_std / excess, begin=scenes[0].model.get(f.name))
+            for f in free
+        ],
+    )
 
 
-def comparison(model_file: ModelFile, scenes: list[Scene]) -> Comparison:
-    """Of scenes as they stand."""
-    warnings = [f"{s.measurement.label}: {w}" for s in scenes for w in s.measurement.warnings]
-    return Comparison(model_file.path.name, [compare_robot(s) for s in scenes], warnings)
-
-
-def fit(measurements: list[Measurement], model_file: ModelFile, out: Path, command: str) -> FitResult:
+def fit(
+    measurements: list[Measurement], model_file: ModelFile, out: Path, command: str
+) -> FitResult:
     """Fits all free quantities of the model to all measurements and writes the new model.
 
     Raises:
         ModelError: the new file cannot be written.
     """
-    scenes = open_scenes(measurements, model_file.model)
-    free = base_quantities(scenes[0].model) + effect_quantities(scenes[0].model)
+    scenes = open_scenes(measurements, model_file)
+    known = effect_quantities(model_file.model)
+    free = excited(scenes, base_quantities(model_file.model), known) + known
     fitted = [s.with_model(model_file.model) for s in scenes]
     solution = refit(fitted, free)
     share_noise(fitted, scenes)
     before, after = comparison(model_file, scenes), comparison(model_file, fitted)
     clock = common_clock(solution)
     model = fitted_model(model_file, solution.estimates)
-    write_child(model_file, Fitted(model, solution.estimates, [m.log_name for m in measurements],
-                                   before.score, after.score, fitted[0].noise, clock), out, command)
+    write_child(
+        model_file,
+        Fitted(
+            model,
+            solution.estimates,
+            {m.log_name: m.log_sha256 for m in measurements},
+            before.score,
+            after.score,
+            fitted[0].noise,
+            clock,
+        ),
+        out,
+        command,
+    )
     return FitResult(before, after, solution.estimates, clock, Path(out))
 
 

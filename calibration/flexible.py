@@ -8,7 +8,6 @@ shown as a model; it only tells noise from what some model could still explain.
 
 import numpy as np
 from scipy.signal import lfilter
-
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.residual import StepGrid, rotate
 from twinmill.calibration.track import command_at
@@ -44,17 +43,22 @@ def unexplained(measurement: Measurement, grid: StepGrid, offset_s: float) -> li
         within[:, axis] = body[:, axis] - x @ _ridge(x, body[:, axis])
         for test in (half, ~half):
             across[test, axis] = body[test, axis] - x[test] @ _ridge(x[~test], body[~test, axis])
-    return [np.column_stack([*rotate(e[:, 0], e[:, 1], heading_rad), e[:, 2]]) for e in (within, across)]
+    return [
+        np.column_stack([*rotate(e[:, 0], e[:, 1], heading_rad), e[:, 2]]) for e in (within, across)
+    ]
 
 
 def _ridge(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     gram = x.T @ x
     scale = np.diag(gram) + 1e-30
-    return np.linalg.solve(gram + RIDGE * np.diag(scale) + 1e-12 * scale.max() * np.eye(len(gram)), x.T @ y)
+    return np.linalg.solve(
+        gram + RIDGE * np.diag(scale) + 1e-12 * scale.max() * np.eye(len(gram)), x.T @ y
+    )
 
 
-def _terms(measurement: Measurement, grid: StepGrid, offset_s: float,
-           heading_rad: np.ndarray) -> list[np.ndarray]:
+def _terms(
+    measurement: Measurement, grid: StepGrid, offset_s: float, heading_rad: np.ndarray
+) -> list[np.ndarray]:
     """For each axis the (S, P) regressors of its velocity."""
     command = _command(measurement, grid, offset_s)
     odd = np.stack([np.sign(command) * _hat(np.abs(command), i) for i in range(len(LEVELS))], -1)
@@ -64,19 +68,33 @@ def _terms(measurement: Measurement, grid: StepGrid, offset_s: float,
     coast = np.concatenate([_lag(odd, tau_s, grid) for tau_s in COAST_S], -1) * stopped
     linear = slow.sum(-1).reshape(len(command), -1, 3)  # lags as columns, axes last
     even = _lagged(np.abs(command) @ AXES.T, grid)
-    voltage = command_at(grid.t_s - offset_s, measurement.track.command_t_s,
-                         np.nan_to_num(measurement.track.battery_V)[:, None])
+    voltage = command_at(
+        grid.t_s - offset_s,
+        measurement.track.command_t_s,
+        np.nan_to_num(measurement.track.battery_V)[:, None],
+    )
     voltage = voltage - voltage.mean()
     moving = (np.abs(command).max(1) > 0)[:, None] * 1.0
     c, s = np.cos(heading_rad)[:, None] * moving, np.sin(heading_rad)[:, None] * moving
     per_axis = []
     for axis in range(3):
-        own = linear[:, 2, axis:axis + 1]
+        own = linear[:, 2, axis : axis + 1]
         room = {0: [c, s], 1: [-s, c], 2: [moving]}[axis]
-        per_axis.append(np.concatenate(
-            [slow[:, :, axis].reshape(len(command), -1), coast[:, axis], linear.reshape(len(command), -1),
-             even.reshape(len(command), -1), own * voltage, linear[:, 2] * linear[:, 2, [1, 2, 0]],
-             np.abs(linear[:, 2]), *room], axis=1))
+        per_axis.append(
+            np.concatenate(
+                [
+                    slow[:, :, axis].reshape(len(command), -1),
+                    coast[:, axis],
+                    linear.reshape(len(command), -1),
+                    even.reshape(len(command), -1),
+                    own * voltage,
+                    linear[:, 2] * linear[:, 2, [1, 2, 0]],
+                    np.abs(linear[:, 2]),
+                    *room,
+                ],
+                axis=1,
+            )
+        )
     return per_axis
 
 

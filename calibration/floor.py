@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import twinmill_native as native
-
 from twinmill.calibration.problem import Scene
 from twinmill.calibration.repeats import repeated_starts
 from twinmill.calibration.windows import Windows, difference, rms

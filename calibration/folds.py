@@ -2,7 +2,6 @@
 """Two halves of a log, drive by drive: what is fitted on one is judged on the other."""
 
 import numpy as np
-
 from twinmill.calibration.problem import CLOCK, Scene
 from twinmill.calibration.windows import Windows
 

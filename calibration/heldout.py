@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
-
 from twinmill.calibration.folds import halves, step_mask, window_mask
 from twinmill.calibration.problem import Free, Scene
 from twinmill.calibration.solve import solve
@@ -21,14 +20,16 @@ class HeldOut:
 
     def rows(self) -> list[dict]:
         """One row per channel and horizon."""
-        return [{"channel": channel, "unit": unit, "horizon_s": horizon_s,
-                 "rms": float(self.rms[h, c])}
-                for c, (channel, unit) in enumerate(CHANNELS)
-                for h, horizon_s in enumerate(HORIZONS_S)]
+        return [
+            {"channel": channel, "unit": unit, "horizon_s": horizon_s, "rms": float(self.rms[h, c])}
+            for c, (channel, unit) in enumerate(CHANNELS)
+            for h, horizon_s in enumerate(HORIZONS_S)
+        ]
 
 
-def held_out(scenes: list[Scene], model: native.Model, free: list[Free],
-             floors: list[np.ndarray]) -> HeldOut:
+def held_out(
+    scenes: list[Scene], model: native.Model, free: list[Free], floors: list[np.ndarray]
+) -> HeldOut:
     """Fits on each half and predicts the other.
 
     Args:
@@ -42,13 +43,15 @@ def held_out(scenes: list[Scene], model: native.Model, free: list[Free],
     for which in (0, 1):
         tried = [s.with_model(model) for s in scenes]
         if free:
-            solve(tried, free, [step_mask(s, h, which)
-                                for s, h in zip(tried, halves_of, strict=True)])
+            solve(
+                tried, free, [step_mask(s, h, which) for s, h in zip(tried, halves_of, strict=True)]
+            )
         for i, (scene, half) in enumerate(zip(tried, halves_of, strict=True)):
             windows = Windows.of(scene.measurement.track)
             other = window_mask(windows, half, 1 - which)
             errors[i].append(np.where(other[..., None], windows.errors(scene), np.nan))
     parts = [rms(np.concatenate(e)) for e in errors]
     ratios = [part / floor for part, floor in zip(parts, floors, strict=True)]
-    return HeldOut(np.sqrt(np.nanmean(np.square(parts), axis=0)),
-                   float(np.sqrt(np.nanmean(np.square(ratios)))))
+    return HeldOut(
+        np.sqrt(np.nanmean(np.square(parts), axis=0)), float(np.sqrt(np.nanmean(np.square(ratios))))
+    )

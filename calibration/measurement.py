@@ -56,16 +56,26 @@ def load_measurements(paths: list[Path]) -> list[Measurement]:
         for robot in log.robots.values():
             track = make_track(robot)
             _check_length(path, track)
-            measurements.append(Measurement(Path(path).name, log.sha256, track, _played(track),
-                                            [*log.warnings, *track.notes], log.t0_utime_us))
+            measurements.append(
+                Measurement(
+                    Path(path).name,
+                    log.sha256,
+                    track,
+                    _played(track),
+                    [*log.warnings, *track.notes],
+                    log.t0_utime_us,
+                )
+            )
     return measurements
 
 
 def _check_length(path: Path, track: Track) -> None:
     usable_s = np.count_nonzero(track.segment >= 0) * track.timing.pose_period_s
     if usable_s < SHORTEST_LOG_S:
-        raise LogError(f"{path}: robot {track.robot_id} has {usable_s:.1f} s of usable poses; a model "
-                       f"cannot be judged on less than {SHORTEST_LOG_S:g} s, so record a longer run.")
+        raise LogError(
+            f"{path}: robot {track.robot_id} has {usable_s:.1f} s of usable poses; a model "
+            f"cannot be judged on less than {SHORTEST_LOG_S:g} s, so record a longer run."
+        )
 
 
 def _played(track: Track) -> native.Track:
@@ -75,6 +85,10 @@ def _played(track: Track) -> native.Track:
         t_s = np.insert(t_s, silent + 1, t_s[silent] + SILENCE_S)
         command = np.insert(command, silent + 1, 0.0, axis=0)
         battery_V = np.insert(battery_V, silent + 1, battery_V[silent])
-    return native.Track(*(np.ascontiguousarray(a, float) for a in
-                          (t_s, command, battery_V, track.pose_t_s, track.pose)),
-                        np.ascontiguousarray(track.segment, np.int64))
+    return native.Track(
+        *(
+            np.ascontiguousarray(a, float)
+            for a in (t_s, command, battery_V, track.pose_t_s, track.pose)
+        ),
+        np.ascontiguousarray(track.segment, np.int64),
+    )

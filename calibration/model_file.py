@@ -3,12 +3,11 @@
 
 import hashlib
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import tomlkit
 import twinmill_native as native
-
 from twinmill.calibration.noise import Noise
 from twinmill.calibration.problem import catalogue, effect_names
 from twinmill.calibration.solve import Estimate
@@ -41,6 +40,11 @@ class ModelFile:
             raise ModelError(str(error)) from error
 
     @property
+    def clock_logs(self) -> list[str]:
+        """Hashes (sha256) of the logs that told the clock offset."""
+        return list(tomlkit.parse(self.text).get("clock", {}).get("fitted_on", []))
+
+    @property
     def hash(self) -> str:
         """Of the text, as a child names its parent."""
         return hashlib.sha256(self.text.encode()).hexdigest()
@@ -53,20 +57,19 @@ class Fitted:
     Attributes:
         model: with the fitted values and effects.
         estimates: with their uncertainties.
-        logs: names of the logs fitted on.
+        logs: sha256 of the logs fitted on, by name.
         score_before, score_after: on those logs.
         noise: of the first log, or None to leave the old.
-        clock_offset_s: the logs' common clock offset, or None if they do not agree on one.
+        clock: the offset that the logs share, or None if they do not agree on one.
     """
 
     model: native.Model
     estimates: list[Estimate]
-    logs: list[str]
+    logs: dict[str, str]
     score_before: float
     score_after: float
     noise: Noise | None = None
     clock: Estimate | None = None
-    robots: dict[int, dict[str, float]] = field(default_factory=dict)
 
 
 def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> None:
@@ -87,8 +90,12 @@ def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> 
         section = document.setdefault("clock", tomlkit.table())
         section["offset_s"] = _short(fitted.clock.value)
         section["std"] = {"offset_s": _short(fitted.clock.std)}
-    document["fit"] = {"logs": fitted.logs, "score_before": _short(fitted.score_before),
-                       "score_after": _short(fitted.score_after)}
+        section["fitted_on"] = list(fitted.logs.values())
+    document["fit"] = {
+        "logs": list(fitted.logs),
+        "score_before": _short(fitted.score_before),
+        "score_after": _short(fitted.score_after),
+    }
     write_whole(Path(path), tomlkit.dumps(document))
 
 
@@ -104,7 +111,9 @@ def write_whole(path: Path, text: str) -> None:
         os.replace(temporary, path)
     except OSError as error:
         temporary.unlink(missing_ok=True)
-        raise ModelError(f"{path}: cannot be written ({error.strerror}); choose another place.") from error
+        raise ModelError(
+            f"{path}: cannot be written ({error.strerror}); choose another place."
+        ) from error
 
 
 def _short(value: float) -> float:
@@ -113,16 +122,29 @@ def _short(value: float) -> float:
 
 def _write_base(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
     base = document.setdefault("base", tomlkit.table())
-    table = [v for v in fitted.model.values() if v["name"].startswith("base.wheel_speed_mps.")]
-    stds = {e.name: e.std for e in fitted.estimates if e.name.startswith("base.")}
-    for name in stds:
-        if not name.startswith("base.wheel_speed_mps."):
-            base[name.removeprefix("base.")] = _short(fitted.model.get(name))
-    if any(name.startswith("base.wheel_speed_mps.") for name in stds):
-        base["wheel_speed_mps"] = [_short(v["value"]) for v in table]
-    scalar = {n.removeprefix("base."): _short(s) for n, s in stds.items() if n.count(".") == 1}
-    if scalar:
-        base["std"] = scalar
+    stds: dict = {}
+    for estimate in fitted.estimates:
+        section, key = estimate.name.split(".", 1)
+        if section != "base":
+            continue
+        if key.startswith("wheel_speed_mps."):
+            stds.setdefault("wheel_speed_mps", [0.0]).append(_short(estimate.std))
+        else:
+            base[key] = _short(estimate.value)
+            stds[key] = _short(estimate.std)
+    if "wheel_speed_mps" in stds:
+        table = [
+            v["value"]
+            for v in fitted.model.values()
+            if v["name"].startswith("base.wheel_speed_mps.")
+        ]
+        missing = len(base["duty_pct"]) - len(table)  # the first speed, 0, is no free quantity
+        base["wheel_speed_mps"] = [0.0] * missing + [_short(v) for v in table]
+        stds["wheel_speed_mps"] = (
+            stds["wheel_speed_mps"][:1] * missing + stds["wheel_speed_mps"][1:]
+        )
+    if stds:
+        base["std"] = stds
 
 
 def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
@@ -136,7 +158,9 @@ def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
         keys = [p["name"] for p in entries[name]["parameters"]]
         for key in keys:
             table[key] = _short(fitted.model.get(f"{instance}.{key}"))
-        known = {key: _short(stds[f"{instance}.{key}"]) for key in keys if f"{instance}.{key}" in stds}
+        known = {
+            key: _short(stds[f"{instance}.{key}"]) for key in keys if f"{instance}.{key}" in stds
+        }
         if known:
             table["std"] = known
             table["fitted_on"] = ", ".join(fitted.logs)

@@ -41,8 +41,11 @@ class ChannelNoise:
         fresh = (period_s * self.drive) ** 2 * (1 - phi**2)
         variance = self.sensor**2
         # Autocovariance of (1 - phi B) e, factored into the minimum-phase moving average.
-        lags = [variance * phi, -variance * (1 + phi) ** 2,
-                fresh + variance * (1 + (1 + phi) ** 2 + phi**2)]
+        lags = [
+            variance * phi,
+            -variance * (1 + phi) ** 2,
+            fresh + variance * (1 + (1 + phi) ** 2 + phi**2),
+        ]
         roots = np.roots([*lags, lags[1], lags[0]])
         inside = roots[np.argsort(np.abs(roots))][:2]
         average = np.real(np.poly(inside))
@@ -59,9 +62,14 @@ class Noise:
 
     def to_json(self) -> dict:
         """The interface's field names."""
-        return {"sensor_m": self.position.sensor, "sensor_rad": self.heading.sensor,
-                "drive_mps": self.position.drive, "drive_radps": self.heading.drive,
-                "drive_s": self.position.memory_s, "drive_turn_s": self.heading.memory_s}
+        return {
+            "sensor_m": self.position.sensor,
+            "sensor_rad": self.heading.sensor,
+            "drive_mps": self.position.drive,
+            "drive_radps": self.heading.drive,
+            "drive_s": self.position.memory_s,
+            "drive_turn_s": self.heading.memory_s,
+        }
 
     def loudness(self, period_s: float) -> float:
         """Log of the one-step variance that remains when all memory is used, summed over channels."""
@@ -74,10 +82,11 @@ class Noise:
         for channels, noise in ((slice(0, 2), self.position), (slice(2, 3), self.heading)):
             numerator, denominator, scale = noise.whitening(grid.period_s)
             for part in grid.slices:
-                white[..., part, channels] = lfilter(
-                    numerator, denominator, errors[..., part, channels], axis=-2) / scale
+                white[..., part, channels] = (
+                    lfilter(numerator, denominator, errors[..., part, channels], axis=-2) / scale
+                )
         for start in grid.starts:
-            white[..., start:start + TRANSIENT, :] = 0
+            white[..., start : start + TRANSIENT, :] = 0
         return white
 
 
@@ -96,15 +105,20 @@ def fit_noise(errors: list[np.ndarray], moving: np.ndarray, grid: StepGrid) -> N
         chunk //= 2
     frequency_Hz = np.fft.rfftfreq(chunk, grid.period_s)[LOWEST:-1]
     power = np.mean([_median_power(e, pieces, chunk) for e in errors], axis=0)
-    return Noise(_fit_channel(power[:, :2].mean(1), frequency_Hz, grid.period_s),
-                 _fit_channel(power[:, 2], frequency_Hz, grid.period_s))
+    return Noise(
+        _fit_channel(power[:, :2].mean(1), frequency_Hz, grid.period_s),
+        _fit_channel(power[:, 2], frequency_Hz, grid.period_s),
+    )
 
 
 def _pieces(grid: StepGrid, moving: np.ndarray, chunk: int) -> np.ndarray | None:
     """(C,) starts of overlapping stretches in which the robot moves; None if there are too few."""
-    starts = [at for part in grid.slices
-              for at in range(part.start + TRANSIENT, part.stop - chunk, chunk // 2)
-              if moving[at:at + chunk].mean() > 0.9]
+    starts = [
+        at
+        for part in grid.slices
+        for at in range(part.start + TRANSIENT, part.stop - chunk, chunk // 2)
+        if moving[at : at + chunk].mean() > 0.9
+    ]
     return np.array(starts) if len(starts) >= FEWEST_CHUNKS or chunk <= CHUNK // 8 else None
 
 
@@ -119,8 +133,8 @@ def _median_power(errors: np.ndarray, pieces: np.ndarray, chunk: int) -> np.ndar
 
 def _fit_channel(power: np.ndarray, frequency_Hz: np.ndarray, period_s: float) -> ChannelNoise:
     """Whittle's likelihood over sensor, drive and memory."""
-    sensor = np.sqrt(power[-len(power) // 4:].mean() / 4)
-    drive = np.sqrt(power[:len(power) // 8].mean()) / period_s / 5
+    sensor = np.sqrt(power[-len(power) // 4 :].mean() / 4)
+    drive = np.sqrt(power[: len(power) // 8].mean()) / period_s / 5
 
     def unpack(logs: np.ndarray) -> ChannelNoise:
         return ChannelNoise(*np.exp(np.clip(logs, -25, 5)))
@@ -131,6 +145,11 @@ def _fit_channel(power: np.ndarray, frequency_Hz: np.ndarray, period_s: float) -
         return float(np.sum(np.log(model) + power / model) + 1e3 * outside**2)
 
     starts = [np.log([sensor, drive, memory_s]) for memory_s in (0.03, 0.15, 0.6)]
-    best = min((minimize(cost, s, method="Nelder-Mead", options={"maxiter": 600, "xatol": 1e-4})
-                for s in starts), key=lambda found: found.fun)
+    best = min(
+        (
+            minimize(cost, s, method="Nelder-Mead", options={"maxiter": 600, "xatol": 1e-4})
+            for s in starts
+        ),
+        key=lambda found: found.fun,
+    )
     return unpack(best.x)

@@ -25,7 +25,16 @@ BASE_STEP = 0.002
 
 @dataclass(frozen=True)
 class Free:
-    """One free quantity: name in the model, start of the fit, bounds, weak prior, difference step."""
+    """One free quantity.
+
+    Attributes:
+        name, unit: in the model.
+        start: centre of the weak prior, and where the fit begins unless `begin` says otherwise.
+        min, max: bounds.
+        prior_std: width of the prior.
+        step: of finite differences.
+        begin: where the fit begins.
+    """
 
     name: str
     unit: str
@@ -34,6 +43,7 @@ class Free:
     max: float
     prior_std: float
     step: float
+    begin: float | None = None
 
 
 def catalogue() -> dict[str, dict]:
@@ -56,8 +66,18 @@ def base_quantities(model: native.Model) -> list[Free]:
     values = {v["name"]: v for v in model.values()}
     table = [n for n in values if n.startswith("base.wheel_speed_mps.") and not n.endswith(".0")]
     forward = table if model.drive == "duty" and len(table) > 1 else ["base.forward_gain"]
-    return [Free(n, values[n]["unit"], values[n]["value"], values[n]["min"], values[n]["max"],
-                 BASE_PRIOR.get(n, GAIN_PRIOR), BASE_STEP) for n in (*forward, *BASE)]
+    return [
+        Free(
+            n,
+            values[n]["unit"],
+            values[n]["value"],
+            values[n]["min"],
+            values[n]["max"],
+            BASE_PRIOR.get(n, GAIN_PRIOR),
+            BASE_STEP,
+        )
+        for n in (*forward, *BASE)
+    ]
 
 
 def effect_quantities(model: native.Model, fresh: str | None = None) -> list[Free]:
@@ -69,8 +89,17 @@ def effect_quantities(model: native.Model, fresh: str | None = None) -> list[Fre
             name = f"{instance}.{p['name']}"
             reach = abs(p["default"] - p["neutral"])
             start = p["default"] if instance == fresh else model.get(name)
-            free.append(Free(name, p["unit"], start, p["min"], p["max"], EFFECT_PRIOR * reach,
-                             min(STEP * reach, 0.05 * max(abs(p["default"]), 1e-6))))
+            free.append(
+                Free(
+                    name,
+                    p["unit"],
+                    start,
+                    p["min"],
+                    p["max"],
+                    EFFECT_PRIOR * reach,
+                    min(STEP * reach, 0.05 * max(abs(p["default"]), 1e-6)),
+                )
+            )
     return free
 
 
@@ -85,13 +114,14 @@ class Scene:
     noise: Noise | None = None
 
     @classmethod
-    def of(cls, measurement: Measurement, model: native.Model) -> "Scene":
-        """Takes the clock from the model if it is known there, else estimates it from the log."""
+    def of(cls, measurement: Measurement, model: native.Model, clock_free: bool) -> "Scene":
+        """Starts from the model's clock if it is known there, else estimates it from the log."""
         own = model.for_robot(measurement.track.robot_id)
         if not own.clock_known:
             own.set(CLOCK, estimate_offset(measurement.track).offset_s)
-        scene = cls(measurement, own, StepGrid.of(measurement), not own.clock_known)
+        scene = cls(measurement, own, StepGrid.of(measurement), clock_free)
         scene.noise = scene._own_noise()
+        scene.settle_noise()
         return scene
 
     def with_model(self, model: native.Model) -> "Scene":
@@ -102,8 +132,9 @@ class Scene:
 
     def errors(self) -> np.ndarray:
         """(S, 3) one-step errors of the scene's model."""
-        return self.grid.errors(native.one_step(self.model, self.measurement.played),
-                                self.measurement)
+        return self.grid.errors(
+            native.one_step(self.model, self.measurement.played), self.measurement
+        )
 
     def settle_noise(self) -> None:
         """Takes the noise that the model leaves, if it leaves less than any smooth response did."""
@@ -124,6 +155,7 @@ class Scene:
 
     def whitened(self, names: list[str], rows: np.ndarray) -> np.ndarray:
         """(B, P) values to (B, S, 3) whitened one-step errors."""
-        predicted = native.one_step_batch(self.model, self.measurement.played, names,
-                                          np.ascontiguousarray(rows))
+        predicted = native.one_step_batch(
+            self.model, self.measurement.played, names, np.ascontiguousarray(rows)
+        )
         return self.noise.whiten(self.grid.errors(predicted, self.measurement), self.grid)

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-
 from twinmill.calibration.problem import Scene
 from twinmill.calibration.residual import body_velocity
 from twinmill.calibration.track import command_at
@@ -34,16 +33,25 @@ class Regime:
         return vars(self)
 
 
-def where_it_fails(scene: Scene, windows: Windows, errors: np.ndarray, floor: np.ndarray) -> list[Regime]:
+def where_it_fails(
+    scene: Scene, windows: Windows, errors: np.ndarray, floor: np.ndarray
+) -> list[Regime]:
     """Regimes with enough windows, by group; within a group the worst first."""
-    squares = np.nanmean((errors[:, HORIZON] / floor[HORIZON]) ** 2, axis=1)
+    squares = np.mean((errors[:, HORIZON] / floor[HORIZON]) ** 2, axis=1)
     known = np.isfinite(squares)
     regimes = []
     for group, name, mask in _masks(scene, windows):
         inside = mask & known
         if np.count_nonzero(inside) >= FEWEST:
-            regimes.append(Regime(group, name, float(squares[inside].sum() / squares[known].sum()),
-                                  float(np.sqrt(squares[inside].mean())), int(inside.sum())))
+            regimes.append(
+                Regime(
+                    group,
+                    name,
+                    float(squares[inside].sum() / squares[known].sum()),
+                    float(np.sqrt(squares[inside].mean())),
+                    int(inside.sum()),
+                )
+            )
     order = {group: i for i, group in enumerate(dict.fromkeys(r.group for r in regimes))}
     return sorted(regimes, key=lambda r: (order[r.group], -r.ratio))
 
@@ -55,7 +63,9 @@ def _masks(scene: Scene, windows: Windows) -> Iterator[tuple[str, str, np.ndarra
     yield from _by_change(track, t_s)
     yield from _by_motion(scene, starts)
     if track.command_kind == "duty":
-        level = np.abs(command_at(t_s + HORIZONS_S[HORIZON] / 2, track.command_t_s, track.command)).max(1)
+        level = np.abs(
+            command_at(t_s + HORIZONS_S[HORIZON] / 2, track.command_t_s, track.command)
+        ).max(1)
         for low, high in zip(DUTY_EDGES[:-1], DUTY_EDGES[1:], strict=True):
             yield "duty", f"{100 * low:.0f} to {100 * high:.0f} %", (level > low) & (level <= high)
     edges = np.quantile(t_s, (0.25, 0.5, 0.75))
@@ -63,8 +73,12 @@ def _masks(scene: Scene, windows: Windows) -> Iterator[tuple[str, str, np.ndarra
         yield "time", f"{name} quarter", np.searchsorted(edges, t_s) == i
     x_m, y_m = track.pose[starts, 0], track.pose[starts, 1]
     east, north = x_m > np.median(x_m), y_m > np.median(y_m)
-    for name, mask in (("+x +y", east & north), ("-x +y", ~east & north), ("-x -y", ~east & ~north),
-                       ("+x -y", east & ~north)):
+    for name, mask in (
+        ("+x +y", east & north),
+        ("-x +y", ~east & north),
+        ("-x -y", ~east & ~north),
+        ("+x -y", east & ~north),
+    ):
         yield "place", name, mask
 
 
@@ -92,4 +106,8 @@ def _by_motion(scene: Scene, starts: np.ndarray) -> Iterator[tuple[str, str, np.
     yield "motion", "turning right", turning & (turn < 0)
     yield "motion", "forward", ~turning & (forward > MOVING_MPS) & (forward > np.abs(left))
     yield "motion", "backward", ~turning & (forward < -MOVING_MPS) & (-forward > np.abs(left))
-    yield "motion", "sideways", ~turning & (np.abs(left) > MOVING_MPS) & (np.abs(left) >= np.abs(forward))
+    yield (
+        "motion",
+        "sideways",
+        ~turning & (np.abs(left) > MOVING_MPS) & (np.abs(left) >= np.abs(forward)),
+    )

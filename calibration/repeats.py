@@ -4,7 +4,6 @@
 from collections import defaultdict
 
 import numpy as np
-
 from twinmill.calibration.track import Track
 
 CHANGES = 5  # commands in a row that must agree
@@ -26,8 +25,11 @@ def repeated_starts(track: Track, length: int) -> np.ndarray | None:
     """
     changed = np.flatnonzero(np.any(np.diff(track.command, axis=0) != 0, axis=1)) + 1
     t_s, value = track.command_t_s[changed], track.command[changed]
-    pairs = [pair for a, b in _partners(t_s, value)
-             for pair in _windows(track, t_s[a], t_s[a + CHANGES], t_s[b] - t_s[a])]
+    pairs = [
+        pair
+        for a, b in _partners(t_s, value)
+        for pair in _windows(track, t_s[a], t_s[a + CHANGES], t_s[b] - t_s[a])
+    ]
     unique = np.unique(np.array(pairs, np.int64).reshape(-1, 2), axis=0)
     return unique if 2 * len(unique) >= COVERED * length else None
 
@@ -36,11 +38,11 @@ def _partners(t_s: np.ndarray, value: np.ndarray) -> list[tuple[int, int]]:
     """Pairs of places (a < b) from which the next changes agree; each place is used once."""
     places = defaultdict(list)
     for i in range(len(t_s) - CHANGES):
-        places[value[i:i + CHANGES].tobytes()].append(i)
+        places[value[i : i + CHANGES].tobytes()].append(i)
     pairs = []
     for same in places.values():
         for a, b in zip(same[:-1:2], same[1::2], strict=False):
-            apart = np.abs(np.diff(t_s[a:a + CHANGES + 1]) - np.diff(t_s[b:b + CHANGES + 1]))
+            apart = np.abs(np.diff(t_s[a : a + CHANGES + 1]) - np.diff(t_s[b : b + CHANGES + 1]))
             if apart.max() <= TIMING_S:
                 pairs.append((a, b))
     return pairs

@@ -39,8 +39,13 @@ class StepGrid:
         source = np.repeat(ends, spans.astype(int))
         segment = track.segment[source]
         starts = np.flatnonzero(np.diff(segment, prepend=-1))
-        return cls(source, 1 / np.repeat(spans, spans.astype(int)), starts, track.pose_t_s[source],
-                   period_s)
+        return cls(
+            source,
+            1 / np.repeat(spans, spans.astype(int)),
+            starts,
+            track.pose_t_s[source],
+            period_s,
+        )
 
     @cached_property
     def slices(self) -> list[slice]:

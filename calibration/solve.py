@@ -9,6 +9,7 @@ from twinmill.calibration.problem import CLOCK, Free, Scene
 
 HUBER_SIGMA = 3.5
 BLOCK_S = 4.0  # errors of one block may hang together; blocks do not
+SEEN = 0.5  # times the prior's width: a wider estimate is the prior's, not the log's
 AT_BOUND = 0.01  # share of the range that counts as at the bound
 
 
@@ -47,11 +48,28 @@ def solve(scenes: list[Scene], free: list[Free], masks: list[np.ndarray] | None 
     """
     masks = masks or [np.ones(len(s.grid.source), bool) for s in scenes]
     system = _System(scenes, free, masks)
-    found = least_squares(system.residuals, system.start, jac=system.jacobian, loss="huber",
-                          f_scale=HUBER_SIGMA, bounds=(system.low, system.high),
-                          x_scale=np.maximum(system.step, 1e-9), xtol=1e-7, ftol=1e-9, max_nfev=40)
+    found = least_squares(
+        system.residuals,
+        system.start,
+        jac=system.jacobian,
+        loss="huber",
+        f_scale=HUBER_SIGMA,
+        bounds=(system.low, system.high),
+        x_scale=np.maximum(system.step, 1e-9),
+        xtol=1e-7,
+        ftol=1e-9,
+        max_nfev=40,
+    )
     system.store(found.x)
     return system.solution(found.x)
+
+
+def excited(scenes: list[Scene], base: list[Free], others: list[Free]) -> list[Free]:
+    """Those base quantities that the logs tell beside the others: the rest would only wander."""
+    system = _System(scenes, base + others, [np.ones(len(s.grid.source), bool) for s in scenes])
+    jacobian = system.jacobian(system.start)
+    std = np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian)))
+    return [f for f, s in zip(base, std, strict=False) if s < SEEN * f.prior_std]
 
 
 class _System:
@@ -71,18 +89,22 @@ class _System:
         self.unknowns = unknowns
         self.low, self.high, self.step, self.prior, centre = (
             np.array([getattr(u, key) for u in unknowns])
-            for key in ("min", "max", "step", "prior_std", "start"))
+            for key in ("min", "max", "step", "prior_std", "start")
+        )
         margin = 1e-6 * (self.high - self.low)
         self.centre = centre
-        self.start = np.clip(centre, self.low + margin, self.high - margin)
+        begin = np.array([u.start if u.begin is None else u.begin for u in unknowns])
+        self.start = np.clip(begin, self.low + margin, self.high - margin)
 
     def _names(self, i: int) -> list[str]:
         return [self.unknowns[c].name for c in self.columns[i]]
 
     def _whitened(self, rows: np.ndarray) -> np.ndarray:
         """(B, P) unknowns to (B, R) whitened errors of all scenes, then the prior's rows."""
-        parts = [scene.whitened(self._names(i), rows[:, self.columns[i]])[:, mask].reshape(
-            len(rows), -1) for i, (scene, mask) in enumerate(zip(self.scenes, self.masks, strict=True))]
+        parts = [
+            scene.whitened(self._names(i), rows[:, self.columns[i]])[:, mask].reshape(len(rows), -1)
+            for i, (scene, mask) in enumerate(zip(self.scenes, self.masks, strict=True))
+        ]
         return np.concatenate([*parts, (rows - self.centre) / self.prior], axis=1)
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
@@ -109,25 +131,35 @@ class _System:
         estimates = [self._estimate(u, x[p], std[p]) for p, u in enumerate(self.unknowns)]
         shared = len(self.free)
         clocks = [estimates[own[-1]] if len(own) > shared else None for own in self.columns]
-        data = np.clip(residual[:-len(x)], -HUBER_SIGMA, HUBER_SIGMA)
+        data = np.clip(residual[: -len(x)], -HUBER_SIGMA, HUBER_SIGMA)
         return Solution(estimates[:shared], clocks, float(np.mean(data**2)))
 
     def _estimate(self, unknown: Free, value: float, std: float) -> Estimate:
         near = AT_BOUND * (unknown.max - unknown.min)
         at_bound = value - unknown.min < near or unknown.max - value < near
-        return Estimate(unknown.name, float(value), float(std), unknown.unit, bool(at_bound),
-                        bool(std < 0.5 * unknown.prior_std))
+        return Estimate(
+            unknown.name,
+            float(value),
+            float(std),
+            unknown.unit,
+            bool(at_bound),
+            bool(std < SEEN * unknown.prior_std),
+        )
 
     def _standard_errors(self, jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
         """Sandwich over 4 s blocks (Liang and Zeger 1986): honest where errors hang together."""
         bread = np.linalg.pinv(jacobian.T @ jacobian)
         weight = np.minimum(1, HUBER_SIGMA / np.maximum(np.abs(residual), 1e-12))
         pull = jacobian * (residual * weight)[:, None]
-        block = np.concatenate([np.repeat((1000 * i + s.grid.t_s[m] // BLOCK_S), 3)
-                                for i, (s, m) in enumerate(zip(self.scenes, self.masks, strict=True))])
+        block = np.concatenate(
+            [
+                np.repeat((1000 * i + s.grid.t_s[m] // BLOCK_S), 3)
+                for i, (s, m) in enumerate(zip(self.scenes, self.masks, strict=True))
+            ]
+        )
         _, label = np.unique(block, return_inverse=True)
         sums = np.zeros((label.max() + 1, len(bread)))
-        np.add.at(sums, label, pull[:len(label)])
+        np.add.at(sums, label, pull[: len(label)])
         prior = np.diag(1 / self.prior**2)
         covariance = bread @ (sums.T @ sums + prior) @ bread
         return np.sqrt(np.maximum(np.diag(covariance), np.diag(bread)))

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
-
 from twinmill.calibration.problem import Scene
 from twinmill.calibration.residual import rotate
 from twinmill.calibration.track import Track

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
 #include "make.h"
 
 namespace twin
@@ -11,7 +14,7 @@ constexpr Card kCard = {
     .stage = Stage::kWheel,
     .drives = kDutyOnly,
     .summary = "At zero duty the motors do not brake: the robot rolls to a stop.",
-    .equation = "u = 0: |dv/dt| <= deceleration, tau' = 0",
+    .equation = "u = 0: |dv/dt| <= deceleration + viscous |v|, tau' = 0",
     .leaves_out = "rolling on at duties that are small but not zero",
     .measure = "stops to zero duty from several speeds",
     .reference =
@@ -21,12 +24,13 @@ constexpr Card kCard = {
 constexpr Parameter kParameters[] = {
     {"deceleration_mps2", "m/s^2", 20, 0.7, 0.05, 20,
      "deceleration of a wheel's rim while its duty is zero"},
+    {"viscous_per_s", "1/s", 0, 0.5, 0, 20, "what speed adds to the deceleration"},
 };
 
 class Coasting final : public Effect
 {
 public:
-    explicit Coasting(std::span<const double> v) : deceleration_mps2_(v[0]) {}
+    explicit Coasting(std::span<const double> v) : deceleration_mps2_(v[0]), viscous_per_s_(v[1]) {}
 
     void Step(Signals &s, double *) const override
     {
@@ -37,12 +41,15 @@ public:
             if (s.duty[k] != 0)
                 continue;
             s.tau_s[k] = 0;
-            s.max_decel_mps2[k] = deceleration_mps2_;
+            // Drag at the speed in the middle of the step: right to second order.
+            const double half_s = std::min(s.dt_s / 2, 1 / (1 + viscous_per_s_));
+            const double start_mps2 = deceleration_mps2_ + viscous_per_s_ * std::abs(s.rim_mps[k]);
+            s.max_decel_mps2[k] = start_mps2 * (1 - viscous_per_s_ * half_s);
         }
     }
 
 private:
-    double deceleration_mps2_;
+    double deceleration_mps2_, viscous_per_s_;
 };
 
 }  // namespace

@@ -125,14 +125,14 @@ private:
             const toml::table *table = node.as_table();
             if (!table || name == "robots" || name == "fit")
                 continue;
-            std::set<std::string> known{"std"};
+            std::set<std::string> known{"std", "fitted_on"};
             for (const Field &field : Fields())
                 if (name == field.section)
                     known.insert(field.key);
             for (const auto &[key, value] : *table)
             {
                 const std::string path = name + "." + std::string(key.str());
-                if (kSpecial.contains(path) || key == "std")
+                if (kSpecial.contains(path) || key == "std" || key == "fitted_on")
                     continue;
                 if (!known.contains(std::string(key.str())))
                     FailUnknown(origin_, "key", key.str(), "[" + name + "]", known);
