@@ -79,7 +79,7 @@ class RobotComparison:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All robots of all logs against one model; the robot with most windows speaks for the errors."""
+    """All robots of all logs against one model; the one with most windows speaks for errors."""
 
     model_name: str
     robots: list[RobotComparison]
@@ -94,11 +94,17 @@ class Comparison:
     def verdict(self) -> str:
         """What the score means, in a sentence."""
         if self.score < SUSPECT:
-            return "Better than the log's own noise allows: the floor is wrong, or the model was fitted to noise."
+            return (
+                "Better than the log's own noise allows: the floor is wrong, or the model was "
+                "fitted to noise."
+            )
         if self.score <= GOOD:
             return "As good as this log can tell: nothing is missing that it would show."
         if self.score <= MISSING:
-            return "Close to what this log can tell; a small effect may be missing or parameters stale."
+            return (
+                "Close to what this log can tell; a small effect may be missing, or parameters "
+                "are stale."
+            )
         return "Something is missing in the model, or its parameters are stale."
 
     def to_json(self) -> dict:

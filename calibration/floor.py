@@ -31,7 +31,7 @@ def measure_floor(scene: Scene, windows: Windows) -> Floor:
 
 
 def _replica_errors(scene: Scene, windows: Windows) -> list[np.ndarray]:
-    """The twin, with the noise fitted to this log, plays the commands; the model predicts that run."""
+    """The twin, with this log's noise, plays the commands; the model predicts that run."""
     noisy = scene.model.copy()
     for name, value in scene.noise.to_json().items():
         noisy.set(f"noise.{name}", value)

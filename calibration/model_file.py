@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model files: read by the twin's own reader, written anew with what was fitted. Never changed in place."""
+"""Model files: read by the twin's own reader, written anew with what was fitted."""
 
 import hashlib
 import os

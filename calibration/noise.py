@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Noise of a log: white sensor noise and coloured drive noise, and the filter that whitens both.
 
-One-step errors of a right model are e_k = dt n_k + s_k - s_(k-1): s is the sensor's noise, white; n is a
-disturbance of the velocity, first order: n_(k+1) = phi n_k + sqrt(1 - phi^2) sigma_d w_k with
+One-step errors of a right model are e_k = dt n_k + s_k - s_(k-1): s is the sensor's noise, white; n
+is a disturbance of the velocity, first order: n_(k+1) = phi n_k + sqrt(1 - phi^2) sigma_d w_k with
 phi = exp(-dt / tau). Whitened, they have unit variance and no memory.
 """
 
@@ -72,7 +72,7 @@ class Noise:
         }
 
     def loudness(self, period_s: float) -> float:
-        """Log of the one-step variance that remains when all memory is used, summed over channels."""
+        """Log of the one-step variance that remains when all memory is used, over channels."""
         scales = [noise.whitening(period_s)[2] for noise in (self.position, self.heading)]
         return float(4 * np.log(scales[0]) + 2 * np.log(scales[1]))
 

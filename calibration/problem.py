@@ -62,7 +62,7 @@ def effect_names(model: native.Model) -> list[str]:
 
 
 def base_quantities(model: native.Model) -> list[Free]:
-    """The base model's free quantities: the speeds of its duty table, or one gain if it is a line."""
+    """The base model's free quantities: speeds of its duty table, or a gain if it is a line."""
     values = {v["name"]: v for v in model.values()}
     table = [n for n in values if n.startswith("base.wheel_speed_mps.") and not n.endswith(".0")]
     forward = table if model.drive == "duty" and len(table) > 1 else ["base.forward_gain"]
@@ -149,7 +149,7 @@ class Scene:
         return np.any(command_at(t_s, track.command_t_s, track.command) != 0, axis=1)
 
     def _own_noise(self) -> Noise:
-        """Noise of the log, whatever the model: what no smooth response to the commands explains."""
+        """Noise of the log, whatever the model: what no response to the commands explains."""
         errors = unexplained(self.measurement, self.grid, self.model.get(CLOCK))
         return fit_noise(errors, self._moving(), self.grid)
 

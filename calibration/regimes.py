@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a model fails: the prediction errors of half a second, sorted by what the robot was doing."""
+"""Where a model fails: prediction errors of half a second, sorted by what the robot was doing."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from twinmill.calibration.problem import Scene
@@ -66,7 +67,7 @@ def _masks(scene: Scene, windows: Windows) -> Iterator[tuple[str, str, np.ndarra
         level = np.abs(
             command_at(t_s + HORIZONS_S[HORIZON] / 2, track.command_t_s, track.command)
         ).max(1)
-        for low, high in zip(DUTY_EDGES[:-1], DUTY_EDGES[1:], strict=True):
+        for low, high in pairwise(DUTY_EDGES):
             yield "duty", f"{100 * low:.0f} to {100 * high:.0f} %", (level > low) & (level <= high)
     edges = np.quantile(t_s, (0.25, 0.5, 0.75))
     for i, name in enumerate(QUARTERS):

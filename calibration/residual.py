@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import twinmill_native as native
@@ -51,7 +52,7 @@ class StepGrid:
     def slices(self) -> list[slice]:
         """Unbroken stretches of the grid."""
         edges = [*self.starts, len(self.source)]
-        return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return [slice(a, b) for a, b in pairwise(edges)]
 
     def errors(self, predicted: np.ndarray, measurement: Measurement) -> np.ndarray:
         """(..., N, 3) predictions to (..., S, 3) errors in W: x, y in m, heading in rad."""

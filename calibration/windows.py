@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prediction errors that a person can read: from measured states, some time ahead, in three channels."""
+"""Prediction errors that a person can read: from measured states, some time ahead."""
 
 from dataclasses import dataclass
 
@@ -48,7 +48,7 @@ class Windows:
         late = track.pose_t_s[ends] - wanted_s > 2 * track.timing.pose_period_s
         broken = track.segment[ends] != track.segment[starts][:, None]
         ends[~inside | broken | late] = -1
-        # A horizon is predicted only if all shorter ones are: predictions go on from one to the next.
+        # Predictions go on from one horizon to the next, so all shorter ones must be there.
         ends[np.cumsum(ends < 0, axis=1) > 0] = -1
         return cls(starts.astype(np.int64), ends.astype(np.int64))
 
