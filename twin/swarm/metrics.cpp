@@ -100,7 +100,7 @@ void MeasurePairs(std::span<const RobotState> robots, const MetricScale &scale, 
 
 Metrics Measure(std::span<const RobotState> robots, size_t ring_size, const MetricScale &scale)
 {
-    Metrics metrics{};
+    Metrics metrics;
     MeasureRing(robots.first(ring_size), robots.subspan(ring_size), metrics);
     MeasurePairs(robots, scale, metrics);
     return metrics;
@@ -115,7 +115,7 @@ void MetricWindow::Add(double t_s, const Metrics &metrics)
 
 Metrics MetricWindow::Mean() const
 {
-    Metrics mean{};
+    Metrics mean;
     for (const auto field : kAll)
     {
         for (const auto &[t_s, metrics] : kept_)

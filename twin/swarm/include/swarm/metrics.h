@@ -17,18 +17,18 @@ struct Metrics
 {
     // (max r - min r) / min r, 0 for a perfect ring (Vega et al. 2024, arXiv 2410.16444). A robot
     // in the middle makes it very large.
-    double circliness;
-    double radius_m;    // mean r
-    double scatter_m2;  // mean r^2
+    double circliness = 0;
+    double radius_m = 0;    // mean r
+    double scatter_m2 = 0;  // mean r^2
     // Mean of (r_i x u_i) / (|r_i| |u_i|): 1 = all circle counter-clockwise, -1 = clockwise.
-    double rotation;
-    double odd_ratio;  // mean distance of odd robots from the ring's centre over radius_m
+    double rotation = 0;
+    double odd_ratio = 0;  // mean distance of odd robots from the ring's centre over radius_m
     // Over all robots, odd ones included:
     // Least distance of two turning centres o_i over R, o = z + (v / omega) (-sin, cos) of the
     // direction of travel, o = z where omega = 0. Above 1: nobody can reach another's view.
-    double diffusion;
-    double groups;    // components of the graph "closer than R"
-    double contacts;  // pairs of bodies that touch (2 % of the diameter apart at most)
+    double diffusion = 0;
+    double groups = 0;    // components of the graph "closer than R"
+    double contacts = 0;  // pairs of bodies that touch (2 % of the diameter apart at most)
 };
 
 struct MetricScale

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""twin/app: what a user of twin_run gets."""
+
+import json
+import os
+import signal
+import subprocess
+import time
+
+import lcm
+import numpy as np
+import pytest
+import turbopi
+
+TWIN_RUN = os.environ.get("TWIN_RUN", "")
+pytestmark = pytest.mark.skipif(not TWIN_RUN, reason="TWIN_RUN does not name the program")
+
+
+def run(*arguments, plant="planar", model="paper.toml"):
+    command = [TWIN_RUN, "--plant", plant, "--model", model, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+
+
+def read(path):
+    """All messages of a log by channel, and the log's time stamps in us."""
+    messages, stamps = {}, []
+    for event in lcm.EventLog(str(path), "r"):
+        kind = event.channel.rsplit("_", 1)[1].lower()
+        kind = "truth" if "TRUTH" in event.channel else kind
+        message = getattr(turbopi, kind + "_t").decode(event.data)
+        messages.setdefault(event.channel, []).append(message)
+        stamps.append(event.timestamp)
+    return messages, stamps
+
+
+def test_log_holds_what_real_robots_would_say(tmp_path):
+    log = tmp_path / "a.lcmlog"
+    assert run("--n", 3, "--duration-s", 11, "--log", log).returncode == 0
+    messages, stamps = read(log)
+    assert set(messages) == {
+        name
+        for i in range(3)
+        for name in (
+            f"R{i:02d}_TELEMETRY",
+            f"R{i:02d}_POSE",
+            f"R{i:02d}_RUN",
+            f"TWIN_TRUTH_R{i:02d}",
+        )
+    }
+    assert stamps == sorted(stamps)
+    telemetry = messages["R01_TELEMETRY"]
+    assert len(telemetry) == 500  # 11 s at 22 ms
+    assert {t.utime_us - telemetry[0].utime_us - 22000 * t.seq for t in telemetry} == {0}
+    assert all(t.frame_utime_us == t.utime_us and t.mode == t.MODE_TABLE for t in telemetry)
+    # Milling at full speed: the vendor's mixing gives 100 and 37.
+    assert {tuple(sorted(t.wheel_duty_pct)) for t in telemetry} == {(37, 37, 100, 100)}
+    assert 8.0 < telemetry[-1].battery_V < telemetry[0].battery_V <= 8.2
+    assert len(messages["R01_RUN"]) == 3  # at 0, 5 and 10 s
+    assert messages["R01_RUN"][0].source == "twin"
+    assert "--seed 1" in messages["R01_RUN"][0].config_toml
+    assert "[sensor]" in messages["R01_RUN"][0].config_toml
+    assert len(messages["R01_POSE"]) == 11 * 120 + 1
+
+
+def test_poses_follow_the_unicycle_between_decisions(tmp_path):
+    log = tmp_path / "a.lcmlog"
+    run("--n", 1, "--duration-s", 5, "--log", log)
+    poses = read(log)[0]["R00_POSE"]
+    xy = np.array([p.position_m[:2] for p in poses])
+    theta = np.unwrap([2 * np.arctan2(p.orientation_wxyz[3], p.orientation_wxyz[0]) for p in poses])
+    t = np.array([p.utime_us - poses[0].utime_us for p in poses]) * 1e-6
+    rate = np.polyfit(t, theta, 1)[0]
+    speed = np.hypot(*np.diff(xy, axis=0).T).sum() / t[-1]
+    # Alone it turns right; N(1, 0.04) is the spread of speed and turn rate.
+    assert rate == pytest.approx(-np.pi / 4, rel=0.16)
+    assert speed == pytest.approx(0.25, rel=0.16)
+    centre = xy + speed / rate * np.column_stack([-np.sin(theta), np.cos(theta)])
+    assert np.ptp(centre, axis=0).max() < 1e-4
+
+
+def test_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path):
+    logs = [tmp_path / name for name in "abc"]
+    for log, seed in zip(logs, (7, 7, 8), strict=True):
+        result = run(
+            "--n", 4, "--duration-s", 5, "--seed", seed, "--log", log, model="turbopi.toml"
+        )
+        assert result.returncode == 0, result.stderr
+    assert logs[0].read_bytes() == logs[1].read_bytes()
+    assert logs[0].read_bytes() != logs[2].read_bytes()
+
+
+def test_clock_offset_and_prefix_reach_the_messages(tmp_path):
+    model = tmp_path / "m.toml"
+    model.write_text('[base]\ndrive = "twist"\n[clock]\noffset_s = 0.1\nrate_ppm = 50\n')
+    log = tmp_path / "a.lcmlog"
+    result = run(
+        "--n", 1, "--duration-s", 2, "--log", log, "--channel-prefix", "TWIN_", model=model
+    )
+    assert result.returncode == 0, result.stderr
+    messages = read(log)[0]
+    poses, truths = messages["TWIN_R00_POSE"], messages["TWIN_TRUTH_R00"]
+    ahead_us = [p.utime_us - t.utime_us for p, t in zip(poses, truths, strict=True)]
+    assert ahead_us[0] == 100000
+    assert ahead_us[-1] == pytest.approx(100000 + 2e6 * 50e-6, abs=1)
+
+
+def test_script_is_played_instead_of_the_table(tmp_path):
+    script = tmp_path / "s.csv"
+    script.write_text("t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,50,50,50,50\n1,0,0,0,0\n1.1,0,0,0,0\n")
+    log = tmp_path / "a.lcmlog"
+    run("--n", 1, "--script", script, "--log", log, model="turbopi_nominal.toml")
+    messages = read(log)[0]
+    assert {t.mode for t in messages["R00_TELEMETRY"]} == {2}
+    truths = messages["TWIN_TRUTH_R00"]
+    # Half of 0.36 m/s for a second, up to one control period longer.
+    moved = np.hypot(truths[-1].x_m - truths[0].x_m, truths[-1].y_m - truths[0].y_m)
+    assert 0.18 <= moved <= 0.18 + 0.18 * 0.022
+
+
+def test_json_is_one_object(tmp_path):
+    result = run("--n", 2, "--duration-s", 1, "--log", tmp_path / "a.lcmlog", "--json")
+    summary = json.loads(result.stdout)
+    assert summary["n"] == 2 and summary["class"] and "circliness" in summary["metrics"]
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_finishes_the_log(tmp_path, stop):
+    log = tmp_path / "a.lcmlog"
+    command = [
+        TWIN_RUN,
+        "--plant",
+        "planar",
+        "--model",
+        "paper.toml",
+        "--n",
+        "2",
+        "--log",
+        str(log),
+    ]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        time.sleep(1)
+        process.send_signal(stop)
+        out, _ = process.communicate(timeout=10)
+    assert process.returncode == 0 and "stopped after" in out
+    assert 20 < len(read(log)[0]["R01_TELEMETRY"]) < 200  # in real time: 45 a second
+    assert os.listdir(tmp_path) == ["a.lcmlog"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--view"], 2, "--view"),
+        (["--sensor", "camera"], 2, "camera"),
+        (["--n", 0], 2, "--n"),
+        (["--n", 101], 2, "--n"),
+        (["--duration-s", -1], 2, "--duration-s"),
+        (["--behavior", "miling"], 1, "miling"),
+        (["--behavior", "milling:2,shell:1", "--n", 4], 1, "--n"),
+        (["--n", 50, "--spread-m", 0.5], 1, "do not fit"),
+        (["--model", "nowhere.toml"], 1, "nowhere.toml"),
+    ],
+)
+def test_mistakes_end_in_one_sentence_and_no_file(tmp_path, arguments, code, words):
+    log = tmp_path / "a.lcmlog"
+    command = [TWIN_RUN, "--plant", "planar", "--model", "turbopi.toml", "--duration-s", "1"]
+    command += ["--log", str(log), *map(str, arguments)]
+    if "--duration-s" in arguments:
+        command = [word for i, word in enumerate(command) if i not in (5, 6)]
+    if "--model" in arguments:
+        command = [word for i, word in enumerate(command) if i not in (3, 4)]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert result.returncode == code
+    assert words in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert os.listdir(tmp_path) == []
