@@ -107,7 +107,7 @@ def table(data: Table) -> RenderableType:
         caption_justify="left",
         box=box.SIMPLE_HEAD,
         pad_edge=False,
-        padding=(0, 1),
+        padding=(0, 1, 0, 0),
     )
     for i, column in enumerate(data.columns):
         words = i in data.words

@@ -49,7 +49,7 @@ class Table:
 def number(value: float | None) -> str:
     """Three significant digits without an exponent where a person would write none."""
     if value is None or not np.isfinite(value):
-        return "–"
+        return "-"
     if value == 0 or 1e-4 <= abs(value) < 1e6:
         digits = 2 if value == 0 else max(0, 2 - int(np.floor(np.log10(abs(value)))))
         return f"{value:.{digits}f}"
@@ -94,7 +94,8 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
             "noise",
             f"sensor {number(1000 * noise.position.sensor)} mm, "
             f"{number(np.degrees(noise.heading.sensor))}°; "
-            f"drive {number(1000 * noise.position.drive)} mm/s for {number(noise.position.memory_s)} s, "
+            f"drive {number(1000 * noise.position.drive)} mm/s "
+            f"for {number(noise.position.memory_s)} s, "
             f"{number(np.degrees(noise.heading.drive))}°/s for {number(noise.heading.memory_s)} s",
         ),
         ("floor", f"from {FLOOR_KINDS.get(robot.floor.kind, robot.floor.kind)}"),
@@ -111,7 +112,7 @@ def errors(robot: RobotComparison) -> Table:
     found, floor = rms(robot.errors), robot.floor.rms
     columns = ["ahead\ns"]
     for channel, unit in CHANNELS:
-        columns += [f"{channel}\n{SHOWN[unit][1]}", "floor", "×"]
+        columns += [f"{channel}\n{SHOWN[unit][1]}", "floor", "ratio"]
     rows = []
     for h, horizon_s in enumerate(HORIZONS_S):
         row = [Cell(f"{horizon_s:g}")]
@@ -127,7 +128,7 @@ def errors(robot: RobotComparison) -> Table:
         "How far predictions miss",
         columns,
         rows,
-        "RMS error of predictions that start from measured poses; × is error over floor.",
+        "RMS error of predictions that start from measured poses; ratio is error over floor.",
     )
 
 
@@ -163,7 +164,7 @@ def parameters(estimates: list[Estimate]) -> Table:
     for e in estimates:
         remark = ("at its bound" if e.at_bound else "") if e.seen else "not told by this log"
         value, std = (
-            (_rounded(e.value, e.std), f"± {number(e.std)}") if e.seen else (number(e.value), "–")
+            (_rounded(e.value, e.std), f"± {number(e.std)}") if e.seen else (number(e.value), "-")
         )
         rows.append(
             [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command `twinmill`: puts the subcommands together and tells what went wrong in one sentence."""
+"""The command `twinmill`: all subcommands, and one sentence on what went wrong."""
 
 import sys
 from importlib.metadata import version

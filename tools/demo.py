@@ -167,8 +167,8 @@ def _gain(steps: list[Step]) -> str:
     half_s = HORIZONS_S.index(0.5)
     first, last = (1000 * float(np.hypot(*s.rms[half_s, :2])) for s in (steps[0], steps[-1]))
     return (
-        f"Half a second ahead, predictions of data not fitted to missed by {number(first)} mm at first and "
-        f"miss by {number(last)} mm now."
+        f"Half a second ahead, predictions of data not fitted to missed by {number(first)} mm "
+        f"at first and miss by {number(last)} mm now."
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all subcommands share: the JSON object or the text, the spinner, and early checks of outputs."""
+"""What all subcommands share: JSON or text, the spinner, early checks of outputs."""
 
 import json
 import math
@@ -20,7 +20,7 @@ AsJson = Annotated[
 
 
 def plain(value: Any) -> Any:
-    """A value of which JSON can hold all: numbers of numpy as Python's, NaN and infinity as null."""
+    """A value of which JSON can hold all: numpy's numbers as Python's, NaN as null."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -44,7 +44,10 @@ def deliver(data: dict, text: RenderableType, as_json: bool) -> None:
 def busy(what: str) -> Iterator[None]:
     """Shows on stderr, if that is a terminal, what is being done and for how long."""
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    console = Console(stderr=True)
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as progress:
         progress.add_task(what, total=None)
         yield
 

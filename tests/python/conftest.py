@@ -3,14 +3,38 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import lcm
 import numpy as np
 import pytest
 import turbopi
+import twinmill_native as native
 from twinmill.calibration.log import RobotLog
+from twinmill.tools.import_log import ImportOptions, import_log
+
+BASE_MODEL = """
+name = "coaster"
+[robot]
+wheel_radius_m = 0.0325
+half_wheelbase_m = 0.059
+half_track_m = 0.067
+body_radius_m = 0.1
+battery_nominal_V = 7.4
+[base]
+drive = "duty"
+wheels = "mecanum"
+duty_pct = [0, 100]
+wheel_speed_mps = [0, 0.36]
+motor_lag_s = 0.06
+control_period_s = 0.022
+[noise]
+sensor_m = 0.0003
+sensor_rad = 0.0017
+drive_mps = 0.005
+drive_radps = 0.03
+"""
 
 
 @pytest.fixture(scope="session")
@@ -62,11 +86,82 @@ def driven() -> Callable[..., RobotLog]:
         pose = np.column_stack([0.6 * np.sin(theta), 0.6 * (1 - np.cos(theta)), theta])
         flags, count = np.zeros(len(command_t_s), np.int8), len(command_t_s)
         robot = RobotLog(
-            robot_id=3, source="robot", behavior="", command_kind="duty", command_t_s=command_t_s,
-            command=np.tile([0.5, 0.8, 0.5, 0.8], (count, 1)), battery_V=np.full(count, 8.0),
-            mode=flags, detected_raw=flags, detected=flags, speed_input=np.zeros(count),
-            turn_input=np.zeros(count), pose_t_s=pose_t_s, pose=pose,
-            z_m=np.full(len(pose_t_s), 0.1), valid=np.ones(len(pose_t_s), bool))
+            robot_id=3,
+            source="robot",
+            behavior="",
+            command_kind="duty",
+            command_t_s=command_t_s,
+            command=np.tile([0.5, 0.8, 0.5, 0.8], (count, 1)),
+            battery_V=np.full(count, 8.0),
+            mode=flags,
+            detected_raw=flags,
+            detected=flags,
+            speed_input=np.zeros(count),
+            turn_input=np.zeros(count),
+            pose_t_s=pose_t_s,
+            pose=pose,
+            z_m=np.full(len(pose_t_s), 0.1),
+            valid=np.ones(len(pose_t_s), bool),
+        )
         return replace(robot, **changes)
 
     return make
+
+
+@dataclass(frozen=True)
+class CoastingRobot:
+    """A log that the twin's planar plant made, and the two models of it.
+
+    Attributes:
+        log: 120 s of steps and turns, none driven twice, each followed by a stop.
+        model: the model as it was driven, but without its effect.
+        true_model: with it: coasting at `deceleration_mps2`.
+    """
+
+    log: Path
+    model: Path
+    true_model: Path
+    deceleration_mps2: float
+
+
+@pytest.fixture(scope="session")
+def coasting_robot(tmp_path_factory) -> CoastingRobot:
+    """A robot with noise that rolls on after each stop; the user's model knows all but that."""
+    folder = tmp_path_factory.mktemp("coasting")
+    effect = '[[effect]]\nname = "coasting"\ndeceleration_mps2 = 0.7\n'
+    (folder / "model.toml").write_text(BASE_MODEL)
+    (folder / "true.toml").write_text(BASE_MODEL + effect)
+    command_t_s = np.arange(0, 120, 0.022)
+    legs = np.random.default_rng(1).choice([-1, -0.8, -0.6, 0.6, 0.8, 1], (80, 2))
+    legs[::2] = 0
+    left, right = legs[(command_t_s // 1.5).astype(int)].T
+    command = np.ascontiguousarray(np.column_stack([left, right, left, right]))
+    pose_t_s = np.arange(0.1, 119.9, 0.01)
+    played = native.Track(
+        command_t_s,
+        command,
+        np.full(len(command_t_s), 7.4),
+        pose_t_s,
+        np.zeros((len(pose_t_s), 3)),
+        np.zeros(len(pose_t_s), np.int64),
+    )
+    pose = native.replica(native.Model.load(str(folder / "true.toml")), played, 1)
+    poses, commands = folder / "poses.csv", folder / "commands.csv"
+    np.savetxt(
+        poses,
+        np.column_stack([pose_t_s, np.full(len(pose_t_s), 3), pose]),
+        delimiter=",",
+        header="t_s,robot_id,x_m,y_m,theta_rad",
+        comments="",
+        fmt="%.7f",
+    )
+    np.savetxt(
+        commands,
+        np.column_stack([command_t_s, np.full(len(command_t_s), 3), 100 * command]),
+        delimiter=",",
+        header="t_s,robot_id,fl_pct,fr_pct,rl_pct,rr_pct",
+        comments="",
+        fmt="%.4f",
+    )
+    import_log(poses, commands, folder / "run.lcmlog", options=ImportOptions())
+    return CoastingRobot(folder / "run.lcmlog", folder / "model.toml", folder / "true.toml", 0.7)

@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+import hashlib
+import json
+import sys
+from importlib.metadata import version
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from twinmill.calibration.tables import number
+from twinmill.tools import cli
+from twinmill.tools.output import plain
+
+
+@pytest.fixture
+def twinmill(monkeypatch, capsys):
+    """Runs the command line: exit code, stdout, stderr."""
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["twinmill", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stopped:
+            cli.main()
+        return stopped.value.code, *capsys.readouterr()
+
+    return run
+
+
+def strict(text):
+    """One JSON object without the NaN and Infinity that only Python reads."""
+
+    def refuse(name):
+        raise AssertionError(f"{name} is no JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+@pytest.fixture
+def compared(twinmill, coasting_robot):
+    """JSON of a comparison with one of the two models."""
+
+    def run(model):
+        code, out, err = twinmill("compare", coasting_robot.log, "--model", model, "--json")
+        assert (code, err) == (0, "")
+        return strict(out)
+
+    return run
+
+
+def test_compare_tells_what_the_interface_promises(compared, coasting_robot):
+    found = compared(coasting_robot.model)
+    assert {"score", "floor_kind", "noise", "errors", "where", "time_offset_s", "robots"} <= set(
+        found
+    )
+    assert {"sensor_m", "sensor_rad", "drive_mps", "drive_radps", "drive_s"} <= set(found["noise"])
+    assert found["floor_kind"] in ("repeat", "bootstrap", "sensor")
+    cells = {(row["channel"], row["unit"], row["horizon_s"]) for row in found["errors"]}
+    units = {"forward": "m", "left": "m", "heading": "rad"}
+    assert cells == {(c, u, h) for c, u in units.items() for h in (0.1, 0.2, 0.5, 1.0, 2.0)}
+    assert all({"regime", "share", "ratio"} <= set(row) for row in found["where"])
+    digest = hashlib.sha256(coasting_robot.model.read_bytes()).hexdigest()
+    assert (found["model_sha256"], found["version"]) == (digest, f"twinmill {version('twinmill')}")
+
+
+def test_score_is_the_rms_of_errors_over_their_floors(compared, coasting_robot):
+    found = compared(coasting_robot.model)
+    squares = [(row["rms"] / row["floor"]) ** 2 for row in found["errors"]]
+    assert found["score"] == pytest.approx((sum(squares) / len(squares)) ** 0.5, rel=1e-9)
+
+
+def test_score_tells_the_true_model_from_one_that_lacks_an_effect(compared, coasting_robot):
+    # The interface: 1.0 is as good as the log can tell, above 1.3 something is missing.
+    assert 0.9 < compared(coasting_robot.true_model)["score"] < 1.3
+    poor = compared(coasting_robot.model)
+    assert poor["score"] > 1.3
+    phases = {row["regime"]: row["ratio"] for row in poor["where"] if row["group"] == "phase"}
+    assert max(phases, key=phases.get) == "stopping"
+
+
+def test_fit_writes_a_child_and_leaves_the_parent(twinmill, coasting_robot, tmp_path):
+    before = coasting_robot.model.read_bytes()
+    code, out, _ = twinmill(
+        "fit",
+        coasting_robot.log,
+        "--model",
+        coasting_robot.model,
+        "-o",
+        tmp_path / "fitted.toml",
+        "--json",
+    )
+    found = strict(out)
+    assert code == 0
+    assert found["score_after"] < found["score_before"]
+    assert found["parameters"]
+    assert all({"name", "value", "std", "unit", "at_bound"} <= set(p) for p in found["parameters"])
+    assert coasting_robot.model.read_bytes() == before
+    assert hashlib.sha256(before).hexdigest() in (tmp_path / "fitted.toml").read_text()
+
+
+def test_add_finds_the_effect_that_the_robot_has(twinmill, coasting_robot, tmp_path):
+    code, out, _ = twinmill(
+        "add",
+        "coasting",
+        coasting_robot.log,
+        "--model",
+        coasting_robot.model,
+        "-o",
+        tmp_path / "better.toml",
+        "--json",
+        "--out",
+        tmp_path / "report",
+    )
+    found = strict(out)
+    assert code == 0
+    assert {"score_before", "score_after", "heldout_before", "heldout_after"} <= set(found)
+    assert found["heldout_after"] < 0.8 * found["heldout_before"]
+    (fitted,) = (p for p in found["parameters"] if p["name"] == "coasting.deceleration_mps2")
+    assert fitted["value"] == pytest.approx(coasting_robot.deceleration_mps2, abs=4 * fitted["std"])
+    assert fitted["std"] < 0.1
+    assert (tmp_path / "report" / "index.html").exists()
+
+
+def test_effects_lists_the_catalogue_in_json(twinmill):
+    code, out, _ = twinmill("effects", "--json")
+    entries = {entry["name"]: entry for entry in strict(out)["effects"]}
+    assert code == 0
+    assert {"dead_zone", "speed_curve", "motor_lag", "coasting", "floor_tilt"} <= set(entries)
+    for entry in entries.values():
+        assert entry["equation"] and entry["measure"] and entry["reference"] and entry["stage"]
+        for p in entry["parameters"]:
+            assert p["unit"] and p["min"] <= p["default"] <= p["max"]
+    assert strict(twinmill("effects", "coasting", "--json")[1]) == entries["coasting"]
+
+
+def test_text_names_the_quantities_that_json_has(twinmill, coasting_robot, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    code, out, err = twinmill("compare", coasting_robot.log, "--model", coasting_robot.model)
+    assert (code, err) == (0, "")
+    assert all(word in out for word in ("score", "forward", "heading", "stopping", "Next:"))
+    assert max(map(len, out.splitlines())) <= 80
+
+
+BAD = {
+    "missing log": ("compare", "nowhere.lcmlog", "--model", "{model}"),
+    "not a log": ("compare", "{model}", "--model", "{model}"),
+    "missing model": ("compare", "{log}", "--model", "nowhere.toml"),
+    "unknown key": ("compare", "{log}", "--model", "odd.toml"),
+    "no effect of that name": ("add", "coastin", "{log}", "--model", "{model}", "-o", "new.toml"),
+    "no card of that name": ("effects", "coastin"),
+    "folder is not there": ("fit", "{log}", "--model", "{model}", "-o", "nowhere/new.toml"),
+    "output is a folder": ("fit", "{log}", "--model", "{model}", "-o", "."),
+    "output exists": ("fit", "{log}", "--model", "{model}", "-o", "odd.toml"),
+    "output is the model": ("fit", "{log}", "--model", "odd.toml", "-o", "odd.toml", "--force"),
+    "report is under a file": ("compare", "{log}", "--model", "{model}", "--out", "odd.toml/r"),
+}
+
+
+@pytest.mark.parametrize("arguments", BAD.values(), ids=BAD)
+def test_bad_input_gets_one_sentence_and_leaves_nothing(
+    twinmill, coasting_robot, tmp_path, monkeypatch, arguments
+):
+    monkeypatch.chdir(tmp_path)
+    odd = coasting_robot.model.read_text().replace("motor_lag_s", "motor_lug_s")
+    (tmp_path / "odd.toml").write_text(odd)
+    places = {"log": coasting_robot.log, "model": coasting_robot.model}
+    code, out, err = twinmill(*(word.format(**places) for word in arguments))
+    assert (code, out) == (1, "")
+    assert err.startswith("twinmill: ") and err.endswith("\n") and err.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["odd.toml"]
+    assert (tmp_path / "odd.toml").read_text() == odd
+
+
+@pytest.mark.parametrize(
+    ("arguments", "nearest"),
+    [
+        (("add", "coastin", "x.lcmlog", "-o", "y.toml"), "coasting"),
+        (("effects", "motorlag"), "motor_lag"),
+    ],
+)
+def test_unknown_effect_is_told_the_nearest(twinmill, arguments, nearest):
+    assert f"did you mean {nearest}?" in twinmill(*arguments)[2]
+
+
+@pytest.mark.parametrize(
+    "arguments", [("fit", "a.lcmlog"), ("compare", "a", "--frob"), ("hop",), ("compare",)]
+)
+def test_wrong_command_line_is_exit_code_two(twinmill, arguments):
+    code, out, err = twinmill(*arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+
+
+def test_truncated_log_is_read_with_a_warning(twinmill, coasting_robot, tmp_path):
+    cut = tmp_path / "cut.lcmlog"
+    cut.write_bytes(coasting_robot.log.read_bytes()[:-7])
+    code, out, _ = twinmill("compare", cut, "--model", coasting_robot.model, "--json")
+    assert code == 0
+    assert any("breaks off" in text for text in strict(out)["warnings"])
+
+
+def test_version_and_help(twinmill):
+    assert twinmill("--version")[:2] == (0, f"twinmill {version('twinmill')}\n")
+    for verb in ("compare", "fit", "add", "effects", "import"):
+        code, out, _ = twinmill(verb, "--help")
+        assert code == 0 and "Example: twinmill" in out
+
+
+def test_json_holds_no_nan_and_no_numpy():
+    import numpy as np
+
+    value = {
+        "a": np.float64("nan"),
+        "b": np.array([1.5, np.inf]),
+        "c": (np.int64(3), np.bool_(True)),
+    }
+    assert plain(value) == {"a": None, "b": [1.5, None], "c": [3, True]}
+    assert json.dumps(plain(value)) == '{"a": null, "b": [1.5, null], "c": [3, true]}'
+
+
+@given(st.floats(-1e9, 1e9))
+def test_numbers_are_shown_to_three_digits(value):
+    assert float(number(value)) == pytest.approx(value, rel=5.1e-3, abs=1e-12)

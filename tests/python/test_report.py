@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+import xml.etree.ElementTree as ET
+from html.parser import HTMLParser
+
+import pytest
+from twinmill.calibration.compare import compare
+from twinmill.calibration.measurement import load_measurements
+from twinmill.calibration.model_file import ModelFile
+from twinmill.calibration.report import (
+    Provenance,
+    Section,
+    comparison_section,
+    steps_section,
+    write_report,
+)
+
+SOURCE = Provenance("twinmill compare run.lcmlog", "twinmill 0.1.0", "ab" * 32)
+
+
+class Page(HTMLParser):
+    """What a browser would fetch, and the text of the page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.fetched, self.tags, self.text = [], [], ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.fetched += [
+            value
+            for key, value in attrs
+            if key in ("src", "href", "xlink:href", "srcset", "data", "action")
+        ]
+
+    def handle_data(self, data):
+        self.text += data
+
+
+@pytest.fixture(scope="module")
+def section(coasting_robot):
+    return comparison_section(
+        compare(load_measurements([coasting_robot.log]), ModelFile.load(str(coasting_robot.model)))
+    )
+
+
+def test_report_fetches_nothing(section, tmp_path):
+    text = write_report(tmp_path / "new" / "folder", "A report", SOURCE, [section]).read_text()
+    page = Page(text)
+    assert page.fetched and all(target.startswith("#") for target in page.fetched)
+    assert not {"script", "link", "iframe", "object"} & set(page.tags)
+    assert "@import" not in text and "url(http" not in text
+
+
+def test_same_comparison_gives_the_same_bytes(coasting_robot, tmp_path):
+    pages = []
+    for name in ("a", "b"):
+        result = compare(
+            load_measurements([coasting_robot.log]), ModelFile.load(str(coasting_robot.model))
+        )
+        page = write_report(tmp_path / name, "A report", SOURCE, [comparison_section(result)])
+        pages.append(page.read_bytes())
+    assert pages[0] == pages[1]
+
+
+def test_report_says_where_it_comes_from(section, tmp_path):
+    text = Page(write_report(tmp_path, "A report", SOURCE, [section]).read_text()).text
+    assert all(
+        part in text
+        for part in (
+            SOURCE.command,
+            SOURCE.version,
+            SOURCE.model_sha256[:16],
+            "run.lcmlog",
+            "model.toml",
+            section.verdict,
+        )
+    )
+
+
+def test_every_figure_is_well_formed_and_explained(section):
+    assert len(section.figures) == 5
+    for figure in section.figures:
+        assert ET.fromstring(figure.svg).tag.endswith("svg")
+        assert len(figure.caption.split()) > 15
+
+
+def test_names_from_a_log_are_text_and_not_markup(section, tmp_path):
+    hostile = "<script>alert(1)</script>"
+    told = Section(hostile, section.score, hostile, [("log", hostile)], warnings=[hostile])
+    page = Page(write_report(tmp_path, hostile, SOURCE, [told, told]).read_text())
+    assert "script" not in page.tags and hostile in page.text
+
+
+def test_a_chain_shows_each_step_and_its_score(tmp_path):
+    chain = [("data sheet", 35.0), ("numbers fitted", 22.0), ("+ coasting", 2.5), ("+ worse", 3.0)]
+    section = steps_section("Gained", chain, "A sentence.")
+    page = Page(write_report(tmp_path, "Demo", SOURCE, [section]).read_text())
+    for label, score in chain:
+        assert label in page.text and f"{score:.3g}" in page.text
+    # On a scale of factors 35 fills the bar, 2.5 takes log 2.5 / log 35 of it, 1.0 would be empty.
+    assert [row[1].bar for row in section.tables[0].rows] == pytest.approx(
+        [1.0, 0.8694, 0.2577, 0.3090], abs=1e-4
+    )
