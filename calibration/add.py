@@ -6,10 +6,10 @@ from pathlib import Path
 
 from twinmill.calibration.compare import Comparison, comparison, open_scenes
 from twinmill.calibration.fit import common_clock, refit, share_noise
+from twinmill.calibration.freedom import base_quantities, effect_names, effect_quantities
 from twinmill.calibration.heldout import HeldOut, held_out
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import Fitted, ModelFile, write_child
-from twinmill.calibration.problem import base_quantities, effect_names, effect_quantities
 from twinmill.calibration.solve import Estimate, excited
 
 
@@ -63,7 +63,9 @@ def add(
     name = effect_names(richer)[-1]
     scenes = open_scenes(measurements, model_file)
     known = effect_quantities(model_file.model)
-    old = excited(scenes, base_quantities(model_file.model), known) + known
+    logs = {m.log_name: m.log_sha256 for m in measurements}
+    told = model_file.told_by_others(logs.values())
+    old = excited(scenes, base_quantities(model_file.model, told), known) + known
     fresh = [f for f in effect_quantities(richer, fresh=name) if f.name.startswith(f"{name}.")]
     free = old + fresh
     grown = [scene.with_model(richer) for scene in scenes]
@@ -78,7 +80,6 @@ def add(
 
     for estimate in solution.estimates:
         richer.set(estimate.name, estimate.value)
-    logs = {m.log_name: m.log_sha256 for m in measurements}
     write_child(
         model_file,
         Fitted(
@@ -89,6 +90,7 @@ def add(
             after.score,
             grown[0].noise,
             common_clock(solution),
+            bool(told),
         ),
         out,
         command,

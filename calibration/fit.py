@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import twinmill_native as native
 from twinmill.calibration.compare import Comparison, comparison, open_scenes
+from twinmill.calibration.freedom import Free, base_quantities, effect_quantities
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import Fitted, ModelFile, write_child
-from twinmill.calibration.problem import CLOCK, Free, Scene, base_quantities, effect_quantities
+from twinmill.calibration.problem import CLOCK, Scene
 from twinmill.calibration.solve import Estimate, Solution, excited, solve
 
 AGREE_SIGMA = 5.0  # clock offsets of several logs that differ by less are one
@@ -77,7 +78,7 @@ def fit(
     """
     scenes = open_scenes(measurements, model_file)
     known = effect_quantities(model_file.model)
-    free = excited(scenes, base_quantities(model_file.model), known) + known
+    free = excited(scenes, base_quantities(model_file.model, {}), known) + known
     fitted = [s.with_model(model_file.model) for s in scenes]
     solution = refit(fitted, free)
     share_noise(fitted, scenes)

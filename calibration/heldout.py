@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 from twinmill.calibration.folds import halves, step_mask, window_mask
-from twinmill.calibration.problem import Free, Scene
+from twinmill.calibration.freedom import Free
+from twinmill.calibration.problem import Scene
 from twinmill.calibration.solve import solve
 from twinmill.calibration.windows import CHANNELS, HORIZONS_S, Windows, rms
 

@@ -3,13 +3,14 @@
 
 import hashlib
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import tomlkit
 import twinmill_native as native
+from twinmill.calibration.freedom import catalogue, effect_names
 from twinmill.calibration.noise import Noise
-from twinmill.calibration.problem import catalogue, effect_names
 from twinmill.calibration.solve import Estimate
 
 
@@ -44,6 +45,19 @@ class ModelFile:
         """Hashes (sha256) of the logs that told the clock offset."""
         return list(tomlkit.parse(self.text).get("clock", {}).get("fitted_on", []))
 
+    def told_by_others(self, log_sha256: Iterable[str]) -> dict[str, float]:
+        """Standard errors of base quantities that were fitted on none of these logs, by name."""
+        base = tomlkit.parse(self.text).get("base", {})
+        if not base.get("fitted_on") or set(base["fitted_on"]) & set(log_sha256):
+            return {}
+        told = {}
+        for key, std in base.get("std", {}).items():
+            if isinstance(std, list):
+                told |= {f"base.{key}.{i}": float(s) for i, s in enumerate(std)}
+            else:
+                told[f"base.{key}"] = float(std)
+        return told
+
     @property
     def hash(self) -> str:
         """Of the text, as a child names its parent."""
@@ -61,6 +75,7 @@ class Fitted:
         score_before, score_after: on those logs.
         noise: of the first log, or None to leave the old.
         clock: the offset that the logs share, or None if they do not agree on one.
+        base_told: the base was held near what other logs told; they keep the credit.
     """
 
     model: native.Model
@@ -70,6 +85,7 @@ class Fitted:
     score_after: float
     noise: Noise | None = None
     clock: Estimate | None = None
+    base_told: bool = False
 
 
 def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> None:
@@ -143,8 +159,9 @@ def _write_base(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
         stds["wheel_speed_mps"] = (
             stds["wheel_speed_mps"][:1] * missing + stds["wheel_speed_mps"][1:]
         )
-    if stds:
+    if stds and not fitted.base_told:
         base["std"] = stds
+        base["fitted_on"] = list(fitted.logs.values())
 
 
 def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from twinmill.calibration.problem import CLOCK, Free, Scene
+from twinmill.calibration.freedom import Free
+from twinmill.calibration.problem import CLOCK, Scene
 
 HUBER_SIGMA = 3.5
 BLOCK_S = 4.0  # errors of one block may hang together; blocks do not
