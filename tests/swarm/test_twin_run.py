@@ -126,17 +126,7 @@ def test_json_is_one_object(tmp_path):
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_finishes_the_log(tmp_path, stop):
     log = tmp_path / "a.lcmlog"
-    command = [
-        TWIN_RUN,
-        "--plant",
-        "planar",
-        "--model",
-        "paper.toml",
-        "--n",
-        "2",
-        "--log",
-        str(log),
-    ]
+    command = f"{TWIN_RUN} --plant planar --model paper.toml --n 2 --log {log}".split()
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         time.sleep(1)
         process.send_signal(stop)

@@ -163,10 +163,10 @@ public:
             for (int i = 0; i < swarm.Substeps(); ++i)
             {
                 swarm.Advance();
+                KeepPace(swarm.TimeS());
                 publisher.PublishPoses(swarm);
             }
             Observe(swarm);
-            KeepPace(swarm.TimeS());
         }
         progress_.Clear();
     }
