@@ -28,7 +28,7 @@ from twinmill.tools.output import AsJson, busy, check_new_file, check_new_folder
 Logs = Annotated[
     list[Path],
     typer.Argument(
-        metavar="LOG...", show_default=False, help="LCM logs with commands and poses of a robot."
+        metavar="LOG", show_default=False, help="LCM logs with commands and poses of a robot."
     ),
 ]
 Model = Annotated[

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 from twinmill.calibration import show, tables
-from twinmill.calibration.problem import catalogue
+from twinmill.calibration.freedom import catalogue
 from twinmill.tools.output import AsJson, deliver
 
 

@@ -95,7 +95,8 @@ def speeds(robot: RobotComparison) -> Figure:
         draw(5.2, paint, nrows=3, sharex=True),
         "Measured and predicted speed",
         "The same seconds: speed forward, to the left, and turning (counter-clockwise is "
-        "positive). Wrong heights are wrong gains; edges that come late or are too round are delays and lags.",
+        "positive). Wrong heights are wrong gains; edges that come late or are too round are "
+        "delays and lags.",
     )
 
 
