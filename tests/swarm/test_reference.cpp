@@ -99,6 +99,11 @@ constexpr Cell kCells[] = {
     {"robot_arc_n6", Kind::kRobot, false, 6, 0.04, 0.022, 0.897, 1000, 0.359},
 };
 
+void PrintTo(const Cell &cell, std::ostream *out)
+{
+    *out << cell.name;
+}
+
 Model ModelOf(const Cell &cell)
 {
     Model model = PaperModel();
