@@ -58,11 +58,9 @@ def main() -> None:
         code = result if isinstance(result, int) else 0
     except typer.TyperException as error:
         code = error.exit_code
-        _complain(
-            f"{error.format_message()} (--help lists what can be given)"
-            if code == 2
-            else error.format_message()
-        )
+        sentence = error.format_message()  # empty where help was printed instead
+        if sentence:
+            _complain(f"{sentence} (--help lists what can be given)" if code == 2 else sentence)
     except (ValueError, OSError) as error:
         code = 1
         _complain(str(error))
