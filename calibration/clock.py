@@ -60,7 +60,8 @@ def estimate_offset(track: Track) -> ClockOffset:
         raise LogError(
             f"robot {track.robot_id}: the clock offset cannot be told (best {offset_s:.3f} s, "
             f"where commands explain {explained:.0%} of the motion); check that commands and poses "
-            f"are of the same run and within {SEARCH_S} s, or shift the poses when importing.")
+            f"are of the same run and within {SEARCH_S} s, or shift the poses when importing."
+        )
     return ClockOffset(offset_s, fit.jackknife(fine), lag_s, explained)
 
 
@@ -69,7 +70,7 @@ def _minimum(losses: np.ndarray, offsets_s: np.ndarray) -> tuple[float, float, f
     lag, k = np.unravel_index(losses.argmin(), losses.shape)
     offset_s = float(offsets_s[k])
     if 0 < k < len(offsets_s) - 1:
-        left, middle, right = losses[lag, k - 1:k + 2]
+        left, middle, right = losses[lag, k - 1 : k + 2]
         curvature = left - 2 * middle + right
         if curvature > 0:
             offset_s += float(0.5 * (left - right) / curvature * (offsets_s[1] - offsets_s[0]))
@@ -82,9 +83,11 @@ class _Regression:
     def __init__(self, track: Track):
         self.t_s, self.velocity = _body_velocity(track)
         if len(self.t_s) < BLOCKS or not np.diff(track.command, axis=0).any():
-            raise LogError(f"robot {track.robot_id}: the clock offset cannot be told, because the "
-                           "commands never change while the robot is tracked; record a run in "
-                           "which they do.")
+            raise LogError(
+                f"robot {track.robot_id}: the clock offset cannot be told, because the "
+                "commands never change while the robot is tracked; record a run in "
+                "which they do."
+            )
         self.block = np.arange(len(self.t_s)) * BLOCKS // len(self.t_s)
         self.total = float(np.sum(self.velocity**2))
         end_s = max(track.command_t_s[-1], self.t_s[-1]) + 1
@@ -96,14 +99,14 @@ class _Regression:
 
     def losses(self, offsets_s: np.ndarray) -> np.ndarray:
         """(lags, offsets) sums of squares that stay unexplained."""
-        self.sums = [[self._block_sums(lagged, offset) for offset in offsets_s]
-                     for lagged in self.lagged]
+        self.sums = [
+            [self._block_sums(lagged, offset) for offset in offsets_s] for lagged in self.lagged
+        ]
         return self._solve(np.ones(BLOCKS, bool))
 
     def jackknife(self, offsets_s: np.ndarray) -> float:
         """Standard error of the minimum of the losses computed last (Efron and Stein 1981)."""
-        found = [_minimum(self._solve(np.arange(BLOCKS) != k), offsets_s)[0]
-                 for k in range(BLOCKS)]
+        found = [_minimum(self._solve(np.arange(BLOCKS) != k), offsets_s)[0] for k in range(BLOCKS)]
         return float(np.sqrt((BLOCKS - 1) * np.var(found)))
 
     def _block_sums(self, lagged: np.ndarray, offset_s: float) -> tuple[np.ndarray, np.ndarray]:
@@ -111,17 +114,22 @@ class _Regression:
         position = (self.t_s - offset_s - self.grid_s[0]) / GRID_S
         k = np.floor(position).astype(int)
         part = (position - k)[:, None]
-        rows = np.hstack([lagged[k] * (1 - part) + lagged[k + 1] * part,
-                          np.ones((len(k), 1))])
+        rows = np.hstack([lagged[k] * (1 - part) + lagged[k + 1] * part, np.ones((len(k), 1))])
         edges = np.searchsorted(self.block, np.arange(BLOCKS + 1))
         parts = [slice(first, last) for first, last in pairwise(edges)]
-        return (np.array([rows[p].T @ rows[p] for p in parts]),
-                np.array([rows[p].T @ self.velocity[p] for p in parts]))
+        return (
+            np.array([rows[p].T @ rows[p] for p in parts]),
+            np.array([rows[p].T @ self.velocity[p] for p in parts]),
+        )
 
     def _solve(self, keep: np.ndarray) -> np.ndarray:
-        total = np.sum(self.velocity[keep[self.block]]**2)
-        return np.array([[total - _explained(g[keep].sum(axis=0), h[keep].sum(axis=0))
-                          for g, h in row] for row in self.sums])
+        total = np.sum(self.velocity[keep[self.block]] ** 2)
+        return np.array(
+            [
+                [total - _explained(g[keep].sum(axis=0), h[keep].sum(axis=0)) for g, h in row]
+                for row in self.sums
+            ]
+        )
 
 
 def _averaged(grid_s: np.ndarray, track: Track) -> np.ndarray:
@@ -130,11 +138,13 @@ def _averaged(grid_s: np.ndarray, track: Track) -> np.ndarray:
     A point value instead would come half a step late on the mean.
     """
     command = track.command
-    shapes = np.hstack([command, np.sign(command) * np.sqrt(np.abs(command)),
-                        command * np.abs(command)])
+    shapes = np.hstack(
+        [command, np.sign(command) * np.sqrt(np.abs(command)), command * np.abs(command)]
+    )
     knots_s = np.append(track.command_t_s, grid_s[-1] + 1)
-    area = np.vstack([np.zeros(shapes.shape[1]),
-                      np.cumsum(shapes * np.diff(knots_s)[:, None], axis=0)])
+    area = np.vstack(
+        [np.zeros(shapes.shape[1]), np.cumsum(shapes * np.diff(knots_s)[:, None], axis=0)]
+    )
     at_grid = np.column_stack([np.interp(grid_s, knots_s, column) for column in area.T])
     return np.diff(at_grid, axis=0, prepend=0.0) / GRID_S
 
@@ -147,11 +157,17 @@ def _explained(gram: np.ndarray, moment: np.ndarray) -> float:
 
 def _body_velocity(track: Track) -> tuple[np.ndarray, np.ndarray]:
     """(K,) s and (K, 3) forward, left, LEVER_M * turning; m/s; thinned."""
-    slope = np.column_stack([local_line(track.pose_t_s, track.pose[:, k], track.segment, SLOPE_S)[1]
-                             for k in range(3)])
+    slope = np.column_stack(
+        [local_line(track.pose_t_s, track.pose[:, k], track.segment, SLOPE_S)[1] for k in range(3)]
+    )
     cos, sin = np.cos(track.heading_smooth), np.sin(track.heading_smooth)
-    velocity = np.column_stack([cos * slope[:, 0] + sin * slope[:, 1],
-                                cos * slope[:, 1] - sin * slope[:, 0], LEVER_M * slope[:, 2]])
+    velocity = np.column_stack(
+        [
+            cos * slope[:, 0] + sin * slope[:, 1],
+            cos * slope[:, 1] - sin * slope[:, 0],
+            LEVER_M * slope[:, 2],
+        ]
+    )
     every = max(1, round(THIN_S / track.timing.pose_period_s))
     known = np.flatnonzero(np.isfinite(velocity).all(axis=1))[::every]
     return track.pose_t_s[known], velocity[known]

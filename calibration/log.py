@@ -102,24 +102,33 @@ def read_log(path: str | Path, channel_prefix: str = "") -> Log:
     channels = _robot_channels(events.by_channel, channel_prefix, warnings)
     if not channels:
         names = ", ".join(sorted(events.by_channel)[:5])
-        raise LogError(f"{path.name}: no channel {channel_prefix}R<nn>_TELEMETRY, _DRIVE or _POSE "
-                       f"(the log has {names}); name the prefix that the log uses.")
-    messages = {robot_id: _decode_robot(robot_id, kinds, warnings)
-                for robot_id, kinds in sorted(channels.items())}
-    t0_us = min(int(m["utime_us"].min()) for pair in messages.values() for m in pair
-                if m is not None)
+        raise LogError(
+            f"{path.name}: no channel {channel_prefix}R<nn>_TELEMETRY, _DRIVE or _POSE "
+            f"(the log has {names}); name the prefix that the log uses."
+        )
+    messages = {
+        robot_id: _decode_robot(robot_id, kinds, warnings)
+        for robot_id, kinds in sorted(channels.items())
+    }
+    t0_us = min(
+        int(m["utime_us"].min()) for pair in messages.values() for m in pair if m is not None
+    )
     robots = {}
     for robot_id, (commands, poses) in messages.items():
         source, behavior = _last_run(channels[robot_id].get("RUN", []), robot_id)
         robots[robot_id] = RobotLog(
-            robot_id=robot_id, source=source, behavior=behavior,
+            robot_id=robot_id,
+            source=source,
+            behavior=behavior,
             **_command_series(commands, t0_us, robot_id, warnings),
-            **_pose_series(poses, t0_us, robot_id, warnings))
+            **_pose_series(poses, t0_us, robot_id, warnings),
+        )
     return Log(path, hashlib.sha256(data).hexdigest(), t0_us, robots, warnings)
 
 
-def _robot_channels(by_channel: dict[str, list[bytes]], prefix: str,
-                    warnings: list[str]) -> dict[int, dict[str, list[bytes]]]:
+def _robot_channels(
+    by_channel: dict[str, list[bytes]], prefix: str, warnings: list[str]
+) -> dict[int, dict[str, list[bytes]]]:
     """Payloads by robot and kind of channel; robots with neither commands nor poses left out."""
     found = _match_channels(by_channel, prefix)
     if not found and not prefix:
@@ -127,12 +136,17 @@ def _robot_channels(by_channel: dict[str, list[bytes]], prefix: str,
         found = _match_channels(by_channel, prefix)
         if found:
             warnings.append("Only channels with the prefix TWIN_ are in the log; these were read.")
-    unknown = [name for name in by_channel
-               if not _channel_pattern(prefix).fullmatch(name) and not _KNOWN_ELSEWHERE.match(name)]
+    unknown = [
+        name
+        for name in by_channel
+        if not _channel_pattern(prefix).fullmatch(name) and not _KNOWN_ELSEWHERE.match(name)
+    ]
     if found and unknown:
         count = sum(len(by_channel[name]) for name in unknown)
-        warnings.append(f"{count} messages on {len(unknown)} other channels were ignored "
-                        f"({', '.join(sorted(unknown)[:5])}).")
+        warnings.append(
+            f"{count} messages on {len(unknown)} other channels were ignored "
+            f"({', '.join(sorted(unknown)[:5])})."
+        )
     return {robot_id: kinds for robot_id, kinds in found.items() if set(kinds) - {"RUN"}}
 
 
@@ -140,8 +154,9 @@ def _channel_pattern(prefix: str) -> re.Pattern:
     return re.compile(rf"{re.escape(prefix)}R(\d\d)_({'|'.join(_READ)})")
 
 
-def _match_channels(by_channel: dict[str, list[bytes]],
-                    prefix: str) -> dict[int, dict[str, list[bytes]]]:
+def _match_channels(
+    by_channel: dict[str, list[bytes]], prefix: str
+) -> dict[int, dict[str, list[bytes]]]:
     found: dict[int, dict[str, list[bytes]]] = {}
     for name, payloads in by_channel.items():
         if match := _channel_pattern(prefix).fullmatch(name):
@@ -149,8 +164,11 @@ def _match_channels(by_channel: dict[str, list[bytes]],
     return found
 
 
-def _decode_robot(robot_id: int, kinds: dict[str, list[bytes]], warnings: list[str],
-                  ) -> tuple[np.ndarray | None, np.ndarray | None]:
+def _decode_robot(
+    robot_id: int,
+    kinds: dict[str, list[bytes]],
+    warnings: list[str],
+) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Commands and poses of a robot, in order of time; None where there are none."""
     name = f"R{robot_id:02d}"
     if "TELEMETRY" in kinds and "DRIVE" in kinds:
@@ -159,23 +177,31 @@ def _decode_robot(robot_id: int, kinds: dict[str, list[bytes]], warnings: list[s
     for sources in (("TELEMETRY", "DRIVE"), ("POSE",)):
         source = next((s for s in sources if s in kinds), None)
         if source is None:
-            warnings.append(f"{name}: has no {'poses' if sources == ('POSE',) else 'commands'}; "
-                            "it cannot be compared with a model.")
+            warnings.append(
+                f"{name}: has no {'poses' if sources == ('POSE',) else 'commands'}; "
+                "it cannot be compared with a model."
+            )
             series.append(None)
             continue
         message = getattr(turbopi, f"{source.lower()}_t")
-        series.append(_in_order(decode(kinds[source], message, f"{name}_{source}"),
-                                f"{name}_{source}", robot_id, warnings))
+        series.append(
+            _in_order(
+                decode(kinds[source], message, f"{name}_{source}"),
+                f"{name}_{source}",
+                robot_id,
+                warnings,
+            )
+        )
     return series[0], series[1]
 
 
-def _in_order(messages: np.ndarray, channel: str, robot_id: int,
-              warnings: list[str]) -> np.ndarray:
+def _in_order(messages: np.ndarray, channel: str, robot_id: int, warnings: list[str]) -> np.ndarray:
     """Sorted by stamp; of messages with the same stamp the last is kept."""
     foreign = int(np.count_nonzero(messages["robot_id"] != robot_id))
     if foreign:
-        warnings.append(f"{channel}: {foreign} messages carry another robot_id; the channel's "
-                        "number was used.")
+        warnings.append(
+            f"{channel}: {foreign} messages carry another robot_id; the channel's number was used."
+        )
     stamps = messages["utime_us"].astype(np.int64)
     late = int(np.count_nonzero(np.diff(stamps) < 0))
     if late:
@@ -183,8 +209,10 @@ def _in_order(messages: np.ndarray, channel: str, robot_id: int,
     order = np.argsort(stamps, kind="stable")
     last = np.append(np.diff(stamps[order]) > 0, True)
     if not last.all():
-        warnings.append(f"{channel}: {np.count_nonzero(~last)} messages repeat a stamp; the last "
-                        "one of each was kept.")
+        warnings.append(
+            f"{channel}: {np.count_nonzero(~last)} messages repeat a stamp; the last "
+            "one of each was kept."
+        )
     return messages[order[last]]
 
 
@@ -195,20 +223,28 @@ def _last_run(payloads: list[bytes], robot_id: int) -> tuple[str, str]:
     try:
         run = turbopi.run_t.decode(payloads[-1])
     except Exception as error:  # the generated decoder raises what its steps happen to raise
-        raise LogError(f"R{robot_id:02d}_RUN: a message is not of type turbopi.run_t ({error}): "
-                       "the log was made with other message types.") from error
+        raise LogError(
+            f"R{robot_id:02d}_RUN: a message is not of type turbopi.run_t ({error}): "
+            "the log was made with other message types."
+        ) from error
     return run.source, run.behavior
 
 
-def _command_series(messages: np.ndarray | None, t0_us: int, robot_id: int,
-                    warnings: list[str]) -> dict:
+def _command_series(
+    messages: np.ndarray | None, t0_us: int, robot_id: int, warnings: list[str]
+) -> dict:
     """The command fields of RobotLog."""
     count = 0 if messages is None else len(messages)
     series = {
-        "command_kind": "none", "command_t_s": np.empty(0), "command": np.empty((0, 4)),
+        "command_kind": "none",
+        "command_t_s": np.empty(0),
+        "command": np.empty((0, 4)),
         "battery_V": np.full(count, np.nan),
-        "mode": np.empty(0, np.int8), "detected_raw": np.empty(0, np.int8),
-        "detected": np.empty(0, np.int8), "speed_input": np.empty(0), "turn_input": np.empty(0),
+        "mode": np.empty(0, np.int8),
+        "detected_raw": np.empty(0, np.int8),
+        "detected": np.empty(0, np.int8),
+        "speed_input": np.empty(0),
+        "turn_input": np.empty(0),
     }
     if messages is None:
         return series
@@ -223,8 +259,10 @@ def _command_series(messages: np.ndarray | None, t0_us: int, robot_id: int,
         for name in ("speed_input", "turn_input"):
             series[name] = messages[name].astype(float)
     if not np.isfinite(command).all():
-        raise LogError(f"R{robot_id:02d}: {np.count_nonzero(~np.isfinite(command).all(axis=1))} "
-                       "commands are not finite numbers; repair the program that wrote the log.")
+        raise LogError(
+            f"R{robot_id:02d}: {np.count_nonzero(~np.isfinite(command).all(axis=1))} "
+            "commands are not finite numbers; repair the program that wrote the log."
+        )
     if kind == "duty":
         command = _duty_fraction(command, robot_id, warnings)
     return series | {"command_kind": kind, "command": command}
@@ -233,39 +271,54 @@ def _command_series(messages: np.ndarray | None, t0_us: int, robot_id: int,
 def _drive_kind(messages: np.ndarray, robot_id: int) -> CommandKind:
     kinds = np.unique(messages["kind"])
     if len(kinds) != 1 or not 0 <= kinds[0] < len(KINDS):
-        raise LogError(f"R{robot_id:02d}_DRIVE: holds kinds {_listed(kinds)}, but a log must keep "
-                       "to one of 0 (duty), 1 (wheel speed), 2 (twist); split the log.")
+        raise LogError(
+            f"R{robot_id:02d}_DRIVE: holds kinds {_listed(kinds)}, but a log must keep "
+            "to one of 0 (duty), 1 (wheel speed), 2 (twist); split the log."
+        )
     return KINDS[kinds[0]]
 
 
 def _duty_fraction(duty_pct: np.ndarray, robot_id: int, warnings: list[str]) -> np.ndarray:
     outside = int(np.count_nonzero((np.abs(duty_pct) > 100).any(axis=1)))
     if outside:
-        warnings.append(f"R{robot_id:02d}: {outside} commands have a duty outside -100..100 "
-                        "percent; clamped, as the motor board does.")
+        warnings.append(
+            f"R{robot_id:02d}: {outside} commands have a duty outside -100..100 "
+            "percent; clamped, as the motor board does."
+        )
     return np.clip(duty_pct, -100, 100) / 100
 
 
-def _pose_series(messages: np.ndarray | None, t0_us: int, robot_id: int,
-                 warnings: list[str]) -> dict:
+def _pose_series(
+    messages: np.ndarray | None, t0_us: int, robot_id: int, warnings: list[str]
+) -> dict:
     """The pose fields of RobotLog."""
     if messages is None:
-        return {"pose_t_s": np.empty(0), "pose": np.empty((0, 3)), "z_m": np.empty(0),
-                "valid": np.empty(0, bool)}
+        return {
+            "pose_t_s": np.empty(0),
+            "pose": np.empty((0, 3)),
+            "z_m": np.empty(0),
+            "valid": np.empty(0, bool),
+        }
     position_m = messages["position_m"].astype(float)
     quaternion = messages["orientation_wxyz"].astype(float)
     stated = messages["valid"] != 0
     norm = np.linalg.norm(quaternion, axis=1)
     usable = np.isfinite(position_m).all(axis=1) & (np.abs(norm - 1) < 0.1)  # NaN compares false
     if (stated & ~usable).any():
-        warnings.append(f"R{robot_id:02d}_POSE: {np.count_nonzero(stated & ~usable)} poses are "
-                        "marked valid but hold no position or no unit quaternion; taken as lost.")
+        warnings.append(
+            f"R{robot_id:02d}_POSE: {np.count_nonzero(stated & ~usable)} poses are "
+            "marked valid but hold no position or no unit quaternion; taken as lost."
+        )
     valid = stated & usable
     pose = np.full((len(messages), 3), np.nan)
     pose[valid, :2] = position_m[valid, :2]
     pose[valid, 2] = np.unwrap(heading_rad(quaternion[valid]))
-    return {"pose_t_s": _seconds(messages, t0_us), "pose": pose,
-            "z_m": np.where(valid, position_m[:, 2], np.nan), "valid": valid}
+    return {
+        "pose_t_s": _seconds(messages, t0_us),
+        "pose": pose,
+        "z_m": np.where(valid, position_m[:, 2], np.nan),
+        "valid": valid,
+    }
 
 
 def heading_rad(quaternion_wxyz: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from twinmill.calibration.track import Track
 
 CHANGES = 5  # commands in a row that must agree
-TIMING_S = 0.03  # agreement of their times: a control step
+TIMING_S = 0.006  # agreement of their times: the model knows when each command came
 LEAD_S, AHEAD_S = 0.5, 2.0  # commands before and after a window's start that must be repeated
 EVERY_S = 0.25
 COVERED = 0.5  # share of the log that must have been repeated to speak for all of it

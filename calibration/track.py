@@ -70,8 +70,7 @@ class Track:
     notes: list[str]
 
 
-def make_track(robot: RobotLog, max_speed_mps: float = 1.5,
-               max_turn_radps: float = 12.0) -> Track:
+def make_track(robot: RobotLog, max_speed_mps: float = 1.5, max_turn_radps: float = 12.0) -> Track:
     """Cleans one robot's series.
 
     Args:
@@ -85,8 +84,10 @@ def make_track(robot: RobotLog, max_speed_mps: float = 1.5,
     """
     if not len(robot.command_t_s) or np.count_nonzero(robot.valid) < 2:
         missing = "commands" if not len(robot.command_t_s) else "valid poses"
-        raise LogError(f"robot {robot.robot_id}: the log has no {missing}, so nothing can be "
-                       "predicted; record telemetry and motion capture together.")
+        raise LogError(
+            f"robot {robot.robot_id}: the log has no {missing}, so nothing can be "
+            "predicted; record telemetry and motion capture together."
+        )
     notes: list[str] = []
     usable = _trackable(robot, notes)
     usable &= ~_excursions(robot, usable, (max_speed_mps, max_turn_radps), notes)
@@ -97,9 +98,20 @@ def make_track(robot: RobotLog, max_speed_mps: float = 1.5,
     _note_frozen(robot, notes)
     heading_smooth, _ = local_line(robot.pose_t_s, pose[:, 2], segment, SMOOTH_S)
     _note_astray(robot, pose, segment, notes)
-    return Track(robot.robot_id, robot.command_kind, robot.command_t_s, robot.command,
-                 _filled(robot.command_t_s, robot.battery_V), robot.pose_t_s, pose, segment,
-                 heading_smooth, rest, _timing(robot, segment), notes)
+    return Track(
+        robot.robot_id,
+        robot.command_kind,
+        robot.command_t_s,
+        robot.command,
+        _filled(robot.command_t_s, robot.battery_V),
+        robot.pose_t_s,
+        pose,
+        segment,
+        heading_smooth,
+        rest,
+        _timing(robot, segment),
+        notes,
+    )
 
 
 def command_at(t_s: np.ndarray, command_t_s: np.ndarray, command: np.ndarray) -> np.ndarray:
@@ -119,13 +131,17 @@ def _trackable(robot: RobotLog, notes: list[str]) -> np.ndarray:
     """(N,) bool: poses that are valid, on the floor, and taken while commands are known."""
     lifted = np.abs(robot.z_m - np.nanmedian(robot.z_m)) > LIFT_M  # NaN compares false
     if lifted.any():
-        notes.append(f"{np.count_nonzero(lifted)} poses from {robot.pose_t_s[lifted][0]:.3f} s on "
-                     "are off the floor; left out.")
+        notes.append(
+            f"{np.count_nonzero(lifted)} poses from {robot.pose_t_s[lifted][0]:.3f} s on "
+            "are off the floor; left out."
+        )
     silent = _silent(robot)
     if (silent & robot.valid).any():
         first = robot.pose_t_s[silent & robot.valid][0]
-        notes.append(f"{np.count_nonzero(silent & robot.valid)} poses from {first:.3f} s on were "
-                     "taken while no commands are in the log; left out.")
+        notes.append(
+            f"{np.count_nonzero(silent & robot.valid)} poses from {first:.3f} s on were "
+            "taken while no commands are in the log; left out."
+        )
     return robot.valid & ~lifted & ~silent
 
 
@@ -145,12 +161,14 @@ def _jumps(robot: RobotLog, index: np.ndarray, limits: tuple[float, float]) -> n
     dt_s = np.diff(robot.pose_t_s[index])
     step = np.diff(robot.pose[index], axis=0)
     turn_rad = np.abs(np.remainder(step[:, 2] + np.pi, 2 * np.pi) - np.pi)
-    return ((np.hypot(step[:, 0], step[:, 1]) > limits[0] * dt_s + JUMP_NOISE_M)
-            | (turn_rad > np.minimum(limits[1] * dt_s + JUMP_NOISE_RAD, np.pi)))
+    return (np.hypot(step[:, 0], step[:, 1]) > limits[0] * dt_s + JUMP_NOISE_M) | (
+        turn_rad > np.minimum(limits[1] * dt_s + JUMP_NOISE_RAD, np.pi)
+    )
 
 
-def _excursions(robot: RobotLog, usable: np.ndarray, limits: tuple[float, float],
-                notes: list[str]) -> np.ndarray:
+def _excursions(
+    robot: RobotLog, usable: np.ndarray, limits: tuple[float, float], notes: list[str]
+) -> np.ndarray:
     """(N,) bool: poses between a jump and the jump back, as when markers are mixed up."""
     outlier = np.zeros(len(usable), bool)
     index = np.flatnonzero(usable)
@@ -159,19 +177,24 @@ def _excursions(robot: RobotLog, usable: np.ndarray, limits: tuple[float, float]
     while position + 1 < len(jumps):
         before, after = index[jumps[position]], index[jumps[position + 1] + 1]
         ends = np.array([before, after])
-        back = (robot.pose_t_s[after] - robot.pose_t_s[before] <= _gap_s(robot)
-                and not _jumps(robot, ends, limits)[0])
+        back = (
+            robot.pose_t_s[after] - robot.pose_t_s[before] <= _gap_s(robot)
+            and not _jumps(robot, ends, limits)[0]
+        )
         if back:
-            outlier[before + 1:after] = True
+            outlier[before + 1 : after] = True
         position += 2 if back else 1
     if outlier.any():
-        notes.append(f"{np.count_nonzero(outlier)} poses from {robot.pose_t_s[outlier][0]:.3f} s "
-                     "on jump away and back; left out.")
+        notes.append(
+            f"{np.count_nonzero(outlier)} poses from {robot.pose_t_s[outlier][0]:.3f} s "
+            "on jump away and back; left out."
+        )
     return outlier
 
 
-def _cuts(robot: RobotLog, usable: np.ndarray, limits: tuple[float, float],
-          notes: list[str]) -> tuple[np.ndarray, np.ndarray]:
+def _cuts(
+    robot: RobotLog, usable: np.ndarray, limits: tuple[float, float], notes: list[str]
+) -> tuple[np.ndarray, np.ndarray]:
     """Usable poses without the margins, and which of them begin a segment: (K,) int, (K,) bool."""
     index = np.flatnonzero(usable)
     t = robot.pose_t_s[index]
@@ -181,18 +204,20 @@ def _cuts(robot: RobotLog, usable: np.ndarray, limits: tuple[float, float],
     keep = np.ones(len(index), bool)
     for k in np.flatnonzero(jump | gap):
         moved_m = np.hypot(*(robot.pose[index[k + 1], :2] - robot.pose[index[k], :2]))
-        what = ("not tracked" if lost[k] else "no poses" if gap[k] else "the robot jumps")
-        notes.append(f"cut at {t[k]:.3f} s: {what} for {t[k + 1] - t[k]:.3f} s, "
-                     f"then {moved_m:.3f} m away.")
+        what = "not tracked" if lost[k] else "no poses" if gap[k] else "the robot jumps"
+        notes.append(
+            f"cut at {t[k]:.3f} s: {what} for {t[k + 1] - t[k]:.3f} s, then {moved_m:.3f} m away."
+        )
         if jump[k] or lost[k]:
             keep &= (t < t[k] - MARGIN_S) | (t > t[k + 1] + MARGIN_S)
-    begins = np.concatenate([[0], np.cumsum(jump | gap)])[:len(index)]
+    begins = np.concatenate([[0], np.cumsum(jump | gap)])[: len(index)]
     index, begins = index[keep], begins[keep]
     return index, np.diff(begins, prepend=-1) > 0
 
 
-def _segments(robot: RobotLog, index: np.ndarray, begins: np.ndarray,
-              notes: list[str]) -> np.ndarray:
+def _segments(
+    robot: RobotLog, index: np.ndarray, begins: np.ndarray, notes: list[str]
+) -> np.ndarray:
     """(N,) numbers of segments, short ones dropped."""
     segment, number = np.full(len(robot.pose_t_s), -1), 0
     for part in np.split(index, np.flatnonzero(begins)):
@@ -214,8 +239,9 @@ def _continuous(pose: np.ndarray, segment: np.ndarray) -> np.ndarray:
     return pose
 
 
-def local_line(t_s: np.ndarray, values: np.ndarray, segment: np.ndarray,
-               half_width_s: float) -> tuple[np.ndarray, np.ndarray]:
+def local_line(
+    t_s: np.ndarray, values: np.ndarray, segment: np.ndarray, half_width_s: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Straight line by least squares around each sample, within its segment.
 
     Args:
@@ -233,8 +259,12 @@ def local_line(t_s: np.ndarray, values: np.ndarray, segment: np.ndarray,
     s0, s1, s2, sy, sty = (np.zeros(count) for _ in range(5))
     for lag in range(-reach, reach + 1):
         other = np.clip(sample + lag, 0, count - 1)
-        near = ((other == sample + lag) & (segment[other] == segment) & (segment >= 0)
-                & (np.abs(t_s[other] - t_s) <= half_width_s))
+        near = (
+            (other == sample + lag)
+            & (segment[other] == segment)
+            & (segment >= 0)
+            & (np.abs(t_s[other] - t_s) <= half_width_s)
+        )
         dt = np.where(near, t_s[other] - t_s, 0.0)
         dy = np.where(near, values[other] - values, 0.0)
         s0, s1, s2 = s0 + near, s1 + dt, s2 + dt * dt
@@ -267,14 +297,17 @@ def _filled(t_s: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _timing(robot: RobotLog, segment: np.ndarray) -> Timing:
     pose_period_s = float(np.median(np.diff(robot.pose_t_s)))
     steps = np.diff(robot.command, axis=0)
-    spans_s = sum(np.ptp(robot.pose_t_s[segment == number]) + pose_period_s
-                  for number in range(segment.max() + 1))
+    spans_s = sum(
+        np.ptp(robot.pose_t_s[segment == number]) + pose_period_s
+        for number in range(segment.max() + 1)
+    )
     lost = 1 - np.count_nonzero(segment >= 0) * pose_period_s / spans_s if spans_s else np.nan
     return Timing(
         pose_period_s=pose_period_s,
         command_period_s=float(np.median(np.diff(robot.command_t_s))) if len(steps) else np.nan,
         pose_lost_share=max(0.0, float(lost)),
-        command_held_share=float((steps == 0).all(axis=1).mean()) if len(steps) else np.nan)
+        command_held_share=float((steps == 0).all(axis=1).mean()) if len(steps) else np.nan,
+    )
 
 
 def _note_frozen(robot: RobotLog, notes: list[str]) -> None:
@@ -287,21 +320,28 @@ def _note_frozen(robot: RobotLog, notes: list[str]) -> None:
         within = (robot.command_t_s >= t[first]) & (robot.command_t_s <= t[last])
         driven = within.any() and (robot.command[within] != 0).any(axis=1).all()
         if t[last] - t[first] > FROZEN_S and driven:
-            notes.append(f"the pose is frozen from {t[first]:.3f} to {t[last]:.3f} s while the "
-                         "robot is driven; check the motion capture.")
+            notes.append(
+                f"the pose is frozen from {t[first]:.3f} to {t[last]:.3f} s while the "
+                "robot is driven; check the motion capture."
+            )
 
 
-def _note_astray(robot: RobotLog, pose: np.ndarray, segment: np.ndarray,
-                 notes: list[str]) -> None:
+def _note_astray(robot: RobotLog, pose: np.ndarray, segment: np.ndarray, notes: list[str]) -> None:
     """Motion that points elsewhere than the heading although the robot is driven straight."""
     half = max(1, round(0.25 / float(np.median(np.diff(robot.pose_t_s)))))
     middle = np.arange(half, len(pose) - half)
     whole = (segment[middle - half] >= 0) & (segment[middle - half] == segment[middle + half])
     middle = middle[whole]
     first, last = middle - half, middle + half
-    forward = np.column_stack([
-        _straight(command_at(robot.pose_t_s[middle] + shift, robot.command_t_s, robot.command),
-                  robot.command_kind) for shift in (-0.5, -0.25, 0.0, 0.25, 0.5)])
+    forward = np.column_stack(
+        [
+            _straight(
+                command_at(robot.pose_t_s[middle] + shift, robot.command_t_s, robot.command),
+                robot.command_kind,
+            )
+            for shift in (-0.5, -0.25, 0.0, 0.25, 0.5)
+        ]
+    )
     steady = (forward != 0).all(axis=1) & (np.ptp(np.sign(forward), axis=1) == 0)
     if np.count_nonzero(steady) < half:
         return
@@ -310,9 +350,11 @@ def _note_astray(robot: RobotLog, pose: np.ndarray, segment: np.ndarray,
     weight = np.hypot(step[:, 0], step[:, 1])
     astray = float(np.angle(np.sum(weight * np.exp(1j * angle))))
     if abs(astray) > ASTRAY_RAD:
-        notes.append(f"driven straight, the robot moves {np.degrees(astray):.0f} degrees to the "
-                     "left of its heading; turn the poses by that (`twinmill import "
-                     f"--heading-offset-deg {np.degrees(astray):.0f}`).")
+        notes.append(
+            f"driven straight, the robot moves {np.degrees(astray):.0f} degrees to the "
+            "left of its heading; turn the poses by that (`twinmill import "
+            f"--heading-offset-deg {np.degrees(astray):.0f}`)."
+        )
 
 
 def _straight(command: np.ndarray, kind: CommandKind) -> np.ndarray:

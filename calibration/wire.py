@@ -18,18 +18,46 @@ MAX_CHANNEL = 63  # LCM_MAX_CHANNEL_NAME_LENGTH
 
 # Wire order of lcm_types/*.lcm; `hash` is LCM's fingerprint of the type.
 LAYOUT = {
-    turbopi.telemetry_t: np.dtype([
-        ("hash", "S8"), ("utime_us", ">i8"), ("frame_utime_us", ">i8"), ("robot_id", ">i4"),
-        ("seq", ">i4"), ("frame_seq", ">i4"), ("blob_px", ">i4"), ("detected_raw", "i1"),
-        ("detected", "i1"), ("mode", "i1"), ("speed_input", ">f4"), ("turn_input", ">f4"),
-        ("wheel_duty_pct", "i1", 4), ("battery_V", ">f4"), ("loop_us", ">i4"),
-        ("status_flags", ">i4")]),
-    turbopi.pose_t: np.dtype([
-        ("hash", "S8"), ("utime_us", ">i8"), ("robot_id", ">i4"), ("seq", ">i4"), ("valid", "i1"),
-        ("position_m", ">f8", 3), ("orientation_wxyz", ">f8", 4)]),
-    turbopi.drive_t: np.dtype([
-        ("hash", "S8"), ("utime_us", ">i8"), ("robot_id", ">i4"), ("kind", "i1"),
-        ("value", ">f8", 4)]),
+    turbopi.telemetry_t: np.dtype(
+        [
+            ("hash", "S8"),
+            ("utime_us", ">i8"),
+            ("frame_utime_us", ">i8"),
+            ("robot_id", ">i4"),
+            ("seq", ">i4"),
+            ("frame_seq", ">i4"),
+            ("blob_px", ">i4"),
+            ("detected_raw", "i1"),
+            ("detected", "i1"),
+            ("mode", "i1"),
+            ("speed_input", ">f4"),
+            ("turn_input", ">f4"),
+            ("wheel_duty_pct", "i1", 4),
+            ("battery_V", ">f4"),
+            ("loop_us", ">i4"),
+            ("status_flags", ">i4"),
+        ]
+    ),
+    turbopi.pose_t: np.dtype(
+        [
+            ("hash", "S8"),
+            ("utime_us", ">i8"),
+            ("robot_id", ">i4"),
+            ("seq", ">i4"),
+            ("valid", "i1"),
+            ("position_m", ">f8", 3),
+            ("orientation_wxyz", ">f8", 4),
+        ]
+    ),
+    turbopi.drive_t: np.dtype(
+        [
+            ("hash", "S8"),
+            ("utime_us", ">i8"),
+            ("robot_id", ">i4"),
+            ("kind", "i1"),
+            ("value", ">f8", 4),
+        ]
+    ),
 }
 
 
@@ -63,21 +91,25 @@ def split_events(data: bytes, name: str) -> Events:
             if following < 0:
                 events.warnings.append(
                     f"{name}: breaks off inside an event at byte {position} of {len(data)}; "
-                    "read up to there.")
+                    "read up to there."
+                )
                 break
             if events.by_channel:
                 events.warnings.append(
-                    f"{name}: bytes {position} to {following} are no event; skipped.")
+                    f"{name}: bytes {position} to {following} are no event; skipped."
+                )
             position = following
             continue
         channel_size = HEADER.unpack_from(data, position)[3]
         start = position + HEADER.size
-        channel = data[start:start + channel_size].decode("utf-8", "replace")
-        events.by_channel.setdefault(channel, []).append(data[start + channel_size:end])
+        channel = data[start : start + channel_size].decode("utf-8", "replace")
+        events.by_channel.setdefault(channel, []).append(data[start + channel_size : end])
         position = end
     if not events.by_channel:
-        raise LogError(f"{name}: holds no complete LCM event in {len(data)} bytes, so it is no LCM "
-                       "log; record one with lcm-logger, or make one with `twinmill import`.")
+        raise LogError(
+            f"{name}: holds no complete LCM event in {len(data)} bytes, so it is no LCM "
+            "log; record one with lcm-logger, or make one with `twinmill import`."
+        )
     return events
 
 
@@ -109,5 +141,6 @@ def decode(payloads: list[bytes], message: type, channel: str) -> np.ndarray:
             raise LogError(
                 f"{channel}: a message is not of type turbopi.{message.__name__} (fingerprint "
                 f"{payload[:8].hex()}, expected {fingerprint.hex()}): the log was made with other "
-                "message types; convert it with the programs that wrote it.")
+                "message types; convert it with the programs that wrote it."
+            )
     return np.frombuffer(b"".join(payloads), layout)

@@ -51,8 +51,15 @@ class ImportOptions:
     force: bool = False
 
 
-def import_log(poses: Path | None, commands: Path | None, out: Path, *, motive: Path | None = None,
-               io_tsv: tuple[Path, ...] = (), options: ImportOptions | None = None) -> dict:
+def import_log(
+    poses: Path | None,
+    commands: Path | None,
+    out: Path,
+    *,
+    motive: Path | None = None,
+    io_tsv: tuple[Path, ...] = (),
+    options: ImportOptions | None = None,
+) -> dict:
     """Makes a log from one source of poses and one of commands.
 
     Args:
@@ -72,16 +79,26 @@ def import_log(poses: Path | None, commands: Path | None, out: Path, *, motive: 
     """
     options = options or ImportOptions()
     if (poses is None) == (motive is None) or (commands is None) == (not io_tsv):
-        raise LogError("a log needs one source of poses and one of commands: give --poses or "
-                       "--motive, and --commands or --io-tsv.")
+        raise LogError(
+            "a log needs one source of poses and one of commands: give --poses or "
+            "--motive, and --commands or --io-tsv."
+        )
     if options.robot_id is not None and (not 0 <= options.robot_id <= 99 or len(io_tsv) > 1):
-        raise LogError(f"--robot-id {options.robot_id}: must be in 0..99 and fits one robot; "
-                       "number several by their folders' names.")
-    pose_series = (read_motive(motive, options.robots, options.up, absolute=bool(io_tsv))
-                   if motive else read_poses(poses, options.rename, options.robot_id))
+        raise LogError(
+            f"--robot-id {options.robot_id}: must be in 0..99 and fits one robot; "
+            "number several by their folders' names."
+        )
+    pose_series = (
+        read_motive(motive, options.robots, options.up, absolute=bool(io_tsv))
+        if motive
+        else read_poses(poses, options.rename, options.robot_id)
+    )
     pose_series = [_moved(series, options) for series in pose_series]
-    command_series = (read_commands(commands, options.rename, options.robot_id) if commands else
-                      [read_io_tsv(path, options.robot_id) for path in io_tsv])
+    command_series = (
+        read_commands(commands, options.rename, options.robot_id)
+        if commands
+        else [read_io_tsv(path, options.robot_id) for path in io_tsv]
+    )
     _check_times(pose_series, command_series)
     sources = [path for path in (poses, motive, commands, *io_tsv) if path is not None]
     with _replacing(out, options.force) as temporary:
@@ -94,20 +111,29 @@ def _moved(series: PoseSeries, options: ImportOptions) -> PoseSeries:
     """Poses on the shifted clock, of the body whose x axis is the robot's front."""
     half = options.heading_offset_rad / 2
     turn = np.array([np.cos(half), 0, 0, np.sin(half)])
-    return PoseSeries(series.robot_id, series.utime_us + round(options.pose_shift_s * 1e6),
-                      series.position_m, multiply(series.orientation_wxyz, turn), series.valid)
+    return PoseSeries(
+        series.robot_id,
+        series.utime_us + round(options.pose_shift_s * 1e6),
+        series.position_m,
+        multiply(series.orientation_wxyz, turn),
+        series.valid,
+    )
 
 
 def _check_times(poses: list[PoseSeries], commands: list[CommandSeries]) -> None:
     """Raises LogError unless some robot has both, at the same time, without absurd holds."""
     ids = [series.robot_id for series in commands]
     if len(set(ids)) < len(ids):
-        raise LogError(f"two sources of commands are for robot {max(ids, key=ids.count)}; name the "
-                       "folders by the robots' numbers.")
+        raise LogError(
+            f"two sources of commands are for robot {max(ids, key=ids.count)}; name the "
+            "folders by the robots' numbers."
+        )
     pairs = [(p, c) for p in poses for c in commands if p.robot_id == c.robot_id]
     if not pairs:
-        raise LogError(f"poses are of robots {[p.robot_id for p in poses]}, commands of {ids}: no "
-                       "robot has both; number them alike (--robot NAME=ID, --robot-id).")
+        raise LogError(
+            f"poses are of robots {[p.robot_id for p in poses]}, commands of {ids}: no "
+            "robot has both; number them alike (--robot NAME=ID, --robot-id)."
+        )
     for p, c in pairs:
         first_s, last_s = p.utime_us[[0, -1]] / 1e6
         start_s, end_s = c.utime_us[[0, -1]] / 1e6
@@ -115,20 +141,33 @@ def _check_times(poses: list[PoseSeries], commands: list[CommandSeries]) -> None
             raise LogError(
                 f"robot {p.robot_id}: poses from {first_s:.3f} to {last_s:.3f} s and commands from "
                 f"{start_s:.3f} to {end_s:.3f} s do not overlap; shift the poses, for example so "
-                f"that both start together: --pose-shift-s {start_s - first_s:.3f}.")
+                f"that both start together: --pose-shift-s {start_s - first_s:.3f}."
+            )
         hold_s = np.diff(np.append(c.utime_us / 1e6, max(last_s, end_s))).max()
         if c.repeat and hold_s > LONGEST_HOLD_S:
-            raise LogError(f"robot {p.robot_id}: a command would be held for {hold_s:.0f} s; the "
-                           "times of commands and poses are not of one run, or mixed up.")
+            raise LogError(
+                f"robot {p.robot_id}: a command would be held for {hold_s:.0f} s; the "
+                "times of commands and poses are not of one run, or mixed up."
+            )
 
 
 def _provenance(sources: list[Path], options: ImportOptions) -> str:
     """TOML for run_t: files with their hashes, and what was changed on the way."""
-    files = [{"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
-             for path in sources]
-    return tomlkit.dumps({"import": {
-        "files": files, "up": options.up, "pose_shift_s": options.pose_shift_s,
-        "heading_offset_rad": options.heading_offset_rad, "rename": options.rename}})
+    files = [
+        {"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+        for path in sources
+    ]
+    return tomlkit.dumps(
+        {
+            "import": {
+                "files": files,
+                "up": options.up,
+                "pose_shift_s": options.pose_shift_s,
+                "heading_offset_rad": options.heading_offset_rad,
+                "rename": options.rename,
+            }
+        }
+    )
 
 
 @contextmanager
@@ -139,16 +178,18 @@ def _replacing(out: Path, force: bool) -> Iterator[Path]:
     try:
         handle, name = tempfile.mkstemp(prefix=f".{out.name}.", dir=out.parent)
     except OSError as error:
-        raise LogError(f"{out}: cannot be written ({error.strerror}); choose another "
-                       "place.") from error
+        raise LogError(
+            f"{out}: cannot be written ({error.strerror}); choose another place."
+        ) from error
     os.close(handle)
     try:
         yield Path(name)
         os.chmod(name, 0o644)
         os.replace(name, out)
     except OSError as error:
-        raise LogError(f"{out}: cannot be written ({error.strerror}); choose another "
-                       "place.") from error
+        raise LogError(
+            f"{out}: cannot be written ({error.strerror}); choose another place."
+        ) from error
     finally:
         Path(name).unlink(missing_ok=True)
 
@@ -160,14 +201,24 @@ def _summary(log: Log, out: Path, warnings: list[str]) -> dict:
     for robot in log.robots.values():
         series = [t for t in (robot.command_t_s, robot.pose_t_s) if len(t)]
         end_s = max(end_s, *(float(t[-1]) for t in series))
-        robots.append({"robot_id": robot.robot_id, "command_kind": robot.command_kind,
-                       "commands": len(robot.command_t_s), "poses": len(robot.pose_t_s),
-                       "poses_valid": int(robot.valid.sum())})
+        robots.append(
+            {
+                "robot_id": robot.robot_id,
+                "command_kind": robot.command_kind,
+                "commands": len(robot.command_t_s),
+                "poses": len(robot.pose_t_s),
+                "poses_valid": int(robot.valid.sum()),
+            }
+        )
         if len(series) == 2 and robot.valid.sum() > 1:
             warnings += [f"robot {robot.robot_id}: {note}" for note in make_track(robot).notes]
-    return {"out": str(out), "robots": robots,
-            "messages": sum(robot["commands"] + robot["poses"] for robot in robots),
-            "duration_s": end_s, "warnings": warnings}
+    return {
+        "out": str(out),
+        "robots": robots,
+        "messages": sum(robot["commands"] + robot["poses"] for robot in robots),
+        "duration_s": end_s,
+        "warnings": warnings,
+    }
 
 
 def register(app: typer.Typer) -> None:
@@ -177,25 +228,49 @@ def register(app: typer.Typer) -> None:
 
 def _command(
     out: Annotated[Path, typer.Option("--out", "-o", help="The log to write (.lcmlog).")],
-    poses: Annotated[Path | None, typer.Option(help=(
-        "CSV: t_s, robot_id, x_m, y_m, theta_rad or qw, qx, qy, qz; optional z_m, valid."))] = None,
-    motive: Annotated[Path | None, typer.Option(help=(
-        "CSV export of OptiTrack Motive with rigid bodies, quaternions, global "
-        "coordinates."))] = None,
-    commands: Annotated[Path | None, typer.Option(help=(
-        "CSV: t_s, robot_id and fl_pct, fr_pct, rl_pct, rr_pct | speed_input, turn_input | "
-        "w1_radps..w4_radps | vx_mps, vy_mps, omega_radps; held until the next row."))] = None,
-    io_tsv: Annotated[list[Path] | None, typer.Option(help=(
-        "io.tsv of a robot; repeat for several."))] = None,
-    robot: Annotated[list[str] | None, typer.Option(
-        metavar="NAME=ID", help="Number of a Motive rigid body; else digits in its name.")] = None,
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            help=("CSV: t_s, robot_id, x_m, y_m, theta_rad or qw, qx, qy, qz; optional z_m, valid.")
+        ),
+    ] = None,
+    motive: Annotated[
+        Path | None,
+        typer.Option(
+            help=(
+                "CSV export of OptiTrack Motive with rigid bodies, quaternions, global coordinates."
+            )
+        ),
+    ] = None,
+    commands: Annotated[
+        Path | None,
+        typer.Option(
+            help=(
+                "CSV: t_s, robot_id and fl_pct, fr_pct, rl_pct, rr_pct | speed_input, turn_input | "
+                "w1_radps..w4_radps | vx_mps, vy_mps, omega_radps; held until the next row."
+            )
+        ),
+    ] = None,
+    io_tsv: Annotated[
+        list[Path] | None, typer.Option(help=("io.tsv of a robot; repeat for several."))
+    ] = None,
+    robot: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=ID", help="Number of a Motive rigid body; else digits in its name."
+        ),
+    ] = None,
     robot_id: Annotated[int | None, typer.Option(help="For files of one robot.")] = None,
-    rename: Annotated[list[str] | None, typer.Option(
-        metavar="OLD=NEW", help="Read column OLD of the CSV files as NEW.")] = None,
+    rename: Annotated[
+        list[str] | None,
+        typer.Option(metavar="OLD=NEW", help="Read column OLD of the CSV files as NEW."),
+    ] = None,
     up: Annotated[str, typer.Option(help="Axis that is up in the Motive export: y or z.")] = "y",
     pose_shift_s: Annotated[float, typer.Option(help="Added to the times of poses.")] = 0.0,
-    heading_offset_deg: Annotated[float, typer.Option(help=(
-        "From the tracked body's x axis to the robot's front, left positive."))] = 0.0,
+    heading_offset_deg: Annotated[
+        float,
+        typer.Option(help=("From the tracked body's x axis to the robot's front, left positive.")),
+    ] = 0.0,
     force: Annotated[bool, typer.Option("--force", help="Replace the output.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> None:
@@ -212,12 +287,18 @@ def _command(
         options = ImportOptions(
             robot_id=robot_id,
             rename=dict(_pair(text, "--rename OLD=NEW") for text in rename or []),
-            robots={name: _number(number) for name, number in
-                    (_pair(text, "--robot NAME=ID") for text in robot or [])},
-            up=up, pose_shift_s=pose_shift_s, force=force,
-            heading_offset_rad=float(np.radians(heading_offset_deg)))
-        summary = import_log(poses, commands, out, motive=motive, io_tsv=tuple(io_tsv or ()),
-                             options=options)
+            robots={
+                name: _number(number)
+                for name, number in (_pair(text, "--robot NAME=ID") for text in robot or [])
+            },
+            up=up,
+            pose_shift_s=pose_shift_s,
+            force=force,
+            heading_offset_rad=float(np.radians(heading_offset_deg)),
+        )
+        summary = import_log(
+            poses, commands, out, motive=motive, io_tsv=tuple(io_tsv or ()), options=options
+        )
     except LogError as error:
         typer.echo(f"twinmill import: {error}", err=True)
         raise typer.Exit(1) from error
@@ -241,8 +322,9 @@ def _number(text: str) -> int:
 
 
 def _print(summary: dict) -> None:
-    table = Table(title=f"{summary['out']}: {summary['messages']} messages, "
-                        f"{summary['duration_s']:.1f} s")
+    table = Table(
+        title=f"{summary['out']}: {summary['messages']} messages, {summary['duration_s']:.1f} s"
+    )
     for column in ("robot", "driven by", "commands", "poses", "of them valid"):
         table.add_column(column, justify="right")
     for robot in summary["robots"]:

@@ -50,20 +50,23 @@ def read_motive(path: Path, robots: dict[str, int], up: str, absolute: bool) -> 
     with open_text(path) as text:
         reader = csv.reader(text)
         header = _header(reader, path.name)
-        numbers = [_row(row, header, f"{path.name}: row {reader.line_num}")
-                   for row in filter(None, reader)]
+        numbers = [
+            _row(row, header, f"{path.name}: row {reader.line_num}") for row in filter(None, reader)
+        ]
     if not numbers:
         raise LogError(f"{path.name}: has no frames; export the take again.")
     values = np.array(numbers)
     start_us = _capture_start_us(header, path.name) if absolute else 0
     utime_us = start_us + np.round(values[:, 0] * 1e6).astype(np.int64)
     if (np.diff(utime_us) <= 0).any():
-        raise LogError(f"{path.name}: frame {np.argmax(np.diff(utime_us) <= 0) + 1} is not later "
-                       "than the one before; export the take again.")
+        raise LogError(
+            f"{path.name}: frame {np.argmax(np.diff(utime_us) <= 0) + 1} is not later "
+            "than the one before; export the take again."
+        )
     scale = _unit_m(header, path.name)
     series = []
     for k, (name, number) in enumerate(_numbered(header, robots, path.name).items()):
-        block = values[:, 1 + 7 * k:8 + 7 * k]
+        block = values[:, 1 + 7 * k : 8 + 7 * k]
         series.append(_pose_series(number, utime_us, block[:, :3] * scale, block[:, 3:], up))
         if not series[-1].valid.any():
             raise LogError(f"{path.name}: rigid body '{name}' is never tracked; export it solved.")
@@ -79,13 +82,17 @@ def _header(reader, name: str) -> _Header:
         if len(rows) > HEADER_ROWS:
             break
     if not rows or rows[0][:1] != ["Format Version"] or rows[-1][:1] != ["Frame"]:
-        raise LogError(f"{name}: does not begin with 'Format Version' and a row 'Frame,Time "
-                       "(Seconds)', so it is no Motive export; use --poses for plain CSV.")
+        raise LogError(
+            f"{name}: does not begin with 'Format Version' and a row 'Frame,Time "
+            "(Seconds)', so it is no Motive export; use --poses for plain CSV."
+        )
     fields = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
     for key, needed in (("Rotation Type", "Quaternion"), ("Coordinate Space", "Global")):
         if fields.get(key, needed) != needed:
-            raise LogError(f"{name}: {key} is '{fields[key]}', but {needed} is needed; export "
-                           "again with that setting.")
+            raise LogError(
+                f"{name}: {key} is '{fields[key]}', but {needed} is needed; export "
+                "again with that setting."
+            )
     return _Header(fields, _bodies(rows, name), rows[-1].index("Time (Seconds)"))
 
 
@@ -93,8 +100,9 @@ def _bodies(rows: list[list[str]], name: str) -> dict[str, list[int]]:
     """Columns of each rigid body in the order of COMPONENTS."""
     types = next((k for k, row in enumerate(rows) if "Rigid Body" in row), None)
     if types is None:
-        raise LogError(f"{name}: has no rigid body; define one in Motive and export again with "
-                       "rigid bodies.")
+        raise LogError(
+            f"{name}: has no rigid body; define one in Motive and export again with rigid bodies."
+        )
     names, components, axes = rows[types + 1], rows[-2], rows[-1]
     places: dict[str, dict[tuple[str, str], int]] = {}
     for k, kind in enumerate(rows[types]):
@@ -102,8 +110,9 @@ def _bodies(rows: list[list[str]], name: str) -> dict[str, list[int]]:
             places.setdefault(names[k], {})[components[k], axes[k]] = k
     for body, columns in places.items():
         if missing := [" ".join(c) for c in COMPONENTS if c not in columns]:
-            raise LogError(f"{name}: rigid body '{body}' lacks {missing[0]}; export positions and "
-                           "quaternions.")
+            raise LogError(
+                f"{name}: rigid body '{body}' lacks {missing[0]}; export positions and quaternions."
+            )
     return {body: [columns[c] for c in COMPONENTS] for body, columns in places.items()}
 
 
@@ -111,15 +120,19 @@ def _row(row: list[str], header: _Header, where: str) -> list[float]:
     """Time, then the seven components of each body; empty cells are NaN."""
     columns = [column for body in header.bodies.values() for column in body]
     try:
-        return [float(row[header.time_column]),
-                *(float(row[k]) if k < len(row) and row[k].strip() else np.nan for k in columns)]
+        return [
+            float(row[header.time_column]),
+            *(float(row[k]) if k < len(row) and row[k].strip() else np.nan for k in columns),
+        ]
     except (ValueError, IndexError) as error:
-        raise LogError(f"{where}: holds no number where one must be ({error}); export the take "
-                       "again.") from None
+        raise LogError(
+            f"{where}: holds no number where one must be ({error}); export the take again."
+        ) from None
 
 
-def _pose_series(robot_id: int, utime_us: np.ndarray, position_m: np.ndarray,
-                 quaternion: np.ndarray, up: str) -> PoseSeries:
+def _pose_series(
+    robot_id: int, utime_us: np.ndarray, position_m: np.ndarray, quaternion: np.ndarray, up: str
+) -> PoseSeries:
     if up == "y":
         position_m = position_m[:, [0, 2, 1]] * [1, -1, 1]
         quaternion = quaternion[:, [0, 1, 3, 2]] * [1, 1, -1, 1]
@@ -132,15 +145,19 @@ def _pose_series(robot_id: int, utime_us: np.ndarray, position_m: np.ndarray,
 def _numbered(header: _Header, robots: dict[str, int], name: str) -> dict[str, int]:
     """robot_id by body, in the order of the columns."""
     if unknown := set(robots) - set(header.bodies):
-        raise LogError(f"{name}: has no rigid body '{min(unknown)}' (it has "
-                       f"{', '.join(header.bodies)}); correct --robot.")
+        raise LogError(
+            f"{name}: has no rigid body '{min(unknown)}' (it has "
+            f"{', '.join(header.bodies)}); correct --robot."
+        )
     numbered = {}
     for body in header.bodies:
         digits = re.findall(r"\d+", body)
         number = robots.get(body, int(digits[-1]) if digits else -1)
         if not 0 <= number <= 99 or number in numbered.values():
-            raise LogError(f"{name}: rigid body '{body}' gives no robot_id of its own in 0..99; "
-                           f"give it with --robot '{body}=ID'.")
+            raise LogError(
+                f"{name}: rigid body '{body}' gives no robot_id of its own in 0..99; "
+                f"give it with --robot '{body}=ID'."
+            )
         numbered[body] = number
     return numbered
 
@@ -148,8 +165,10 @@ def _numbered(header: _Header, robots: dict[str, int], name: str) -> dict[str, i
 def _unit_m(header: _Header, name: str) -> float:
     unit = header.fields.get("Length Units", "")
     if unit not in UNIT_M:
-        raise LogError(f"{name}: Length Units is '{unit}', not one of {', '.join(UNIT_M)}; export "
-                       "again in metres.")
+        raise LogError(
+            f"{name}: Length Units is '{unit}', not one of {', '.join(UNIT_M)}; export "
+            "again in metres."
+        )
     return UNIT_M[unit]
 
 
@@ -158,6 +177,8 @@ def _capture_start_us(header: _Header, name: str) -> int:
     try:
         start = datetime.strptime(stamp, CAPTURE_TIME).replace(tzinfo=UTC)
     except ValueError:
-        raise LogError(f"{name}: Capture Start Time '{stamp}' is no time like 2025-12-05 "
-                       "03.07.49.123 PM; correct line 1.") from None
+        raise LogError(
+            f"{name}: Capture Start Time '{stamp}' is no time like 2025-12-05 "
+            "03.07.49.123 PM; correct line 1."
+        ) from None
     return round(start.timestamp() * 1e6)

@@ -17,8 +17,20 @@ VALUES: dict[CommandKind, tuple[str, ...]] = {
     "wheel_speed": ("w1_radps", "w2_radps", "w3_radps", "w4_radps"),
     "twist": ("vx_mps", "vy_mps", "omega_radps"),
 }
-KNOWN = frozenset({"t_s", "robot_id", "x_m", "y_m", "z_m", "theta_rad", "valid", *QUATERNION,
-                   *INPUTS, *(name for names in VALUES.values() for name in names)})
+KNOWN = frozenset(
+    {
+        "t_s",
+        "robot_id",
+        "x_m",
+        "y_m",
+        "z_m",
+        "theta_rad",
+        "valid",
+        *QUATERNION,
+        *INPUTS,
+        *(name for names in VALUES.values() for name in names),
+    }
+)
 
 
 def read_poses(path: Path, rename: dict[str, str], robot_id: int | None) -> list[PoseSeries]:
@@ -42,8 +54,11 @@ def read_poses(path: Path, rename: dict[str, str], robot_id: int | None) -> list
         valid &= table.finite("valid") != 0
     position[~valid] = orientation[~valid] = np.nan
     _refuse_unsorted(table, ids, utime_us)
-    return [PoseSeries(number, utime_us[rows], position[rows], orientation[rows], valid[rows])
-            for number in np.unique(ids).tolist() for rows in [ids == number]]
+    return [
+        PoseSeries(number, utime_us[rows], position[rows], orientation[rows], valid[rows])
+        for number in np.unique(ids).tolist()
+        for rows in [ids == number]
+    ]
 
 
 def read_commands(path: Path, rename: dict[str, str], robot_id: int | None) -> list[CommandSeries]:
@@ -61,24 +76,40 @@ def read_commands(path: Path, rename: dict[str, str], robot_id: int | None) -> l
     table = read_table(path, rename, KNOWN)
     ids, utime_us = _robot_ids(table, robot_id), _utime_us(table)
     kind = _kind(table)
-    inputs = (np.column_stack([table.finite(name) for name in INPUTS])
-              if kind == "duty" and table.has(*INPUTS) else np.full((len(ids), 2), np.nan))
+    inputs = (
+        np.column_stack([table.finite(name) for name in INPUTS])
+        if kind == "duty" and table.has(*INPUTS)
+        else np.full((len(ids), 2), np.nan)
+    )
     for k, (name, limit) in enumerate(zip(INPUTS, (100, 2), strict=True)):
-        table.refuse(np.abs(inputs[:, k]) > limit, name, inputs[:, k],
-                     f"must lie in -{limit}..{limit}")
+        table.refuse(
+            np.abs(inputs[:, k]) > limit, name, inputs[:, k], f"must lie in -{limit}..{limit}"
+        )
     value = _values(table, kind, inputs)
     _refuse_unsorted(table, ids, utime_us)
-    return [CommandSeries(number, utime_us[rows], kind, value[rows], kind == "duty", inputs[rows],
-                          np.zeros((np.count_nonzero(rows), 2), int),
-                          turbopi.telemetry_t.MODE_SCRIPT)
-            for number in np.unique(ids).tolist() for rows in [ids == number]]
+    return [
+        CommandSeries(
+            number,
+            utime_us[rows],
+            kind,
+            value[rows],
+            kind == "duty",
+            inputs[rows],
+            np.zeros((np.count_nonzero(rows), 2), int),
+            turbopi.telemetry_t.MODE_SCRIPT,
+        )
+        for number in np.unique(ids).tolist()
+        for rows in [ids == number]
+    ]
 
 
 def _kind(table: Table) -> CommandKind:
     found = [kind for kind, columns in VALUES.items() if table.has(*columns)]
     if len(found) > 1:
-        raise LogError(f"{table.name}: has columns for {' and '.join(found)}, but a log keeps to "
-                       "one kind of command; remove the others.")
+        raise LogError(
+            f"{table.name}: has columns for {' and '.join(found)}, but a log keeps to "
+            "one kind of command; remove the others."
+        )
     if found:
         return found[0]
     if table.has(*INPUTS):
@@ -99,8 +130,9 @@ def _values(table: Table, kind: CommandKind, inputs: np.ndarray) -> np.ndarray:
         value[:, k] = table.finite(name)
         if kind == "duty":
             table.refuse(np.abs(value[:, k]) > 100, name, value[:, k], "must lie in -100..100")
-            table.refuse(value[:, k] % 1 != 0, name, value[:, k],
-                         "the motor board takes whole percent")
+            table.refuse(
+                value[:, k] % 1 != 0, name, value[:, k], "the motor board takes whole percent"
+            )
     return value
 
 
@@ -110,8 +142,9 @@ def _orientation(table: Table) -> np.ndarray:
         return quaternion_from_heading(table.numbers("theta_rad", True))
     quaternion = np.column_stack([table.numbers(name, True) for name in QUATERNION])
     norm = np.linalg.norm(quaternion, axis=1)
-    table.refuse((np.abs(norm - 1) > 0.05) & (norm > 0), "the length of qw, qx, qy, qz", norm,
-                 "must be 1")
+    table.refuse(
+        (np.abs(norm - 1) > 0.05) & (norm > 0), "the length of qw, qx, qy, qz", norm, "must be 1"
+    )
     return quaternion / np.where(norm > 0, norm, np.nan)[:, None]
 
 
@@ -119,11 +152,14 @@ def _robot_ids(table: Table, robot_id: int | None) -> np.ndarray:
     if robot_id is not None and not table.has("robot_id"):
         return np.full(len(table.rows), robot_id)
     if not table.has("robot_id"):
-        raise LogError(f"{table.name}: column robot_id is missing; add it, or give --robot-id for "
-                       "a file of one robot.")
+        raise LogError(
+            f"{table.name}: column robot_id is missing; add it, or give --robot-id for "
+            "a file of one robot."
+        )
     ids = table.finite("robot_id")
-    table.refuse((ids % 1 != 0) | (ids < 0) | (ids > 99), "robot_id", ids,
-                 "must be a whole number in 0..99")
+    table.refuse(
+        (ids % 1 != 0) | (ids < 0) | (ids > 99), "robot_id", ids, "must be a whole number in 0..99"
+    )
     return ids.astype(int)
 
 

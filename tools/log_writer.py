@@ -17,8 +17,9 @@ CONTROL_PERIOD_US = 22_000  # a TurboPi tells its duties once per control step, 
 Event = tuple[int, str, bytes]  # stamp, channel, encoded message
 
 
-def write_log(path: Path, poses: list[PoseSeries], commands: list[CommandSeries],
-              config_toml: str) -> None:
+def write_log(
+    path: Path, poses: list[PoseSeries], commands: list[CommandSeries], config_toml: str
+) -> None:
     """Writes a log in order of stamps.
 
     Args:
@@ -31,8 +32,11 @@ def write_log(path: Path, poses: list[PoseSeries], commands: list[CommandSeries]
     streams = [_pose_events(series) for series in poses]
     for series in commands:
         streams.append(_run_event(series, config_toml))
-        streams.append(_telemetry_events(series, end_us.get(series.robot_id, 0))
-                       if series.kind == "duty" else _drive_events(series))
+        streams.append(
+            _telemetry_events(series, end_us.get(series.robot_id, 0))
+            if series.kind == "duty"
+            else _drive_events(series)
+        )
     log = lcm.EventLog(str(path), "w", overwrite=True)
     try:
         for event in heapq.merge(*streams, key=lambda event: event[0]):
@@ -51,8 +55,13 @@ def _run_event(series: CommandSeries, config_toml: str) -> Iterator[Event]:
 def _pose_events(series: PoseSeries) -> Iterator[Event]:
     channel, message = f"R{series.robot_id:02d}_POSE", turbopi.pose_t()
     message.robot_id = series.robot_id
-    rows = zip(series.utime_us.tolist(), series.valid.tolist(), series.position_m.tolist(),
-               series.orientation_wxyz.tolist(), strict=True)
+    rows = zip(
+        series.utime_us.tolist(),
+        series.valid.tolist(),
+        series.position_m.tolist(),
+        series.orientation_wxyz.tolist(),
+        strict=True,
+    )
     for seq, (utime_us, valid, position, orientation) in enumerate(rows):
         message.utime_us, message.seq, message.valid = utime_us, seq, int(valid)
         message.position_m, message.orientation_wxyz = position, orientation

@@ -26,15 +26,21 @@ def open_text(path: Path) -> Iterator[TextIO]:
         LogError: it cannot be read, is no text, or ends in `.gz` and is not gzip.
     """
     try:
-        with rich.progress.open(path, "rb", description=path.name, transient=True,
-                                console=Console(stderr=True),
-                                disable=not sys.stderr.isatty()) as raw:
+        with rich.progress.open(
+            path,
+            "rb",
+            description=path.name,
+            transient=True,
+            console=Console(stderr=True),
+            disable=not sys.stderr.isatty(),
+        ) as raw:
             binary = gzip.GzipFile(fileobj=raw) if path.suffix == ".gz" else raw
             yield io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
     except (OSError, EOFError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
-        raise LogError(f"{path}: cannot be read as text ({reason}); check the name and the "
-                       "format.") from error
+        raise LogError(
+            f"{path}: cannot be read as text ({reason}); check the name and the format."
+        ) from error
 
 
 @dataclass(frozen=True)
@@ -71,8 +77,10 @@ class Table:
             return np.array([float(cell) for cell in cells])
         except ValueError:
             bad = next(k for k, cell in enumerate(cells) if not _is_number(cell))
-            raise LogError(f"{self.name}: row {self.line[bad]}: {column} is '{cells[bad]}', not a "
-                           "number; correct or remove the row.") from None
+            raise LogError(
+                f"{self.name}: row {self.line[bad]}: {column} is '{cells[bad]}', not a "
+                "number; correct or remove the row."
+            ) from None
 
     def finite(self, column: str) -> np.ndarray:
         """Like numbers, but NaN and infinity are errors too."""
@@ -84,8 +92,10 @@ class Table:
         """Raises LogError on the first row that is bad, with its value and why."""
         if bad.any():
             k = int(np.argmax(bad))
-            raise LogError(f"{self.name}: row {self.line[k]}: {column} is {values[k]:g}, but "
-                           f"{why}; correct or remove the row.")
+            raise LogError(
+                f"{self.name}: row {self.line[k]}: {column} is {values[k]:g}, but "
+                f"{why}; correct or remove the row."
+            )
 
     def missing(self, column: str) -> LogError:
         """The error to raise where this column is needed and not there."""
@@ -93,8 +103,10 @@ class Table:
         near = difflib.get_close_matches(column, strange, n=1, cutoff=0.0)
         if not near:
             return LogError(f"{self.name}: column {column} is missing; add it.")
-        return LogError(f"{self.name}: column {column} is missing (nearest is '{near[0]}'); rename "
-                        f"it in the file or with --rename {near[0]}={column}.")
+        return LogError(
+            f"{self.name}: column {column} is missing (nearest is '{near[0]}'); rename "
+            f"it in the file or with --rename {near[0]}={column}."
+        )
 
 
 def read_table(path: Path, rename: dict[str, str], known: frozenset[str]) -> Table:
@@ -116,13 +128,17 @@ def read_table(path: Path, rename: dict[str, str], known: frozenset[str]) -> Tab
             if not any(cell.strip() for cell in row):
                 continue
             if len(row) != len(header):
-                raise LogError(f"{path.name}: row {reader.line_num}: has {len(row)} cells, but the "
-                               f"header has {len(header)}; correct or remove the row.")
+                raise LogError(
+                    f"{path.name}: row {reader.line_num}: has {len(row)} cells, but the "
+                    f"header has {len(header)}; correct or remove the row."
+                )
             rows.append(row)
             line.append(reader.line_num)
     if not rows:
-        raise LogError(f"{path.name}: has no rows of numbers, so there is nothing to import; check "
-                       "that the export worked.")
+        raise LogError(
+            f"{path.name}: has no rows of numbers, so there is nothing to import; check "
+            "that the export worked."
+        )
     return Table(path.name, header, rows, line, known)
 
 

@@ -28,8 +28,9 @@ def steps(driven):
         at = np.searchsorted(time_s, robot.pose_t_s - 1e-9)
         pose = np.column_stack([xy.real, xy.imag, theta])[at]
         pose += rng.normal(0, [0.0003, 0.0003, 0.002], pose.shape)
-        return replace(robot, command=held[:, [0, 1, 0, 1]], pose=pose,
-                       pose_t_s=robot.pose_t_s + offset_s)
+        return replace(
+            robot, command=held[:, [0, 1, 0, 1]], pose=pose, pose_t_s=robot.pose_t_s + offset_s
+        )
 
     return make
 

@@ -36,8 +36,12 @@ def imported(put, tmp_path):
     """The robot 4 of a log made from two texts."""
 
     def make(poses=POSES, commands=COMMANDS, **options):
-        import_log(put("p.csv", poses), put("c.csv.gz", commands), tmp_path / "o.lcmlog",
-                   options=ImportOptions(**options))
+        import_log(
+            put("p.csv", poses),
+            put("c.csv.gz", commands),
+            tmp_path / "o.lcmlog",
+            options=ImportOptions(**options),
+        )
         return read_log(tmp_path / "o.lcmlog").robots[4]
 
     return make
@@ -57,20 +61,25 @@ def test_duties_are_held_to_the_last_pose_and_told_every_22_ms(imported):
     np.testing.assert_allclose(robot.command_t_s, held, atol=1e-9)
     late = held >= 0.1
     np.testing.assert_array_equal(robot.command[~late], np.zeros((5, 4)))
-    np.testing.assert_array_equal(robot.command[late],
-                                  np.tile([0.1, -0.2, 0.3, -1.0], (late.sum(), 1)))
+    np.testing.assert_array_equal(
+        robot.command[late], np.tile([0.1, -0.2, 0.3, -1.0], (late.sum(), 1))
+    )
     assert np.isnan(robot.battery_V).all() and (robot.mode == 2).all()
 
 
-@pytest.mark.parametrize(("columns", "kind", "row"), [
-    ("w1_radps,w2_radps,w3_radps,w4_radps", "wheel_speed", [1.5, -2.25, 3.125, 4.0]),
-    ("vx_mps,vy_mps,omega_radps", "twist", [0.25, -0.1, 1.0])])
+@pytest.mark.parametrize(
+    ("columns", "kind", "row"),
+    [
+        ("w1_radps,w2_radps,w3_radps,w4_radps", "wheel_speed", [1.5, -2.25, 3.125, 4.0]),
+        ("vx_mps,vy_mps,omega_radps", "twist", [0.25, -0.1, 1.0]),
+    ],
+)
 def test_wheel_speeds_and_twists_stay_at_their_rows(imported, columns, kind, row):
     cells = ",".join(map(str, row))
     robot = imported(commands=f"t_s,robot_id,{columns}\n0,4,{cells}\n0.7,4,{cells}\n")
     assert robot.command_kind == kind
     np.testing.assert_array_equal(robot.command_t_s, [0, 0.7])
-    np.testing.assert_array_equal(robot.command[:, :len(row)], [row, row])
+    np.testing.assert_array_equal(robot.command[:, : len(row)], [row, row])
 
 
 def test_inputs_become_duties_and_are_kept(imported):
@@ -81,9 +90,12 @@ def test_inputs_become_duties_and_are_kept(imported):
 
 
 def test_lost_poses_and_renamed_columns_and_files_of_one_robot(imported):
-    robot = imported("t_s,x_m,y_m,yaw_rad\n0,1,2,0\n0.01,nan,nan,nan\n0.02,,,\n0.03,1,2,0\n",
-                     "t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,1,1,1,1\n",
-                     rename={"yaw_rad": "theta_rad"}, robot_id=4)
+    robot = imported(
+        "t_s,x_m,y_m,yaw_rad\n0,1,2,0\n0.01,nan,nan,nan\n0.02,,,\n0.03,1,2,0\n",
+        "t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,1,1,1,1\n",
+        rename={"yaw_rad": "theta_rad"},
+        robot_id=4,
+    )
     assert robot.valid.tolist() == [True, False, False, True]
 
 
@@ -93,28 +105,44 @@ def test_heading_offset_and_shift_move_the_poses_alone(imported):
     assert (robot.pose_t_s[0], robot.command_t_s[0]) == (0.125, 0)
 
 
-@pytest.mark.parametrize(("poses", "commands", "sentence"), [
-    (POSES.replace("theta_rad", "theta"), COMMANDS, r"theta_rad is missing.*--rename theta="),
-    (POSES.replace("0.3", "x"), COMMANDS, r"p\.csv: row 4: x_m is 'x', not a number"),
-    (POSES.replace("1.0,4", "0.2,4"), COMMANDS, r"row 4: t_s is 0\.2, .*not earlier"),
-    (POSES.replace("1.0,4", "1.0,123"), COMMANDS, r"row 4: robot_id is 123, .*0\.\.99"),
-    (POSES + "1,4,0\n", COMMANDS, r"row 5: has 3 cells"),
-    ("", COMMANDS, r"p\.csv: has no rows"),
-    (POSES.replace("robot_id", "robot"), COMMANDS, r"robot_id is missing.*--robot-id"),
-    (POSES, COMMANDS.replace("-100", "-101"), r"row 3: rr_pct is -101, .*-100\.\.100"),
-    (POSES, COMMANDS.replace("-100", "12.5"), r"row 3: rr_pct is 12\.5, .*whole"),
-    (POSES, COMMANDS.replace("-100", ""), r"row 3: rr_pct is '', not a number"),
-    (POSES, COMMANDS.replace("-100", "inf"), r"row 3: rr_pct is inf, .*finite"),
-    (POSES, COMMANDS.replace("rr_pct", "rr"), r"rr_pct is missing \(nearest is 'rr'\)"),
-    (POSES.replace("x_m,", "").replace(",0.1,", ",").replace(",0,0,", ",0,")
-     .replace("0.3,", ""), COMMANDS, r"column x_m is missing; add it"),
-    (POSES, "t_s,robot_id,speed_input,turn_input\n0,4,10,2.5\n", r"turn_input is 2\.5, .*-2\.\.2"),
-    (POSES, COMMANDS.replace(",4,", ",5,"), r"no robot has both"),
-    (POSES, COMMANDS.replace("\n0,4", "\n50,4").replace("0.1,4", "51,4"),
-     r"do not overlap.*--pose-shift-s 50\.000"),
-    (POSES.replace("1.0,4", "1750000000,4"), COMMANDS, r"held for 1\d+ s"),
-    ("t_s,robot_id,x_m,y_m,qw,qx,qy,qz\n0,4,0,0,1,1,0,0\n", COMMANDS, r"row 2: .*must be 1"),
-])
+@pytest.mark.parametrize(
+    ("poses", "commands", "sentence"),
+    [
+        (POSES.replace("theta_rad", "theta"), COMMANDS, r"theta_rad is missing.*--rename theta="),
+        (POSES.replace("0.3", "x"), COMMANDS, r"p\.csv: row 4: x_m is 'x', not a number"),
+        (POSES.replace("1.0,4", "0.2,4"), COMMANDS, r"row 4: t_s is 0\.2, .*not earlier"),
+        (POSES.replace("1.0,4", "1.0,123"), COMMANDS, r"row 4: robot_id is 123, .*0\.\.99"),
+        (POSES + "1,4,0\n", COMMANDS, r"row 5: has 3 cells"),
+        ("", COMMANDS, r"p\.csv: has no rows"),
+        (POSES.replace("robot_id", "robot"), COMMANDS, r"robot_id is missing.*--robot-id"),
+        (POSES, COMMANDS.replace("-100", "-101"), r"row 3: rr_pct is -101, .*-100\.\.100"),
+        (POSES, COMMANDS.replace("-100", "12.5"), r"row 3: rr_pct is 12\.5, .*whole"),
+        (POSES, COMMANDS.replace("-100", ""), r"row 3: rr_pct is '', not a number"),
+        (POSES, COMMANDS.replace("-100", "inf"), r"row 3: rr_pct is inf, .*finite"),
+        (POSES, COMMANDS.replace("rr_pct", "rr"), r"rr_pct is missing \(nearest is 'rr'\)"),
+        (
+            POSES.replace("x_m,", "")
+            .replace(",0.1,", ",")
+            .replace(",0,0,", ",0,")
+            .replace("0.3,", ""),
+            COMMANDS,
+            r"column x_m is missing; add it",
+        ),
+        (
+            POSES,
+            "t_s,robot_id,speed_input,turn_input\n0,4,10,2.5\n",
+            r"turn_input is 2\.5, .*-2\.\.2",
+        ),
+        (POSES, COMMANDS.replace(",4,", ",5,"), r"no robot has both"),
+        (
+            POSES,
+            COMMANDS.replace("\n0,4", "\n50,4").replace("0.1,4", "51,4"),
+            r"do not overlap.*--pose-shift-s 50\.000",
+        ),
+        (POSES.replace("1.0,4", "1750000000,4"), COMMANDS, r"held for 1\d+ s"),
+        ("t_s,robot_id,x_m,y_m,qw,qx,qy,qz\n0,4,0,0,1,1,0,0\n", COMMANDS, r"row 2: .*must be 1"),
+    ],
+)
 def test_bad_input_is_one_sentence_and_nothing_is_written(put, tmp_path, poses, commands, sentence):
     with pytest.raises(LogError, match=sentence) as caught:
         import_log(put("p.csv", poses), put("c.csv", commands), tmp_path / "o.lcmlog")
@@ -156,10 +184,18 @@ def test_same_input_same_bytes(put, tmp_path):
 
 
 # The vendor's mixing as documented: (v, d, w) to left and right duty.
-@pytest.mark.parametrize(("move", "left", "right"), [
-    ((100, 90, 0.5), 100, 37), ((100, 90, -0.5), 37, 100), ((100, 90, 0.65), 100, 18),
-    ((75, 90, -0.5), 12, 100), ((100, 90, -2), -100, 100), ((0, 90, 0.5), 63, -63),
-    ((0, 270, 2), 100, -100)])
+@pytest.mark.parametrize(
+    ("move", "left", "right"),
+    [
+        ((100, 90, 0.5), 100, 37),
+        ((100, 90, -0.5), 37, 100),
+        ((100, 90, 0.65), 100, 18),
+        ((75, 90, -0.5), 12, 100),
+        ((100, 90, -2), -100, 100),
+        ((0, 90, 0.5), 63, -63),
+        ((0, 270, 2), 100, -100),
+    ],
+)
 def test_mixing_is_the_vendors_table(move, left, right):
     assert duties_from_vendor_move(*move) == (left, right, left, right)
     if move[1] == 90:
@@ -193,8 +229,7 @@ Frame,Time (Seconds),X,X,Y,Z,W,X,Y,Z,
 
 
 def test_motive_y_up_millimetres_become_z_up_metres(put, tmp_path):
-    import_log(None, put("c.csv", COMMANDS), tmp_path / "o.lcmlog",
-               motive=put("take.csv", MOTIVE))
+    import_log(None, put("c.csv", COMMANDS), tmp_path / "o.lcmlog", motive=put("take.csv", MOTIVE))
     robot = read_log(tmp_path / "o.lcmlog").robots[4]
     np.testing.assert_allclose(robot.pose[:2, :2], [[0.1, -0.2], [0.1, 0.2]])
     np.testing.assert_allclose(robot.z_m[:2], 0.05)
@@ -204,42 +239,62 @@ def test_motive_y_up_millimetres_become_z_up_metres(put, tmp_path):
 
 
 def test_motive_z_up_is_left_as_it_is(put, tmp_path):
-    import_log(None, put("c.csv", COMMANDS.replace(",4,", ",7,")), tmp_path / "o.lcmlog",
-               motive=put("take.csv", MOTIVE),
-               options=ImportOptions(up="z", robots={"turbopi-04": 7}))
+    import_log(
+        None,
+        put("c.csv", COMMANDS.replace(",4,", ",7,")),
+        tmp_path / "o.lcmlog",
+        motive=put("take.csv", MOTIVE),
+        options=ImportOptions(up="z", robots={"turbopi-04": 7}),
+    )
     robot = read_log(tmp_path / "o.lcmlog").robots[7]
     np.testing.assert_allclose(robot.pose[:2, :2], [[0.1, 0.05], [0.1, 0.05]])
 
 
-@pytest.mark.parametrize(("old", "new", "sentence"), [
-    ("Quaternion", "XYZ", "Rotation Type is 'XYZ'"),
-    ("Millimeters", "Inches", "Length Units is 'Inches'"),
-    ("Format", "Farmat", "no Motive export"),
-    ("Rigid Body", "Bone", "has no rigid body"),
-    ("turbopi-04", "robot", r"--robot 'robot=ID'"),
-    ("Rotation,Position", "Speed,Position", "lacks Rotation W"),
-    ("0.010", "0.000", "frame 1 is not later"),
-    ("1,100,50,200", "1,100,fifty,200", "row 8: holds no number")])
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("Quaternion", "XYZ", "Rotation Type is 'XYZ'"),
+        ("Millimeters", "Inches", "Length Units is 'Inches'"),
+        ("Format", "Farmat", "no Motive export"),
+        ("Rigid Body", "Bone", "has no rigid body"),
+        ("turbopi-04", "robot", r"--robot 'robot=ID'"),
+        ("Rotation,Position", "Speed,Position", "lacks Rotation W"),
+        ("0.010", "0.000", "frame 1 is not later"),
+        ("1,100,50,200", "1,100,fifty,200", "row 8: holds no number"),
+    ],
+)
 def test_wrong_motive_export_is_one_sentence(put, tmp_path, old, new, sentence):
     with pytest.raises(LogError, match=sentence):
-        import_log(None, put("c.csv", COMMANDS), tmp_path / "o.lcmlog",
-                   motive=put("take.csv", MOTIVE.replace(old, new)))
+        import_log(
+            None,
+            put("c.csv", COMMANDS),
+            tmp_path / "o.lcmlog",
+            motive=put("take.csv", MOTIVE.replace(old, new)),
+        )
 
 
-IO_TSV = ("time_ns\tdetected [0, 1]\tsmoothed_detected [0, 1] (10)\tmoves [(v, d, w), ...]\n"
-          "1764947269500000000\t1\t0\t[(100, 90, -0.5)]\n"
-          "1764947269533000000\t0\t1\t[(50, 90, 0), (50, 270, 0.0)]\n")
+IO_TSV = (
+    "time_ns\tdetected [0, 1]\tsmoothed_detected [0, 1] (10)\tmoves [(v, d, w), ...]\n"
+    "1764947269500000000\t1\t0\t[(100, 90, -0.5)]\n"
+    "1764947269533000000\t0\t1\t[(50, 90, 0), (50, 270, 0.0)]\n"
+)
 
 
 def test_io_tsv_goes_with_the_take_of_the_same_hour(put, tmp_path):
     # 1764947269.5 s is 2025-12-05 15:07:49.5 UTC, the capture start above (date -u -d @...).
-    import_log(None, None, tmp_path / "o.lcmlog", motive=put("take.csv", MOTIVE),
-               io_tsv=(put("251205-150749-Milling-turbopi-04/io.tsv", IO_TSV),))
+    import_log(
+        None,
+        None,
+        tmp_path / "o.lcmlog",
+        motive=put("take.csv", MOTIVE),
+        io_tsv=(put("251205-150749-Milling-turbopi-04/io.tsv", IO_TSV),),
+    )
     robot = read_log(tmp_path / "o.lcmlog").robots[4]
     assert robot.command_t_s.tolist() == [0, 0.033]
     assert robot.pose_t_s[0] == 0
-    np.testing.assert_array_equal(np.round(robot.command * 100),
-                                  [[37, 100, 37, 100], [-50, -49, -49, -50]])
+    np.testing.assert_array_equal(
+        np.round(robot.command * 100), [[37, 100, 37, 100], [-50, -49, -49, -50]]
+    )
     # The vendor turns clockwise, we count counter-clockwise.
     np.testing.assert_allclose(robot.turn_input, [0.5, 0])
     np.testing.assert_allclose(robot.speed_input, [100, -50])
@@ -247,15 +302,24 @@ def test_io_tsv_goes_with_the_take_of_the_same_hour(put, tmp_path):
     assert (robot.mode == 1).all()
 
 
-@pytest.mark.parametrize(("old", "new", "sentence"), [
-    ("[(100, 90, -0.5)]", "[(100, 90)]", r"row 2: .* list of moves"),
-    ("[(100, 90, -0.5)]", "__import__('os')", r"row 2: .* list of moves"),
-    ("533000000", "400000000", r"row 3: .*not later"),
-    ("smoothed_detected", "smooth", "the header is")])
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("[(100, 90, -0.5)]", "[(100, 90)]", r"row 2: .* list of moves"),
+        ("[(100, 90, -0.5)]", "__import__('os')", r"row 2: .* list of moves"),
+        ("533000000", "400000000", r"row 3: .*not later"),
+        ("smoothed_detected", "smooth", "the header is"),
+    ],
+)
 def test_wrong_io_tsv_is_one_sentence(put, tmp_path, old, new, sentence):
     with pytest.raises(LogError, match=sentence):
-        import_log(None, None, tmp_path / "o.lcmlog", motive=put("take.csv", MOTIVE),
-                   io_tsv=(put("turbopi-04/io.tsv", IO_TSV.replace(old, new)),))
+        import_log(
+            None,
+            None,
+            tmp_path / "o.lcmlog",
+            motive=put("take.csv", MOTIVE),
+            io_tsv=(put("turbopi-04/io.tsv", IO_TSV.replace(old, new)),),
+        )
 
 
 def test_recorded_straight_runs_come_back_whole(data_dir, tmp_path):
@@ -274,8 +338,12 @@ def test_recorded_mecanum_poses_import_with_a_renamed_column(data_dir, put, tmp_
     path = data_dir / "mecanum_optiodom" / "square_080920201810_run-01_mocap.csv.gz"
     table = np.genfromtxt(path, delimiter=",", names=True)
     commands = "t_s,w1_radps,w2_radps,w3_radps,w4_radps\n0,0,0,0,0\n1,1,1,1,1\n"
-    import_log(path, put("c.csv", commands), tmp_path / "o.lcmlog",
-               options=ImportOptions(rename={"yaw_rad": "theta_rad"}, robot_id=1))
+    import_log(
+        path,
+        put("c.csv", commands),
+        tmp_path / "o.lcmlog",
+        options=ImportOptions(rename={"yaw_rad": "theta_rad"}, robot_id=1),
+    )
     robot = read_log(tmp_path / "o.lcmlog").robots[1]
     np.testing.assert_array_equal(robot.valid, np.isfinite(table["x_m"]))
     np.testing.assert_array_equal(robot.pose[:, 1], table["y_m"])
@@ -289,19 +357,31 @@ def run_command(*arguments):
 
 
 def test_command_prints_one_json_object(put, tmp_path):
-    result = run_command("--poses", put("p.csv", POSES), "--commands", put("c.csv", COMMANDS),
-                         "--out", tmp_path / "o.lcmlog", "--json")
+    result = run_command(
+        "--poses",
+        put("p.csv", POSES),
+        "--commands",
+        put("c.csv", COMMANDS),
+        "--out",
+        tmp_path / "o.lcmlog",
+        "--json",
+    )
     summary = json.loads(result.stdout)
-    assert summary["robots"] == [{"robot_id": 4, "command_kind": "duty", "commands": 46,
-                                  "poses": 3, "poses_valid": 3}]
+    assert summary["robots"] == [
+        {"robot_id": 4, "command_kind": "duty", "commands": 46, "poses": 3, "poses_valid": 3}
+    ]
     assert summary["duration_s"] == 1.0 and summary["out"].endswith("o.lcmlog")
 
 
-@pytest.mark.parametrize(("arguments", "sentence"), [
-    ([], "one source of poses and one of commands"),
-    (["--rename", "yaw"], "--rename yaw: must have the form OLD=NEW"),
-    (["--robot", "a=b"], "'b' is no robot number"),
-    (["--up", "x"], "--up x: must be y or z")])
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ([], "one source of poses and one of commands"),
+        (["--rename", "yaw"], "--rename yaw: must have the form OLD=NEW"),
+        (["--robot", "a=b"], "'b' is no robot number"),
+        (["--up", "x"], "--up x: must be y or z"),
+    ],
+)
 def test_wrong_options_are_one_sentence_on_stderr(tmp_path, arguments, sentence):
     result = run_command("--out", tmp_path / "o.lcmlog", *arguments)
     assert result.exit_code == 1

@@ -101,8 +101,10 @@ def test_twin_prefix_is_found_and_truth_never_read(write_log, message):
 
 
 def test_disordered_and_repeated_stamps_are_sorted_and_the_last_kept(write_log, message):
-    events = [("R07_POSE", message("pose", utime_us=t, robot_id=7, position_m=[x, 0.0, 0.0]))
-              for t, x in [(30, 3.0), (10, 1.0), (20, 2.0), (20, 2.5)]]
+    events = [
+        ("R07_POSE", message("pose", utime_us=t, robot_id=7, position_m=[x, 0.0, 0.0]))
+        for t, x in [(30, 3.0), (10, 1.0), (20, 2.0), (20, 2.5)]
+    ]
     log = read_log(write_log(*events))
     np.testing.assert_array_equal(log.robots[7].pose[:, 0], [1, 2.5, 3])
     np.testing.assert_allclose(log.robots[7].pose_t_s, [0, 10e-6, 20e-6])
@@ -110,8 +112,9 @@ def test_disordered_and_repeated_stamps_are_sorted_and_the_last_kept(write_log, 
 
 
 def test_duties_beyond_full_are_clamped_and_told(write_log, message):
-    path = write_log(("R07_TELEMETRY", message("telemetry", robot_id=7,
-                                               wheel_duty_pct=[-128, 50, 101, 100])))
+    path = write_log(
+        ("R07_TELEMETRY", message("telemetry", robot_id=7, wheel_duty_pct=[-128, 50, 101, 100]))
+    )
     log = read_log(path)
     np.testing.assert_array_equal(log.robots[7].command, [[-1, 0.5, 1, 1]])
     assert any("1 commands have a duty outside" in w for w in log.warnings)
@@ -119,15 +122,19 @@ def test_duties_beyond_full_are_clamped_and_told(write_log, message):
 
 
 def test_kinds_of_drive_must_not_mix(write_log, message):
-    path = write_log(("R07_DRIVE", message("drive", robot_id=7, kind=1)),
-                     ("R07_DRIVE", message("drive", robot_id=7, kind=2, utime_us=1)))
+    path = write_log(
+        ("R07_DRIVE", message("drive", robot_id=7, kind=1)),
+        ("R07_DRIVE", message("drive", robot_id=7, kind=2, utime_us=1)),
+    )
     with pytest.raises(LogError, match="kinds 1, 2"):
         read_log(path)
 
 
 def test_valid_pose_without_unit_quaternion_is_lost(write_log, message):
-    path = write_log(("R07_POSE", message("pose", robot_id=7, orientation_wxyz=[0.0] * 4)),
-                     ("R07_POSE", message("pose", robot_id=7, utime_us=9)))
+    path = write_log(
+        ("R07_POSE", message("pose", robot_id=7, orientation_wxyz=[0.0] * 4)),
+        ("R07_POSE", message("pose", robot_id=7, utime_us=9)),
+    )
     log = read_log(path)
     assert log.robots[7].valid.tolist() == [False, True]
     assert np.isnan(log.robots[7].pose[0]).all()

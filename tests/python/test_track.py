@@ -32,7 +32,7 @@ def test_robot_put_elsewhere_is_cut_and_margins_dropped(driven):
     assert track.segment.max() == 1
     used = track.pose_t_s[track.segment >= 0]
     gap = np.argmax(np.diff(used))
-    assert used[gap:gap + 2] == pytest.approx([5 - 0.1, 5 + 0.1], abs=2.1 / 120)
+    assert used[gap : gap + 2] == pytest.approx([5 - 0.1, 5 + 0.1], abs=2.1 / 120)
     assert any("cut at 4.99" in note and "jumps" in note for note in track.notes)
 
 
@@ -45,7 +45,7 @@ def test_fast_but_possible_motion_is_not_cut(driven):
 @pytest.mark.parametrize("length", [1, 3])
 def test_jump_and_jump_back_leaves_one_segment(driven, length):
     robot = driven()
-    robot.pose[600:600 + length] += [0.3, 0, 2.5]
+    robot.pose[600 : 600 + length] += [0.3, 0, 2.5]
     track = make_track(robot)
     assert np.flatnonzero(track.segment < 0).tolist() == list(range(600, 600 + length))
     assert track.segment.max() == 0
@@ -64,16 +64,25 @@ def test_gap_cuts_and_short_loss_does_not(driven):
 def test_slow_camera_is_not_cut_at_every_frame(driven):
     robot = driven()
     slow = slice(None, None, 12)  # 10 Hz
-    robot = replace(robot, pose_t_s=robot.pose_t_s[slow], pose=robot.pose[slow],
-                    z_m=robot.z_m[slow], valid=robot.valid[slow])
+    robot = replace(
+        robot,
+        pose_t_s=robot.pose_t_s[slow],
+        pose=robot.pose[slow],
+        z_m=robot.z_m[slow],
+        valid=robot.valid[slow],
+    )
     assert make_track(robot).segment.max() == 0
 
 
 def test_poses_without_known_duties_are_unusable(driven):
     robot = driven()
     known = (robot.command_t_s < 3) | (robot.command_t_s > 6)
-    robot = replace(robot, command_t_s=robot.command_t_s[known], command=robot.command[known],
-                    battery_V=robot.battery_V[known])
+    robot = replace(
+        robot,
+        command_t_s=robot.command_t_s[known],
+        command=robot.command[known],
+        battery_V=robot.battery_V[known],
+    )
     track = make_track(robot)
     middle = (track.pose_t_s > 3.5) & (track.pose_t_s < 5.5)
     assert (track.segment[middle] == -1).all()
