@@ -16,15 +16,17 @@ LEVELS = (0.15, 0.3, 0.5, 0.65, 0.8, 0.9, 1.0)  # of the largest command
 LAGS_S = (0.0, 0.03, 0.07, 0.15)
 COAST_S = (0.07, 0.15, 0.4)
 BLOCK_S = 4.0
+FOLDS = 10
 RIDGE = 1e-6
 # Sums over the wheels that a mecanum base turns into forward, left and turn.
 AXES = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4
 
 
 def unexplained(measurement: Measurement, grid: StepGrid, offset_s: float) -> list[np.ndarray]:
-    """Two (S, 3) one-step errors in W: of a fit to all of the log, and of fits to the other half.
+    """Two (S, 3) one-step errors in W: of a fit to all of the log, and of fits to the other blocks.
 
-    The first is too small, the second too large by the same share: their mean power is the noise's.
+    The first is too small by the share of terms in the log's samples, the second too large by
+    nearly the same, as it is fitted on nearly all: their mean power is the noise's.
     """
     track = measurement.track
     pose = track.pose
@@ -36,24 +38,30 @@ def unexplained(measurement: Measurement, grid: StepGrid, offset_s: float) -> li
     body = np.column_stack([*rotate(step[:, 0], step[:, 1], -heading_rad), step[:, 2]])
     body[grid.starts] = 0
     terms = _terms(measurement, grid, offset_s, heading_rad)
-    half = (grid.t_s // BLOCK_S).astype(int) % 2 == 0
-    within, across = np.empty_like(body), np.empty_like(body)
-    for axis in range(3):
-        x = terms[axis]
-        within[:, axis] = body[:, axis] - x @ _ridge(x, body[:, axis])
-        for test in (half, ~half):
-            across[test, axis] = body[test, axis] - x[test] @ _ridge(x[~test], body[~test, axis])
+    fold = (grid.t_s // BLOCK_S).astype(int) % FOLDS
+    fitted = [_fitted(x, y, fold) for x, y in zip(terms, body.T, strict=True)]
+    within, across = (body - np.column_stack(predicted) for predicted in zip(*fitted, strict=True))
     return [
         np.column_stack([*rotate(e[:, 0], e[:, 1], heading_rad), e[:, 2]]) for e in (within, across)
     ]
 
 
-def _ridge(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    gram = x.T @ x
+def _fitted(x: np.ndarray, y: np.ndarray, fold: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(S, P) terms and (S,) values to (S,) values by a fit to all, and by fits to other folds."""
+    masks = [fold == k for k in range(FOLDS)]
+    grams = np.array([x[m].T @ x[m] for m in masks])
+    moments = np.array([x[m].T @ y[m] for m in masks])
+    gram, moment = grams.sum(axis=0), moments.sum(axis=0)
+    across = np.empty_like(y)
+    for k, mask in enumerate(masks):
+        across[mask] = x[mask] @ _ridge(gram - grams[k], moment - moments[k])
+    return x @ _ridge(gram, moment), across
+
+
+def _ridge(gram: np.ndarray, moment: np.ndarray) -> np.ndarray:
     scale = np.diag(gram) + 1e-30
-    return np.linalg.solve(
-        gram + RIDGE * np.diag(scale) + 1e-12 * scale.max() * np.eye(len(gram)), x.T @ y
-    )
+    ridge = RIDGE * np.diag(scale) + 1e-12 * scale.max() * np.eye(len(gram))
+    return np.linalg.solve(gram + ridge, moment)
 
 
 def _terms(
