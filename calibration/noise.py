@@ -138,7 +138,7 @@ def _median_power(errors: np.ndarray, pieces: np.ndarray, bins: np.ndarray) -> n
 
 
 def _median_of_exponentials(count: int) -> float:
-    """Expected median of so many of mean 1: their k-th smallest has mean 1/count + ... (k terms)."""
+    """Expected median of so many of mean 1: their k-th has mean 1/count + ... of k terms."""
     waits = np.cumsum(1 / np.arange(count, 0, -1))
     return float(waits[[(count - 1) // 2, count // 2]].mean())
 
