@@ -78,7 +78,7 @@ def fit(
     """
     scenes = open_scenes(measurements, model_file)
     known = effect_quantities(model_file.model)
-    free = excited(scenes, base_quantities(model_file.model, {}), known) + known
+    free = excited(scenes, base_quantities(model_file.model, ()), known) + known
     fitted = [s.with_model(model_file.model) for s in scenes]
     solution = refit(fitted, free)
     share_noise(fitted, scenes)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which quantities of a model a fit may change, and how far they may be from what is known."""
 
-from collections.abc import Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import twinmill_native as native
@@ -12,9 +12,6 @@ BASE = ("base.forward_gain", "base.sideways_gain", "base.yaw_gain", "base.motor_
 PRIOR = {"base.motor_lag_s": 0.3}
 GAIN_PRIOR = 0.5
 EFFECT_PRIOR = 2  # times the distance of an effect's default from its neutral value
-# What other logs told is held this much looser than their standard error says.
-LOOSER = 5.0
-LEAST = 0.005  # of the value
 STEP = 0.02  # of that distance: finite differences of effects
 BASE_STEP = 0.002
 
@@ -57,14 +54,14 @@ def effect_names(model: native.Model) -> list[str]:
     return names
 
 
-def base_quantities(model: native.Model, told: Mapping[str, float]) -> list[Free]:
+def base_quantities(model: native.Model, told: Collection[str]) -> list[Free]:
     """The base model's free quantities.
 
     Args:
         model: whose base it is.
-        told: standard errors by name of what other logs told. These quantities are held near their
-            values; gains stay free, since batteries and floors change. Without any, the speeds of
-            the duty table are free in place of the forward gain.
+        told: names of what other logs told. These quantities are held, but for the gains, since
+            batteries and floors change. Without any, the speeds of the duty table are free in place
+            of the forward gain.
     """
     values = {v["name"]: v for v in model.values()}
     table = [n for n in values if n.startswith("base.wheel_speed_mps.")]
@@ -72,32 +69,33 @@ def base_quantities(model: native.Model, told: Mapping[str, float]) -> list[Free
     names = [*(table if has_table else []), *(BASE[1:] if has_table and not told else BASE)]
     free = []
     for name in names:
+        if name in told and not name.endswith("_gain"):
+            continue
         v = values[name]
         width = PRIOR.get(name, GAIN_PRIOR)
-        if name in told and not name.endswith("_gain"):
-            width = LOOSER * max(told[name], LEAST * abs(v["value"]))
         free.append(Free(name, v["unit"], v["value"], v["min"], v["max"], width, BASE_STEP))
     return free
 
 
 def effect_quantities(model: native.Model, fresh: str | None = None) -> list[Free]:
-    """Free quantities of a model's effects; those of the effect `fresh` start at their defaults."""
+    """Free quantities of a model's effects; those of `fresh` begin at their defaults."""
     entries = catalogue()
     free = []
     for instance in effect_names(model):
         for p in entries[instance.split("#")[0]]["parameters"]:
             name = f"{instance}.{p['name']}"
             reach = abs(p["default"] - p["neutral"])
-            start = p["default"] if instance == fresh else model.get(name)
+            is_fresh = instance == fresh
             free.append(
                 Free(
                     name,
                     p["unit"],
-                    start,
+                    p["neutral"] if is_fresh else model.get(name),
                     p["min"],
                     p["max"],
                     EFFECT_PRIOR * reach,
                     min(STEP * reach, 0.05 * max(abs(p["default"]), 1e-6)),
+                    p["default"] if is_fresh else None,
                 )
             )
     return free

@@ -3,7 +3,7 @@
 
 import hashlib
 import os
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,17 +45,18 @@ class ModelFile:
         """Hashes (sha256) of the logs that told the clock offset."""
         return list(tomlkit.parse(self.text).get("clock", {}).get("fitted_on", []))
 
-    def told_by_others(self, log_sha256: Iterable[str]) -> dict[str, float]:
-        """Standard errors of base quantities that were fitted on none of these logs, by name."""
+    def told_by_others(self, log_sha256: Collection[str]) -> set[str]:
+        """Names of the base quantities that were fitted, and on none of these logs."""
         base = tomlkit.parse(self.text).get("base", {})
         if not base.get("fitted_on") or set(base["fitted_on"]) & set(log_sha256):
-            return {}
-        told = {}
+            return set()
+        told = set()
         for key, std in base.get("std", {}).items():
-            if isinstance(std, list):
-                told |= {f"base.{key}.{i}": float(s) for i, s in enumerate(std)}
-            else:
-                told[f"base.{key}"] = float(std)
+            told |= (
+                {f"base.{key}.{i}" for i in range(len(std))}
+                if isinstance(std, list)
+                else {f"base.{key}"}
+            )
         return told
 
     @property

@@ -39,16 +39,21 @@ class Solution:
     chi2: float
 
 
-def solve(scenes: list[Scene], free: list[Free], masks: list[np.ndarray] | None = None) -> Solution:
+def solve(
+    scenes: list[Scene],
+    free: list[Free],
+    masks: list[np.ndarray] | None = None,
+    rounds: int = 40,
+) -> Solution:
     """Fits, and leaves the values in the scenes' models.
 
     Args:
         scenes: measurements; each with a free clock gets an offset of its own.
         free: quantities shared by all.
         masks: (S,) bool per scene: the steps to fit on; all if None.
+        rounds: at most so many evaluations.
     """
-    masks = masks or [np.ones(len(s.grid.source), bool) for s in scenes]
-    system = _System(scenes, free, masks)
+    system = System(scenes, free, masks)
     found = least_squares(
         system.residuals,
         system.start,
@@ -59,7 +64,7 @@ def solve(scenes: list[Scene], free: list[Free], masks: list[np.ndarray] | None 
         x_scale=np.maximum(system.step, 1e-9),
         xtol=1e-7,
         ftol=1e-9,
-        max_nfev=40,
+        max_nfev=rounds,
     )
     system.store(found.x)
     return system.solution(found.x)
@@ -67,17 +72,20 @@ def solve(scenes: list[Scene], free: list[Free], masks: list[np.ndarray] | None 
 
 def excited(scenes: list[Scene], base: list[Free], others: list[Free]) -> list[Free]:
     """Those base quantities that the logs tell beside the others: the rest would only wander."""
-    system = _System(scenes, base + others, [np.ones(len(s.grid.source), bool) for s in scenes])
+    system = System(scenes, base + others)
     jacobian = system.jacobian(system.start)
     std = np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian)))
     return [f for f, s in zip(base, std, strict=False) if s < SEEN * f.prior_std]
 
 
-class _System:
+class System:
     """The stacked residuals of all scenes, and a prior row for each unknown."""
 
-    def __init__(self, scenes: list[Scene], free: list[Free], masks: list[np.ndarray]) -> None:
-        self.scenes, self.free, self.masks = scenes, free, masks
+    def __init__(
+        self, scenes: list[Scene], free: list[Free], masks: list[np.ndarray] | None = None
+    ) -> None:
+        self.scenes, self.free = scenes, free
+        self.masks = masks or [np.ones(len(s.grid.source), bool) for s in scenes]
         self.columns = []  # per scene: places of its names in the vector of unknowns
         unknowns = list(free)
         for scene in scenes:
@@ -112,14 +120,10 @@ class _System:
         return self._whitened(x[None])[0]
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Central differences; at a bound the outer point is moved onto it."""
-        ahead = np.minimum(x + self.step, self.high)
-        behind = np.maximum(x - self.step, self.low)
-        rows = np.tile(x, (2 * len(x), 1))
-        for p in range(len(x)):
-            rows[2 * p, p], rows[2 * p + 1, p] = ahead[p], behind[p]
-        values = self._whitened(rows)
-        return ((values[0::2] - values[1::2]) / (ahead - behind)[:, None]).T
+        """One-sided differences, upwards unless the bound is nearer than the step."""
+        step = np.where(x + self.step <= self.high, self.step, -self.step)
+        values = self._whitened(np.vstack([x, x + np.diag(step)]))
+        return ((values[1:] - values[0]) / step[:, None]).T
 
     def store(self, x: np.ndarray) -> None:
         for i, scene in enumerate(self.scenes):
@@ -147,18 +151,22 @@ class _System:
             bool(std < SEEN * unknown.prior_std),
         )
 
+    def blocks(self) -> np.ndarray:
+        """(R,) number of the 4 s block that each whitened error belongs to, over all scenes."""
+        label = np.concatenate(
+            [
+                np.repeat(1000 * i + s.grid.t_s[m] // BLOCK_S, 3)
+                for i, (s, m) in enumerate(zip(self.scenes, self.masks, strict=True))
+            ]
+        )
+        return np.unique(label, return_inverse=True)[1]
+
     def _standard_errors(self, jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
         """Sandwich over 4 s blocks (Liang and Zeger 1986): honest where errors hang together."""
         bread = np.linalg.pinv(jacobian.T @ jacobian)
         weight = np.minimum(1, HUBER_SIGMA / np.maximum(np.abs(residual), 1e-12))
         pull = jacobian * (residual * weight)[:, None]
-        block = np.concatenate(
-            [
-                np.repeat((1000 * i + s.grid.t_s[m] // BLOCK_S), 3)
-                for i, (s, m) in enumerate(zip(self.scenes, self.masks, strict=True))
-            ]
-        )
-        _, label = np.unique(block, return_inverse=True)
+        label = self.blocks()
         sums = np.zeros((label.max() + 1, len(bread)))
         np.add.at(sums, label, pull[: len(label)])
         prior = np.diag(1 / self.prior**2)

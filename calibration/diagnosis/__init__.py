@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Learns which physical effect a model lacks."""

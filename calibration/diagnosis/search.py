@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Searches for missing effects: one at a time, then pairs, and drops what later ones make needless."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+
+import numpy as np
+from twinmill.calibration.diagnosis.candidates import candidates
+from twinmill.calibration.diagnosis.evidence import State, Trial, attempt, without
+from twinmill.calibration.diagnosis.screen import Screening, screen
+from twinmill.calibration.freedom import effect_names
+
+ALPHA = 0.01  # chance of accepting anything if nothing is missing, over all candidates
+TRIED, PAIRED = 6, 8
+CLOSE = 1.02  # held-out scores whose ratio is nearer to 1 are decided by chi2
+MOST = 4
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A trial and what it is worth: log evidence against the state it started from."""
+
+    trial: Trial
+    evidence: float
+    p_value: float
+
+
+@dataclass
+class Round:
+    """One step of the search: what was screened, tried, and accepted (None: nothing)."""
+
+    before: Trial
+    screening: Screening
+    judged: list[Judged]
+    accepted: Judged | None = None
+
+
+@dataclass
+class Search:
+    """The whole search."""
+
+    rounds: list[Round] = field(default_factory=list)
+    blind: list[str] = field(default_factory=list)
+    dropped: list[str] = field(default_factory=list)
+
+
+def search(state: State, say: Callable[[str], None]) -> tuple[Search, State]:
+    """Adds effects until none is worth it.
+
+    Args:
+        state: the refitted base.
+        say: told in words what is being done.
+    """
+    done = Search()
+    for number in range(MOST):
+        say(f"round {number + 1}: screening the catalogue")
+        found, blind = candidates(state.scenes)
+        done.blind = blind if number == 0 else done.blind
+        screening = screen(state.scenes, state.free, found)
+        before = attempt(state, ())
+        limit = np.log(max(len(found), 1) / ALPHA)
+        this = Round(before, screening, [])
+        done.rounds.append(this)
+        for i in _promising(screening, limit)[:TRIED]:
+            say(f"round {number + 1}: trying {screening.found[i].candidate.effect}")
+            this.judged.append(_judge(state, before, screening, (i,)))
+        this.accepted = _best(this.judged, limit)
+        if this.accepted is None:
+            say(f"round {number + 1}: trying pairs")
+            for pair in _pairs(screening, 2 * limit)[:2]:
+                this.judged.append(_judge(state, before, screening, pair))
+            this.accepted = _best(this.judged, limit + np.log(len(found)))
+        this.judged.sort(key=lambda j: j.trial.score)
+        if this.accepted is None:
+            break
+        state = _settle(replace(state, scenes=this.accepted.trial.scenes))
+        state = _prune(state, done, limit)
+    return done, state
+
+
+def _promising(screening: Screening, least: float) -> list[int]:
+    """Candidates whose linear gain leaves a chance of acceptance, best first."""
+    worth = [s.gain / s.excess for s in screening.found]
+    return [i for i in np.argsort(worth)[::-1] if worth[i] > least]
+
+
+def _judge(state: State, before: Trial, screening: Screening, which: tuple[int, ...]) -> Judged:
+    found = [screening.found[i] for i in which]
+    trial = attempt(state, tuple(f.candidate.effect for f in found))
+    excess = max(f.excess for f in found)
+    evidence = (before.chi2 - trial.chi2) / (2 * excess)
+    return Judged(trial, evidence, min(f.p_value for f in found))
+
+
+def _best(judged: list[Judged], limit: float) -> Judged | None:
+    """Of those with enough evidence the one with the smallest held-out error."""
+    good = [j for j in judged if j.evidence > limit]
+    if not good:
+        return None
+    smallest = min(j.trial.score for j in good)
+    close = [j for j in good if j.trial.score <= CLOSE * smallest]
+    return min(close, key=lambda j: j.trial.chi2)
+
+
+def _pairs(screening: Screening, least: float) -> list[tuple[int, int]]:
+    """Pairs of effects, by what they explain together beyond the better one alone."""
+    top = _promising(screening, 0.0)[:PAIRED]
+    worth = {}
+    for i, j in combinations(top, 2):
+        both = np.hstack([screening.signatures[i], screening.signatures[j]])
+        gram, moment = both.T @ both, both.T @ screening.left
+        gain = moment @ np.linalg.lstsq(gram, moment, rcond=1e-9)[0]
+        alone = max(screening.found[i].gain, screening.found[j].gain)
+        excess = max(screening.found[i].excess, screening.found[j].excess)
+        worth[i, j] = (gain - alone) / excess
+    return [p for p in sorted(worth, key=lambda pair: -worth[pair]) if worth[p] > least]
+
+
+def _settle(state: State) -> State:
+    """Takes the noise that the richer model leaves."""
+    for scene in state.scenes:
+        scene.settle_noise()
+    return state
+
+
+def _prune(state: State, done: Search, limit: float) -> State:
+    """Drops effects that the latest made needless."""
+    names = effect_names(state.model)
+    fresh = len(names) - len(done.rounds[-1].accepted.trial.effects)
+    given = fresh - sum(
+        len(r.accepted.trial.effects) for r in done.rounds[:-1] if r.accepted
+    ) + len(done.dropped)
+    whole = attempt(state, ()) if fresh > given else None
+    for index in range(fresh - 1, given - 1, -1):
+        less = without(state, index)
+        if (less.chi2 - whole.chi2) / 2 < limit:
+            done.dropped.append(names[index])
+            state, whole = replace(state, scenes=less.scenes), less
+    return state
