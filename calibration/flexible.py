@@ -17,7 +17,7 @@ LAGS_S = (0.0, 0.03, 0.07, 0.15)
 COAST_S = (0.07, 0.15, 0.4)
 BLOCK_S = 4.0
 FOLDS = 10
-RIDGE = 1e-6
+RIDGE = 1e-4  # times the squares of a term: what a log barely shows is not made up
 # Sums over the wheels that a mecanum base turns into forward, left and turn.
 AXES = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4
 
@@ -52,16 +52,12 @@ def _fitted(x: np.ndarray, y: np.ndarray, fold: np.ndarray) -> tuple[np.ndarray,
     grams = np.array([x[m].T @ x[m] for m in masks])
     moments = np.array([x[m].T @ y[m] for m in masks])
     gram, moment = grams.sum(axis=0), moments.sum(axis=0)
+    # Of the whole log, so that a term which some folds hardly see is held at zero there.
+    ridge = RIDGE * np.diag(np.diag(gram)) + 1e-12 * gram.max() * np.eye(len(gram))
     across = np.empty_like(y)
     for k, mask in enumerate(masks):
-        across[mask] = x[mask] @ _ridge(gram - grams[k], moment - moments[k])
-    return x @ _ridge(gram, moment), across
-
-
-def _ridge(gram: np.ndarray, moment: np.ndarray) -> np.ndarray:
-    scale = np.diag(gram) + 1e-30
-    ridge = RIDGE * np.diag(scale) + 1e-12 * scale.max() * np.eye(len(gram))
-    return np.linalg.solve(gram + ridge, moment)
+        across[mask] = x[mask] @ np.linalg.solve(gram - grams[k] + ridge, moment - moments[k])
+    return x @ np.linalg.solve(gram + ridge, moment), across
 
 
 def _terms(
