@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "config.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "config_keys.h"
+#include "fw/behavior.h"
+
+#define FILE_MAX_BYTES 16384
+
+void config_default(struct app_config *config)
+{
+    const struct fw_config core = fw_config_default();
+    *config = (struct app_config){
+        .behavior = "milling",
+        .y_min = core.box.y_min,
+        .y_max = core.box.y_max,
+        .u_min = core.box.u_min,
+        .u_max = core.box.u_max,
+        .v_min = core.box.v_min,
+        .v_max = core.box.v_max,
+        .min_blob_px = core.min_blob_px,
+        .vote_frames = core.vote.max_frames,
+        .frame_timeout_ms = (int32_t)(core.frame_timeout_us / 1000),
+        .duty_cap_pct = core.duty_cap_pct,
+        .camera = "/dev/video0",
+        .width_px = core.width_px,
+        .height_px = core.height_px,
+        .rate_Hz = 30,
+        .board = "auto",
+        .i2c_device = "/dev/i2c-1",
+        .uart_device = "/dev/ttyAMA0",
+        .board_retry_ms = 10,
+        .sign = {-1, 1, -1, 1},
+        // 3.45 V a cell, where the authors' robots switch themselves off.
+        .battery_low_mV = 6900,
+        .panel = "gpio",
+        .gpio_chip = "/dev/gpiochip0",
+        .button_line = 13,
+        .detected_line = 16,
+        .running_line = 26,
+        .buzzer_line = 6,
+        .script_dir = "/etc/turbopi/scripts",
+        .lcm_url = "udpm://239.255.76.67:7667?ttl=0",
+        .watchdog_ms = 500,
+        .restart_ms = 1000,
+    };
+}
+
+static const struct config_key *find_key(const char *key)
+{
+    for (size_t i = 0; i < config_key_count; ++i)
+    {
+        if (strcmp(config_keys[i].key, key) == 0)
+        {
+            return &config_keys[i];
+        }
+    }
+    return NULL;
+}
+
+static bool set_integer(const struct config_key *key, const char *value, int32_t *field,
+                        char *error)
+{
+    char *end;
+    errno = 0;
+    const long number = strtol(value, &end, 10);
+    if (errno != 0 || end == value || *end != '\0' || number < key->min || number > key->max)
+    {
+        (void)snprintf(error, CONFIG_ERROR_MAX,
+                       "%s: '%s': must be a whole number in %" PRId32 "..%" PRId32, key->key, value,
+                       key->min, key->max);
+        return false;
+    }
+    *field = (int32_t)number;
+    return true;
+}
+
+static bool set_bool(const struct config_key *key, const char *value, bool *field, char *error)
+{
+    if (strcmp(value, "true") != 0 && strcmp(value, "false") != 0)
+    {
+        (void)snprintf(error, CONFIG_ERROR_MAX, "%s: '%s': must be true or false", key->key, value);
+        return false;
+    }
+    *field = strcmp(value, "true") == 0;
+    return true;
+}
+
+// Texts that a TOML string could not hold as they are, are refused.
+static bool set_text(const struct config_key *key, const char *value, char *field, char *error)
+{
+    for (const char *c = value; *c != '\0'; ++c)
+    {
+        if ((unsigned char)*c < ' ' || *c == '"' || *c == '\\')
+        {
+            (void)snprintf(error, CONFIG_ERROR_MAX,
+                           "%s: must hold no quote, backslash or control character", key->key);
+            return false;
+        }
+    }
+    if (strlen(value) >= CONFIG_TEXT_MAX)
+    {
+        (void)snprintf(error, CONFIG_ERROR_MAX, "%s: too long: at most %d characters", key->key,
+                       CONFIG_TEXT_MAX - 1);
+        return false;
+    }
+    strcpy(field, value);
+    return true;
+}
+
+bool config_set(struct app_config *config, const char *key, const char *value,
+                char error[CONFIG_ERROR_MAX])
+{
+    const struct config_key *found = find_key(key);
+    if (found == NULL)
+    {
+        (void)snprintf(error, CONFIG_ERROR_MAX,
+                       "'%.60s' is no key: turbopi --print-config lists them all", key);
+        return false;
+    }
+    char *field = (char *)config + found->offset;
+    switch (found->kind)
+    {
+        case KEY_INTEGER: return set_integer(found, value, (int32_t *)(void *)field, error);
+        case KEY_BOOL: return set_bool(found, value, (bool *)field, error);
+        case KEY_TEXT: return set_text(found, value, field, error);
+    }
+    return false;
+}
+
+// Cuts white space off both ends, in place.
+static char *trim(char *text)
+{
+    text += strspn(text, " \t\r");
+    size_t length = strlen(text);
+    while (length > 0 && strchr(" \t\r", text[length - 1]) != NULL)
+    {
+        --length;
+    }
+    text[length] = '\0';
+    return text;
+}
+
+// Takes a value out of its quotes, or cuts the comment after a bare one. @return NULL if neither.
+static char *value_of(char *text)
+{
+    text = trim(text);
+    if (*text != '"')
+    {
+        text[strcspn(text, "#")] = '\0';
+        return trim(text);
+    }
+    char *end = strchr(text + 1, '"');
+    if (end == NULL)
+    {
+        return NULL;
+    }
+    *end = '\0';
+    const char *rest = trim(end + 1);
+    return *rest == '\0' || *rest == '#' ? text + 1 : NULL;
+}
+
+static bool parse_line(struct app_config *config, char *line, char *error)
+{
+    line = trim(line);
+    if (*line == '\0' || *line == '#')
+    {
+        return true;
+    }
+    char *equals = strchr(line, '=');
+    char *value = equals != NULL ? value_of(equals + 1) : NULL;
+    if (value == NULL)
+    {
+        (void)snprintf(error, CONFIG_ERROR_MAX, "'%.60s' is not of the form key = value", line);
+        return false;
+    }
+    *equals = '\0';
+    return config_set(config, trim(line), value, error);
+}
+
+bool config_parse(struct app_config *config, const char *name, const char *text,
+                  char error[CONFIG_ERROR_MAX])
+{
+    for (int number = 1; *text != '\0'; ++number)
+    {
+        char line[256];
+        char cause[CONFIG_ERROR_MAX] = "the line is too long: at most 255 characters";
+        const size_t length = strcspn(text, "\n");
+        const bool fits = length < sizeof line;
+        if (fits)
+        {
+            memcpy(line, text, length);
+            line[length] = '\0';
+        }
+        if (!fits || !parse_line(config, line, cause))
+        {
+            (void)snprintf(error, CONFIG_ERROR_MAX, "%.100s, line %d: %.180s", name, number, cause);
+            return false;
+        }
+        text += length + (text[length] == '\n');
+    }
+    return true;
+}
+
+bool config_load(struct app_config *config, const char *path, char error[CONFIG_ERROR_MAX])
+{
+    char text[FILE_MAX_BYTES];
+    FILE *file = fopen(path, "rb");
+    if (file == NULL)
+    {
+        (void)snprintf(error, CONFIG_ERROR_MAX, "%.200s: cannot be read: %s", path,
+                       strerror(errno));
+        return false;
+    }
+    const size_t length = fread(text, 1, sizeof text - 1, file);
+    const bool whole = length < sizeof text - 1 && !ferror(file);
+    (void)fclose(file);
+    text[length] = '\0';
+    if (!whole || strlen(text) != length)
+    {
+        (void)snprintf(error, CONFIG_ERROR_MAX, "%.200s: is no text of at most %d bytes", path,
+                       FILE_MAX_BYTES - 2);
+        return false;
+    }
+    return config_parse(config, path, text, error);
+}
+
+static int print_value(const struct app_config *config, const struct config_key *key, char *text,
+                       size_t size)
+{
+    const char *field = (const char *)config + key->offset;
+    switch (key->kind)
+    {
+        case KEY_INTEGER:
+            return snprintf(text, size, "%s = %" PRId32 "\n", key->key,
+                            *(const int32_t *)(const void *)field);
+        case KEY_BOOL:
+            return snprintf(text, size, "%s = %s\n", key->key,
+                            *(const bool *)field ? "true" : "false");
+        case KEY_TEXT: return snprintf(text, size, "%s = \"%s\"\n", key->key, field);
+    }
+    return 0;
+}
+
+size_t config_print(const struct app_config *config, bool with_docs, char *text, size_t size)
+{
+    size_t used = 0;
+    for (size_t i = 0; i < config_key_count; ++i)
+    {
+        char entry[CONFIG_ERROR_MAX];
+        int length = with_docs ? snprintf(entry, sizeof entry, "# %s\n", config_keys[i].doc) : 0;
+        length +=
+            print_value(config, &config_keys[i], entry + length, sizeof entry - (size_t)length);
+        if (used + (size_t)length >= size)
+        {
+            break;
+        }
+        memcpy(text + used, entry, (size_t)length);
+        used += (size_t)length;
+    }
+    text[used] = '\0';
+    return used;
+}
+
+enum fw_err config_core(const struct app_config *config, struct fw_config *core)
+{
+    const struct fw_behavior *behavior = fw_behavior_find(config->behavior);
+    if (behavior == NULL)
+    {
+        return FW_ERR_INPUT_RANGE;
+    }
+    *core = (struct fw_config){
+        .width_px = config->width_px,
+        .height_px = config->height_px,
+        .box = {(uint8_t)config->y_min, (uint8_t)config->y_max, (uint8_t)config->u_min,
+                (uint8_t)config->u_max, (uint8_t)config->v_min, (uint8_t)config->v_max},
+        .min_blob_px = config->min_blob_px,
+        .vote = {config->vote_frames,
+                 config->vote_window_ms == 0 ? INT64_MAX : (int64_t)config->vote_window_ms * 1000},
+        .table = behavior->table,
+        .frame_timeout_us = (int64_t)config->frame_timeout_ms * 1000,
+        .duty_cap_pct = config->duty_cap_pct,
+    };
+    return fw_config_check(core);
+}

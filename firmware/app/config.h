@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// All that can be set about the robot's program. config.c has the one list of keys.
+#ifndef APP_CONFIG_H
+#define APP_CONFIG_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "fw/config.h"
+#include "fw/err.h"
+#include "fw/mixing.h"
+
+#define CONFIG_TEXT_MAX 112
+#define CONFIG_ERROR_MAX 320
+
+struct app_config
+{
+    int32_t robot_id;
+    char behavior[CONFIG_TEXT_MAX];
+    bool autostart;
+
+    int32_t y_min, y_max, u_min, u_max, v_min, v_max;
+    int32_t min_blob_px;
+    int32_t vote_frames, vote_window_ms;
+    int32_t frame_timeout_ms, duty_cap_pct;
+
+    char camera[CONFIG_TEXT_MAX];
+    int32_t width_px, height_px, rate_Hz, exposure_100us, white_balance_K;
+
+    char board[CONFIG_TEXT_MAX];
+    char i2c_device[CONFIG_TEXT_MAX], uart_device[CONFIG_TEXT_MAX];
+    bool i2c_burst;
+    int32_t board_retry_ms;
+    int32_t sign[FW_WHEEL_COUNT];
+    int32_t battery_low_mV;
+
+    char panel[CONFIG_TEXT_MAX], gpio_chip[CONFIG_TEXT_MAX];
+    int32_t button_line, detected_line, running_line, buzzer_line;
+
+    char script[CONFIG_TEXT_MAX], script_dir[CONFIG_TEXT_MAX];
+    char lcm_url[CONFIG_TEXT_MAX], io_tsv[CONFIG_TEXT_MAX];
+    int32_t watchdog_ms, restart_ms;
+};
+
+void config_default(struct app_config *config);
+
+// Sets one key from text. @param error on failure one sentence without the key's origin.
+// @return false if the key is unknown or the value does not fit; then config is untouched.
+bool config_set(struct app_config *config, const char *key, const char *value,
+                char error[CONFIG_ERROR_MAX]);
+
+// Sets every key of a text of lines `key = value`; # begins a comment, text may stand in quotes.
+// @param name of the text, for the error. @return as config_set(); then config may be half set.
+bool config_parse(struct app_config *config, const char *name, const char *text,
+                  char error[CONFIG_ERROR_MAX]);
+
+// The same from a file of at most 16 KB.
+bool config_load(struct app_config *config, const char *path, char error[CONFIG_ERROR_MAX]);
+
+// Writes all keys as lines that config_parse() reads back, valid TOML as well.
+// @param with_docs a comment above each key. @return bytes written, without the final 0; the text
+// ends early if size is too small.
+size_t config_print(const struct app_config *config, bool with_docs, char *text, size_t size);
+
+// The part that the core decides by. @return FW_OK, or why the core refuses it.
+enum fw_err FW_MUST_CHECK config_core(const struct app_config *config, struct fw_config *core);
+
+#endif

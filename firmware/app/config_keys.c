@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "config_keys.h"
+
+#include <stddef.h>
+
+#define FIELD(member) offsetof(struct app_config, member)
+#define INTEGER(name, lowest, highest, unit_and_doc) \
+    {.key = #name,                                   \
+     .kind = KEY_INTEGER,                            \
+     .offset = FIELD(name),                          \
+     .min = lowest,                                  \
+     .max = highest,                                 \
+     .doc = unit_and_doc}
+#define TEXT(name, words) {.key = #name, .kind = KEY_TEXT, .offset = FIELD(name), .doc = words}
+#define YES_NO(name, words) {.key = #name, .kind = KEY_BOOL, .offset = FIELD(name), .doc = words}
+#define SIGN(name, wheel, words)                        \
+    {.key = name,                                       \
+     .kind = KEY_INTEGER,                               \
+     .offset = FIELD(sign) + sizeof(int32_t) * (wheel), \
+     .min = -1,                                         \
+     .max = 1,                                          \
+     .doc = words}
+
+const struct config_key config_keys[] = {
+    INTEGER(robot_id, 0, 99, "number of this robot, in the names of its channels"),
+    TEXT(behavior, "name of the table that is played"),
+    YES_NO(autostart, "true: drive as soon as frames come; false: wait for button or command"),
+    INTEGER(y_min, 0, 255, "target's colour, YUV of BT.601, both ends included"),
+    INTEGER(y_max, 0, 255, "as above"),
+    INTEGER(u_min, 0, 255, "as above"),
+    INTEGER(u_max, 0, 255, "as above"),
+    INTEGER(v_min, 0, 255, "as above"),
+    INTEGER(v_max, 0, 255, "as above"),
+    INTEGER(min_blob_px, 0, 1000000, "the target is seen if its largest blob has more pixels"),
+    INTEGER(vote_frames, 1, 64, "the vote is over this many frames at most"),
+    INTEGER(vote_window_ms, 0, 60000, "and over those of the last ms; 0: of any age"),
+    INTEGER(frame_timeout_ms, 1, 10000, "motors stop without a frame for this long"),
+    INTEGER(duty_cap_pct, 0, 100, "largest duty of any wheel"),
+    TEXT(camera, "V4L2 device, or stub:FILE of YUYV frames, or stub:unix:SOCKET"),
+    INTEGER(width_px, 2, 1280, "frame size asked for; the camera's nearest is taken"),
+    INTEGER(height_px, 1, 1024, "as above"),
+    INTEGER(rate_Hz, 1, 240, "frame rate asked for"),
+    INTEGER(exposure_100us, -1, 100000, "0: locked as it is, -1: automatic"),
+    INTEGER(white_balance_K, -1, 10000, "0: locked as it is, -1: automatic"),
+    TEXT(board, "auto, i2c (Pi 4 kit), uart (Pi 5 kit), stub or stub:FILE that records duties"),
+    TEXT(i2c_device, "bus of the Pi 4 kit's board"),
+    TEXT(uart_device, "serial line of the Pi 5 kit's board"),
+    YES_NO(i2c_burst, "true: four duties in one transfer; false: one by one"),
+    INTEGER(board_retry_ms, 0, 100, "a refused transfer is tried again for this long"),
+    SIGN("sign_fl", FW_FRONT_LEFT, "1 or -1: which way a positive duty turns the wheel; 0: never"),
+    SIGN("sign_fr", FW_FRONT_RIGHT, "as above"),
+    SIGN("sign_rl", FW_REAR_LEFT, "as above"),
+    SIGN("sign_rr", FW_REAR_RIGHT, "as above"),
+    INTEGER(battery_low_mV, 0, 8500, "motors stop for good when the pack stays below"),
+    TEXT(panel, "gpio or none"),
+    TEXT(gpio_chip, "chip of the lines below"),
+    INTEGER(button_line, 0, 1023, "start/stop button, low while pressed"),
+    INTEGER(detected_line, 0, 1023, "LED: target detected"),
+    INTEGER(running_line, 0, 1023, "LED: running"),
+    INTEGER(buzzer_line, 0, 1023, "sounds while the battery is low"),
+    TEXT(script, "input script that is played instead of the table; empty: none"),
+    TEXT(script_dir, "folder of the scripts that commands name"),
+    TEXT(lcm_url, "where telemetry goes and commands come from; empty: nowhere"),
+    TEXT(io_tsv, "log in the format of the authors' robots; empty: none"),
+    INTEGER(watchdog_ms, 100, 10000, "a program that hangs this long while moving is killed"),
+    INTEGER(restart_ms, -1, 60000, "pause before a dead program is started again; -1: never"),
+};
+
+const size_t config_key_count = sizeof config_keys / sizeof config_keys[0];

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// The one list of keys: names, ranges, where they go, what they mean.
+#ifndef APP_CONFIG_KEYS_H
+#define APP_CONFIG_KEYS_H
+
+#include "config.h"
+
+enum key_kind
+{
+    KEY_INTEGER,
+    KEY_BOOL,
+    KEY_TEXT,
+};
+
+struct config_key
+{
+    const char *key;
+    enum key_kind kind;
+    // Of the field in struct app_config.
+    size_t offset;
+    // Range of an integer, both ends included.
+    int32_t min, max;
+    const char *doc;
+};
+
+extern const struct config_key config_keys[];
+extern const size_t config_key_count;
+
+#endif

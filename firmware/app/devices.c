@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "devices.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "hal_linux/board_probe.h"
+#include "hal_linux/camera_v4l2.h"
+#include "hal_linux/clock_linux.h"
+#include "hal_linux/panel_gpio.h"
+#include "hal_stub/stub_board.h"
+#include "hal_stub/stub_camera.h"
+#include "hal_stub/stub_panel.h"
+
+#define STUB_PACK_MV 8000
+
+// @return what follows the prefix, or NULL.
+static const char *after(const char *text, const char *prefix)
+{
+    const size_t length = strlen(prefix);
+    return strncmp(text, prefix, length) == 0 ? text + length : NULL;
+}
+
+static void use_i2c(struct motors_i2c *board, const struct hal_motors *motors,
+                    struct loop_devices *devices)
+{
+    devices->motors = *motors;
+    devices->battery = motors_i2c_battery(board);
+}
+
+static void use_uart(struct motors_uart *board, const struct hal_motors *motors,
+                     struct loop_devices *devices)
+{
+    devices->motors = *motors;
+    devices->battery = motors_uart_battery(board);
+}
+
+static void use_stub(const char *record_path, struct loop_devices *devices)
+{
+    static struct stub_board board;
+    board = (struct stub_board){
+        .record_path = record_path, .clock = devices->clock, .pack_mV = STUB_PACK_MV};
+    devices->motors = stub_board_motors(&board);
+    devices->battery = stub_board_battery(&board);
+}
+
+static bool use_board(const struct app_config *config, struct loop_devices *devices, char *error)
+{
+    static struct motors_i2c i2c;
+    static struct motors_uart uart;
+    struct motors_i2c_config i2c_config = {.path = config->i2c_device,
+                                           .burst = config->i2c_burst,
+                                           .retry_us = config->board_retry_ms * 1000};
+    struct motors_uart_config uart_config = {.path = config->uart_device,
+                                             .retry_us = config->board_retry_ms * 1000};
+    for (int wheel = 0; wheel < FW_WHEEL_COUNT; ++wheel)
+    {
+        i2c_config.sign[wheel] = uart_config.sign[wheel] = (int8_t)config->sign[wheel];
+    }
+    const struct hal_motors i2c_motors =
+        motors_i2c_make(&i2c, &i2c_config, &devices->clock, &hal_sys_kernel);
+    const struct hal_motors uart_motors = motors_uart_make(&uart, &uart_config, &devices->clock);
+    enum board_kind kind = strcmp(config->board, "uart") == 0 ? BOARD_UART : BOARD_I2C;
+    if (strcmp(config->board, "auto") == 0)
+    {
+        const enum fw_err err = board_probe(&i2c, &uart, &kind);
+        if (err != FW_OK)
+        {
+            (void)snprintf(error, CONFIG_ERROR_MAX,
+                           "motor board: none at %.80s, nor a serial line %.80s: is the robot "
+                           "switched on, and I2C enabled?",
+                           config->i2c_device, config->uart_device);
+            return false;
+        }
+    }
+    else if (strcmp(config->board, "i2c") != 0 && strcmp(config->board, "uart") != 0)
+    {
+        (void)snprintf(error, CONFIG_ERROR_MAX,
+                       "board: '%.100s': must be auto, i2c, uart, stub or stub:FILE",
+                       config->board);
+        return false;
+    }
+    if (kind == BOARD_I2C)
+    {
+        use_i2c(&i2c, &i2c_motors, devices);
+    }
+    else
+    {
+        use_uart(&uart, &uart_motors, devices);
+    }
+    return true;
+}
+
+bool devices_make_board(const struct app_config *config, bool dry_run, struct loop_devices *devices,
+                        char error[CONFIG_ERROR_MAX])
+{
+    devices->clock = clock_linux();
+    const char *record_path = after(config->board, "stub:");
+    if (dry_run || record_path != NULL || strcmp(config->board, "stub") == 0)
+    {
+        use_stub(dry_run ? NULL : record_path, devices);
+        return true;
+    }
+    return use_board(config, devices, error);
+}
+
+static void use_camera(const struct app_config *config, struct loop_devices *devices)
+{
+    static struct camera_v4l2 v4l2;
+    static struct stub_camera stub;
+    const char *socket_path = after(config->camera, "stub:unix:");
+    const char *file_path = after(config->camera, "stub:");
+    const struct stub_camera_config stub_config = {
+        .path = socket_path != NULL ? socket_path : file_path,
+        .width_px = config->width_px,
+        .height_px = config->height_px,
+        .rate_Hz = config->rate_Hz,
+    };
+    if (socket_path != NULL)
+    {
+        devices->camera = stub_camera_socket(&stub, &stub_config, &devices->clock, NULL);
+    }
+    else if (file_path != NULL)
+    {
+        devices->camera = stub_camera_file(&stub, &stub_config, &devices->clock, NULL);
+    }
+    else
+    {
+        const struct camera_v4l2_config v4l2_config = {
+            .path = config->camera,
+            .width_px = config->width_px,
+            .height_px = config->height_px,
+            .rate_Hz = config->rate_Hz,
+            .exposure_100us = config->exposure_100us,
+            .white_balance_K = config->white_balance_K,
+        };
+        devices->camera = camera_v4l2_make(&v4l2, &v4l2_config, &devices->clock, &hal_sys_kernel);
+    }
+}
+
+static bool use_panel(const struct app_config *config, bool dry_run, struct loop_devices *devices,
+                      char *error)
+{
+    static struct panel_gpio gpio;
+    static struct stub_panel none;
+    if (dry_run || strcmp(config->panel, "none") == 0)
+    {
+        devices->panel = stub_panel_make(&none);
+        return true;
+    }
+    if (strcmp(config->panel, "gpio") != 0)
+    {
+        (void)snprintf(error, CONFIG_ERROR_MAX, "panel: '%.100s': must be gpio or none",
+                       config->panel);
+        return false;
+    }
+    const struct panel_gpio_config gpio_config = {
+        .chip = config->gpio_chip,
+        .offset = {[PANEL_GPIO_BUTTON] = (unsigned)config->button_line,
+                   [PANEL_GPIO_DETECTED] = (unsigned)config->detected_line,
+                   [PANEL_GPIO_RUNNING] = (unsigned)config->running_line,
+                   [PANEL_GPIO_BUZZER] = (unsigned)config->buzzer_line},
+    };
+    devices->panel = panel_gpio_make(&gpio, &gpio_config);
+    return true;
+}
+
+bool devices_make(const struct app_config *config, bool dry_run, struct loop_devices *devices,
+                  char error[CONFIG_ERROR_MAX])
+{
+    if (!devices_make_board(config, dry_run, devices, error) ||
+        !use_panel(config, dry_run, devices, error))
+    {
+        return false;
+    }
+    use_camera(config, devices);
+    return true;
+}

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the control loop and the outside say to each other. The loop never waits for it.
+#ifndef APP_LINK_H
+#define APP_LINK_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "fw/step.h"
+#include "hal/camera.h"
+
+#define LINK_NAME_MAX 48
+#define LINK_REASON_MAX 96
+
+// Bits of status_flags that the application adds to those of fw_status, as in telemetry_t.
+enum link_status
+{
+    LINK_STATUS_BATTERY_LOW = 8,
+    LINK_STATUS_BOARD_LOST = 16,
+    LINK_STATUS_CAMERA_LOST = 32,
+};
+
+// One control step: what telemetry says, and the counters that explain it.
+struct link_report
+{
+    struct fw_output out;
+    // Unix times: duties written; frame exposed, 0 if there was none.
+    int64_t utime_us, frame_utime_us;
+    int32_t loop_us;
+    // 0 if not measured.
+    int32_t pack_mV;
+    int32_t status_flags;
+    bool panel_lost;
+    char behavior[LINK_NAME_MAX];
+    struct hal_camera_stats camera;
+    uint32_t rejected_count[FW_REJECT_COUNT];
+    // Reports before this one that nobody took.
+    uint32_t lost_report_count;
+};
+
+// Verbs as in swarm_command_t.
+enum link_verb
+{
+    LINK_STOP = 0,
+    LINK_START = 1,
+    LINK_SELECT = 2,
+    LINK_SCRIPT = 3,
+};
+
+struct link_command
+{
+    // By the sender's clock.
+    int64_t utime_us;
+    int32_t seq;
+    int8_t verb;
+    // 0 = now.
+    int64_t start_utime_us;
+    // Table or script.
+    char name[LINK_NAME_MAX];
+};
+
+struct link_ack
+{
+    int64_t utime_us;
+    int32_t seq;
+    bool accepted;
+    char reason[LINK_REASON_MAX];
+};
+
+// How the loop reaches the other side; all calls return at once.
+struct link
+{
+    void *context;
+    // @return false if the report was lost.
+    bool (*send_report)(void *context, const struct link_report *report);
+    void (*send_ack)(void *context, const struct link_ack *ack);
+    // @return true if there was a command.
+    bool (*receive)(void *context, struct link_command *command);
+    // Readable when a command has come; -1 if there is none.
+    int fd;
+};
+
+#endif

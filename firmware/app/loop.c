@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "loop.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define RETRY_US 500000
+#define LONGEST_WAIT_US 100000
+#define STOP_TRIES 3
+
+static int64_t now_us(const struct loop *loop)
+{
+    return hal_clock_monotonic_us(&loop->devices.clock);
+}
+
+static const char *const part_names[LOOP_PART_COUNT] = {"camera", "motor board", "battery",
+                                                        "panel"};
+
+void loop_lose(struct loop *loop, enum loop_part part, enum fw_err err)
+{
+    if (loop->lost[part] != err && err != FW_ERR_END)
+    {
+        (void)fprintf(stderr, "turbopi: %s: %s: the robot stands still until it is back\n",
+                      part_names[part], fw_err_str(err));
+    }
+    loop->lost[part] = err;
+    loop->retry_us[part] = now_us(loop) + RETRY_US;
+    const enum fw_err stop_err = hal_motors_stop(&loop->devices.motors);
+    loop->moving = loop->moving && stop_err != FW_OK;
+    if (stop_err != FW_OK && loop->lost[LOOP_BOARD] == FW_OK)
+    {
+        loop->lost[LOOP_BOARD] = stop_err;
+    }
+}
+
+void loop_regain(struct loop *loop, enum loop_part part)
+{
+    if (loop->lost[part] != FW_OK)
+    {
+        (void)fprintf(stderr, "turbopi: %s: works\n", part_names[part]);
+        loop->lost[part] = FW_OK;
+    }
+}
+
+enum fw_err loop_init(struct loop *loop, const struct app_config *config,
+                      const struct loop_devices *devices, const struct link *link)
+{
+    struct fw_config core;
+    enum fw_err err = config_core(config, &core);
+    // The script's rows stay untouched: pages that no row needs are never there.
+    memset(loop, 0, offsetof(struct loop, script_rows));
+    if (err == FW_OK)
+    {
+        err = fw_init(&loop->core, &core);
+    }
+    if (err != FW_OK)
+    {
+        return err;
+    }
+    loop->devices = *devices;
+    loop->link = *link;
+    loop->wake_fd = -1;
+    loop->script_dir = config->script_dir;
+    (void)snprintf(loop->behavior, sizeof loop->behavior, "%.*s", LINK_NAME_MAX - 1,
+                   config->behavior);
+    loop->script.rows = loop->script_rows;
+    loop->script.capacity = LOOP_SCRIPT_MAX_ROWS;
+    loop->battery_low_mV = config->battery_low_mV;
+    // Not open yet: lost until the first step opens it.
+    loop->lost[LOOP_CAMERA] = FW_ERR_TIMEOUT;
+    return FW_OK;
+}
+
+void loop_start(struct loop *loop)
+{
+    loop->running = true;
+    loop->start_pending = false;
+    loop->script_over = false;
+    loop->script_begin_us = now_us(loop);
+}
+
+void loop_stop(struct loop *loop)
+{
+    loop->running = false;
+    loop->start_pending = false;
+}
+
+static int64_t min_us(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+// Until a frame comes; but no longer than the newest frame may decide, a start or a script's row is
+// away, so that each happens in time.
+static void wait_for_work(struct loop *loop)
+{
+    const int64_t now = now_us(loop);
+    int64_t timeout_us = LONGEST_WAIT_US;
+    const bool plays_script = loop->running && loop->plays_script;
+    if (loop->core.has_frame && !plays_script)
+    {
+        const int64_t frame_end_us =
+            loop->core.frame_utime_us + loop->core.config.frame_timeout_us + 1;
+        timeout_us = min_us(timeout_us, frame_end_us - now);
+    }
+    if (loop->start_pending)
+    {
+        timeout_us =
+            min_us(timeout_us, loop->start_utime_us - hal_clock_unix_us(&loop->devices.clock));
+    }
+    if (plays_script)
+    {
+        const int64_t t_us = now - loop->script_begin_us;
+        const int64_t next_us = fw_script_next_us(&loop->script, t_us);
+        timeout_us = next_us == INT64_MAX ? timeout_us : min_us(timeout_us, next_us - t_us);
+    }
+    const int fds[] = {loop->lost[LOOP_CAMERA] == FW_OK ? hal_camera_fd(&loop->devices.camera) : -1,
+                       loop->link.fd, loop->wake_fd};
+    hal_clock_wait(&loop->devices.clock, fds, sizeof fds / sizeof fds[0],
+                   timeout_us > 0 ? timeout_us : 0);
+}
+
+// A camera of another size than before needs a core of that size.
+static enum fw_err adopt_format(struct loop *loop, const struct hal_camera_format *format)
+{
+    struct fw_config config = loop->core.config;
+    if (config.width_px == format->width_px && config.height_px == format->height_px)
+    {
+        return FW_OK;
+    }
+    config.width_px = format->width_px;
+    config.height_px = format->height_px;
+    return fw_init(&loop->core, &config);
+}
+
+static void open_camera(struct loop *loop)
+{
+    struct hal_camera_format format;
+    enum fw_err err = hal_camera_open(&loop->devices.camera, &format);
+    if (err == FW_OK)
+    {
+        err = adopt_format(loop, &format);
+        if (err == FW_OK)
+        {
+            loop_regain(loop, LOOP_CAMERA);
+            return;
+        }
+        hal_camera_close(&loop->devices.camera);
+    }
+    loop_lose(loop, LOOP_CAMERA, err);
+}
+
+// @return true if there is a new frame.
+static bool take_frame(struct loop *loop, struct fw_frame *frame)
+{
+    if (loop->lost[LOOP_CAMERA] != FW_OK)
+    {
+        if (now_us(loop) >= loop->retry_us[LOOP_CAMERA])
+        {
+            open_camera(loop);
+        }
+        return false;
+    }
+    const enum fw_err err = hal_camera_take(&loop->devices.camera, frame);
+    if (err == FW_OK || err == FW_ERR_TIMEOUT)
+    {
+        return err == FW_OK;
+    }
+    hal_camera_close(&loop->devices.camera);
+    loop->camera_over = err == FW_ERR_END;
+    loop_lose(loop, LOOP_CAMERA, err);
+    return false;
+}
+
+static bool must_stand_still(const struct loop *loop)
+{
+    bool still = loop->battery_low;
+    for (int part = 0; part < LOOP_PART_COUNT; ++part)
+    {
+        still = still || loop->lost[part] != FW_OK;
+    }
+    return still;
+}
+
+static void decide_by_script(struct loop *loop, int64_t t_us, struct fw_output *out)
+{
+    static const struct fw_script_row idle = {0};
+    const struct fw_script_row *row = fw_script_at(&loop->script, t_us);
+    row = row != NULL ? row : &idle;
+    if (loop->script.has_duties)
+    {
+        fw_step_script_duty(&loop->core, row->wheel_duty_pct, out);
+    }
+    else
+    {
+        fw_step_script_input(&loop->core, &row->input, out);
+    }
+}
+
+static void decide(struct loop *loop, const struct fw_frame *frame, struct fw_output *out)
+{
+    const int64_t now = now_us(loop);
+    const int64_t t_us = now - loop->script_begin_us;
+    if (loop->running && loop->plays_script && fw_script_next_us(&loop->script, t_us) == INT64_MAX)
+    {
+        loop_stop(loop);
+        loop->script_over = true;
+    }
+    fw_set_running(&loop->core, loop->running && !must_stand_still(loop));
+    if (loop->running && loop->plays_script)
+    {
+        decide_by_script(loop, t_us, out);
+    }
+    else
+    {
+        fw_step(&loop->core, frame, now, out);
+    }
+    if (loop->running && must_stand_still(loop))
+    {
+        out->mode = FW_MODE_FAULT;
+    }
+}
+
+// A board that was lost is stopped once before it may move again.
+static void drive(struct loop *loop, struct fw_output *out)
+{
+    const bool moves = loop->lost[LOOP_BOARD] == FW_OK &&
+                       (out->mode == FW_MODE_TABLE || out->mode == FW_MODE_SCRIPT);
+    const enum fw_err err = moves ? hal_motors_write(&loop->devices.motors, out->wheel_duty_pct)
+                                  : hal_motors_stop(&loop->devices.motors);
+    if (err == FW_OK)
+    {
+        static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
+        loop->moving = moves && memcmp(out->wheel_duty_pct, zero_pct, sizeof zero_pct) != 0;
+        loop_regain(loop, LOOP_BOARD);
+        return;
+    }
+    loop_lose(loop, LOOP_BOARD, err);
+    out->mode = loop->running ? FW_MODE_FAULT : FW_MODE_STOPPED;
+    memset(out->wheel_duty_pct, 0, sizeof out->wheel_duty_pct);
+}
+
+static void report(struct loop *loop, const struct fw_output *out, int64_t begin_us)
+{
+    const int64_t now = now_us(loop);
+    const int64_t unix_offset_us = hal_clock_unix_us(&loop->devices.clock) - now;
+    struct link_report report = {
+        .out = *out,
+        .utime_us = now + unix_offset_us,
+        .frame_utime_us = out->frame_utime_us == 0 ? 0 : out->frame_utime_us + unix_offset_us,
+        .loop_us = (int32_t)(now - begin_us),
+        .pack_mV = loop->battery_count > 0
+                       ? loop->battery_mV[(loop->battery_count - 1) % LOOP_BATTERY_READINGS]
+                       : 0,
+        .status_flags = out->status_flags | (loop->battery_low ? LINK_STATUS_BATTERY_LOW : 0) |
+                        (loop->lost[LOOP_BOARD] != FW_OK ? LINK_STATUS_BOARD_LOST : 0) |
+                        (loop->lost[LOOP_CAMERA] != FW_OK ? LINK_STATUS_CAMERA_LOST : 0),
+        .panel_lost = loop->lost[LOOP_PANEL] != FW_OK,
+        .lost_report_count = loop->lost_report_count,
+    };
+    memcpy(report.behavior, loop->behavior, sizeof report.behavior);
+    memcpy(report.rejected_count, loop->core.rejected_count, sizeof report.rejected_count);
+    hal_camera_stats(&loop->devices.camera, &report.camera);
+    loop->lost_report_count += !loop->link.send_report(loop->link.context, &report);
+}
+
+void loop_step(struct loop *loop)
+{
+    wait_for_work(loop);
+    const int64_t begin_us = now_us(loop);
+    loop_obey_commands(loop);
+    struct fw_frame frame;
+    struct fw_output out;
+    const bool has_frame = take_frame(loop, &frame);
+    decide(loop, has_frame ? &frame : NULL, &out);
+    drive(loop, &out);
+    report(loop, &out, begin_us);
+    loop_tend_panel(loop, out.detected);
+    loop_tend_battery(loop);
+}
+
+void loop_close(struct loop *loop)
+{
+    loop_stop(loop);
+    for (int tries = 0; tries < STOP_TRIES && hal_motors_stop(&loop->devices.motors) != FW_OK;
+         ++tries)
+    {
+    }
+    hal_camera_close(&loop->devices.camera);
+    hal_panel_close(&loop->devices.panel);
+    hal_motors_close(&loop->devices.motors);
+}

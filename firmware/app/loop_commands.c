@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an operator may tell the robot, and what it answers.
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "fw/behavior.h"
+#include "loop.h"
+
+// A start further ahead, or longer ago, says that the clocks differ.
+#define START_AHEAD_US 600000000
+#define START_LATE_US 2000000
+#define COMMANDS_PER_STEP 8
+
+bool loop_load_script(struct loop *loop, const char *path, char reason[LINK_REASON_MAX])
+{
+    // 128 KB hold the longest script at 32 bytes a row; too much for a stack.
+    static char text[32 * LOOP_SCRIPT_MAX_ROWS];
+    FILE *file = fopen(path, "rb");
+    if (file == NULL)
+    {
+        (void)snprintf(reason, LINK_REASON_MAX, "script cannot be read: %s", strerror(errno));
+        return false;
+    }
+    const size_t length = fread(text, 1, sizeof text, file);
+    const bool whole = length < sizeof text && !ferror(file);
+    (void)fclose(file);
+    if (!whole)
+    {
+        (void)snprintf(reason, LINK_REASON_MAX, "script cannot be read, or is over 128 KB");
+        return false;
+    }
+    int32_t line;
+    const enum fw_script_fault fault = fw_script_parse(text, length, &loop->script, &line);
+    if (fault != FW_SCRIPT_OK)
+    {
+        loop->script.row_count = 0;
+        (void)snprintf(reason, LINK_REASON_MAX, "script, line %d: %s", line,
+                       fw_script_fault_str(fault));
+        return false;
+    }
+    return true;
+}
+
+static bool select_behavior(struct loop *loop, const char *name, char *reason)
+{
+    const struct fw_behavior *behavior = fw_behavior_find(name);
+    if (behavior == NULL || fw_set_table(&loop->core, &behavior->table) != FW_OK)
+    {
+        (void)snprintf(reason, LINK_REASON_MAX, "no behaviour '%s'", name);
+        return false;
+    }
+    loop->plays_script = false;
+    (void)snprintf(loop->behavior, sizeof loop->behavior, "%s", name);
+    return true;
+}
+
+static bool select_script(struct loop *loop, const char *name, char *reason)
+{
+    char path[CONFIG_TEXT_MAX + LINK_NAME_MAX + 2];
+    if (loop->running)
+    {
+        (void)snprintf(reason, LINK_REASON_MAX, "running: stop before choosing a script");
+        return false;
+    }
+    if (name[0] == '\0' || name[0] == '.' || strchr(name, '/') != NULL)
+    {
+        (void)snprintf(reason, LINK_REASON_MAX, "script must be a file name without folder");
+        return false;
+    }
+    (void)snprintf(path, sizeof path, "%s/%s", loop->script_dir, name);
+    loop->plays_script = loop_load_script(loop, path, reason);
+    return loop->plays_script;
+}
+
+static bool start_at(struct loop *loop, int64_t start_utime_us, char *reason)
+{
+    const int64_t ahead_us =
+        start_utime_us == 0 ? 0 : start_utime_us - hal_clock_unix_us(&loop->devices.clock);
+    if (loop->battery_low)
+    {
+        (void)snprintf(reason, LINK_REASON_MAX, "battery low: charge it, then restart");
+        return false;
+    }
+    if (ahead_us > START_AHEAD_US || ahead_us < -START_LATE_US)
+    {
+        (void)snprintf(reason, LINK_REASON_MAX, "start is %.1f s from now: are the clocks set?",
+                       (double)ahead_us / 1e6);
+        return false;
+    }
+    if (ahead_us <= 0)
+    {
+        loop_start(loop);
+        return true;
+    }
+    loop->start_pending = true;
+    loop->start_utime_us = start_utime_us;
+    return true;
+}
+
+// Commands are repeated until acknowledged: a late copy of an old one must not undo a newer one. A
+// stop is always obeyed.
+static bool obey(struct loop *loop, const struct link_command *command, char *reason)
+{
+    if (command->verb == LINK_STOP)
+    {
+        loop_stop(loop);
+        return true;
+    }
+    if (command->utime_us < loop->obeyed_utime_us)
+    {
+        (void)snprintf(reason, LINK_REASON_MAX, "older than a command already obeyed");
+        return false;
+    }
+    switch (command->verb)
+    {
+        case LINK_START:
+            return (command->name[0] == '\0' || select_behavior(loop, command->name, reason)) &&
+                   start_at(loop, command->start_utime_us, reason);
+        case LINK_SELECT: return select_behavior(loop, command->name, reason);
+        case LINK_SCRIPT:
+            return select_script(loop, command->name, reason) &&
+                   start_at(loop, command->start_utime_us, reason);
+        default:
+            (void)snprintf(reason, LINK_REASON_MAX, "unknown verb %d", command->verb);
+            return false;
+    }
+}
+
+// A copy of the newest command that was obeyed is acknowledged, not obeyed again.
+static void answer(struct loop *loop, const struct link_command *command)
+{
+    const bool is_copy = loop->obeyed_utime_us != 0 && command->verb != LINK_STOP &&
+                         command->utime_us == loop->obeyed_utime_us &&
+                         command->seq == loop->obeyed_seq;
+    struct link_ack ack = {.seq = command->seq, .reason = ""};
+    ack.accepted = is_copy || obey(loop, command, ack.reason);
+    if (ack.accepted && command->utime_us >= loop->obeyed_utime_us)
+    {
+        loop->obeyed_utime_us = command->utime_us;
+        loop->obeyed_seq = command->seq;
+    }
+    ack.utime_us = hal_clock_unix_us(&loop->devices.clock);
+    loop->link.send_ack(loop->link.context, &ack);
+}
+
+void loop_obey_commands(struct loop *loop)
+{
+    struct link_command command;
+    for (int i = 0; i < COMMANDS_PER_STEP && loop->link.receive(loop->link.context, &command); ++i)
+    {
+        answer(loop, &command);
+    }
+    if (loop->start_pending && hal_clock_unix_us(&loop->devices.clock) >= loop->start_utime_us)
+    {
+        loop_start(loop);
+    }
+}

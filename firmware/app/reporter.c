@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "reporter.h"
+
+#include <poll.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "io_tsv.h"
+
+#define STACK_BYTES (256 * 1024)
+#define LONGEST_WAIT_MS 500
+
+// From the loop to the thread.
+struct message
+{
+    enum
+    {
+        MESSAGE_REPORT,
+        MESSAGE_ACK,
+    } kind;
+    union
+    {
+        struct link_report report;
+        struct link_ack ack;
+    };
+};
+
+static bool send_message(const struct reporter *reporter, const struct message *message)
+{
+    return send(reporter->loop_fd, message, sizeof *message, MSG_DONTWAIT | MSG_NOSIGNAL) ==
+           sizeof *message;
+}
+
+static bool send_report(void *context, const struct link_report *report)
+{
+    const struct message message = {.kind = MESSAGE_REPORT, .report = *report};
+    return send_message(context, &message);
+}
+
+static void send_ack(void *context, const struct link_ack *ack)
+{
+    // A lost acknowledgement is asked for again by who wants it.
+    const struct message message = {.kind = MESSAGE_ACK, .ack = *ack};
+    (void)send_message(context, &message);
+}
+
+static bool receive(void *context, struct link_command *command)
+{
+    const struct reporter *reporter = context;
+    return recv(reporter->loop_fd, command, sizeof *command, MSG_DONTWAIT) == sizeof *command;
+}
+
+static void on_command(void *context, const struct link_command *command)
+{
+    const struct reporter *reporter = context;
+    (void)send(reporter->thread_fd, command, sizeof *command, MSG_DONTWAIT | MSG_NOSIGNAL);
+}
+
+static int64_t monotonic_us(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+static void pass_on(struct reporter *reporter, const struct message *message)
+{
+    if (message->kind == MESSAGE_ACK)
+    {
+        telemetry_publish_ack(&reporter->telemetry, &message->ack);
+        return;
+    }
+    telemetry_publish(&reporter->telemetry, &message->report);
+    if (reporter->io_tsv != NULL)
+    {
+        io_tsv_add(reporter->io_tsv, &message->report);
+    }
+}
+
+static void *run(void *context)
+{
+    struct reporter *reporter = context;
+    ssize_t got = -1;
+    // 0 bytes: the loop's side is closed, and all that it sent has been read.
+    while (got != 0)
+    {
+        telemetry_connect(&reporter->telemetry, monotonic_us());
+        struct pollfd fds[] = {{.fd = reporter->thread_fd, .events = POLLIN},
+                               {.fd = telemetry_fd(&reporter->telemetry), .events = POLLIN}};
+        (void)poll(fds, 2, LONGEST_WAIT_MS);
+        if (fds[1].revents != 0)
+        {
+            telemetry_handle(&reporter->telemetry);
+        }
+        struct message message;
+        got = recv(reporter->thread_fd, &message, sizeof message, MSG_DONTWAIT);
+        if (got == sizeof message)
+        {
+            pass_on(reporter, &message);
+        }
+    }
+    return NULL;
+}
+
+static bool start_thread(struct reporter *reporter)
+{
+    pthread_attr_t attributes;
+    if (pthread_attr_init(&attributes) != 0)
+    {
+        return false;
+    }
+    const bool started = pthread_attr_setstacksize(&attributes, STACK_BYTES) == 0 &&
+                         pthread_create(&reporter->thread, &attributes, run, reporter) == 0;
+    (void)pthread_attr_destroy(&attributes);
+    return started;
+}
+
+static void release(struct reporter *reporter)
+{
+    telemetry_close(&reporter->telemetry);
+    if (reporter->io_tsv != NULL)
+    {
+        (void)fclose(reporter->io_tsv);
+    }
+    (void)close(reporter->loop_fd);
+    (void)close(reporter->thread_fd);
+}
+
+// A program that was started again goes on in the same log.
+static bool open_io_tsv(struct reporter *reporter, const struct app_config *config)
+{
+    reporter->io_tsv = fopen(config->io_tsv, "a");
+    if (reporter->io_tsv == NULL)
+    {
+        return false;
+    }
+    (void)setvbuf(reporter->io_tsv, NULL, _IOLBF, BUFSIZ);
+    if (ftell(reporter->io_tsv) == 0)
+    {
+        io_tsv_begin(reporter->io_tsv, config->vote_frames);
+    }
+    return true;
+}
+
+enum fw_err reporter_start(struct reporter *reporter, const struct app_config *config,
+                           struct link *link)
+{
+    int fds[2];
+    if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, fds) != 0)
+    {
+        return FW_ERR_IO;
+    }
+    reporter->loop_fd = fds[0];
+    reporter->thread_fd = fds[1];
+    reporter->io_tsv = NULL;
+    telemetry_init(&reporter->telemetry, config, on_command, reporter);
+    bool ok = true;
+    if (config->io_tsv[0] != '\0')
+    {
+        ok = open_io_tsv(reporter, config);
+    }
+    if (!ok || !start_thread(reporter))
+    {
+        release(reporter);
+        return FW_ERR_IO;
+    }
+    *link = (struct link){reporter, send_report, send_ack, receive, reporter->loop_fd};
+    return FW_OK;
+}
+
+void reporter_stop(struct reporter *reporter)
+{
+    (void)shutdown(reporter->loop_fd, SHUT_WR);
+    (void)pthread_join(reporter->thread, NULL);
+    release(reporter);
+}

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// A thread between the loop and everything slow: network and log files. The loop's side never
+// waits; what the thread cannot take in time is lost and counted.
+#ifndef APP_REPORTER_H
+#define APP_REPORTER_H
+
+#include <pthread.h>
+#include <stdio.h>
+
+#include "config.h"
+#include "link.h"
+#include "telemetry.h"
+
+struct reporter
+{
+    pthread_t thread;
+    // Two ends of one connection that keeps messages whole.
+    int loop_fd, thread_fd;
+    struct telemetry telemetry;
+    // NULL: no such log.
+    FILE *io_tsv;
+};
+
+// Starts the thread. @param config lives as long as the reporter.
+// @param link the loop's side. @return FW_OK; FW_ERR_IO: see errno; then nothing runs.
+enum fw_err FW_MUST_CHECK reporter_start(struct reporter *reporter, const struct app_config *config,
+                                         struct link *link);
+
+// Ends the thread after it has passed on all that it got.
+void reporter_stop(struct reporter *reporter);
+
+#endif

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hal_stub/stub_board.h"
+
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+// One line in one write, so that several processes may record into one file.
+static enum fw_err record(const struct stub_board *board)
+{
+    if (board->record_path == NULL)
+    {
+        return FW_OK;
+    }
+    const int fd = open(board->record_path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+    if (fd < 0)
+    {
+        return FW_ERR_NO_DEVICE;
+    }
+    const int8_t *duty_pct = board->wheel_duty_pct;
+    char line[64];
+    const int length =
+        snprintf(line, sizeof line, "%" PRId64 ",%d,%d,%d,%d\n",
+                 hal_clock_monotonic_us(&board->clock), duty_pct[FW_FRONT_LEFT],
+                 duty_pct[FW_FRONT_RIGHT], duty_pct[FW_REAR_LEFT], duty_pct[FW_REAR_RIGHT]);
+    const enum fw_err err = write(fd, line, (size_t)length) == length ? FW_OK : FW_ERR_IO;
+    (void)close(fd);
+    return err;
+}
+
+static enum fw_err put(struct stub_board *board, const int8_t wheel_duty_pct[FW_WHEEL_COUNT])
+{
+    const enum fw_err err = stub_faults_next(board->faults);
+    if (err != FW_OK)
+    {
+        return err;
+    }
+    memcpy(board->wheel_duty_pct, wheel_duty_pct, sizeof board->wheel_duty_pct);
+    return record(board);
+}
+
+static enum fw_err write_duties(void *device, const int8_t wheel_duty_pct[FW_WHEEL_COUNT])
+{
+    struct stub_board *board = device;
+    const enum fw_err err = put(board, wheel_duty_pct);
+    board->write_count += err == FW_OK;
+    return err;
+}
+
+static enum fw_err stop(void *device)
+{
+    static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
+    struct stub_board *board = device;
+    const enum fw_err err = put(board, zero_pct);
+    board->stop_count += err == FW_OK;
+    return err;
+}
+
+static void close_board(void *device)
+{
+    (void)device;
+}
+
+static enum fw_err read_battery(void *device, int32_t *pack_mV)
+{
+    const struct stub_board *board = device;
+    const enum fw_err err = stub_faults_next(board->faults);
+    if (err == FW_OK)
+    {
+        *pack_mV = board->pack_mV;
+    }
+    return err;
+}
+
+struct hal_motors stub_board_motors(struct stub_board *board)
+{
+    static const struct hal_motors_ops ops = {write_duties, stop, close_board};
+    return (struct hal_motors){.device = board, .ops = &ops};
+}
+
+struct hal_battery stub_board_battery(struct stub_board *board)
+{
+    static const struct hal_battery_ops ops = {read_battery};
+    return (struct hal_battery){.device = board, .ops = &ops};
+}
