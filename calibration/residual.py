@@ -62,15 +62,20 @@ class StepGrid:
 
 
 def body_velocity(measurement: Measurement, grid: StepGrid, model: native.Model) -> np.ndarray:
-    """(S, 3) predicted velocity in the body frame: forward, left in m/s, turn in rad/s."""
+    """(S, 3) predicted velocity in the body frame: forward, left in m/s, turn in rad/s.
+
+    Each prediction is turned back by the very heading it started from, so that the noise of that
+    heading does not come into the velocity.
+    """
     track = measurement.track
     predicted = native.one_step(model, measurement.played)
     usable = np.flatnonzero(track.segment >= 0)
     before = np.full(len(track.pose), -1)
     before[usable[1:]] = usable[:-1]
-    step = (predicted - track.pose[before])[grid.source] * (grid.share / grid.period_s)[:, None]
-    heading_rad = track.heading_smooth[grid.source]
-    return np.column_stack([*rotate(step[:, 0], step[:, 1], -heading_rad), step[:, 2]])
+    step = (predicted - track.pose[before])[grid.source]
+    middle_rad = track.pose[before[grid.source], 2] + step[:, 2] / 2
+    body = np.column_stack([*rotate(step[:, 0], step[:, 1], -middle_rad), step[:, 2]])
+    return body * (grid.share / grid.period_s)[:, None]
 
 
 def rotate(x: np.ndarray, y: np.ndarray, angle_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -117,6 +117,7 @@ class System:
         return np.concatenate([*parts, (rows - self.centre) / self.prior], axis=1)
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
+        """(R,) whitened errors at the unknowns x, then the prior's rows."""
         return self._whitened(x[None])[0]
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
@@ -126,11 +127,13 @@ class System:
         return ((values[1:] - values[0]) / step[:, None]).T
 
     def store(self, x: np.ndarray) -> None:
+        """Puts the unknowns into the scenes' models."""
         for i, scene in enumerate(self.scenes):
             for name, value in zip(self._names(i), x[self.columns[i]], strict=True):
                 scene.model.set(name, float(value))
 
     def solution(self, x: np.ndarray) -> Solution:
+        """Estimates and what they leave at x."""
         residual = self.residuals(x)
         std = self._standard_errors(self.jacobian(x), residual)
         estimates = [self._estimate(u, x[p], std[p]) for p, u in enumerate(self.unknowns)]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Judges effects on drives that they were not fitted to.
 
-The fall of the held-out chi2 is evidence for an effect (split likelihood ratio: Wasserman, Ramdas and
-Balakrishnan 2020), divided by what the errors scatter more than the noise model says.
+The fall of the held-out chi2 is evidence for an effect (split likelihood ratio: Wasserman, Ramdas
+and Balakrishnan 2020), divided by what the errors scatter more than the noise model says.
 """
 
 from dataclasses import dataclass, replace
@@ -63,9 +63,7 @@ class Trial:
     estimates: list[Estimate]
 
 
-def attempt(
-    state: State, effects: tuple[str, ...], begin: dict[str, float] | None = None
-) -> Trial:
+def attempt(state: State, effects: tuple[str, ...], begin: dict[str, float] | None = None) -> Trial:
     """Fits the state's model with `effects` added.
 
     Args:

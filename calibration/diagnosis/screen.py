@@ -61,7 +61,7 @@ class Screening:
 def screen(scenes: list[Scene], base: list[Free], candidates: list[Candidate]) -> Screening:
     """Tests all candidates at once against what the scenes' models leave."""
     system = System(scenes, base)
-    left, basis = _base(system)
+    left, basis = project_out(system)
     blocks = np.append(system.blocks(), np.full(len(system.unknowns), -1))
     signatures = [c.columns(scenes, len(system.unknowns)) for c in candidates]
     signatures = [s - basis @ (basis.T @ s) for s in signatures]
@@ -81,8 +81,8 @@ def screen(scenes: list[Scene], base: list[Free], candidates: list[Candidate]) -
     return Screening(found, signatures, left)
 
 
-def _base(system: System) -> tuple[np.ndarray, np.ndarray]:
-    """Robust whitened errors without what the base explains; orthonormal basis of the base."""
+def project_out(system: System) -> tuple[np.ndarray, np.ndarray]:
+    """Robust whitened errors without what the free quantities explain, and a basis of these."""
     residual = system.residuals(system.start)
     residual = np.clip(residual, -HUBER_SIGMA, HUBER_SIGMA)
     jacobian = system.jacobian(system.start)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Searches for missing effects: one at a time, then pairs, and drops what later ones make needless."""
+"""Searches for missing effects: one at a time, then pairs; drops what later ones replace."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -128,9 +128,11 @@ def _prune(state: State, done: Search, limit: float) -> State:
     """Drops effects that the latest made needless."""
     names = effect_names(state.model)
     fresh = len(names) - len(done.rounds[-1].accepted.trial.effects)
-    given = fresh - sum(
-        len(r.accepted.trial.effects) for r in done.rounds[:-1] if r.accepted
-    ) + len(done.dropped)
+    given = (
+        fresh
+        - sum(len(r.accepted.trial.effects) for r in done.rounds[:-1] if r.accepted)
+        + len(done.dropped)
+    )
     whole = attempt(state, ()) if fresh > given else None
     for index in range(fresh - 1, given - 1, -1):
         less = without(state, index)

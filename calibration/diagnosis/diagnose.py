@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names what a model lacks, says so when nothing is missing, and when the log cannot tell."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from twinmill.calibration.compare import GOOD, Comparison, comparison, open_scenes
+from twinmill.calibration.diagnosis.evidence import State
+from twinmill.calibration.diagnosis.omnibus import Omnibus, unexplained
+from twinmill.calibration.diagnosis.ranking import Ranked, groups_of, rank
+from twinmill.calibration.diagnosis.search import ALPHA, Search, search
+from twinmill.calibration.fit import refit, share_noise
+from twinmill.calibration.freedom import base_quantities, effect_names, effect_quantities
+from twinmill.calibration.measurement import Measurement
+from twinmill.calibration.model_file import ModelFile
+from twinmill.calibration.solve import excited
+
+HELPED = 0.95  # a refit that lowers the score below this share of it was worth it
+NOISIER = 2.0  # drive noise over that of the model file, beyond which it is a finding
+OUTSIDE = 0.25  # share of what could be explained that no effect does
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The result.
+
+    Attributes:
+        verdict: model_adequate, refit_enough, effect_missing, ambiguous or outside_catalogue.
+        sentence: the same for people.
+        before: the model as given; score_refit: its base refitted.
+        found: names of the missing effects, most important first.
+        ranking: effects, best first.
+        not_identifiable: effect and why.
+        omnibus: what the found effects leave.
+        share_unexplained: of all that could be explained.
+        state: scenes with the model that has the found effects.
+        notes: sentences on what to keep in mind.
+        next_experiment: which run would settle what this log leaves open, or None.
+    """
+
+    verdict: str
+    sentence: str
+    before: Comparison
+    score_refit: float
+    found: list[str]
+    ranking: list[Ranked]
+    not_identifiable: list[tuple[str, str]]
+    omnibus: Omnibus
+    share_unexplained: float
+    state: State
+    steps: list[tuple[str | None, float]]
+    notes: list[str]
+    next_experiment: dict | None
+
+    def to_json(self) -> dict:
+        """The interface's object."""
+        top = next((r.group for r in self.ranking if r.group is not None), None)
+        same = [r.effect for r in self.ranking if r.group == top and top is not None]
+        term = self.omnibus.term
+        return {
+            "verdict": self.verdict,
+            "sentence": self.sentence,
+            "score": self.before.score,
+            "score_refit": self.score_refit,
+            "found": self.found,
+            "ranking": [r.to_json() for r in self.ranking],
+            "confusable_with": [e for e in same if e not in self.found],
+            "not_identifiable": [{"effect": e, "why": w} for e, w in self.not_identifiable],
+            "unexplained": {
+                "depends_on": [g.group for g in self.omnibus.groups],
+                "share": self.share_unexplained,
+                "formula": f"{term.channel} += p0 * {term.formula}" if term else None,
+                "p0": self.omnibus.coefficient if term else None,
+            },
+            "steps": [{"effect": e, "score_heldout": s} for e, s in self.steps],
+            "next_experiment": self.next_experiment,
+            "notes": self.notes,
+        }
+
+
+def diagnose(
+    measurements: list[Measurement],
+    model_file: ModelFile,
+    say: Callable[[str], None] = lambda _: None,
+) -> Diagnosis:
+    """Diagnoses all measurements with one model.
+
+    Args:
+        measurements: one robot, or several of a kind.
+        model_file: the model; what other logs told of it is held, its gains are refitted.
+        say: told in words what is being done.
+    """
+    say("refitting the base")
+    told = model_file.told_by_others([m.log_sha256 for m in measurements])
+    given = open_scenes(measurements, model_file)
+    known = effect_quantities(model_file.model)
+    base = excited(given, base_quantities(model_file.model, told), known)
+    scenes = [s.with_model(model_file.model) for s in given]
+    refit(scenes, base + known)
+    share_noise(scenes, given)
+    before, fitted = comparison(model_file, given), comparison(model_file, scenes)
+
+    state = State(scenes, base, [r.floor.rms for r in fitted.robots])
+    done, final = search(state, say)
+    say("looking for what no effect explains")
+    omnibus = unexplained(final.scenes, final.free)
+    explained = done.rounds[0].before.chi2 - _last(done)
+    share = omnibus.gain / max(omnibus.gain + explained, 1e-9) if omnibus.groups else 0.0
+    names = effect_names(final.model)[len(model_file.model.effects) :]
+    ranking = rank(done, names, explained + omnibus.gain)
+    noises = _noisier(model_file, final)
+    verdict = _verdict(before.score, fitted.score, names, ranking, share, bool(noises))
+    return Diagnosis(
+        verdict,
+        _sentence(verdict, names, ranking, omnibus, noises),
+        before,
+        fitted.score,
+        names,
+        ranking,
+        _not_identifiable(done),
+        omnibus,
+        float(share),
+        final,
+        _steps(done),
+        noises + _clock_notes(final),
+        _next_experiment(verdict, ranking, done),
+    )
+
+
+def _last(done: Search) -> float:
+    """Held-out chi2 of the final model."""
+    accepted = [r.accepted for r in done.rounds if r.accepted]
+    return accepted[-1].trial.chi2 if accepted else done.rounds[0].before.chi2
+
+
+def _steps(done: Search) -> list[tuple[str | None, float]]:
+    steps: list[tuple[str | None, float]] = [(None, done.rounds[0].before.score)]
+    for this in done.rounds:
+        if this.accepted:
+            steps.append((" + ".join(this.accepted.trial.effects), this.accepted.trial.score))
+    return steps
+
+
+def _verdict(
+    score: float,
+    score_refit: float,
+    names: list[str],
+    ranking: list[Ranked],
+    share: float,
+    noisy: bool,
+) -> str:
+    if share > OUTSIDE or (noisy and not names):
+        return "outside_catalogue"
+    if names:
+        tied = {r.group for r in ranking if r.effect in names and r.group is not None}
+        return "ambiguous" if tied else "effect_missing"
+    if score_refit < HELPED * score and score > GOOD:
+        return "refit_enough"
+    return "model_adequate"
+
+
+def _noisier(model_file: ModelFile, state: State) -> list[str]:
+    """A note for each scene whose drive noise is far above what another log told."""
+    if model_file.model.get("noise.drive_mps") <= 0:
+        return []
+    notes = []
+    usual = model_file.model.get("noise.drive_mps")
+    for scene in state.scenes:
+        ratio = scene.noise.position.drive / usual
+        if ratio > NOISIER:
+            notes.append(
+                f"{scene.measurement.label}: the random disturbance of the motion is {ratio:.1f} "
+                "times what the model file says; no effect that follows from commands, place or "
+                "time is like that (slipping wheels or a rough floor may be)."
+            )
+    return notes
+
+
+def _clock_notes(state: State) -> list[str]:
+    if any(s.clock_free for s in state.scenes):
+        return [
+            "The clock offset was found from this log itself, so a delay of the commands cannot be "
+            "told from it; a calibration log on the same clocks would part them."
+        ]
+    return []
+
+
+def _not_identifiable(done: Search) -> list[tuple[str, str]]:
+    """Effects that could be there and not be seen."""
+    limit = 2 * np.log(max(len(done.rounds[0].screening.found), 1) / ALPHA)
+    hidden = [(name, "the log has no drive on which it acts") for name in done.blind]
+    for s in done.rounds[0].screening.found:
+        if 9 * s.expected < limit * s.excess:
+            hidden.append((s.candidate.effect, "three times its usual strength would not show"))
+    return hidden
+
+
+def _next_experiment(verdict: str, ranking: list[Ranked], done: Search) -> dict | None:
+    """What to drive next, in words; the script itself is designed by `twinmill next`."""
+    hidden = [name for name, _ in _not_identifiable(done)]
+    if verdict == "ambiguous":
+        group = next(r.group for r in ranking if r.group is not None)
+        same = [r.effect for r in ranking if r.group == group]
+        return {
+            "script": None,
+            "separates": same,
+            "why": f"this log cannot tell {' from '.join(same)}: drive all three axes at five or "
+            "more duties, from rest and through zero, on clocks tied by a calibration log",
+        }
+    if hidden:
+        return {
+            "script": None,
+            "separates": hidden,
+            "why": "these effects leave no trace in this log: drive sideways as well, and at five "
+            "or more duties on all axes",
+        }
+    return None
+
+
+def _sentence(
+    verdict: str, names: list[str], ranking: list[Ranked], omnibus: Omnibus, noises: list[str]
+) -> str:
+    depends = " and ".join(g.group for g in omnibus.groups)
+    if verdict == "model_adequate":
+        return "Nothing is missing that these logs would show."
+    if verdict == "refit_enough":
+        return "No effect is missing; the base model's numbers were stale, and a refit is enough."
+    if verdict == "effect_missing":
+        return f"Missing: {' and '.join(names)}."
+    if verdict == "ambiguous":
+        same = groups_of(ranking, names)
+        return f"Missing: one of {' or '.join(same)}; these logs cannot tell which."
+    if not omnibus.groups and noises:
+        return "Something random disturbs the motion that no effect of the catalogue describes."
+    also = (
+        f" {' and '.join(names)} explain{'s' if len(names) == 1 else ''} part of it."
+        if names
+        else ""
+    )
+    return f"Something outside the catalogue is there; it depends on {depends}.{also}"
