@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests of firmware/hal_linux/motors_uart.c and uart_frame.c, on a pseudo-terminal.
+#include "hal_linux/motors_uart.h"
+
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include "hal_linux/clock_linux.h"
+#include "uart_frame.h"
+#include "unity.h"
+
+// Fixture: the test holds the board's end of the line.
+
+static int board_fd;
+static struct motors_uart driver;
+static struct hal_motors motors;
+static struct hal_battery battery;
+
+void setUp(void)
+{
+    board_fd = posix_openpt(O_RDWR | O_NOCTTY);
+    TEST_ASSERT_TRUE(board_fd >= 0 && grantpt(board_fd) == 0 && unlockpt(board_fd) == 0);
+    static char path[64];
+    strcpy(path, ptsname(board_fd));
+    const struct motors_uart_config config = {
+        .path = path, .retry_us = 10000, .sign = {-1, 1, -1, 1}};
+    const struct hal_clock clock = clock_linux();
+    motors = motors_uart_make(&driver, &config, &clock);
+    battery = motors_uart_battery(&driver);
+}
+
+void tearDown(void)
+{
+    hal_motors_close(&motors);
+    if (board_fd >= 0)
+    {
+        close(board_fd);
+    }
+}
+
+static void board_sends(const uint8_t *bytes, size_t count)
+{
+    TEST_ASSERT_EQUAL(count, write(board_fd, bytes, count));
+}
+
+// Reads until the battery is known: the line's two ends are joined by the kernel, in its own time.
+static enum fw_err read_battery(int32_t *pack_mV)
+{
+    enum fw_err err = FW_ERR_TIMEOUT;
+    for (int tries = 0; tries < 100 && err == FW_ERR_TIMEOUT; ++tries)
+    {
+        usleep(1000);
+        err = hal_battery_read(&battery, pack_mV);
+    }
+    return err;
+}
+
+// Test
+
+// The check value of CRC-8/MAXIM-DOW in the catalogue of parametrised CRC algorithms is 0xA1.
+static void test_crc_has_its_published_check_value(void)
+{
+    TEST_ASSERT_EQUAL_HEX8(0xA1, uart_frame_crc((const uint8_t *)"123456789", 9));
+}
+
+// 10, 20, -30 and 100 percent with the left wheels negated, as IEEE 754 single precision.
+static void test_duties_are_one_frame_of_floats(void)
+{
+    static const uint8_t expected[] = {
+        0xAA, 0x55, 0x03, 0x16, 0x05, 0x04,  //
+        0x00, 0x00, 0x00, 0x20, 0xC1,        // 0: -10
+        0x01, 0x00, 0x00, 0xA0, 0x41,        // 1: 20
+        0x02, 0x00, 0x00, 0xF0, 0x41,        // 2: 30
+        0x03, 0x00, 0x00, 0xC8, 0x42,        // 3: 100
+    };
+    const int8_t duties_pct[FW_WHEEL_COUNT] = {10, 20, -30, 100};
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_write(&motors, duties_pct));
+    uint8_t got[64];
+    TEST_ASSERT_EQUAL(sizeof expected + 1, read(board_fd, got, sizeof got));
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, got, sizeof expected);
+    TEST_ASSERT_EQUAL_HEX8(uart_frame_crc(expected + 2, sizeof expected - 2), got[sizeof expected]);
+}
+
+// Bytes that a terminal would change or swallow must arrive as they are.
+static void test_line_is_raw_and_fast(void)
+{
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_stop(&motors));
+    struct termios line;
+    TEST_ASSERT_EQUAL(0, tcgetattr(driver.fd, &line));
+    TEST_ASSERT_EQUAL(B1000000, cfgetospeed(&line));
+    TEST_ASSERT_EQUAL(0, line.c_lflag & (ICANON | ECHO | ISIG));
+    TEST_ASSERT_EQUAL(0, line.c_oflag & OPOST);
+}
+
+static void test_battery_is_unknown_until_the_board_reports_it(void)
+{
+    int32_t pack_mV = -1;
+    TEST_ASSERT_EQUAL(FW_ERR_TIMEOUT, hal_battery_read(&battery, &pack_mV));
+    TEST_ASSERT_EQUAL(-1, pack_mV);
+    // 7708 mV behind noise, half a header, a frame with a wrong CRC and a key's frame.
+    uint8_t frame[16];
+    board_sends((const uint8_t *)"\x00\xAA\xAA\x55\x00\x03\x04\xFF\xFF\x00", 10);
+    board_sends(frame, uart_frame_make(6, (const uint8_t *)"\x01\x20", 2, frame));
+    const size_t count = uart_frame_make(0, (const uint8_t *)"\x04\x1C\x1E", 3, frame);
+    board_sends(frame, 5);
+    board_sends(frame + 5, count - 5);
+    TEST_ASSERT_EQUAL(FW_OK, read_battery(&pack_mV));
+    TEST_ASSERT_EQUAL(7708, pack_mV);
+}
+
+static void test_endless_noise_neither_blocks_nor_fools(void)
+{
+    uint8_t noise[1024];
+    memset(noise, 0xAA, sizeof noise);
+    board_sends(noise, sizeof noise);
+    int32_t pack_mV = -1;
+    for (int i = 0; i < 50; ++i)
+    {
+        TEST_ASSERT_EQUAL(FW_ERR_TIMEOUT, hal_battery_read(&battery, &pack_mV));
+    }
+}
+
+static void test_line_that_vanishes_is_an_error(void)
+{
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_stop(&motors));
+    close(board_fd);
+    board_fd = -1;
+    TEST_ASSERT_NOT_EQUAL(FW_OK, hal_motors_stop(&motors));
+    TEST_ASSERT_NOT_EQUAL(FW_OK, hal_motors_stop(&motors));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_crc_has_its_published_check_value);
+    RUN_TEST(test_duties_are_one_frame_of_floats);
+    RUN_TEST(test_line_is_raw_and_fast);
+    RUN_TEST(test_battery_is_unknown_until_the_board_reports_it);
+    RUN_TEST(test_endless_noise_neither_blocks_nor_fools);
+    RUN_TEST(test_line_that_vanishes_is_an_error);
+    return UNITY_END();
+}
