@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests of firmware/app/config.c, config_keys.c and io_tsv.c
+#include "config.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "../firmware/support.h"
+#include "config_keys.h"
+#include "fw/behavior.h"
+#include "io_tsv.h"
+#include "unity.h"
+
+// Fixture
+
+static struct app_config config;
+static char error[CONFIG_ERROR_MAX];
+
+void setUp(void)
+{
+    config_default(&config);
+    error[0] = '\0';
+}
+
+void tearDown(void) {}
+
+static bool parse(const char *text)
+{
+    return config_parse(&config, "robot.conf", text, error);
+}
+
+// Test
+
+static void test_defaults_are_the_cores(void)
+{
+    struct fw_config core;
+    const struct fw_config expected = fw_config_default();
+    TEST_ASSERT_EQUAL(FW_OK, config_core(&config, &core));
+    TEST_ASSERT_EQUAL(expected.width_px, core.width_px);
+    TEST_ASSERT_EQUAL(expected.height_px, core.height_px);
+    TEST_ASSERT_EQUAL_MEMORY(&expected.box, &core.box, sizeof core.box);
+    TEST_ASSERT_EQUAL(expected.min_blob_px, core.min_blob_px);
+    TEST_ASSERT_EQUAL(expected.vote.max_frames, core.vote.max_frames);
+    TEST_ASSERT_EQUAL_INT64(expected.vote.window_us, core.vote.window_us);
+    TEST_ASSERT_EQUAL_MEMORY(&expected.table, &core.table, sizeof core.table);
+    TEST_ASSERT_EQUAL_INT64(expected.frame_timeout_us, core.frame_timeout_us);
+    TEST_ASSERT_EQUAL(expected.duty_cap_pct, core.duty_cap_pct);
+}
+
+static void test_every_default_is_in_its_own_range(void)
+{
+    static char text[16384], again_text[16384];
+    struct app_config again = {0};
+    const size_t length = config_print(&config, true, text, sizeof text);
+    TEST_ASSERT_EQUAL(strlen(text), length);
+    TEST_ASSERT_TRUE_MESSAGE(config_parse(&again, "printed", text, error), error);
+    (void)config_print(&again, true, again_text, sizeof again_text);
+    TEST_ASSERT_EQUAL_STRING(text, again_text);
+}
+
+static void test_values_comments_and_quotes(void)
+{
+    TEST_ASSERT_TRUE_MESSAGE(parse("# a robot\n\n robot_id=7 # seven\r\nbehavior = \"orbit\"\n"
+                                   "camera = /dev/video2\ni2c_burst = true\nsign_fl = 1\n"
+                                   "lcm_url = \"\"  # silent\nio_tsv = \"a # b\""),
+                             error);
+    TEST_ASSERT_EQUAL(7, config.robot_id);
+    TEST_ASSERT_EQUAL_STRING("orbit", config.behavior);
+    TEST_ASSERT_EQUAL_STRING("/dev/video2", config.camera);
+    TEST_ASSERT_TRUE(config.i2c_burst);
+    TEST_ASSERT_EQUAL(1, config.sign[FW_FRONT_LEFT]);
+    TEST_ASSERT_EQUAL_STRING("", config.lcm_url);
+    TEST_ASSERT_EQUAL_STRING("a # b", config.io_tsv);
+}
+
+static void test_core_gets_what_was_set(void)
+{
+    struct fw_config core;
+    TEST_ASSERT_TRUE(
+        parse("behavior = orbit\nvote_frames = 64\nvote_window_ms = 150\n"
+              "frame_timeout_ms = 100\nduty_cap_pct = 60\nu_max = 100\n"));
+    TEST_ASSERT_EQUAL(FW_OK, config_core(&config, &core));
+    TEST_ASSERT_EQUAL(64, core.vote.max_frames);
+    TEST_ASSERT_EQUAL_INT64(150000, core.vote.window_us);
+    TEST_ASSERT_EQUAL_INT64(100000, core.frame_timeout_us);
+    TEST_ASSERT_EQUAL(60, core.duty_cap_pct);
+    TEST_ASSERT_EQUAL(100, core.box.u_max);
+    TEST_ASSERT_EQUAL_MEMORY(&fw_behavior_find("orbit")->table, &core.table, sizeof core.table);
+    TEST_ASSERT_TRUE(parse("u_min = 101\n"));
+    TEST_ASSERT_EQUAL(FW_ERR_BOX, config_core(&config, &core));
+}
+
+static void test_mistakes_name_file_line_key_and_what_is_allowed(void)
+{
+    TEST_ASSERT_FALSE(parse("robot_id = 3\nrobot_id = 100\n"));
+    TEST_ASSERT_EQUAL_STRING("robot.conf, line 2: robot_id: '100': must be a whole number in 0..99",
+                             error);
+    TEST_ASSERT_EQUAL(3, config.robot_id);
+    const char *const mistakes[] = {"speed = 3",        "robot_id",
+                                    "robot_id =",       "robot_id = 1.5",
+                                    "robot_id = 1 2",   "robot_id = 0x1",
+                                    "autostart = yes",  "camera = \"/dev/video0",
+                                    "camera = \"a\" b", "= 3",
+                                    "camera = a\tb\"c", "robot_id = 99999999999999999999"};
+    for (size_t i = 0; i < sizeof mistakes / sizeof mistakes[0]; ++i)
+    {
+        TEST_ASSERT_FALSE_MESSAGE(parse(mistakes[i]), mistakes[i]);
+        TEST_ASSERT_NOT_NULL(strstr(error, "robot.conf, line 1: "));
+    }
+}
+
+static void test_long_lines_and_texts_are_refused(void)
+{
+    char text[400] = "camera = ";
+    memset(text + 9, 'x', 300);
+    TEST_ASSERT_FALSE(parse(text));
+    text[9 + CONFIG_TEXT_MAX] = '\0';
+    TEST_ASSERT_FALSE(parse(text));
+    text[9 + CONFIG_TEXT_MAX - 1] = '\0';
+    TEST_ASSERT_TRUE(parse(text));
+}
+
+// Whatever the bytes: it returns, a failure has a sentence, and a success still prints and reads.
+static void test_any_bytes_are_read_or_refused(void)
+{
+    static const char alphabet[] = "=\n\r \t\"#\\robt_id0129-camer\x01\xFF";
+    uint32_t random = 7;
+    for (int round = 0; round < 20000; ++round)
+    {
+        char text[64];
+        const size_t length = random_next(&random) % sizeof text;
+        for (size_t i = 0; i < length; ++i)
+        {
+            text[i] = alphabet[random_next(&random) % (sizeof alphabet - 1)];
+        }
+        text[length == sizeof text ? length - 1 : length] = '\0';
+        error[0] = '\0';
+        TEST_ASSERT_TRUE(parse(text) || error[0] != '\0');
+    }
+}
+
+// The authors' header and their milling, (100, 90, -0.5) when seen: left, clockwise negative.
+static void test_io_tsv_speaks_the_authors_language(void)
+{
+    struct link_report report = {.utime_us = 1700000000123456};
+    report.out.detected_raw = 1;
+    report.out.speed_input_pct = 100;
+    report.out.turn_input_milli = 500;
+    char *text = NULL;
+    size_t length = 0;
+    FILE *file = open_memstream(&text, &length);
+    io_tsv_begin(file, 10);
+    io_tsv_add(file, &report);
+    report.out.detected = 1;
+    report.out.speed_input_pct = -50;
+    report.out.turn_input_milli = 0;
+    io_tsv_add(file, &report);
+    fclose(file);
+    TEST_ASSERT_EQUAL_STRING(
+        "time_ns\tdetected [0, 1]\tsmoothed_detected [0, 1] (10)\tmoves [(v, d, w), ...]\n"
+        "1700000000123456000\t1\t0\t[(100, 90, -0.5)]\n"
+        "1700000000123456000\t1\t1\t[(50, 270, 0)]\n",
+        text);
+    free(text);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_defaults_are_the_cores);
+    RUN_TEST(test_every_default_is_in_its_own_range);
+    RUN_TEST(test_values_comments_and_quotes);
+    RUN_TEST(test_core_gets_what_was_set);
+    RUN_TEST(test_mistakes_name_file_line_key_and_what_is_allowed);
+    RUN_TEST(test_long_lines_and_texts_are_refused);
+    RUN_TEST(test_any_bytes_are_read_or_refused);
+    RUN_TEST(test_io_tsv_speaks_the_authors_language);
+    return UNITY_END();
+}
