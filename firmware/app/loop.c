@@ -221,11 +221,10 @@ static void decide(struct loop *loop, const struct fw_frame *frame, struct fw_ou
     }
 }
 
-// A board that was lost is stopped once before it may move again.
+// A board that was lost stands still in decide(), so that it is stopped once before it moves again.
 static void drive(struct loop *loop, struct fw_output *out)
 {
-    const bool moves = loop->lost[LOOP_BOARD] == FW_OK &&
-                       (out->mode == FW_MODE_TABLE || out->mode == FW_MODE_SCRIPT);
+    const bool moves = out->mode == FW_MODE_TABLE || out->mode == FW_MODE_SCRIPT;
     const enum fw_err err = moves ? hal_motors_write(&loop->devices.motors, out->wheel_duty_pct)
                                   : hal_motors_stop(&loop->devices.motors);
     if (err == FW_OK)

@@ -53,6 +53,7 @@ static enum fw_err stop(void *device)
 {
     static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
     struct stub_board *board = device;
+    ++board->stop_try_count;
     const enum fw_err err = put(board, zero_pct);
     board->stop_count += err == FW_OK;
     return err;

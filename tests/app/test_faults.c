@@ -28,7 +28,8 @@ static int32_t calls_of_a_drive(void)
     return count;
 }
 
-// Drives until the failure has happened. @return stops before the step in which it did.
+// Drives until the failure has happened: a stop was tried in that very step.
+// @return stops that had succeeded before it.
 static int drive_into(int32_t fails_at, int32_t fails_count, enum fw_err err)
 {
     robot.faults =
@@ -36,12 +37,14 @@ static int drive_into(int32_t fails_at, int32_t fails_count, enum fw_err err)
     robot.view = VIEW_GREEN;
     robot_boot();
     loop_start(&robot.loop);
-    int stops = 0;
+    int stops = 0, tries = 0;
     while (robot.faults.call_count < fails_at)
     {
         stops = robot.board.stop_count;
+        tries = robot.board.stop_try_count;
         loop_step(&robot.loop);
     }
+    TEST_ASSERT_GREATER_THAN(tries, robot.board.stop_try_count);
     return stops;
 }
 
@@ -52,7 +55,7 @@ static void check_one_failure(enum fw_err err)
     for (int32_t fails_at = 1; fails_at <= calls; ++fails_at)
     {
         const int stops = drive_into(fails_at, 1, err);
-        // A failed stop is repeated in the next step, all others within the same.
+        // Only a stop that fails itself has to wait for the next step.
         if (robot.board.stop_count == stops)
         {
             loop_step(&robot.loop);

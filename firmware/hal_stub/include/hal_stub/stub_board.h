@@ -17,8 +17,8 @@ struct stub_board
     struct hal_clock clock;
     // As on the real board: what was written last stays.
     int8_t wheel_duty_pct[FW_WHEEL_COUNT];
-    // Calls of write and stop that succeeded.
-    int32_t write_count, stop_count;
+    // Calls that succeeded, and calls of stop that were tried.
+    int32_t write_count, stop_count, stop_try_count;
     int32_t pack_mV;
 };
 
