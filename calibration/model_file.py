@@ -2,8 +2,10 @@
 """Model files: read by the twin's own reader, written anew with what was fitted."""
 
 import hashlib
+import math
 import os
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -53,7 +55,7 @@ class ModelFile:
         told = set()
         for key, std in base.get("std", {}).items():
             told |= (
-                {f"base.{key}.{i}" for i in range(len(std))}
+                {f"base.{key}.{i}" for i, s in enumerate(std) if not math.isnan(s)}
                 if isinstance(std, list)
                 else {f"base.{key}"}
             )
@@ -127,7 +129,8 @@ def write_whole(path: Path, text: str) -> None:
         temporary.write_text(text)
         os.replace(temporary, path)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink()
         raise ModelError(
             f"{path}: cannot be written ({error.strerror}); choose another place."
         ) from error
@@ -141,25 +144,14 @@ def _write_base(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
     base = document.setdefault("base", tomlkit.table())
     stds: dict = {}
     for estimate in fitted.estimates:
-        section, key = estimate.name.split(".", 1)
+        section, *key = estimate.name.split(".")
         if section != "base":
             continue
-        if key.startswith("wheel_speed_mps."):
-            stds.setdefault("wheel_speed_mps", [0.0]).append(_short(estimate.std))
-        else:
-            base[key] = _short(estimate.value)
-            stds[key] = _short(estimate.std)
-    if "wheel_speed_mps" in stds:
-        table = [
-            v["value"]
-            for v in fitted.model.values()
-            if v["name"].startswith("base.wheel_speed_mps.")
-        ]
-        missing = len(base["duty_pct"]) - len(table)  # the first speed, 0, is no free quantity
-        base["wheel_speed_mps"] = [0.0] * missing + [_short(v) for v in table]
-        stds["wheel_speed_mps"] = (
-            stds["wheel_speed_mps"][:1] * missing + stds["wheel_speed_mps"][1:]
-        )
+        values, errors, place = base, stds, key[0]
+        if len(key) == 2:  # an entry of a table: those that were not fitted have no error
+            values, place = base[key[0]], int(key[1])
+            errors = stds.setdefault(key[0], [math.nan] * len(values))
+        values[place], errors[place] = _short(estimate.value), _short(estimate.std)
     if stds and not fitted.base_told:
         base["std"] = stds
         base["fitted_on"] = list(fitted.logs.values())
