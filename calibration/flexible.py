@@ -53,7 +53,7 @@ def _fitted(x: np.ndarray, y: np.ndarray, fold: np.ndarray) -> tuple[np.ndarray,
     moments = np.array([x[m].T @ y[m] for m in masks])
     gram, moment = grams.sum(axis=0), moments.sum(axis=0)
     # Of the whole log, so that a term which some folds hardly see is held at zero there.
-    ridge = RIDGE * np.diag(np.diag(gram)) + 1e-12 * gram.max() * np.eye(len(gram))
+    ridge = RIDGE * np.diag(np.diag(gram)) + (1e-12 * gram.max() + 1e-30) * np.eye(len(gram))
     across = np.empty_like(y)
     for k, mask in enumerate(masks):
         across[mask] = x[mask] @ np.linalg.solve(gram - grams[k] + ridge, moment - moments[k])

@@ -112,14 +112,19 @@ def fit_noise(errors: list[np.ndarray], moving: np.ndarray, grid: StepGrid) -> N
 
 
 def _pieces(grid: StepGrid, moving: np.ndarray, chunk: int) -> np.ndarray | None:
-    """(C,) starts of overlapping stretches in which the robot moves; None if there are too few."""
-    starts = [
+    """(C,) starts of overlapping stretches in which the robot moves; None if there are too few.
+
+    Of the shortest stretches all are taken where it never moves for so long.
+    """
+    everywhere = [
         at
         for part in grid.slices
         for at in range(part.start + TRANSIENT, part.stop - chunk, chunk // 2)
-        if moving[at : at + chunk].mean() > 0.9
     ]
-    return np.array(starts) if len(starts) >= FEWEST_CHUNKS or chunk <= CHUNK // 8 else None
+    starts = [at for at in everywhere if moving[at : at + chunk].mean() > 0.9]
+    if len(starts) < FEWEST_CHUNKS and chunk > CHUNK // 8:
+        return None
+    return np.array(starts or everywhere)
 
 
 def _bins(chunk: int) -> np.ndarray:
