@@ -77,11 +77,11 @@ def _compare(
 
     Example: twinmill compare run.lcmlog --model turbopi.toml --out report
     """
-    source = provenance(_command("compare", logs, model), model_file := _open(model, out))
+    source = provenance(command_line("compare", logs, model), model_file := open_model(model, out))
     with busy(f"comparing with {model}"):
         result = compare(load_measurements(logs), model_file)
     section = comparison_section(result)
-    _finish(result.to_json(), show.comparison(result), source, section, as_json, out)
+    finish(result.to_json(), show.comparison(result), source, section, as_json, out)
     return result
 
 
@@ -97,12 +97,14 @@ def _fit(
 
     Example: twinmill fit run.lcmlog --model turbopi.toml -o fitted.toml
     """
-    source = provenance(_command("fit", logs, model, output), model_file := _open(model, out))
-    _check_output(output, model_file, force)
+    source = provenance(
+        command_line("fit", logs, model, output), model_file := open_model(model, out)
+    )
+    check_output(output, model_file, force)
     with busy(f"fitting {model}"):
         result = fit(load_measurements(logs), model_file, output, source.command)
     section = fit_section(result)
-    _finish(result.to_json(), show.fit(result), source, section, as_json, out)
+    finish(result.to_json(), show.fit(result), source, section, as_json, out)
     return result
 
 
@@ -126,29 +128,31 @@ def _add(
     """
     find_effect(effect)
     source = provenance(
-        _command(f"add {effect}", logs, model, output), model_file := _open(model, out)
+        command_line(f"add {effect}", logs, model, output), model_file := open_model(model, out)
     )
-    _check_output(output, model_file, force)
+    check_output(output, model_file, force)
     with busy(f"adding {effect} to {model}"):
         result = add(effect, load_measurements(logs), model_file, output, source.command)
     section = added_section(result)
-    _finish(result.to_json(), show.added(result), source, section, as_json, out)
+    finish(result.to_json(), show.added(result), source, section, as_json, out)
     return result
 
 
-def _command(verb: str, logs: list[Path], model: str, output: Path | None = None) -> str:
+def command_line(verb: str, logs: list[Path], model: str, output: Path | None = None) -> str:
     """The command line that does this again, without what only changes where and how it is told."""
     words = ["twinmill", *verb.split(), *map(str, logs), "--model", model]
     return shlex.join(words + (["-o", str(output)] if output else []))
 
 
-def _open(model: str, out: Path | None) -> ModelFile:
+def open_model(model: str, out: Path | None) -> ModelFile:
+    """Reads the model, once it is clear that the report's folder can be written."""
     if out:
         check_new_folder(out)
     return ModelFile.load(model)
 
 
-def _check_output(output: Path, model_file: ModelFile, force: bool) -> None:
+def check_output(output: Path, model_file: ModelFile, force: bool) -> None:
+    """Raises ValueError if the new model could not be written, before the long work."""
     if output.resolve() == model_file.path.resolve():
         raise ValueError(
             f"{output}: is the model that is read, and models are never changed in place; "
@@ -157,7 +161,7 @@ def _check_output(output: Path, model_file: ModelFile, force: bool) -> None:
     check_new_file(output, force)
 
 
-def _finish(
+def finish(
     data: dict,
     text: RenderableType,
     source: Provenance,

@@ -6,7 +6,7 @@ from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
-from twinmill.tools import calibrate, effects, import_log
+from twinmill.tools import calibrate, diagnose, effects, import_log
 
 app = typer.Typer(
     add_completion=False,
@@ -15,6 +15,7 @@ app = typer.Typer(
 )
 import_log.register(app)
 calibrate.register(app)
+diagnose.register(app)
 effects.register(app)
 
 

@@ -5,7 +5,7 @@ import json
 import math
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -43,13 +43,20 @@ def deliver(data: dict, text: RenderableType, as_json: bool) -> None:
 @contextmanager
 def busy(what: str) -> Iterator[None]:
     """Shows on stderr, if that is a terminal, what is being done and for how long."""
+    with telling(what):
+        yield
+
+
+@contextmanager
+def telling(what: str) -> Iterator[Callable[[str], None]]:
+    """The same, with a function that tells in words where the work has got to."""
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     console = Console(stderr=True)
     with Progress(
         *columns, console=console, transient=True, disable=not console.is_terminal
     ) as progress:
-        progress.add_task(what, total=None)
-        yield
+        task = progress.add_task(what, total=None)
+        yield lambda words: progress.update(task, description=f"{what}: {words}")
 
 
 def check_new_file(path: Path, force: bool) -> None:

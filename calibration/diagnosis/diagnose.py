@@ -6,15 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from twinmill.calibration.compare import GOOD, Comparison, comparison, open_scenes
-from twinmill.calibration.diagnosis.evidence import State
+from twinmill.calibration.diagnosis.evidence import State, over
 from twinmill.calibration.diagnosis.omnibus import Omnibus, unexplained
 from twinmill.calibration.diagnosis.ranking import Ranked, groups_of, rank
 from twinmill.calibration.diagnosis.search import ALPHA, Search, search
 from twinmill.calibration.fit import refit, share_noise
+from twinmill.calibration.floor import measure_floor
 from twinmill.calibration.freedom import base_quantities, effect_names, effect_quantities
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import ModelFile
 from twinmill.calibration.solve import excited
+from twinmill.calibration.windows import Windows
 
 HELPED = 0.95  # a refit that lowers the score below this share of it was worth it
 NOISIER = 2.0  # drive noise over that of the model file, beyond which it is a finding
@@ -98,17 +100,18 @@ def diagnose(
     base = excited(given, base_quantities(model_file.model, told), known)
     scenes = [s.with_model(model_file.model) for s in given]
     refit(scenes, base + known)
-    share_noise(scenes, given)
+    floors = [measure_floor(s, Windows.of(s.measurement.track)).rms for s in scenes]
+    done, final = search(State(scenes, base, floors), say)
+    for earlier in (given, scenes):
+        share_noise(final.scenes, earlier)
     before, fitted = comparison(model_file, given), comparison(model_file, scenes)
-
-    state = State(scenes, base, [r.floor.rms for r in fitted.robots])
-    done, final = search(state, say)
+    floors = [r.floor.rms for r in fitted.robots]
     say("looking for what no effect explains")
     omnibus = unexplained(final.scenes, final.free)
     explained = done.rounds[0].before.chi2 - _last(done)
     share = omnibus.gain / max(omnibus.gain + explained, 1e-9) if omnibus.groups else 0.0
     names = effect_names(final.model)[len(model_file.model.effects) :]
-    ranking = rank(done, names, explained + omnibus.gain)
+    ranking = rank(done, names, explained + omnibus.gain, floors)
     noises = _noisier(model_file, final)
     verdict = _verdict(before.score, fitted.score, names, ranking, share, bool(noises))
     return Diagnosis(
@@ -122,7 +125,7 @@ def diagnose(
         omnibus,
         float(share),
         final,
-        _steps(done),
+        _steps(done, floors),
         noises + _clock_notes(final),
         _next_experiment(verdict, ranking, done),
     )
@@ -134,11 +137,12 @@ def _last(done: Search) -> float:
     return accepted[-1].trial.chi2 if accepted else done.rounds[0].before.chi2
 
 
-def _steps(done: Search) -> list[tuple[str | None, float]]:
-    steps: list[tuple[str | None, float]] = [(None, done.rounds[0].before.score)]
+def _steps(done: Search, floors: list[np.ndarray]) -> list[tuple[str | None, float]]:
+    steps: list[tuple[str | None, float]] = [(None, over(done.rounds[0].before.rms, floors))]
     for this in done.rounds:
         if this.accepted:
-            steps.append((" + ".join(this.accepted.trial.effects), this.accepted.trial.score))
+            trial = this.accepted.trial
+            steps.append((" + ".join(trial.effects), over(trial.rms, floors)))
     return steps
 
 

@@ -13,7 +13,7 @@ from twinmill.calibration.folds import halves, step_mask, window_mask
 from twinmill.calibration.freedom import Free, effect_names, effect_quantities
 from twinmill.calibration.problem import Scene
 from twinmill.calibration.solve import HUBER_SIGMA, Estimate, solve
-from twinmill.calibration.windows import Windows, score
+from twinmill.calibration.windows import Windows, rms
 
 ROUNDS, REFINED = 8, 3  # of a trial's fit, and of the halves that start from it
 
@@ -51,13 +51,15 @@ class Trial:
     Attributes:
         effects: what was added.
         chi2: held-out robust chi2, both ways.
-        score: held-out score over the floors.
+        rms: (H, 3) held-out errors per scene.
+        score: of these over the state's floors.
         scenes: with the model fitted to all.
         estimates: of the added effects' parameters, fitted to all.
     """
 
     effects: tuple[str, ...]
     chi2: float
+    rms: list[np.ndarray]
     score: float
     scenes: list[Scene]
     estimates: list[Estimate]
@@ -81,9 +83,17 @@ def attempt(state: State, effects: tuple[str, ...], begin: dict[str, float] | No
     scenes = [s.with_model(model) for s in state.scenes]
     solution = solve(scenes, state.free + fresh, rounds=ROUNDS)
     again = [replace(f, begin=scenes[0].model.get(f.name)) for f in state.free + fresh]
-    chi2, held = _cross(scenes, again, state.floors)
+    chi2, held = _cross(scenes, again)
     names = {f.name for f in fresh}
-    return Trial(effects, chi2, held, scenes, [e for e in solution.estimates if e.name in names])
+    estimates = [e for e in solution.estimates if e.name in names]
+    return Trial(effects, chi2, held, over(held, state.floors), scenes, estimates)
+
+
+def over(errors: list[np.ndarray], floors: list[np.ndarray]) -> float:
+    """Score of (H, 3) RMS errors over floors, both per scene."""
+    return float(
+        np.sqrt(np.mean([np.nanmean((e / f) ** 2) for e, f in zip(errors, floors, strict=True)]))
+    )
 
 
 def without(state: State, index: int) -> Trial:
@@ -95,8 +105,8 @@ def without(state: State, index: int) -> Trial:
     return attempt(reduced, ())
 
 
-def _cross(scenes: list[Scene], free: list[Free], floors: list[np.ndarray]) -> tuple[float, float]:
-    """Held-out chi2 and score, both ways."""
+def _cross(scenes: list[Scene], free: list[Free]) -> tuple[float, list[np.ndarray]]:
+    """Held-out chi2 and (H, 3) RMS errors per scene, both ways."""
     halves_of = [halves(s) for s in scenes]
     chi2, errors = 0.0, [[] for _ in scenes]
     for which in (0, 1):
@@ -111,8 +121,7 @@ def _cross(scenes: list[Scene], free: list[Free], floors: list[np.ndarray]) -> t
             windows = Windows.of(scene.measurement.track)
             seen = window_mask(windows, half, 1 - which)[..., None]
             errors[i].append(np.where(seen, windows.errors(scene), np.nan))
-    scores = [score(np.concatenate(e), f) for e, f in zip(errors, floors, strict=True)]
-    return chi2, float(np.sqrt(np.mean(np.square(scores))))
+    return chi2, [rms(np.concatenate(e)) for e in errors]
 
 
 def _chi2(scenes: list[Scene], masks: list[np.ndarray]) -> float:

@@ -3,6 +3,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+from twinmill.calibration.diagnosis.evidence import over
 from twinmill.calibration.diagnosis.screen import Screening
 from twinmill.calibration.diagnosis.search import Judged, Round, Search
 from twinmill.calibration.solve import Estimate
@@ -36,7 +38,9 @@ class Ranked:
         return {**vars(self), "parameters": [e.to_json() for e in self.parameters]}
 
 
-def rank(done: Search, names: list[str], explainable: float) -> list[Ranked]:
+def rank(
+    done: Search, names: list[str], explainable: float, floors: list[np.ndarray]
+) -> list[Ranked]:
     """Found effects in the order of acceptance with their rivals, then the first round's rest."""
     ranking: list[Ranked] = []
     group = 0
@@ -49,11 +53,11 @@ def rank(done: Search, names: list[str], explainable: float) -> list[Ranked]:
             group += 1
             number = group
         for judged in [this.accepted, *same]:
-            ranking += _entries(judged, this, explainable, number)
+            ranking += _entries(judged, this, explainable, floors, number)
     seen = {r.effect for r in ranking}
     for judged in done.rounds[0].judged:
         if len(judged.trial.effects) == 1 and judged.trial.effects[0] not in seen:
-            ranking += _entries(judged, done.rounds[0], explainable, None)
+            ranking += _entries(judged, done.rounds[0], explainable, floors, None)
     return ranking
 
 
@@ -63,14 +67,24 @@ def groups_of(ranking: list[Ranked], names: list[str]) -> list[str]:
     return [r.effect for r in ranking if r.effect in names or r.group in numbers]
 
 
-def _entries(judged: Judged, this: Round, explainable: float, group: int | None) -> list[Ranked]:
+def _entries(
+    judged: Judged, this: Round, explainable: float, floors: list[np.ndarray], group: int | None
+) -> list[Ranked]:
     trial = judged.trial
     share = (this.before.chi2 - trial.chi2) / max(explainable, 1e-9)
     entries = []
     for effect in trial.effects:
         own = [e for e in trial.estimates if e.name.split(".")[0].split("#")[0] == effect]
         entries.append(
-            Ranked(effect, trial.score, float(share), judged.p_value, judged.evidence, own, group)
+            Ranked(
+                effect,
+                over(trial.rms, floors),
+                float(share),
+                judged.p_value,
+                judged.evidence,
+                own,
+                group,
+            )
         )
     return entries
 

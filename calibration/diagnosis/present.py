@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A diagnosis as tables, for the terminal and as a section of a report."""
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+from twinmill.calibration import show, tables
+from twinmill.calibration.diagnosis.diagnose import Diagnosis
+from twinmill.calibration.diagnosis.explain import Explanation, steps
+from twinmill.calibration.report import Section
+from twinmill.calibration.report.error_figures import regimes, waterfall
+from twinmill.calibration.report.motion_figures import floor_map, speeds
+from twinmill.calibration.solve import Estimate
+from twinmill.calibration.tables import Cell, Table, Tone, number, tone
+
+TONES: dict[str, Tone] = {
+    "model_adequate": "good",
+    "refit_enough": "warn",
+    "effect_missing": "bad",
+    "ambiguous": "warn",
+    "outside_catalogue": "bad",
+}
+
+
+def ranking(diagnosis: Diagnosis) -> Table:
+    """Effects, best first."""
+    rows = []
+    for r in diagnosis.ranking:
+        found = r.effect in diagnosis.found
+        rows.append(
+            [
+                Cell(r.effect, "good" if found else "dim"),
+                Cell(number(r.score_heldout), tone(r.score_heldout)),
+                Cell(f"{100 * r.share_explained:.0f} %"),
+                Cell(f"{r.p_value:.3f}"),
+                Cell("" if r.group is None else str(r.group)),
+                Cell(", ".join(_estimate(e) for e in r.parameters)),
+            ]
+        )
+    return Table(
+        "What could be missing",
+        ["effect", "held-out\nscore", "explains", "p", "group", "estimates"],
+        rows,
+        "Found effects are coloured. The score is of drives that were not fitted to; explains: "
+        "share of what anything could explain; p: chance of such a fit if nothing were missing, "
+        "for all effects together; effects of one group look alike in this log.",
+        words=(0, 5),
+    )
+
+
+def unseen(diagnosis: Diagnosis) -> Table:
+    """Effects that could be there and not be seen."""
+    rows = [[Cell(effect), Cell(why)] for effect, why in diagnosis.not_identifiable]
+    return Table("What this log cannot show", ["effect", "why"], rows, words=(0, 1))
+
+
+def lines(diagnosis: Diagnosis) -> list[str]:
+    """What the tables do not say."""
+    told = list(diagnosis.notes)
+    term = diagnosis.omnibus.term
+    if term:
+        told.append(
+            f"{100 * diagnosis.share_unexplained:.0f} % of what could be explained depends on "
+            f"{' and '.join(g.group for g in diagnosis.omnibus.groups)}; best formula: "
+            f"{term.channel} velocity += {diagnosis.omnibus.coefficient:.3g} * {term.formula}."
+        )
+    if diagnosis.next_experiment:
+        told.append(f"Next run: {diagnosis.next_experiment['why']}.")
+    return told
+
+
+def terminal(diagnosis: Diagnosis) -> RenderableType:
+    """What a person reads of a diagnosis."""
+    parts: list[RenderableType] = [
+        Text(f"{diagnosis.sentence}", show.STYLES[TONES[diagnosis.verdict]]),
+        Text(
+            f"score {number(diagnosis.before.score)} as given, "
+            f"{number(diagnosis.score_refit)} after a refit of the base"
+        ),
+        Text(),
+    ]
+    parts += [show.table(t) for t in _tables(diagnosis)]
+    parts += [Text(line) for line in lines(diagnosis)]
+    return Group(*parts)
+
+
+def terminal_explanation(result: Explanation) -> RenderableType:
+    """What a person reads of the whole loop."""
+    return Group(
+        terminal(result.diagnosis),
+        Text(),
+        show.table(tables.steps(_labelled(result.diagnosis))),
+        show.table(tables.parameters(result.parameters)),
+        Text(f"Written: {result.path}"),
+    )
+
+
+def section(diagnosis: Diagnosis) -> Section:
+    """Of a report."""
+    robot = tables.main_robot(diagnosis.before)
+    return Section(
+        f"What {diagnosis.before.model_name} lacks",
+        [
+            ("as given", number(diagnosis.before.score), tone(diagnosis.before.score)),
+            ("base refitted", number(diagnosis.score_refit), tone(diagnosis.score_refit)),
+        ],
+        diagnosis.sentence,
+        tables.facts(diagnosis.before),
+        [waterfall(_labelled(diagnosis)), regimes(robot), floor_map(robot), speeds(robot)],
+        _tables(diagnosis),
+        " ".join(lines(diagnosis)),
+        diagnosis.before.warnings,
+    )
+
+
+def _tables(diagnosis: Diagnosis) -> list[Table]:
+    return [t for t in (ranking(diagnosis), unseen(diagnosis)) if t.rows]
+
+
+def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
+    """Steps of the waterfall."""
+    names = {None: "as given", "refit": "base refitted"}
+    return [
+        (names.get(s["effect"], f"+ {s['effect']}"), s["score_heldout"]) for s in steps(diagnosis)
+    ]
+
+
+def _estimate(estimate: Estimate) -> str:
+    name = estimate.name.split(".", 1)[1]
+    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
+    return f"{name} {estimate.value:.3g} ± {estimate.std:.1g}{unit}"
