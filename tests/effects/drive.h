@@ -93,6 +93,7 @@ inline void PlayMedley(Player &player)
                            Scaled(kBack, 0.5),
                            {0.4, 0.9, 0.4, 0.9},
                            Scaled(kStrafeLeft, -0.7),
+                           {0.1, 0.9, 0.7, 0.3},
                            kStop,
                            {-0.8, -0.3, -0.8, -0.3},
                            kStop};

@@ -35,6 +35,19 @@ TEST(DriveChain, TurnsMeasuredWheelSpeedsIntoRimSpeeds)
     EXPECT_NEAR(player.state.pose.x_m, 10 * model.robot.wheel_radius_m, 1e-12);
 }
 
+// A wheel that has rolled x through its lag has turned by x / radius, whatever the gains say.
+TEST(DriveChain, CountsTheAnglesOfItsWheels)
+{
+    Model model = Lagging(0.1);
+    model.base.forward_gain = 0.5;
+    Player player(model, 0.02);
+    player.Play({1, -0.5, 0, 0.25}, 0.4);
+    const double way_m = kFull_mps * (0.4 - 0.1 * (1 - std::exp(-4)));
+    const Wheels duty{1, -0.5, 0, 0.25};
+    for (size_t k = 0; k < kWheels; ++k)
+        EXPECT_NEAR(player.state.wheel_rad[k], duty[k] * way_m / model.robot.wheel_radius_m, 1e-12);
+}
+
 TEST(DriveChain, FollowsVelocityCommandsWhateverTheWheels)
 {
     for (const WheelKind wheels : {WheelKind::kMecanum, WheelKind::kOmni3, WheelKind::kNone})

@@ -114,6 +114,31 @@ const Bad kBad[] = {
     {"EffectForAnotherDrive",
      "[base]\ndrive = \"twist\"\n[[effect]]\nname = \"dead_zone\"",
      {"'dead_zone'", "duties"}},
+    {"UnknownNameInAFormula",
+     "[[effect]]\nname = \"equation\"\nformula = \"p0*omga\"",
+     {"equation.formula", "'omga'", "'omega'", "letter 4"}},
+    {"FormulaThatIsNoText", "[[effect]]\nname = \"equation\"\nformula = 3", {"text"}},
+    {"UnknownTextOfAnEffect",
+     "[[effect]]\nname = \"dead_zone\"\nformula = \"p0\"",
+     {"'formula'", "dead_zone"}},
+    {"ValueOutsideItsOwnBounds",
+     "[[effect]]\nname = \"dead_zone\"\nwidth = 0.3\nbounds = { width = [0, 0.2] }",
+     {"dead_zone.width = 0.3", "0 to 0.2"}},
+    {"BoundsOutsideTheEffects",
+     "[[effect]]\nname = \"dead_zone\"\nbounds = { width = [0, 2] }",
+     {"upper bound", "dead_zone.width = 2", "0 to 0.6"}},
+    {"BoundsTheWrongWayRound",
+     "[[effect]]\nname = \"dead_zone\"\nbounds = { width = [0.3, 0.2] }",
+     {"upper bound", "dead_zone.width = 0.2", "0.3 to 0.6"}},
+    {"BoundsOfAnUnknownParameter",
+     "[[effect]]\nname = \"dead_zone\"\nbounds = { widht = [0, 0.2] }",
+     {"'widht'", "bounds", "'width'"}},
+    {"BoundsThatAreNoPair",
+     "[[effect]]\nname = \"dead_zone\"\nbounds = { width = 0.2 }",
+     {"dead_zone.width", "[min, max]"}},
+    {"BoundsThatAreNoTable",
+     "[[effect]]\nname = \"dead_zone\"\nbounds = [0, 1]",
+     {"'bounds'", "table"}},
     {"RobotOfOneDigit", "[robots.R3]\nyaw_gain = 1", {"robots.R3", "R00 to R99"}},
     {"RobotWithALetter", "[robots.R3x]\nyaw_gain = 1", {"robots.R3x", "R00 to R99"}},
     {"RobotWithASign", "[robots.\"R+3\"]\nyaw_gain = 1", {"robots.R+3", "R00 to R99"}},
@@ -181,6 +206,32 @@ TEST(ModelFile, ReadsWhatIsThereAndLeavesTheRestAtItsDefaults)
     EXPECT_STREQ(model.effects[1].spec->card.name, "marker_offset");
     EXPECT_EQ(model.effects[1].values[1], 0.02);
     EXPECT_EQ(model.effects[1].values[0], model.effects[1].spec->parameters[0].default_value);
+}
+
+TEST(ModelFile, ReadsFormulasAndNarrowerBounds)
+{
+    Model model = Parse(
+        "[[effect]]\nname = \"equation\"\nadds_to = \"vy_mps\"\nformula = \"p0*vx\"\n"
+        "p0 = 0.5\nbounds = { p0 = [-1, 1] }");
+    EXPECT_EQ(model.effects[0].texts, (std::vector<std::string>{"vy_mps", "p0*vx"}));
+    model.Set("equation.p0", 1);
+    EXPECT_THROW(model.Set("equation.p0", 1.1), std::invalid_argument);
+    model.Set("equation.p1", 1.1);
+    Signals s;
+    s.vx_mps = 2;
+    model.effects[0].Make()->Step(s, nullptr);
+    EXPECT_EQ(s.vy_mps, 2);
+}
+
+TEST(ModelFile, AddsAnEffectWithTextsOrWithItsOwn)
+{
+    Model model;
+    model.AddEffect("equation", {{"formula", "p0*vy"}});
+    EXPECT_EQ(model.effects[0].texts, (std::vector<std::string>{"vx_mps", "p0*vy"}));
+    EXPECT_THROW(model.AddEffect("equation", {{"formula", "p0*"}}), std::invalid_argument);
+    EXPECT_THROW(model.AddEffect("equation", {{"formla", "p0"}}), std::invalid_argument);
+    EXPECT_THROW(model.AddEffect("dead_zone", {{"formula", "p0"}}), std::invalid_argument);
+    EXPECT_EQ(model.effects.size(), 1u);
 }
 
 TEST(ModelFile, TakesWholeNumbersForReals)

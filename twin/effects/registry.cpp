@@ -5,13 +5,19 @@
 namespace twin
 {
 
-extern const EffectSpec kBatterySag, kClockOffset, kCoasting, kDeadZone, kFloorTilt, kHeadingBias,
-    kInputDelay, kLagByDuty, kMarkerOffset, kMotorLag, kReverseAsymmetry, kSpeedCurve, kWheelGain;
+extern const EffectSpec kBatterySag, kCarpetGrain, kClockOffset, kClockRate, kCoasting,
+    kCoulombFriction, kDeadZone, kEquation, kFloorPatch, kFloorTilt, kGainSlope, kHeadingBias,
+    kHeatGain, kInputDelay, kLagByDuty, kLateralSlip, kMarkerOffset, kMassOffset, kMotorLag,
+    kReversalDeadTime, kReverseAsymmetry, kSlewLimit, kSpeedCurve, kSpeedSlip, kStrafeLoss,
+    kTurnAsymmetry, kWheelEccentricity, kWheelGain, kYawLever;
 
 static const EffectSpec *const kCatalogue[] = {
-    &kBatterySag,       &kClockOffset, &kCoasting,  &kDeadZone,     &kFloorTilt,
-    &kHeadingBias,      &kInputDelay,  &kLagByDuty, &kMarkerOffset, &kMotorLag,
-    &kReverseAsymmetry, &kSpeedCurve,  &kWheelGain,
+    &kBatterySag,       &kCarpetGrain,       &kClockOffset, &kClockRate,  &kCoasting,
+    &kCoulombFriction,  &kDeadZone,          &kEquation,    &kFloorPatch, &kFloorTilt,
+    &kGainSlope,        &kHeadingBias,       &kHeatGain,    &kInputDelay, &kLagByDuty,
+    &kLateralSlip,      &kMarkerOffset,      &kMassOffset,  &kMotorLag,   &kReversalDeadTime,
+    &kReverseAsymmetry, &kSlewLimit,         &kSpeedCurve,  &kSpeedSlip,  &kStrafeLoss,
+    &kTurnAsymmetry,    &kWheelEccentricity, &kWheelGain,   &kYawLever,
 };
 
 std::span<const EffectSpec *const> Catalogue()

@@ -51,12 +51,18 @@ void ForEach(Model &model, Visit visit)
         for (size_t k = 0; k < effect.values.size(); ++k)
         {
             const Parameter &p = effect.spec->parameters[k];
-            visit(prefix + p.name, Slot{&effect.values[k], p.min, p.max, p.unit});
+            const Bounds &bounds = effect.bounds[k];
+            visit(prefix + p.name, Slot{&effect.values[k], bounds.min, bounds.max, p.unit});
         }
     }
 }
 
 }  // namespace
+
+std::unique_ptr<Effect> EffectInstance::Make() const
+{
+    return texts.empty() ? spec->make(values) : spec->make_with_texts(values, texts);
+}
 
 std::vector<NamedValue> Model::Values() const
 {
@@ -97,7 +103,7 @@ void Model::Set(const std::string &name, double value)
         throw std::invalid_argument("model has no quantity '" + name + "'");
 }
 
-void Model::AddEffect(const std::string &name)
+void Model::AddEffect(const std::string &name, const std::map<std::string, std::string> &texts)
 {
     const EffectSpec *spec = FindEffect(name);
     if (!spec)
@@ -107,9 +113,23 @@ void Model::AddEffect(const std::string &name)
         throw std::invalid_argument("effect '" + name +
                                     "' acts on wheel duties, and this model's " +
                                     "robot is not driven by duties");
-    EffectInstance instance{spec, {}};
+    EffectInstance instance{spec, {}, {}, {}};
     for (const Parameter &parameter : spec->parameters)
+    {
         instance.values.push_back(parameter.neutral);
+        instance.bounds.push_back({parameter.min, parameter.max});
+    }
+    size_t used = 0;
+    for (const TextParameter &text : spec->texts)
+    {
+        const auto given = texts.find(text.name);
+        used += given != texts.end();
+        instance.texts.push_back(given != texts.end() ? given->second : text.default_value);
+    }
+    if (used != texts.size())
+        throw std::invalid_argument("effect '" + name + "' has no such text; `twinmill effects " +
+                                    name + "` lists those it has");
+    instance.Make();
     effects.push_back(instance);
 }
 

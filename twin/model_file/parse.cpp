@@ -10,6 +10,7 @@
 
 #include <toml++/toml.h>
 
+#include "effects/nearest.h"
 #include "fields.h"
 #include "model_file/model.h"
 
@@ -24,37 +25,13 @@ namespace
     throw std::invalid_argument(origin + ": " + sentence);
 }
 
-// Number of single-letter edits that turn a into b (Levenshtein 1966).
-size_t EditDistance(std::string_view a, std::string_view b)
-{
-    std::vector<size_t> row(b.size() + 1);
-    for (size_t j = 0; j <= b.size(); ++j)
-        row[j] = j;
-    for (size_t i = 1; i <= a.size(); ++i)
-    {
-        size_t diagonal = row[0];
-        row[0] = i;
-        for (size_t j = 1; j <= b.size(); ++j)
-        {
-            const size_t substituted = diagonal + (a[i - 1] != b[j - 1]);
-            diagonal = row[j];
-            row[j] = std::min({substituted, row[j] + 1, row[j - 1] + 1});
-        }
-    }
-    return row[b.size()];
-}
-
 // `what` is "key" or the like, `where` the table that holds it.
 [[noreturn]] void FailUnknown(const std::string &origin, const std::string &what,
                               std::string_view name, const std::string &where,
                               const std::set<std::string> &known)
 {
-    std::string nearest;
-    for (const std::string &other : known)
-        if (nearest.empty() || EditDistance(name, other) < EditDistance(name, nearest))
-            nearest = other;
     Fail(origin, "unknown " + what + " '" + std::string(name) + "' in " + where +
-                     "; the nearest known is '" + nearest + "'");
+                     "; the nearest known is '" + Nearest(name, known) + "'");
 }
 
 double Number(const std::string &origin, const std::string &name, const toml::node &node,
@@ -256,7 +233,7 @@ private:
             }
             try
             {
-                model_.AddEffect(name);
+                model_.AddEffect(name, ReadTexts(*table, *spec));
             }
             catch (const std::invalid_argument &error)
             {
@@ -266,23 +243,68 @@ private:
         }
     }
 
+    std::map<std::string, std::string> ReadTexts(const toml::table &table, const EffectSpec &spec)
+    {
+        std::map<std::string, std::string> texts;
+        for (const TextParameter &text : spec.texts)
+        {
+            const toml::node *node = table.get(text.name);
+            if (node && !node->is_string())
+                Fail(origin_, std::string(spec.card.name) + "." + text.name + " must be a text");
+            if (node)
+                texts[text.name] = node->value_or(std::string());
+        }
+        return texts;
+    }
+
     void ReadEffectValues(const toml::table &table, const EffectSpec &spec)
     {
-        std::set<std::string> known{"name", "std", "fitted_on", "error_before", "error_after"};
-        auto &values = model_.effects.back().values;
+        std::set<std::string> known{"name",      "std",          "bounds",
+                                    "fitted_on", "error_before", "error_after"};
+        for (const TextParameter &text : spec.texts)
+            known.insert(text.name);
+        std::set<std::string> parameters;
+        EffectInstance &effect = model_.effects.back();
         for (size_t i = 0; i < spec.parameters.size(); ++i)
         {
             const Parameter &p = spec.parameters[i];
-            known.insert(p.name);
+            const std::string name = std::string(spec.card.name) + "." + p.name;
+            parameters.insert(p.name);
+            const Bounds &bounds = effect.bounds[i] = ReadBounds(table, name, p);
             const toml::node *node = table.get(p.name);
-            values[i] = node ? Number(origin_, std::string(spec.card.name) + "." + p.name, *node,
-                                      p.min, p.max, p.unit)
-                             : p.default_value;
+            effect.values[i] = node ? Number(origin_, name, *node, bounds.min, bounds.max, p.unit)
+                                    : std::clamp(p.default_value, bounds.min, bounds.max);
         }
+        known.insert(parameters.begin(), parameters.end());
+        CheckKeys(table, known, "effect '" + std::string(spec.card.name) + "'");
+        if (const toml::table *bounds = table["bounds"].as_table())
+            CheckKeys(*bounds, parameters, "bounds of '" + std::string(spec.card.name) + "'");
+    }
+
+    void CheckKeys(const toml::table &table, const std::set<std::string> &known,
+                   const std::string &where)
+    {
         for (const auto &[key, value] : table)
             if (!known.contains(std::string(key.str())))
-                FailUnknown(origin_, "key", key.str(),
-                            "effect '" + std::string(spec.card.name) + "'", known);
+                FailUnknown(origin_, "key", key.str(), where, known);
+    }
+
+    // Of one parameter: `bounds = { width = [0, 0.2] }` narrows its own.
+    Bounds ReadBounds(const toml::table &table, const std::string &name, const Parameter &p)
+    {
+        const toml::node *node = table.get("bounds");
+        const toml::table *all = node ? node->as_table() : nullptr;
+        const toml::node *pair = all ? all->get(p.name) : nullptr;
+        if (node && !all)
+            Fail(origin_, name + ": 'bounds' must be a table such as { " + p.name + " = [0, 1] }");
+        if (!pair)
+            return {p.min, p.max};
+        const toml::array *ends = pair->as_array();
+        if (!ends || ends->size() != 2)
+            Fail(origin_, name + ": its bounds must be two numbers, [min, max]");
+        const double min =
+            Number(origin_, "lower bound of " + name, *ends->get(0), p.min, p.max, p.unit);
+        return {min, Number(origin_, "upper bound of " + name, *ends->get(1), min, p.max, p.unit)};
     }
 
     const toml::table &root_;

@@ -74,9 +74,9 @@ DriveChain::DriveChain(const Model &model)
 {
     for (const EffectInstance &instance : model.effects)
     {
-        Bound bound{instance.spec->make(instance.values), state_size_};
+        Bound bound{instance.Make(), state_size_};
         state_size_ += bound.effect->StateSize();
-        switch (instance.spec->card.stage)
+        switch (bound.effect->ActsAt(instance.spec->card))
         {
             case Stage::kDuty: duty_.push_back(std::move(bound)); break;
             case Stage::kWheel: wheel_.push_back(std::move(bound)); break;
@@ -134,6 +134,7 @@ Wheels DriveChain::DriveWheels(const Command &command, double t_s, double dt_s,
         s.dt_s = dt_s - done_s;
         s.battery_V = command.battery_V;
         s.battery_nominal_V = battery_nominal_V_;
+        s.wheel_radius_m = wheel_radius_m_;
         s.duty = command.value;
         Run(duty_, s, state);
 
@@ -141,14 +142,17 @@ Wheels DriveChain::DriveWheels(const Command &command, double t_s, double dt_s,
         s.target_mps = Target(s.duty);
         s.tau_s.fill(base_.motor_lag_s);
         s.max_decel_mps2.fill(kNoLimit);
+        s.wheel_rad = state.wheel_rad;
         Run(wheel_, s, state);
 
+        const double part = s.dt_s / dt_s, rad_per_mps = s.dt_s / wheel_radius_m_;
         for (int k = 0; k < kWheels; ++k)
         {
             const Relaxed rim =
                 Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k], s.max_decel_mps2[k], s.dt_s);
             state.rim_mps[k] = rim.end;
-            mean_mps[k] += rim.mean * (s.dt_s / dt_s);
+            state.wheel_rad[k] += rim.mean * rad_per_mps;
+            mean_mps[k] += rim.mean * s.roll[k] * part;
         }
         done_s += s.dt_s;
     }

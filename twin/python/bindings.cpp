@@ -2,6 +2,7 @@
 // twinmill_native: the catalogue, model files and short predictions for Python.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -93,6 +94,16 @@ nb::list CatalogueList()
             parameters.append(row);
         }
         entry["parameters"] = parameters;
+        nb::list texts;
+        for (const TextParameter &t : spec->texts)
+        {
+            nb::dict row;
+            row["name"] = t.name;
+            row["default"] = t.default_value;
+            row["doc"] = t.doc;
+            texts.append(row);
+        }
+        entry["texts"] = texts;
         effects.append(entry);
     }
     return effects;
@@ -176,7 +187,9 @@ NB_MODULE(twinmill_native, m)
         .def("values", &ValueList, "Every quantity: name, unit, value, min, max.")
         .def("get", &Model::Get, "name"_a)
         .def("set", &Model::Set, "name"_a, "value"_a)
-        .def("add_effect", &Model::AddEffect, "name"_a, "Appends an effect at its neutral values.")
+        .def("add_effect", &Model::AddEffect, "name"_a,
+             "texts"_a = std::map<std::string, std::string>(),
+             "Appends an effect at its neutral values; texts: its formula and the like, by name.")
         .def("remove_effect", &Model::RemoveEffect, "index"_a)
         .def("for_robot", &Model::ForRobot, "robot_id"_a)
         .def("copy", [](const Model &model) { return Model(model); })

@@ -11,6 +11,7 @@
 #include <array>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace twin
@@ -50,12 +51,15 @@ struct Signals
 
     double battery_V = 0;          // pack voltage now
     double battery_nominal_V = 0;  // pack voltage at which the base model's speeds hold
+    double wheel_radius_m = 0;     // of the base model
 
     Wheels duty{};            // kDuty: command on its way to the wheels; duty drive: -1..1
     Wheels rim_mps{};         // kWheel: rim speed at the start of the step (read only)
     Wheels target_mps{};      // kWheel: rim speed that the wheel tends to
     Wheels tau_s{};           // kWheel: time constant with which it gets there
     Wheels max_decel_mps2{};  // kWheel: limit on slowing down; infinity = none
+    Wheels wheel_rad{};       // kWheel: angle turned since the start (read only)
+    Wheels roll{1, 1, 1, 1};  // kWheel: way over the floor per way of the rim
 
     bool moves = false;                      // kGround: some wheel turns (read only)
     double x_m = 0, y_m = 0, theta_rad = 0;  // kGround: pose in W (read only); kObserve: pose seen
@@ -71,6 +75,14 @@ struct Parameter
     double neutral;        // value at which the effect does nothing, bit for bit
     double default_value;  // plausible value: where a fit starts
     double min, max;
+    const char *doc;
+};
+
+// A choice or formula of an effect: what no number can say.
+struct TextParameter
+{
+    const char *name;
+    const char *default_value;
     const char *doc;
 };
 
@@ -92,6 +104,8 @@ class Effect
 public:
     virtual ~Effect() = default;
     virtual int StateSize() const { return 0; }
+    // Where it acts: the card's stage, unless its texts say otherwise.
+    virtual Stage ActsAt(const Card &card) const { return card.stage; }
     // Acts on the signals of one step; `state` holds StateSize() doubles, zero at the start.
     virtual void Step(Signals &signals, double *state) const = 0;
     // kObserve only: from the pose seen and its time stamp back to the robot's own.
@@ -104,6 +118,11 @@ struct EffectSpec
     std::span<const Parameter> parameters;
     // `values` in the order of `parameters`, within bounds (checked by the model file).
     std::unique_ptr<Effect> (*make)(std::span<const double> values);
+    std::span<const TextParameter> texts = {};
+    // Effects with texts only: the same with `texts`, in their order; `make` takes their defaults.
+    // Throws std::invalid_argument in one sentence if a text makes no sense.
+    std::unique_ptr<Effect> (*make_with_texts)(std::span<const double> values,
+                                               std::span<const std::string> texts) = nullptr;
 };
 
 // All effects in alphabetical order.

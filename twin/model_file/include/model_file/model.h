@@ -76,10 +76,20 @@ struct Clock
     double offset_s = 0, rate_ppm = 0;
 };
 
+struct Bounds
+{
+    double min, max;
+};
+
 struct EffectInstance
 {
     const EffectSpec *spec;
-    std::vector<double> values;  // in the order of spec->parameters
+    std::vector<double> values;      // in the order of spec->parameters
+    std::vector<Bounds> bounds;      // the same; within the parameters' own
+    std::vector<std::string> texts;  // in the order of spec->texts
+
+    // Throws std::invalid_argument if a text makes no sense.
+    std::unique_ptr<Effect> Make() const;
 };
 
 // A quantity of a model under its name: "base.forward_gain", "dead_zone.width",
@@ -102,8 +112,10 @@ public:
     double Get(const std::string &name) const;
     // Throws std::invalid_argument if the name is unknown or the value out of bounds.
     void Set(const std::string &name, double value);
-    // Appends an effect at its neutral values. Throws if unknown or made for another drive.
-    void AddEffect(const std::string &name);
+    // Appends an effect at its neutral values, with these texts in place of its default ones.
+    // Throws if it or a text's name is unknown, if a text makes no sense, or if made for another
+    // drive.
+    void AddEffect(const std::string &name, const std::map<std::string, std::string> &texts = {});
     void RemoveEffect(size_t index);
     // The model of one robot: its [robots.Rnn] overrides applied.
     Model ForRobot(int robot_id) const;

@@ -22,8 +22,8 @@ public:
     explicit DriveChain(const Model &model);
 
     RobotState Start(const Pose2 &pose) const;
-    // Duty and wheel stages: advances `state.rim_mps` by `dt_s`; returns the mean rim speeds
-    // meanwhile.
+    // Duty and wheel stages: advances the wheels' speed and angle by `dt_s`; returns the mean
+    // speeds at which they roll meanwhile.
     Wheels DriveWheels(const Command &command, double t_s, double dt_s, RobotState &state) const;
     // Ground stage: the body velocity that these rim speeds give, gains, effects and, if `random`
     // is not null, drive noise included. Stores it in `state`.

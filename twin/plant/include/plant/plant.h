@@ -31,6 +31,7 @@ struct RobotState
     Pose2 pose;
     double vx_mps = 0, vy_mps = 0, omega_radps = 0;  // body frame, mean over the last step
     Wheels rim_mps{};
+    Wheels wheel_rad{};                   // angle turned since the start
     std::array<double, 3> drive_noise{};  // velocity disturbance: forward, left, turn
     std::vector<double> effect_state;
 };

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "carpet_grain",
+    .stage = Stage::kGround,
+    .drives = kAnyDrive,
+    .summary = "The robot travels faster along one line of the room than across it.",
+    .equation = "v' = v (1 + c2 cos(2 phi) + s2 sin(2 phi)), phi the direction of travel in W",
+    .leaves_out = "a difference between there and back; sideways drift across the grain",
+    .measure =
+        "the same straight drive along four headings; along one heading base.forward_gain and"
+        " base.sideways_gain look alike",
+    .reference =
+        "lowest harmonic of anisotropic friction; Zmitrowicz 1989, Mathematical descriptions "
+        "of anisotropic friction",
+};
+
+constexpr Parameter kParameters[] = {
+    {"c2", "1", 0, 0.03, -0.5, 0.5, "rise of speed along x of W, and loss along y"},
+    {"s2", "1", 0, 0.03, -0.5, 0.5, "rise of speed halfway between x and y of W, and loss across"},
+};
+
+class CarpetGrain final : public Effect
+{
+public:
+    explicit CarpetGrain(std::span<const double> v) : c2_(v[0]), s2_(v[1]) {}
+
+    void Step(Signals &s, double *) const override
+    {
+        const double squared = s.vx_mps * s.vx_mps + s.vy_mps * s.vy_mps;
+        if (squared <= 0)
+            return;
+        const double heading_rad = s.theta_rad + s.omega_radps * s.dt_s / 2;
+        const double c = std::cos(heading_rad), d = std::sin(heading_rad);
+        const double x_mps = c * s.vx_mps - d * s.vy_mps, y_mps = d * s.vx_mps + c * s.vy_mps;
+        const double cos2 = (x_mps * x_mps - y_mps * y_mps) / squared;
+        const double sin2 = 2 * x_mps * y_mps / squared;
+        const double factor = 1 + (c2_ * cos2 + s2_ * sin2);
+        s.vx_mps *= factor;
+        s.vy_mps *= factor;
+    }
+
+private:
+    double c2_, s2_;
+};
+
+}  // namespace
+
+extern const EffectSpec kCarpetGrain;
+const EffectSpec kCarpetGrain = {kCard, kParameters, Make<CarpetGrain>};
+
+}  // namespace twin

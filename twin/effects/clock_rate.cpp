@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "clock_rate",
+    .stage = Stage::kObserve,
+    .drives = kAnyDrive,
+    .summary = "Motion capture's clock runs faster than the robot's.",
+    .equation = "t' = t (1 + rate 1e-6), t since the start of the log",
+    .leaves_out = "a rate that changes, as with temperature",
+    .measure =
+        "a log of ten minutes or more with steps at both ends; on short ones clock_offset "
+        "looks alike",
+    .reference = "clock model of order one; Mills 2016, Computer Network Time Synchronization",
+};
+
+constexpr Parameter kParameters[] = {
+    {"rate_ppm", "ppm", 0, 20, -500, 500, "seconds gained on the robot's clock in a million"},
+};
+
+class ClockRate final : public Effect
+{
+public:
+    explicit ClockRate(std::span<const double> v) : rate_(1 + v[0] * 1e-6) {}
+
+    void Step(Signals &s, double *) const override { s.observed_t_s *= rate_; }
+    void Invert(Signals &s) const override { s.observed_t_s /= rate_; }
+
+private:
+    double rate_;
+};
+
+}  // namespace
+
+extern const EffectSpec kClockRate;
+const EffectSpec kClockRate = {kCard, kParameters, Make<ClockRate>};
+
+}  // namespace twin

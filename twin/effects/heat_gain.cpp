@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "heat_gain",
+    .stage = Stage::kWheel,
+    .drives = kDutyOnly,
+    .summary = "Wheels slow down as their motors get warm.",
+    .equation =
+        "v' = v (1 - loss h); 60 s dh/dt = u^2 - h, each wheel by itself, cold at the start",
+    .leaves_out = "the room's temperature, cooling by the wind of driving; a log that starts warm",
+    .measure =
+        "one continuous drive of two minutes at full duty after a rest; battery_sag looks "
+        "alike where the battery empties meanwhile",
+    .reference = "first-order thermal model; Hughes and Drury 2019, Electric Motors and Drives",
+};
+
+constexpr Parameter kParameters[] = {
+    {"loss", "1", 0, 0.06, -0.5, 0.5,
+     "relative loss of speed of a wheel that has long been at full duty"},
+};
+
+constexpr double kMemory_s = 60;
+
+class HeatGain final : public Effect
+{
+public:
+    explicit HeatGain(std::span<const double> v) : loss_(v[0]) {}
+
+    int StateSize() const override { return loss_ != 0 ? kWheels : 0; }
+
+    // `heat` approaches u^2; what counts is its mean over the step.
+    void Step(Signals &s, double *heat) const override
+    {
+        if (loss_ == 0)
+            return;
+        const double decay = std::exp(-s.dt_s / kMemory_s);
+        const double mean_part = (1 - decay) * kMemory_s / s.dt_s;
+        for (int k = 0; k < kWheels; ++k)
+        {
+            const double end = s.duty[k] * s.duty[k], gap = heat[k] - end;
+            s.target_mps[k] *= 1 - loss_ * (end + gap * mean_part);
+            heat[k] = end + gap * decay;
+        }
+    }
+
+private:
+    double loss_;
+};
+
+}  // namespace
+
+extern const EffectSpec kHeatGain;
+const EffectSpec kHeatGain = {kCard, kParameters, Make<HeatGain>};
+
+}  // namespace twin

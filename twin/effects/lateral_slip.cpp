@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "lateral_slip",
+    .stage = Stage::kGround,
+    .drives = kAnyDrive,
+    .summary = "In curves the robot slips outwards.",
+    .equation = "vx' = vx + slip omega vy, vy' = vy - slip omega vx",
+    .leaves_out = "the limit of grip; different slip along and across the wheels",
+    .measure =
+        "arcs of several speeds and radii, both ways; on arcs of one speed marker_offset "
+        "looks alike",
+    .reference =
+        "side slip proportional to the centripetal acceleration; Pacejka 2012, Tire and "
+        "Vehicle Dynamics",
+};
+
+constexpr Parameter kParameters[] = {
+    {"slip_s", "s", 0, 0.03, -0.5, 0.5, "outward speed per centripetal acceleration"},
+};
+
+class LateralSlip final : public Effect
+{
+public:
+    explicit LateralSlip(std::span<const double> v) : slip_s_(v[0]) {}
+
+    void Step(Signals &s, double *) const override
+    {
+        const double turn = slip_s_ * s.omega_radps, vx_mps = s.vx_mps;
+        s.vx_mps += turn * s.vy_mps;
+        s.vy_mps -= turn * vx_mps;
+    }
+
+private:
+    double slip_s_;
+};
+
+}  // namespace
+
+extern const EffectSpec kLateralSlip;
+const EffectSpec kLateralSlip = {kCard, kParameters, Make<LateralSlip>};
+
+}  // namespace twin

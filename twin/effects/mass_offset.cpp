@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "mass_offset",
+    .stage = Stage::kGround,
+    .drives = kAnyDrive,
+    .summary =
+        "The floor's drag acts beside the wheels' centre: turning pulls the robot along, "
+        "driving turns it.",
+    .equation =
+        "vx' = vx + y omega, vy' = vy - x omega, omega' = omega - (x vy - y vx) / (0.1 m)^2",
+    .leaves_out =
+        "inertia when starting and stopping; the floor's drag itself, which is the base "
+        "gains'",
+    .measure =
+        "turns on the spot and straight drives forward and sideways; turns alone show "
+        "marker_offset, with the sign reversed, and straight drives alone wheel_gain",
+    .reference =
+        "viscous creep of the wheels against drag at the centre of mass, to first order in "
+        "slip; creep law as in Pacejka 2012, Tire and Vehicle Dynamics",
+};
+
+constexpr Parameter kParameters[] = {
+    {"x_m", "m", 0, 0.002, -0.05, 0.05,
+     "centre of mass ahead of the wheels' centre, times the share of speed lost to slip"},
+    {"y_m", "m", 0, 0.002, -0.05, 0.05,
+     "centre of mass left of the wheels' centre, times the same share"},
+};
+
+// With which the wheels' creep resists turning.
+constexpr double kArm_m = 0.1;
+
+class MassOffset final : public Effect
+{
+public:
+    explicit MassOffset(std::span<const double> v) : x_m_(v[0]), y_m_(v[1]) {}
+
+    void Step(Signals &s, double *) const override
+    {
+        const double omega_radps = s.omega_radps;
+        s.omega_radps -= (x_m_ * s.vy_mps - y_m_ * s.vx_mps) / (kArm_m * kArm_m);
+        s.vx_mps += y_m_ * omega_radps;
+        s.vy_mps -= x_m_ * omega_radps;
+    }
+
+private:
+    double x_m_, y_m_;
+};
+
+}  // namespace
+
+extern const EffectSpec kMassOffset;
+const EffectSpec kMassOffset = {kCard, kParameters, Make<MassOffset>};
+
+}  // namespace twin

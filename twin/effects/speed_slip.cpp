@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "speed_slip",
+    .stage = Stage::kGround,
+    .drives = kAnyDrive,
+    .summary =
+        "The faster the robot travels, the larger the share of its speed that is lost to "
+        "slip.",
+    .equation = "v' = v max(0, 1 - loss |v|), v = (vx, vy)",
+    .leaves_out = "slip of wheels that turn the robot on the spot",
+    .measure =
+        "straight drives at five or more speeds, forward and sideways; on drives in one "
+        "direction speed_curve looks alike, and at one speed base.forward_gain",
+    .reference = "slip linear in speed; Wong 2008, Theory of Ground Vehicles",
+};
+
+constexpr Parameter kParameters[] = {
+    {"loss_s_per_m", "s/m", 0, 0.2, -1, 2, "relative loss of speed per speed"},
+};
+
+class SpeedSlip final : public Effect
+{
+public:
+    explicit SpeedSlip(std::span<const double> v) : loss_s_per_m_(v[0]) {}
+
+    void Step(Signals &s, double *) const override
+    {
+        const double speed_mps = std::hypot(s.vx_mps, s.vy_mps);
+        const double kept = std::max(0.0, 1 - loss_s_per_m_ * speed_mps);
+        s.vx_mps *= kept;
+        s.vy_mps *= kept;
+    }
+
+private:
+    double loss_s_per_m_;
+};
+
+}  // namespace
+
+extern const EffectSpec kSpeedSlip;
+const EffectSpec kSpeedSlip = {kCard, kParameters, Make<SpeedSlip>};
+
+}  // namespace twin

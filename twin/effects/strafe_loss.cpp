@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "strafe_loss",
+    .stage = Stage::kGround,
+    .drives = kAnyDrive,
+    .summary = "Sideways speed is lost when the robot drives forward meanwhile.",
+    .equation = "vy' = vy (1 - loss sin(2 a)^2), a the direction of travel in the robot's frame",
+    .leaves_out =
+        "loss in purely sideways motion, which is base.sideways_gain's; bumps of single "
+        "rollers",
+    .measure =
+        "drives at 30, 45 and 60 degrees to the heading; with one robot heading carpet_grain "
+        "looks alike",
+    .reference =
+        "on a diagonal two mecanum wheels stand and drag their rollers; Tlale and de Villiers"
+        " 2008, Kinematics and dynamics modelling of a mecanum wheeled mobile platform",
+};
+
+constexpr Parameter kParameters[] = {
+    {"loss", "1", 0, 0.1, -1, 1, "relative loss of sideways speed at 45 degrees"},
+};
+
+class StrafeLoss final : public Effect
+{
+public:
+    explicit StrafeLoss(std::span<const double> v) : loss_(v[0]) {}
+
+    void Step(Signals &s, double *) const override
+    {
+        const double squared = s.vx_mps * s.vx_mps + s.vy_mps * s.vy_mps;
+        if (squared <= 0)
+            return;
+        const double sin2 = 2 * s.vx_mps * s.vy_mps / squared;
+        s.vy_mps *= 1 - loss_ * sin2 * sin2;
+    }
+
+private:
+    double loss_;
+};
+
+}  // namespace
+
+extern const EffectSpec kStrafeLoss;
+const EffectSpec kStrafeLoss = {kCard, kParameters, Make<StrafeLoss>};
+
+}  // namespace twin

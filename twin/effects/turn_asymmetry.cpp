@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "turn_asymmetry",
+    .stage = Stage::kGround,
+    .drives = kAnyDrive,
+    .summary = "The robot turns faster to the left than to the right.",
+    .equation = "omega' = omega + asymmetry |omega|",
+    .leaves_out = "a turn while driving straight, which is wheel_gain's",
+    .measure =
+        "turns on the spot, both ways; turns one way show base.yaw_gain, and "
+        "reverse_asymmetry looks alike on the spot",
+    .reference =
+        "Borenstein and Feng 1996, Measurement and correction of systematic odometry errors "
+        "in mobile robots",
+};
+
+constexpr Parameter kParameters[] = {
+    {"asymmetry", "1", 0, 0.03, -0.5, 0.5, "relative rise of left turns, and loss of right ones"},
+};
+
+class TurnAsymmetry final : public Effect
+{
+public:
+    explicit TurnAsymmetry(std::span<const double> v) : asymmetry_(v[0]) {}
+
+    void Step(Signals &s, double *) const override
+    {
+        s.omega_radps += asymmetry_ * std::abs(s.omega_radps);
+    }
+
+private:
+    double asymmetry_;
+};
+
+}  // namespace
+
+extern const EffectSpec kTurnAsymmetry;
+const EffectSpec kTurnAsymmetry = {kCard, kParameters, Make<TurnAsymmetry>};
+
+}  // namespace twin

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "yaw_lever",
+    .stage = Stage::kGround,
+    .drives = kAnyDrive,
+    .summary = "The robot turns at another rate while it travels than on the spot.",
+    .equation = "omega' = omega (1 + rise |v|), v = (vx, vy)",
+    .leaves_out = "another lever at all speeds, which is base.yaw_gain's",
+    .measure = "turns on the spot and arcs of several speeds; arcs of one speed show base.yaw_gain",
+    .reference =
+        "effective lever of wheels that slip; Mandow et al. 2007, Experimental kinematics for"
+        " wheeled skid-steer mobile robots",
+};
+
+constexpr Parameter kParameters[] = {
+    {"rise_s_per_m", "s/m", 0, 0.3, -2, 2, "relative rise of the turn rate per speed of travel"},
+};
+
+class YawLever final : public Effect
+{
+public:
+    explicit YawLever(std::span<const double> v) : rise_s_per_m_(v[0]) {}
+
+    void Step(Signals &s, double *) const override
+    {
+        s.omega_radps *= 1 + rise_s_per_m_ * std::hypot(s.vx_mps, s.vy_mps);
+    }
+
+private:
+    double rise_s_per_m_;
+};
+
+}  // namespace
+
+extern const EffectSpec kYawLever;
+const EffectSpec kYawLever = {kCard, kParameters, Make<YawLever>};
+
+}  // namespace twin
