@@ -33,21 +33,41 @@ struct Relaxed
     double end, mean;
 };
 
+// exp(-dt / tau), kept for the next wheel: most often all four ask for the same.
+class Decay
+{
+public:
+    double Over(double dt_s, double tau_s)
+    {
+        if (dt_s != dt_s_ || tau_s != tau_s_)
+        {
+            dt_s_ = dt_s;
+            tau_s_ = tau_s;
+            value_ = std::exp(-dt_s / tau_s);
+        }
+        return value_;
+    }
+
+private:
+    double dt_s_ = 0, tau_s_ = 0, value_ = 1;
+};
+
 // First-order approach of `target` over `dt_s`, exact: v' = (target - v) / tau.
-Relaxed Approach(double v, double target, double tau_s, double dt_s)
+Relaxed Approach(double v, double target, double tau_s, double dt_s, Decay &decays)
 {
     if (tau_s <= 0)
         return {target, target};
-    const double decay = std::exp(-dt_s / tau_s);
+    const double decay = decays.Over(dt_s, tau_s);
     return {target + (v - target) * decay, target + (v - target) * (1 - decay) * tau_s / dt_s};
 }
 
 // The same while slowing down no faster than `max_decel_mps2`: linear first, then first-order.
-Relaxed Relax(double v, double target, double tau_s, double max_decel_mps2, double dt_s)
+Relaxed Relax(double v, double target, double tau_s, double max_decel_mps2, double dt_s,
+              Decay &decays)
 {
     const bool slows = std::abs(target) < std::abs(v) || target * v < 0;
     if (!slows || max_decel_mps2 == kNoLimit)
-        return Approach(v, target, tau_s, dt_s);
+        return Approach(v, target, tau_s, dt_s, decays);
     const double distance = std::abs(v - target) - max_decel_mps2 * tau_s;
     const double linear_s = std::clamp(distance / max_decel_mps2, 0.0, dt_s);
     const double rate = std::copysign(max_decel_mps2, target - v);
@@ -56,7 +76,7 @@ Relaxed Relax(double v, double target, double tau_s, double max_decel_mps2, doub
     const double rest_s = dt_s - linear_s;
     if (rest_s <= 0)
         return {turned, linear_mean};
-    const Relaxed rest = Approach(turned, target, tau_s, rest_s);
+    const Relaxed rest = Approach(turned, target, tau_s, rest_s, decays);
     return {rest.end, (linear_mean * linear_s + rest.mean * rest_s) / dt_s};
 }
 
@@ -127,6 +147,7 @@ Wheels DriveChain::DriveWheels(const Command &command, double t_s, double dt_s,
                                RobotState &state) const
 {
     Wheels mean_mps{};
+    Decay decays;
     for (double done_s = 0; done_s < dt_s;)
     {
         Signals s;
@@ -148,8 +169,8 @@ Wheels DriveChain::DriveWheels(const Command &command, double t_s, double dt_s,
         const double part = s.dt_s / dt_s, rad_per_mps = s.dt_s / wheel_radius_m_;
         for (int k = 0; k < kWheels; ++k)
         {
-            const Relaxed rim =
-                Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k], s.max_decel_mps2[k], s.dt_s);
+            const Relaxed rim = Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k],
+                                      s.max_decel_mps2[k], s.dt_s, decays);
             state.rim_mps[k] = rim.end;
             state.wheel_rad[k] += rim.mean * rad_per_mps;
             mean_mps[k] += rim.mean * s.roll[k] * part;
