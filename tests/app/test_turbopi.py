@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: Apache-2.0
+"""firmware/app: what the robot's program does as a whole, kill -9 included."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import lcm
+import numpy as np
+import pytest
+import turbopi
+from robot_process import GREEN, GREY, HEIGHT_PX, LEFT, RIGHT, WIDTH_PX, ZERO, Robot, wait_until
+from twinmill.tools.import_io_tsv import read_io_tsv
+
+TURBOPI = os.environ.get("TURBOPI", "")
+CORE_DUTIES = os.environ.get("CORE_DUTIES", "")
+pytestmark = pytest.mark.skipif(not TURBOPI, reason="TURBOPI does not name the program")
+
+WATCHDOG_S = 0.5
+# The machine may be busy with other tests.
+SLACK_S = 1.0
+
+
+def run(*arguments):
+    return subprocess.run([TURBOPI, *arguments], capture_output=True, text=True, timeout=60)
+
+
+@pytest.fixture
+def driving(tmp_path):
+    """A robot that sees green and turns left; it is not started again if it dies."""
+    with Robot(TURBOPI, tmp_path, "--start", "--set", "restart_ms=-1") as robot:
+        assert robot.wait_for(LEFT)
+        yield robot
+
+
+def assert_stopped_since(robot, killed_s, within_s):
+    """All that the board heard last is zero, and it came in time."""
+    rows = robot.rows()
+    last_move_s = max(t for t, duties in rows if duties != ZERO)
+    zeros_s = [t for t, duties in rows if t > last_move_s]
+    assert robot.duties() == ZERO
+    assert zeros_s[0] - killed_s < within_s
+
+
+def test_green_turns_left_and_grey_turns_right(driving):
+    driving.camera.view = GREY
+    assert driving.wait_for(RIGHT)
+    driving.camera.view = GREEN
+    assert driving.wait_for(LEFT)
+
+
+def test_kill_9_of_the_driving_process_stops_the_wheels(driving):
+    killed_s = time.monotonic()
+    os.kill(driving.children()[0], signal.SIGKILL)
+    code, said = driving.end()
+    assert_stopped_since(driving, killed_s, WATCHDOG_S)
+    assert code == 1 and "killed by signal 9" in said
+
+
+def test_hanging_process_is_killed_and_the_wheels_stop(driving):
+    stopped_s = time.monotonic()
+    os.kill(driving.children()[0], signal.SIGSTOP)
+    code, said = driving.end()
+    assert_stopped_since(driving, stopped_s, WATCHDOG_S + SLACK_S)
+    assert code == 1 and "hangs" in said
+
+
+def test_kill_9_of_the_parent_stops_the_wheels(driving):
+    killed_s = time.monotonic()
+    os.kill(driving.process.pid, signal.SIGKILL)
+    assert driving.wait_for(ZERO)
+    time.sleep(0.2)
+    assert_stopped_since(driving, killed_s, WATCHDOG_S)
+
+
+def test_stop_option_stops_what_a_double_kill_left(driving):
+    for pid in (driving.process.pid, *driving.children()):
+        os.kill(pid, signal.SIGSTOP)
+    for pid in (*driving.children(), driving.process.pid):
+        os.kill(pid, signal.SIGKILL)
+    driving.process.wait()
+    assert driving.duties() == LEFT
+    assert (
+        run("--config", "/dev/null", "--stop", "--board", f"stub:{driving.record}").returncode == 0
+    )
+    assert driving.duties() == ZERO
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_signal_stops_the_wheels_and_ends_well(driving, number):
+    killed_s = time.monotonic()
+    driving.process.send_signal(number)
+    code, _ = driving.end()
+    assert code == 0
+    assert_stopped_since(driving, killed_s, WATCHDOG_S)
+
+
+def test_dead_program_is_started_again(tmp_path):
+    with Robot(TURBOPI, tmp_path, "--start", "--set", "restart_ms=100") as robot:
+        assert robot.wait_for(LEFT)
+        first = robot.children()[0]
+        os.kill(first, signal.SIGKILL)
+        assert robot.wait_for(ZERO)
+        assert robot.wait_for(LEFT)
+        assert robot.children() not in ([], [first])
+
+
+def test_frozen_picture_stops_the_wheels_after_200_ms(driving):
+    driving.camera.view = b""
+    frozen_s = time.monotonic()
+    assert driving.wait_for(ZERO)
+    stopped_s = next(t for t, duties in driving.rows() if duties == ZERO and t > frozen_s)
+    # The last frame came at most one period earlier.
+    assert 0.2 - 0.04 < stopped_s - frozen_s < 0.2 + SLACK_S
+
+
+def test_unplugged_camera_comes_back(driving):
+    driving.camera.unplug()
+    assert driving.wait_for(ZERO)
+    driving.camera.plug()
+    assert driving.wait_for(LEFT)
+
+
+def test_script_is_played_once(tmp_path):
+    script = tmp_path / "s.csv"
+    script.write_text(
+        "t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,10,20,30,40\n0.3,-5,5,-5,5\n0.6,0,0,0,0\n"
+    )
+    with Robot(TURBOPI, tmp_path, "--start", "--script", str(script)) as robot:
+        code, _ = robot.end()
+        rows = [duties for _, duties in robot.rows()]
+    assert code == 0
+    assert [d for i, d in enumerate(rows) if i == 0 or rows[i - 1] != d] == [
+        (10, 20, 30, 40),
+        (-5, 5, -5, 5),
+        ZERO,
+    ]
+
+
+def write_frames(path: Path, seed: int, count: int):
+    """Green rectangles of sizes about the threshold of 300 pixels, with noise, on grey."""
+    rng = np.random.default_rng(seed)
+    frames = np.tile(
+        np.frombuffer(GREY, np.uint8).reshape(1, HEIGHT_PX, WIDTH_PX // 2, 4), (count, 1, 1, 1)
+    )
+    frames = frames.copy()
+    for frame in frames:
+        height, width = rng.integers(8, 24, 2)
+        frame[4 : 4 + height, 2 : 2 + width // 2] = (81, 91, 81, 81)
+        noisy = rng.random(frame.shape) < 0.02
+        frame[noisy] = rng.integers(0, 256, np.count_nonzero(noisy))
+    path.write_bytes(frames.tobytes())
+
+
+def play(tmp_path, *arguments):
+    """Plays a file of frames through the program and reads its log."""
+    frames, log = tmp_path / "frames.yuyv", tmp_path / "a.lcmlog"
+    write_frames(frames, seed=5, count=150)
+    done = run(
+        *("--config", "/dev/null", "--start", "--camera", f"stub:{frames}", "--board", "stub"),
+        *(
+            "--set",
+            "panel=none",
+            "--set",
+            f"width_px={WIDTH_PX}",
+            "--set",
+            f"height_px={HEIGHT_PX}",
+        ),
+        *("--set", "rate_Hz=100", "--set", "frame_timeout_ms=5000", "--set", "robot_id=7"),
+        *("--lcm-url", f"file://{log}?mode=w", *arguments),
+    )
+    assert done.returncode == 0, done.stderr
+    events = list(lcm.EventLog(str(log), "r"))
+    telemetry = [turbopi.telemetry_t.decode(e.data) for e in events if e.channel == "R07_TELEMETRY"]
+    runs = [turbopi.run_t.decode(e.data) for e in events if e.channel == "R07_RUN"]
+    return frames, telemetry, runs
+
+
+def test_duties_are_those_of_the_core_byte_for_byte(tmp_path):
+    frames, telemetry, _ = play(tmp_path)
+    expected = subprocess.run(
+        [CORE_DUTIES, frames, str(WIDTH_PX), str(HEIGHT_PX)],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.splitlines()
+    decided = {t.frame_seq: t for t in telemetry if t.frame_utime_us and t.mode == t.MODE_TABLE}
+    assert sorted(decided) == list(range(150))
+    assert [" ".join(map(str, decided[i].wheel_duty_pct)) for i in range(150)] == expected
+    # Both rows of the table and both bits are among them.
+    assert len(set(expected)) == 2
+    assert {t.detected_raw for t in decided.values()} == {0, 1}
+
+
+def test_telemetry_explains_itself(tmp_path):
+    _, telemetry, runs = play(tmp_path)
+    assert [t.seq for t in telemetry] == list(range(len(telemetry)))
+    for t in telemetry:
+        assert t.frame_utime_us <= t.utime_us
+        assert abs(t.utime_us / 1e6 - time.time()) < 60
+    assert telemetry[-2].battery_V == pytest.approx(8.0)
+    assert runs[0].source == "robot" and runs[0].behavior == "milling" and runs[0].robot_id == 7
+    try:
+        import tomllib
+    except ImportError:
+        pytest.skip("no tomllib")
+    config = tomllib.loads(runs[0].config_toml)
+    assert config["robot_id"] == 7 and config["rate_Hz"] == 100 and config["panel"] == "none"
+
+
+def test_io_tsv_is_read_by_the_importer(tmp_path):
+    io_tsv = tmp_path / "io.tsv"
+    _, telemetry, _ = play(tmp_path, "--io-tsv", str(io_tsv))
+    series = read_io_tsv(io_tsv, 7)
+    logged = {t.utime_us: t for t in telemetry}
+    assert len(series.utime_us) == len(telemetry)
+    moving = [t for t in telemetry if t.mode == t.MODE_TABLE]
+    rows = dict(zip(series.utime_us.tolist(), series.value.tolist(), strict=True))
+    assert len(moving) > 100 and set(rows) == set(logged)
+    # The vendor's mixing of the logged move gives the duties that the robot sent.
+    assert all(rows[t.utime_us] == list(t.wheel_duty_pct) for t in moving)
+
+
+def test_systemd_is_told(tmp_path):
+    inbox = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    inbox.bind(str(tmp_path / "notify"))
+    inbox.settimeout(10)
+    env = {"NOTIFY_SOCKET": str(tmp_path / "notify")}
+    with Robot(TURBOPI, tmp_path, "--start", env=env) as robot:
+        assert inbox.recv(100) == b"READY=1"
+        assert inbox.recv(100) == b"WATCHDOG=1"
+        robot.process.terminate()
+        assert wait_until(lambda: inbox.recv(100) == b"STOPPING=1")
+
+
+@pytest.fixture(scope="module")
+def bus_session(tmp_path_factory):
+    """What happened in a network of its own: see bus_session.py."""
+    script = Path(__file__).with_name("bus_session.py")
+    done = subprocess.run(
+        [
+            "unshare",
+            "--map-root-user",
+            "--net",
+            sys.executable,
+            script,
+            TURBOPI,
+            tmp_path_factory.mktemp("bus"),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    if "unshare" in done.stderr:
+        pytest.skip(f"no network namespace here: {done.stderr.strip()}")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_bus_commands_are_obeyed_and_acknowledged(bus_session):
+    assert bus_session["stands_before_start"]
+    assert bus_session["acks"] == [[1, 1, ""], [2, 0, "no behaviour 'dance'"], [3, 1, ""]]
+    # To the instant: the first moving duties come at most one frame and some load later.
+    assert 0 <= bus_session["start_delay_s"] < 0.033 + SLACK_S
+    assert bus_session["stopped"]
+
+
+def test_network_that_goes_away_does_not_delay_the_loop(bus_session):
+    # 30 frames a second: at 200 ms the core would have stopped the wheels.
+    assert bus_session["longest_gap_without_network_s"] < 0.2
+    assert bus_session["moved_without_network"]
+
+
+def test_telemetry_comes_back_with_the_network(bus_session):
+    assert bus_session["heard_again"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--behavior", "dance"], "must be one of"),
+        (["--set", "robot_id=100"], "0..99"),
+        (["--set", "speed=1"], "is no key"),
+        (["--config", "/nowhere.conf"], "cannot be read"),
+        (["--board", "parallel"], "must be auto, i2c, uart"),
+        (["--script", "/nowhere.csv"], "cannot be read"),
+        (["frames"], "not an option"),
+    ],
+)
+def test_mistakes_get_one_sentence(arguments, words):
+    config = [] if "--config" in arguments else ["--config", "/dev/null"]
+    done = run(*config, "--board", "stub", "--lcm-url", "", "--set", "restart_ms=-1", *arguments)
+    assert done.returncode in (1, 2)
+    assert words in done.stderr and done.stdout == ""
+
+
+def test_help_version_and_config_go_to_stdout(tmp_path):
+    assert "usage: turbopi" in run("--help").stdout
+    assert run("--version").stdout.startswith("turbopi ")
+    printed = run("--config", "/dev/null", "--set", "robot_id=42", "--print-config").stdout
+    path = tmp_path / "robot.conf"
+    path.write_text(printed)
+    assert run("--config", str(path), "--print-config").stdout == printed
+    assert "robot_id = 42" in printed
