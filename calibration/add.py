@@ -74,10 +74,13 @@ def add(
     before, after = comparison(model_file, scenes), comparison(model_file, grown)
     floors = [r.floor.rms for r in after.robots]
     held = [
-        held_out(grown, model, quantities, floors)
-        for model, quantities in ((model_file.model, []), (model_file.model, old), (richer, free))
+        held_out(clocked, model, quantities, floors)
+        for clocked, model, quantities in (
+            (scenes, model_file.model, []),
+            (scenes, model_file.model, old),
+            (grown, richer, free),
+        )
     ]
-
     for estimate in solution.estimates:
         richer.set(estimate.name, estimate.value)
     write_child(
