@@ -158,7 +158,7 @@ class System:
         """(R,) number of the 4 s block that each whitened error belongs to, over all scenes."""
         label = np.concatenate(
             [
-                np.repeat(1000 * i + s.grid.t_s[m] // BLOCK_S, 3)
+                np.repeat(1e6 * i + s.grid.t_s[m] // BLOCK_S, 3)
                 for i, (s, m) in enumerate(zip(self.scenes, self.masks, strict=True))
             ]
         )
