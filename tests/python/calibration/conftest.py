@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot that shares no code with the twin: numpy, 480 Hz Euler, a tanh curve from duty to speed.
+
+It is the outside truth of the tests here: what calibration says of its logs is compared with the
+constants that it was made with.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import lcm
+import numpy as np
+import pytest
+import turbopi
+from twinmill.calibration.measurement import Measurement, load_measurements
+from twinmill.calibration.model_file import ModelFile
+
+STEP_S = 1 / 480
+POSE_EVERY, COMMAND_EVERY = 4, 10  # 120 Hz and 48 Hz
+STANDSTILL_MPS = 1e-3
+EPOCH_US = 1_700_000_000_000_000
+LEVELS_PCT = (25, 50, 75, 100)
+
+MODEL = """
+name = "guess"
+[robot]
+wheel_radius_m = 0.0325
+half_wheelbase_m = 0.059
+half_track_m = 0.067
+body_radius_m = 0.1
+battery_nominal_V = 7.4
+[base]
+drive = "duty"
+wheels = "mecanum"
+duty_pct = [0, 25, 50, 75, 100]
+wheel_speed_mps = [0, 0.1, 0.2, 0.3, 0.4]
+motor_lag_s = 0.05
+control_period_s = 0.0208
+"""
+
+
+@dataclass(frozen=True)
+class TanhRobot:
+    """Constants of the robot.
+
+    Attributes:
+        top_mps, bend: speed at duty u is top tanh(bend u) / tanh(bend).
+        lag_s: first order; coast_mps2: drag at zero duty in its place, 0 = the lag acts there too.
+        sideways, yaw: share of ideal rolling; lever_m: half wheelbase and half track.
+        sensor_m, sensor_rad: white noise of poses.
+        drive_mps, drive_radps, memory_s: disturbance of the body's velocity, first order,
+            while a wheel turns.
+        offset_s: capture's clock less the robot's.
+    """
+
+    top_mps: float = 0.4
+    bend: float = 1.6
+    lag_s: float = 0.09
+    coast_mps2: float = 0.0
+    sideways: float = 0.88
+    yaw: float = 0.8
+    lever_m: float = 0.126
+    sensor_m: float = 3e-4
+    sensor_rad: float = 1.75e-3
+    drive_mps: float = 3e-3
+    drive_radps: float = 0.03
+    memory_s: float = 0.15
+    offset_s: float = 0.0
+
+    def speed_mps(self, duty: np.ndarray) -> np.ndarray:
+        """Steady speed of a wheel's rim."""
+        return self.top_mps * np.tanh(self.bend * duty) / np.tanh(self.bend)
+
+    def wheels_mps(self, duty: np.ndarray) -> np.ndarray:
+        """(K, 4) duties -1..1 to (K, 4) rim speeds at the end of each step."""
+        speeds, now = np.empty(duty.shape), np.zeros(4)
+        target = self.speed_mps(duty)
+        for k in range(len(duty)):
+            change = STEP_S / self.lag_s * (target[k] - now)
+            if self.coast_mps2:
+                drag = np.clip(now, -self.coast_mps2 * STEP_S, self.coast_mps2 * STEP_S)
+                change = np.where(duty[k] == 0, -drag, change)
+            now = now + change
+            speeds[k] = now
+        return speeds
+
+    def poses(self, duty: np.ndarray, seed: int) -> np.ndarray:
+        """(K, 4) duties to (K, 3) poses as seen at the end of each step."""
+        random = np.random.default_rng(seed)
+        fl, fr, rl, rr = self.wheels_mps(duty).T
+        keep = np.exp(-STEP_S / self.memory_s)
+        drift = np.zeros((len(duty), 3))
+        for k, fresh in enumerate(random.normal(size=(len(duty) - 1, 3))):
+            drift[k + 1] = keep * drift[k] + np.sqrt(1 - keep**2) * fresh
+        drift *= (self.drive_mps, self.drive_mps, self.drive_radps)
+        drift[np.abs([fl, fr, rl, rr]).max(axis=0) < STANDSTILL_MPS] = 0
+        forward = (fl + fr + rl + rr) / 4 + drift[:, 0]
+        left = self.sideways * (-fl + fr + rl - rr) / 4 + drift[:, 1]
+        turn = self.yaw * (-fl + fr - rl + rr) / 4 / self.lever_m + drift[:, 2]
+        heading = np.cumsum(turn) * STEP_S
+        c, s = np.cos(heading), np.sin(heading)
+        x, y = (np.cumsum(v) * STEP_S for v in (c * forward - s * left, s * forward + c * left))
+        noise = random.normal(size=(len(duty), 3)) * (self.sensor_m, self.sensor_m, self.sensor_rad)
+        return np.column_stack([x, y, heading]) + noise
+
+
+def rich_script(duration_s: float, seed: int, legs_s: tuple[float, float] = (0.4, 1.6)):
+    """(K, 4) duties in percent at each control step: straights, curves, strafes, rests."""
+    random = np.random.default_rng(seed)
+    count = round(duration_s / (COMMAND_EVERY * STEP_S))
+    rows: list[np.ndarray] = []
+    while len(rows) < count:
+        a, b = random.choice(LEVELS_PCT, 2) * random.choice([-1, 1], 2)
+        leg = [(a, a, a, a), (a, b, a, b), (a, -a, a, -a), (-a, a, a, -a), (0, 0, 0, 0)]
+        length = round(random.uniform(*legs_s) / (COMMAND_EVERY * STEP_S))
+        rows += [np.array(leg[random.integers(len(leg))])] * length
+    return np.array(rows[:count])
+
+
+def write_run(
+    path: Path, robot: TanhRobot, script_pct: np.ndarray, seed: int, spoil: Callable | None = None
+) -> Path:
+    """Drives the robot by a script and writes its log; `spoil` may change (N, 3) poses, (N,) valid.
+
+    Commands start half a second before the first and end after the last pose.
+    """
+    still = np.zeros((24, 4), int)
+    script_pct = np.vstack([still, script_pct, still])
+    pose = robot.poses(np.repeat(script_pct, COMMAND_EVERY, axis=0) / 100, seed)
+    pose = pose[POSE_EVERY - 1 :: POSE_EVERY]
+    pose_us = np.rint(1e6 * (np.arange(1, len(pose) + 1) * POSE_EVERY * STEP_S + robot.offset_s))
+    command_us = np.rint(1e6 * np.arange(len(script_pct)) * COMMAND_EVERY * STEP_S)
+    valid = np.ones(len(pose), bool)
+    if spoil:
+        pose, valid = spoil(pose, valid)
+    log = lcm.EventLog(str(path), "w", overwrite=True)
+    for k, (t_us, duty) in enumerate(zip(command_us, script_pct, strict=True)):
+        message = turbopi.telemetry_t()
+        message.utime_us, message.seq, message.robot_id = EPOCH_US + int(t_us), k, 3
+        message.wheel_duty_pct, message.battery_V, message.mode = [int(d) for d in duty], 7.4, 2
+        log.write_event(message.utime_us, "R03_TELEMETRY", message.encode())
+    for k, (t_us, (x_m, y_m, theta_rad)) in enumerate(zip(pose_us, pose, strict=True)):
+        message = turbopi.pose_t()
+        message.utime_us, message.seq, message.robot_id = EPOCH_US + int(t_us), k, 3
+        message.position_m, message.valid = [x_m, y_m, 0.1], int(valid[k])
+        message.orientation_wxyz = [np.cos(theta_rad / 2), 0, 0, np.sin(theta_rad / 2)]
+        log.write_event(message.utime_us, "R03_POSE", message.encode())
+    log.close()
+    return path
+
+
+@pytest.fixture(scope="session")
+def run_log(tmp_path_factory) -> Callable[..., Path]:
+    """Writes a log of a TanhRobot that drives a rich script (or another one)."""
+
+    def make(robot=None, seed=1, duration_s=40.0, script_pct=None, spoil=None) -> Path:
+        script_pct = rich_script(duration_s, seed) if script_pct is None else script_pct
+        path = tmp_path_factory.mktemp("run") / "run.lcmlog"
+        return write_run(path, robot or TanhRobot(), script_pct, seed, spoil)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def measure(run_log) -> Callable[..., Measurement]:
+    """The same, read and cleaned."""
+
+    def make(*arguments, **options) -> Measurement:
+        (measurement,) = load_measurements([run_log(*arguments, **options)])
+        return measurement
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def tanh_robot() -> type[TanhRobot]:
+    """The robot's class: its constants are the truth."""
+    return TanhRobot
+
+
+@pytest.fixture(scope="session")
+def model_file(tmp_path_factory) -> Callable[..., ModelFile]:
+    """A model of the robot: all speeds, gains and lags guessed, but for the text put in."""
+
+    def make(*changes: tuple[str, str], extra: str = "", name: str = "guess.toml") -> ModelFile:
+        text = MODEL
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        path = tmp_path_factory.mktemp("model") / name
+        path.write_text(text + extra)
+        return ModelFile.load(str(path))
+
+    return make
