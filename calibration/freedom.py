@@ -80,6 +80,7 @@ def base_quantities(model: native.Model, told: Collection[str]) -> list[Free]:
 def effect_quantities(model: native.Model, fresh: str | None = None) -> list[Free]:
     """Free quantities of a model's effects; those of `fresh` begin at their defaults."""
     entries = catalogue()
+    bounds = {v["name"]: (v["min"], v["max"]) for v in model.values()}
     free = []
     for instance in effect_names(model):
         for p in entries[instance.split("#")[0]]["parameters"]:
@@ -91,8 +92,7 @@ def effect_quantities(model: native.Model, fresh: str | None = None) -> list[Fre
                     name,
                     p["unit"],
                     p["neutral"] if is_fresh else model.get(name),
-                    p["min"],
-                    p["max"],
+                    *bounds[name],
                     EFFECT_PRIOR * reach,
                     min(STEP * reach, 0.05 * max(abs(p["default"]), 1e-6)),
                     p["default"] if is_fresh else None,

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 from twinmill.tools import calibrate, diagnose, effects, import_log
+from twinmill.tools.challenge import run as challenge
 
 app = typer.Typer(
     add_completion=False,
@@ -16,6 +17,7 @@ app = typer.Typer(
 import_log.register(app)
 calibrate.register(app)
 diagnose.register(app)
+challenge.register(app)
 effects.register(app)
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects that a model could lack, and how the errors change with each of their parameters."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,16 +61,23 @@ def _instance(model: native.Model, effect: str) -> str:
     return effect if count == 1 else f"{effect}#{count}"
 
 
-def candidates(scenes: list[Scene]) -> tuple[list[Candidate], list[str]]:
-    """Candidates for the scenes' model, and effects that leave no trace in these logs."""
+def candidates(
+    scenes: list[Scene], barred: Collection[str] = ()
+) -> tuple[list[Candidate], list[str]]:
+    """Candidates for the scenes' model, and effects that leave no trace in these logs.
+
+    Args:
+        scenes: measurements with their models.
+        barred: effects that are not to be thought of.
+    """
     model = scenes[0].model
     found, blind = [], []
     for name, entry in catalogue().items():
-        if name in model.effects or entry["stage"] not in STAGES:
+        if name in model.effects or name in barred or entry["stage"] not in STAGES:
             continue
         if entry["duty_only"] and model.drive != "duty":
             continue
-        if not entry["parameters"]:
+        if entry["texts"]:  # a formula is the user's own, and no candidate
             continue
         candidate, energy = _best_columns(scenes, entry)
         if np.any(energy > BLIND):

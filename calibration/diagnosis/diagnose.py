@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names what a model lacks, says so when nothing is missing, and when the log cannot tell."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,6 +85,7 @@ def diagnose(
     measurements: list[Measurement],
     model_file: ModelFile,
     say: Callable[[str], None] = lambda _: None,
+    barred: Collection[str] = (),
 ) -> Diagnosis:
     """Diagnoses all measurements with one model.
 
@@ -92,6 +93,7 @@ def diagnose(
         measurements: one robot, or several of a kind.
         model_file: the model; what other logs told of it is held, its gains are refitted.
         say: told in words what is being done.
+        barred: effects that are not to be thought of.
     """
     say("refitting the base")
     told = model_file.told_by_others([m.log_sha256 for m in measurements])
@@ -101,7 +103,7 @@ def diagnose(
     scenes = [s.with_model(model_file.model) for s in given]
     refit(scenes, base + known)
     floors = [measure_floor(s, Windows.of(s.measurement.track)).rms for s in scenes]
-    done, final = search(State(scenes, base, floors), say)
+    done, final = search(State(scenes, base, floors), say, barred)
     for earlier in (given, scenes):
         share_noise(final.scenes, earlier)
     before, fitted = comparison(model_file, given), comparison(model_file, scenes)

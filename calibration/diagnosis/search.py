@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Searches for missing effects: one at a time, then pairs; drops what later ones replace."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -45,17 +45,20 @@ class Search:
     dropped: list[str] = field(default_factory=list)
 
 
-def search(state: State, say: Callable[[str], None]) -> tuple[Search, State]:
+def search(
+    state: State, say: Callable[[str], None], barred: Collection[str] = ()
+) -> tuple[Search, State]:
     """Adds effects until none is worth it.
 
     Args:
         state: the refitted base.
         say: told in words what is being done.
+        barred: effects that are not to be thought of.
     """
     done = Search()
     for number in range(MOST):
         say(f"round {number + 1}: screening the catalogue")
-        found, blind = candidates(state.scenes)
+        found, blind = candidates(state.scenes, barred)
         done.blind = blind if number == 0 else done.blind
         screening = screen(state.scenes, state.free, found)
         before = attempt(state, ())
