@@ -24,8 +24,8 @@ class Script
 {
 public:
     // Reads CSV with the header t_s,speed_input,turn_input or t_s,fl_pct,fr_pct,rl_pct,rr_pct.
-    // Times must rise, values be in range; speed and duties are rounded to whole percent, turn to
-    // thousandths. Throws std::invalid_argument in one sentence.
+    // The core parses it, as on the robot: see fw/script.h. Throws std::invalid_argument in one
+    // sentence.
     static Script Load(const std::string &path);
 
     bool has_duties() const { return has_duties_; }
