@@ -210,6 +210,7 @@ int supervise(const struct options *options, worker_fn *run)
             break;
         }
         notify("READY=1");
+        notify("WATCHDOG=1");
         const bool asked = watch(&worker, stop_fd, options->config.watchdog_ms);
         if (asked)
         {
