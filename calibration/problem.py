@@ -7,6 +7,7 @@ import numpy as np
 import twinmill_native as native
 from twinmill.calibration.clock import estimate_offset
 from twinmill.calibration.flexible import unexplained
+from twinmill.calibration.log import LogError
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.noise import Noise, fit_noise
 from twinmill.calibration.residual import StepGrid
@@ -61,8 +62,15 @@ class Scene:
         return np.any(command_at(t_s, track.command_t_s, track.command) != 0, axis=1)
 
     def _own_noise(self) -> Noise:
-        """Noise of the log, whatever the model: what no response to the commands explains."""
-        errors = unexplained(self.measurement, self.grid, self.model.get(CLOCK))
+        """Noise of the log, whatever the model: what no response to the commands explains.
+
+        By the log's own clock: with a wrong one from elsewhere all motion would count as noise.
+        """
+        try:
+            offset_s = estimate_offset(self.measurement.track).offset_s
+        except LogError:
+            offset_s = self.model.get(CLOCK)
+        errors = unexplained(self.measurement, self.grid, offset_s)
         return fit_noise(errors, self._moving(), self.grid)
 
     def whitened(self, names: list[str], rows: np.ndarray) -> np.ndarray:
