@@ -73,6 +73,18 @@ def test_logs_with_one_clock_share_its_offset(tanh_robot, measure, model_file, t
     assert ModelFile.load(str(tmp_path / "m.toml")).model.clock_known
 
 
+def test_a_clock_that_is_not_the_logs_is_no_noise(tanh_robot, measure, fitted):
+    """The fitted model keeps its clock; a log that is 0.1 s off must not look as good as its own.
+
+    At 0.1 s and 0.4 m/s that is up to 40 mm, a hundred times the sensor's noise.
+    """
+    run = measure(tanh_robot(offset_s=OFFSET_S - 0.1), 91, 30.0)
+    found = compare([run], ModelFile.load(str(fitted.path)))
+    assert found.score > 3
+    noise = found.robots[0].scene.noise
+    assert noise.position.sensor == pytest.approx(tanh_robot().sensor_m, rel=0.1)
+
+
 @pytest.fixture(scope="module")
 def coasting(tanh_robot, measure, fitted, tmp_path_factory):
     """The same robot rolls on at zero duty with 0.7 m/s^2, in a log of its own."""
