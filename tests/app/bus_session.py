@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commands over a real multicast bus, in a network namespace of its own that may be broken.
 
-Usage: bus_session.py PROGRAM FOLDER, as root of the namespace. Prints what happened as JSON.
+Usage: bus_session.py FOLDER PROGRAM..., as root of the namespace. Prints what happened as JSON.
 """
 
 import itertools
@@ -63,7 +63,7 @@ class Operator:
                 return
 
 
-def main(program: str, folder: Path) -> dict:
+def main(folder: Path, program: list[str]) -> dict:
     network(up=True)
     result = {}
     command = turbopi.swarm_command_t
@@ -100,4 +100,4 @@ def main(program: str, folder: Path) -> dict:
 
 
 if __name__ == "__main__":
-    print(json.dumps(main(sys.argv[1], Path(sys.argv[2]))))
+    print(json.dumps(main(Path(sys.argv[1]), sys.argv[2:])))

@@ -68,11 +68,11 @@ class Camera:
 class Robot:
     """The running program. As a context it is killed at the end, if it still lives."""
 
-    def __init__(self, program: str, folder: Path, *arguments: str, env: dict | None = None):
+    def __init__(self, program: list[str], folder: Path, *arguments: str, env: dict | None = None):
         self.record = folder / "board.csv"
         self.camera = Camera(folder / "camera")
         command = [
-            program,
+            *program,
             *("--config", "/dev/null", "--camera", f"stub:unix:{folder}/camera"),
             *("--board", f"stub:{self.record}", "--lcm-url", "", "--set", "panel=none"),
             *("--set", f"width_px={WIDTH_PX}", "--set", f"height_px={HEIGHT_PX}"),

@@ -3,6 +3,7 @@
 
 import json
 import os
+import shlex
 import signal
 import socket
 import subprocess
@@ -17,8 +18,9 @@ import turbopi
 from robot_process import GREEN, GREY, HEIGHT_PX, LEFT, RIGHT, WIDTH_PX, ZERO, Robot, wait_until
 from twinmill.tools.import_io_tsv import read_io_tsv
 
-TURBOPI = os.environ.get("TURBOPI", "")
-CORE_DUTIES = os.environ.get("CORE_DUTIES", "")
+# Programs of another machine are run by an emulator, whose command comes first.
+TURBOPI = shlex.split(os.environ.get("TURBOPI", ""))
+CORE_DUTIES = shlex.split(os.environ.get("CORE_DUTIES", ""))
 pytestmark = pytest.mark.skipif(not TURBOPI, reason="TURBOPI does not name the program")
 
 WATCHDOG_S = 0.5
@@ -27,7 +29,7 @@ SLACK_S = 1.0
 
 
 def run(*arguments):
-    return subprocess.run([TURBOPI, *arguments], capture_output=True, text=True, timeout=60)
+    return subprocess.run([*TURBOPI, *arguments], capture_output=True, text=True, timeout=60)
 
 
 @pytest.fixture
@@ -184,7 +186,7 @@ def play(tmp_path, *arguments):
 def test_duties_are_those_of_the_core_byte_for_byte(tmp_path):
     frames, telemetry, _ = play(tmp_path)
     expected = subprocess.run(
-        [CORE_DUTIES, frames, str(WIDTH_PX), str(HEIGHT_PX)],
+        [*CORE_DUTIES, frames, str(WIDTH_PX), str(HEIGHT_PX)],
         capture_output=True,
         text=True,
         check=True,
@@ -249,8 +251,8 @@ def bus_session(tmp_path_factory):
             "--net",
             sys.executable,
             script,
-            TURBOPI,
             tmp_path_factory.mktemp("bus"),
+            *TURBOPI,
         ],
         capture_output=True,
         text=True,
