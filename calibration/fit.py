@@ -10,7 +10,7 @@ from twinmill.calibration.compare import Comparison, comparison, open_scenes
 from twinmill.calibration.freedom import Free, base_quantities, effect_quantities
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import Fitted, ModelFile, write_child
-from twinmill.calibration.problem import CLOCK, Scene
+from twinmill.calibration.problem import CLOCK, CLOCK_RATE, Scene
 from twinmill.calibration.solve import Estimate, Solution, excited, solve
 
 AGREE_SIGMA = 5.0  # clock offsets of several logs that differ by less are one
@@ -99,7 +99,7 @@ def fit(
         out,
         command,
     )
-    return FitResult(before, after, solution.estimates, clock, Path(out))
+    return FitResult(before, after, solution.estimates, clock.get(CLOCK), Path(out))
 
 
 def fitted_model(model_file: ModelFile, estimates: list[Estimate]) -> native.Model:
@@ -110,14 +110,18 @@ def fitted_model(model_file: ModelFile, estimates: list[Estimate]) -> native.Mod
     return model
 
 
-def common_clock(solution: Solution) -> Estimate | None:
-    """The clock offset that the logs share; None if they have different ones, or it was known."""
-    clocks = [c for c in solution.clocks if c is not None]
-    if not clocks or len(clocks) < len(solution.clocks):
-        return None
-    values, stds = np.array([c.value for c in clocks]), np.array([c.std for c in clocks])
-    weights = 1 / stds**2
-    mean = float(np.sum(weights * values) / weights.sum())
-    if np.any(np.abs(values - mean) > AGREE_SIGMA * np.hypot(stds, 0.001)):
-        return None
-    return Estimate(CLOCK, mean, float(1 / np.sqrt(weights.sum())), "s", False, True)
+def common_clock(solution: Solution) -> dict[str, Estimate]:
+    """Offset and rate that the logs share; empty if they differ, or were known before."""
+    if not all(solution.clocks):
+        return {}
+    common = {}
+    for name, least in ((CLOCK, 0.001), (CLOCK_RATE, 5.0)):
+        values = np.array([c[name].value for c in solution.clocks])
+        stds = np.array([c[name].std for c in solution.clocks])
+        weights = 1 / stds**2
+        mean = float(np.sum(weights * values) / weights.sum())
+        if np.any(np.abs(values - mean) > AGREE_SIGMA * np.hypot(stds, least)):
+            return {}
+        unit = solution.clocks[0][name].unit
+        common[name] = Estimate(name, mean, float(1 / np.sqrt(weights.sum())), unit, False, True)
+    return common

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Collection
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import tomlkit
@@ -77,7 +77,7 @@ class Fitted:
         logs: sha256 of the logs fitted on, by name.
         score_before, score_after: on those logs.
         noise: of the first log, or None to leave the old.
-        clock: the offset that the logs share, or None if they do not agree on one.
+        clock: offset and rate that the logs share, by name; empty if they do not agree.
         base_told: the base was held near what other logs told; they keep the credit.
     """
 
@@ -87,7 +87,7 @@ class Fitted:
     score_before: float
     score_after: float
     noise: Noise | None = None
-    clock: Estimate | None = None
+    clock: dict[str, Estimate] = field(default_factory=dict)
     base_told: bool = False
 
 
@@ -107,8 +107,9 @@ def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> 
         section.update({k: _short(v) for k, v in fitted.noise.to_json().items()})
     if fitted.clock:
         section = document.setdefault("clock", tomlkit.table())
-        section["offset_s"] = _short(fitted.clock.value)
-        section["std"] = {"offset_s": _short(fitted.clock.std)}
+        clock = {name.removeprefix("clock."): e for name, e in fitted.clock.items()}
+        section.update({key: _short(e.value) for key, e in clock.items()})
+        section["std"] = {key: _short(e.std) for key, e in clock.items()}
         section["fitted_on"] = list(fitted.logs.values())
     document["fit"] = {
         "logs": list(fitted.logs),

@@ -13,7 +13,7 @@ from twinmill.calibration.noise import Noise, fit_noise
 from twinmill.calibration.residual import StepGrid
 from twinmill.calibration.track import command_at
 
-CLOCK = "clock.offset_s"
+CLOCK, CLOCK_RATE = "clock.offset_s", "clock.rate_ppm"
 
 
 @dataclass
@@ -40,7 +40,8 @@ class Scene:
     def with_model(self, model: native.Model) -> "Scene":
         """The same measurement, clock and noise with another model."""
         model = model.for_robot(self.measurement.track.robot_id)
-        model.set(CLOCK, self.model.get(CLOCK))
+        for name in (CLOCK, CLOCK_RATE):
+            model.set(name, self.model.get(name))
         return replace(self, model=model)
 
     def errors(self) -> np.ndarray:

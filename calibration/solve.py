@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 from twinmill.calibration.freedom import Free
-from twinmill.calibration.problem import CLOCK, Scene
+from twinmill.calibration.problem import CLOCK, CLOCK_RATE, Scene
 
 HUBER_SIGMA = 3.5
 BLOCK_S = 4.0  # errors of one block may hang together; blocks do not
 SEEN = 0.5  # times the prior's width: a wider estimate is the prior's, not the log's
+RATE_PRIOR_PPM = 30.0  # of ordinary crystals against each other
 AT_BOUND = 0.01  # share of the range that counts as at the bound
 
 
@@ -32,10 +33,13 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Solution:
-    """Result of a fit: estimates of the shared quantities, clock offsets by measurement, chi2."""
+    """Result of a fit: estimates of the shared quantities, clocks by measurement, chi2.
+
+    A clock is its offset and rate by name; empty where it was not free.
+    """
 
     estimates: list[Estimate]
-    clocks: list[Estimate | None]
+    clocks: list[dict[str, Estimate]]
     chi2: float
 
 
@@ -48,7 +52,7 @@ def solve(
     """Fits, and leaves the values in the scenes' models.
 
     Args:
-        scenes: measurements; each with a free clock gets an offset of its own.
+        scenes: measurements; each with a free clock gets an offset and a rate of its own.
         free: quantities shared by all.
         masks: (S,) bool per scene: the steps to fit on; all if None.
         rounds: at most so many evaluations.
@@ -78,6 +82,15 @@ def excited(scenes: list[Scene], base: list[Free], others: list[Free]) -> list[F
     return [f for f, s in zip(base, std, strict=False) if s < SEEN * f.prior_std]
 
 
+def _clock_quantities(scene: Scene) -> list[Free]:
+    """Offset and rate of one measurement's clock."""
+    offset_s, rate_ppm = scene.model.get(CLOCK), scene.model.get(CLOCK_RATE)
+    return [
+        Free(CLOCK, "s", offset_s, offset_s - 0.3, offset_s + 0.3, 0.3, 0.002),
+        Free(CLOCK_RATE, "ppm", 0.0, -500.0, 500.0, RATE_PRIOR_PPM, 5.0, rate_ppm),
+    ]
+
+
 class System:
     """The stacked residuals of all scenes, and a prior row for each unknown."""
 
@@ -91,9 +104,8 @@ class System:
         for scene in scenes:
             own = list(range(len(free)))
             if scene.clock_free:
-                own.append(len(unknowns))
-                now = scene.model.get(CLOCK)
-                unknowns.append(Free(CLOCK, "s", now, now - 0.3, now + 0.3, 0.3, 0.002))
+                own += [len(unknowns), len(unknowns) + 1]
+                unknowns += _clock_quantities(scene)
             self.columns.append(own)
         self.unknowns = unknowns
         self.low, self.high, self.step, self.prior, centre = (
@@ -138,7 +150,7 @@ class System:
         std = self._standard_errors(self.jacobian(x), residual)
         estimates = [self._estimate(u, x[p], std[p]) for p, u in enumerate(self.unknowns)]
         shared = len(self.free)
-        clocks = [estimates[own[-1]] if len(own) > shared else None for own in self.columns]
+        clocks = [{estimates[c].name: estimates[c] for c in own[shared:]} for own in self.columns]
         data = np.clip(residual[: -len(x)], -HUBER_SIGMA, HUBER_SIGMA)
         return Solution(estimates[:shared], clocks, float(np.mean(data**2)))
 

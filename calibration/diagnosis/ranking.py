@@ -71,7 +71,8 @@ def _entries(
     judged: Judged, this: Round, explainable: float, floors: list[np.ndarray], group: int | None
 ) -> list[Ranked]:
     trial = judged.trial
-    share = (this.before.chi2 - trial.chi2) / max(explainable, 1e-9)
+    gain = max(this.before.chi2 - trial.chi2, 0.0)
+    share = gain / max(explainable, gain, 1e-9)
     entries = []
     for effect in trial.effects:
         own = [e for e in trial.estimates if e.name.split(".")[0].split("#")[0] == effect]

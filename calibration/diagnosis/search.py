@@ -15,6 +15,7 @@ ALPHA = 0.01  # chance of accepting anything if nothing is missing, over all can
 TRIED, PAIRED = 6, 8
 CLOSE = 1.02  # held-out scores whose ratio is nearer to 1 are decided by chi2
 MOST = 4
+WORTH = 0.998  # an effect must lower the held-out score below this share: certain is not important
 
 
 @dataclass(frozen=True)
@@ -68,12 +69,12 @@ def search(
         for i in _promising(screening, limit)[:TRIED]:
             say(f"round {number + 1}: trying {screening.found[i].candidate.effect}")
             this.judged.append(_judge(state, before, screening, (i,)))
-        this.accepted = _best(this.judged, limit)
+        this.accepted = _best(before, this.judged, limit)
         if this.accepted is None:
             say(f"round {number + 1}: trying pairs")
             for pair in _pairs(screening, 2 * limit)[:2]:
                 this.judged.append(_judge(state, before, screening, pair))
-            this.accepted = _best(this.judged, limit + np.log(len(found)))
+            this.accepted = _best(before, this.judged, limit + np.log(len(found)))
         this.judged.sort(key=lambda j: j.trial.score)
         if this.accepted is None:
             break
@@ -96,9 +97,9 @@ def _judge(state: State, before: Trial, screening: Screening, which: tuple[int, 
     return Judged(trial, evidence, min(f.p_value for f in found))
 
 
-def _best(judged: list[Judged], limit: float) -> Judged | None:
-    """Of those with enough evidence the one with the smallest held-out error."""
-    good = [j for j in judged if j.evidence > limit]
+def _best(before: Trial, judged: list[Judged], limit: float) -> Judged | None:
+    """Of those with enough evidence, and that matter, the one with the smallest held-out error."""
+    good = [j for j in judged if j.evidence > limit and j.trial.score < WORTH * before.score]
     if not good:
         return None
     smallest = min(j.trial.score for j in good)

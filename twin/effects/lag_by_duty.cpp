@@ -32,8 +32,9 @@ public:
     void Step(Signals &s, double *) const override
     {
         for (int k = 0; k < kWheels; ++k)
-            s.tau_s[k] =
-                std::max(0.0, s.tau_s[k] + extra_s_ * std::max(0.0, 1 - std::abs(s.duty[k])));
+            if (!Rolls(s, k))
+                s.tau_s[k] =
+                    std::max(0.0, s.tau_s[k] + extra_s_ * std::max(0.0, 1 - std::abs(s.duty[k])));
     }
 
 private:

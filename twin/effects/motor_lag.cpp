@@ -30,8 +30,9 @@ public:
 
     void Step(Signals &s, double *) const override
     {
-        for (double &tau : s.tau_s)
-            tau = std::max(0.0, tau + extra_s_);
+        for (int k = 0; k < kWheels; ++k)
+            if (!Rolls(s, k))
+                s.tau_s[k] = std::max(0.0, s.tau_s[k] + extra_s_);
     }
 
 private:
