@@ -72,8 +72,9 @@ def _compare(
 ) -> Comparison:
     """Tell how well a model predicts logs, against the log's own noise, and where it fails.
 
-    Predictions start from measured poses and are judged 0.1, 0.2, 0.5, 1 and 2 s later. A score
-    of 1.0 is as good as the log can tell; above 1.3 something is missing.
+    Predictions start from measured poses and are judged 0.1, 0.2, 0.5, 1 and
+    2 s later. A score of 1.0 is as good as the log can tell; above 1.3
+    something is missing.
 
     Example: twinmill compare run.lcmlog --model turbopi.toml --out report
     """

@@ -19,7 +19,7 @@ def find_effect(name: str) -> dict:
     entries = catalogue()
     if name in entries:
         return entries[name]
-    near = get_close_matches(name, entries, n=1, cutoff=0.4)
+    near = get_close_matches(name, entries, n=1, cutoff=0.6)
     hint = f"did you mean {near[0]}?" if near else "`twinmill effects` lists them all."
     raise ValueError(f"effect '{name}': not in the catalogue; {hint}")
 

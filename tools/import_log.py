@@ -15,13 +15,15 @@ import numpy as np
 import tomlkit
 import typer
 from rich.console import Console
-from rich.table import Table
+from twinmill.calibration import show
 from twinmill.calibration.log import Log, LogError, read_log
+from twinmill.calibration.tables import Cell, Table
 from twinmill.calibration.track import make_track
 from twinmill.tools.import_io_tsv import read_io_tsv
 from twinmill.tools.import_motive import read_motive
 from twinmill.tools.import_plain import read_commands, read_poses
 from twinmill.tools.log_writer import write_log
+from twinmill.tools.output import check_new_file
 from twinmill.tools.series import CommandSeries, PoseSeries, multiply
 
 LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
@@ -173,14 +175,8 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
 @contextmanager
 def _replacing(out: Path, force: bool) -> Iterator[Path]:
     """A temporary file beside `out` that takes its place if the block succeeds."""
-    if out.exists() and not force:
-        raise LogError(f"{out}: exists; choose another name, or replace it with --force.")
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{out.name}.", dir=out.parent)
-    except OSError as error:
-        raise LogError(
-            f"{out}: cannot be written ({error.strerror}); choose another place."
-        ) from error
+    check_new_file(out, force)
+    handle, name = tempfile.mkstemp(prefix=f".{out.name}.", dir=out.parent)
     os.close(handle)
     try:
         yield Path(name)
@@ -276,8 +272,8 @@ def _command(
 ) -> None:
     """Make a log from motion capture exports and command tables.
 
-    Files may end in .gz. A Motive export that goes with io.tsv is placed in time by its capture
-    start, read as UTC; use --pose-shift-s for another time zone.
+    Files may end in .gz. A Motive export that goes with io.tsv is placed in time
+    by its capture start, read as UTC; use --pose-shift-s for another time zone.
 
     Example: twinmill import --poses poses.csv --commands commands.csv -o run.lcmlog
     """
@@ -299,8 +295,8 @@ def _command(
         summary = import_log(
             poses, commands, out, motive=motive, io_tsv=tuple(io_tsv or ()), options=options
         )
-    except LogError as error:
-        typer.echo(f"twinmill import: {error}", err=True)
+    except ValueError as error:
+        typer.echo(f"twinmill: {error}", err=True)
         raise typer.Exit(1) from error
     if as_json:
         typer.echo(json.dumps(summary))
@@ -323,15 +319,17 @@ def _number(text: str) -> int:
 
 def _print(summary: dict) -> None:
     table = Table(
-        title=f"{summary['out']}: {summary['messages']} messages, {summary['duration_s']:.1f} s"
+        f"{summary['out']}: {summary['messages']} messages, {summary['duration_s']:.1f} s",
+        ["robot", "driven by", "commands", "poses", "of them valid"],
+        [
+            [Cell("-" if value is None else str(value)) for value in robot.values()]
+            for robot in summary["robots"]
+        ],
+        words=(1,),
     )
-    for column in ("robot", "driven by", "commands", "poses", "of them valid"):
-        table.add_column(column, justify="right")
-    for robot in summary["robots"]:
-        table.add_row(*(str(value) for value in robot.values()))
     console = Console()
-    console.print(table)
+    console.print(show.table(table))
     for text in summary["warnings"][:SHOWN]:
-        console.print(text, markup=False)
+        console.print(f"! {text}", style="yellow", markup=False)
     if len(summary["warnings"]) > SHOWN:
         console.print(f"and {len(summary['warnings']) - SHOWN} more (--json has all).")

@@ -63,6 +63,8 @@ def check_new_file(path: Path, force: bool) -> None:
     """Raises ValueError if a file could not be written here; tried before the long work."""
     if path.is_dir():
         raise ValueError(f"{path}: is a folder; name a file in it.")
+    if path.exists() and not path.is_file():
+        raise ValueError(f"{path}: is a device, not a file; choose another name.")
     if path.exists() and not force:
         raise ValueError(f"{path}: exists; choose another name, or replace it with --force.")
     _check_folder(path, path.parent)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import gzip
 import json
+from pathlib import Path
 
 import lcm
 import numpy as np
@@ -152,10 +153,12 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(put, tmp_path, poses, 
 
 def test_existing_and_unwritable_outputs_are_refused(put, tmp_path):
     poses, commands = put("p.csv", POSES), put("c.csv", COMMANDS)
-    with pytest.raises(LogError, match=r"exists; .* --force"):
+    with pytest.raises(ValueError, match=r"exists; .* --force"):
         import_log(poses, commands, commands)
-    with pytest.raises(LogError, match=r"o\.lcmlog: cannot be written"):
+    with pytest.raises(ValueError, match=r"o\.lcmlog: cannot be written"):
         import_log(poses, commands, tmp_path / "none" / "o.lcmlog")
+    with pytest.raises(ValueError, match=r"/dev/null: is a device"):
+        import_log(poses, commands, Path("/dev/null"), options=ImportOptions(force=True))
 
 
 def test_not_gzip_and_not_text_are_refused(put, tmp_path):
