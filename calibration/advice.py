@@ -31,7 +31,7 @@ def advice(comparison: Comparison) -> str:
     wrong, effects = HINTS[worst.regime]
     fresh = [name for name in effects if name not in robot.scene.model.effects]
     try_next = (
-        f"once the base is fitted, try {' or '.join(fresh)}" if fresh else "look at where it fails"
+        f"fit if you have not, then add {' or '.join(fresh)}" if fresh else "look at where it fails"
     )
     return (
         f"{100 * worst.share:.0f} % of the error comes while the robot is {worst.regime} "

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from twinmill.calibration.add import AddResult
 from twinmill.calibration.compare import GOOD, MISSING, SUSPECT, Comparison, RobotComparison
+from twinmill.calibration.noise import Noise
 from twinmill.calibration.regimes import HORIZON, Regime
 from twinmill.calibration.solve import Estimate
 from twinmill.calibration.windows import CHANNELS, HORIZONS_S, rms
@@ -46,14 +47,14 @@ class Table:
     words: tuple[int, ...] = (0,)
 
 
-def number(value: float | None) -> str:
-    """Three significant digits without an exponent where a person would write none."""
+def number(value: float | None, significant: int = 3) -> str:
+    """That many significant digits, without an exponent where a person would write none."""
     if value is None or not np.isfinite(value):
         return "-"
     if value == 0 or 1e-4 <= abs(value) < 1e6:
-        digits = 2 if value == 0 else max(0, 2 - int(np.floor(np.log10(abs(value)))))
-        return f"{value:.{digits}f}"
-    return f"{value:.2e}"
+        power = 0 if value == 0 else int(np.floor(np.log10(abs(value))))
+        return f"{value:.{max(0, significant - 1 - power)}f}"
+    return f"{value:.{significant - 1}e}"
 
 
 def tone(score: float) -> Tone:
@@ -90,14 +91,7 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
             f"{len(track.pose)} poses, driven by {track.command_kind.replace('_', ' ')}",
         ),
         ("model", comparison.model_name),
-        (
-            "noise",
-            f"sensor {number(1000 * noise.position.sensor)} mm, "
-            f"{number(np.degrees(noise.heading.sensor))}°; "
-            f"drive {number(1000 * noise.position.drive)} mm/s "
-            f"for {number(noise.position.memory_s)} s, "
-            f"{number(np.degrees(noise.heading.drive))}°/s for {number(noise.heading.memory_s)} s",
-        ),
+        ("noise", _noise(noise)),
         ("floor", f"from {FLOOR_KINDS.get(robot.floor.kind, robot.floor.kind)}"),
         (
             "clock",
@@ -105,6 +99,18 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
             f"{'ahead of' if robot.time_offset_s >= 0 else 'behind'} the robot",
         ),
     ]
+
+
+def _noise(noise: Noise) -> str:
+    """In words: what the sensor adds to a pose, and how the robot itself wavers."""
+    at, heading = noise.position, noise.heading
+    mm, degrees = number(1000 * at.sensor, 2), number(np.degrees(heading.sensor), 2)
+    mm_s, degrees_s = number(1000 * at.drive, 2), number(np.degrees(heading.drive), 2)
+    return (
+        f"each measured pose is off by {mm} mm and {degrees}°; "
+        f"the robot's speed wavers by {mm_s} mm/s for {number(at.memory_s, 2)} s at a time, "
+        f"its turning by {degrees_s}°/s for {number(heading.memory_s, 2)} s"
+    )
 
 
 def errors(robot: RobotComparison) -> Table:
