@@ -26,6 +26,7 @@ static void use_i2c(struct motors_i2c *board, const struct hal_motors *motors,
 {
     devices->motors = *motors;
     devices->battery = motors_i2c_battery(board);
+    devices->board = "i2c";
 }
 
 static void use_uart(struct motors_uart *board, const struct hal_motors *motors,
@@ -33,6 +34,7 @@ static void use_uart(struct motors_uart *board, const struct hal_motors *motors,
 {
     devices->motors = *motors;
     devices->battery = motors_uart_battery(board);
+    devices->board = "uart";
 }
 
 static void use_stub(const char *record_path, struct loop_devices *devices)
@@ -102,6 +104,21 @@ bool devices_make_board(const struct app_config *config, bool dry_run, struct lo
         return true;
     }
     return use_board(config, devices, error);
+}
+
+void devices_settle_board(struct app_config *config, bool dry_run)
+{
+    struct loop_devices devices = {0};
+    char error[CONFIG_ERROR_MAX];
+    if (strcmp(config->board, "auto") != 0 || !devices_make_board(config, dry_run, &devices, error))
+    {
+        return;
+    }
+    if (devices.board != NULL)
+    {
+        (void)snprintf(config->board, sizeof config->board, "%s", devices.board);
+    }
+    hal_motors_close(&devices.motors);
 }
 
 static void use_camera(const struct app_config *config, struct loop_devices *devices)

@@ -17,4 +17,8 @@ bool devices_make(const struct app_config *config, bool dry_run, struct loop_dev
 bool devices_make_board(const struct app_config *config, bool dry_run, struct loop_devices *devices,
                         char error[CONFIG_ERROR_MAX]);
 
+// Looks which board there is, if the configuration leaves it open, and writes it there; without an
+// answer it stays open.
+void devices_settle_board(struct app_config *config, bool dry_run);
+
 #endif

@@ -24,6 +24,8 @@ struct loop_devices
     struct hal_battery battery;
     struct hal_panel panel;
     struct hal_clock clock;
+    // "i2c" or "uart", as in the configuration; NULL: neither.
+    const char *board;
 };
 
 // The parts that can be lost and come back. A robot that has lost one stands still.

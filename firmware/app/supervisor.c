@@ -42,25 +42,46 @@ static void pause_ms(int32_t duration_ms)
     (void)poll(NULL, 0, duration_ms);
 }
 
-bool stop_board(const struct options *options)
+static bool stop_once(struct app_config *config, const char *board, bool dry_run)
 {
     struct loop_devices devices;
-    char error[CONFIG_ERROR_MAX] = "motor board: does not take a stop";
+    char error[CONFIG_ERROR_MAX];
+    if (board != NULL)
+    {
+        (void)snprintf(config->board, sizeof config->board, "%s", board);
+    }
+    if (!devices_make_board(config, dry_run, &devices, error))
+    {
+        return false;
+    }
+    const enum fw_err err = hal_motors_stop(&devices.motors);
+    hal_motors_close(&devices.motors);
+    return err == FW_OK;
+}
+
+bool stop_board(const struct options *options)
+{
+    struct app_config config = options->config;
+    const bool is_known = strcmp(config.board, "auto") != 0;
+    bool line_took_it = false;
     for (int tries = 0; tries < STOP_TRIES; ++tries)
     {
-        if (devices_make_board(&options->config, options->dry_run, &devices, error))
+        // A board on I2C that refuses for a while must not be taken for the other one: a serial
+        // line takes anything, so it is told as well, and believed only if I2C never answers.
+        if (stop_once(&config, is_known ? NULL : "i2c", options->dry_run))
         {
-            const enum fw_err err = hal_motors_stop(&devices.motors);
-            hal_motors_close(&devices.motors);
-            if (err == FW_OK)
-            {
-                return true;
-            }
+            return true;
         }
+        line_took_it = !is_known && stop_once(&config, "uart", options->dry_run);
         pause_ms(STOP_PAUSE_MS);
     }
-    (void)fprintf(stderr, "turbopi: %s: the wheels may turn: switch the robot off\n", error);
-    return false;
+    if (!line_took_it)
+    {
+        (void)fprintf(stderr,
+                      "turbopi: motor board: does not take a stop: the wheels may turn: "
+                      "switch the robot off\n");
+    }
+    return line_took_it;
 }
 
 // SIGTERM, SIGINT and SIGHUP as something to wait for. @return -1 and errno on failure.
@@ -198,8 +219,10 @@ static int wait_for_end(const struct worker *worker)
     return WEXITSTATUS(status);
 }
 
-int supervise(const struct options *options, worker_fn *run)
+int supervise(struct options *options, worker_fn *run)
 {
+    // Both processes speak to the same board, whatever it answers later.
+    devices_settle_board(&options->config, options->dry_run);
     const int stop_fd = block_signals();
     int code = 1;
     for (bool again = stop_fd >= 0; again;)

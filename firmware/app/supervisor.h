@@ -22,8 +22,9 @@ typedef int worker_fn(const struct options *options, const struct heartbeat *hea
 
 // Starts the worker in a child process and again whenever it dies, until a signal asks to end or
 // the worker ends by itself with code 0 or 2. Whatever ended the worker, the board is told zero.
-// SIGTERM, SIGINT and SIGHUP stay blocked for the rest of the process. @return the exit code.
-int supervise(const struct options *options, worker_fn *worker);
+// A board that was to be found is written into the options. SIGTERM, SIGINT and SIGHUP stay blocked
+// for the rest of the process. @return the exit code.
+int supervise(struct options *options, worker_fn *worker);
 
 // Tells the board zero until it takes it, for at most a second.
 bool stop_board(const struct options *options);
