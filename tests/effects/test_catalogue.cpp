@@ -114,7 +114,7 @@ Signals RandomSignals(std::mt19937_64 &engine, double t_s)
         s.rim_mps[k] = wide(engine);
         s.target_mps[k] = off(engine) ? 0 : wide(engine);
         s.tau_s[k] = off(engine) ? 0 : positive(engine);
-        s.max_decel_mps2[k] = positive(engine);
+        s.max_decel_mps2[k] = off(engine) ? positive(engine) : kNoLimit;
         s.wheel_rad[k] = 10 * wide(engine);
         s.roll[k] = positive(engine);
     }

@@ -10,8 +10,6 @@ namespace twin
 namespace
 {
 
-constexpr double kNoLimit = std::numeric_limits<double>::infinity();
-
 // A first-order approach to rest never ends: below this rim speed a wheel counts as standing.
 constexpr double kStandstill_mps = 1e-3;
 
@@ -162,7 +160,6 @@ Wheels DriveChain::DriveWheels(const Command &command, double t_s, double dt_s,
         s.rim_mps = state.rim_mps;
         s.target_mps = Target(s.duty);
         s.tau_s.fill(base_.motor_lag_s);
-        s.max_decel_mps2.fill(kNoLimit);
         s.wheel_rad = state.wheel_rad;
         Run(wheel_, s, state);
 

@@ -36,7 +36,7 @@ def fitted(parent):
         model.set(name, value)
     estimates = [Estimate(n, v, s, "", False, True) for n, (v, s) in values.items()]
     clock = Estimate("clock.offset_s", 0.06, 0.001, "s", False, True)
-    return Fitted(model, estimates, {"run.lcmlog": "ab12"}, 4.5, 1.1, NOISE, clock)
+    return Fitted(model, estimates, {"run.lcmlog": "ab12"}, 4.5, 1.1, NOISE, {clock.name: clock})
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@
 #define EFFECTS_EFFECT_H
 
 #include <array>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -19,6 +20,7 @@ namespace twin
 
 constexpr int kWheels = 4;  // front-left, front-right, rear-left, rear-right
 using Wheels = std::array<double, kWheels>;
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 enum class Stage
 {
@@ -53,11 +55,12 @@ struct Signals
     double battery_nominal_V = 0;  // pack voltage at which the base model's speeds hold
     double wheel_radius_m = 0;     // of the base model
 
-    Wheels duty{};            // kDuty: command on its way to the wheels; duty drive: -1..1
-    Wheels rim_mps{};         // kWheel: rim speed at the start of the step (read only)
-    Wheels target_mps{};      // kWheel: rim speed that the wheel tends to
-    Wheels tau_s{};           // kWheel: time constant with which it gets there
-    Wheels max_decel_mps2{};  // kWheel: limit on slowing down; infinity = none
+    Wheels duty{};        // kDuty: command on its way to the wheels; duty drive: -1..1
+    Wheels rim_mps{};     // kWheel: rim speed at the start of the step (read only)
+    Wheels target_mps{};  // kWheel: rim speed that the wheel tends to
+    Wheels tau_s{};       // kWheel: time constant with which it gets there
+    // kWheel: limit on slowing down.
+    Wheels max_decel_mps2{kNoLimit, kNoLimit, kNoLimit, kNoLimit};
     Wheels wheel_rad{};       // kWheel: angle turned since the start (read only)
     Wheels roll{1, 1, 1, 1};  // kWheel: way over the floor per way of the rim
 
