@@ -52,7 +52,7 @@ def number(value: float | None, significant: int = 3) -> str:
     if value is None or not np.isfinite(value):
         return "-"
     if value == 0 or 1e-4 <= abs(value) < 1e6:
-        power = 0 if value == 0 else int(np.floor(np.log10(abs(value))))
+        power = int(f"{value:.{significant - 1}e}".partition("e")[2])
         return f"{value:.{max(0, significant - 1 - power)}f}"
     return f"{value:.{significant - 1}e}"
 
