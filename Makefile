@@ -4,7 +4,7 @@
 PYTHON := .venv/bin/python
 CTEST := ctest --test-dir build --output-on-failure --no-tests=error --parallel $(shell nproc)
 
-.PHONY: build check check-long demo format lint clean
+.PHONY: build check demo format lint clean
 
 build:
 	@tools/setup
@@ -12,12 +12,9 @@ build:
 	@cmake --install build --component python --prefix "$$($(PYTHON) -c \
 	    'import sysconfig; print(sysconfig.get_path("platlib"))')" >/dev/null
 
-# All tests in C, C++ and Python, and the lint, but for the ones labelled `long`.
+# All tests in C, C++ and Python, and the lint.
 check: build
-	@$(CTEST) --label-exclude '^long$$'
-
-check-long: build
-	@$(CTEST) --label-regex '^long$$'
+	@$(CTEST)
 
 demo: build
 	@$(PYTHON) -m twinmill.tools.demo

@@ -163,3 +163,16 @@ def test_mistakes_end_in_one_sentence_and_no_file(tmp_path, arguments, code, wor
     assert words in result.stderr
     assert result.stderr.count("\n") == 1
     assert os.listdir(tmp_path) == []
+
+
+def test_a_device_is_not_replaced_by_a_log(tmp_path):
+    device = tmp_path / "device"
+    os.mkfifo(device)
+    done = subprocess.run(
+        [TWIN_RUN, "--plant", "planar", "--duration-s", "1", "--log", str(device)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1 and "no ordinary file" in done.stderr
+    assert device.is_fifo()

@@ -10,8 +10,21 @@
 namespace twin
 {
 
+namespace
+{
+
+// The finished log is renamed over `path`: a device or a folder must not be replaced by it.
+const std::string &Replaceable(const std::string &path)
+{
+    if (std::filesystem::exists(path) && !std::filesystem::is_regular_file(path))
+        throw std::runtime_error("--log " + path + ": is no ordinary file; choose another name");
+    return path;
+}
+
+}  // namespace
+
 LogWriter::LogWriter(const std::string &path)
-    : path_(path),
+    : path_(Replaceable(path)),
       partial_path_(path + ".partial"),
       file_(std::make_unique<lcm::LogFile>(partial_path_, "w"))
 {
