@@ -29,11 +29,7 @@ def unexplained(measurement: Measurement, grid: StepGrid, offset_s: float) -> li
     nearly the same, as it is fitted on nearly all: their mean power is the noise's.
     """
     track = measurement.track
-    pose = track.pose
-    before = np.flatnonzero(track.segment >= 0)
-    previous = np.full(len(pose), -1)
-    previous[before[1:]] = before[:-1]
-    step = (pose - pose[previous])[grid.source] * grid.share[:, None]
+    step = (track.pose[grid.source] - track.pose[grid.origin]) * grid.share[:, None]
     heading_rad = track.heading_smooth[grid.source]
     body = np.column_stack([*rotate(step[:, 0], step[:, 1], -heading_rad), step[:, 2]])
     body[grid.starts] = 0

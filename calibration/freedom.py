@@ -12,7 +12,7 @@ BASE = ("base.forward_gain", "base.sideways_gain", "base.yaw_gain", "base.motor_
 PRIOR = {"base.motor_lag_s": 0.3}
 GAIN_PRIOR = 0.5
 EFFECT_PRIOR = 2  # times the distance of an effect's default from its neutral value
-STEP = 0.02  # of that distance: finite differences of effects
+STEP = 0.02  # times the same distance: finite differences of effects
 BASE_STEP = 0.002
 
 

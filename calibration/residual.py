@@ -16,6 +16,7 @@ class StepGrid:
 
     Attributes:
         source: (S,) index of the pose that ends the step.
+        origin: (S,) index of the pose that it starts from.
         share: (S,) 1 over the number of grid steps that this step spans.
         starts: (K,) grid index at which a new unbroken stretch begins.
         t_s: (S,) end of the step, capture's clock.
@@ -23,6 +24,7 @@ class StepGrid:
     """
 
     source: np.ndarray
+    origin: np.ndarray
     share: np.ndarray
     starts: np.ndarray
     t_s: np.ndarray
@@ -38,10 +40,12 @@ class StepGrid:
         period_s = track.timing.pose_period_s
         spans = np.maximum(1, np.rint((track.pose_t_s[ends] - track.pose_t_s[begins]) / period_s))
         source = np.repeat(ends, spans.astype(int))
+        origin = np.repeat(begins, spans.astype(int))
         segment = track.segment[source]
         starts = np.flatnonzero(np.diff(segment, prepend=-1))
         return cls(
             source,
+            origin,
             1 / np.repeat(spans, spans.astype(int)),
             starts,
             track.pose_t_s[source],
@@ -69,11 +73,8 @@ def body_velocity(measurement: Measurement, grid: StepGrid, model: native.Model)
     """
     track = measurement.track
     predicted = native.one_step(model, measurement.played)
-    usable = np.flatnonzero(track.segment >= 0)
-    before = np.full(len(track.pose), -1)
-    before[usable[1:]] = usable[:-1]
-    step = (predicted - track.pose[before])[grid.source]
-    middle_rad = track.pose[before[grid.source], 2] + step[:, 2] / 2
+    step = predicted[grid.source] - track.pose[grid.origin]
+    middle_rad = track.pose[grid.origin, 2] + step[:, 2] / 2
     body = np.column_stack([*rotate(step[:, 0], step[:, 1], -middle_rad), step[:, 2]])
     return body * (grid.share / grid.period_s)[:, None]
 

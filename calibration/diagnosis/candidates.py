@@ -23,7 +23,7 @@ class Candidate:
         effect: its name.
         names: parameters that act near the neutral value; all if the effect starts at a corner.
         origin: (k,) values from which the steps are taken.
-        step: (k,) steps; a corner's single step moves all parameters to their defaults.
+        target: (k, parameters) values stepped to; a corner's one step goes to all defaults.
         corner: nothing happens near the neutral value, so the whole way to the default is taken.
         strength: (k,) plausible strength in units of the columns.
     """

@@ -65,13 +65,12 @@ class Trial:
     estimates: list[Estimate]
 
 
-def attempt(state: State, effects: tuple[str, ...], begin: dict[str, float] | None = None) -> Trial:
+def attempt(state: State, effects: tuple[str, ...]) -> Trial:
     """Fits the state's model with `effects` added.
 
     Args:
         state: the model so far.
         effects: names.
-        begin: start values of some of their parameters, by full name; else their defaults.
     """
     model = state.model.copy()
     fresh: list[Free] = []
@@ -79,7 +78,6 @@ def attempt(state: State, effects: tuple[str, ...], begin: dict[str, float] | No
         model.add_effect(effect)
         name = effect_names(model)[-1]
         fresh += [f for f in effect_quantities(model, name) if f.name.startswith(f"{name}.")]
-    fresh = [replace(f, begin=(begin or {}).get(f.name, f.begin)) for f in fresh]
     scenes = [s.with_model(model) for s in state.scenes]
     solution = solve(scenes, state.free + fresh, rounds=ROUNDS)
     again = [replace(f, begin=scenes[0].model.get(f.name)) for f in state.free + fresh]

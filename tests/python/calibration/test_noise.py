@@ -22,7 +22,7 @@ TRUTHS = [
 
 def even_grid(count, period_s):
     index = np.arange(count)
-    return StepGrid(index, np.ones(count), np.array([0]), index * period_s, period_s)
+    return StepGrid(index, index - 1, np.ones(count), np.array([0]), index * period_s, period_s)
 
 
 def drawn(channel, count, period_s, random):
@@ -77,9 +77,8 @@ def test_whitening_starts_anew_after_a_break():
     channel = TRUTHS[0][0]
     random = np.random.default_rng(6)
     parts = [drawn(channel, 500, 1 / 120, random) for _ in range(2)]
-    grid = StepGrid(
-        np.arange(1000), np.ones(1000), np.array([0, 500]), np.arange(1000) / 120, 1 / 120
-    )
+    index = np.arange(1000)
+    grid = StepGrid(index, index - 1, np.ones(1000), np.array([0, 500]), index / 120, 1 / 120)
     noise = Noise(channel, channel)
     white = noise.whiten(np.tile(np.concatenate(parts)[:, None], 3), grid)
     alone = noise.whiten(np.tile(parts[1][:, None], 3), even_grid(500, 1 / 120))
