@@ -6,6 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "fw/command.h"
 #include "fw/step.h"
 #include "hal/camera.h"
 
@@ -38,23 +39,9 @@ struct link_report
     uint32_t lost_report_count;
 };
 
-// Verbs as in swarm_command_t.
-enum link_verb
-{
-    LINK_STOP = 0,
-    LINK_START = 1,
-    LINK_SELECT = 2,
-    LINK_SCRIPT = 3,
-};
-
 struct link_command
 {
-    // By the sender's clock.
-    int64_t utime_us;
-    int32_t seq;
-    int8_t verb;
-    // 0 = now.
-    int64_t start_utime_us;
+    struct fw_command order;
     // Table or script.
     char name[LINK_NAME_MAX];
 };

@@ -56,9 +56,7 @@ struct loop
     bool running;
     bool start_pending;
     int64_t start_utime_us;
-    // The newest command that was obeyed.
-    int64_t obeyed_utime_us;
-    int32_t obeyed_seq;
+    struct fw_inbox inbox;
 
     // Playing a script instead of the table, since when (monotonic).
     bool plays_script;

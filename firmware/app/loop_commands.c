@@ -7,9 +7,6 @@
 #include "fw/behavior.h"
 #include "loop.h"
 
-// A start further ahead, or longer ago, says that the clocks differ.
-#define START_AHEAD_US 600000000
-#define START_LATE_US 2000000
 #define COMMANDS_PER_STEP 8
 
 bool loop_load_script(struct loop *loop, const char *path, char reason[LINK_REASON_MAX])
@@ -58,11 +55,6 @@ static bool select_behavior(struct loop *loop, const char *name, char *reason)
 static bool select_script(struct loop *loop, const char *name, char *reason)
 {
     char path[CONFIG_TEXT_MAX + LINK_NAME_MAX + 2];
-    if (loop->running)
-    {
-        (void)snprintf(reason, LINK_REASON_MAX, "running: stop before choosing a script");
-        return false;
-    }
     if (name[0] == '\0' || name[0] == '.' || strchr(name, '/') != NULL)
     {
         (void)snprintf(reason, LINK_REASON_MAX, "script must be a file name without folder");
@@ -75,20 +67,12 @@ static bool select_script(struct loop *loop, const char *name, char *reason)
 
 static bool start_at(struct loop *loop, int64_t start_utime_us, char *reason)
 {
-    const int64_t ahead_us =
-        start_utime_us == 0 ? 0 : start_utime_us - hal_clock_unix_us(&loop->devices.clock);
     if (loop->battery_low)
     {
         (void)snprintf(reason, LINK_REASON_MAX, "battery low: charge it, then restart");
         return false;
     }
-    if (ahead_us > START_AHEAD_US || ahead_us < -START_LATE_US)
-    {
-        (void)snprintf(reason, LINK_REASON_MAX, "start is %.1f s from now: are the clocks set?",
-                       (double)ahead_us / 1e6);
-        return false;
-    }
-    if (ahead_us <= 0)
+    if (start_utime_us <= hal_clock_unix_us(&loop->devices.clock))
     {
         loop_start(loop);
         return true;
@@ -98,47 +82,35 @@ static bool start_at(struct loop *loop, int64_t start_utime_us, char *reason)
     return true;
 }
 
-// Commands are repeated until acknowledged: a late copy of an old one must not undo a newer one. A
-// stop is always obeyed.
 static bool obey(struct loop *loop, const struct link_command *command, char *reason)
 {
-    if (command->verb == LINK_STOP)
+    const struct fw_command *order = &command->order;
+    switch ((enum fw_verb)order->verb)
     {
-        loop_stop(loop);
-        return true;
-    }
-    if (command->utime_us < loop->obeyed_utime_us)
-    {
-        (void)snprintf(reason, LINK_REASON_MAX, "older than a command already obeyed");
-        return false;
-    }
-    switch (command->verb)
-    {
-        case LINK_START:
+        case FW_VERB_STOP: loop_stop(loop); return true;
+        case FW_VERB_START:
             return (command->name[0] == '\0' || select_behavior(loop, command->name, reason)) &&
-                   start_at(loop, command->start_utime_us, reason);
-        case LINK_SELECT: return select_behavior(loop, command->name, reason);
-        case LINK_SCRIPT:
+                   start_at(loop, order->start_utime_us, reason);
+        case FW_VERB_SELECT: return select_behavior(loop, command->name, reason);
+        case FW_VERB_SCRIPT:
             return select_script(loop, command->name, reason) &&
-                   start_at(loop, command->start_utime_us, reason);
-        default:
-            (void)snprintf(reason, LINK_REASON_MAX, "unknown verb %d", command->verb);
-            return false;
+                   start_at(loop, order->start_utime_us, reason);
     }
+    return false;
 }
 
-// A copy of the newest command that was obeyed is acknowledged, not obeyed again.
 static void answer(struct loop *loop, const struct link_command *command)
 {
-    const bool is_copy = loop->obeyed_utime_us != 0 && command->verb != LINK_STOP &&
-                         command->utime_us == loop->obeyed_utime_us &&
-                         command->seq == loop->obeyed_seq;
-    struct link_ack ack = {.seq = command->seq, .reason = ""};
-    ack.accepted = is_copy || obey(loop, command, ack.reason);
-    if (ack.accepted && command->utime_us >= loop->obeyed_utime_us)
+    const struct fw_command *order = &command->order;
+    const int64_t now_us = hal_clock_unix_us(&loop->devices.clock);
+    struct link_ack ack = {.seq = order->seq};
+    const enum fw_verdict verdict = fw_command_judge(&loop->inbox, order, now_us, loop->running);
+    (void)snprintf(ack.reason, sizeof ack.reason, "%s", fw_verdict_str(verdict));
+    ack.accepted = verdict == FW_VERDICT_COPY ||
+                   (verdict == FW_VERDICT_OBEY && obey(loop, command, ack.reason));
+    if (ack.accepted)
     {
-        loop->obeyed_utime_us = command->utime_us;
-        loop->obeyed_seq = command->seq;
+        fw_command_obeyed(&loop->inbox, order);
     }
     ack.utime_us = hal_clock_unix_us(&loop->devices.clock);
     loop->link.send_ack(loop->link.context, &ack);

@@ -39,10 +39,13 @@ static void on_swarm_command(const lcm_recv_buf_t *buffer, const char *channel,
         return;
     }
     struct link_command command = {
-        .utime_us = message->utime_us,
-        .seq = message->seq,
-        .verb = message->verb,
-        .start_utime_us = message->start_utime_us,
+        .order =
+            {
+                .utime_us = message->utime_us,
+                .seq = message->seq,
+                .verb = message->verb,
+                .start_utime_us = message->start_utime_us,
+            },
     };
     (void)snprintf(command.name, sizeof command.name, "%s", message->behavior);
     telemetry->on_command(telemetry->context, &command);

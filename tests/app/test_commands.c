@@ -30,14 +30,14 @@ static int64_t unix_us(void)
 }
 
 // Sends a command stamped `age_us` ago and lets the robot read it. @return true if accepted.
-static bool tell_as_of(int64_t age_us, enum link_verb verb, int64_t start_utime_us,
+static bool tell_as_of(int64_t age_us, enum fw_verb verb, int64_t start_utime_us,
                        const char *name)
 {
     static int32_t seq;
-    robot.command = (struct link_command){.utime_us = unix_us() - age_us,
-                                          .seq = ++seq,
-                                          .verb = (int8_t)verb,
-                                          .start_utime_us = start_utime_us};
+    robot.command = (struct link_command){.order = {.utime_us = unix_us() - age_us,
+                                                    .seq = ++seq,
+                                                    .verb = (int8_t)verb,
+                                                    .start_utime_us = start_utime_us}};
     snprintf(robot.command.name, sizeof robot.command.name, "%s", name);
     robot.has_command = true;
     const int acks = robot.ack_count;
@@ -48,7 +48,7 @@ static bool tell_as_of(int64_t age_us, enum link_verb verb, int64_t start_utime_
     return robot.ack.accepted;
 }
 
-static bool tell(enum link_verb verb, int64_t start_utime_us, const char *name)
+static bool tell(enum fw_verb verb, int64_t start_utime_us, const char *name)
 {
     return tell_as_of(0, verb, start_utime_us, name);
 }
@@ -67,9 +67,9 @@ static void write_script(const char *text)
 
 static void test_start_and_stop(void)
 {
-    TEST_ASSERT_TRUE(tell(LINK_START, 0, ""));
+    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, ""));
     ASSERT_DUTIES(left_pct);
-    TEST_ASSERT_TRUE(tell(LINK_STOP, 0, ""));
+    TEST_ASSERT_TRUE(tell(FW_VERB_STOP, 0, ""));
     TEST_ASSERT_TRUE(robot_stands());
 }
 
@@ -77,7 +77,7 @@ static void test_start_and_stop(void)
 static void test_start_happens_at_its_instant(void)
 {
     const int64_t start_us = unix_us() + 700000;
-    TEST_ASSERT_TRUE(tell(LINK_START, start_us, ""));
+    TEST_ASSERT_TRUE(tell(FW_VERB_START, start_us, ""));
     while (robot_stands())
     {
         TEST_ASSERT_LESS_OR_EQUAL_INT64(start_us, unix_us());
@@ -88,23 +88,23 @@ static void test_start_happens_at_its_instant(void)
 
 static void test_stop_cancels_a_start_that_waits(void)
 {
-    TEST_ASSERT_TRUE(tell(LINK_START, unix_us() + 700000, ""));
-    TEST_ASSERT_TRUE(tell(LINK_STOP, 0, ""));
+    TEST_ASSERT_TRUE(tell(FW_VERB_START, unix_us() + 700000, ""));
+    TEST_ASSERT_TRUE(tell(FW_VERB_STOP, 0, ""));
     robot_steps(60);
     TEST_ASSERT_TRUE(robot_stands());
 }
 
 static void test_start_by_a_wrong_clock_is_refused(void)
 {
-    TEST_ASSERT_FALSE(tell(LINK_START, unix_us() - 3600000000, ""));
-    TEST_ASSERT_FALSE(tell(LINK_START, unix_us() + 3600000000, ""));
+    TEST_ASSERT_FALSE(tell(FW_VERB_START, unix_us() - 3600000000, ""));
+    TEST_ASSERT_FALSE(tell(FW_VERB_START, unix_us() + 3600000000, ""));
     robot_steps(5);
     TEST_ASSERT_TRUE(robot_stands());
 }
 
 static void test_copy_is_acknowledged_and_changes_nothing(void)
 {
-    TEST_ASSERT_TRUE(tell(LINK_START, unix_us() + 100000, ""));
+    TEST_ASSERT_TRUE(tell(FW_VERB_START, unix_us() + 100000, ""));
     const struct link_command copy = robot.command;
     robot_steps(120);
     robot.command = copy;
@@ -116,10 +116,10 @@ static void test_copy_is_acknowledged_and_changes_nothing(void)
 
 static void test_late_copy_of_a_start_does_not_undo_a_stop(void)
 {
-    TEST_ASSERT_TRUE(tell(LINK_START, 0, ""));
+    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, ""));
     const struct link_command copy = robot.command;
     robot_steps(3);
-    TEST_ASSERT_TRUE(tell(LINK_STOP, 0, ""));
+    TEST_ASSERT_TRUE(tell(FW_VERB_STOP, 0, ""));
     robot.command = copy;
     robot.has_command = true;
     robot_steps(5);
@@ -129,19 +129,19 @@ static void test_late_copy_of_a_start_does_not_undo_a_stop(void)
 
 static void test_stop_is_obeyed_however_old(void)
 {
-    TEST_ASSERT_TRUE(tell(LINK_START, 0, ""));
-    TEST_ASSERT_TRUE(tell_as_of(3600000000, LINK_STOP, 0, ""));
+    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_TRUE(tell_as_of(3600000000, FW_VERB_STOP, 0, ""));
     TEST_ASSERT_TRUE(robot_stands());
 }
 
 static void test_select_changes_the_table(void)
 {
-    TEST_ASSERT_TRUE(tell(LINK_START, 0, ""));
-    TEST_ASSERT_TRUE(tell(LINK_SELECT, 0, "diffusing_v2"));
+    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_TRUE(tell(FW_VERB_SELECT, 0, "diffusing_v2"));
     robot_steps(1);
     ASSERT_DUTIES(((const int8_t[4]){100, 100, 100, 100}));
     TEST_ASSERT_EQUAL_STRING("diffusing_v2", robot.report.behavior);
-    TEST_ASSERT_FALSE(tell(LINK_SELECT, 0, "dance"));
+    TEST_ASSERT_FALSE(tell(FW_VERB_SELECT, 0, "dance"));
     TEST_ASSERT_EQUAL_STRING("no behaviour 'dance'", robot.ack.reason);
     ASSERT_DUTIES(((const int8_t[4]){100, 100, 100, 100}));
 }
@@ -151,7 +151,7 @@ static void test_script_is_played_at_its_times_and_ends_in_a_stop(void)
     write_script(
         "t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,10,20,30,40\n0.05,-50,50,-50,50\n0.1,9,9,9,9\n");
     robot.hand.wait_us = INT64_MAX;  // only the loop's own time-outs wake it
-    TEST_ASSERT_TRUE(tell(LINK_SCRIPT, 0, "s.csv"));
+    TEST_ASSERT_TRUE(tell(FW_VERB_SCRIPT, 0, "s.csv"));
     const int64_t begin_us = robot.hand.monotonic_us;
     ASSERT_DUTIES(((const int8_t[4]){10, 20, 30, 40}));
     TEST_ASSERT_EQUAL(FW_MODE_SCRIPT, robot.report.out.mode);
@@ -166,27 +166,27 @@ static void test_script_is_played_at_its_times_and_ends_in_a_stop(void)
 
 static void test_bad_scripts_are_refused_in_words(void)
 {
-    TEST_ASSERT_FALSE(tell(LINK_SCRIPT, 0, "absent.csv"));
-    TEST_ASSERT_FALSE(tell(LINK_SCRIPT, 0, "../../etc/passwd"));
-    TEST_ASSERT_FALSE(tell(LINK_SCRIPT, 0, ""));
+    TEST_ASSERT_FALSE(tell(FW_VERB_SCRIPT, 0, "absent.csv"));
+    TEST_ASSERT_FALSE(tell(FW_VERB_SCRIPT, 0, "../../etc/passwd"));
+    TEST_ASSERT_FALSE(tell(FW_VERB_SCRIPT, 0, ""));
     write_script("t_s,speed_input,turn_input\n0,500,0\n");
-    TEST_ASSERT_FALSE(tell(LINK_SCRIPT, 0, "s.csv"));
+    TEST_ASSERT_FALSE(tell(FW_VERB_SCRIPT, 0, "s.csv"));
     TEST_ASSERT_NOT_NULL(strstr(robot.ack.reason, "line 2"));
-    TEST_ASSERT_TRUE(tell(LINK_START, 0, ""));
-    TEST_ASSERT_FALSE(tell(LINK_SCRIPT, 0, "s.csv"));
+    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_FALSE(tell(FW_VERB_SCRIPT, 0, "s.csv"));
     ASSERT_DUTIES(left_pct);
 }
 
 static void test_unknown_verb_is_refused(void)
 {
-    TEST_ASSERT_FALSE(tell((enum link_verb)77, 0, ""));
+    TEST_ASSERT_FALSE(tell((enum fw_verb)77, 0, ""));
 }
 
 static void test_start_is_refused_while_the_battery_is_low(void)
 {
     robot.board.pack_mV = 6000;
     robot_steps(30 * 7);
-    TEST_ASSERT_FALSE(tell(LINK_START, 0, ""));
+    TEST_ASSERT_FALSE(tell(FW_VERB_START, 0, ""));
     TEST_ASSERT_TRUE(robot_stands());
 }
 
