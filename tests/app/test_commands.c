@@ -30,8 +30,7 @@ static int64_t unix_us(void)
 }
 
 // Sends a command stamped `age_us` ago and lets the robot read it. @return true if accepted.
-static bool tell_as_of(int64_t age_us, enum fw_verb verb, int64_t start_utime_us,
-                       const char *name)
+static bool tell_as_of(int64_t age_us, enum fw_verb verb, int64_t start_utime_us, const char *name)
 {
     static int32_t seq;
     robot.command = (struct link_command){.order = {.utime_us = unix_us() - age_us,

@@ -76,8 +76,8 @@ static void test_script_is_refused_while_running_and_unknown_verbs_always(void)
     for (int verb = -128; verb <= 127; ++verb)
     {
         const struct fw_command any = {.utime_us = NOW_US, .seq = 1, .verb = (int8_t)verb};
-        TEST_ASSERT_EQUAL(verb < 0 || verb > 3, fw_command_judge(&empty, &any, NOW_US, false) ==
-                                                    FW_VERDICT_UNKNOWN);
+        TEST_ASSERT_EQUAL(verb < 0 || verb > 3,
+                          fw_command_judge(&empty, &any, NOW_US, false) == FW_VERDICT_UNKNOWN);
     }
 }
 

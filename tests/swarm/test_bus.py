@@ -53,8 +53,9 @@ def logging_to(log):
 
 
 def events(log):
-    """(channel, bytes) of a log in its order."""
-    return [(e.channel, e.data) for e in lcm.EventLog(str(log), "r")]
+    """(channel, bytes) of a log in its order, without what LCM says to itself before it listens."""
+    said = [(e.channel, e.data) for e in lcm.EventLog(str(log), "r")]
+    return [event for event in said if event[0] != "LCM_SELF_TEST"]
 
 
 def in_one_network(lines):

@@ -79,6 +79,10 @@ void AddOutput(CLI::App &app, Options &o)
                    "bus; default udpm://239.255.76.67:7667?ttl=0, memq:// for none");
     app.add_option("--channel-prefix", o.channel_prefix,
                    "put before every channel but the truth's, e.g. TWIN_");
+    app.add_flag("--wait", o.wait, "stand until `twinmill swarm start`, heard on the bus");
+    app.add_option("--script-dir", o.script_dir, "folder of the scripts that commands name")
+        ->check(CLI::ExistingDirectory)
+        ->capture_default_str();
     app.add_option("--pose-rate-hz", o.pose_rate_hz, "poses a second")
         ->check(CLI::Range(0.1, 10000.0))
         ->capture_default_str();

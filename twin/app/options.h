@@ -29,7 +29,8 @@ struct Options
     double spread_m = 1.2;
     std::optional<double> duration_s, dt_s, realtime_factor;
     double pose_rate_hz = 120;
-    std::string script, log, channel_prefix;
+    std::string script, log, channel_prefix, script_dir = ".";
+    bool wait = false;
     std::optional<std::string> lcm_url;
     std::optional<int64_t> epoch_us;
     bool json = false;

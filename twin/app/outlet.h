@@ -38,6 +38,8 @@ public:
     void OpenBus(const std::string &url);
     void OpenLog(const std::string &path) { log_ = std::make_unique<LogWriter>(path); }
     void Finish();
+    // nullptr if there is none.
+    lcm::LCM *Bus() { return bus_.get(); }
 
     // `utime_us` is when the message is received: the log's time stamp.
     template <class Message>

@@ -17,13 +17,12 @@ namespace
 constexpr double kMarkerHeight_m = 0.106;  // of the marker body above the floor
 constexpr int64_t kRunPeriod_us = 5'000'000;
 
-// "R07".
+}  // namespace
+
 std::string RobotName(int id)
 {
     return (id < 10 ? "R0" : "R") + std::to_string(id);
 }
-
-}  // namespace
 
 Publisher::Publisher(Outlet &outlet, const Swarm &swarm, const std::vector<Model> &models,
                      std::vector<Robot> robots, const std::string &channel_prefix,

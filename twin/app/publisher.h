@@ -14,6 +14,9 @@
 namespace twin
 {
 
+// The beginning of a robot's channels: "R07".
+std::string RobotName(int id);
+
 class Publisher
 {
 public:
@@ -26,6 +29,12 @@ public:
     Publisher(Outlet &outlet, const Swarm &swarm, const std::vector<Model> &models,
               std::vector<Robot> robots, const std::string &channel_prefix, double pose_rate_hz,
               uint64_t seed);
+
+    // What R<nn>_RUN says from now on.
+    void SetBehavior(int robot, const std::string &name)
+    {
+        members_[static_cast<size_t>(robot)].robot.behavior = name;
+    }
 
     // After Swarm::Decide(): R<nn>_TELEMETRY, and R<nn>_RUN every 5 s.
     void PublishDecisions(const Swarm &swarm);

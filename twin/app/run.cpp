@@ -9,6 +9,7 @@
 #include <sstream>
 #include <thread>
 
+#include "commands.h"
 #include "plant_mujoco/mujoco_plant.h"
 #include "publisher.h"
 #include "summary.h"
@@ -75,15 +76,16 @@ std::unique_ptr<Plant> MakePlant(const Options &options, const Setup &setup)
                                          MujocoOptions{.seed = options.seed});
 }
 
-Swarm MakeSwarm(const Options &options, const Setup &setup, const std::optional<Script> &script)
+Swarm MakeSwarm(const Options &options, const Setup &setup,
+                const std::shared_ptr<const Script> &script)
 {
     std::vector<fw_table> tables;
     for (const fw_behavior *behavior : setup.behaviors)
         tables.push_back(behavior->table);
     Swarm swarm(MakePlant(options, setup), setup.robots, tables,
                 {options.seed, setup.start_utime_us, kMaxStep_s});
-    if (script)
-        swarm.Play(*script);
+    for (int robot = 0; robot < swarm.Size(); ++robot)
+        swarm.Play(robot, script);
     return swarm;
 }
 
@@ -153,11 +155,12 @@ public:
     {
     }
 
-    void Turn(Swarm &swarm, Publisher &publisher)
+    void Turn(Swarm &swarm, Publisher &publisher, Commands &commands)
     {
         publisher.PublishPoses(swarm);
         while (!g_stop && !(duration_s_ && swarm.TimeS() >= *duration_s_ - swarm.PeriodS() / 2))
         {
+            commands.Obey();
             swarm.Decide();
             publisher.PublishDecisions(swarm);
             for (int i = 0; i < swarm.Substeps(); ++i)
@@ -215,9 +218,9 @@ void RequestStop()
 void Run(const Options &options)
 {
     const Setup setup = Prepare(options);
-    std::optional<Script> script;
+    std::shared_ptr<const Script> script;
     if (!options.script.empty())
-        script = Script::Load(options.script);
+        script = std::make_shared<Script>(Script::Load(options.script));
     std::optional<double> duration_s = options.duration_s;
     if (script && !duration_s)
         duration_s = script->EndS();
@@ -231,7 +234,9 @@ void Run(const Options &options)
     Publisher publisher(outlet, swarm, setup.robots, DescribeRobots(options, setup),
                         options.channel_prefix, options.pose_rate_hz, options.seed);
     Loop loop(options, setup, duration_s, realtime_factor);
-    loop.Turn(swarm, publisher);
+    Commands commands(outlet, swarm, publisher, script,
+                      {options.channel_prefix, options.script_dir, options.wait});
+    loop.Turn(swarm, publisher, commands);
     const double wall_s = loop.WallS();
     outlet.Finish();
     PrintSummary(options, {setup.command_line, swarm.Size(), swarm.PeriodS(), swarm.TimeS(), wall_s,

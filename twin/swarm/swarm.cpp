@@ -57,20 +57,35 @@ Swarm::Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
                             {},
                             ConeSensor(models[i].sensor, static_cast<int>(i), options.seed),
                             models[i].base,
-                            kFullPack_V});
+                            kFullPack_V,
+                            nullptr,
+                            0});
         if (const fw_err error = fw_init(&members_.back().firmware, &config); error != FW_OK)
             throw std::invalid_argument(std::string("the firmware refuses its configuration: ") +
                                         fw_err_str(error));
     }
 }
 
-void Swarm::Play(Script script)
+void Swarm::Play(int robot, std::shared_ptr<const Script> script)
 {
-    if (script.has_duties() && members_.front().base.drive != Drive::kDuty)
+    Member &member = members_[static_cast<size_t>(robot)];
+    if (script && script->has_duties() && member.base.drive != Drive::kDuty)
         throw std::invalid_argument(
             "the script gives wheel duties, but the model's base.drive is 'twist': give "
             "speed_input and turn_input instead");
-    script_ = std::move(script);
+    member.script = std::move(script);
+    member.script_begin_s = TimeS();
+}
+
+void Swarm::SetRunning(int robot, bool running)
+{
+    fw_set_running(&members_[static_cast<size_t>(robot)].firmware, running);
+}
+
+void Swarm::SetTable(int robot, const fw_table &table)
+{
+    if (fw_set_table(&members_[static_cast<size_t>(robot)].firmware, &table) != FW_OK)
+        throw std::invalid_argument("the firmware refuses the table");
 }
 
 void Swarm::Step()
@@ -85,24 +100,24 @@ void Swarm::Decide()
     for (int i = 0; i < Size(); ++i)
         poses_[static_cast<size_t>(i)] = plant_->State(i).pose;
     const int64_t now_us = UtimeUs();
-    const ScriptRow *row = script_ ? script_->At(TimeS()) : nullptr;
     for (int i = 0; i < Size(); ++i)
     {
         Member &member = members_[static_cast<size_t>(i)];
-        DecideOne(member, now_us, row);
+        DecideOne(member, now_us);
         plant_->SetCommand(i, CommandFor(member));
     }
     ++step_count_;
 }
 
-void Swarm::DecideOne(Member &member, int64_t now_us, const ScriptRow *row)
+void Swarm::DecideOne(Member &member, int64_t now_us)
 {
     const auto frame = member.sensor.Expose(poses_, now_us);
-    if (script_)
+    if (member.script)
     {
         const ScriptRow idle{};
+        const ScriptRow *row = member.script->At(TimeS() - member.script_begin_s);
         const ScriptRow &now = row ? *row : idle;
-        if (script_->has_duties())
+        if (member.script->has_duties())
             fw_step_script_duty(&member.firmware, now.wheel_duty_pct.data(), &member.output);
         else
             fw_step_script_input(&member.firmware, &now.input, &member.output);

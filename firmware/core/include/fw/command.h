@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which of an operator's commands a robot obeys. Commands are repeated until acknowledged, and copies
-// come late or in another order: a late copy of an old one must not undo a newer one. A stop is
-// always obeyed.
+// Which of an operator's commands a robot obeys. Commands are repeated until acknowledged, and
+// copies come late or in another order: a late copy of an old one must not undo a newer one. A stop
+// is always obeyed.
 #ifndef FW_COMMAND_H
 #define FW_COMMAND_H
 

@@ -5,7 +5,6 @@
 #define SWARM_SWARM_H
 
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "fw/step.h"
@@ -34,8 +33,13 @@ public:
     Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
           const std::vector<fw_table> &tables, const SwarmOptions &options);
 
-    // All robots play `script` instead of their tables.
-    void Play(Script script);
+    // From now on `robot` plays `script` instead of its table; nullptr: its table again. Throws
+    // std::invalid_argument if the model has no wheels to give the script's duties to.
+    void Play(int robot, std::shared_ptr<const Script> script);
+    // What an operator may tell a robot: stand or go, and which table. Throws std::invalid_argument
+    // if the firmware refuses the table.
+    void SetRunning(int robot, bool running);
+    void SetTable(int robot, const fw_table &table);
 
     // Decide(), then Substeps() times Advance().
     void Step();
@@ -66,14 +70,15 @@ private:
         ConeSensor sensor;
         Base base;
         double battery_V;
+        std::shared_ptr<const Script> script;
+        double script_begin_s;
     };
-    void DecideOne(Member &member, int64_t now_us, const ScriptRow *row);
+    void DecideOne(Member &member, int64_t now_us);
     Command CommandFor(const Member &member) const;
 
     std::unique_ptr<Plant> plant_;
     std::vector<Member> members_;
     std::vector<Pose2> poses_;
-    std::optional<Script> script_;
     double period_s_;
     int substeps_;
     int64_t start_utime_us_;
