@@ -14,6 +14,9 @@
 #define RUN_PERIOD_US 5000000
 #define COMMAND_CHANNEL "SWARM_COMMAND"
 #define ALL_ROBOTS (-1)
+// Bytes of a swarm_command_t before its text: type, utime_us, seq, robot_id, verb, start_utime_us
+// and the text's length, big-endian.
+#define COMMAND_TEXT_AT (8 + 8 + 4 + 4 + 1 + 8 + 4)
 
 struct channel
 {
@@ -28,12 +31,25 @@ static struct channel channel_of(const struct telemetry *telemetry, const char *
     return channel;
 }
 
-static void on_swarm_command(const lcm_recv_buf_t *buffer, const char *channel,
-                             const turbopi_swarm_command_t *message, void *context)
+// LCM's decoder trusts that a text is as long as it says and ends in 0, but anyone may send.
+static bool decode_command(const lcm_recv_buf_t *buffer, turbopi_swarm_command_t *message)
 {
-    (void)buffer;
-    (void)channel;
-    struct telemetry *telemetry = context;
+    const uint8_t *bytes = buffer->data;
+    if (buffer->data_size <= COMMAND_TEXT_AT || bytes[buffer->data_size - 1] != 0)
+    {
+        return false;
+    }
+    uint32_t length = 0;
+    for (int i = 4; i > 0; --i)
+    {
+        length = length << 8 | bytes[COMMAND_TEXT_AT - i];
+    }
+    return length == buffer->data_size - COMMAND_TEXT_AT &&
+           turbopi_swarm_command_t_decode(bytes, 0, (int)buffer->data_size, message) >= 0;
+}
+
+static void pass_on_command(struct telemetry *telemetry, const turbopi_swarm_command_t *message)
+{
     if (message->robot_id != ALL_ROBOTS && message->robot_id != telemetry->config->robot_id)
     {
         return;
@@ -49,6 +65,18 @@ static void on_swarm_command(const lcm_recv_buf_t *buffer, const char *channel,
     };
     (void)snprintf(command.name, sizeof command.name, "%s", message->behavior);
     telemetry->on_command(telemetry->context, &command);
+}
+
+static void on_swarm_command(const lcm_recv_buf_t *buffer, const char *channel, void *context)
+{
+    turbopi_swarm_command_t message;
+    if (!decode_command(buffer, &message))
+    {
+        (void)fprintf(stderr, "turbopi: %s: ignored: not a command of this version\n", channel);
+        return;
+    }
+    pass_on_command(context, &message);
+    (void)turbopi_swarm_command_t_decode_cleanup(&message);
 }
 
 void telemetry_init(struct telemetry *telemetry, const struct app_config *config,
@@ -72,8 +100,7 @@ void telemetry_connect(struct telemetry *telemetry, int64_t now_us)
     }
     telemetry->lcm = lcm_create(telemetry->config->lcm_url);
     if (telemetry->lcm != NULL && hears_commands(telemetry) &&
-        turbopi_swarm_command_t_subscribe(telemetry->lcm, COMMAND_CHANNEL, on_swarm_command,
-                                          telemetry) == NULL)
+        lcm_subscribe(telemetry->lcm, COMMAND_CHANNEL, on_swarm_command, telemetry) == NULL)
     {
         telemetry_close(telemetry);
     }

@@ -146,10 +146,13 @@ static void count_gap(struct camera_v4l2 *camera, uint32_t sequence)
     camera->next_sequence = sequence + 1;
 }
 
-// Exposure time. A driver that does not stamp by the monotonic clock is stamped on arrival.
+// Exposure time. A frame is stamped on arrival if its driver did not stamp it by the monotonic
+// clock, or with what is no time at all.
 static int64_t utime_us(const struct camera_v4l2 *camera, const struct v4l2_buffer *buffer)
 {
-    if ((buffer->flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC)
+    if ((buffer->flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC ||
+        buffer->timestamp.tv_sec < 0 || buffer->timestamp.tv_sec > INT32_MAX ||
+        buffer->timestamp.tv_usec < 0 || buffer->timestamp.tv_usec >= 1000000)
     {
         return hal_clock_monotonic_us(&camera->clock);
     }

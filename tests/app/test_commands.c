@@ -97,6 +97,8 @@ static void test_start_by_a_wrong_clock_is_refused(void)
 {
     TEST_ASSERT_FALSE(tell(FW_VERB_START, unix_us() - 3600000000, ""));
     TEST_ASSERT_FALSE(tell(FW_VERB_START, unix_us() + 3600000000, ""));
+    TEST_ASSERT_FALSE(tell(FW_VERB_START, INT64_MIN, ""));
+    TEST_ASSERT_FALSE(tell(FW_VERB_START, INT64_MAX, ""));
     robot_steps(5);
     TEST_ASSERT_TRUE(robot_stands());
 }

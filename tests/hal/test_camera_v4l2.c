@@ -134,6 +134,19 @@ static void test_time_of_another_clock_is_replaced_by_the_arrival(void)
     TEST_ASSERT_EQUAL_INT64(5000000, frame.utime_us);
 }
 
+static void test_time_that_is_none_is_replaced_by_the_arrival(void)
+{
+    static const int64_t no_times_us[] = {-1, INT64_MIN, INT64_MAX};
+    open_camera();
+    for (size_t i = 0; i < sizeof no_times_us / sizeof no_times_us[0]; ++i)
+    {
+        fake_arrive((uint32_t)i, MONOTONIC, FRAME_BYTES, no_times_us[i]);
+        struct fw_frame frame;
+        TEST_ASSERT_EQUAL(FW_OK, hal_camera_take(&camera, &frame));
+        TEST_ASSERT_EQUAL_INT64(5000000, frame.utime_us);
+    }
+}
+
 static void test_half_a_frame_says_how_long_it_is(void)
 {
     open_camera();
@@ -231,6 +244,7 @@ int main(void)
     RUN_TEST(test_absent_camera_is_no_device);
     RUN_TEST(test_frame_has_the_drivers_time_number_and_bytes);
     RUN_TEST(test_time_of_another_clock_is_replaced_by_the_arrival);
+    RUN_TEST(test_time_that_is_none_is_replaced_by_the_arrival);
     RUN_TEST(test_half_a_frame_says_how_long_it_is);
     RUN_TEST(test_newest_of_several_is_taken_and_the_others_are_dropped);
     RUN_TEST(test_gap_in_the_numbers_counts_as_dropped);
