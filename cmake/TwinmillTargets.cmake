@@ -14,9 +14,14 @@ endif()
 
 # Same bits on every machine: no fused multiply-add that one compiler makes and another does not.
 add_compile_options(-ffp-contract=off)
-if(TWINMILL_SANITIZE)
-    add_compile_options(-fsanitize=address,undefined -fno-omit-frame-pointer)
+# A finding ends the program, so that its test fails.
+if(TWINMILL_SANITIZE OR TWINMILL_FUZZ)
+    add_compile_options(
+        -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
     add_link_options(-fsanitize=address,undefined)
+endif()
+if(TWINMILL_FUZZ)
+    add_compile_options(-fsanitize=fuzzer-no-link)
 endif()
 
 # Warnings are errors in our own code.
