@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 from twinmill.tools import calibrate, diagnose, effects, import_log
 from twinmill.tools.challenge import run as challenge
+from twinmill.tools.swarm import commands as swarm
 
 app = typer.Typer(
     add_completion=False,
@@ -19,6 +20,7 @@ calibrate.register(app)
 diagnose.register(app)
 challenge.register(app)
 effects.register(app)
+swarm.register(app)
 
 
 def _show_version(wanted: bool) -> None:

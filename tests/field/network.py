@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs a session, a script of this folder, in a network of its own, and reads what it prints."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+NETWORK = (
+    "ip link set lo up && ip link set lo multicast on && "
+    'ip route add 224.0.0.0/4 dev lo && exec "$@"'
+)
+
+
+def run_session(script: str, *arguments) -> dict:
+    """What a session found, as it printed it; skips where networks cannot be made."""
+    command = ["unshare", "--net", *([] if os.geteuid() == 0 else ["--map-root-user"])]
+    command += ["sh", "-c", NETWORK, "sh", sys.executable, Path(__file__).with_name(script)]
+    try:
+        done = subprocess.run(
+            [*map(str, command), *map(str, arguments)], capture_output=True, text=True, timeout=200
+        )
+    except FileNotFoundError as error:
+        pytest.skip(f"not installed: {error.filename}")
+    if "unshare: " in done.stderr:
+        pytest.skip(f"no network namespace here: {done.stderr.strip()}")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Three robots' programs and a twin under an operator whose network loses half of all packets.
+
+Usage: swarm_session.py FOLDER, in a network of its own, with TURBOPI and TWIN_RUN set. Prints what
+happened as JSON.
+"""
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+from lossy import DeafBus, LossyBus
+from robot_process import ZERO, Robot
+from twinmill.tools.swarm import tell
+from twinmill.tools.swarm.fleet import URL, Fleet
+
+IDS = {1, 2, 3}
+ROUNDS = 3
+AHEAD_S = 1.0
+PROTOCOL = {  # verb, behaviour, start after now in us, age of the command in us
+    "select_unknown": (2, "dance", 0, 0),
+    "script_with_folder": (3, "../s.csv", 0, 0),
+    "start_late": (1, "", -3_000_000, 0),
+    "start_far_ahead": (1, "", 700_000_000, 0),
+    "verb_unknown": (9, "", 0, 0),
+    "old": (1, "", 0, 3_600_000_000),
+    "stop_however_old": (0, "", 0, 3_600_000_000),
+}
+
+
+def first_move_s(robot: Robot, since_s: float) -> float:
+    return next(t for t, duties in robot.rows() if t > since_s and duties != ZERO)
+
+
+def lossy_round(robots: dict, seed: int) -> dict:
+    """One start and one stop."""
+    fleet = Fleet(URL, connect=lambda url: LossyBus(url, seed))
+    begin_s = time.monotonic()
+    found = tell.find(fleet, set())
+    begun = tell.start(fleet, found, "milling", AHEAD_S, partial=False)
+    instant_s = begun.utime_us / 1e6 - (time.time() - time.monotonic())
+    late_s = [first_move_s(robot, begin_s) - instant_s for robot in robots.values()]
+    stop_s = time.monotonic()
+    stopped = tell.stop(fleet, set())
+    return {
+        "found": sorted(found),
+        "start_accepted": [a.accepted for a in begun.answers],
+        "late_s": late_s,
+        "stop_accepted": [a.accepted for a in stopped],
+        "stop_took_s": time.monotonic() - stop_s,
+        "duties_after_stop": [robot.duties() for robot in robots.values()],
+        "lost": fleet.bus.lost,
+    }
+
+
+def deaf_round(robots: dict) -> dict:
+    """The operator never hears robot 2's acknowledgements."""
+    fleet = Fleet(URL, connect=lambda url: DeafBus(url, "R02_ACK"))
+    fleet.listen(0.5)
+    begin_s = time.monotonic()
+    begun = tell.start(fleet, IDS, "", AHEAD_S, partial=False)
+    time.sleep(0.5)
+    moved = {duties for r in robots.values() for t, duties in r.rows() if t > begin_s} - {ZERO}
+    return {
+        "called_off": begun.called_off,
+        "accepted": [a.accepted for a in begun.answers],
+        "moved": bool(moved),
+    }
+
+
+def one_robot_round(robots: dict) -> list:
+    """Robot 1 alone is told to start, with another behaviour."""
+    fleet = Fleet(URL)
+    fleet.listen(0.5)
+    tell.start(fleet, {1}, "diffusing_v2", 0.5, partial=False)
+    duties = [robot.duties() for robot in robots.values()]
+    tell.stop(fleet, set())
+    return duties
+
+
+def answers_to_bad_commands(prefix: str, robot_id: int) -> dict:
+    """What a robot answers to each command of PROTOCOL after one that it obeyed."""
+    fleet = Fleet(URL, prefix)
+    fleet.listen(0.5)
+    given = {}
+    first = tell.make_command(2, "milling")
+    tell.tell(fleet, first, {robot_id}, time.monotonic() + 5)
+    for name, (verb, behavior, ahead_us, age_us) in PROTOCOL.items():
+        time.sleep(0.002)  # the number of a command comes from the clock
+        command = tell.make_command(verb, behavior)
+        command.start_utime_us = command.utime_us + ahead_us if ahead_us else 0
+        command.utime_us -= age_us
+        (answer,) = tell.tell(fleet, command, {robot_id}, time.monotonic() + 5)
+        given[name] = [answer.accepted, answer.reason]
+    return given
+
+
+def main(folder: Path) -> dict:
+    turbopi, result = shlex.split(os.environ["TURBOPI"]), {}
+    with ExitStack() as stack:
+        robots = {}
+        for robot_id in sorted(IDS):
+            (folder / str(robot_id)).mkdir()
+            options = ("--lcm-url", URL, "--set", f"robot_id={robot_id}")
+            robots[robot_id] = stack.enter_context(Robot(turbopi, folder / str(robot_id), *options))
+        time.sleep(1)
+        result["rounds"] = [lossy_round(robots, seed) for seed in range(ROUNDS)]
+        result["deaf"] = deaf_round(robots)
+        result["one_robot"] = one_robot_round(robots)
+        result["robot_answers"] = answers_to_bad_commands("", 1)
+    twin = f"{os.environ['TWIN_RUN']} --plant planar --n 2 --wait --channel-prefix TWIN_"
+    with subprocess.Popen(shlex.split(twin), stdout=subprocess.DEVNULL) as process:
+        time.sleep(1)
+        result["twin_answers"] = answers_to_bad_commands("TWIN_", 1)
+        fleet = Fleet(URL, "TWIN_")
+        begun = tell.start(fleet, tell.find(fleet, set()), "", 0.5, partial=False)
+        result["twin_modes"] = [a.mode for a in begun.answers]
+        result["twin_stopped"] = [a.mode for a in tell.stop(fleet, set())]
+        process.terminate()
+    return result
+
+
+if __name__ == "__main__":
+    print(json.dumps(main(Path(sys.argv[1]))))
