@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "swarm/metrics.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <vector>
+
+#include "swarm/metrics_lanes.h"
 
 namespace twin
 {
@@ -13,97 +13,52 @@ namespace
 {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kTouch = 1.02;  // times the diameter
 constexpr double Metrics::*kAll[] = {
     &Metrics::circliness, &Metrics::radius_m,  &Metrics::scatter_m2, &Metrics::rotation,
     &Metrics::odd_ratio,  &Metrics::diffusion, &Metrics::groups,     &Metrics::contacts};
 
-struct Vec
+// The robots as columns of one lane, with room for scratch.
+class Columns
 {
-    double x, y;
-};
-
-Vec VelocityInWorld(const RobotState &robot)
-{
-    const double c = std::cos(robot.pose.theta_rad), s = std::sin(robot.pose.theta_rad);
-    return {c * robot.vx_mps - s * robot.vy_mps, s * robot.vx_mps + c * robot.vy_mps};
-}
-
-Vec TurningCentre(const RobotState &robot)
-{
-    if (robot.omega_radps == 0)
-        return {robot.pose.x_m, robot.pose.y_m};
-    const Vec u = VelocityInWorld(robot);
-    return {robot.pose.x_m - u.y / robot.omega_radps, robot.pose.y_m + u.x / robot.omega_radps};
-}
-
-// Metrics of the ring about its centroid.
-void MeasureRing(std::span<const RobotState> ring, std::span<const RobotState> odd,
-                 Metrics &metrics)
-{
-    const double n = static_cast<double>(ring.size());
-    Vec mean{0, 0};
-    for (const RobotState &robot : ring)
-        mean = {mean.x + robot.pose.x_m / n, mean.y + robot.pose.y_m / n};
-    double least_m = std::numeric_limits<double>::infinity(), most_m = 0;
-    for (const RobotState &robot : ring)
+public:
+    explicit Columns(std::span<const RobotState> robots) : n_(robots.size()), values_(kCount * n_)
     {
-        const Vec r{robot.pose.x_m - mean.x, robot.pose.y_m - mean.y}, u = VelocityInWorld(robot);
-        const double radius_m = std::hypot(r.x, r.y), speed_mps = std::hypot(u.x, u.y);
-        least_m = std::min(least_m, radius_m);
-        most_m = std::max(most_m, radius_m);
-        metrics.radius_m += radius_m / n;
-        metrics.scatter_m2 += radius_m * radius_m / n;
-        if (radius_m > 0 && speed_mps > 0)
-            metrics.rotation += (r.x * u.y - r.y * u.x) / (radius_m * speed_mps) / n;
-    }
-    metrics.circliness = most_m > 0 ? (most_m - least_m) / least_m : kNaN;
-    metrics.odd_ratio = odd.empty() ? kNaN : 0;
-    for (const RobotState &robot : odd)
-        metrics.odd_ratio += std::hypot(robot.pose.x_m - mean.x, robot.pose.y_m - mean.y) /
-                             metrics.radius_m / static_cast<double>(odd.size());
-}
-
-// Metrics of pairs; groups by union of the robots that see each other.
-void MeasurePairs(std::span<const RobotState> robots, const MetricScale &scale, Metrics &metrics)
-{
-    std::vector<size_t> group(robots.size());
-    std::iota(group.begin(), group.end(), size_t{0});
-    const auto root = [&group](size_t i) {
-        while (group[i] != i)
-            i = group[i];
-        return i;
-    };
-    std::vector<Vec> centres;
-    for (const RobotState &robot : robots)
-        centres.push_back(TurningCentre(robot));
-    metrics.groups = static_cast<double>(robots.size());
-    double nearest_m = robots.size() > 1 ? std::numeric_limits<double>::infinity() : kNaN;
-    for (size_t i = 0; i < robots.size(); ++i)
-        for (size_t j = i + 1; j < robots.size(); ++j)
+        for (size_t i = 0; i < n_; ++i)
         {
-            const Pose2 &a = robots[i].pose, &b = robots[j].pose;
-            const double distance_m = std::hypot(a.x_m - b.x_m, a.y_m - b.y_m);
-            metrics.contacts += distance_m < 2 * scale.body_radius_m * kTouch;
-            nearest_m = std::min(
-                nearest_m, std::hypot(centres[i].x - centres[j].x, centres[i].y - centres[j].y));
-            if (distance_m < scale.range_m && root(i) != root(j))
-            {
-                group[root(i)] = root(j);
-                metrics.groups -= 1;
-            }
+            const RobotState &r = robots[i];
+            const double row[]{r.pose.x_m,
+                               r.pose.y_m,
+                               std::cos(r.pose.theta_rad),
+                               std::sin(r.pose.theta_rad),
+                               r.vx_mps,
+                               r.vy_mps,
+                               r.omega_radps};
+            for (size_t column = 0; column < std::size(row); ++column)
+                values_[column * n_ + i] = row[column];
         }
-    metrics.diffusion = nearest_m / scale.range_m;
-}
+    }
+    Lanes<1>::Real *At(size_t column)
+    {
+        return reinterpret_cast<Lanes<1>::Real *>(values_.data() + column * n_);
+    }
+
+private:
+    static constexpr size_t kCount = 10;
+    size_t n_;
+    std::vector<double> values_;
+};
 
 }  // namespace
 
 Metrics Measure(std::span<const RobotState> robots, size_t ring_size, const MetricScale &scale)
 {
-    Metrics metrics;
-    MeasureRing(robots.first(ring_size), robots.subspan(ring_size), metrics);
-    MeasurePairs(robots, scale, metrics);
-    return metrics;
+    Columns at(robots);
+    const auto m = MetricFormulas<1>::Measure(
+        {static_cast<int>(robots.size()), static_cast<int>(ring_size), at.At(0), at.At(1), at.At(2),
+         at.At(3), at.At(4), at.At(5), at.At(6), at.At(7), at.At(8), at.At(9),
+         Lanes<1>::All(scale.range_m), 2 * scale.body_radius_m * kTouch});
+    return {m.circliness[0], m.radius_m[0],  m.scatter_m2[0], m.rotation[0],
+            m.odd_ratio[0],  m.diffusion[0], m.groups[0],     m.contacts[0]};
 }
 
 void MetricWindow::Add(double t_s, const Metrics &metrics)

@@ -2,6 +2,7 @@
 #include "swarm/robots.h"
 
 #include <algorithm>
+#include <array>
 
 #include "plant/random.h"
 
@@ -10,21 +11,42 @@ namespace twin
 namespace
 {
 
+// Draws two quantities around their model values, from a stream of their own.
+struct Draw
+{
+    const char *key;
+    double *value;
+    double std, min, max;
+};
+
+void DrawPair(const char *stream, const std::array<Draw, 2> &pair, const Model &model, int id,
+              uint64_t seed)
+{
+    if (pair[0].std == 0 && pair[1].std == 0)
+        return;
+    Random random(seed, id, stream);
+    const auto stated = model.robot_overrides.find(id);
+    for (const Draw &draw : pair)
+    {
+        const double drawn = *draw.value + draw.std * random.Normal();
+        if (stated == model.robot_overrides.end() || !stated->second.contains(draw.key))
+            *draw.value = std::clamp(drawn, draw.min, draw.max);
+    }
+}
+
 Model DrawRobot(const Model &model, int id, uint64_t seed)
 {
     Model robot = model.ForRobot(id);
-    const auto overrides = model.robot_overrides.find(id);
-    const auto draw = [&](const char *key, double &value, double std, double min, double max,
-                          Random &random) {
-        const double drawn = std::clamp(value + std * random.Normal(), min, max);
-        if (overrides == model.robot_overrides.end() || !overrides->second.contains(key))
-            value = drawn;
-    };
-    Random drive(seed, id, "idiosyncrasy"), view(seed, id, "view");
-    draw("theta_a1", robot.theta_a1, model.idiosyncrasy.theta_a1_std, 0.05, 5, drive);
-    draw("theta_a2", robot.theta_a2, model.idiosyncrasy.theta_a2_std, 0.05, 5, drive);
-    draw("range_m", robot.sensor.range_m, model.sensor.range_std_m, 0, 100, view);
-    draw("cone_rad", robot.sensor.cone_rad, model.sensor.cone_std_rad, 0, 6.2832, view);
+    const Idiosyncrasy &drive = model.idiosyncrasy;
+    const Sensor &view = model.sensor;
+    DrawPair("idiosyncrasy",
+             {{{"theta_a1", &robot.theta_a1, drive.theta_a1_std, 0.05, 5},
+               {"theta_a2", &robot.theta_a2, drive.theta_a2_std, 0.05, 5}}},
+             model, id, seed);
+    DrawPair("view",
+             {{{"range_m", &robot.sensor.range_m, view.range_std_m, 0, 100},
+               {"cone_rad", &robot.sensor.cone_rad, view.cone_std_rad, 0, 6.2832}}},
+             model, id, seed);
     return robot;
 }
 

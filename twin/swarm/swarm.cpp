@@ -41,12 +41,29 @@ void CheckModel(const Model &model, const fw_config &config)
 
 }  // namespace
 
+int SubstepCount(double period_s, double max_step_s)
+{
+    return static_cast<int>(std::ceil(period_s / max_step_s - 1e-9));
+}
+
+Command CommandFor(const Base &base, const fw_input &input, const int8_t *wheel_duty_pct)
+{
+    Command command;
+    if (base.drive == Drive::kTwist)
+        command.value = {input.speed_input_pct * base.speed_per_input_mps, 0,
+                         input.turn_input_milli / 1000.0 * base.turn_per_input_radps, 0};
+    else
+        for (size_t k = 0; k < kWheels; ++k)
+            command.value[k] = wheel_duty_pct[k] / 100.0;
+    return command;
+}
+
 Swarm::Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
              const std::vector<fw_table> &tables, const SwarmOptions &options)
     : plant_(std::move(plant)),
       poses_(models.size()),
       period_s_(models.front().base.control_period_s),
-      substeps_(static_cast<int>(std::ceil(period_s_ / options.max_step_s - 1e-9))),
+      substeps_(SubstepCount(period_s_, options.max_step_s)),
       start_utime_us_(options.start_utime_us)
 {
     for (size_t i = 0; i < models.size(); ++i)
@@ -104,7 +121,11 @@ void Swarm::Decide()
     {
         Member &member = members_[static_cast<size_t>(i)];
         DecideOne(member, now_us);
-        plant_->SetCommand(i, CommandFor(member));
+        const fw_output &out = member.output;
+        Command command = CommandFor(member.base, {out.speed_input_pct, out.turn_input_milli},
+                                     out.wheel_duty_pct);
+        command.battery_V = member.battery_V;
+        plant_->SetCommand(i, command);
     }
     ++step_count_;
 }
@@ -133,20 +154,6 @@ void Swarm::DecideOne(Member &member, int64_t now_us)
         duty += std::abs(pct) / 100.0 / kWheels;
     const double charge_As = (kComputer_A + kMotors_A * duty) * period_s_;
     member.battery_V -= (kFullPack_V - kEmptyPack_V) * charge_As / kPackCharge_As;
-}
-
-Command Swarm::CommandFor(const Member &member) const
-{
-    Command command;
-    command.battery_V = member.battery_V;
-    const fw_output &out = member.output;
-    if (member.base.drive == Drive::kTwist)
-        command.value = {out.speed_input_pct * member.base.speed_per_input_mps, 0,
-                         out.turn_input_milli / 1000.0 * member.base.turn_per_input_radps, 0};
-    else
-        for (size_t k = 0; k < kWheels; ++k)
-            command.value[k] = out.wheel_duty_pct[k] / 100.0;
-    return command;
 }
 
 void Swarm::Advance()

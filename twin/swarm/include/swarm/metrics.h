@@ -31,6 +31,8 @@ struct Metrics
     double contacts = 0;  // pairs of bodies that touch (2 % of the diameter apart at most)
 };
 
+constexpr double kTouch = 1.02;  // bodies touch up to this many diameters apart
+
 struct MetricScale
 {
     double range_m;

@@ -24,6 +24,12 @@ struct SwarmOptions
     double max_step_s = 0.025;
 };
 
+// Into how many substeps of at most `max_step_s` a control period is split.
+int SubstepCount(double period_s, double max_step_s);
+
+// What the plant is told when the firmware has chosen this input, and mixed it to these duties.
+Command CommandFor(const Base &base, const fw_input &input, const int8_t *wheel_duty_pct);
+
 class Swarm
 {
 public:
@@ -74,7 +80,6 @@ private:
         double script_begin_s;
     };
     void DecideOne(Member &member, int64_t now_us);
-    Command CommandFor(const Member &member) const;
 
     std::unique_ptr<Plant> plant_;
     std::vector<Member> members_;

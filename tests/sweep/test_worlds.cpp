@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+// The lean kernel against the full path: firmware, cone sensor and planar plant robot by robot.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "fw/behavior.h"
+#include "sweep/lean.h"
+#include "sweep/worlds.h"
+
+namespace twin
+{
+namespace
+{
+
+Cell PaperCell(int n = 6)
+{
+    return {Model::Load("paper.toml"),
+            std::vector<fw_table>(static_cast<size_t>(n), fw_behavior_find("milling")->table),
+            static_cast<size_t>(n)};
+}
+
+struct Variant
+{
+    const char *name;
+    std::function<void(Cell &)> change;
+    double duration_s = 20;
+};
+
+const Variant kVariants[] = {
+    {"paper", [](Cell &) {}},
+    {"disc", [](Cell &c) { c.model.sensor.target_radius_m = 0.1; }},
+    {"bodies",
+     [](Cell &c) {
+         c.model.robot.body_radius_m = 0.1;
+         c.start = StartShape::kFacingOut;
+     }},
+    {"errors_and_vote",
+     [](Cell &c) {
+         c.model.sensor.false_negative_rate = 0.04;
+         c.model.sensor.false_positive_rate = 0.1;
+         c.model.sensor.vote_frames = 10;
+     }},
+    {"delay", [](Cell &c) { c.model.sensor.delay_s = 0.1; }},
+    // Frames come late by a little more or less than a period: two at once, or none.
+    {"ragged_delay",
+     [](Cell &c) {
+         c.model.base.control_period_s = 0.0133333;
+         c.model.sensor.delay_s = 3 * 0.0133333;
+         c.model.sensor.vote_frames = 4;
+     }},
+    {"wide_cone_of_its_own",
+     [](Cell &c) {
+         c.model.sensor.cone_rad = 3.6;
+         c.model.sensor.cone_std_rad = 0.2;
+         c.model.sensor.range_std_m = 0.1;
+     }},
+    {"species",
+     [](Cell &c) {
+         c.tables.back() = fw_behavior_find("self_centering")->table;
+         c.ring_size = 5;
+         c.start = StartShape::kDisc;
+     }},
+    {"duty_drive",
+     [](Cell &c) {
+         c.model = Model::Load("turbopi_nominal.toml");
+         c.model.base.motor_lag_s = 0;
+         c.model.noise = {};
+         c.model.effects.clear();
+     }},
+    {"long_period",
+     [](Cell &c) {
+         c.model.base.control_period_s = 0.06;
+         c.model.robot.body_radius_m = 0.1;
+     }},
+};
+
+void PrintTo(const Variant &variant, std::ostream *out)
+{
+    *out << variant.name;
+}
+
+class LeanKernel : public ::testing::TestWithParam<Variant>
+{
+};
+
+void ExpectSame(double lean, double full, double tolerance, const char *what)
+{
+    if (std::isnan(full))
+        EXPECT_TRUE(std::isnan(lean)) << what;
+    else
+        EXPECT_NEAR(lean, full, tolerance * (1 + std::abs(full))) << what;
+}
+
+TEST_P(LeanKernel, DoesWhatTheFirmwareAndPlantDo)
+{
+    Cell cell = PaperCell();
+    GetParam().change(cell);
+    ASSERT_EQ(WhyNotLean(cell.model), "");
+    std::vector<World> worlds;
+    for (uint64_t seed = 1; seed <= 19; ++seed)  // not a multiple of any vector's width
+        worlds.push_back({&cell, seed});
+    const auto lean = RunWorlds(worlds, GetParam().duration_s, Path::kBest);
+    const auto full = RunWorlds(worlds, GetParam().duration_s, Path::kFull);
+    for (size_t w = 0; w < worlds.size(); ++w)
+    {
+        SCOPED_TRACE(worlds[w].seed);
+        const Metrics &l = lean[w].mean, &f = full[w].mean;
+        ExpectSame(l.circliness, f.circliness, 1e-7, "circliness");
+        ExpectSame(l.radius_m, f.radius_m, 1e-7, "radius_m");
+        ExpectSame(l.scatter_m2, f.scatter_m2, 1e-7, "scatter_m2");
+        ExpectSame(l.rotation, f.rotation, 1e-7, "rotation");
+        ExpectSame(l.odd_ratio, f.odd_ratio, 1e-7, "odd_ratio");
+        ExpectSame(l.diffusion, f.diffusion, 1e-7, "diffusion");
+        ExpectSame(l.groups, f.groups, 0.01, "groups");
+        ExpectSame(l.contacts, f.contacts, 0.01, "contacts");
+        ExpectSame(lean[w].least_diffusion, full[w].least_diffusion, 1e-7, "least_diffusion");
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Variants, LeanKernel, ::testing::ValuesIn(kVariants),
+                         [](const auto &variant) { return std::string(variant.param.name); });
+
+TEST(LeanKernel, GivesTheSameBytesInAnyWidth)
+{
+    Cell cell = PaperCell(8);
+    cell.model.robot.body_radius_m = 0.1;
+    cell.model.sensor.target_radius_m = 0.1;
+    cell.model.sensor.false_positive_rate = 0.05;
+    cell.model.sensor.vote_frames = 3;
+    cell.model.sensor.delay_s = 0.05;
+    std::vector<World> worlds;
+    for (uint64_t seed = 1; seed <= 8; ++seed)
+        worlds.push_back({&cell, seed});
+    std::vector<std::vector<Outcome>> runs;
+    for (const LeanWidth &width : LeanWidths())
+    {
+        auto &run = runs.emplace_back(worlds.size());
+        for (size_t at = 0; at < worlds.size(); at += width.lanes)
+            RunLean(width, std::span(worlds).subspan(at, width.lanes), 30,
+                    std::span(run).subspan(at));
+        for (size_t w = 0; w < worlds.size(); ++w)
+        {
+            EXPECT_EQ(run[w].mean.circliness, runs[0][w].mean.circliness) << width.lanes;
+            EXPECT_EQ(run[w].mean.diffusion, runs[0][w].mean.diffusion) << width.lanes;
+            EXPECT_EQ(run[w].mean.contacts, runs[0][w].mean.contacts) << width.lanes;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace twin

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the lean kernel works on: plain numbers, laid out by the caller. Only C headers, see
+// lanes.h.
+#ifndef SWEEP_LEAN_PLAN_H
+#define SWEEP_LEAN_PLAN_H
+
+#include <stdint.h>
+
+namespace twin
+{
+
+// Columns of n robots each.
+enum LeanColumn
+{
+    // State.
+    kX,
+    kY,
+    kCos,
+    kSin,
+    // Range squared; cos(half cone) times its absolute value.
+    kRange2,
+    kCone,
+    // For targets that are discs: cosine and sine of the half cone, radius squared.
+    kHalfCos,
+    kHalfSin,
+    kTarget2,
+    kMiss,
+    kFalse,
+    // A row of the table: displacement in the body frame and rotation in one substep.
+    kUnseenX,
+    kUnseenY,
+    kUnseenCos,
+    kUnseenSin,
+    kSeenX,
+    kSeenY,
+    kSeenCos,
+    kSeenSin,
+    // And its velocities in the body frame.
+    kUnseenVx,
+    kUnseenVy,
+    kUnseenOmega,
+    kSeenVx,
+    kSeenVy,
+    kSeenOmega,
+    // Scratch.
+    kScratch,
+    kLeanColumns = kScratch + 6,
+};
+
+enum LeanSum
+{
+    kCirclinessSum,
+    kRadiusSum,
+    kScatterSum,
+    kRotationSum,
+    kOddSum,
+    kDiffusionSum,
+    kGroupsSum,
+    kContactsSum,
+    kLeastDiffusion,
+    kLeanSums,
+};
+
+// What the controller knows in a step: the same for all robots.
+struct LeanStep
+{
+    int32_t frame;   // newest that has reached it, modulo kept_frames; -1: none so far
+    int32_t slot;    // of the vote that it takes; -1: it voted before
+    int32_t voters;  // frames that count
+};
+
+// What all lanes of a batch share.
+struct LeanPlan
+{
+    int n, ring, substeps;
+    int first_measured;  // step
+    int vote_frames;     // majority over this many
+    int kept_frames;     // of the sensor, newest included
+    const LeanStep *steps;
+    bool target_is_disc, errors;
+    double body_m;   // diameter; 0: no bodies
+    double touch_m;  // nearer bodies count as in contact
+};
+
+// Numbers of one lane, in units of the lane count: columns, range, sums, bits seen, votes' ones,
+// frames on the way, frames that vote.
+struct LeanLayout
+{
+    explicit LeanLayout(const LeanPlan &p)
+        : range(kLeanColumns * p.n),
+          sums(range + 1),
+          seen(sums + kLeanSums),
+          ones(seen + p.n),
+          frames(ones + p.n),
+          votes(frames + p.kept_frames * p.n),
+          size(votes + p.vote_frames * p.n)
+    {
+    }
+    int range, sums, seen, ones, frames, votes, size;
+};
+
+// Runs steps [from, to) of W worlds. `numbers`: LeanLayout::size * W doubles, aligned to 64 bytes.
+// `chances`: with errors, one uniform number for each step from `from`, robot and lane.
+using LeanAdvance = void (*)(const LeanPlan &, double *numbers, const double *chances, int from,
+                             int to);
+
+void LeanAdvance2(const LeanPlan &, double *numbers, const double *chances, int from, int to);
+#ifdef __x86_64__
+void LeanAdvance4(const LeanPlan &, double *numbers, const double *chances, int from, int to);
+void LeanAdvance8(const LeanPlan &, double *numbers, const double *chances, int from, int to);
+#endif
+
+}  // namespace twin
+
+#endif

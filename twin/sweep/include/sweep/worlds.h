@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// Many swarms, each to its end: what phase diagrams are made of.
+#ifndef SWEEP_WORLDS_H
+#define SWEEP_WORLDS_H
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "fw/table.h"
+#include "model_file/model.h"
+#include "swarm/metrics.h"
+#include "swarm/starts.h"
+
+namespace twin
+{
+
+// A swarm but for its seed.
+struct Cell
+{
+    Model model;
+    std::vector<fw_table> tables;  // one per robot; those after the first `ring_size` are odd
+    size_t ring_size;
+    StartShape start = StartShape::kSquare;
+    double spread_m = 1.2;
+};
+
+struct World
+{
+    const Cell *cell;
+    uint64_t seed;
+};
+
+struct Outcome
+{
+    Metrics mean;                // over the last 10 s, every control period
+    double least_diffusion = 0;  // over the same
+};
+
+enum class Path
+{
+    kBest,  // lean where it serves, else full
+    kFull,  // every robot its firmware, its effects and its plant
+};
+
+// Why the lean kernel cannot run this model: effects, lag, noise, a delay near the firmware's
+// time-out. Empty if it can.
+std::string WhyNotLean(const Model &model);
+
+// Runs each world for `duration_s`; outcomes in the same order. They depend on nothing but the
+// world and the duration. Throws std::invalid_argument in one sentence if a swarm cannot be made.
+std::vector<Outcome> RunWorlds(std::span<const World> worlds, double duration_s, Path path);
+
+// Poses of one world by the full path, every `every_s`, the start first: robots within times.
+std::vector<std::vector<Pose2>> TraceWorld(const World &world, double duration_s, double every_s);
+
+}  // namespace twin
+
+#endif

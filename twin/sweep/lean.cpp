@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sweep/lean.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "fw/mixing.h"
+#include "plant/planar_plant.h"
+#include "plant/random.h"
+#include "swarm/robots.h"
+#include "swarm/swarm.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr double kWindow_s = 10;
+constexpr int kBlock = 32;  // steps for which uniform numbers are drawn at once
+constexpr size_t kAlign = 64;
+
+std::vector<LeanWidth> UsableWidths()
+{
+    std::vector<LeanWidth> widths;
+#ifdef __x86_64__
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512vl"))
+        widths.push_back({8, LeanAdvance8});
+    if (__builtin_cpu_supports("avx2"))
+        widths.push_back({4, LeanAdvance4});
+#endif
+    widths.push_back({2, LeanAdvance2});
+    return widths;
+}
+
+double StepS(const Base &base)
+{
+    return base.control_period_s / SubstepCount(base.control_period_s, SwarmOptions{}.max_step_s);
+}
+
+// The firmware's view of time: which frame has arrived, which votes are in.
+std::vector<LeanStep> Schedule(const Model &model, int steps, int vote_frames, int &kept_frames)
+{
+    const auto utime_us = [&](int step) {
+        return std::llround(step * model.base.control_period_s * 1e6);
+    };
+    const int64_t delay_us = std::llround(model.sensor.delay_s * 1e6);
+    std::vector<LeanStep> schedule;
+    std::vector<int> newest;
+    int frame = -1, pushed = 0;
+    kept_frames = 1;
+    for (int step = 0; step < steps; ++step)
+    {
+        const int before = frame;
+        while (frame < step && utime_us(frame + 1) + delay_us <= utime_us(step))
+            ++frame;
+        const bool fresh = frame > before;
+        const int slot = fresh ? pushed++ % vote_frames : -1;
+        schedule.push_back({frame, slot, std::min(pushed, vote_frames)});
+        kept_frames = std::max(kept_frames, step - std::max(frame, 0) + 1);
+    }
+    for (LeanStep &step : schedule)
+        step.frame = step.frame < 0 ? -1 : step.frame % kept_frames;
+    return schedule;
+}
+
+class Batch
+{
+public:
+    Batch(const LeanWidth &width, std::span<const World> worlds, double duration_s)
+        : worlds_(worlds), lanes_(width.lanes), advance_(width.advance)
+    {
+        const Cell &cell = *worlds.front().cell;
+        const Model &model = cell.model;
+        const StepCount count = CountSteps(model.base.control_period_s, duration_s);
+        steps_ = count.steps;
+        measured_ = count.steps - count.first_measured;
+        plan_.n = static_cast<int>(cell.tables.size());
+        plan_.ring = static_cast<int>(cell.ring_size);
+        plan_.substeps = SubstepCount(model.base.control_period_s, SwarmOptions{}.max_step_s);
+        plan_.first_measured = count.first_measured;
+        plan_.vote_frames = static_cast<int>(std::lround(model.sensor.vote_frames));
+        schedule_ = Schedule(model, steps_, plan_.vote_frames, plan_.kept_frames);
+        plan_.steps = schedule_.data();
+        plan_.body_m = 2 * model.robot.body_radius_m;
+        plan_.touch_m = plan_.body_m * kTouch;
+        const size_t size = static_cast<size_t>(LeanLayout(plan_).size) * lanes_;
+        memory_.assign(size + kAlign / sizeof(double), 0.0);
+        numbers_ = Aligned(memory_);
+        for (size_t lane = 0; lane < lanes_; ++lane)  // idle lanes repeat the first world
+            FillLane(lane, worlds[lane < worlds.size() ? lane : 0]);
+    }
+
+    void Run()
+    {
+        if (!plan_.errors)
+            return advance_(plan_, numbers_, nullptr, 0, steps_);
+        std::vector<Random> streams;
+        for (int robot = 0; robot < plan_.n; ++robot)
+            for (size_t lane = 0; lane < lanes_; ++lane)
+                streams.emplace_back(worlds_[lane < worlds_.size() ? lane : 0].seed, robot,
+                                     "sensor");
+        std::vector<double> chances(kBlock * streams.size() + kAlign / sizeof(double));
+        double *aligned = Aligned(chances);
+        for (int from = 0; from < steps_; from += kBlock)
+        {
+            double *next = aligned;
+            for (int step = 0; step < kBlock; ++step)
+                for (Random &stream : streams)
+                    *next++ = stream.Uniform();
+            advance_(plan_, numbers_, aligned, from, std::min(from + kBlock, steps_));
+        }
+    }
+
+    Outcome OutcomeOf(size_t lane) const
+    {
+        const auto mean = [&](LeanSum sum) { return Sum(sum, lane) / measured_; };
+        return {{mean(kCirclinessSum), mean(kRadiusSum), mean(kScatterSum), mean(kRotationSum),
+                 mean(kOddSum), mean(kDiffusionSum), mean(kGroupsSum), mean(kContactsSum)},
+                Sum(kLeastDiffusion, lane)};
+    }
+
+private:
+    static double *Aligned(std::vector<double> &memory)
+    {
+        const auto address = reinterpret_cast<uintptr_t>(memory.data());
+        return memory.data() + (kAlign - address % kAlign) % kAlign / sizeof(double);
+    }
+
+    double &At(int column, size_t robot, size_t lane)
+    {
+        return numbers_[(static_cast<size_t>(column * plan_.n) + robot) * lanes_ + lane];
+    }
+
+    double &Sum(int sum, size_t lane) const
+    {
+        return numbers_[static_cast<size_t>(LeanLayout(plan_).sums + sum) * lanes_ + lane];
+    }
+
+    void FillLane(size_t lane, const World &world)
+    {
+        const Cell &cell = *world.cell;
+        const auto robots = DrawRobots(cell.model, plan_.n, world.seed);
+        const auto starts = StartPoses(cell.start, plan_.n, cell.spread_m,
+                                       cell.model.robot.body_radius_m, world.seed);
+        for (size_t i = 0; i < robots.size(); ++i)
+        {
+            At(kX, i, lane) = starts[i].x_m;
+            At(kY, i, lane) = starts[i].y_m;
+            At(kCos, i, lane) = std::cos(starts[i].theta_rad);
+            At(kSin, i, lane) = std::sin(starts[i].theta_rad);
+            FillSensor(i, lane, robots[i].sensor);
+            const DriveChain chain(robots[i]);
+            FillRow(i, lane, kUnseenX, kUnseenVx, chain, robots[i].base, cell.tables[i].unseen);
+            FillRow(i, lane, kSeenX, kSeenVx, chain, robots[i].base, cell.tables[i].seen);
+        }
+        numbers_[static_cast<size_t>(LeanLayout(plan_).range) * lanes_ + lane] =
+            cell.model.sensor.range_m;
+        Sum(kLeastDiffusion, lane) = std::numeric_limits<double>::infinity();
+    }
+
+    void FillSensor(size_t robot, size_t lane, const Sensor &sensor)
+    {
+        const double half_cos = std::cos(sensor.cone_rad / 2);
+        At(kRange2, robot, lane) = sensor.range_m * sensor.range_m;
+        At(kCone, robot, lane) = half_cos * std::abs(half_cos);
+        At(kHalfCos, robot, lane) = half_cos;
+        At(kHalfSin, robot, lane) = std::sin(sensor.cone_rad / 2);
+        At(kTarget2, robot, lane) = sensor.target_radius_m * sensor.target_radius_m;
+        At(kMiss, robot, lane) = sensor.false_negative_rate;
+        At(kFalse, robot, lane) = sensor.false_positive_rate;
+        plan_.target_is_disc |= sensor.target_radius_m > 0;
+        plan_.errors |= sensor.false_negative_rate > 0 || sensor.false_positive_rate > 0;
+    }
+
+    // The velocity that a row of the table gives this robot, and one substep of it: the chord of
+    // the arc, in the body frame, and the turn.
+    void FillRow(size_t robot, size_t lane, int move, int velocity, const DriveChain &chain,
+                 const Base &base, const fw_input &input)
+    {
+        const double dt_s = StepS(base);
+        RobotState state = chain.Start({});
+        int8_t duty_pct[FW_WHEEL_COUNT];
+        fw_mix(&input, duty_pct);
+        const Command command = CommandFor(base, input, duty_pct);
+        const Twist v =
+            chain.BodyTwist(chain.DriveWheels(command, 0, dt_s, state), 0, dt_s, state, nullptr);
+        state = chain.Start({});
+        PlanarStep(chain, command, 0, dt_s, state, nullptr);
+        At(move, robot, lane) = state.pose.x_m;
+        At(move + 1, robot, lane) = state.pose.y_m;
+        At(move + 2, robot, lane) = std::cos(state.pose.theta_rad);
+        At(move + 3, robot, lane) = std::sin(state.pose.theta_rad);
+        At(velocity, robot, lane) = v.vx_mps;
+        At(velocity + 1, robot, lane) = v.vy_mps;
+        At(velocity + 2, robot, lane) = v.omega_radps;
+    }
+
+    std::span<const World> worlds_;
+    size_t lanes_;
+    LeanAdvance advance_;
+    int steps_ = 0, measured_ = 0;
+    LeanPlan plan_{};
+    std::vector<LeanStep> schedule_;
+    std::vector<double> memory_;
+    double *numbers_ = nullptr;
+};
+
+}  // namespace
+
+std::span<const LeanWidth> LeanWidths()
+{
+    static const std::vector<LeanWidth> widths = UsableWidths();
+    return widths;
+}
+
+bool SameBatch(const Cell &a, const Cell &b)
+{
+    const Model &m = a.model, &o = b.model;
+    return a.tables.size() == b.tables.size() && a.ring_size == b.ring_size &&
+           m.base.control_period_s == o.base.control_period_s &&
+           m.sensor.delay_s == o.sensor.delay_s && m.sensor.vote_frames == o.sensor.vote_frames &&
+           m.robot.body_radius_m == o.robot.body_radius_m;
+}
+
+StepCount CountSteps(double period_s, double duration_s)
+{
+    const int steps = std::max(1, static_cast<int>(std::ceil(duration_s / period_s - 0.5)));
+    int first = steps - 1;
+    while (first > 0 && first * period_s > steps * period_s - kWindow_s)
+        --first;
+    return {steps, first};
+}
+
+void RunLean(const LeanWidth &width, std::span<const World> worlds, double duration_s,
+             std::span<Outcome> outcomes)
+{
+    Batch batch(width, worlds, duration_s);
+    batch.Run();
+    for (size_t lane = 0; lane < worlds.size(); ++lane)
+        outcomes[lane] = batch.OutcomeOf(lane);
+}
+
+}  // namespace twin

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+// Many worlds of robots without memory in their drive: a table row is a constant velocity, so that
+// a step is a rotation and a displacement worked out beforehand. Same rules as Swarm, PlanarBodies
+// and ConeSensor; differences are those of rounding.
+#ifndef SWEEP_LEAN_KERNEL_H
+#define SWEEP_LEAN_KERNEL_H
+
+#include "swarm/metrics_lanes.h"
+#include "sweep/lean_plan.h"
+
+namespace twin
+{
+
+template <int W>
+class LeanKernel
+{
+    using L = Lanes<W>;
+    using Real = typename L::Real;
+    using Mask = typename L::Mask;
+
+public:
+    LeanKernel(const LeanPlan &plan, double *numbers)
+        : p_(plan), n_(plan.n), at_(plan), numbers_(reinterpret_cast<Real *>(numbers))
+    {
+    }
+
+    void Advance(const double *chances, int from, int to)
+    {
+        const Real *chance = reinterpret_cast<const Real *>(chances);
+        for (int step = from; step < to; ++step)
+        {
+            if (p_.target_is_disc)
+                Sense<true>();
+            else
+                Sense<false>();
+            if (p_.errors)
+                Err(chance + (step - from) * n_);
+            Decide(step);
+            const bool moves = p_.steps[step].frame >= 0;
+            for (int i = 0; moves && i < p_.substeps; ++i)
+            {
+                Move();
+                PushApart();
+            }
+            if (step >= p_.first_measured)
+                Measure(moves);
+        }
+    }
+
+private:
+    Real *Column(int column) const { return numbers_ + column * n_; }
+    Mask *Bits(int at) const { return reinterpret_cast<Mask *>(numbers_ + at); }
+
+    // InView() of the cone sensor, both ways for each pair. Its ahead > cos * distance is squared
+    // with the signs kept, which spares the root.
+    template <bool kDisc>
+    void Sense()
+    {
+        const Real *x = Column(kX), *y = Column(kY), *c = Column(kCos), *s = Column(kSin);
+        const Real *range2 = Column(kRange2), *cone = Column(kCone);
+        Mask *seen = Bits(at_.seen);
+        const int n = n_;
+        for (int i = 0; i < n; ++i)
+            seen[i] = Mask{};
+        for (int i = 0; i < n; ++i)
+        {
+            const Real xi = x[i], yi = y[i], ci = c[i], si = s[i], range2i = range2[i],
+                       conei = cone[i];
+            Mask seen_i = seen[i];
+            for (int j = i + 1; j < n; ++j)
+            {
+                const Real dx = x[j] - xi, dy = y[j] - yi, d2 = dx * dx + dy * dy;
+                const Real ahead_i = ci * dx + si * dy, behind_j = c[j] * dx + s[j] * dy;
+                Mask in_i = ahead_i * L::Abs(ahead_i) > conei * d2;
+                Mask in_j = behind_j * L::Abs(behind_j) < -cone[j] * d2;
+                if constexpr (kDisc)
+                {
+                    in_i |= Edge(i, ahead_i, L::Abs(ci * dy - si * dx));
+                    in_j |= Edge(j, -behind_j, L::Abs(c[j] * dy - s[j] * dx));
+                }
+                seen_i |= in_i & (d2 < range2i);
+                seen[j] |= in_j & (d2 < range2[j]);
+            }
+            seen[i] = seen_i;
+        }
+    }
+
+    // Whether the disc reaches over the edge of the cone of `robot`.
+    Mask Edge(int robot, Real ahead, Real aside) const
+    {
+        const Real cos_half = Column(kHalfCos)[robot], sin_half = Column(kHalfSin)[robot];
+        const Real along = L::Max(ahead * cos_half + aside * sin_half, Real{});
+        const Real over = ahead - along * cos_half, off = aside - along * sin_half;
+        return over * over + off * off < Column(kTarget2)[robot];
+    }
+
+    void Err(const Real *chance)
+    {
+        Mask *seen = Bits(at_.seen);
+        const Real *miss = Column(kMiss), *imagined = Column(kFalse);
+        for (int i = 0; i < n_; ++i)
+            seen[i] ^= chance[i] < (seen[i] ? miss[i] : imagined[i]);
+    }
+
+    // Frames travel, then vote. The firmware takes the newest frame alone, once.
+    void Decide(int step)
+    {
+        if (p_.kept_frames == 1 && p_.vote_frames == 1)
+            return;
+        Mask *seen = Bits(at_.seen), *ones = Bits(at_.ones);
+        Mask *sent = Bits(at_.frames) + (step % p_.kept_frames) * n_;
+        for (int i = 0; i < n_; ++i)
+            sent[i] = seen[i];
+        const LeanStep now = p_.steps[step];
+        const Mask *arrived = Bits(at_.frames) + now.frame * n_;
+        Mask *slot = Bits(at_.votes) + now.slot * n_;
+        for (int i = 0; now.slot >= 0 && i < n_; ++i)
+        {
+            ones[i] += slot[i] - arrived[i];  // a set bit is -1
+            slot[i] = arrived[i];
+        }
+        for (int i = 0; i < n_; ++i)
+            seen[i] = ones[i] + ones[i] > now.voters;
+    }
+
+    void Move()
+    {
+        const int n = n_;
+        const Mask *seen = Bits(at_.seen);
+        const Real *unseen_row = Column(kUnseenX), *seen_row = Column(kSeenX);
+        Real *x = Column(kX), *y = Column(kY), *c = Column(kCos), *s = Column(kSin);
+        for (int i = 0; i < n; ++i)
+        {
+            const auto driven = [&](int column) {
+                const int at = column * n + i;
+                return seen[i] ? seen_row[at] : unseen_row[at];
+            };
+            const Real ahead = driven(0), left = driven(1), turn_c = driven(2), turn_s = driven(3);
+            const Real ci = c[i], si = s[i];
+            x[i] += ci * ahead - si * left;
+            y[i] += si * ahead + ci * left;
+            c[i] = ci * turn_c - si * turn_s;
+            s[i] = si * turn_c + ci * turn_s;
+        }
+    }
+
+    // As twin::PushApart(): each by half of the overlap, all at once.
+    void PushApart()
+    {
+        if (p_.body_m == 0)
+            return;
+        Real *x = Column(kX), *y = Column(kY), *x0 = Column(kScratch), *y0 = Column(kScratch + 1);
+        for (int i = 0; i < n_; ++i)
+        {
+            x0[i] = x[i];
+            y0[i] = y[i];
+        }
+        const Real zero{}, body2 = L::All(p_.body_m * p_.body_m);
+        for (int i = 0; i < n_; ++i)
+            for (int j = i + 1; j < n_; ++j)
+            {
+                const Real dx = x0[j] - x0[i], dy = y0[j] - y0[i], d2 = dx * dx + dy * dy;
+                const Mask overlaps = (d2 < body2) & (d2 != 0);
+                if (!L::Any(overlaps))
+                    continue;
+                const Real push = overlaps ? (p_.body_m / L::Sqrt(d2) - 1) / 2 : zero;
+                x[i] -= push * dx;
+                y[i] -= push * dy;
+                x[j] += push * dx;
+                y[j] += push * dy;
+            }
+    }
+
+    void Measure(bool moves)
+    {
+        const Mask *seen = Bits(at_.seen);
+        Real *vx = Column(kScratch), *vy = Column(kScratch + 1), *omega = Column(kScratch + 2);
+        for (int i = 0; i < n_; ++i)
+        {
+            const Real zero{};
+            vx[i] = !moves ? zero : seen[i] ? Column(kSeenVx)[i] : Column(kUnseenVx)[i];
+            vy[i] = !moves ? zero : seen[i] ? Column(kSeenVy)[i] : Column(kUnseenVy)[i];
+            omega[i] = !moves ? zero : seen[i] ? Column(kSeenOmega)[i] : Column(kUnseenOmega)[i];
+        }
+        const MetricLanes<W> m = MetricFormulas<W>::Measure(
+            {n_, p_.ring, Column(kX), Column(kY), Column(kCos), Column(kSin), vx, vy, omega,
+             Column(kScratch + 3), Column(kScratch + 4), Column(kScratch + 5), numbers_[at_.range],
+             p_.touch_m});
+        Real *sums = numbers_ + at_.sums;
+        sums[kCirclinessSum] += m.circliness;
+        sums[kRadiusSum] += m.radius_m;
+        sums[kScatterSum] += m.scatter_m2;
+        sums[kRotationSum] += m.rotation;
+        sums[kOddSum] += m.odd_ratio;
+        sums[kDiffusionSum] += m.diffusion;
+        sums[kGroupsSum] += m.groups;
+        sums[kContactsSum] += m.contacts;
+        sums[kLeastDiffusion] = L::Min(sums[kLeastDiffusion], m.diffusion);
+    }
+
+    const LeanPlan &p_;
+    int n_;
+    LeanLayout at_;
+    Real *numbers_;
+};
+
+}  // namespace twin
+
+#endif

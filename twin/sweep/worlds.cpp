@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sweep/worlds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "fw/config.h"
+#include "swarm/bodies.h"
+#include "swarm/robots.h"
+#include "swarm/swarm.h"
+#include "sweep/lean.h"
+
+namespace twin
+{
+namespace
+{
+
+Swarm MakeSwarm(const World &world)
+{
+    const Cell &cell = *world.cell;
+    const int n = static_cast<int>(cell.tables.size());
+    const auto robots = DrawRobots(cell.model, n, world.seed);
+    const auto starts =
+        StartPoses(cell.start, n, cell.spread_m, cell.model.robot.body_radius_m, world.seed);
+    return Swarm(std::make_unique<PlanarBodies>(robots, starts, world.seed), robots, cell.tables,
+                 {.seed = world.seed});
+}
+
+Outcome RunFull(const World &world, double duration_s)
+{
+    const Cell &cell = *world.cell;
+    const MetricScale scale{cell.model.sensor.range_m, cell.model.robot.body_radius_m};
+    Swarm swarm = MakeSwarm(world);
+    const StepCount count = CountSteps(swarm.PeriodS(), duration_s);
+    MetricWindow window(std::numeric_limits<double>::infinity());
+    Outcome outcome{{}, std::numeric_limits<double>::infinity()};
+    std::vector<RobotState> states(cell.tables.size());
+    for (int step = 0; step < count.steps; ++step)
+    {
+        swarm.Step();
+        if (step < count.first_measured)
+            continue;
+        for (size_t i = 0; i < states.size(); ++i)
+            states[i] = swarm.State(static_cast<int>(i));
+        const Metrics now = Measure(states, cell.ring_size, scale);
+        window.Add(swarm.TimeS(), now);
+        outcome.least_diffusion = std::min(outcome.least_diffusion, now.diffusion);
+    }
+    outcome.mean = window.Mean();
+    return outcome;
+}
+
+// How many of the first worlds make one batch of the lean kernel.
+size_t BatchSize(std::span<const World> worlds)
+{
+    size_t size = 1;
+    const size_t most = std::min(worlds.size(), LeanWidths().front().lanes);
+    while (size < most && (worlds[size].cell == worlds[0].cell ||
+                           (WhyNotLean(worlds[size].cell->model).empty() &&
+                            SameBatch(*worlds[size].cell, *worlds[0].cell))))
+        ++size;
+    return size;
+}
+
+}  // namespace
+
+std::string WhyNotLean(const Model &model)
+{
+    if (!model.effects.empty())
+        return std::string("the model has the effect ") + model.effects.front().spec->card.name;
+    if (model.noise.drive_mps > 0 || model.noise.drive_radps > 0)
+        return "the model has drive noise";
+    // With a frame older than this at the next step, the firmware forgets its votes.
+    const double timeout_s = static_cast<double>(fw_config_default().frame_timeout_us) * 1e-6;
+    if (model.sensor.delay_s + 2 * model.base.control_period_s > timeout_s)
+        return "the sensor's delay comes near the firmware's time-out";
+    if (model.base.motor_lag_s > 0)
+        return "the model has motor lag";
+    for (const auto &[id, values] : model.robot_overrides)
+    {
+        const Model robot = model.ForRobot(id);
+        if (robot.base.motor_lag_s > 0 || robot.sensor.delay_s != model.sensor.delay_s)
+            return "a robot of the model has a lag or delay of its own";
+    }
+    return "";
+}
+
+std::vector<Outcome> RunWorlds(std::span<const World> worlds, double duration_s, Path path)
+{
+    std::vector<Outcome> outcomes(worlds.size());
+    for (size_t done = 0; done < worlds.size();)
+    {
+        const World &world = worlds[done];
+        size_t size = 1;
+        if (path == Path::kFull || !WhyNotLean(world.cell->model).empty())
+            outcomes[done] = RunFull(world, duration_s);
+        else
+        {
+            size = BatchSize(worlds.subspan(done));
+            RunLean(LeanWidths().front(), worlds.subspan(done, size), duration_s,
+                    std::span(outcomes).subspan(done, size));
+        }
+        done += size;
+    }
+    return outcomes;
+}
+
+std::vector<std::vector<Pose2>> TraceWorld(const World &world, double duration_s, double every_s)
+{
+    Swarm swarm = MakeSwarm(world);
+    const int steps = CountSteps(swarm.PeriodS(), duration_s).steps;
+    const int stride = std::max(1, static_cast<int>(std::lround(every_s / swarm.PeriodS())));
+    std::vector<std::vector<Pose2>> trace;
+    for (int step = 0; step <= steps; ++step)
+    {
+        if (step % stride == 0)
+        {
+            trace.emplace_back();
+            for (int i = 0; i < swarm.Size(); ++i)
+                trace.back().push_back(swarm.State(i).pose);
+        }
+        swarm.Step();
+    }
+    return trace;
+}
+
+}  // namespace twin
