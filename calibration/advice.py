@@ -2,6 +2,7 @@
 """What to do after a comparison, in a sentence."""
 
 from twinmill.calibration.compare import GOOD, SUSPECT, Comparison
+from twinmill.calibration.steady.compare import SteadyComparison
 from twinmill.calibration.tables import main_robot, number
 
 # By what the robot was doing: what is wrong, and effects that act there.
@@ -24,6 +25,8 @@ def advice(comparison: Comparison) -> str:
     if comparison.score <= GOOD:
         return "nothing to add for this log; compare with one of another day, floor or battery."
     robot = main_robot(comparison)
+    if isinstance(robot, SteadyComparison):
+        return _steady_advice(robot)
     phases = [r for r in robot.where if r.group == "phase"]
     if not phases:
         return "record a longer log with starts, stops and turns, then compare again."
@@ -36,4 +39,12 @@ def advice(comparison: Comparison) -> str:
     return (
         f"{100 * worst.share:.0f} % of the error comes while the robot is {worst.regime} "
         f"({number(worst.ratio)} times the floor): {wrong}; {try_next}."
+    )
+
+
+def _steady_advice(robot: SteadyComparison) -> str:
+    worst = max((r for r in robot.where if r.group == "path"), key=lambda r: r.share)
+    return (
+        f"{100 * worst.share:.0f} % of the error comes {worst.regime} ({number(worst.ratio)} times "
+        "the floor); `twinmill diagnose` names what is missing."
     )

@@ -10,6 +10,9 @@ from twinmill.calibration.model_file import ModelFile
 from twinmill.calibration.problem import CLOCK, Scene
 from twinmill.calibration.regimes import Regime, where_it_fails
 from twinmill.calibration.solve import solve
+from twinmill.calibration.steady.compare import SteadyComparison, compare_steady
+from twinmill.calibration.steady.scene import SteadyScene
+from twinmill.calibration.steady.sheet import Sheet
 from twinmill.calibration.windows import CHANNELS, HORIZONS_S, Windows, rms, score
 
 GOOD, MISSING, SUSPECT = (
@@ -41,6 +44,11 @@ class RobotComparison:
     def score(self) -> float:
         """Of this robot alone."""
         return score(self.errors, self.floor.rms)
+
+    @property
+    def size(self) -> int:
+        """How many values were predicted: the largest of a comparison speaks for its errors."""
+        return len(self.windows.starts)
 
     @property
     def time_offset_s(self) -> float:
@@ -79,16 +87,21 @@ class RobotComparison:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All robots of all logs against one model; the one with most windows speaks for errors."""
+    """All robots of all logs and tables against one model."""
 
     model_name: str
-    robots: list[RobotComparison]
+    robots: list[RobotComparison | SteadyComparison]
     warnings: list[str]
 
     @property
     def score(self) -> float:
         """RMS over robots."""
         return float(np.sqrt(np.mean([r.score**2 for r in self.robots])))
+
+    @property
+    def main(self) -> RobotComparison | SteadyComparison:
+        """The robot that speaks for the errors."""
+        return max(self.robots, key=lambda r: r.size)
 
     @property
     def verdict(self) -> str:
@@ -109,10 +122,9 @@ class Comparison:
 
     def to_json(self) -> dict:
         """The interface's object."""
-        main = max(self.robots, key=lambda r: len(r.windows.starts))
         return {
             "model": self.model_name,
-            **main.to_json(),
+            **self.main.to_json(),
             "score": self.score,
             "verdict": self.verdict,
             "robots": [r.to_json() for r in self.robots],
@@ -120,8 +132,10 @@ class Comparison:
         }
 
 
-def compare_robot(scene: Scene) -> RobotComparison:
+def compare_robot(scene: Scene | SteadyScene) -> RobotComparison | SteadyComparison:
     """Compares one robot; the scene's model, clock and noise are taken as they are."""
+    if isinstance(scene, SteadyScene):
+        return compare_steady(scene)
     windows = Windows.of(scene.measurement.track)
     errors = windows.errors(scene)
     floor = measure_floor(scene, windows)
@@ -130,7 +144,9 @@ def compare_robot(scene: Scene) -> RobotComparison:
     )
 
 
-def open_scenes(measurements: list[Measurement], model_file: ModelFile) -> list[Scene]:
+def open_scenes(
+    measurements: list[Measurement | Sheet], model_file: ModelFile
+) -> list[Scene | SteadyScene]:
     """Scenes of the model as it is, each with its clock aligned.
 
     A clock offset that another log told is kept: only so can a delay be told from it. One that this
@@ -138,6 +154,9 @@ def open_scenes(measurements: list[Measurement], model_file: ModelFile) -> list[
     """
     scenes = []
     for measurement in measurements:
+        if isinstance(measurement, Sheet):
+            scenes.append(SteadyScene.of(measurement, model_file.model))
+            continue
         other = model_file.model.clock_known and measurement.log_sha256 not in model_file.clock_logs
         scene = Scene.of(measurement, model_file.model, clock_free=not other)
         if scene.clock_free:

@@ -2,6 +2,7 @@
 """The floor: how large prediction errors are when nothing is missing in the model."""
 
 from dataclasses import dataclass, replace
+from functools import singledispatch
 
 import numpy as np
 import twinmill_native as native
@@ -18,6 +19,12 @@ class Floor:
 
     rms: np.ndarray
     kind: str
+
+
+@singledispatch
+def floor_of(scene: Scene) -> Floor:
+    """The floor of a scene's predictions."""
+    return measure_floor(scene, Windows.of(scene.measurement.track))
 
 
 def measure_floor(scene: Scene, windows: Windows) -> Floor:

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two halves of a log, drive by drive: what is fitted on one is judged on the other."""
+"""Two halves of a log, drive by drive: what is fitted on one is judged on the other.
+
+Functions of a scene are open to scenes of other kinds of measurement (functools.singledispatch).
+"""
+
+from functools import singledispatch
 
 import numpy as np
 from twinmill.calibration.problem import CLOCK, Scene
@@ -11,6 +16,7 @@ FEWEST = 6  # drives, below which blocks are taken
 MARGIN_S = 0.3  # steps after a change of half still remember the other through noise and wheels
 
 
+@singledispatch
 def halves(scene: Scene) -> np.ndarray:
     """(N,) 0 or 1 for each pose.
 
@@ -33,6 +39,7 @@ def _edges(scene: Scene) -> np.ndarray:
     return np.arange(track.pose_t_s[0], track.pose_t_s[-1], BLOCK_S)
 
 
+@singledispatch
 def step_mask(scene: Scene, half: np.ndarray, which: int) -> np.ndarray:
     """(S,) bool: steps of one half, without those just after a change of half."""
     own = half[scene.grid.source] == which
@@ -48,3 +55,11 @@ def window_mask(windows: Windows, half: np.ndarray, which: int) -> np.ndarray:
     """(W, H) bool: predictions that start and end in one half."""
     inside = (half[windows.starts] == which)[:, None] & (half[windows.ends] == which)
     return inside & (windows.ends >= 0)
+
+
+@singledispatch
+def held_errors(scene: Scene, half: np.ndarray, which: int) -> np.ndarray:
+    """(W, H, 3) errors of predictions within one half; NaN elsewhere."""
+    windows = Windows.of(scene.measurement.track)
+    inside = window_mask(windows, half, which)
+    return np.where(inside[..., None], windows.errors(scene), np.nan)

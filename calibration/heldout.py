@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
-from twinmill.calibration.folds import halves, step_mask, window_mask
+from twinmill.calibration.folds import halves, held_errors, step_mask
 from twinmill.calibration.freedom import Free
 from twinmill.calibration.problem import Scene
 from twinmill.calibration.solve import solve
-from twinmill.calibration.windows import CHANNELS, HORIZONS_S, Windows, rms
+from twinmill.calibration.windows import CHANNELS, HORIZONS_S, rms
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,9 @@ class HeldOut:
     score: float
 
     def rows(self) -> list[dict]:
-        """One row per channel and horizon."""
+        """One row per channel and horizon; none without a log."""
+        if len(self.rms) != len(HORIZONS_S):
+            return []
         return [
             {"channel": channel, "unit": unit, "horizon_s": horizon_s, "rms": float(self.rms[h, c])}
             for c, (channel, unit) in enumerate(CHANNELS)
@@ -48,11 +50,10 @@ def held_out(
                 tried, free, [step_mask(s, h, which) for s, h in zip(tried, halves_of, strict=True)]
             )
         for i, (scene, half) in enumerate(zip(tried, halves_of, strict=True)):
-            windows = Windows.of(scene.measurement.track)
-            other = window_mask(windows, half, 1 - which)
-            errors[i].append(np.where(other[..., None], windows.errors(scene), np.nan))
+            errors[i].append(held_errors(scene, half, 1 - which))
     parts = [rms(np.concatenate(e)) for e in errors]
     ratios = [part / floor for part, floor in zip(parts, floors, strict=True)]
-    return HeldOut(
-        np.sqrt(np.nanmean(np.square(parts), axis=0)), float(np.sqrt(np.nanmean(np.square(ratios))))
-    )
+    # A log's errors are metres ahead in time; a table's have no horizon.
+    ahead = [part for part in parts if len(part) == len(HORIZONS_S)] or parts
+    squares = [np.nanmean(np.square(ratio)) for ratio in ratios]
+    return HeldOut(np.sqrt(np.nanmean(np.square(ahead), axis=0)), float(np.sqrt(np.mean(squares))))

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import twinmill_native as native
 from twinmill.calibration.log import LogError, read_log
+from twinmill.calibration.steady.sheet import Sheet, is_sheet, read_sheets
 from twinmill.calibration.track import SILENCE_S, SMOOTH_S, Track, local_line, make_track
 
 SHORTEST_LOG_S = 10.0  # below it no regime is seen twice
@@ -44,14 +45,17 @@ class Measurement:
         return replace(self, track=track, played=_played(track))
 
 
-def load_measurements(paths: list[Path]) -> list[Measurement]:
-    """Reads logs and cleans every robot in them.
+def load_measurements(paths: list[Path]) -> list[Measurement | Sheet]:
+    """Reads logs and cleans every robot in them; reads steady-state tables (.csv).
 
     Raises:
         LogError: a log cannot be read, or is too short to judge a model by.
     """
     measurements = []
     for path in paths:
+        if is_sheet(path):
+            measurements += read_sheets(path)
+            continue
         log = read_log(path)
         for robot in log.robots.values():
             track = make_track(robot)

@@ -50,6 +50,10 @@ class Scene:
             native.one_step(self.model, self.measurement.played), self.measurement
         )
 
+    def white_errors(self) -> np.ndarray:
+        """(S, 3) the same, whitened."""
+        return self.noise.whiten(self.errors(), self.grid)
+
     def settle_noise(self) -> None:
         """Takes the noise that the model leaves, if it leaves less than any smooth response did."""
         left = fit_noise([self.errors()], self._moving(), self.grid)

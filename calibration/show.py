@@ -6,7 +6,7 @@ from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table as RichTable
 from rich.text import Text
-from twinmill.calibration import tables
+from twinmill.calibration import tables, views
 from twinmill.calibration.add import AddResult
 from twinmill.calibration.advice import advice
 from twinmill.calibration.compare import Comparison
@@ -20,15 +20,13 @@ WARNINGS = 3  # in the terminal; --json has all
 
 def comparison(result: Comparison) -> RenderableType:
     """A comparison."""
-    robot = tables.main_robot(result)
     return Group(
-        _facts(tables.facts(result)),
+        _facts(views.facts(result)),
         Text(),
         score_line("score", result),
         *_robots(result),
         Text(),
-        table(tables.errors(robot)),
-        table(tables.where(robot)),
+        *(table(t) for t in views.robot_tables(result)),
         *_warnings(result.warnings),
         _next(result),
     )
@@ -37,7 +35,7 @@ def comparison(result: Comparison) -> RenderableType:
 def fit(result: FitResult) -> RenderableType:
     """A fit."""
     return Group(
-        _facts(tables.facts(result.before)),
+        _facts(views.facts(result.before)),
         Text(),
         _change("score", result.before.score, result.after.score),
         score_line("", result.after, number_too=False),
@@ -54,7 +52,7 @@ def added(result: AddResult) -> RenderableType:
     own = [e for e in result.parameters if e.name.startswith(f"{result.effect}.")]
     rest = len(result.parameters) - len(own)
     return Group(
-        _facts(tables.facts(result.before)),
+        _facts(views.facts(result.before)),
         Text(),
         _change("score", result.before.score, result.after.score),
         _change(
@@ -67,7 +65,7 @@ def added(result: AddResult) -> RenderableType:
         Text(),
         table(tables.parameters(own)),
         Text(f"  and {rest} more refitted (--json has all).", "dim"),
-        table(tables.held_out(result)),
+        *(table(t) for t in tables.held_out(result)),
         *_warnings(result.after.warnings),
         _written(result.path),
         _next(result.after),

@@ -68,7 +68,7 @@ def tone(score: float) -> Tone:
 
 def main_robot(comparison: Comparison) -> RobotComparison:
     """The robot with most windows speaks for the errors, as in the JSON."""
-    return max(comparison.robots, key=lambda r: len(r.windows.starts))
+    return comparison.main
 
 
 def facts(comparison: Comparison) -> list[tuple[str, str]]:
@@ -193,8 +193,10 @@ def _rounded(value: float, std: float) -> str:
     return f"{value:.{int(np.clip(1 - np.floor(np.log10(std)), 0, 6))}f}"
 
 
-def held_out(added: AddResult) -> Table:
-    """Errors on the half that was not fitted, before and after."""
+def held_out(added: AddResult) -> list[Table]:
+    """Errors on the half that was not fitted, before and after; none without a log."""
+    if not added.heldout_after.rows():
+        return []
     columns = ["ahead\ns"]
     for channel, unit in CHANNELS:
         columns += [f"{channel}\n{SHOWN[unit][1]}", "after"]
@@ -211,12 +213,8 @@ def held_out(added: AddResult) -> Table:
                 ),
             ]
         rows.append(row)
-    return Table(
-        "Errors on data that was not fitted",
-        columns,
-        rows,
-        "Fitted on one half of the log, judged on the other, both ways.",
-    )
+    note = "Fitted on one half of the log, judged on the other, both ways."
+    return [Table("Errors on data that was not fitted", columns, rows, note)]
 
 
 def steps(scores: list[tuple[str, float]]) -> Table:

@@ -83,8 +83,9 @@ def difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def rms(errors: np.ndarray) -> np.ndarray:
-    """(W, H, 3) to (H, 3), NaN ignored."""
-    return np.sqrt(np.nanmean(errors**2, axis=0))
+    """(W, H, 3) to (H, 3); NaN ignored, and NaN where there is nothing else."""
+    count = np.count_nonzero(np.isfinite(errors), axis=0)
+    return np.sqrt(np.nansum(errors**2, axis=0) / np.where(count, count, np.nan))
 
 
 def score(errors: np.ndarray, floor: np.ndarray) -> float:

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import turbopi
 from twinmill.calibration.log import LogError
-from twinmill.tools.measurement_table import open_text
-from twinmill.tools.mixing import duties_from_vendor_move
+from twinmill.calibration.measurement_table import open_text
+from twinmill.calibration.mixing import duties_from_vendor_move
 from twinmill.tools.series import CommandSeries
 
 COLUMNS = ("time_ns", "detected", "smoothed_detected", "moves")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from twinmill.calibration.log import LogError
-from twinmill.tools.measurement_table import open_text
+from twinmill.calibration.measurement_table import open_text
 from twinmill.tools.series import PoseSeries
 
 UNIT_M = {"Meters": 1.0, "Centimeters": 0.01, "Millimeters": 0.001}

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import turbopi
 from twinmill.calibration.log import CommandKind, LogError
-from twinmill.tools.measurement_table import Table, read_table
-from twinmill.tools.mixing import duties_from_inputs
+from twinmill.calibration.measurement_table import Table, read_table
+from twinmill.calibration.mixing import duties_from_inputs
 from twinmill.tools.series import CommandSeries, PoseSeries, quaternion_from_heading
 
 QUATERNION = ("qw", "qx", "qy", "qz")

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from twinmill.calibration.compare import GOOD, Comparison, comparison, open_scenes
 from twinmill.calibration.diagnosis.evidence import State, over
-from twinmill.calibration.diagnosis.omnibus import Omnibus, unexplained
+from twinmill.calibration.diagnosis.omnibus import NOTHING, Omnibus, unexplained
 from twinmill.calibration.diagnosis.ranking import Ranked, groups_of, rank
 from twinmill.calibration.diagnosis.search import ALPHA, Search, search
 from twinmill.calibration.fit import refit, share_noise
-from twinmill.calibration.floor import measure_floor
+from twinmill.calibration.floor import floor_of
 from twinmill.calibration.freedom import base_quantities, effect_names, effect_quantities
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import ModelFile
 from twinmill.calibration.solve import excited
-from twinmill.calibration.windows import Windows
+from twinmill.calibration.steady.limits import unseen_by_tables
 
 HELPED = 0.95  # a refit that lowers the score below this share of it was worth it
 NOISIER = 2.0  # drive noise over that of the model file, beyond which it is a finding
@@ -102,14 +102,16 @@ def diagnose(
     base = excited(given, base_quantities(model_file.model, told), known)
     scenes = [s.with_model(model_file.model) for s in given]
     refit(scenes, base + known)
-    floors = [measure_floor(s, Windows.of(s.measurement.track)).rms for s in scenes]
-    done, final = search(State(scenes, base, floors), say, barred)
+    floors = [floor_of(s).rms for s in scenes]
+    unseen = unseen_by_tables(measurements)
+    done, final = search(State(scenes, base, floors), say, {*barred, *unseen})
     for earlier in (given, scenes):
         share_noise(final.scenes, earlier)
     before, fitted = comparison(model_file, given), comparison(model_file, scenes)
     floors = [r.floor.rms for r in fitted.robots]
     say("looking for what no effect explains")
-    omnibus = unexplained(final.scenes, final.free)
+    logs = [s for s in final.scenes if s.noise]
+    omnibus = unexplained(logs, final.free) if logs else NOTHING
     explained = done.rounds[0].before.chi2 - _last(done)
     share = omnibus.gain / max(omnibus.gain + explained, 1e-9) if omnibus.groups else 0.0
     names = effect_names(final.model)[len(model_file.model.effects) :]
@@ -123,7 +125,7 @@ def diagnose(
         fitted.score,
         names,
         ranking,
-        _not_identifiable(done),
+        [*_not_identifiable(done), *unseen.items()],
         omnibus,
         float(share),
         final,
@@ -173,6 +175,8 @@ def _noisier(model_file: ModelFile, state: State) -> list[str]:
     notes = []
     usual = model_file.model.get("noise.drive_mps")
     for scene in state.scenes:
+        if scene.noise is None:
+            continue
         ratio = scene.noise.position.drive / usual
         if ratio > NOISIER:
             notes.append(

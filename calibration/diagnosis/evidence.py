@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import twinmill_native as native
-from twinmill.calibration.folds import halves, step_mask, window_mask
+from twinmill.calibration.folds import halves, held_errors, step_mask
 from twinmill.calibration.freedom import Free, effect_names, effect_quantities
 from twinmill.calibration.problem import Scene
 from twinmill.calibration.solve import HUBER_SIGMA, Estimate, solve
-from twinmill.calibration.windows import Windows, rms
+from twinmill.calibration.windows import rms
 
 ROUNDS, REFINED = 8, 3  # of a trial's fit, and of the halves that start from it
 
@@ -116,9 +116,7 @@ def _cross(scenes: list[Scene], free: list[Free]) -> tuple[float, list[np.ndarra
         solve(tried, free, own, REFINED)
         chi2 += _chi2(tried, other)
         for i, (scene, half) in enumerate(zip(tried, halves_of, strict=True)):
-            windows = Windows.of(scene.measurement.track)
-            seen = window_mask(windows, half, 1 - which)[..., None]
-            errors[i].append(np.where(seen, windows.errors(scene), np.nan))
+            errors[i].append(held_errors(scene, half, 1 - which))
     return chi2, [rms(np.concatenate(e)) for e in errors]
 
 
@@ -126,7 +124,7 @@ def _chi2(scenes: list[Scene], masks: list[np.ndarray]) -> float:
     """Robust chi2 of the masked steps (Huber 1964)."""
     total = 0.0
     for scene, mask in zip(scenes, masks, strict=True):
-        z = np.abs(scene.noise.whiten(scene.errors(), scene.grid)[mask])
+        z = np.abs(scene.white_errors()[mask])
         robust = np.where(z < HUBER_SIGMA, z**2, HUBER_SIGMA * (2 * z - HUBER_SIGMA))
         total += float(robust.sum())
     return total

@@ -62,6 +62,9 @@ class Omnibus:
         return bool(self.groups)
 
 
+NOTHING = Omnibus(0.0, 0.0, [], None, 0.0)
+
+
 def unexplained(scenes: list[Scene], free: list[Free]) -> Omnibus:
     """Tests the library on what the scenes' models leave."""
     system = System(scenes, free)
@@ -82,7 +85,7 @@ def unexplained(scenes: list[Scene], free: list[Free]) -> Omnibus:
     groups.sort(key=lambda g: -g.gain)
     helps = np.array([any(t.group == g.group for g in groups) for t in terms])
     if not groups:
-        return Omnibus(0.0, 0.0, [], None, 0.0)
+        return NOTHING
     gain, error = _held_out(columns[:, helps], left, blocks)
     best, coefficient = _best_term(terms, columns, left, groups[0].group)
     return Omnibus(max(gain, groups[0].gain), error, groups, best, coefficient)

@@ -3,12 +3,12 @@
 
 from rich.console import Group, RenderableType
 from rich.text import Text
-from twinmill.calibration import show, tables
+from twinmill.calibration import show, tables, views
 from twinmill.calibration.diagnosis.diagnose import Diagnosis
 from twinmill.calibration.diagnosis.explain import Explanation, steps
 from twinmill.calibration.report import Section
-from twinmill.calibration.report.error_figures import regimes, waterfall
-from twinmill.calibration.report.motion_figures import floor_map, speeds
+from twinmill.calibration.report.error_figures import waterfall
+from twinmill.calibration.report.sections import robot_pictures
 from twinmill.calibration.solve import Estimate
 from twinmill.calibration.tables import Cell, Table, Tone, number, tone
 
@@ -96,7 +96,6 @@ def terminal_explanation(result: Explanation) -> RenderableType:
 
 def section(diagnosis: Diagnosis) -> Section:
     """Of a report."""
-    robot = tables.main_robot(diagnosis.before)
     return Section(
         f"What {diagnosis.before.model_name} lacks",
         [
@@ -104,8 +103,8 @@ def section(diagnosis: Diagnosis) -> Section:
             ("base refitted", number(diagnosis.score_refit), tone(diagnosis.score_refit)),
         ],
         diagnosis.sentence,
-        tables.facts(diagnosis.before),
-        [waterfall(_labelled(diagnosis)), regimes(robot), floor_map(robot), speeds(robot)],
+        views.facts(diagnosis.before),
+        [waterfall(_labelled(diagnosis)), *robot_pictures(diagnosis.before)],
         _tables(diagnosis),
         " ".join(lines(diagnosis)),
         diagnosis.before.warnings,

@@ -9,7 +9,7 @@ import numpy as np
 from twinmill.calibration.diagnosis.candidates import candidates
 from twinmill.calibration.diagnosis.evidence import State, Trial, attempt, without
 from twinmill.calibration.diagnosis.screen import Screening, screen
-from twinmill.calibration.freedom import effect_names
+from twinmill.calibration.freedom import catalogue, effect_names
 
 ALPHA = 0.01  # chance of accepting anything if nothing is missing, over all candidates
 TRIED, PAIRED = 6, 8
@@ -70,9 +70,10 @@ def search(
             say(f"round {number + 1}: trying {screening.found[i].candidate.effect}")
             this.judged.append(_judge(state, before, screening, (i,)))
         this.accepted = _best(before, this.judged, limit)
-        if this.accepted is None:
+        if this.accepted is None or _only_tables(state):
             say(f"round {number + 1}: trying pairs")
-            for pair in _pairs(screening, 2 * limit)[:2]:
+            likely = _pairs(screening, 2 * limit)[:2]
+            for pair in _drive_pairs(screening) if _only_tables(state) else likely:
                 this.judged.append(_judge(state, before, screening, pair))
             this.accepted = _best(before, this.judged, limit + np.log(len(found)))
         this.judged.sort(key=lambda j: j.trial.score)
@@ -119,6 +120,20 @@ def _pairs(screening: Screening, least: float) -> list[tuple[int, int]]:
         excess = max(screening.found[i].excess, screening.found[j].excess)
         worth[i, j] = (gain - alone) / excess
     return [p for p in sorted(worth, key=lambda pair: -worth[pair]) if worth[p] > least]
+
+
+def _only_tables(state: State) -> bool:
+    """Nothing but steady-state tables: a trial is cheap, and the drive's curve is all there is."""
+    return all(s.noise is None for s in state.scenes)
+
+
+def _drive_pairs(screening: Screening) -> list[tuple[int, int]]:
+    """Pairs of effects between duty and wheel, which hide each other: dead zone and curve."""
+    stages = {name: entry["stage"] for name, entry in catalogue().items()}
+    drive = [
+        i for i, s in enumerate(screening.found) if stages[s.candidate.effect] in ("duty", "wheel")
+    ]
+    return list(combinations(drive, 2))
 
 
 def _settle(state: State) -> State:

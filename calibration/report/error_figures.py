@@ -12,6 +12,7 @@ from twinmill.calibration.report.canvas import (
     plain_ticks,
 )
 from twinmill.calibration.report.html import Figure
+from twinmill.calibration.steady.compare import SteadyComparison
 from twinmill.calibration.tables import SHOWN, WORST, number
 from twinmill.calibration.windows import CHANNELS, HORIZONS_S, rms
 
@@ -52,7 +53,9 @@ def error_growth(models: list[tuple[str, RobotComparison]]) -> Figure:
     )
 
 
-def regimes(robot: RobotComparison) -> Figure:
+def regimes(
+    robot: RobotComparison | SteadyComparison, of: str = "Predictions half a second ahead"
+) -> Figure:
     """Error over floor by what the robot was doing."""
     shown, labels, groups = [], [], {}
     for regime in robot.where:
@@ -93,7 +96,7 @@ def regimes(robot: RobotComparison) -> Figure:
     return Figure(
         draw(0.9 + 0.24 * max(len(shown), 3), paint),
         "When it fails",
-        "Predictions half a second ahead, sorted by what the robot was doing. A bar that ends "
+        f"{of}, sorted by what the robot was doing. A bar that ends "
         "at the dashed line (1) is as good as the noise allows; a long bar is a place to look.",
     )
 

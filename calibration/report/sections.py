@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results of calibration to sections of a report."""
 
-from twinmill.calibration import tables
+from twinmill.calibration import tables, views
 from twinmill.calibration.add import AddResult
 from twinmill.calibration.advice import advice
 from twinmill.calibration.compare import Comparison
 from twinmill.calibration.fit import FitResult
 from twinmill.calibration.report.error_figures import error_growth, regimes, waterfall
-from twinmill.calibration.report.html import Section
+from twinmill.calibration.report.html import Figure, Section
 from twinmill.calibration.report.motion_figures import floor_map, path, speeds
+from twinmill.calibration.report.steady_figures import steady_values
 from twinmill.calibration.tables import number, tone
 
 
@@ -20,15 +21,9 @@ def comparison_section(result: Comparison) -> Section:
         title,
         [_score("score", result.score)],
         result.verdict,
-        tables.facts(result),
-        [
-            path(robot),
-            speeds(robot),
-            error_growth([("this model", robot)]),
-            regimes(robot),
-            floor_map(robot),
-        ],
-        [tables.errors(robot), tables.where(robot)],
+        views.facts(result),
+        _pictures(result, [("this model", robot)]),
+        views.robot_tables(result),
         advice(result),
         result.warnings,
     )
@@ -42,15 +37,9 @@ def fit_section(result: FitResult) -> Section:
         title,
         [_score("before", result.before.score), _score("after", result.after.score)],
         result.after.verdict,
-        tables.facts(result.after),
-        [
-            path(after),
-            speeds(after),
-            error_growth([("before", before), ("after", after)]),
-            regimes(after),
-            floor_map(after),
-        ],
-        [tables.parameters(result.parameters), tables.errors(after), tables.where(after)],
+        views.facts(result.after),
+        _pictures(result.after, [("before", before), ("after", after)]),
+        [tables.parameters(result.parameters), *views.robot_tables(result.after)],
         advice(result.after),
         result.after.warnings,
     )
@@ -70,9 +59,9 @@ def added_section(result: AddResult) -> Section:
         title,
         scores,
         result.after.verdict,
-        tables.facts(result.after),
-        [speeds(after), error_growth([("before", before), ("after", after)]), regimes(after)],
-        [tables.parameters(result.parameters), tables.held_out(result)],
+        views.facts(result.after),
+        _pictures(result.after, [("before", before), ("after", after)]),
+        [tables.parameters(result.parameters), *tables.held_out(result)],
         advice(result.after),
         result.after.warnings,
     )
@@ -82,6 +71,22 @@ def steps_section(title: str, scores: list[tuple[str, float]], verdict: str) -> 
     """Of a chain of steps."""
     ends = [_score("start", scores[0][1]), _score("end", scores[-1][1])]
     return Section(title, ends, verdict, figures=[waterfall(scores)], tables=[tables.steps(scores)])
+
+
+def robot_pictures(result: Comparison) -> list[Figure]:
+    """Where and how fast the robot went, and when the model fails."""
+    robot, steady = result.main, views.sheets(result)
+    own = [] if robot in steady else [path(robot), speeds(robot), regimes(robot), floor_map(robot)]
+    if steady:
+        number = steady[0].scene.measurement.robot_id
+        own += [steady_values(steady), regimes(steady[0], f"Steady inputs of robot {number}")]
+    return own
+
+
+def _pictures(result: Comparison, models: list[tuple]) -> list[Figure]:
+    """The same, with errors over time if there is a log."""
+    growth = [] if result.main in views.sheets(result) else [error_growth(models)]
+    return robot_pictures(result) + growth
 
 
 def _score(label: str, value: float) -> tuple[str, str, tables.Tone]:

@@ -11,8 +11,8 @@ import typer
 from hypothesis import given
 from hypothesis import strategies as st
 from twinmill.calibration.log import LogError, read_log
+from twinmill.calibration.mixing import duties_from_inputs, duties_from_vendor_move
 from twinmill.tools.import_log import ImportOptions, import_log, register
-from twinmill.tools.mixing import duties_from_inputs, duties_from_vendor_move
 from typer.testing import CliRunner
 
 POSES = "t_s,robot_id,x_m,y_m,theta_rad\n0,4,0,0,3\n0.5,4,0.1,0.2,-3\n1.0,4,0.3,0.2,-2.5\n"

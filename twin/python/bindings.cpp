@@ -7,6 +7,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "predict/predict.h"
+#include "predict/steady.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -166,6 +167,20 @@ Array OneStepBatch(const Model &model, const PyTrack &track, const std::vector<s
     return ToNumpy(std::move(predicted), {values.shape(0), track.pose_t_s.size(), 3});
 }
 
+Array Steady(const Model &model, Matrix commands, const std::vector<std::string> &names,
+             Matrix values)
+{
+    if (commands.shape(1) != kWheels || values.shape(1) != names.size())
+        throw std::invalid_argument("commands must be (K, 4), values have one column per name");
+    const size_t rows = names.empty() ? 1 : values.shape(0);
+    std::vector<double> steady;
+    {
+        nb::gil_scoped_release unlocked;
+        steady = PredictSteady(model, Span(commands), names, Span(values));
+    }
+    return ToNumpy(std::move(steady), {rows, commands.shape(0), kSteadyValues});
+}
+
 }  // namespace
 
 NB_MODULE(twinmill_native, m)
@@ -210,6 +225,8 @@ NB_MODULE(twinmill_native, m)
           "(N, 3) poses predicted from the pose before each.");
     m.def("one_step_batch", &OneStepBatch, "model"_a, "track"_a, "names"_a, "values"_a,
           "(B, N, 3) one-step predictions for B rows of values.");
+    m.def("steady", &Steady, "model"_a, "commands"_a, "names"_a, "values"_a,
+          "(B, K, 7) steady vx_mps, vy_mps, omega_radps and rim speeds at K constant commands.");
     m.def("windows", &Windows, "model"_a, "track"_a, "starts"_a, "ends"_a,
           "(W, H, 3) poses predicted at `ends` from the poses at `starts`.");
     m.def(
