@@ -140,7 +140,7 @@ def test_a_signal_finishes_the_log(tmp_path, stop):
     ("arguments", "code", "words"),
     [
         (["--view"], 2, "--view"),
-        (["--sensor", "camera"], 2, "camera"),
+        (["--sensor", "lidar"], 2, "lidar"),
         (["--n", 0], 2, "--n"),
         (["--n", 101], 2, "--n"),
         (["--duration-s", -1], 2, "--duration-s"),
@@ -176,3 +176,18 @@ def test_a_device_is_not_replaced_by_a_log(tmp_path):
     )
     assert done.returncode == 1 and "no ordinary file" in done.stderr
     assert device.is_fifo()
+
+
+def test_camera_draws_frames_and_decides_by_them(tmp_path):
+    logs = []
+    for seed in (1, 1, 2):
+        log = tmp_path / f"{len(logs)}.lcmlog"
+        done = run("--sensor", "camera", "--n", 3, "--duration-s", 1, "--seed", seed, "--log", log)
+        assert done.returncode == 0, done.stderr
+        logs.append(log.read_bytes())
+    assert logs[0] == logs[1] != logs[2]
+    messages, _ = read(log)
+    telemetry = [t for i in range(3) for t in messages[f"R{i:02d}_TELEMETRY"]]
+    assert {t.detected_raw for t in telemetry} == {0, 1}
+    # The authors' limit on the blob's size.
+    assert all((t.blob_px > 300) == t.detected_raw for t in telemetry)

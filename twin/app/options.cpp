@@ -48,7 +48,7 @@ void AddWorld(CLI::App &app, Options &o)
         ->capture_default_str();
     AddChoice(app, "--plant", o.plant, kPlants, "what moves the robots");
     app.add_option("--sensor", o.sensor, "what gives the bit")
-        ->check(CLI::IsMember({"cone"}))
+        ->check(CLI::IsMember({"cone", "camera"}))
         ->capture_default_str();
     app.add_option("--n", o.n, "robots; default 6, or the sum of the counts in --behavior")
         ->check(CLI::Range(1, 100));
@@ -109,6 +109,7 @@ Options ParseOptions(int argc, const char *const *argv)
         "Exit: 0 done or stopped by Ctrl-C, 1 failed, 2 wrong command line.");
     app.set_version_flag("--version", "twin_run " TWINMILL_VERSION);
     AddWorld(app, options);
+    AddCameraOptions(app, options.camera);
     AddOutput(app, options);
     try
     {
@@ -144,6 +145,8 @@ std::string CommandLine(const Options &o, size_t robots, int64_t epoch_us)
          << " --behavior " << o.behavior << " --seed " << o.seed << " --start "
          << NameOf(kStarts, o.start) << " --spread-m " << o.spread_m << " --pose-rate-hz "
          << o.pose_rate_hz << " --epoch-us " << epoch_us;
+    if (o.sensor == "camera")
+        line << CameraWords(o.camera);
     if (o.dt_s)
         line << " --dt-s " << *o.dt_s;
     if (o.duration_s)

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "camera_options.h"
 #include "swarm/starts.h"
 
 namespace twin
@@ -23,6 +24,7 @@ struct Options
     std::string mjcf = "turbopi.xml", model = "turbopi.toml", behavior = "milling";
     PlantKind plant = PlantKind::kMujoco;
     std::string sensor = "cone";
+    CameraOptions camera;
     std::optional<int> n;
     uint64_t seed = 1;
     StartShape start = StartShape::kSquare;

@@ -28,6 +28,8 @@ using Clock = std::chrono::steady_clock;
 constexpr double kWindow_s = 10;
 // Poses between steps are interpolated: right to 0.02 mm even while a robot starts.
 constexpr double kMaxStep_s = 0.0055;
+// Distractors lie this many spreads of the start away.
+constexpr double kRing = 1.5;
 // A fixed date, so that a log depends on nothing but its options: 2023-11-14 22:13:20 UTC.
 constexpr int64_t kLogEpoch_us = 1'700'000'000'000'000;
 
@@ -86,6 +88,9 @@ Swarm MakeSwarm(const Options &options, const Setup &setup,
                 {options.seed, setup.start_utime_us, kMaxStep_s});
     for (int robot = 0; robot < swarm.Size(); ++robot)
         swarm.Play(robot, script);
+    if (options.sensor == "camera")
+        UseCameras(swarm, MakeCameraWorld(options.camera, kRing * options.spread_m, options.seed),
+                   setup.robots, options.seed);
     return swarm;
 }
 

@@ -76,6 +76,7 @@ Swarm::Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
                             models[i].base,
                             kFullPack_V,
                             nullptr,
+                            nullptr,
                             0});
         if (const fw_err error = fw_init(&members_.back().firmware, &config); error != FW_OK)
             throw std::invalid_argument(std::string("the firmware refuses its configuration: ") +
@@ -103,6 +104,11 @@ void Swarm::SetTable(int robot, const fw_table &table)
 {
     if (fw_set_table(&members_[static_cast<size_t>(robot)].firmware, &table) != FW_OK)
         throw std::invalid_argument("the firmware refuses the table");
+}
+
+void Swarm::LookThrough(int robot, std::unique_ptr<Eye> eye)
+{
+    members_[static_cast<size_t>(robot)].eye = std::move(eye);
 }
 
 void Swarm::Step()
@@ -143,6 +149,8 @@ void Swarm::DecideOne(Member &member, int64_t now_us)
         else
             fw_step_script_input(&member.firmware, &now.input, &member.output);
     }
+    else if (member.eye)
+        member.eye->Decide(poses_, now_us, member.firmware, member.output);
     else if (frame)
         fw_step_bit(&member.firmware, frame->detected, frame->utime_us, frame->seq, now_us,
                     &member.output);

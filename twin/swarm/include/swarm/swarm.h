@@ -10,6 +10,7 @@
 #include "fw/step.h"
 #include "plant/plant.h"
 #include "sensor/cone_sensor.h"
+#include "swarm/eye.h"
 #include "swarm/script.h"
 
 namespace twin
@@ -47,6 +48,9 @@ public:
     void SetRunning(int robot, bool running);
     void SetTable(int robot, const fw_table &table);
 
+    // From now on `robot` decides by `eye` instead of the cone.
+    void LookThrough(int robot, std::unique_ptr<Eye> eye);
+
     // Decide(), then Substeps() times Advance().
     void Step();
     // Senses, decides, commands.
@@ -76,6 +80,7 @@ private:
         ConeSensor sensor;
         Base base;
         double battery_V;
+        std::unique_ptr<Eye> eye;  // none: the cone decides
         std::shared_ptr<const Script> script;
         double script_begin_s;
     };

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// The part of twin_run's command line that is about cameras.
+#ifndef APP_CAMERA_OPTIONS_H
+#define APP_CAMERA_OPTIONS_H
+
+#include <string>
+#include <vector>
+
+#include "model_file/model.h"
+#include "swarm/camera_eye.h"
+#include "swarm/swarm.h"
+
+namespace CLI
+{
+class App;
+}
+
+namespace twin
+{
+
+struct CameraOptions
+{
+    std::string target = "ball";
+    int distractors = 0;
+    double tilt_rad = 0;
+};
+
+void AddCameraOptions(CLI::App &app, CameraOptions &options);
+
+// As words of a command line, each after a space.
+std::string CameraWords(const CameraOptions &options);
+
+// What all cameras see and share; distractors lie `ring_radius_m` away and beyond.
+CameraWorld MakeCameraWorld(const CameraOptions &options, double ring_radius_m, uint64_t seed);
+
+// One camera for each robot.
+void UseCameras(Swarm &swarm, const CameraWorld &world, const std::vector<Model> &robots,
+                uint64_t seed);
+
+}  // namespace twin
+
+#endif

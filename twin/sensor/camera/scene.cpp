@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sensor/scene.h"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "plant/random.h"
+
+namespace twin
+{
+namespace
+{
+
+using Eigen::Vector3d;
+
+uint8_t Byte(double value)
+{
+    return static_cast<uint8_t>(std::lround(value));
+}
+
+// Parts of turbopi.xml, in the body frame.
+struct Part
+{
+    Vector3d centre_m, half_m;
+    Colour colour;
+};
+
+const Colour kGreen = Colour::FromRgb(0.10, 0.78, 0.20);
+const Vector3d kBallAt_m{-0.035, 0, 0.18};
+constexpr double kBallRadius_m = 0.02;
+
+std::vector<Part> BodyParts()
+{
+    const Colour dark = Colour::FromRgb(0.13, 0.14, 0.16), rubber = Colour::FromRgb(0.1, 0.1, 0.11),
+                 board = Colour::FromRgb(0.2, 0.22, 0.25), steel = Colour::FromRgb(0.6, 0.6, 0.6);
+    std::vector<Part> parts{
+        {{0.0015, 0, 0.0615}, {0.092, 0.047, 0.020}, dark},     // plates, battery and motors
+        {{-0.035, 0, 0.0945}, {0.0425, 0.028, 0.013}, board},   // Raspberry Pi and driver board
+        {{0.055, 0, 0.112}, {0.014, 0.0165, 0.024}, dark},      // camera on pan and tilt
+        {{-0.035, 0, 0.134}, {0.0025, 0.0025, 0.028}, steel}};  // mast
+    for (const double x : {0.059, -0.059})
+        for (const double y : {0.067, -0.067})
+            parts.push_back({{x, y, 0.0325}, {0.0325, 0.013, 0.0325}, rubber});
+    return parts;
+}
+
+const Part kCover{{-0.035, 0, 0.129}, {0.050, 0.047, 0.020}, kGreen};
+
+}  // namespace
+
+Colour Colour::FromRgb(double red, double green, double blue)
+{
+    const double luma = 0.299 * red + 0.587 * green + 0.114 * blue;
+    return {Byte(16 + 219 * luma), Byte(128 + 224 * (blue - luma) / 1.772),
+            Byte(128 + 224 * (red - luma) / 1.402)};
+}
+
+Scene RobotsSeenBy(size_t self, std::span<const Pose2> poses, Target target)
+{
+    static const std::vector<Part> parts = BodyParts();
+    Scene scene;
+    for (size_t i = 0; i < poses.size(); ++i)
+    {
+        if (i == self)
+            continue;
+        const Pose2 &pose = poses[i];
+        const double c = std::cos(pose.theta_rad), s = std::sin(pose.theta_rad);
+        const auto in_world = [&](const Vector3d &p) {
+            return Vector3d{pose.x_m + c * p.x() - s * p.y(), pose.y_m + s * p.x() + c * p.y(),
+                            p.z()};
+        };
+        const auto add = [&](const Part &part) {
+            scene.boxes.push_back(
+                {in_world(part.centre_m), part.half_m, pose.theta_rad, part.colour});
+        };
+        for (const Part &part : parts)
+            add(part);
+        if (target == Target::kCover)
+            add(kCover);
+        else
+            scene.balls.push_back({in_world(kBallAt_m), kBallRadius_m, kGreen});
+    }
+    return scene;
+}
+
+std::vector<Ball> Distractors(int count, double ring_radius_m, uint64_t seed)
+{
+    static const std::array<Colour, 4> colours{
+        Colour::FromRgb(0.85, 0.1, 0.1), Colour::FromRgb(0.1, 0.2, 0.85),
+        Colour::FromRgb(0.9, 0.55, 0.1), Colour::FromRgb(0.6, 0.2, 0.7)};
+    std::vector<Ball> balls;
+    for (int i = 0; i < count; ++i)
+    {
+        Random random(seed, i, "distractor");
+        const double at_rad = 2 * std::numbers::pi * random.Uniform();
+        const double out_m = ring_radius_m * (1 + 0.3 * random.Uniform());
+        const double radius_m = 0.04 + 0.08 * random.Uniform();
+        balls.push_back({{out_m * std::cos(at_rad), out_m * std::sin(at_rad), radius_m},
+                         radius_m,
+                         colours[static_cast<size_t>(i) % colours.size()]});
+    }
+    return balls;
+}
+
+}  // namespace twin

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// What there is to see: robots as boxes and balls, and things of other colours.
+#ifndef SENSOR_SCENE_H
+#define SENSOR_SCENE_H
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "plant/plant.h"
+
+namespace twin
+{
+
+// BT.601, studio range, as cameras send it.
+struct Colour
+{
+    uint8_t y, u, v;
+    // From red, green and blue in [0, 1], without gamma of its own (ITU-R BT.601-7, 2.5).
+    static Colour FromRgb(double red, double green, double blue);
+};
+
+struct Ball
+{
+    Eigen::Vector3d centre_m;
+    double radius_m;
+    Colour colour;
+};
+
+// Turned about the vertical alone: robots stand on a level floor.
+struct Box
+{
+    Eigen::Vector3d centre_m, half_m;
+    double yaw_rad;
+    Colour colour;
+};
+
+struct Scene
+{
+    std::vector<Ball> balls;
+    std::vector<Box> boxes;
+};
+
+// The green thing on a robot that others look for.
+enum class Target
+{
+    kBall,  // on a mast, as in turbopi.xml
+    kCover  // a box over the upper deck
+};
+
+// What robot `self` may see of all the robots: the rest of them, sizes as in turbopi.xml.
+Scene RobotsSeenBy(size_t self, std::span<const Pose2> poses, Target target);
+
+// Coloured balls, none of them green, that lie on the floor in a ring about the origin.
+std::vector<Ball> Distractors(int count, double ring_radius_m, uint64_t seed);
+
+}  // namespace twin
+
+#endif

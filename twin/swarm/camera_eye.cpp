@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "swarm/camera_eye.h"
+
+#include <cmath>
+
+namespace twin
+{
+
+CameraEye::CameraEye(const CameraWorld &world, int robot, double delay_s, uint64_t seed)
+    : world_(world),
+      self_(static_cast<size_t>(robot)),
+      camera_(world.settings, robot, seed),
+      delay_us_(std::llround(delay_s * 1e6))
+{
+}
+
+std::optional<fw_frame> CameraEye::NextFrame(std::span<const Pose2> poses, int64_t now_us)
+{
+    on_the_way_.push_back({{poses.begin(), poses.end()}, now_us, seq_++});
+    std::optional<Exposure> due;
+    while (!on_the_way_.empty() && on_the_way_.front().utime_us + delay_us_ <= now_us)
+    {
+        due = std::move(on_the_way_.front());
+        on_the_way_.pop_front();
+    }
+    if (!due)
+        return std::nullopt;
+    Scene scene = RobotsSeenBy(self_, due->poses, world_.target);
+    scene.balls.insert(scene.balls.end(), world_.distractors.begin(), world_.distractors.end());
+    frame_ = camera_.Draw(scene, due->poses[self_]);
+    fw_frame frame{};
+    frame.yuyv = frame_.data();
+    frame.width_px = world_.settings.width_px;
+    frame.height_px = world_.settings.height_px;
+    frame.stride_bytes = 2 * frame.width_px;
+    frame.utime_us = due->utime_us;
+    frame.seq = due->seq;
+    frame.length_bytes = frame_.size();
+    return frame;
+}
+
+void CameraEye::Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
+                       fw_output &out)
+{
+    const std::optional<fw_frame> frame = NextFrame(poses, now_us);
+    fw_step(&firmware, frame ? &*frame : nullptr, now_us, &out);
+}
+
+}  // namespace twin

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// A drawn camera whose frames go through the firmware's own threshold.
+#ifndef SWARM_CAMERA_EYE_H
+#define SWARM_CAMERA_EYE_H
+
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "sensor/camera.h"
+#include "swarm/eye.h"
+
+namespace twin
+{
+
+// What all cameras of a swarm share.
+struct CameraWorld
+{
+    Target target = Target::kBall;
+    std::vector<Ball> distractors;
+    CameraSettings settings;
+};
+
+class CameraEye : public Eye
+{
+public:
+    // A frame reaches the firmware `delay_s` after its exposure.
+    CameraEye(const CameraWorld &world, int robot, double delay_s, uint64_t seed);
+
+    void Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
+                fw_output &out) override;
+
+    // The frame drawn last, YUYV; empty before the first.
+    const std::vector<uint8_t> &frame() const { return frame_; }
+
+protected:
+    // Exposes at every call. Draws the newest frame that is due; none if no further one is.
+    std::optional<fw_frame> NextFrame(std::span<const Pose2> poses, int64_t now_us);
+
+private:
+    struct Exposure
+    {
+        std::vector<Pose2> poses;
+        int64_t utime_us;
+        uint32_t seq;
+    };
+    CameraWorld world_;
+    size_t self_;
+    Camera camera_;
+    int64_t delay_us_;
+    uint32_t seq_ = 0;
+    std::deque<Exposure> on_the_way_;
+    std::vector<uint8_t> frame_;
+};
+
+}  // namespace twin
+
+#endif

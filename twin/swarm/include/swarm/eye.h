@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a robot decides by, where that is more than the cone's bit.
+#ifndef SWARM_EYE_H
+#define SWARM_EYE_H
+
+#include <cstdint>
+#include <span>
+
+#include "fw/step.h"
+#include "plant/plant.h"
+
+namespace twin
+{
+
+class Eye
+{
+public:
+    virtual ~Eye() = default;
+    // One control step of the robot's `firmware` while all robots are at `poses`; `out` is always
+    // written. `now_us` is the robots' clock.
+    virtual void Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
+                        fw_output &out) = 0;
+};
+
+}  // namespace twin
+
+#endif
