@@ -6,7 +6,7 @@ from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
-from twinmill.tools import calibrate, diagnose, effects, import_log
+from twinmill.tools import calibrate, characterise, diagnose, effects, import_log
 from twinmill.tools.challenge import run as challenge
 from twinmill.tools.swarm import commands as swarm
 
@@ -21,6 +21,7 @@ diagnose.register(app)
 challenge.register(app)
 effects.register(app)
 swarm.register(app)
+characterise.register(app)
 
 
 def _show_version(wanted: bool) -> None:

@@ -121,6 +121,8 @@ class Fleet:
             ValueError: there is no such bus.
         """
         self.robots: dict[int, Robot] = {}
+        # Called again and again while listening; what it raises ends that.
+        self.watch: Callable[[], None] = lambda: None
         self._prefix = channel_prefix
         try:
             self.bus = connect(url)
@@ -155,6 +157,7 @@ class Fleet:
         end_s = time.monotonic() + duration_s
         while not enough() and (left_s := end_s - time.monotonic()) > 0:
             self.bus.handle_timeout(max(1, min(20, int(1000 * left_s))))
+            self.watch()
 
     def send(self, command: Any) -> None:
         """Says a swarm_command_t once."""

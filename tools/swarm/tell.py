@@ -2,7 +2,6 @@
 """Commands that are repeated until acknowledged: any one packet may be lost, either way."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import turbopi
@@ -129,7 +128,6 @@ def start(
     ahead_s: float,
     partial: bool,
     verb: int = VERBS.VERB_START,
-    told: Callable[[], None] = lambda: None,
 ) -> Start:
     """Starts robots at one instant of their clocks; all of them or, unless partial, none.
 
@@ -140,7 +138,6 @@ def start(
         ahead_s: from now to the instant.
         partial: start though some do not answer or refuse.
         verb: start, or play script.
-        told: called when all have acknowledged, before the instant.
     """
     command = make_command(verb, behavior)
     command.start_utime_us = command.utime_us + int(ahead_s * 1e6)
@@ -151,7 +148,6 @@ def start(
         if called_off:
             stop(fleet, robots)
         else:
-            told()
             fleet.listen(instant_s - time.monotonic())
             fleet.listen(0.5, lambda: all(not stands(fleet.robots[a.robot_id]) for a in given
                                           if a.accepted))  # fmt: skip

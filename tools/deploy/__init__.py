@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Robots over ssh: their program, its configuration, its scripts."""
