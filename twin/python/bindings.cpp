@@ -1,41 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// twinmill_native: the catalogue, model files and short predictions for Python.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
+// twinmill_native: the catalogue, model files, short predictions and swarms for Python.
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "arrays.h"
 #include "predict/predict.h"
 #include "predict/steady.h"
 
-namespace nb = nanobind;
-using namespace nb::literals;
+using namespace nanobind::literals;
 using namespace twin;
 
 namespace
 {
-
-using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Indices = nb::ndarray<const int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using IndexMatrix = nb::ndarray<const int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Array = nb::ndarray<nb::numpy, double>;
-
-template <class T>
-auto Span(const T &array)
-{
-    return std::span(array.data(), array.size());
-}
-
-// Hands a vector's memory to numpy.
-Array ToNumpy(std::vector<double> &&values, std::initializer_list<size_t> shape)
-{
-    auto *owned = new std::vector<double>(std::move(values));
-    nb::capsule owner(owned,
-                      [](void *p) noexcept { delete static_cast<std::vector<double> *>(p); });
-    return Array(owned->data(), shape, owner);
-}
 
 // The arrays of a run, checked once and kept alive.
 struct PyTrack
@@ -185,7 +162,7 @@ Array Steady(const Model &model, Matrix commands, const std::vector<std::string>
 
 NB_MODULE(twinmill_native, m)
 {
-    m.doc() = "Effects, model files and short predictions of the twin's planar plant.";
+    m.doc() = "Effects, model files, short predictions and swarms of the twin's planar plant.";
     m.def("catalogue", &CatalogueList,
           "All effects: cards and parameter tables, in alphabetical order.");
     m.def("find_model_file", &FindModelFile, "name"_a,
@@ -236,4 +213,6 @@ NB_MODULE(twinmill_native, m)
         },
         "model"_a, "track"_a, "seed"_a,
         "(N, 3) poses had this model, with its noise, been driven.");
+
+    BindSwarms(m);
 }

@@ -12,8 +12,11 @@ namespace
 
 constexpr int kMaxRobots = 100;
 
-const fw_behavior *FindBehavior(const std::string &name)
+const fw_behavior *FindBehavior(const std::string &name, std::span<const fw_behavior> own)
 {
+    for (const fw_behavior &behavior : own)
+        if (name == behavior.name)
+            return &behavior;
     if (const fw_behavior *found = fw_behavior_find(name.c_str()))
         return found;
     std::string known;
@@ -36,12 +39,13 @@ int ParseCount(const std::string &part, const std::string &digits)
 
 }  // namespace
 
-std::vector<const fw_behavior *> ParseSpecies(const std::string &text, std::optional<int> n)
+std::vector<const fw_behavior *> ParseSpecies(const std::string &text, std::optional<int> n,
+                                              std::span<const fw_behavior> own)
 {
     std::vector<const fw_behavior *> robots;
     if (text.find(':') == std::string::npos && text.find(',') == std::string::npos)
     {
-        robots.assign(static_cast<size_t>(n.value_or(6)), FindBehavior(text));
+        robots.assign(static_cast<size_t>(n.value_or(6)), FindBehavior(text, own));
         return robots;
     }
     std::istringstream parts(text);
@@ -51,7 +55,7 @@ std::vector<const fw_behavior *> ParseSpecies(const std::string &text, std::opti
         const std::string digits = colon == std::string::npos ? "" : part.substr(colon + 1);
         const int count = ParseCount(part, digits);
         robots.insert(robots.end(), static_cast<size_t>(count),
-                      FindBehavior(part.substr(0, colon)));
+                      FindBehavior(part.substr(0, colon), own));
     }
     const size_t wanted = n ? static_cast<size_t>(*n) : robots.size();
     if (robots.size() != wanted || robots.size() > kMaxRobots)

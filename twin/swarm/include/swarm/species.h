@@ -4,6 +4,7 @@
 #define SWARM_SPECIES_H
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,8 +15,9 @@ namespace twin
 
 // One behaviour per robot from "milling" (for all) or "milling:5,self_centering:1", in that order.
 // `n` may be left out if counts are given. Throws std::invalid_argument in one sentence if a name
-// is unknown to the firmware or the counts do not add up to n.
-std::vector<const fw_behavior *> ParseSpecies(const std::string &text, std::optional<int> n);
+// is neither the firmware's nor one of `own`, or the counts do not add up to n.
+std::vector<const fw_behavior *> ParseSpecies(const std::string &text, std::optional<int> n,
+                                              std::span<const fw_behavior> own = {});
 
 }  // namespace twin
 

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sweeps: the same bytes for all workers, nothing lost by a kill, axes that do what they say."""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import twinmill_native as native
+from twinmill.tools.sweep import request as request_module
+from twinmill.tools.sweep.axes import parse_axis
+from twinmill.tools.sweep.command import make_request, sweep
+from twinmill.tools.sweep.request import Request
+from twinmill.tools.sweep.store import Store, read_sweep
+
+AXES = ["v_mps=0.1:0.3:3", "omega_degps=30:90:2"]
+
+
+def request(axes: list[str] = AXES, **changes) -> Request:
+    given = {"seeds": 10, "duration_s": 5.0, **changes}
+    return make_request(
+        given.pop("behavior", "milling"), given.pop("model", "paper.toml"), axes, **given
+    )
+
+
+@pytest.fixture
+def small_parts(monkeypatch):
+    """Twelve parts or so, where the real size would make one."""
+    monkeypatch.setattr(request_module, "PART_LEAN", 7000)
+
+
+def test_any_number_of_workers_gives_the_same_bytes(tmp_path: Path, small_parts):
+    sweep(request(), tmp_path / "one", workers=1)
+    sweep(request(), tmp_path / "three", workers=3)
+    assert len(request().parts()) > 5
+    files = [(tmp_path / name / "sweep.parquet").read_bytes() for name in ("one", "three")]
+    assert files[0] == files[1]
+
+
+def test_every_cell_and_seed_is_a_row(tmp_path: Path):
+    data = sweep(request(), tmp_path / "s")
+    read, table = read_sweep(tmp_path / "s")
+    assert data["worlds"] == table.num_rows == 3 * 2 * 10
+    found = set(zip(*(table[c].to_pylist() for c in ("v_mps", "omega_degps", "seed")), strict=True))
+    assert found == {(v, w, s) for v in (0.1, 0.2, 0.3) for w in (30.0, 90.0) for s in range(1, 11)}
+    assert set(native.METRICS) | {"class", "least_diffusion", "n"} <= set(table.column_names)
+    assert read == request()
+
+
+KILLED = """
+import sys
+from twinmill.tools.sweep import request as r
+r.PART_LEAN = 200000
+from twinmill.tools.sweep.command import make_request, sweep
+print(sweep(make_request("milling", "paper.toml", ["v_mps=0.1:0.3:40"], seeds=20, duration_s=60.0),
+      __import__("pathlib").Path(sys.argv[1]), workers=1)["parts_kept_before"])
+"""
+
+
+def test_a_killed_sweep_goes_on_and_ends_the_same(tmp_path: Path):
+    killed, whole = tmp_path / "killed", tmp_path / "whole"
+    run = subprocess.Popen([sys.executable, "-c", KILLED, killed])
+    while len(list(killed.glob("parts/*.parquet"))) < 3:
+        time.sleep(0.005)
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    kept = {path: path.stat().st_mtime_ns for path in killed.glob("parts/*.parquet")}
+    assert not (killed / "sweep.parquet").exists()
+    told = subprocess.check_output([sys.executable, "-c", KILLED, killed], text=True)
+    assert int(told) == len(kept) >= 3
+    subprocess.check_call([sys.executable, "-c", KILLED, whole], stdout=subprocess.DEVNULL)
+    assert (killed / "sweep.parquet").read_bytes() == (whole / "sweep.parquet").read_bytes()
+
+
+def test_other_parameters_do_not_mix_into_a_folder(tmp_path: Path):
+    sweep(request(), tmp_path / "s")
+    with pytest.raises(ValueError, match="holds a sweep with other parameters"):
+        sweep(request(seeds=11), tmp_path / "s")
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(tmp_path: Path, monkeypatch):
+    from dask.distributed import Client, LocalCluster
+
+    monkeypatch.setattr(request_module, "PART_LEAN", 400_000)
+    asked = request(["v_mps=0.1:0.3:20"], seeds=20, duration_s=60.0)
+    sweep(asked, tmp_path / "here")
+    with (
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        Client(cluster) as client,
+    ):
+        pids = list(client.run(os.getpid).values())
+        assert len(set(pids)) == 2
+        keep, kept = Store.keep, []
+
+        def keep_and_kill(store: Store, number: int, columns: dict) -> None:
+            keep(store, number, columns)
+            kept.append(number)
+            if len(kept) == 3:
+                os.kill(pids[0], signal.SIGKILL)
+
+        monkeypatch.setattr(Store, "keep", keep_and_kill)
+        sweep(asked, tmp_path / "there", dask=cluster.scheduler_address)
+        assert len(kept) == len(asked.parts()) > 6
+    files = [(tmp_path / name / "sweep.parquet").read_bytes() for name in ("here", "there")]
+    assert files[0] == files[1]
+
+
+def test_nobody_at_the_cluster_is_one_sentence(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr("twinmill.tools.sweep.workers.CONNECT_S", 0.5)
+    with pytest.raises(ValueError, match="no scheduler answers"):
+        sweep(request(), tmp_path / "s", dask="tcp://127.0.0.1:9")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("v_mp=0.1:0.3:3", "nearest is 'v_mps'"),
+        ("v_mps", "name=from:to:count"),
+        ("v_mps=0.1:0.3", "from:to:count"),
+        ("n=4:7:3", "whole numbers"),
+        ("n=6,6", "differ"),
+    ],
+)
+def test_a_wrong_axis_is_told_in_one_sentence(text: str, says: str):
+    with pytest.raises(ValueError, match=says):
+        parse_axis(text, native.Model.load("paper.toml"))
+
+
+def test_speeds_need_a_drive_where_they_can_be_chosen():
+    with pytest.raises(ValueError, match="'twist'"):
+        request(model="turbopi_nominal.toml")
+
+
+@pytest.mark.parametrize(("v_mps", "omega_degps"), [(0.1, 90), (0.3, 20)])
+def test_a_lone_robot_circles_at_the_speed_asked_for(v_mps: float, omega_degps: float):
+    asked = request([f"v_mps={v_mps}", f"omega_degps={omega_degps}", "theta_a=0", "n=1"], seeds=1)
+    pose = native.trace_world(asked.cell(asked.points[0]), 1, 2.0, 0.022)[:, 0]
+    dt_s = 0.022
+    turned = np.diff(pose[:, 2])
+    assert turned == pytest.approx(-math.radians(omega_degps) * dt_s)
+    # A chord of the circle of radius v / w.
+    chord = 2 * v_mps / math.radians(omega_degps) * math.sin(math.radians(omega_degps) * dt_s / 2)
+    assert np.hypot(*np.diff(pose[:, :2], axis=0).T) == pytest.approx(chord)
+
+
+def test_the_first_species_takes_up_the_rest():
+    mixed = request(["n=4:8:3"], behavior="milling:5,self_centering:1")
+    for point in mixed.points:
+        tables, ring = mixed.species(int(point[0]))
+        assert len(tables) == point[0] and ring == point[0] - 1
+
+
+def test_effects_take_the_full_path_and_say_so(tmp_path: Path):
+    asked = request(
+        ["spread_m=1,2"], model="turbopi.toml", seeds=1, duration_s=0.5, start="facing-out"
+    )
+    data = sweep(asked, tmp_path / "s")
+    assert data["kernels"] == {"full": 2}
+    assert data["why_full"]
+    assert pq.read_table(tmp_path / "s" / "sweep.parquet")["kernel"].to_pylist() == ["full"] * 2

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The program twin_sweep. Python drives it, for tables, clusters and progress; C++ simulates."""
+
+import os
+import sys
+import time
+from collections import Counter
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from twinmill.calibration.model_file import ModelFile
+from twinmill.tools.output import AsJson, check_new_folder, deliver
+from twinmill.tools.sweep.axes import ALIASES, QUANTITIES, parse_axis
+from twinmill.tools.sweep.request import Request
+from twinmill.tools.sweep.store import Store, read_sweep
+from twinmill.tools.sweep.workers import run_here, run_on_dask
+
+AXIS_HELP = "name=from:to:count or name=value,value,..."
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def make_request(
+    behavior: str, model: str, axes: list[str], tables: list[str] | None = None, **rest
+) -> Request:
+    """Checks everything before the long work.
+
+    Raises:
+        ValueError: in one sentence.
+    """
+    model_file = ModelFile.load(model)
+    parsed = [parse_axis(text, model_file.model) for text in axes]
+    names = [axis.name for axis in parsed]
+    if len(set(names)) < len(names):
+        raise ValueError(f"the axes {', '.join(names)}: each must be another quantity.")
+    request = Request(
+        behavior=behavior,
+        model_name=model_file.path.name,
+        model_text=model_file.text,
+        version=version("twinmill"),
+        axes=parsed,
+        tables=[parse_table(text) for text in tables or []],
+        **rest,
+    )
+    for point in request.points:
+        request.cell(point)
+    return request
+
+
+def parse_table(text: str) -> tuple[str, list[int]]:
+    """`name=unseen_speed,unseen_turn,seen_speed,seen_turn` in the robot's inputs.
+
+    Raises:
+        ValueError: in one sentence.
+    """
+    name, _, rest = text.partition("=")
+    try:
+        unseen_speed, unseen_turn, seen_speed, seen_turn = map(float, rest.split(","))
+    except ValueError:
+        raise ValueError(
+            f"--table '{text}': write name=speed,turn,speed,turn, for nothing seen and for seen, "
+            "as in spin=0,-1.5,100,0.5 (speed -100 to 100, turn -2 to 2)."
+        ) from None
+    milli = [round(unseen_turn * 1000), round(seen_turn * 1000)]
+    return name, [round(unseen_speed), milli[0], round(seen_speed), milli[1]]
+
+
+def sweep(
+    request: Request, folder: Path, workers: int | None = None, dask: str | None = None
+) -> dict:
+    """Runs what is missing of a sweep and joins it.
+
+    Returns:
+        What the JSON says.
+    """
+    store = Store(folder)
+    check_new_folder(folder)
+    store.open(request)
+    begin_s, parts = time.monotonic(), request.parts()
+    todo = {} if store.result.exists() else {k: parts[k] for k in store.missing(len(parts))}
+    done = len(parts) - len(todo)
+    run = run_on_dask(request, todo, dask) if dask else run_here(request, todo, workers)
+    with _progress() as progress:
+        task = progress.add_task("worlds", total=request.world_count)
+        progress.advance(task, request.world_count - sum(map(len, todo.values())))
+        for number, columns in run:
+            store.keep(number, columns)
+            progress.advance(task, len(parts[number]))
+    if not store.result.exists():
+        store.finish(request, len(parts))
+    return {**_summary(request, folder, begin_s), "parts": len(parts), "parts_kept_before": done}
+
+
+def _summary(request: Request, folder: Path, begin_s: float) -> dict:
+    _, table = read_sweep(folder)
+    wall_s = time.monotonic() - begin_s
+    kernels = Counter(table["kernel"].to_pylist())
+    reasons = {request.cell(point).why_not_lean for point in request.points} - {""}
+    return {
+        "out": str(folder),
+        "file": str(Store(folder).result),
+        "sha256": request.sha256,
+        "version": f"twinmill {request.version}",
+        "axes": {axis.name: list(axis.values) for axis in request.axes},
+        "cells": len(request.points),
+        "worlds": table.num_rows,
+        "classes": dict(sorted(Counter(table["class"].to_pylist()).items())),
+        "kernels": dict(sorted(kernels.items())),
+        "why_full": "asked for" if request.full else "; ".join(sorted(reasons)),
+        "wall_s": wall_s,
+    }
+
+
+def _progress() -> Progress:
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    return Progress(
+        *columns,
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
+
+
+def _text(data: dict) -> str:
+    classes = ", ".join(f"{name} {count}" for name, count in data["classes"].items())
+    lines = [f"{data['worlds']} worlds in {data['cells']} cells, {data['wall_s']:.1f} s: {classes}"]
+    if data["why_full"]:
+        lines.append(f"Every robot ran its firmware and plant, slowly: {data['why_full']}.")
+    lines.append(f"{data['file']}\nPicture: twinmill phase {data['out']}")
+    return "\n".join(lines)
+
+
+@app.command(
+    epilog=f"Axes: {', '.join(QUANTITIES)}, {', '.join(f'{a} = {b}' for a, b in ALIASES.items())}; "
+    "or any quantity of the model file by its full name."
+)
+def _command(
+    x: Annotated[str, typer.Option("--x", show_default=False, help=AXIS_HELP)],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", show_default=False, help="Folder of the sweep.")
+    ],
+    y: Annotated[str | None, typer.Option("--y", help=AXIS_HELP)] = None,
+    z: Annotated[list[str] | None, typer.Option("--z", help="More axes.")] = None,
+    behavior: Annotated[
+        str, typer.Option("--behavior", help="One for all, or milling:5,self_centering:1.")
+    ] = "milling",
+    table: Annotated[
+        list[str] | None,
+        typer.Option("--table", help="Own behaviour: name=speed,turn,speed,turn, unseen first."),
+    ] = None,
+    n: Annotated[int | None, typer.Option("--n", help="Robots; default 6 or the mix's.")] = None,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Runs of each cell.")] = 50,
+    first_seed: Annotated[int, typer.Option("--first-seed", min=0)] = 1,
+    duration_s: Annotated[float, typer.Option("--duration-s", min=0.1, help="Of each run.")] = 120,
+    start: Annotated[str, typer.Option("--start", help="square, disc or facing-out.")] = "square",
+    spread_m: Annotated[
+        float, typer.Option("--spread-m", min=0.01, help="Side of the square, diameter of the disc")
+    ] = 1.2,
+    target_radius_m: Annotated[
+        float | None,
+        typer.Option("--target-radius-m", help="Of the disc that is seen; default: the model's."),
+    ] = None,
+    model: Annotated[str, typer.Option("--model", "-m", metavar="M")] = "paper.toml",
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="Threads; default: all cores.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option("--dask", help="Address of a Dask scheduler, tcp://host:port.")
+    ] = None,
+    full: Annotated[
+        bool, typer.Option("--full", help="Each robot its firmware and plant, always.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Run swarms over a grid of parameters, with metrics and a class for each.
+
+    Stopped half way, the same command goes on where it was.
+
+    Example: twin_sweep --x v_mps=0.1:0.35:6 --y omega_degps=20:90:8 --out sweep
+    """
+    request = make_request(
+        behavior,
+        model,
+        [axis for axis in (x, y, *(z or [])) if axis],
+        table,
+        n=n,
+        seeds=seeds,
+        first_seed=first_seed,
+        duration_s=duration_s,
+        start=start,
+        spread_m=spread_m,
+        target_radius_m=target_radius_m,
+        full=full,
+    )
+    data = sweep(request, out, workers, dask)
+    deliver(data, _text(data), as_json)
+
+
+def main() -> None:
+    """Entry point: leaves with the exit code."""
+    code = 0
+    try:
+        result = app(sys.argv[1:] or ["--help"], prog_name="twin_sweep", standalone_mode=False)
+        code = result if isinstance(result, int) else 0
+    except typer.TyperException as error:
+        code = error.exit_code
+        print(f"twin_sweep: {' '.join(error.format_message().split())}", file=sys.stderr)
+    except (ValueError, OSError) as error:
+        code = 1
+        print(f"twin_sweep: {' '.join(str(error).split())}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("twin_sweep: stopped; the same command goes on from here.", file=sys.stderr)
+        os._exit(130)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

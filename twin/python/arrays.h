@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Arrays to and from numpy.
+#ifndef PYTHON_ARRAYS_H
+#define PYTHON_ARRAYS_H
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <span>
+#include <vector>
+
+namespace twin
+{
+
+namespace nb = nanobind;
+
+using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Indices = nb::ndarray<const int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using IndexMatrix = nb::ndarray<const int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Array = nb::ndarray<nb::numpy, double>;
+
+template <class T>
+auto Span(const T &array)
+{
+    return std::span(array.data(), array.size());
+}
+
+// Hands a vector's memory to numpy.
+inline Array ToNumpy(std::vector<double> &&values, std::initializer_list<size_t> shape)
+{
+    auto *owned = new std::vector<double>(std::move(values));
+    nb::capsule owner(owned,
+                      [](void *p) noexcept { delete static_cast<std::vector<double> *>(p); });
+    return Array(owned->data(), shape, owner);
+}
+
+// Adds what the module knows of swarms.
+void BindSwarms(nb::module_ &m);
+
+}  // namespace twin
+
+#endif

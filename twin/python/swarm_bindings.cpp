@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+// Swarms for Python: behaviours, worlds to their end, metrics and classes.
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <array>
+#include <stdexcept>
+
+#include "arrays.h"
+#include "swarm/metrics.h"
+#include "swarm/species.h"
+#include "sweep/worlds.h"
+
+using namespace nanobind::literals;
+
+namespace twin
+{
+namespace
+{
+
+using Cube = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+using Seeds = nb::ndarray<const uint64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Tables = std::vector<std::array<int, 4>>;
+
+constexpr const char *kMetricNames[] = {"circliness", "radius_m",  "scatter_m2", "rotation",
+                                        "odd_ratio",  "diffusion", "groups",     "contacts"};
+constexpr size_t kMetrics = std::size(kMetricNames);
+
+void Append(std::vector<double> &row, const Metrics &m)
+{
+    row.insert(row.end(), {m.circliness, m.radius_m, m.scatter_m2, m.rotation, m.odd_ratio,
+                           m.diffusion, m.groups, m.contacts});
+}
+
+StartShape StartNamed(const std::string &name)
+{
+    if (name == "square")
+        return StartShape::kSquare;
+    if (name == "disc")
+        return StartShape::kDisc;
+    if (name == "facing-out")
+        return StartShape::kFacingOut;
+    throw std::invalid_argument("--start: there is no start '" + name +
+                                "'; choose square, disc or facing-out");
+}
+
+fw_table TableOf(const std::array<int, 4> &row)
+{
+    const fw_table table{{row[0], row[1]}, {row[2], row[3]}};
+    if (fw_table_check(&table) != FW_OK)
+        throw std::invalid_argument(
+            "the firmware refuses a table: speed inputs are -100 to 100, turn inputs -2 to 2");
+    return table;
+}
+
+std::array<int, 4> RowOf(const fw_table &table)
+{
+    return {table.unseen.speed_input_pct, table.unseen.turn_input_milli, table.seen.speed_input_pct,
+            table.seen.turn_input_milli};
+}
+
+using NamedTables = std::vector<std::pair<std::string, std::array<int, 4>>>;
+
+NamedTables Species(const std::string &text, std::optional<int> n, const NamedTables &own)
+{
+    std::vector<fw_behavior> behaviors;
+    for (const auto &[name, row] : own)
+        behaviors.push_back({name.c_str(), "", TableOf(row)});
+    NamedTables robots;
+    for (const fw_behavior *behavior : ParseSpecies(text, n, behaviors))
+        robots.emplace_back(behavior->name, RowOf(behavior->table));
+    return robots;
+}
+
+Cell MakeCell(const Model &model, const Tables &rows, size_t ring_size, const std::string &start,
+              double spread_m)
+{
+    if (ring_size < 1 || ring_size > rows.size())
+        throw std::invalid_argument("ring_size must be 1 to the number of tables");
+    std::vector<fw_table> tables;
+    for (const auto &row : rows)
+        tables.push_back(TableOf(row));
+    return {model, std::move(tables), ring_size, StartNamed(start), spread_m};
+}
+
+// (W, 9): the metrics, and the least diffusion.
+Array Run(const std::vector<const Cell *> &cells, Indices cell, Seeds seeds, double duration_s,
+          bool full)
+{
+    if (cell.size() != seeds.size())
+        throw std::invalid_argument("cell and seeds must be as long as each other");
+    std::vector<World> worlds;
+    for (size_t w = 0; w < seeds.size(); ++w)
+        worlds.push_back({cells.at(static_cast<size_t>(cell.data()[w])), seeds.data()[w]});
+    std::vector<double> rows;
+    {
+        nb::gil_scoped_release unlocked;
+        for (const Outcome &o : RunWorlds(worlds, duration_s, full ? Path::kFull : Path::kBest))
+        {
+            Append(rows, o.mean);
+            rows.push_back(o.least_diffusion);
+        }
+    }
+    return ToNumpy(std::move(rows), {worlds.size(), kMetrics + 1});
+}
+
+Array Trace(const Cell &cell, uint64_t seed, double duration_s, double every_s)
+{
+    std::vector<double> poses;
+    size_t times = 0;
+    {
+        nb::gil_scoped_release unlocked;
+        for (const auto &at_once : TraceWorld({&cell, seed}, duration_s, every_s))
+        {
+            ++times;
+            for (const Pose2 &pose : at_once)
+                poses.insert(poses.end(), {pose.x_m, pose.y_m, pose.theta_rad});
+        }
+    }
+    return ToNumpy(std::move(poses), {times, cell.tables.size(), 3});
+}
+
+Array MeasureAll(Cube pose, Cube velocity, size_t ring_size, double range_m, double body_radius_m)
+{
+    const size_t times = pose.shape(0), n = pose.shape(1);
+    if (pose.shape(2) != 3 || velocity.shape(0) != times || velocity.shape(1) != n ||
+        velocity.shape(2) != 3 || ring_size < 1 || ring_size > n)
+        throw std::invalid_argument("pose and velocity must be (T, n, 3), ring_size 1 to n");
+    std::vector<double> rows;
+    std::vector<RobotState> robots(n);
+    for (size_t t = 0; t < times; ++t)
+    {
+        for (size_t i = 0; i < n; ++i)
+        {
+            const double *p = pose.data() + (t * n + i) * 3, *v = velocity.data() + (t * n + i) * 3;
+            robots[i].pose = {p[0], p[1], p[2]};
+            robots[i].vx_mps = v[0];
+            robots[i].vy_mps = v[1];
+            robots[i].omega_radps = v[2];
+        }
+        Append(rows, Measure(robots, ring_size, {range_m, body_radius_m}));
+    }
+    return ToNumpy(std::move(rows), {times, kMetrics});
+}
+
+std::vector<std::string> ClassifyAll(Matrix rows)
+{
+    if (rows.shape(1) < kMetrics)
+        throw std::invalid_argument("rows must hold the metrics in the order of METRICS");
+    std::vector<std::string> classes;
+    for (size_t i = 0; i < rows.shape(0); ++i)
+    {
+        const double *m = rows.data() + i * rows.shape(1);
+        classes.emplace_back(Classify({m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7]}));
+    }
+    return classes;
+}
+
+}  // namespace
+
+void BindSwarms(nb::module_ &m)
+{
+    nb::list names;
+    for (const char *name : kMetricNames)
+        names.append(name);
+    m.attr("METRICS") = names;
+    m.def("species", &Species, "text"_a, "n"_a = nb::none(), "own"_a = NamedTables(),
+          "Per robot the behaviour's name and (unseen speed, turn, seen speed, turn) inputs, turn "
+          "in thousandths. `own`: tables beside the firmware's.");
+    nb::class_<Cell>(m, "Cell", "A swarm but for its seed; robots after ring_size are odd.")
+        .def(
+            "__init__",
+            [](Cell *self, const Model &model, const Tables &tables, size_t ring_size,
+               const std::string &start, double spread_m) {
+                new (self) Cell(MakeCell(model, tables, ring_size, start, spread_m));
+            },
+            "model"_a, "tables"_a, "ring_size"_a, "start"_a = "square", "spread_m"_a = 1.2)
+        .def_prop_ro("why_not_lean", [](const Cell &cell) { return WhyNotLean(cell.model); });
+    m.def(
+        "run_worlds", &Run, "cells"_a, "cell"_a, "seeds"_a, "duration_s"_a, "full"_a = false,
+        "(W, 9) METRICS over the last 10 s and the least diffusion, for worlds of cell and seed.");
+    m.def("trace_world", &Trace, "cell"_a, "seed"_a, "duration_s"_a, "every_s"_a,
+          "(T, n, 3) poses of one world, the start first.");
+    m.def("measure", &MeasureAll, "pose"_a, "velocity"_a, "ring_size"_a, "range_m"_a,
+          "body_radius_m"_a,
+          "(T, 8) METRICS of (T, n, 3) poses and body velocities (vx, vy, omega).");
+    m.def("classify", &ClassifyAll, "rows"_a, "Class of each row of mean METRICS.");
+}
+
+}  // namespace twin
