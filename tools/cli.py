@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 from twinmill.tools import calibrate, characterise, diagnose, effects, import_log
+from twinmill.tools import next as next_run
 from twinmill.tools.challenge import run as challenge
 from twinmill.tools.swarm import commands as swarm
 
@@ -18,6 +19,7 @@ app = typer.Typer(
 import_log.register(app)
 calibrate.register(app)
 diagnose.register(app)
+next_run.register(app)
 challenge.register(app)
 effects.register(app)
 swarm.register(app)

@@ -41,9 +41,10 @@ def _diagnose(
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with telling(f"diagnosing with {model}") as say:
         result = diagnose(load_measurements(logs), model_file, say)
-    finish(
-        result.to_json(), present.terminal(result), source, present.section(result), as_json, out
-    )
+    data = result.to_json()
+    if data["next_experiment"]:  # the script comes from a command of its own
+        data["next_experiment"]["command"] = command_line("next", logs, model)
+    finish(data, present.terminal(result), source, present.section(result), as_json, out)
     return result
 
 

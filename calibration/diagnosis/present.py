@@ -64,7 +64,10 @@ def lines(diagnosis: Diagnosis) -> list[str]:
             f"{term.channel} velocity += {diagnosis.omnibus.coefficient:.3g} * {term.formula}."
         )
     if diagnosis.next_experiment:
-        told.append(f"Next run: {diagnosis.next_experiment['why']}.")
+        told.append(
+            f"Next run: {diagnosis.next_experiment['why']}; `twinmill next`, given the same logs "
+            "and model, writes the script."
+        )
     return told
 
 

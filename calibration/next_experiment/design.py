@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Puts a script together, move by move, that parts most within the time and the floor given."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import twinmill_native as native
+from twinmill.calibration.diagnosis.diagnose import Diagnosis
+from twinmill.calibration.freedom import catalogue
+from twinmill.calibration.next_experiment.contest import WEAKEST, Contest, contest, subjects
+from twinmill.calibration.next_experiment.foresight import LEAD_S, Played, Rows, rows_of
+from twinmill.calibration.next_experiment.information import Ledger, Subject
+from twinmill.calibration.next_experiment.moves import Move, family
+from twinmill.calibration.next_experiment.power import power
+from twinmill.calibration.problem import Scene
+
+ENOUGH_CHI2 = 20.0  # a margin of this is about what an acceptance needs
+BESIDES = 0.05  # weight of effects that are not in question: once these are seen, they count
+WANDER_M = 0.08  # of a real robot from the predicted path within a minute, beside the candidates'
+CENTRE = np.zeros(3)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the user has: s, m by m (along and across the robot at its start), share of duty."""
+
+    duration_s: float
+    floor_m: tuple[float, float]
+    max_duty: float
+
+
+@dataclass(frozen=True)
+class Chance:
+    """What the run does for one effect.
+
+    Attributes:
+        effect, rival: and the effect that could imitate it best after the run; None: the base.
+        margin_before, margin: chi2 that no rival can imitate, over the scatter of the log.
+        power_before, power: chance that the effect is named if it is the one.
+    """
+
+    effect: str
+    rival: str | None
+    margin_before: float
+    margin: float
+    power_before: float
+    power: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The script and what is foreseen of it.
+
+    Attributes:
+        why: what the logs leave open.
+        moves, rows: the script.
+        chances: one per effect in question, surest first.
+        pose_t_s, paths: (N,) s, and (V, N, 3) m, m, rad: the model's path, then with each effect.
+        limits: that it was made for.
+        radius_m: of the robot's body.
+    """
+
+    why: str
+    moves: list[Move]
+    rows: Rows
+    chances: list[Chance]
+    pose_t_s: np.ndarray
+    paths: np.ndarray
+    limits: Limits
+    radius_m: float
+
+    @property
+    def predicted_power(self) -> float:
+        """Chance of the right name if each effect in question is as probable."""
+        return float(np.mean([c.power for c in self.chances]))
+
+    @property
+    def separates(self) -> list[str]:
+        """Effects that the run would more probably name than not."""
+        return [c.effect for c in self.chances if c.power > 0.5]
+
+    @property
+    def extent_m(self) -> np.ndarray:
+        """(2,) floor that the body sweeps on the predicted paths: along, across."""
+        at = self.paths[..., :2].reshape(-1, 2)
+        return np.ptp(at, axis=0) + 2 * self.radius_m
+
+    def to_json(self) -> dict:
+        """The interface's object, but for the path."""
+        return {
+            "separates": self.separates,
+            "predicted_power": self.predicted_power,
+            "why": self.why,
+            "duration_s": self.rows.end_s,
+            "floor_used_m": self.extent_m.tolist(),
+            "moves": [m.name for m in self.moves],
+            "effects": [vars(c) for c in self.chances],
+        }
+
+
+def design(diagnosis: Diagnosis, limits: Limits, say: Callable[[str], None]) -> Plan:
+    """Designs the run that best names what the diagnosis leaves open.
+
+    Args:
+        diagnosis: of the logs so far.
+        limits: time, floor, duty.
+        say: told in words what is being done.
+
+    Raises:
+        ValueError: the model is not driven by duties, or no move has room or time.
+    """
+    moves = family(limits.max_duty)
+    _check(diagnosis.state.scenes[0], limits, moves)
+    say("playing the moves in the twin")
+    asked = contest(diagnosis)
+    scene = asked.state.scenes[0]
+    played = Played.of([[m] for m in moves], scene)
+    foreseen = played.scene(scene, CENTRE)
+    known = subjects(asked.state.scenes, foreseen, asked.state, asked)
+    ledger = Ledger(asked.state.free, known)
+    told = np.sum([ledger.told(s) for s in asked.state.scenes], axis=0)
+    wanted = _wanted(asked, known, ledger.margins(told))
+    say("choosing moves")
+    floor = _Floor(limits, scene, [known[i] for i in wanted])
+    chosen = _choose(moves, ledger, told, ledger.foreseen(foreseen), wanted, floor)
+    say("checking the whole script")
+    whole = Played.of([chosen], scene)
+    after = told + ledger.foreseen(whole.scene(scene, CENTRE))[0]
+    return Plan(
+        asked.why,
+        chosen,
+        rows_of(chosen),
+        _chances(ledger, told, after, wanted),
+        whole.pose_t_s - whole.pose_t_s[0],
+        np.array([whole.path(m, CENTRE) for m in floor.models]),
+        limits,
+        scene.model.get("robot.body_radius_m"),
+    )
+
+
+def _check(scene: Scene, limits: Limits, moves: list[Move]) -> None:
+    """Raises ValueError, before the long work, where no script can be."""
+    if scene.model.drive != "duty":
+        raise ValueError(
+            f"the model is driven by {scene.model.drive}; scripts are made of wheel duties, so "
+            "they can be designed for a robot driven by duty alone."
+        )
+    floor = _Floor(limits, scene, [])
+    short = [m for m in moves if m.duration_s + 2 * LEAD_S <= limits.duration_s]
+    if not any(floor.holds([m]) for m in short):
+        size = "x".join(f"{side:g}" for side in limits.floor_m)
+        raise ValueError(
+            f"no move fits into {limits.duration_s:g} s and a floor of {size} m; allow more of "
+            "either."
+        )
+
+
+def _wanted(asked: Contest, known: list[Subject], margins: np.ndarray) -> list[int]:
+    """Places of the effects in question."""
+    if asked.effects:
+        return [i for i, s in enumerate(known) if s.name in asked.effects]
+    return [int(i) for i in np.argsort(margins.min(axis=-1))[:WEAKEST]]
+
+
+class _Floor:
+    """Keeps the robot on the floor, whichever of the effects it has."""
+
+    def __init__(self, limits: Limits, scene: Scene, effects: list[Subject]) -> None:
+        self.scene, self.limits = scene, limits
+        self.models = [scene.model, *(_with(scene.model, e) for e in effects)]
+        radius_m = scene.model.get("robot.body_radius_m")
+        self.room_m = np.array(limits.floor_m) / 2 - radius_m - WANDER_M
+
+    def holds(self, moves: list[Move]) -> bool:
+        """Whether these moves, one after the other, stay on it."""
+        played = Played.of([moves], self.scene)
+        return all(
+            np.all(np.abs(played.path(model, CENTRE)[:, :2]) <= self.room_m)
+            for model in self.models
+        )
+
+
+def _with(model: native.Model, effect: Subject) -> native.Model:
+    """The model with the effect at its strength."""
+    richer = model.copy()
+    richer.add_effect(effect.name)
+    for name, value in zip(effect.whole.names, effect.whole.target[0], strict=True):
+        richer.set(f"{effect.name}.{name}", value)
+    return richer
+
+
+def _choose(
+    moves: list[Move],
+    ledger: Ledger,
+    told: np.ndarray,
+    foreseen: np.ndarray,
+    wanted: list[int],
+    floor: _Floor,
+) -> list[Move]:
+    """Greedy: each time the move that adds most per second and still stays on the floor."""
+    left_s = floor.limits.duration_s - 2 * LEAD_S
+    duration_s = np.array([m.duration_s for m in moves])
+    chosen: list[Move] = []
+    while True:
+        worth = _worth(ledger, told + foreseen, wanted) - _worth(ledger, told, wanted)
+        worth = np.where(duration_s <= left_s, worth / duration_s, -np.inf)
+        order = [int(k) for k in np.argsort(worth)[::-1] if np.isfinite(worth[k])]
+        best = next((k for k in order if floor.holds([*chosen, moves[k]])), None)
+        if best is None:
+            break
+        chosen.append(moves[best])
+        told = told + foreseen[best]
+        left_s -= duration_s[best]
+    return chosen
+
+
+def _worth(ledger: Ledger, grams: np.ndarray, wanted: list[int]) -> np.ndarray:
+    """(...,) sum of what is reached of an ample margin: of the effects in question, then of all."""
+    margins = _tempered(ledger, grams).min(axis=-1)
+    reached = margins / (margins + ENOUGH_CHI2)
+    return reached[..., wanted].sum(axis=-1) + BESIDES * reached.sum(axis=-1)
+
+
+def _tempered(ledger: Ledger, grams: np.ndarray) -> np.ndarray:
+    """(..., T, 1 + J) margins over the scatter of the log."""
+    excess = np.array([s.excess for s in ledger.subjects])
+    return ledger.margins(grams) / excess[:, None]
+
+
+def _chances(
+    ledger: Ledger, told: np.ndarray, after: np.ndarray, wanted: list[int]
+) -> list[Chance]:
+    before_chi2, chi2 = (_tempered(ledger, g)[wanted] for g in (told, after))
+    parameters = np.array([len(catalogue()[ledger.subjects[i].name]["parameters"]) for i in wanted])
+    count = len(ledger.subjects)
+    before, then = (power(m, parameters, count) for m in (before_chi2, chi2))
+    chances = []
+    for row, i in enumerate(wanted):
+        nearest = int(chi2[row].argmin())
+        chances.append(
+            Chance(
+                ledger.subjects[i].name,
+                ledger.subjects[nearest - 1].name if nearest else None,
+                float(before_chi2[row].min()),
+                float(chi2[row].min()),
+                float(before[row]),
+                float(then[row]),
+            )
+        )
+    return sorted(chances, key=lambda c: -c.power)

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How probably a diagnosis would name an effect, from what its signature leaves."""
+
+import numpy as np
+from scipy.stats import ncx2, norm
+from twinmill.calibration.diagnosis.ranking import ALIKE, TIE_CHI2
+from twinmill.calibration.diagnosis.search import ALPHA
+
+
+def power(margins: np.ndarray, parameters: np.ndarray, candidates: int) -> np.ndarray:
+    """Chance that each effect, if it is the one, is accepted and told from its nearest rival.
+
+    Args:
+        margins: (T, 1 + J) over the scatter: with the base to imitate it, then each rival besides.
+        parameters: (T,) how many each effect has.
+        candidates: how many effects the threshold allows for.
+
+    Returns:
+        (T,) 0..1.
+
+    Fitted to one half of the data and judged on the other, an effect's fall of chi2 is short by
+    three times its number of parameters of that where it was fitted, a noncentral chi-square.
+    Against a rival the difference of two fits decides: normal, of variance four times its mean.
+    """
+    whole, against = margins[:, 0], margins[:, 1:]
+    threshold = 2 * np.log(candidates / ALPHA) + 3 * parameters
+    accepted = ncx2.sf(threshold, parameters, np.maximum(whole, 1e-9))
+    nearest = against.min(axis=1)
+    tied = nearest < (1 - ALIKE) * whole
+    ahead = (nearest - np.where(tied, TIE_CHI2, 0.0)) / (2 * np.sqrt(np.maximum(nearest, 1e-9)))
+    return np.minimum(accepted, norm.cdf(ahead))

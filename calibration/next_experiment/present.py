@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A planned run for people: terminal and report."""
+
+from itertools import groupby
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+from twinmill.calibration import show
+from twinmill.calibration.freedom import catalogue
+from twinmill.calibration.next_experiment import figures
+from twinmill.calibration.next_experiment.design import Chance, Plan
+from twinmill.calibration.report import Section
+from twinmill.calibration.tables import Cell, Table, Tone, number
+
+
+def terminal(plan: Plan, how: list[str]) -> RenderableType:
+    """What a person reads; `how`: sentences on how to play it."""
+    return Group(
+        Text(plan.why),
+        Text(_outlook(plan), show.STYLES[_tone(plan.predicted_power)]),
+        Text(f"It takes {_length(plan)}"),
+        Text(),
+        show.table(_moves(plan)),
+        show.table(_chances(plan)),
+        *(Text(line) for line in (*_hidden(plan), *how)),
+    )
+
+
+def section(plan: Plan, how: list[str]) -> Section:
+    """Of a report."""
+    power = plan.predicted_power
+    return Section(
+        "The next run",
+        [("predicted power", f"{100 * power:.0f} %", _tone(power))],
+        f"{plan.why} {_outlook(plan)}",
+        [("run", _length(plan))],
+        [figures.duties(plan), figures.floor(plan), figures.margins(plan)],
+        [_chances(plan), _moves(plan)],
+        " ".join(how),
+        _hidden(plan),
+    )
+
+
+def _length(plan: Plan) -> str:
+    along_m, across_m = plan.extent_m
+    return (
+        f"{plan.rows.end_s:.1f} s on {along_m:.1f} m along by {across_m:.1f} m across, the robot's "
+        "body included."
+    )
+
+
+def _outlook(plan: Plan) -> str:
+    told, asked = len(plan.separates), len(plan.chances)
+    return (
+        f"The run tells {told} of these {asked}; the right name comes with a chance of "
+        f"{100 * plan.predicted_power:.0f} %."
+    )
+
+
+def _hidden(plan: Plan) -> list[str]:
+    """What even this run does not tell, and what would."""
+    entries = catalogue()
+    return [
+        f"{c.effect} stays open ({_rival(c)}); measured by hand: {entries[c.effect]['measure']}"
+        for c in plan.chances
+        if c.effect not in plan.separates
+    ]
+
+
+def _rival(chance: Chance) -> str:
+    return f"like {chance.rival}" if chance.rival else "too weak here"
+
+
+def _moves(plan: Plan) -> Table:
+    rows, at_s = [], float(plan.rows.t_s[1])
+    for name, same in groupby(plan.moves, key=lambda move: move.name):
+        moves = list(same)
+        times = f"{len(moves)} x " if len(moves) > 1 else ""
+        rows.append([Cell(f"{at_s:.1f}"), Cell(f"{times}{name}")])
+        at_s += sum(move.duration_s for move in moves)
+    return Table("The script", ["from (s)", "move"], rows, words=(1,))
+
+
+def _chances(plan: Plan) -> Table:
+    rows = [
+        [
+            Cell(c.effect),
+            Cell(c.rival or "none"),
+            Cell(number(c.margin_before)),
+            Cell(number(c.margin)),
+            Cell(f"{100 * c.power_before:.0f} %"),
+            Cell(f"{100 * c.power:.0f} %", _tone(c.power)),
+        ]
+        for c in plan.chances
+    ]
+    return Table(
+        "What it tells apart",
+        ["effect", "best\nimitation", "margin\nso far", "with\nthis run", "named\nso far", "then"],
+        rows,
+        "Margin: chi2 of the effect's trace that no rival and no change of the base could leave, "
+        "at its fitted strength or else its usual one; named: chance that it is, if it is the one.",
+        words=(0, 1),
+    )
+
+
+def _tone(power: float) -> Tone:
+    return "good" if power > 0.8 else "warn" if power > 0.5 else "bad"

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The next run: its algebra, its promised chance, its script, and that it settles what was open."""
+
+import json
+import os
+import subprocess
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from twinmill.calibration.diagnosis.diagnose import Diagnosis, diagnose
+from twinmill.calibration.diagnosis.search import ALPHA
+from twinmill.calibration.fit import fit
+from twinmill.calibration.freedom import Free
+from twinmill.calibration.log import read_log
+from twinmill.calibration.measurement import Measurement
+from twinmill.calibration.model_file import ModelFile
+from twinmill.calibration.next_experiment.design import Limits, Plan, design
+from twinmill.calibration.next_experiment.foresight import Rows, rows_of
+from twinmill.calibration.next_experiment.information import CLOCKS, Ledger
+from twinmill.calibration.next_experiment.moves import AXES, family
+from twinmill.calibration.next_experiment.power import power
+from twinmill.calibration.next_experiment.script_file import csv_text
+from twinmill.tools import cli
+from twinmill.tools import next as next_run
+
+BIAS_RAD = 0.02
+HALVES = slice(0, None, 2), slice(1, None, 2)
+COMMAND_S = 10 / 480  # of the robot in conftest.py
+
+
+def ledger_of(widths: list[float], sizes: list[int]) -> Ledger:
+    """Free quantities with priors of these widths, and effects with so many parameters."""
+    free = [Free("x", "1", 0, -1, 1, width, 0.1) for width in widths]
+    subjects = [
+        SimpleNamespace(name=str(k), candidate=SimpleNamespace(strength=np.ones(size)))
+        for k, size in enumerate(sizes)
+    ]
+    return Ledger(free, subjects)
+
+
+def test_a_margin_is_what_least_squares_leaves_of_the_trace():
+    random = np.random.default_rng(1)
+    ledger = ledger_of([0.5, 2.0], [1, 3, 2])
+    columns = random.normal(size=(200, ledger.shared + CLOCKS))
+    margins = ledger.margins(columns.T @ columns)
+    others = columns[:, [*range(2), ledger.shared, ledger.shared + 1]]
+    others = np.vstack([others, np.diag([2.0, 0.5, 0, 0])])  # 1 / width: a weak prior's rows
+    for i, step in enumerate(ledger.steps):
+        for j, place in enumerate(ledger.places):
+            rival = np.vstack([columns[:, place], np.zeros((4, len(place)))])
+            prior = np.hstack([np.zeros((len(place), 4)), 0.5 * np.eye(len(place))])
+            all_rows = np.vstack([np.hstack([others, rival]), prior])
+            target = np.append(columns[:, step], np.zeros(len(all_rows) - 200))
+            left = target - all_rows @ np.linalg.lstsq(all_rows, target)[0]
+            expected = np.inf if i == j else left @ left
+            assert margins[i, 1 + j] == pytest.approx(expected, rel=1e-6)
+
+
+def test_two_runs_tell_more_than_either():
+    random = np.random.default_rng(2)
+    ledger = ledger_of([1.0], [2, 1])
+    runs = random.normal(size=(2, 50, ledger.shared + CLOCKS))
+    grams = np.einsum("rkc,rkd->rcd", runs, runs)
+    alone, together = ledger.margins(grams), ledger.margins(grams.sum(axis=0))
+    finite = np.isfinite(together)
+    assert np.all(together[finite] >= alone.sum(axis=0)[finite] - 1e-9)
+
+
+@pytest.mark.parametrize(("energy", "alike"), [(15, 0.5), (25, 0.5), (60, 0.95), (150, 0.95)])
+def test_promised_chance_is_that_of_a_simulated_trial(energy, alike):
+    """Two traces in white noise, fitted on one half of the samples and judged on the other."""
+    random = np.random.default_rng(3)
+    basis = np.linalg.qr(random.normal(size=(400, 2)))[0]
+    true = basis[:, 0]
+    rival = np.sqrt(alike) * true + np.sqrt(1 - alike) * basis[:, 1]
+    named, trials = 0, 2000
+    for data in np.sqrt(energy) * true + random.normal(size=(trials, 400)):
+        left = {"true": 0.0, "rival": 0.0, "none": data @ data}
+        for train, test in (HALVES, HALVES[::-1]):
+            for name, trace in (("true", true), ("rival", rival)):
+                size = data[train] @ trace[train] / (trace[train] @ trace[train])
+                left[name] += np.sum((data[test] - size * trace[test]) ** 2)
+        enough = left["none"] - left["true"] > 2 * np.log(28 / ALPHA)
+        lead = 6.0 if alike > 0.9 else 0.0
+        named += enough and left["rival"] - left["true"] > lead
+    margins = np.array([[energy, np.inf, energy * (1 - alike)]])
+    assert power(margins, np.array([1]), 28)[0] == pytest.approx(named / trials, abs=0.08)
+
+
+def test_each_move_comes_to_rest_and_keeps_the_duty_cap():
+    for move in family(max_duty=0.6):
+        assert not move.duty[-1].any() and move.hold_s[-1] >= 0.5
+        assert np.abs(move.duty).max() <= 0.6
+
+
+@dataclass(frozen=True)
+class Designed:
+    """A heading bias that milling alone cannot name: the first log's diagnosis and the plan."""
+
+    model: ModelFile
+    milling: Measurement
+    before: Diagnosis
+    plan: Plan
+
+
+def turned(pose, valid):
+    """Motion capture's body is turned against the robot's."""
+    return pose + np.array([0, 0, BIAS_RAD]), valid
+
+
+def milling_pct(duration_s: float) -> np.ndarray:
+    """(K, 4) full speed, switching sides at random times: the duties of the vendor's mixing."""
+    random = np.random.default_rng(4)
+    sides = np.repeat(random.permutation([0, 1] * 50), random.integers(15, 70, 100))
+    return np.array([(37, 100, 37, 100), (100, 37, 100, 37)])[
+        sides[: round(duration_s / COMMAND_S)]
+    ]
+
+
+@pytest.fixture(scope="module")
+def designed(run_log, measure, model_file, tmp_path_factory) -> Designed:
+    """Fits the base to a rich run, then diagnoses milling with a turned marker body."""
+    fitted = tmp_path_factory.mktemp("next") / "fitted.toml"
+    fit([measure(seed=1, duration_s=60)], model_file(), fitted, "test")
+    model = ModelFile.load(str(fitted))
+    milling = measure(seed=2, script_pct=milling_pct(60), spoil=turned)
+    before = diagnose([milling], model)
+    return Designed(model, milling, before, design(before, Limits(15, (2.0, 1.5), 0.8), print))
+
+
+def at_steps(rows: Rows) -> np.ndarray:
+    """(K, 4) duties in percent at the robot's control steps."""
+    t_s = np.arange(0, rows.end_s, COMMAND_S)
+    held = np.searchsorted(rows.t_s, t_s + 1e-9, side="right") - 1
+    return np.rint(100 * rows.duty[held]).astype(int)
+
+
+def test_the_run_names_what_milling_alone_cannot(designed, measure):
+    """Without strafing a heading bias and unequal wheels are one thing, by algebra.
+
+    The curve between the duties of the model's table may be named besides, since it is truly there.
+    """
+    assert designed.before.verdict == "ambiguous"
+    asked = {c.effect for c in designed.plan.chances}
+    assert {"heading_bias", "wheel_gain"} <= asked
+    assert all(c.power_before < 0.5 for c in designed.plan.chances if c.effect == "heading_bias")
+    assert "heading_bias" in designed.plan.separates
+    run = measure(seed=3, script_pct=at_steps(designed.plan.rows), spoil=turned)
+    after = diagnose([designed.milling, run], designed.model)
+    assert after.verdict == "effect_missing" and after.found[0] == "heading_bias"
+    assert set(after.found) <= {"heading_bias", "speed_curve"}
+    assert abs(after.ranking[0].parameters[0].value) == pytest.approx(BIAS_RAD, rel=0.15)
+
+
+def test_the_script_keeps_to_time_floor_and_duty_and_strafes(designed):
+    rows, plan = designed.plan.rows, designed.plan
+    assert rows.end_s <= 15
+    assert np.abs(rows.duty).max() <= 0.8
+    assert np.all(plan.extent_m <= plan.limits.floor_m)
+    assert np.abs(rows.duty @ AXES["strafe"]).max() > 1
+
+
+def test_the_real_path_is_the_predicted_one(designed, tanh_robot):
+    """The robot of the test shares no code with the planar plant."""
+    pose = replace(tanh_robot(), drive_mps=0, drive_radps=0).poses(
+        np.repeat(at_steps(designed.plan.rows), 10, axis=0) / 100, 1
+    )
+    t_s = np.arange(1, len(pose) + 1) / 480
+    path = designed.plan.paths[0]
+    seen = np.column_stack([np.interp(designed.plan.pose_t_s, t_s, pose[:, k]) for k in range(2)])
+    assert np.abs(seen - path[:, :2]).max() < 0.05
+
+
+@pytest.mark.skipif("TWIN_RUN" not in os.environ, reason="TWIN_RUN does not name the program")
+def test_the_firmware_reads_the_script_as_it_was_meant(tmp_path):
+    """The twin reads scripts with the firmware's parser; its telemetry must say the same duties."""
+    rows = rows_of(family(1.0)[-3:])
+    script, log = tmp_path / "script.csv", tmp_path / "run.lcmlog"
+    script.write_text(csv_text(rows))
+    subprocess.run(
+        [os.environ["TWIN_RUN"], "--plant", "planar", "--model", "turbopi.toml", "--n", "1",
+         "--script", script, "--log", log],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    (robot,) = read_log(log).robots.values()
+    # A duty may come one control step late.
+    settled = np.searchsorted(rows.t_s, robot.command_t_s - 0.03) == np.searchsorted(
+        rows.t_s, robot.command_t_s + 0.001
+    )
+    held = np.searchsorted(rows.t_s, robot.command_t_s, side="right") - 1
+    assert np.count_nonzero(settled) > 200
+    assert np.allclose(robot.command[settled], rows.duty[held][settled], atol=1e-6)
+
+
+def test_the_command_writes_the_script_and_says_what_it_parts(
+    designed, monkeypatch, capsys, tmp_path, coasting_robot
+):
+    """What a run is designed from is tested above; here it is the ready plan."""
+    monkeypatch.setattr(next_run, "diagnose", lambda *_: designed.before)
+    monkeypatch.setattr(next_run, "design", lambda *_: designed.plan)
+    script, report = tmp_path / "script.csv", tmp_path / "report"
+    words = ["next", coasting_robot.log, "--model", coasting_robot.model, "-o", script]
+    cli.run([str(w) for w in [*words, "--json", "--out", report]])
+    told = json.loads(capsys.readouterr().out)
+    assert told["script"] == str(script) and "heading_bias" in told["separates"]
+    assert 0 <= told["predicted_power"] <= 1
+    rows = np.loadtxt(script, delimiter=",", skiprows=1)
+    assert np.array_equal(rows[:-1, 1:], np.rint(100 * designed.plan.rows.duty))
+    assert not rows[-1, 1:].any() and rows[-1, 0] == pytest.approx(told["duration_s"], abs=1e-3)
+    assert (report / "index.html").read_text().count("<svg") == 3
+
+
+@pytest.mark.parametrize("floor", ["2", "2x", "-1x2", "axb"])
+def test_a_floor_that_is_none_is_refused_in_one_sentence(floor, tmp_path):
+    with pytest.raises(ValueError, match="is no floor"):
+        cli.run(["next", "no.lcmlog", "--floor-m", floor, "-o", str(tmp_path / "s.csv")])
+
+
+@pytest.mark.parametrize("limits", [(15, (0.3, 2.0), 1.0), (3, (2.0, 2.0), 1.0)])
+def test_where_no_move_fits_it_is_said_at_once(designed, limits):
+    with pytest.raises(ValueError, match="no move fits"):
+        design(designed.before, Limits(*limits), print)
