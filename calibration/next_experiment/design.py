@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 from twinmill.calibration.diagnosis.diagnose import Diagnosis
+from twinmill.calibration.diagnosis.evidence import State
 from twinmill.calibration.freedom import catalogue
 from twinmill.calibration.next_experiment.contest import WEAKEST, Contest, contest, subjects
 from twinmill.calibration.next_experiment.foresight import LEAD_S, Played, Rows, rows_of
@@ -108,13 +109,13 @@ def design(diagnosis: Diagnosis, limits: Limits, say: Callable[[str], None]) -> 
         say: told in words what is being done.
 
     Raises:
-        ValueError: the model is not driven by duties, or no move has room or time.
+        ValueError: there is no log, no duty to drive by, or no move that has room and time.
     """
     moves = family(limits.max_duty)
-    _check(diagnosis.state.scenes[0], limits, moves)
+    _check(_log_of(diagnosis.state), limits, moves)
     say("playing the moves in the twin")
     asked = contest(diagnosis)
-    scene = asked.state.scenes[0]
+    scene = _log_of(asked.state)
     played = Played.of([[m] for m in moves], scene)
     foreseen = played.scene(scene, CENTRE)
     known = subjects(asked.state.scenes, foreseen, asked.state, asked)
@@ -137,6 +138,17 @@ def design(diagnosis: Diagnosis, limits: Limits, say: Callable[[str], None]) -> 
         limits,
         scene.model.get("robot.body_radius_m"),
     )
+
+
+def _log_of(state: State) -> Scene:
+    """The first log: clock, noise and rate of poses are taken to be the same in the next."""
+    logs = [scene for scene in state.scenes if scene.noise]
+    if not logs:
+        raise ValueError(
+            "only steady-state tables were given; the next run is designed for the noise and the "
+            "clocks of a log, so give one of any drive besides."
+        )
+    return logs[0]
 
 
 def _check(scene: Scene, limits: Limits, moves: list[Move]) -> None:
