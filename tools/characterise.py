@@ -13,10 +13,10 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from twinmill.calibration.log import LogError
+from twinmill.calibration.measurement_table import read_table
+from twinmill.calibration.mixing import duties_from_inputs
 from twinmill.tools.deploy.remote import Remote, SshConfig
 from twinmill.tools.keyboard import any_key
-from twinmill.tools.measurement_table import read_table
-from twinmill.tools.mixing import duties_from_inputs
 from twinmill.tools.output import AsJson, check_new_file, deliver
 from twinmill.tools.recorder import Recorder
 from twinmill.tools.swarm import tell
