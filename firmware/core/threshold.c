@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// A quick look asks, sixteen bytes at a time, whether any pair of pixels has the right U and V, and
-// most rows end there. A row that may hold the target is cut into blocks of 32 pixels; those that
-// the same look does not rule out are tested exactly and packed into one word of bits.
+// A quick look asks whether any pair of pixels has the right U and V, and most rows end there. A
+// row that may hold the target is cut into blocks of 32 pixels; those that the same look does not
+// rule out are tested exactly and packed into one word of bits.
 //
 //   bytes    Y0  U Y1  V   Y0  U Y1  V      inside each byte's own limits? 0xFF or 0
 //   pairs  [ Y0  U   Y1  V ]                pixel 0 = Y0 & U & V, pixel 1 = Y1 & U & V
+//
+// The quick look lays the colours of two vectors into one, and tests twice as many pixels at once:
+//
+//   a  Y0 Ua Y1 Va     b  Y0 Ub Y1 Vb       a >> 8 | b & 0xFF00 in 16 bits  ->  Ua Ub Va Vb
 //
 // The vectors are the compiler's own (gcc and clang, x86 and ARM alike), without intrinsics.
 #include "fw/threshold.h"
@@ -32,8 +36,11 @@ struct fw_threshold fw_threshold_make(const struct fw_color_box *box)
     struct fw_threshold threshold;
     for (int i = 0; i < 16; ++i)
     {
+        const int chroma = i % 4 < 2 ? 1 : 3;
         threshold.low[i] = low[i % 4];
         threshold.span[i] = (uint8_t)(high[i % 4] - low[i % 4]);
+        threshold.chroma_low[i] = low[chroma];
+        threshold.chroma_span[i] = (uint8_t)(high[chroma] - low[chroma]);
     }
     return threshold;
 }
@@ -42,30 +49,37 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "a pair has Y0 in its 
 
 #define VECTOR_BYTES 16
 typedef uint8_t byte_vector __attribute__((vector_size(VECTOR_BYTES)));
+typedef uint16_t half_vector __attribute__((vector_size(VECTOR_BYTES)));
 typedef uint32_t pair_vector __attribute__((vector_size(VECTOR_BYTES)));
 
-// Four pairs of pixels: 0xFF for every byte inside its limits, else 0.
-static inline pair_vector test_bytes(const struct fw_threshold *threshold, const uint8_t *yuyv)
+static inline byte_vector load(const uint8_t *bytes)
 {
-    byte_vector low, span, bytes;
-    memcpy(&low, threshold->low, VECTOR_BYTES);
-    memcpy(&span, threshold->span, VECTOR_BYTES);
-    memcpy(&bytes, yuyv, VECTOR_BYTES);
+    byte_vector vector;
+    memcpy(&vector, bytes, VECTOR_BYTES);
+    return vector;
+}
+
+// 0xFF for every byte inside its limits, else 0.
+static inline pair_vector test_bytes(byte_vector bytes, byte_vector low, byte_vector span)
+{
     return (pair_vector)(bytes - low <= span);
 }
 
 // The quick look. @return false only if no pixel is inside the box.
 static bool may_match(const struct fw_threshold *threshold, const uint8_t *yuyv, int length_bytes)
 {
+    const byte_vector low = load(threshold->chroma_low), span = load(threshold->chroma_span);
     pair_vector any = {0};
     int i = 0;
-    for (; i + VECTOR_BYTES <= length_bytes; i += VECTOR_BYTES)
+    for (; i + 2 * VECTOR_BYTES <= length_bytes; i += 2 * VECTOR_BYTES)
     {
-        const pair_vector inside = test_bytes(threshold, yuyv + i);
+        const half_vector a = (half_vector)load(yuyv + i);
+        const half_vector b = (half_vector)load(yuyv + i + VECTOR_BYTES);
+        const pair_vector inside = test_bytes((byte_vector)(a >> 8 | (b & 0xFF00)), low, span);
         any |= inside & inside >> 16;
     }
-    // U of a pair is its second byte, V its fourth. Bytes that fill no vector are left to the test.
-    any &= 0xFF00;
+    // Bytes that do not fill two vectors are left to the test.
+    any &= 0xFFFF;
     uint64_t halves[2];
     memcpy(halves, &any, sizeof halves);
     return i < length_bytes || (halves[0] | halves[1]) != 0;
@@ -78,10 +92,11 @@ static uint32_t threshold_block(const struct fw_threshold *threshold, const uint
     {
         return 0;
     }
+    const byte_vector low = load(threshold->low), span = load(threshold->span);
     uint32_t pairs[FW_MASK_WORD_PX / 2];
     for (int i = 0; i < BLOCK_BYTES; i += VECTOR_BYTES)
     {
-        const pair_vector inside = test_bytes(threshold, yuyv + i);
+        const pair_vector inside = test_bytes(load(yuyv + i), low, span);
         const pair_vector chroma = inside >> 8 & inside >> 24;
         // Pixel 0 becomes bit 0 and pixel 1 bit 1.
         const pair_vector pixels = (chroma & inside & 1) | (chroma & inside >> 16 & 1) << 1;

@@ -23,11 +23,12 @@ struct fw_color_box
     uint8_t v_min, v_max;
 };
 
-// The box laid out like 16 bytes of YUYV: a byte b is inside where (uint8_t)(b - low) <= span.
+// The box laid out for 16 bytes at a time: a byte b is inside where (uint8_t)(b - low) <= span.
 struct fw_threshold
 {
-    uint8_t low[16];
-    uint8_t span[16];
+    // As YUYV, and as U U V V: the colours alone of twice as many pixels.
+    uint8_t low[16], span[16];
+    uint8_t chroma_low[16], chroma_span[16];
 };
 
 // The green of the TurboPi experiments; threshold.c says where the numbers come from.
