@@ -4,7 +4,7 @@
 PYTHON := .venv/bin/python
 CTEST := ctest --test-dir build --output-on-failure --no-tests=error --parallel $(shell nproc)
 
-.PHONY: build check demo format lint clean
+.PHONY: bench build check demo format lint clean
 
 build:
 	@tools/setup
@@ -18,6 +18,14 @@ check: build
 
 demo: build
 	@$(PYTHON) -m twinmill.tools.demo
+
+# The robot's program against named alternatives, which are installed into .deps, not .venv.
+bench: build
+	@[ -d .deps/bench/cv2 ] || $(PYTHON) -m pip install --quiet --no-deps --target .deps/bench \
+	    --requirement benchmarks/requirements.txt
+	@cmake --build build --target bench bench_sweep >/dev/null
+	@PYTHONPATH=.deps/bench $(PYTHON) benchmarks/run.py
+	@build/bin/bench_sweep
 
 format: build
 	@tools/lint --fix
