@@ -6,6 +6,12 @@ from dataclasses import dataclass
 
 import twinmill_native as native
 
+MOTION_STAGES = ("duty", "wheel", "ground", "observe")  # what the path of one robot shows
+    "duty",
+    "wheel",
+    "ground",
+    "observe",
+)  # of effects that the path of one robot shows
 BASE = ("base.forward_gain", "base.sideways_gain", "base.yaw_gain", "base.motor_lag_s")
 # Widths of the weak prior, centred on the value at the start: wide against what any log tells, so
 # that only what the log does not show is held.
@@ -78,12 +84,15 @@ def base_quantities(model: native.Model, told: Collection[str]) -> list[Free]:
 
 
 def effect_quantities(model: native.Model, fresh: str | None = None) -> list[Free]:
-    """Free quantities of a model's effects; those of `fresh` begin at their defaults."""
+    """Free quantities of a model's effects on motion; those of `fresh` begin at their defaults."""
     entries = catalogue()
     bounds = {v["name"]: (v["min"], v["max"]) for v in model.values()}
     free = []
     for instance in effect_names(model):
-        for p in entries[instance.split("#")[0]]["parameters"]:
+        entry = entries[instance.split("#")[0]]
+        if entry["stage"] not in MOTION_STAGES:
+            continue
+        for p in entry["parameters"]:
             name = f"{instance}.{p['name']}"
             reach = abs(p["default"] - p["neutral"])
             is_fresh = instance == fresh

@@ -146,6 +146,15 @@ const Bad kBad[] = {
     {"RobotThatIsNoTable", "[robots]\nR03 = 1", {"robots.R03", "R00 to R99"}},
     {"UnknownOverride", "[robots.R03]\nyaw_gian = 1", {"'yaw_gian'", "robots.R03", "'yaw_gain'"}},
     {"OverrideOfTheKind", "[robots.R03]\nmass_kg = 1", {"'mass_kg'", "robots.R03"}},
+    {"OverrideOfAnEffectThatIsNotThere",
+     "[robots.R03]\nwheel_gain.fl = 0.1",
+     {"'wheel_gain'", "[robots.R03]", "[[effect]]"}},
+    {"UnknownOverrideOfAnEffect",
+     "[[effect]]\nname = 'wheel_gain'\n[robots.R03]\nwheel_gain.fx = 0.1",
+     {"'fx'", "wheel_gain", "'fl'"}},
+    {"OverrideOfAnEffectOutOfBounds",
+     "[[effect]]\nname = 'wheel_gain'\n[robots.R03]\nwheel_gain.fl = 0.6",
+     {"robots.R03.wheel_gain.fl = 0.6", "-0.5 to 0.5"}},
     {"OverrideOutOfBounds", "[robots.R03]\ntheta_a1 = 9", {"robots.R03.theta_a1 = 9", "0.05 to 5"}},
 };
 
@@ -191,6 +200,22 @@ y_m = 0.02
 name = "dead_zone"
 width = 0.2
 )";
+
+TEST(ModelFile, ARobotHasItsOwnValuesOfTheModelsEffects)
+{
+    const Model model = Parse(
+        "[[effect]]\nname = 'wheel_gain'\nfl = 0\nfr = 0.01\nrl = 0\nrr = 0\n"
+        "[[effect]]\nname = 'view_range'\nfactor = 0.9\n"
+        "[robots.R03]\nwheel_gain.fl = -0.1\nview_range.factor = 0.5\nrange_m = 2");
+    const Model third = model.ForRobot(3);
+    EXPECT_EQ(third.Get("wheel_gain.fl"), -0.1);
+    EXPECT_EQ(third.Get("wheel_gain.fr"), 0.01);
+    EXPECT_EQ(third.MakeSight().range_m, 1.0);
+    EXPECT_EQ(model.ForRobot(2).Get("wheel_gain.fl"), 0);
+    Model without = model;
+    without.RemoveEffect(0);
+    EXPECT_EQ(without.ForRobot(3).Get("view_range.factor"), 0.5);
+}
 
 TEST(ModelFile, ReadsWhatIsThereAndLeavesTheRestAtItsDefaults)
 {

@@ -137,9 +137,10 @@ TEST(MujocoPlant, RobotRammedIntoAWallHolds)
     EXPECT_NEAR(pose.theta_rad, 0, 0.05);
 }
 
-TEST(MujocoPlant, RobotsThatRamEachOtherOverlapLittle)
+// Two robots of `model` drive into each other; how near their centres come.
+double NearestWhenRamming(const Model &model)
 {
-    MujocoPlant plant = MakePlant({{-0.4, 0, 0}, {0.4, 0.02, std::numbers::pi}});
+    MujocoPlant plant = MakePlant({{-0.4, 0, 0}, {0.4, 0.02, std::numbers::pi}}, {}, model);
     double nearest_m = 1;
     for (int robot : {0, 1})
         plant.SetCommand(robot, Ideal({0.36, 0, 0}));
@@ -148,8 +149,24 @@ TEST(MujocoPlant, RobotsThatRamEachOtherOverlapLittle)
         plant.Step(kControl_s);
         nearest_m = std::min(nearest_m, plant.State(1).pose.x_m - plant.State(0).pose.x_m);
     }
+    return nearest_m;
+}
+
+TEST(MujocoPlant, RobotsThatRamEachOtherOverlapLittle)
+{
+    const double nearest_m = NearestWhenRamming(WheelSpeedModel());
     EXPECT_GT(nearest_m, 2 * kHalfLength_m - 0.007);
     EXPECT_LT(nearest_m, 2 * kHalfLength_m + 0.001);
+}
+
+TEST(MujocoPlant, WiderBodiesTouchEarlier)
+{
+    Model model = WheelSpeedModel();
+    model.AddEffect("collision");
+    model.Set("collision.radius_m", 0.03);
+    const double nearest_m = NearestWhenRamming(model);
+    EXPECT_GT(nearest_m, 2 * (kHalfLength_m + 0.03) - 0.007);
+    EXPECT_LT(nearest_m, 2 * (kHalfLength_m + 0.03) + 0.001);
 }
 
 // Pushes the still robot sideways; returns how far it went meanwhile.

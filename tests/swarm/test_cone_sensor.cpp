@@ -19,9 +19,9 @@ Pose2 At(double distance_m, double bearing_rad)
     return {distance_m * std::cos(bearing_rad), distance_m * std::sin(bearing_rad), 0};
 }
 
-Sensor Cone(double range_m, double cone_rad, double target_radius_m = 0)
+Sight Cone(double range_m, double cone_rad, double target_radius_m = 0)
 {
-    Sensor sensor;
+    Sight sensor;
     sensor.range_m = range_m;
     sensor.cone_rad = cone_rad;
     sensor.target_radius_m = target_radius_m;
@@ -30,7 +30,7 @@ Sensor Cone(double range_m, double cone_rad, double target_radius_m = 0)
 
 TEST(InView, PointIsSeenInsideTheConeAndRangeOnly)
 {
-    const Sensor sensor = Cone(1.1, 49 * kDeg);
+    const Sight sensor = Cone(1.1, 49 * kDeg);
     for (const double sign : {-1.0, 1.0})
     {
         EXPECT_TRUE(InView({}, At(1.099, sign * 24.4 * kDeg), sensor));
@@ -55,7 +55,7 @@ TEST(InView, ConeWiderThanAHalfTurnSeesBehind)
 // A disc at distance d touches the edge of the cone when its centre is asin(r/d) outside it.
 TEST(InView, DiscIsSeenUntilItsLastPartLeavesTheCone)
 {
-    const Sensor sensor = Cone(1.1, 49 * kDeg, 0.1);
+    const Sight sensor = Cone(1.1, 49 * kDeg, 0.1);
     const double edge_rad = 24.5 * kDeg + std::asin(0.1 / 0.8);
     EXPECT_TRUE(InView({}, At(0.8, edge_rad - 1e-6), sensor));
     EXPECT_FALSE(InView({}, At(0.8, edge_rad + 1e-6), sensor));
@@ -65,9 +65,9 @@ TEST(InView, DiscIsSeenUntilItsLastPartLeavesTheCone)
 TEST(ConeSensor, ErrorRatesAreThoseOfTheModel)
 {
     constexpr int kFrames = 20000;
-    Sensor sensor = Cone(1, 1);
-    sensor.false_negative_rate = 0.04;
-    sensor.false_positive_rate = 0.1;
+    Sight sensor = Cone(1, 1);
+    sensor.miss_rate = 0.04;
+    sensor.false_rate = 0.1;
     const std::vector<Pose2> apart{{0, 0, 0}, {5, 0, 0}}, close{{0, 0, 0}, {0.5, 0, 0}};
     ConeSensor blind(sensor, 0, 1), seeing(sensor, 0, 2);
     int imagined = 0, missed = 0;
@@ -83,7 +83,7 @@ TEST(ConeSensor, ErrorRatesAreThoseOfTheModel)
 
 TEST(ConeSensor, DelayHoldsFramesBackAndKeepsTheirTimeStamps)
 {
-    Sensor sensor = Cone(1, 1);
+    Sight sensor = Cone(1, 1);
     sensor.delay_s = 0.05;
     ConeSensor delayed(sensor, 0, 1);
     const std::vector<Pose2> apart{{0, 0, 0}, {5, 0, 0}}, close{{0, 0, 0}, {0.5, 0, 0}};

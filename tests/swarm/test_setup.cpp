@@ -131,10 +131,39 @@ TEST(Script, MistakesNameTheLine)
 TEST(PushApart, OverlappingBodiesEndTouchingAndTheirMiddleStays)
 {
     std::vector<Pose2> poses{{0, 0, 1}, {0.06, 0.08, 2}, {1, 1, 3}};
-    PushApart(poses, 0.1);
+    PushApart(poses, poses, std::vector<Body>(3, {0.1, 0}));
     EXPECT_NEAR(std::hypot(poses[1].x_m - poses[0].x_m, poses[1].y_m - poses[0].y_m), 0.2, 1e-12);
     EXPECT_NEAR((poses[0].x_m + poses[1].x_m) / 2, 0.03, 1e-12);
     EXPECT_EQ(poses[2].x_m, 1);
+}
+
+// Two bodies slide past each other along y, pressed together by 0.02 m along x.
+TEST(PushApart, FrictionTakesBackUpToItsShareOfThePush)
+{
+    for (const auto &[friction, slid_m, left_m] :
+         {std::tuple{0.0, 0.01, 0.01}, std::tuple{0.3, 0.01, 0.004}, std::tuple{0.3, -0.01, -0.004},
+          std::tuple{2.0, 0.01, 0.0}})
+    {
+        std::vector<Pose2> poses{{0, 0.1, 0}, {0.18, 0.1, 0}};
+        const std::vector<Pose2> then{{0, 0.1 + slid_m / 2, 0}, {0.18, 0.1 - slid_m / 2, 0}};
+        PushApart(poses, then, {{0.1, 0}, {0.1, friction}});
+        EXPECT_NEAR(poses[1].x_m - poses[0].x_m, 0.2, 1e-12);
+        // They slid by `slid_m`; what is not taken back is left.
+        EXPECT_NEAR(slid_m - (poses[0].y_m - poses[1].y_m), left_m, 1e-12) << friction;
+        EXPECT_NEAR(poses[1].y_m + poses[0].y_m, 0.2, 1e-12);
+    }
+}
+
+TEST(PlanarBodies, EachRobotHasItsOwnRadius)
+{
+    Model model = PaperModel();
+    model.robot.body_radius_m = 0.1;
+    Model wide = model;
+    wide.AddEffect("collision");
+    wide.Set("collision.radius_m", 0.05);
+    PlanarBodies plant({model, wide}, {{0, 0, 0}, {0.2, 0, 0}}, 1);
+    plant.Step(0.01);
+    EXPECT_NEAR(plant.State(1).pose.x_m - plant.State(0).pose.x_m, 0.25, 1e-12);
 }
 
 }  // namespace

@@ -5,19 +5,22 @@
 namespace twin
 {
 
-extern const EffectSpec kBatterySag, kCarpetGrain, kClockOffset, kClockRate, kCoasting,
-    kCoulombFriction, kDeadZone, kEquation, kFloorPatch, kFloorTilt, kGainSlope, kHeadingBias,
-    kHeatGain, kInputDelay, kLagByDuty, kLateralSlip, kMarkerOffset, kMassOffset, kMotorLag,
-    kReversalDeadTime, kReverseAsymmetry, kSlewLimit, kSpeedCurve, kSpeedSlip, kStrafeLoss,
-    kTurnAsymmetry, kWheelEccentricity, kWheelGain, kYawLever;
+extern const EffectSpec kBatterySag, kCarpetGrain, kClockOffset, kClockRate, kCoasting, kCollision,
+    kCoulombFriction, kDeadZone, kEquation, kFalseDetection, kFloorPatch, kFloorTilt, kGainSlope,
+    kHeadingBias, kHeatGain, kInputDelay, kLagByDuty, kLateralSlip, kMarkerOffset, kMassOffset,
+    kMissedDetection, kMotorLag, kOcclusion, kReversalDeadTime, kReverseAsymmetry, kSensorDelay,
+    kSlewLimit, kSpeedCurve, kSpeedSlip, kStrafeLoss, kTurnAsymmetry, kViewAngle, kViewPan,
+    kViewRange, kVote, kWheelEccentricity, kWheelGain, kYawLever;
 
 static const EffectSpec *const kCatalogue[] = {
-    &kBatterySag,       &kCarpetGrain,       &kClockOffset, &kClockRate,  &kCoasting,
-    &kCoulombFriction,  &kDeadZone,          &kEquation,    &kFloorPatch, &kFloorTilt,
-    &kGainSlope,        &kHeadingBias,       &kHeatGain,    &kInputDelay, &kLagByDuty,
-    &kLateralSlip,      &kMarkerOffset,      &kMassOffset,  &kMotorLag,   &kReversalDeadTime,
-    &kReverseAsymmetry, &kSlewLimit,         &kSpeedCurve,  &kSpeedSlip,  &kStrafeLoss,
-    &kTurnAsymmetry,    &kWheelEccentricity, &kWheelGain,   &kYawLever,
+    &kBatterySag,        &kCarpetGrain,     &kClockOffset, &kClockRate,        &kCoasting,
+    &kCollision,         &kCoulombFriction, &kDeadZone,    &kEquation,         &kFalseDetection,
+    &kFloorPatch,        &kFloorTilt,       &kGainSlope,   &kHeadingBias,      &kHeatGain,
+    &kInputDelay,        &kLagByDuty,       &kLateralSlip, &kMarkerOffset,     &kMassOffset,
+    &kMissedDetection,   &kMotorLag,        &kOcclusion,   &kReversalDeadTime, &kReverseAsymmetry,
+    &kSensorDelay,       &kSlewLimit,       &kSpeedCurve,  &kSpeedSlip,        &kStrafeLoss,
+    &kTurnAsymmetry,     &kViewAngle,       &kViewPan,     &kViewRange,        &kVote,
+    &kWheelEccentricity, &kWheelGain,       &kYawLever,
 };
 
 std::span<const EffectSpec *const> Catalogue()

@@ -152,7 +152,34 @@ Model Model::ForRobot(int robot_id) const
         if (field.per_robot && value != found->second.end())
             field.at(model) = value->second;
     }
+    ForEach(model, [&](const std::string &name, const Slot &slot) {
+        if (const auto value = found->second.find(name); value != found->second.end())
+            *slot.value = value->second;
+    });
     return model;
+}
+
+Sight Model::MakeSight() const
+{
+    Sight sight;
+    sight.range_m = sensor.range_m;
+    sight.cone_rad = sensor.cone_rad;
+    sight.target_radius_m = sensor.target_radius_m;
+    sight.miss_rate = sensor.false_negative_rate;
+    sight.false_rate = sensor.false_positive_rate;
+    sight.delay_s = sensor.delay_s;
+    sight.vote_frames = sensor.vote_frames;
+    for (const EffectInstance &effect : effects)
+        effect.Make()->Look(sight);
+    return sight;
+}
+
+Body Model::MakeBody() const
+{
+    Body body{robot.body_radius_m, 0};
+    for (const EffectInstance &effect : effects)
+        effect.Make()->Touch(body);
+    return body;
 }
 
 }  // namespace twin

@@ -61,8 +61,8 @@ public:
         CheckSections();
         ReadBase();
         ReadFields();
-        ReadRobots();
         ReadEffects();
+        ReadRobots();
         model_.clock.known = root_.contains("clock");
         return model_;
     }
@@ -200,6 +200,11 @@ private:
             for (const auto &[key, value] : *node.as_table())
             {
                 const std::string word(key.str());
+                if (value.is_table())
+                {
+                    ReadRobotEffect(id, text, word, *value.as_table());
+                    continue;
+                }
                 if (!known.contains(word))
                     FailUnknown(origin_, "key", word, "[robots." + text + "]", known);
                 for (const Field &field : Fields())
@@ -208,6 +213,33 @@ private:
                             Number(origin_, "robots." + text + "." + word, value, field.min,
                                    field.max, field.unit);
             }
+        }
+    }
+
+    // `wheel_gain.front_left = 0.9` of one robot; the effect stands among the model's own.
+    void ReadRobotEffect(int id, const std::string &robot, const std::string &effect,
+                         const toml::table &table)
+    {
+        const std::string where = "[robots." + robot + "]";
+        std::map<std::string, NamedValue> known;
+        for (const NamedValue &quantity : model_.Values())
+            if (FindEffect(effect.substr(0, effect.find('#'))) &&
+                quantity.name.starts_with(effect + "."))
+                known[quantity.name.substr(effect.size() + 1)] = quantity;
+        std::set<std::string> keys;
+        for (const auto &[key, quantity] : known)
+            keys.insert(key);
+        if (keys.empty())
+            Fail(origin_, "effect '" + effect + "' in " + where +
+                              " is not among the model's: give it an [[effect]] of its own, with "
+                              "the values of the other robots");
+        CheckKeys(table, keys, "effect '" + effect + "' of " + where);
+        for (const auto &[key, value] : table)
+        {
+            const NamedValue &quantity = known[std::string(key.str())];
+            model_.robot_overrides[id][quantity.name] =
+                Number(origin_, "robots." + robot + "." + quantity.name, value, quantity.min,
+                       quantity.max, quantity.unit);
         }
     }
 

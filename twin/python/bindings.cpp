@@ -7,12 +7,16 @@
 #include "arrays.h"
 #include "predict/predict.h"
 #include "predict/steady.h"
+#include "sensor/view.h"
 
 using namespace nanobind::literals;
 using namespace twin;
 
 namespace
 {
+
+using Poses =
+    nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 // The arrays of a run, checked once and kept alive.
 struct PyTrack
@@ -114,6 +118,43 @@ const char *DriveName(const Model &model)
     return "";
 }
 
+nb::dict SightDict(const Model &model)
+{
+    const Sight sight = model.MakeSight();
+    nb::dict entry;
+    entry["range_m"] = sight.range_m;
+    entry["softness_m"] = sight.softness_m;
+    entry["cone_rad"] = sight.cone_rad;
+    entry["pan_rad"] = sight.pan_rad;
+    entry["target_radius_m"] = sight.target_radius_m;
+    entry["hide_radius_m"] = sight.hide_radius_m;
+    entry["miss_rate"] = sight.miss_rate;
+    entry["false_rate"] = sight.false_rate;
+    entry["age_s"] = sight.age_s;
+    entry["delay_s"] = sight.delay_s;
+    entry["vote_frames"] = sight.vote_frames;
+    return entry;
+}
+
+// The camera of robot `self` among `poses`, a frame at a time.
+Array InViewOf(const Model &model, size_t self, Poses poses, double position_m, double heading_rad)
+{
+    const size_t frames = poses.shape(0), robots = poses.shape(1);
+    if (poses.shape(2) != 3 || self >= robots)
+        throw std::invalid_argument("poses must be (T, N, 3), with the robot itself among the N");
+    const Sight sight = model.MakeSight();
+    std::vector<double> seen(frames);
+    std::vector<Pose2> at(robots);
+    for (size_t t = 0; t < frames; ++t)
+    {
+        const double *pose = poses.data() + 3 * robots * t;
+        for (size_t i = 0; i < robots; ++i, pose += 3)
+            at[i] = {pose[0], pose[1], pose[2]};
+        seen[t] = ViewProbability(at, self, sight, {position_m, heading_rad});
+    }
+    return ToNumpy(std::move(seen), {frames});
+}
+
 Array Windows(const Model &model, const PyTrack &track, Indices starts, IndexMatrix ends)
 {
     if (ends.shape(0) != starts.size())
@@ -184,6 +225,7 @@ NB_MODULE(twinmill_native, m)
              "Appends an effect at its neutral values; texts: its formula and the like, by name.")
         .def("remove_effect", &Model::RemoveEffect, "index"_a)
         .def("for_robot", &Model::ForRobot, "robot_id"_a)
+        .def("sight", &SightDict, "What the robot's camera sees and how it errs, effects included.")
         .def("copy", [](const Model &model) { return Model(model); })
         .def_prop_ro("drive", &DriveName)
         .def_prop_ro("clock_known", [](const Model &model) { return model.clock.known; })
@@ -206,6 +248,9 @@ NB_MODULE(twinmill_native, m)
           "(B, K, 7) steady vx_mps, vy_mps, omega_radps and rim speeds at K constant commands.");
     m.def("windows", &Windows, "model"_a, "track"_a, "starts"_a, "ends"_a,
           "(W, H, 3) poses predicted at `ends` from the poses at `starts`.");
+    m.def("in_view", &InViewOf, "model"_a, "self"_a, "poses"_a, "position_m"_a, "heading_rad"_a,
+          "(T,) probability that robot `self` of poses (T, N, 3), known to these standard "
+          "deviations, has another in view; poses of NaN are seen by nobody.");
     m.def(
         "replica",
         [](const Model &model, const PyTrack &track, uint64_t seed) {

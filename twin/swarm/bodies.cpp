@@ -1,47 +1,86 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "swarm/bodies.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace twin
 {
-
-void PushApart(std::vector<Pose2> &poses, double radius_m)
+namespace
 {
-    const std::vector<Pose2> before = poses;
-    const double touch_m = 2 * radius_m;
-    for (size_t i = 0; i < before.size(); ++i)
-        for (size_t j = i + 1; j < before.size(); ++j)
+
+struct Shift
+{
+    double x_m, y_m;
+};
+
+// From where `a` was to where it is.
+Shift Moved(const Pose2 &a, const Pose2 &before)
+{
+    return {a.x_m - before.x_m, a.y_m - before.y_m};
+}
+
+// What friction takes back of the way that body j slid past body i along the tangent (-n_y, n_x).
+Shift TakenBack(const Shift &i, const Shift &j, double n_x, double n_y, double most_m)
+{
+    const double slid_m = (j.y_m - i.y_m) * n_x - (j.x_m - i.x_m) * n_y;
+    const double back_m = std::clamp(slid_m, -most_m, most_m);
+    return {-n_y * back_m, n_x * back_m};
+}
+
+}  // namespace
+
+void PushApart(std::vector<Pose2> &poses, const std::vector<Pose2> &before,
+               const std::vector<Body> &bodies)
+{
+    const std::vector<Pose2> now = poses;
+    for (size_t i = 0; i < now.size(); ++i)
+        for (size_t j = i + 1; j < now.size(); ++j)
         {
-            const double dx_m = before[j].x_m - before[i].x_m;
-            const double dy_m = before[j].y_m - before[i].y_m;
+            const double touch_m = bodies[i].radius_m + bodies[j].radius_m;
+            const double dx_m = now[j].x_m - now[i].x_m;
+            const double dy_m = now[j].y_m - now[i].y_m;
             const double distance2 = dx_m * dx_m + dy_m * dy_m;
             if (!(distance2 < touch_m * touch_m) || distance2 == 0)
                 continue;
             const double push = (touch_m / std::sqrt(distance2) - 1) / 2;
-            poses[i].x_m -= push * dx_m;
-            poses[i].y_m -= push * dy_m;
-            poses[j].x_m += push * dx_m;
-            poses[j].y_m += push * dy_m;
+            Shift half{push * dx_m, push * dy_m};
+            const double friction = std::max(bodies[i].friction, bodies[j].friction);
+            if (friction > 0)
+            {
+                const double distance_m = std::sqrt(distance2);
+                const Shift back =
+                    TakenBack(Moved(now[i], before[i]), Moved(now[j], before[j]), dx_m / distance_m,
+                              dy_m / distance_m, friction * (touch_m - distance_m));
+                half = {half.x_m - back.x_m / 2, half.y_m - back.y_m / 2};
+            }
+            poses[i].x_m -= half.x_m;
+            poses[i].y_m -= half.y_m;
+            poses[j].x_m += half.x_m;
+            poses[j].y_m += half.y_m;
         }
 }
 
 PlanarBodies::PlanarBodies(const std::vector<Model> &models, const std::vector<Pose2> &starts,
                            uint64_t seed)
-    : PlanarPlant(models, starts, seed),
-      radius_m_(models.front().robot.body_radius_m),
-      poses_(models.size())
+    : PlanarPlant(models, starts, seed), before_(models.size()), poses_(models.size())
 {
+    for (const Model &model : models)
+        bodies_.push_back(model.MakeBody());
+    touch_ = std::any_of(bodies_.begin(), bodies_.end(),
+                         [](const Body &body) { return body.radius_m > 0; });
 }
 
 void PlanarBodies::Step(double dt_s)
 {
+    for (int i = 0; i < Size(); ++i)
+        before_[static_cast<size_t>(i)] = State(i).pose;
     PlanarPlant::Step(dt_s);
-    if (radius_m_ == 0)
+    if (!touch_)
         return;
     for (int i = 0; i < Size(); ++i)
         poses_[static_cast<size_t>(i)] = State(i).pose;
-    PushApart(poses_, radius_m_);
+    PushApart(poses_, before_, bodies_);
     for (int i = 0; i < Size(); ++i)
         Move(i, poses_[static_cast<size_t>(i)]);
 }

@@ -17,11 +17,11 @@ namespace
 constexpr double kFullPack_V = 8.2, kEmptyPack_V = 7.0, kPackCharge_As = 1.8 * 3600;
 constexpr double kComputer_A = 0.6, kMotors_A = 4 * 0.17;
 
-fw_config ConfigFor(const Sensor &sensor, const fw_table &table)
+fw_config ConfigFor(const Sight &sight, const fw_table &table)
 {
     fw_config config = fw_config_default();
     config.table = table;
-    config.vote.max_frames = static_cast<int32_t>(std::lround(sensor.vote_frames));
+    config.vote.max_frames = static_cast<int32_t>(std::lround(sight.vote_frames));
     config.vote.window_us = std::numeric_limits<int64_t>::max();
     return config;
 }
@@ -68,11 +68,12 @@ Swarm::Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
 {
     for (size_t i = 0; i < models.size(); ++i)
     {
-        const fw_config config = ConfigFor(models[i].sensor, tables[i]);
+        const Sight sight = models[i].MakeSight();
+        const fw_config config = ConfigFor(sight, tables[i]);
         CheckModel(models[i], config);
         members_.push_back({{},
                             {},
-                            ConeSensor(models[i].sensor, static_cast<int>(i), options.seed),
+                            ConeSensor(sight, static_cast<int>(i), options.seed),
                             models[i].base,
                             kFullPack_V,
                             nullptr,

@@ -77,7 +77,7 @@ MujocoPlant::MujocoPlant(const std::string &mjcf, const std::vector<Model> &mode
 {
     CheckInputs(models, starts, options);
     mju_user_warning = PrintWarning;
-    model_.reset(CompileWorld(mjcf, starts, options));
+    model_.reset(CompileWorld(mjcf, models, starts, options));
     data_.reset(mj_makeData(model_.get()));
     const Robot geometry = Geometry(model_.get());
     wheel_radius_m_ = geometry.wheel_radius_m;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mujoco_world.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <stdexcept>
@@ -111,7 +112,27 @@ void AddWheelContact(mjSpec *world, const mjsGeom &wheel, const std::string &nam
         pair->solref[i] = wheel.solref[i];
 }
 
-void AddRobot(const std::string &mjcf, mjSpec *world, mjSpec *robot, int id, const Pose2 &start)
+// What collision effects ask for: the hull wider all around, and rougher.
+void ChangeHull(mjsBody *base, const Model &model)
+{
+    const Body body = model.MakeBody();
+    const double wider_m = body.radius_m - model.robot.body_radius_m;
+    if (wider_m == 0 && body.friction == 0)
+        return;
+    for (mjsElement *e = mjs_firstChild(base, mjOBJ_GEOM, 0); e; e = mjs_nextChild(base, e, 0))
+    {
+        mjsGeom *geom = mjs_asGeom(e);
+        if (!geom->contype)
+            continue;
+        const int axes = geom->type == mjGEOM_BOX || geom->type == mjGEOM_ELLIPSOID ? 2 : 1;
+        for (int axis = 0; axis < axes; ++axis)
+            geom->size[axis] = std::max(geom->size[axis] + wider_m, 1e-3);
+        geom->friction[0] += body.friction;
+    }
+}
+
+void AddRobot(const std::string &mjcf, mjSpec *world, mjSpec *robot, int id, const Pose2 &start,
+              const Model &model)
 {
     mjsFrame *frame = mjs_addFrame(mjs_findBody(world, "world"), nullptr);
     frame->pos[0] = start.x_m;
@@ -121,6 +142,7 @@ void AddRobot(const std::string &mjcf, mjSpec *world, mjSpec *robot, int id, con
 
     const Spec copy(mj_copySpec(robot));
     mjsBody *base = FindBase(mjcf, copy.get());
+    ChangeHull(base, model);
     if (!mjs_attach(frame->element, base->element, NameInWorld(id, "").c_str(), ""))
         Fail(mjcf, std::string("cannot be put into the world: ") + mjs_getError(world));
     for (const char *name : kWheelNames)
@@ -170,8 +192,8 @@ std::string NameInWorld(int robot, const std::string &name)
     return prefix + name;
 }
 
-mjModel *CompileWorld(const std::string &mjcf, const std::vector<Pose2> &starts,
-                      const MujocoOptions &options)
+mjModel *CompileWorld(const std::string &mjcf, const std::vector<Model> &models,
+                      const std::vector<Pose2> &starts, const MujocoOptions &options)
 {
     InstallMecanumCollider();
     const Spec robot = Parse(mjcf);
@@ -179,7 +201,7 @@ mjModel *CompileWorld(const std::string &mjcf, const std::vector<Pose2> &starts,
     const Spec world = MakeSurroundings(mjcf, robot.get());
     CopyRollerDrag(world.get(), robot.get());
     for (size_t i = 0; i < starts.size(); ++i)
-        AddRobot(mjcf, world.get(), robot.get(), static_cast<int>(i), starts[i]);
+        AddRobot(mjcf, world.get(), robot.get(), static_cast<int>(i), starts[i], models[i]);
     if (options.arena_half_width_m)
         AddWalls(world.get(), *options.arena_half_width_m);
     if (!options.visuals)

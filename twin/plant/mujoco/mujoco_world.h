@@ -14,8 +14,8 @@ constexpr const char *kWheelNames[kWheels] = {"fl", "fr", "rl", "rr"};
 constexpr const char *kRollerDrag = "roller_drag";
 
 // A new model, owned by the caller. Throws std::invalid_argument in one sentence.
-mjModel *CompileWorld(const std::string &mjcf, const std::vector<Pose2> &starts,
-                      const MujocoOptions &options);
+mjModel *CompileWorld(const std::string &mjcf, const std::vector<Model> &models,
+                      const std::vector<Pose2> &starts, const MujocoOptions &options);
 
 }  // namespace twin
 

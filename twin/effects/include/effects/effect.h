@@ -70,6 +70,30 @@ struct Signals
     double observed_t_s = 0;  // kObserve: time stamp of the pose, capture's clock
 };
 
+// What a robot's camera sees, and how its bit errs. One robot's numbers do not change while it
+// runs: its effects set them once.
+struct Sight
+{
+    double range_m = 0;          // kView: farthest target seen
+    double softness_m = 0;       // kView: scale of a logistic edge at range_m; 0: sharp
+    double cone_rad = 0;         // kView: full opening angle
+    double pan_rad = 0;          // kView: the cone's axis, left of the heading
+    double target_radius_m = 0;  // kView: 0: only the other robot's centre is seen
+    double hide_radius_m = 0;    // kView: of bodies that hide what is behind them; 0: none do
+    double miss_rate = 0;        // kDecide: share of frames that miss what is in view
+    double false_rate = 0;       // kDecide: share of frames that see what is not there
+    double age_s = 0;            // kDecide: exposure before the frame's time stamp
+    double delay_s = 0;          // kDecide: time stamp to controller
+    double vote_frames = 1;      // kDecide: seen if more than half of so many frames show it
+};
+
+// What a robot's body does on contact.
+struct Body
+{
+    double radius_m = 0;  // kWorld: 0: nothing touches
+    double friction = 0;  // kWorld: Coulomb's coefficient against another body
+};
+
 // One number of an effect. This table is the only place of its name, unit and bounds.
 struct Parameter
 {
@@ -109,10 +133,15 @@ public:
     virtual int StateSize() const { return 0; }
     // Where it acts: the card's stage, unless its texts say otherwise.
     virtual Stage ActsAt(const Card &card) const { return card.stage; }
-    // Acts on the signals of one step; `state` holds StateSize() doubles, zero at the start.
-    virtual void Step(Signals &signals, double *state) const = 0;
+    // kDuty to kObserve: acts on the signals of one step; `state` holds StateSize() doubles, zero
+    // at the start.
+    virtual void Step(Signals &, double * /*state*/) const {}
     // kObserve only: from the pose seen and its time stamp back to the robot's own.
     virtual void Invert(Signals &) const {}
+    // kView and kDecide only.
+    virtual void Look(Sight &) const {}
+    // kWorld only.
+    virtual void Touch(Body &) const {}
 };
 
 struct EffectSpec

@@ -119,6 +119,9 @@ public:
     void RemoveEffect(size_t index);
     // The model of one robot: its [robots.Rnn] overrides applied.
     Model ForRobot(int robot_id) const;
+    // What this robot's camera sees and its body does on contact, effects included.
+    Sight MakeSight() const;
+    Body MakeBody() const;
 
     Robot robot;
     Base base;
@@ -128,6 +131,7 @@ public:
     Clock clock;
     double theta_a1 = 1, theta_a2 = 1;  // this robot's factors on speed and turn rate
     std::vector<EffectInstance> effects;
+    // By robot: "range_m" and the like for fields, "wheel_gain.front_left" for effects.
     std::map<int, std::map<std::string, double>> robot_overrides;
 };
 

@@ -9,19 +9,23 @@ namespace twin
 {
 
 // Moves overlapping discs apart along the line between them, each by half of the overlap, all at
-// once from the same positions. `radius_m` of 0: no bodies.
-void PushApart(std::vector<Pose2> &poses, double radius_m);
+// once from the same positions. With friction, what they moved past each other since `before` is
+// taken back, up to the larger coefficient times the overlap (Macklin et al. 2014). One body per
+// pose; radii of 0: no bodies.
+void PushApart(std::vector<Pose2> &poses, const std::vector<Pose2> &before,
+               const std::vector<Body> &bodies);
 
 class PlanarBodies final : public PlanarPlant
 {
 public:
-    // As PlanarPlant; all bodies have the first model's body_radius_m.
+    // As PlanarPlant; each model gives its robot's body (Model::MakeBody).
     PlanarBodies(const std::vector<Model> &models, const std::vector<Pose2> &starts, uint64_t seed);
     void Step(double dt_s) override;
 
 private:
-    double radius_m_;
-    std::vector<Pose2> poses_;
+    std::vector<Body> bodies_;
+    bool touch_ = false;
+    std::vector<Pose2> before_, poses_;
 };
 
 }  // namespace twin

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fw/step.h"
+#include "model_file/model.h"
 #include "plant/plant.h"
 #include "sensor/cone_sensor.h"
 #include "swarm/eye.h"

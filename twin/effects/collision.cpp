@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "collision",
+    .stage = Stage::kWorld,
+    .drives = kAnyDrive,
+    .summary = "Bodies touch earlier or later than the model says, and rub against each other.",
+    .equation = "r' = max(0, r + radius); |tangential shift| <= friction * normal shift",
+    .leaves_out =
+        "bouncing, and the turn that rubbing gives a body; planar plant: who pushes harder",
+    .measure = "two robots that drive into each other, head on and past each other",
+    .reference =
+        "Coulomb friction in position-based dynamics: Macklin et al. 2014, ACM Transactions on Graphics 33(4) 153",
+};
+
+constexpr Parameter kParameters[] = {
+    {"radius_m", "m", 0, 0.01, -0.2, 0.2, "added to the body's radius"},
+    {"friction", "1", 0, 0.3, 0, 2,
+     "added to the coefficient between two bodies, of which the larger counts"},
+};
+
+class Collision final : public Effect
+{
+public:
+    explicit Collision(std::span<const double> v) : radius_m_(v[0]), friction_(v[1]) {}
+
+    void Touch(Body &b) const override
+    {
+        b.radius_m = std::max(0.0, b.radius_m + radius_m_);
+        b.friction += friction_;
+    }
+
+private:
+    double radius_m_, friction_;
+};
+
+}  // namespace
+
+extern const EffectSpec kCollision;
+const EffectSpec kCollision = {kCard, kParameters, Make<Collision>};
+
+}  // namespace twin

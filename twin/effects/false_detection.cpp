@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "false_detection",
+    .stage = Stage::kDecide,
+    .drives = kAnyDrive,
+    .summary = "Some frames show a target that is not there.",
+    .equation = "P(bit | nothing in view) = false', false' = false + rate (1 - false)",
+    .leaves_out = "false targets at one place of the room, as a green bottle",
+    .measure = "one robot alone in the room, many frames",
+    .reference =
+        "binary asymmetric channel; Cover and Thomas 2006, Elements of Information Theory, ch. 7",
+};
+
+constexpr Parameter kParameters[] = {
+    {"rate", "1", 0, 0.1, 0, 1, "share of frames beyond those of the model"},
+};
+
+class FalseDetection final : public Effect
+{
+public:
+    explicit FalseDetection(std::span<const double> v) : rate_(v[0]) {}
+
+    void Look(Sight &s) const override { s.false_rate += rate_ * (1 - s.false_rate); }
+
+private:
+    double rate_;
+};
+
+}  // namespace
+
+extern const EffectSpec kFalseDetection;
+const EffectSpec kFalseDetection = {kCard, kParameters, Make<FalseDetection>};
+
+}  // namespace twin

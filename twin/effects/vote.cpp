@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include "make.h"
+
+namespace twin
+{
+namespace
+{
+
+constexpr Card kCard = {
+    .name = "vote",
+    .stage = Stage::kDecide,
+    .drives = kAnyDrive,
+    .summary = "The robot votes over another number of frames than the model says.",
+    .equation =
+        "n' = n + extra_frames, at least 1 and at most 64; seen if more than half of n' frames show it",
+    .leaves_out = "votes with weights or another share",
+    .measure = "any run with raw and voted bits in its telemetry",
+    .reference = "majority decoding of a repetition code; MacKay 2003, Information Theory, ch. 1.2",
+};
+
+constexpr Parameter kParameters[] = {
+    {"extra_frames", "1", 0, 5, -63, 63,
+     "frames beyond those of the model, rounded to a whole number"},
+};
+
+class Vote final : public Effect
+{
+public:
+    explicit Vote(std::span<const double> v) : extra_frames_(std::round(v[0])) {}
+
+    void Look(Sight &s) const override
+    {
+        s.vote_frames = std::clamp(s.vote_frames + extra_frames_, 1.0, 64.0);
+    }
+
+private:
+    double extra_frames_;
+};
+
+}  // namespace
+
+extern const EffectSpec kVote;
+const EffectSpec kVote = {kCard, kParameters, Make<Vote>};
+
+}  // namespace twin

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The camera as geometry: whether another robot is in a cone ahead, from poses that are exact or
+// measured.
+#ifndef SENSOR_VIEW_H
+#define SENSOR_VIEW_H
+
+#include <span>
+
+#include "effects/effect.h"
+#include "plant/plant.h"
+
+namespace twin
+{
+
+// Whether `eye` sees `target`: its centre strictly within range_m, and strictly within half of
+// cone_rad of the heading turned by pan_rad. A target_radius_m above zero: any part of that disc
+// may be in the cone. Edges are sharp, and nothing hides the target.
+bool InView(const Pose2 &eye, const Pose2 &target, const Sight &sight);
+
+// How well poses are known: standard deviations. All zero: exactly.
+struct Blur
+{
+    double position_m = 0, heading_rad = 0;
+};
+
+// Probability, 0 to 1, that robot `self` has at least one other in view; misses and false
+// detections apart. With exact poses and a sharp range it is 0 or 1. Blurred edges are logistic,
+// with the variance of the pose noise that they stand for. A pose of NaN is seen by nobody.
+double ViewProbability(std::span<const Pose2> poses, size_t self, const Sight &sight,
+                       const Blur &blur);
+
+}  // namespace twin
+
+#endif

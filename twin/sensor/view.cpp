@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sensor/view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace twin
+{
+namespace
+{
+
+// Where another robot is, as the camera sees it.
+struct Place
+{
+    double distance_m, bearing_rad;
+};
+
+Place PlaceOf(const Pose2 &eye, const Pose2 &other, const Sight &sight)
+{
+    const double dx_m = other.x_m - eye.x_m, dy_m = other.y_m - eye.y_m;
+    return {std::hypot(dx_m, dy_m),
+            std::remainder(std::atan2(dy_m, dx_m) - eye.theta_rad - sight.pan_rad,
+                           2 * std::numbers::pi)};
+}
+
+// Probability that `margin`, known to a standard deviation `std`, is above zero. `scale` is that of
+// a logistic edge that is there besides.
+double Inside(double margin, double std, double scale = 0)
+{
+    const double all = std::hypot(std * std::numbers::sqrt3 / std::numbers::pi, scale);
+    return all > 0 ? 1 / (1 + std::exp(-margin / all)) : margin > 0;
+}
+
+double HalfWidth(double radius_m, double distance_m)
+{
+    return radius_m > 0 ? std::asin(std::min(1.0, radius_m / distance_m)) : 0;
+}
+
+// Probability that a body at `other` hides a target at `target`.
+double Hides(const Place &other, const Place &target, const Sight &sight, const Blur &blur)
+{
+    if (!(other.distance_m < target.distance_m))
+        return 0;
+    const double apart_rad =
+        std::abs(std::remainder(other.bearing_rad - target.bearing_rad, 2 * std::numbers::pi));
+    return Inside(HalfWidth(sight.hide_radius_m, other.distance_m) - apart_rad,
+                  std::numbers::sqrt2 * blur.position_m / std::max(other.distance_m, 1e-3));
+}
+
+// Probability that nothing hides `target` from `self`.
+double Clear(std::span<const Pose2> poses, size_t self, size_t target, const Sight &sight,
+             const Blur &blur)
+{
+    if (sight.hide_radius_m == 0)
+        return 1;
+    const Place place = PlaceOf(poses[self], poses[target], sight);
+    double clear = 1;
+    for (size_t k = 0; k < poses.size(); ++k)
+        if (k != self && k != target)
+            clear *= 1 - Hides(PlaceOf(poses[self], poses[k], sight), place, sight, blur);
+    return clear;
+}
+
+double InViewProbability(const Pose2 &eye, const Pose2 &target, const Sight &sight,
+                         const Blur &blur)
+{
+    if (blur.position_m == 0 && blur.heading_rad == 0 && sight.softness_m == 0)
+        return InView(eye, target, sight);
+    const Place place = PlaceOf(eye, target, sight);
+    const double both_m = std::numbers::sqrt2 * blur.position_m;
+    const double half_rad = sight.cone_rad / 2 + HalfWidth(sight.target_radius_m, place.distance_m);
+    return Inside(sight.range_m - place.distance_m, both_m, sight.softness_m) *
+           Inside(half_rad - std::abs(place.bearing_rad),
+                  std::hypot(blur.heading_rad, both_m / std::max(place.distance_m, 1e-3)));
+}
+
+}  // namespace
+
+bool InView(const Pose2 &eye, const Pose2 &target, const Sight &sight)
+{
+    const double dx_m = target.x_m - eye.x_m, dy_m = target.y_m - eye.y_m;
+    const double distance2 = dx_m * dx_m + dy_m * dy_m;
+    if (!(distance2 < sight.range_m * sight.range_m))
+        return false;
+    // The cone is symmetric: the target in the half plane left of its axis.
+    const double axis_rad = eye.theta_rad + sight.pan_rad;
+    const double c = std::cos(axis_rad), s = std::sin(axis_rad);
+    const double ahead_m = c * dx_m + s * dy_m, aside_m = std::abs(c * dy_m - s * dx_m);
+    const double cos_half = std::cos(sight.cone_rad / 2), sin_half = std::sin(sight.cone_rad / 2);
+    const bool inside = ahead_m > cos_half * std::sqrt(distance2);
+    if (inside || sight.target_radius_m == 0)
+        return inside;
+    // Outside: the nearest point of the cone lies on its edge, or is its tip.
+    const double along_m = std::max(ahead_m * cos_half + aside_m * sin_half, 0.0);
+    return std::hypot(ahead_m - along_m * cos_half, aside_m - along_m * sin_half) <
+           sight.target_radius_m;
+}
+
+double ViewProbability(std::span<const Pose2> poses, size_t self, const Sight &sight,
+                       const Blur &blur)
+{
+    double unseen = 1;
+    for (size_t i = 0; i < poses.size() && unseen > 0; ++i)
+    {
+        if (i == self || std::isnan(poses[i].x_m))
+            continue;
+        const double seen = InViewProbability(poses[self], poses[i], sight, blur);
+        if (seen > 0)
+            unseen *= 1 - seen * Clear(poses, self, i, sight, blur);
+    }
+    return 1 - unseen;
+}
+
+}  // namespace twin
