@@ -180,7 +180,7 @@ double Area(const std::vector<Row> &rows)
 
 }  // namespace
 
-Sight SeeGreen(const Scene &scene, const Pose2 &robot, const CameraSettings &s, double edge_px)
+Sighting SeeGreen(const Scene &scene, const Pose2 &robot, const CameraSettings &s, double edge_px)
 {
     const double f = s.lens.focal_px;
     const size_t height = static_cast<size_t>(s.height_px);

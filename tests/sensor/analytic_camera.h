@@ -13,7 +13,7 @@
 namespace twin
 {
 
-struct Sight
+struct Sighting
 {
     double whole_px = 0;    // area of all green if nothing hid it
     double area_px = 0;     // of what is not hidden
@@ -24,8 +24,8 @@ struct Sight
 
 // `edge_px`: how far the edge of a mask may lie from the true one. The least part is that of edges
 // moved inward, the most part that of edges moved outward and parts joined across gaps of a pixel.
-Sight SeeGreen(const Scene &scene, const Pose2 &robot, const CameraSettings &settings,
-               double edge_px);
+Sighting SeeGreen(const Scene &scene, const Pose2 &robot, const CameraSettings &settings,
+                  double edge_px);
 
 }  // namespace twin
 

@@ -74,7 +74,7 @@ TEST(Camera, SeesABallExactlyWhenAlgebraSeesIt)
     {
         const std::vector<Pose2> poses = RandomRobots(random);
         const Scene scene = RobotsSeenBy(0, poses, Target::kBall);
-        const Sight sight = SeeGreen(scene, poses[0], settings, kEdge_px);
+        const Sighting sight = SeeGreen(scene, poses[0], settings, kEdge_px);
         const int blob_px = Blob(camera.Draw(scene, poses[0]), settings);
         hidden += sight.area_px < 0.99 * sight.whole_px;
         seen += blob_px > limit_px;

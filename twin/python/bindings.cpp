@@ -15,8 +15,7 @@ using namespace twin;
 namespace
 {
 
-using Poses =
-    nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+using Poses = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 // The arrays of a run, checked once and kept alive.
 struct PyTrack
