@@ -9,6 +9,7 @@ import typer
 from twinmill.tools import calibrate, characterise, diagnose, effects, import_log
 from twinmill.tools import next as next_run
 from twinmill.tools.challenge import run as challenge
+from twinmill.tools.deploy import flash
 from twinmill.tools.swarm import commands as swarm
 
 app = typer.Typer(
@@ -23,6 +24,7 @@ next_run.register(app)
 challenge.register(app)
 effects.register(app)
 swarm.register(app)
+flash.register(app)
 characterise.register(app)
 
 

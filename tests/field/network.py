@@ -17,7 +17,7 @@ NETWORK = (
 
 def run_session(script: str, *arguments) -> dict:
     """What a session found, as it printed it; skips where networks cannot be made."""
-    command = ["unshare", "--net", *([] if os.geteuid() == 0 else ["--map-root-user"])]
+    command = ["unshare", "--net", "--mount", *([] if os.geteuid() == 0 else ["--map-root-user"])]
     command += ["sh", "-c", NETWORK, "sh", sys.executable, Path(__file__).with_name(script)]
     try:
         done = subprocess.run(

@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# What is done on a robot, read by its sh from ssh: robot.sh STEP [ARGUMENT...]. Prints KEY=VALUE, or
-# fails with `failed: KIND: SENTENCE`. TURBOPI_ROOT is put before all paths: for another root than /.
+# What is done on a robot, read by its sh from ssh: robot.sh STEP [ARGUMENT...]. Prints KEY=VALUE,
+# or fails with `failed: KIND: SENTENCE`. TURBOPI_ROOT stands before all paths: another root than /.
 set -eu
 
 root=${TURBOPI_ROOT:-}
@@ -15,53 +15,62 @@ as_root() { if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo -n "$@"; fi; }
 may_be_root()
 {
     as_root true 2>/dev/null ||
-        fail "no permission" "sudo asks for a password: let this user be root without (sudo visudo)."
+        fail "no permission" "sudo asks for a password: allow it without (sudo visudo)."
 }
 
-value_of() { sed -n "s/^$1 *= *\"\{0,1\}\([^\"#]*\)\"\{0,1\}.*/\1/p" "$config" 2>/dev/null | tail -n 1; }
-
-# probe ARCHITECTURE NEEDED_KB: may the package go here at all?
+# probe [ARCHITECTURE] NEEDED_KB: may the package go here at all? Changes nothing.
 probe()
 {
     architecture=$(dpkg --print-architecture 2>/dev/null) ||
         fail "no dpkg" "is no Debian: Raspberry Pi OS is needed."
-    [ "$architecture" = "$1" ] ||
-        fail "wrong architecture" "its system is $architecture, the package is for $1: put the 64-bit Raspberry Pi OS on its card."
+    [ -z "$1" ] || [ "$architecture" = "$1" ] ||
+        fail "wrong architecture" "its system is $architecture, the package is for $1: does its card have the 64-bit Raspberry Pi OS?"
     may_be_root
-    as_root mkdir -p "$store"
-    free=$(df -Pk "$store" | awk 'NR == 2 { print $4 }')
-    [ "$free" -ge "$2" ] || fail "no space" "$free KB are free, $2 KB are needed."
-    camera=$(value_of camera)
-    echo "camera=${camera:=/dev/video0}"
-    case $camera in
-        stub:*) ;;
-        *) [ -e "$camera" ] || fail "no camera" "no $camera: is the camera plugged in?" ;;
-    esac
+    for folder in "$root/var/lib" /tmp; do
+        free=$(df -Pk "$folder" | awk 'NR == 2 { print $4 }')
+        [ "$free" -ge "$2" ] ||
+            fail "no space" "$free KB are free in $folder, $2 KB are needed: remove something."
+    done
     echo "installed=$(dpkg-query -W -f='${Version}' turbopi 2>/dev/null || true)"
-    echo "robot_id=$(value_of robot_id)"
-    echo "behavior=$(value_of behavior)"
-    echo "upload=$(mktemp /tmp/turbopi.XXXXXX)"
+    [ ! -e "$store/previous.deb" ] || echo "previous=$(dpkg-deb -f "$store/previous.deb" Version)"
 }
 
-# Installs the package at $1; its dependencies are named if they are missing.
+# The configuration that is there stays; no question is asked. What the package depends on is
+# fetched, if there is a network that has it.
 dpkg_install()
 {
+    as_root dpkg --force-confdef --force-confold --install "$1" >"$log" 2>&1 && return
+    grep -qi 'dependency problems' "$log" || return
+    as_root env DEBIAN_FRONTEND=noninteractive \
+        apt-get --yes --no-remove --no-install-recommends --fix-broken install >"$log.apt" 2>&1
+}
+
+# Installs $1, or puts back what was there.
+install_or_restore()
+{
     log=$(mktemp)
-    if ! as_root dpkg --install "$1" >"$log" 2>&1; then
-        why=$(grep -iE 'depends|error|cannot' "$log" | tail -n 1)
-        rm -f "$log"
-        fail "not installed" "dpkg: ${why:-failed}"
+    if dpkg_install "$1"; then
+        rm -f "$log" "$log.apt"
+        return
     fi
-    rm -f "$log"
+    why=$(grep -iE 'depends|error|cannot|no space' "$log" | tail -n 1 | sed 's|^dpkg: ||')
+    back=
+    if [ -e "$store/current.deb" ] && dpkg_install "$store/current.deb"; then
+        back=' The package before was put back.'
+    fi
+    rm -f "$log" "$log.apt"
+    fail "not installed" "dpkg: ${why:-failed}.$back"
 }
 
 # install UPLOADED_FILE: the package that was installed until now is kept, for rollback.
 install()
 {
     may_be_root
-    as_root mv "$1" "$store/new.deb"
+    as_root mkdir -p "$store"
+    as_root cp "$1" "$store/new.deb"
+    rm -f "$1"
     as_root chmod 644 "$store/new.deb"
-    dpkg_install "$store/new.deb"
+    install_or_restore "$store/new.deb"
     if [ -e "$store/current.deb" ] && ! cmp -s "$store/new.deb" "$store/current.deb"; then
         as_root mv "$store/current.deb" "$store/previous.deb"
     fi
@@ -74,7 +83,7 @@ rollback()
     may_be_root
     [ -e "$store/previous.deb" ] ||
         fail "no previous" "no previous package is kept on it: install one with --package."
-    dpkg_install "$store/previous.deb"
+    install_or_restore "$store/previous.deb"
     as_root mv "$store/current.deb" "$store/other.deb"
     as_root mv "$store/previous.deb" "$store/current.deb"
     as_root mv "$store/other.deb" "$store/previous.deb"
@@ -113,7 +122,10 @@ restart()
         fail "service dies" "turbopi.service does not stay up: $(last_words)"
 }
 
-last_words() { as_root journalctl -u turbopi.service -n 3 -o cat --no-pager 2>/dev/null | tr '\n' ' '; }
+last_words()
+{
+    as_root journalctl -u turbopi.service -n 3 -o cat --no-pager 2>/dev/null | tr '\n' ' '
+}
 
 # script NAME UPLOADED_FILE: for characterise.
 script()
@@ -129,9 +141,15 @@ script()
 # upload: a new file that this user may write.
 upload() { echo "upload=$(mktemp /tmp/turbopi.XXXXXX)"; }
 
-step=$1
-shift
-case $step in
-    probe | install | rollback | configure | restart | script | upload) "$step" "$@" ;;
-    *) fail "bad step" "$step" ;;
-esac
+main()
+{
+    step=$1
+    shift
+    case $step in
+        probe | install | rollback | configure | restart | script | upload) "$step" "$@" ;;
+        *) fail "bad step" "$step" ;;
+    esac
+}
+
+# Read whole before anything runs: a program must not eat the rest of this text.
+main "$@" </dev/null

@@ -32,6 +32,7 @@ class Robot:
     Attributes:
         telemetry, run: its newest messages.
         heard_s: when it said anything last, by time.monotonic().
+        run_heard_s: when it said who it is.
         recent: (time.monotonic(), telemetry_t) of the last WINDOW_S.
         clock_s: how far its clock is ahead of ours, less the delay of the network.
         acks: by number of the command.
@@ -41,6 +42,7 @@ class Robot:
     telemetry: Any = None
     run: Any = None
     heard_s: float = 0.0
+    run_heard_s: float = 0.0
     recent: deque = field(default_factory=deque)
     acks: dict = field(default_factory=dict)
 
@@ -145,7 +147,7 @@ class Fleet:
         if kind == "ACK":
             robot.acks[message.seq] = message
         elif kind == "RUN":
-            robot.run = message
+            robot.run, robot.run_heard_s = message, now_s
         else:
             robot.telemetry = message
             robot.recent.append((now_s, time.time(), message))

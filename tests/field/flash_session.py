@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill flash` on pretended robots, in every way that it can end.
+
+Usage: flash_session.py FOLDER, in a network and with mounts of its own, with TURBOPI set. Prints
+what happened as JSON.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+from ssh_robots import SshRobot, make_package
+from twinmill.tools import cli
+
+
+def let_in(folder: Path) -> Path:
+    """Makes a key pair, and gives root a home folder with it: the server looks nowhere else."""
+    key, home = folder / "key", folder / "home"
+    (home / ".ssh").mkdir(parents=True, mode=0o700)
+    home.chmod(0o700)
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key], check=True)
+    (home / ".ssh/authorized_keys").write_text(key.with_suffix(".pub").read_text())
+    (home / ".ssh/authorized_keys").chmod(0o600)
+    users = Path("/etc/passwd").read_text()
+    users = re.sub(r"^root:.*$", f"root:x:0:0:root:{home}:/bin/sh", users, flags=re.MULTILINE)
+    (folder / "passwd").write_text(users)
+    subprocess.run(["mount", "--bind", folder / "passwd", "/etc/passwd"], check=True)
+    (folder / "shells").write_text("/bin/sh\n")
+    if Path("/etc/shells").exists():
+        subprocess.run(["mount", "--bind", folder / "shells", "/etc/shells"], check=True)
+    return key
+
+
+class Flasher:
+    """Runs the command as a user would, with this session's ssh configuration."""
+
+    def __init__(self, config: Path):
+        self._config = config
+
+    def run(self, *arguments: str) -> dict:
+        """Its exit code, its JSON, and what it complained of."""
+        said, complaint = StringIO(), StringIO()
+        with redirect_stdout(said), redirect_stderr(complaint):
+            try:
+                options = ("--json", "--ssh-config", str(self._config), "--wait-s", "4")
+                code = cli.run(["flash", *options, *map(str, arguments)])
+            except ValueError as error:
+                return {"code": 1, "complaint": str(error), "robots": []}
+        return {"code": code, "complaint": complaint.getvalue(), **json.loads(said.getvalue())}
+
+
+def failures(flash: Flasher, robot: SshRobot, package: Path) -> dict:
+    """Each way to fail, one after the other, on one robot."""
+    run = {}
+    host = robot.name
+
+    def attempt(name: str, broken: dict, healthy: dict) -> None:
+        robot.write(**broken)
+        run[name] = flash.run(host, "--package", package)
+        for key in broken.keys() - healthy.keys():
+            (robot.folder / key).unlink()
+        robot.write(**healthy)
+
+    attempt("wrong architecture", {"architecture": "arm64"}, {"architecture": "amd64"})
+    attempt("no permission", {"uid": "1000"}, {"uid": "0"})
+    attempt("no space", {"free_kb": "100"}, {"free_kb": "500000"})
+    attempt("not installed", {"dpkg_fails": ""}, {})
+    attempt("service dies", {"dies": ""}, {})
+    before = robot.config.read_text()
+    run["bad configuration"] = flash.run(host, "--package", package, "--behavior", "dance")
+    run["config kept"] = robot.config.read_text() == before
+    robot.config.write_text(before.replace("frames.yuyv", "absent"))
+    run["no camera"] = flash.run(host, "--package", package)
+    robot.config.write_text(re.sub("lcm_url.*", 'lcm_url = ""', before))
+    run["no telemetry"] = flash.run(host, "--package", package)
+    robot.config.write_text(before)
+    run["no dpkg package"] = flash.run(host, "--package", "/etc/passwd")
+    return run
+
+
+def main(folder: Path) -> dict:
+    program = Path(os.environ["TURBOPI"])
+    key = let_in(folder)
+    version = subprocess.run(
+        [program, "--version"], capture_output=True, text=True, check=True
+    ).stdout.split()[1]
+    old = make_package(folder, program, f"{version}-1", "amd64")
+    new = make_package(folder, program, f"{version}-2", "amd64")
+    robots = [SshRobot(folder, f"robot0{i}", 2200 + i, key) for i in (3, 4, 5)]
+    config = folder / "ssh_config"
+    other_key = folder / "other"
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", other_key], check=True)
+    config.write_text(
+        "".join(robot.ssh_config for robot in robots)
+        + "Host robot09\n  HostName 127.0.0.1\n  Port 2209\n"
+        + robots[0].ssh_config.replace("robot03", "robot08").replace(str(key), str(other_key))
+    )
+    flash, result, both = Flasher(config), {"version": version}, ("robot03", "robot04")
+    try:
+        result["dry_run"] = flash.run(*both, "--package", old, "--dry-run", "-b", "diffusing")
+        result["touched_by_dry_run"] = (robots[0].folder / "root/usr/bin/turbopi").exists()
+        result["first"] = flash.run(*both, "--package", old, "--behavior", "diffusing")
+        result["configs"] = [robot.config.read_text() for robot in robots[:2]]
+        result["no_previous"] = flash.run("robot03", "--rollback")
+        result["second"] = flash.run(*both, "--package", new)
+        result["installed"] = [(robot.folder / "installed").read_text().strip() for robot in robots]
+        result["rollback"] = flash.run("robot03", "--rollback")
+        result["back_to"] = (robots[0].folder / "installed").read_text().strip()
+        result["mixed"] = flash.run("robot03", "robot09", "robot08", "nobody7.invalid",
+                                    "--package", new)  # fmt: skip
+        result["failures"] = failures(flash, robots[2], new)
+        result["same_number"] = flash.run("robot03", "robot04=3", "--package", new)
+        result["left_in_tmp"] = sorted(path.name for path in Path("/tmp").glob("turbopi.??????"))
+    finally:
+        for robot in robots:
+            robot.end()
+    return result
+
+
+if __name__ == "__main__":
+    print(json.dumps(main(Path(sys.argv[1]))))

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Robots to flash: a real ssh server each, and below it a pretended Debian with the real program.
+
+Each robot is a folder: `root` is its file system (robot.sh's TURBOPI_ROOT), `bin` has stand-ins for
+what would change this machine. The package is unpacked by the real dpkg-deb, and the service is the
+program that it brought.
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+STUBS = {
+    "id": 'cat "$ROBOT/uid"',
+    "sudo": "echo 'sudo: a password is required' >&2; exit 1",
+    "dpkg": """
+case $1 in
+    --print-architecture) cat "$ROBOT/architecture" ;;
+    *)  for package; do :; done
+        if [ -e "$ROBOT/dpkg_fails" ]; then
+            echo "dpkg: dependency problems: turbopi depends on liblcm1" >&2
+            exit 1
+        fi
+        cp -a "$ROBOT/root/etc/turbopi/turbopi.conf" "$ROBOT/kept.conf" || true
+        dpkg-deb --extract "$package" "$ROBOT/root"
+        [ ! -e "$ROBOT/kept.conf" ] || mv "$ROBOT/kept.conf" "$ROBOT/root/etc/turbopi/turbopi.conf"
+        dpkg-deb --field "$package" Version >"$ROBOT/installed" ;;
+esac""",
+    "apt-get": "exit 100",
+    "dpkg-query": 'cat "$ROBOT/installed"',
+    "df": 'echo "header"; echo "disk 1000000 1 $(cat "$ROBOT/free_kb") 1% /"',
+    "systemctl": """
+case $1 in
+    restart)
+        [ ! -e "$ROBOT/pid" ] || kill "$(cat "$ROBOT/pid")" 2>/dev/null || true
+        [ -e "$ROBOT/dies" ] && exit 0
+        turbopi --config "$ROBOT/root/etc/turbopi/turbopi.conf" >"$ROBOT/journal" 2>&1 &
+        echo $! >"$ROBOT/pid" ;;
+    is-active) kill -0 "$(cat "$ROBOT/pid" 2>/dev/null || echo none)" 2>/dev/null ;;
+esac""",
+    "journalctl": 'echo "turbopi: cannot do it"',
+}
+SETTINGS = """\
+robot_id = 0
+behavior = milling
+camera = "stub:{folder}/frames.yuyv"
+board = stub
+panel = none
+width_px = 64
+height_px = 48
+lcm_url = "udpm://239.255.76.67:7667?ttl=0"
+"""
+
+
+def make_package(folder: Path, program: Path, version: str, architecture: str) -> Path:
+    """A Debian package of this machine's program."""
+    staged = folder / f"staged-{version}-{architecture}"
+    for path in ("usr/bin", "etc/turbopi", "DEBIAN"):
+        (staged / path).mkdir(parents=True)
+    shutil.copy(program, staged / "usr/bin/turbopi")
+    (staged / "etc/turbopi/turbopi.conf").write_text("robot_id = 0\nbehavior = milling\n")
+    (staged / "DEBIAN/control").write_text(
+        f"Package: turbopi\nVersion: {version}\nArchitecture: {architecture}\n"
+        "Maintainer: nobody <nobody@example.invalid>\nInstalled-Size: 300\nDescription: test\n"
+    )
+    path = folder / f"turbopi_{version}_{architecture}.deb"
+    subprocess.run(["dpkg-deb", "--build", "-Znone", staged, path], check=True, capture_output=True)
+    return path
+
+
+class SshRobot:
+    """One robot with its ssh server."""
+
+    def __init__(self, folder: Path, name: str, port: int, key: Path):
+        self.folder, self.name, self.port = folder / name, name, port
+        for path in ("bin", "root/var/lib", "root/usr/bin", "root/etc/turbopi"):
+            (self.folder / path).mkdir(parents=True)
+        for stub, text in STUBS.items():
+            path = self.folder / "bin" / stub
+            path.write_text(f"#!/bin/sh\n{text}\n")
+            path.chmod(0o755)
+        self.write(uid="0", architecture="amd64", free_kb="500000", installed="")
+        grey = bytes([126, 128, 126, 128]) * (64 * 48 // 2)
+        (self.folder / "frames.yuyv").write_bytes(grey * 3000)
+        self.config.write_text(SETTINGS.format(folder=self.folder))
+        host_key = self.folder / "host_key"
+        subprocess.run(
+            ["dropbearkey", "-t", "ed25519", "-f", host_key], check=True, capture_output=True
+        )
+        path = f"{self.folder}/bin:{self.folder}/root/usr/bin:{os.environ['PATH']}"
+        forced = (
+            f"env ROBOT={self.folder} TURBOPI_ROOT={self.folder}/root PATH={path} "
+            'sh -c "$SSH_ORIGINAL_COMMAND"'
+        )
+        server = ["dropbear", "-F", "-e", "-s", "-p", f"127.0.0.1:{port}", "-r", str(host_key)]
+        self.server = subprocess.Popen(
+            [*server, "-P", str(self.folder / "ssh.pid"), "-c", forced], stderr=subprocess.DEVNULL
+        )
+        self.ssh_config = (
+            f"Host {name}\n  HostName 127.0.0.1\n  Port {port}\n  User root\n"
+            f"  IdentityFile {key}\n  IdentitiesOnly yes\n"
+            "  StrictHostKeyChecking no\n  UserKnownHostsFile /dev/null\n  LogLevel ERROR\n"
+        )
+
+    @property
+    def config(self) -> Path:
+        return self.folder / "root/etc/turbopi/turbopi.conf"
+
+    def write(self, **files: str) -> None:
+        """Sets what the stand-ins answer."""
+        for name, text in files.items():
+            (self.folder / name).write_text(text)
+
+    def end(self) -> None:
+        """Ends the server and the program."""
+        self.server.terminate()
+        if (self.folder / "pid").exists():
+            try:
+                os.kill(int((self.folder / "pid").read_text()), signal.SIGTERM)
+            except ProcessLookupError:
+                return
+            time.sleep(0.3)

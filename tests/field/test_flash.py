@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tools/deploy: the program comes onto robots over a real ssh; each failure has a name."""
+
+import os
+import shutil
+
+import pytest
+from network import run_session
+from twinmill.tools.deploy.remote import _ssh_failure
+from twinmill.tools.deploy.robot_update import parse_target
+
+REQUIRED = ("dropbear", "dropbearkey", "ssh", "ssh-keygen", "dpkg-deb", "mount")
+FAILURES = (
+    "wrong architecture",
+    "no permission",
+    "no space",
+    "not installed",
+    "service dies",
+    "bad configuration",
+    "no camera",
+    "no telemetry",
+)
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    """What happened: see flash_session.py."""
+    missing = [name for name in REQUIRED if not shutil.which(name)]
+    if missing or not os.environ.get("TURBOPI"):
+        pytest.skip(f"not here: {', '.join(missing) or 'the program, TURBOPI'}")
+    if os.geteuid() != 0:
+        pytest.skip("only root may let an ssh server change users")
+    return run_session("flash_session.py", tmp_path_factory.mktemp("flash"))
+
+
+def only(run: dict) -> dict:
+    (robot,) = run["robots"]
+    return robot
+
+
+def test_dry_run_says_what_would_be_done_and_does_nothing(session):
+    for robot in session["dry_run"]["robots"]:
+        assert any("-1 over nothing" in step for step in robot["would"])
+        assert any("behavior = diffusing" in step for step in robot["would"])
+    assert session["dry_run"]["code"] == 0 and not session["touched_by_dry_run"]
+
+
+def test_two_robots_run_what_was_installed(session):
+    assert session["first"]["code"] == 0
+    for robot in session["first"]["robots"]:
+        # The stand-in's pack of 8 V, and frames thirty times a second.
+        assert robot["ok"] and robot["battery_V"] == 8.0 and "fps" in robot["camera"]
+        assert robot["version"] == session["version"]
+
+
+def test_number_and_behaviour_are_set_and_the_rest_is_kept(session):
+    for robot_id, text in zip((3, 4), session["configs"], strict=True):
+        lines = text.splitlines()
+        assert f"robot_id = {robot_id}" in lines and "behavior = diffusing" in lines
+        assert text.count("robot_id") == 1 and text.count("behavior") == 1
+        assert "board = stub" in lines and "width_px = 64" in lines
+
+
+def test_rollback_goes_to_the_package_before(session):
+    assert only(session["no_previous"])["kind"] == "no previous"
+    assert session["second"]["code"] == 0
+    assert [version[-2:] for version in session["installed"][:2]] == ["-2", "-2"]
+    assert session["rollback"]["code"] == 0 and session["back_to"].endswith("-1")
+
+
+def test_one_robot_that_fails_does_not_hold_up_another(session):
+    kinds = {robot["host"]: robot["kind"] for robot in session["mixed"]["robots"]}
+    assert kinds == {
+        "robot03": "",
+        "robot09": "no answer",
+        "robot08": "no key",
+        "nobody7.invalid": "no host",
+    }
+    assert session["mixed"]["code"] == 1
+
+
+@pytest.mark.parametrize("kind", FAILURES)
+def test_every_failure_has_its_name_and_its_exit_code(session, kind):
+    run = session["failures"][kind]
+    assert run["code"] == 1 and only(run)["kind"] == kind and only(run)["sentence"]
+
+
+def test_bad_configuration_leaves_the_old_one(session):
+    assert session["failures"]["config kept"]
+    assert "milling" in only(session["failures"]["bad configuration"])["sentence"]
+
+
+def test_two_robots_of_one_number_are_refused(session):
+    assert session["same_number"]["code"] == 1
+    assert "would both be robot 3" in session["same_number"]["complaint"]
+
+
+def test_nothing_is_left_behind(session):
+    assert session["left_in_tmp"] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "host", "robot_id"),
+    [
+        ("robot03.local", "robot03.local", 3),
+        ("pi@turbopi-12", "pi@turbopi-12", 12),
+        ("192.168.9.103=3", "192.168.9.103", 3),
+        ("pi4-robot07.lan", "pi4-robot07.lan", 7),
+    ],
+)
+def test_number_is_the_last_in_the_first_name(text, host, robot_id):
+    target = parse_target(text)
+    assert (target.host, target.robot_id) == (host, robot_id)
+
+
+@pytest.mark.parametrize("text", ["192.168.9.103", "robot", "a=100", "a=x", "=3", "-oProxy=1"])
+def test_host_without_a_number_is_refused(text):
+    with pytest.raises(ValueError, match="which robot"):
+        parse_target(text)
+
+
+def test_changed_host_key_is_named():
+    said = "@@@ WARNING @@@\nHost key verification failed."  # OpenSSH's words
+    assert _ssh_failure(said).kind == "host key"
