@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 from twinmill.calibration.diagnosis.diagnose import diagnose
 from twinmill.calibration.measurement import load_measurements
@@ -67,7 +68,7 @@ def _next(
     with telling(f"designing a run with {model}") as say:
         plan = design(diagnose(load_measurements(logs), model_file, say), limits, say)
     write_whole(output, csv_text(plan.rows))
-    how = _how(logs, model, output)
+    how = _how(plan, logs, model, output)
     data = {"script": str(output), **plan.to_json()}
     finish(data, present.terminal(plan, how), source, present.section(plan, how), as_json, out)
     return plan
@@ -83,13 +84,16 @@ def _sides(text: str) -> tuple[float, float]:
     return float(found[1]), float(found[2])
 
 
-def _how(logs: list[Path], model: str, script: Path) -> list[str]:
+def _how(plan: Plan, logs: list[Path], model: str, script: Path) -> list[str]:
     """How to play the script and what to do then."""
-    path, quoted = shlex.quote(str(script)), shlex.quote(model)
+    path, number = shlex.quote(str(script)), plan.robot_id
+    cap_pct = round(100 * float(np.abs(plan.rows.duty).max()))
     return [
         f"Written: {script}. Put the robot in the middle of the floor, its camera along the first "
-        "side, and record motion capture and telemetry.",
-        f"On the robot: turbopi --script {path} --start;",
-        f"in the twin: twin_run --n 1 --model {quoted} --script {path} --log next.lcmlog;",
+        "side.",
+        f"On the robot: twinmill characterise --robot {number} --script {path} --cap-pct {cap_pct} "
+        "--out next.lcmlog;",
+        f"in the twin: twin_run --n 1 --model {shlex.quote(model)} --script {path} "
+        "--log next.lcmlog;",
         f"then: {command_line('diagnose', [*logs, Path('next.lcmlog')], model)}",
     ]

@@ -22,36 +22,66 @@ class Contest:
     """What is in question.
 
     Attributes:
-        effects: names; empty if nothing is, and then the effects that show least are taken.
-        why: a sentence.
-        state: of the diagnosis, the ambiguous effects taken out and the rest refitted.
+        alike: effects that the diagnosis could not tell apart.
+        named: effects that it named; in question if another could imitate one of them after all.
+        hidden: effects that would not show.
+        closest: the two most probable, for want of other questions.
+        state: of the diagnosis, the effects alike or named taken out and the rest refitted.
         fitted: parameters by effect, of those that the logs tell.
     """
 
-    effects: list[str]
-    why: str
+    alike: list[str]
+    named: list[str]
+    hidden: list[str]
+    closest: list[str]
     state: State
     fitted: dict[str, dict[str, float]]
 
 
 def contest(diagnosis: Diagnosis) -> Contest:
-    """Ambiguous effects; else those that the logs cannot show; else the two most probable."""
-    ranking, hidden = diagnosis.ranking, [e for e, _ in diagnosis.not_identifiable]
+    """What a diagnosis leaves open."""
+    ranking = diagnosis.ranking
     top = next((r.group for r in ranking if r.group is not None), None)
-    if top is not None:
-        same = [r for r in ranking if r.group == top]
-        names = [r.effect for r in same]
-        why = f"These logs cannot tell {' from '.join(names)}."
-        return Contest(names, why, _without(diagnosis, names), _values(same))
-    if hidden:
-        why = f"These logs cannot show {', '.join(hidden)}."
-        return Contest(hidden, why, diagnosis.state, {})
-    if len(ranking) > 1:
-        names = [r.effect for r in ranking[:2]]
-        why = f"These logs tell all effects apart; closest were {' and '.join(names)}."
-        return Contest(names, why, _without(diagnosis, names), _values(ranking[:2]))
-    why = "These logs would show and tell apart all effects; what shows least is made to show more."
-    return Contest([], why, diagnosis.state, {})
+    alike = [r.effect for r in ranking if r.group == top and top is not None]
+    named = [] if alike else diagnosis.found
+    hidden = [effect for effect, _ in diagnosis.not_identifiable]
+    closest = [r.effect for r in ranking[:2]]
+    state = _without(diagnosis, [*alike, *named])
+    told = [r for r in ranking if r.effect in (*alike, *named)]
+    return Contest(alike, named, hidden, closest, state, _values(told))
+
+
+def question(
+    asked: Contest, known: list[Subject], margins: np.ndarray, least_chi2: float
+) -> tuple[list[str], str]:
+    """Names of the effects in question, and a sentence.
+
+    Args:
+        asked: what the diagnosis leaves open.
+        known: all effects.
+        margins: (T, 1 + J) of the logs so far, over their scatter.
+        least_chi2: a smaller margin decides nothing.
+    """
+    names = [s.name for s in known]
+    if asked.alike:
+        return asked.alike, f"These logs cannot tell {' from '.join(asked.alike)}."
+    doubtful = []
+    for effect in (n for n in asked.named if n in names):
+        rivals = np.flatnonzero(margins[names.index(effect), 1:] < least_chi2)
+        doubtful += [effect, *(names[j] for j in rivals)] if len(rivals) else []
+    if doubtful:
+        doubtful = list(dict.fromkeys(doubtful))
+        return doubtful, f"These logs hardly tell {' from '.join(doubtful)}."
+    if asked.hidden:
+        return asked.hidden, f"These logs cannot show {', '.join(asked.hidden)}."
+    if len(asked.closest) > 1:
+        first, second = asked.closest
+        return (
+            asked.closest,
+            f"These logs tell all effects apart; closest were {first} and {second}.",
+        )
+    weakest = [names[i] for i in np.argsort(margins.min(axis=-1))[:WEAKEST]]
+    return weakest, f"These logs tell all effects apart; least {', '.join(weakest)}."
 
 
 def subjects(scenes: list[Scene], planned: Scene, state: State, asked: Contest) -> list[Subject]:
@@ -80,6 +110,8 @@ def _whole(effect: str, fitted: dict[str, dict[str, float]]) -> Candidate:
 def _without(diagnosis: Diagnosis, names: list[str]) -> State:
     """The diagnosis' state without these effects, the rest refitted."""
     state = diagnosis.state
+    if not names:
+        return state
     model = state.model.copy()
     for index in reversed(range(len(model.effects))):
         if model.effects[index] in names:

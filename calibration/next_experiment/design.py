@@ -9,7 +9,7 @@ import twinmill_native as native
 from twinmill.calibration.diagnosis.diagnose import Diagnosis
 from twinmill.calibration.diagnosis.evidence import State
 from twinmill.calibration.freedom import catalogue
-from twinmill.calibration.next_experiment.contest import WEAKEST, Contest, contest, subjects
+from twinmill.calibration.next_experiment.contest import contest, question, subjects
 from twinmill.calibration.next_experiment.foresight import LEAD_S, Played, Rows, rows_of
 from twinmill.calibration.next_experiment.information import Ledger, Subject
 from twinmill.calibration.next_experiment.moves import Move, family
@@ -60,6 +60,7 @@ class Plan:
         pose_t_s, paths: (N,) s, and (V, N, 3) m, m, rad: the model's path, then with each effect.
         limits: that it was made for.
         radius_m: of the robot's body.
+        robot_id: of the log.
     """
 
     why: str
@@ -70,6 +71,7 @@ class Plan:
     paths: np.ndarray
     limits: Limits
     radius_m: float
+    robot_id: int
 
     @property
     def predicted_power(self) -> float:
@@ -121,7 +123,8 @@ def design(diagnosis: Diagnosis, limits: Limits, say: Callable[[str], None]) -> 
     known = subjects(asked.state.scenes, foreseen, asked.state, asked)
     ledger = Ledger(asked.state.free, known)
     told = np.sum([ledger.told(s) for s in asked.state.scenes], axis=0)
-    wanted = _wanted(asked, known, ledger.margins(told))
+    names, why = question(asked, known, _tempered(ledger, told), ENOUGH_CHI2)
+    wanted = [i for i, s in enumerate(known) if s.name in names]
     say("choosing moves")
     floor = _Floor(limits, scene, [known[i] for i in wanted])
     chosen = _choose(moves, ledger, told, ledger.foreseen(foreseen), wanted, floor)
@@ -129,7 +132,7 @@ def design(diagnosis: Diagnosis, limits: Limits, say: Callable[[str], None]) -> 
     whole = Played.of([chosen], scene)
     after = told + ledger.foreseen(whole.scene(scene, CENTRE))[0]
     return Plan(
-        asked.why,
+        why,
         chosen,
         rows_of(chosen),
         _chances(ledger, told, after, wanted),
@@ -137,6 +140,7 @@ def design(diagnosis: Diagnosis, limits: Limits, say: Callable[[str], None]) -> 
         np.array([whole.path(m, CENTRE) for m in floor.models]),
         limits,
         scene.model.get("robot.body_radius_m"),
+        scene.measurement.track.robot_id,
     )
 
 
@@ -166,13 +170,6 @@ def _check(scene: Scene, limits: Limits, moves: list[Move]) -> None:
             f"no move fits into {limits.duration_s:g} s and a floor of {size} m; allow more of "
             "either."
         )
-
-
-def _wanted(asked: Contest, known: list[Subject], margins: np.ndarray) -> list[int]:
-    """Places of the effects in question."""
-    if asked.effects:
-        return [i for i, s in enumerate(known) if s.name in asked.effects]
-    return [int(i) for i in np.argsort(margins.min(axis=-1))[:WEAKEST]]
 
 
 class _Floor:
