@@ -1,34 +1,55 @@
 // SPDX-License-Identifier: Apache-2.0
 // What an operator may tell the robot, and what it answers.
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "fw/behavior.h"
 #include "loop.h"
 
 #define COMMANDS_PER_STEP 8
 
+// Reads at most size bytes of a file, without the C library's streams, which take heap.
+// @return how many, or -1 and errno.
+static ssize_t read_file(const char *path, char *text, size_t size)
+{
+    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0)
+    {
+        return -1;
+    }
+    size_t length = 0;
+    ssize_t got = 1;
+    while (got > 0 && length < size)
+    {
+        got = read(fd, text + length, size - length);
+        length += got > 0 ? (size_t)got : 0;
+    }
+    const int error = errno;
+    (void)close(fd);
+    errno = error;
+    return got < 0 ? -1 : (ssize_t)length;
+}
+
 bool loop_load_script(struct loop *loop, const char *path, char reason[LINK_REASON_MAX])
 {
     // 128 KB hold the longest script at 32 bytes a row; too much for a stack.
     static char text[32 * LOOP_SCRIPT_MAX_ROWS];
-    FILE *file = fopen(path, "rb");
-    if (file == NULL)
+    const ssize_t length = read_file(path, text, sizeof text);
+    if (length < 0)
     {
         (void)snprintf(reason, LINK_REASON_MAX, "script cannot be read: %s", strerror(errno));
         return false;
     }
-    const size_t length = fread(text, 1, sizeof text, file);
-    const bool whole = length < sizeof text && !ferror(file);
-    (void)fclose(file);
-    if (!whole)
+    if ((size_t)length == sizeof text)
     {
-        (void)snprintf(reason, LINK_REASON_MAX, "script cannot be read, or is over 128 KB");
+        (void)snprintf(reason, LINK_REASON_MAX, "script is 128 KB or more: make it shorter");
         return false;
     }
     int32_t line;
-    const enum fw_script_fault fault = fw_script_parse(text, length, &loop->script, &line);
+    const enum fw_script_fault fault = fw_script_parse(text, (size_t)length, &loop->script, &line);
     if (fault != FW_SCRIPT_OK)
     {
         loop->script.row_count = 0;

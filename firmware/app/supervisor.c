@@ -182,26 +182,29 @@ static bool watch(struct worker *worker, int stop_fd, int32_t watchdog_ms)
     }
 }
 
-// Asks the worker to end, and makes it.
+static int64_t monotonic_ms(void)
+{
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+// Asks the worker to end, and makes it. Its end of the pipe closes when it is dead.
 static void end_worker(const struct worker *worker)
 {
     (void)kill(worker->pid, SIGTERM);
     char beats[64];
     struct pollfd alive = {.fd = worker->heartbeat_fd, .events = POLLIN};
-    struct timespec begin, now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &begin);
-    int64_t left_ms = END_PATIENCE_MS;
-    while (left_ms > 0 && poll(&alive, 1, (int)left_ms) > 0 &&
-           read(worker->heartbeat_fd, beats, sizeof beats) > 0)
+    const int64_t end_ms = monotonic_ms() + END_PATIENCE_MS;
+    for (int64_t left_ms = END_PATIENCE_MS; left_ms > 0; left_ms = end_ms - monotonic_ms())
     {
-        (void)clock_gettime(CLOCK_MONOTONIC, &now);
-        left_ms = END_PATIENCE_MS - (now.tv_sec - begin.tv_sec) * 1000 -
-                  (now.tv_nsec - begin.tv_nsec) / 1000000;
+        if (poll(&alive, 1, (int)left_ms) > 0 &&
+            read(worker->heartbeat_fd, beats, sizeof beats) <= 0)
+        {
+            return;
+        }
     }
-    if (left_ms <= 0)
-    {
-        (void)kill(worker->pid, SIGKILL);
-    }
+    (void)kill(worker->pid, SIGKILL);
 }
 
 static int wait_for_end(const struct worker *worker)

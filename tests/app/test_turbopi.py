@@ -72,6 +72,16 @@ def test_hanging_process_is_killed_and_the_wheels_stop(driving):
     assert code == 1 and "hangs" in said
 
 
+def test_hanging_process_does_not_keep_the_program_from_ending(driving):
+    stopped_s = time.monotonic()
+    os.kill(driving.children()[0], signal.SIGSTOP)
+    driving.process.terminate()
+    code, _ = driving.end()
+    assert code == 0
+    # It is given a second to end by itself.
+    assert_stopped_since(driving, stopped_s, 1 + SLACK_S)
+
+
 def test_kill_9_of_the_parent_stops_the_wheels(driving):
     killed_s = time.monotonic()
     os.kill(driving.process.pid, signal.SIGKILL)
@@ -276,6 +286,21 @@ def test_network_that_goes_away_does_not_delay_the_loop(bus_session):
     # 30 frames a second: at 200 ms the core would have stopped the wheels.
     assert bus_session["longest_gap_without_network_s"] < 0.2
     assert bus_session["moved_without_network"]
+
+
+def test_server_that_never_answers_delays_neither_loop_nor_end(tmp_path):
+    server = socket.create_server(("127.0.0.1", 0))
+    url = f"tcpq://127.0.0.1:{server.getsockname()[1]}"
+    with server, Robot(TURBOPI, tmp_path, "--start", "--lcm-url", url) as robot:
+        assert robot.wait_for(LEFT)
+        time.sleep(1)
+        times_s = [t for t, duties in robot.rows() if duties == LEFT]
+        killed_s = time.monotonic()
+        robot.process.terminate()
+        code, _ = robot.end()
+        assert_stopped_since(robot, killed_s, WATCHDOG_S)
+    assert code == 0
+    assert len(times_s) > 20 and max(np.diff(times_s)) < 0.2
 
 
 def test_telemetry_comes_back_with_the_network(bus_session):
