@@ -7,11 +7,6 @@ from dataclasses import dataclass
 import twinmill_native as native
 
 MOTION_STAGES = ("duty", "wheel", "ground", "observe")  # what the path of one robot shows
-    "duty",
-    "wheel",
-    "ground",
-    "observe",
-)  # of effects that the path of one robot shows
 BASE = ("base.forward_gain", "base.sideways_gain", "base.yaw_gain", "base.motor_lag_s")
 # Widths of the weak prior, centred on the value at the start: wide against what any log tells, so
 # that only what the log does not show is held.
