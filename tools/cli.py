@@ -11,6 +11,7 @@ from twinmill.tools import next as next_run
 from twinmill.tools.challenge import run as challenge
 from twinmill.tools.deploy import flash
 from twinmill.tools.swarm import commands as swarm
+from twinmill.tools.sweep import phase_command as phase
 
 app = typer.Typer(
     add_completion=False,
@@ -26,6 +27,7 @@ effects.register(app)
 swarm.register(app)
 flash.register(app)
 characterise.register(app)
+phase.register(app)
 
 
 def _show_version(wanted: bool) -> None:

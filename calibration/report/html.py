@@ -55,7 +55,20 @@ class Section:
     warnings: list[str] = field(default_factory=list)
 
 
-def write_report(folder: Path, title: str, source: Provenance, sections: list[Section]) -> Path:
+SCORE_NOTE = (
+    "The score is prediction error over what noise alone would cause: 1.0 is as good as this log "
+    "can tell, above about 1.3 something is missing in the model, below 0.9 the noise was judged "
+    "wrongly."
+)
+
+
+def write_report(
+    folder: Path,
+    title: str,
+    source: Provenance,
+    sections: list[Section],
+    note: str = SCORE_NOTE,
+) -> Path:
     """Writes index.html into a folder, which is made if need be.
 
     The same input gives the same bytes: no date but the log's is in it.
@@ -74,7 +87,7 @@ def write_report(folder: Path, title: str, source: Provenance, sections: list[Se
         lstrip_blocks=True,
     )
     page = environment.get_template("report.html.j2").render(
-        title=title, source=source, sections=sections
+        title=title, source=source, sections=sections, note=note
     )
     Path(folder).mkdir(parents=True, exist_ok=True)
     path = Path(folder) / "index.html"
