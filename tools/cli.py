@@ -6,11 +6,12 @@ from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
-from twinmill.tools import calibrate, characterise, diagnose, effects, import_log
+from twinmill.tools import calibrate, characterise, diagnose, effects, import_log, metrics
 from twinmill.tools import next as next_run
 from twinmill.tools.challenge import run as challenge
 from twinmill.tools.deploy import flash
 from twinmill.tools.swarm import commands as swarm
+from twinmill.tools.sweep import ask
 from twinmill.tools.sweep import phase_command as phase
 
 app = typer.Typer(
@@ -27,7 +28,9 @@ effects.register(app)
 swarm.register(app)
 flash.register(app)
 characterise.register(app)
+metrics.register(app)
 phase.register(app)
+ask.register(app)
 
 
 def _show_version(wanted: bool) -> None:

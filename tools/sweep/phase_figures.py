@@ -147,13 +147,14 @@ def _mark(
                 mfc=COLORS.get(run.observed, COLORS["separated"]),
                 mec="black",
                 mew=1.6,
+                zorder=5,
                 clip_on=False,
             )
     for rank, item in enumerate(worth, 1):
         if item["cell"] in shown:
             at = place(phase.points[item["cell"]])
-            axes.plot(*at, "D", ms=10, mfc="white", mec="black", mew=0.8)
-            axes.text(*at, str(rank), ha="center", va="center", fontsize=7)
+            axes.plot(*at, "D", ms=12, mfc="white", mec="black", mew=0.8, zorder=6)
+            axes.text(*at, str(rank), ha="center", va="center", fontsize=7.5, zorder=7)
 
 
 def probability_figure(phase: Phase, at: dict[str, float]) -> Figure:

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Metrics of swarms in logs, against geometry and against what the twin says of its own run."""
+
+import json
+import math
+import os
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import twinmill_native as native
+from twinmill.calibration.log import LogError, read_log
+from twinmill.calibration.swarm_metrics import swarm_metrics
+from twinmill.tools import cli
+
+PROGRAMS = Path(os.environ.get("TWINMILL_BIN", Path(__file__).parents[2] / "build" / "bin"))
+
+
+def ring(message, n: int, radius_m: float, omega_radps: float, behaviors=None, seconds=15.0):
+    """Poses at 50 Hz of robots that go around the point (1, 2)."""
+    events = []
+    for t in np.arange(0, seconds, 0.02):
+        for i in range(n):
+            at = omega_radps * t + 2 * math.pi * i / n
+            heading = at + math.copysign(math.pi / 2, omega_radps)
+            pose = message(
+                "pose",
+                utime_us=1_700_000_000_000_000 + round(t * 1e6),
+                robot_id=i,
+                position_m=[1 + radius_m * math.cos(at), 2 + radius_m * math.sin(at), 0.0],
+                orientation_wxyz=[math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2)],
+            )
+            events.append((f"R{i:02d}_POSE", pose))
+    for i, behavior in enumerate(behaviors or []):
+        events.append((f"R{i:02d}_RUN", message("run", robot_id=i, behavior=behavior)))
+    return events
+
+
+def metrics_of(series) -> dict[str, float]:
+    return dict(zip(native.METRICS, series.mean.tolist(), strict=True))
+
+
+@pytest.mark.parametrize("omega_radps", [0.5, -0.8])
+def test_robots_on_a_circle_are_a_mill_about_its_middle(write_log, message, omega_radps):
+    series = swarm_metrics(read_log(write_log(*ring(message, 6, 0.6, omega_radps))), 1.1, 0.1)
+    found = metrics_of(series)
+    assert series.final == "milling"
+    assert found["circliness"] == pytest.approx(0, abs=2e-3)
+    assert found["radius_m"] == pytest.approx(0.6, rel=1e-3)
+    assert found["rotation"] == pytest.approx(math.copysign(1, omega_radps), abs=1e-3)
+    # All turn about the same point, so that the centres' least distance is 0: a wrong sign in
+    # z + (v / omega) (-sin, cos) would put them 1.2 m apart.
+    assert found["diffusion"] == pytest.approx(0, abs=0.02)
+
+
+def test_standing_robots_are_as_far_apart_as_they_are(write_log, message):
+    events = ring(message, 3, 2.0, 1e-9)
+    found = metrics_of(swarm_metrics(read_log(write_log(*events)), 1.0, 0.1))
+    assert found["diffusion"] == pytest.approx(2 * math.sqrt(3), rel=1e-3)
+    assert found["groups"] == 3
+
+
+def test_the_robot_with_another_behaviour_is_odd(write_log, message):
+    behaviors = ["milling", "milling", "self_centering", "milling", "milling"]
+    series = swarm_metrics(
+        read_log(write_log(*ring(message, 5, 0.6, 0.5, behaviors, 3.0))), 1.1, 0.1
+    )
+    assert series.odd == [2] and series.robots == [0, 1, 3, 4, 2]
+    assert series.values.shape[1] == len(native.METRICS)
+
+
+def test_one_robot_is_no_swarm(write_log, message):
+    with pytest.raises(LogError, match="a swarm needs two"):
+        swarm_metrics(read_log(write_log(*ring(message, 1, 0.6, 0.5, seconds=1.0))), 1.1, 0.1)
+
+
+def test_the_log_tells_what_the_twin_told(tmp_path: Path, capsys):
+    """The same formulas, once on the twin's own velocities and once on poses in its log."""
+    program = PROGRAMS / "twin_run"
+    if not program.exists():
+        pytest.skip(f"no {program}: set TWINMILL_BIN")
+    log = tmp_path / "run.lcmlog"
+    command = [program, "--plant", "planar", "--model", "paper.toml", "--duration-s", "40"]
+    told = json.loads(
+        subprocess.check_output([*command, "--n", "6", "--log", log, "--json"], text=True)
+    )
+    cli.run(["metrics", str(log), "--model", "paper.toml", "--json", "--out", str(tmp_path / "r")])
+    found = json.loads(capsys.readouterr().out)
+    assert found["class"] == told["class"]
+    for name in ("circliness", "radius_m", "rotation", "groups"):
+        assert found["metrics"][name] == pytest.approx(told["metrics"][name], rel=0.03), name
+    assert (tmp_path / "r" / "index.html").exists()
