@@ -90,6 +90,9 @@ void AddOutput(CLI::App &app, Options &o)
            "--epoch-us", o.epoch_us,
            "time stamp of the start; default: now on the bus, 1700000000000000 in a log alone")
         ->check(CLI::Range(int64_t{0}, int64_t{4000000000000000}));
+    app.add_flag("--view", o.view, "opens a window; needs a display");
+    app.add_option("--picture", o.picture, "PNG file of the end; needs no display");
+    app.add_option("--video", o.video, "MP4 file of the run; needs no display");
     app.add_flag("--json", o.json, "one JSON object on stdout, the rest on stderr");
 }
 

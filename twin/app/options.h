@@ -35,6 +35,8 @@ struct Options
     bool wait = false;
     std::optional<std::string> lcm_url;
     std::optional<int64_t> epoch_us;
+    bool view = false;
+    std::string picture, video;
     bool json = false;
 
     // Messages go to the bus unless only a log is asked for.

@@ -12,6 +12,7 @@
 #include "commands.h"
 #include "plant_mujoco/mujoco_plant.h"
 #include "publisher.h"
+#include "show.h"
 #include "summary.h"
 #include "swarm/bodies.h"
 #include "swarm/metrics.h"
@@ -160,7 +161,7 @@ public:
     {
     }
 
-    void Turn(Swarm &swarm, Publisher &publisher, Commands &commands)
+    void Turn(Swarm &swarm, Publisher &publisher, Commands &commands, Views &views)
     {
         publisher.PublishPoses(swarm);
         while (!g_stop && !(duration_s_ && swarm.TimeS() >= *duration_s_ - swarm.PeriodS() / 2))
@@ -175,6 +176,9 @@ public:
                 publisher.PublishPoses(swarm);
             }
             Observe(swarm);
+            begin_ += ToClock(views.Show(swarm));
+            if (views.Closed())
+                RequestStop();
         }
         progress_.Clear();
     }
@@ -197,9 +201,13 @@ private:
     void KeepPace(double t_s) const
     {
         if (realtime_factor_ > 0)
-            std::this_thread::sleep_until(
-                begin_ + std::chrono::duration_cast<Clock::duration>(
-                             std::chrono::duration<double>(t_s / realtime_factor_)));
+            std::this_thread::sleep_until(begin_ + ToClock(t_s / realtime_factor_));
+    }
+
+    static Clock::duration ToClock(double duration_s)
+    {
+        return std::chrono::duration_cast<Clock::duration>(
+            std::chrono::duration<double>(duration_s));
     }
 
     Clock::time_point begin_ = Clock::now();
@@ -238,11 +246,13 @@ void Run(const Options &options)
     PrintHeader(options, swarm, on_bus, realtime_factor);
     Publisher publisher(outlet, swarm, setup.robots, DescribeRobots(options, setup),
                         options.channel_prefix, options.pose_rate_hz, options.seed);
+    Views views(MakeViewOptions(options, setup.robots));
     Loop loop(options, setup, duration_s, realtime_factor);
     Commands commands(outlet, swarm, publisher, script,
                       {options.channel_prefix, options.script_dir, options.wait});
-    loop.Turn(swarm, publisher, commands);
+    loop.Turn(swarm, publisher, commands, views);
     const double wall_s = loop.WallS();
+    views.Finish(swarm);
     outlet.Finish();
     PrintSummary(options, {setup.command_line, swarm.Size(), swarm.PeriodS(), swarm.TimeS(), wall_s,
                            g_stop != 0, loop.Mean()});

@@ -191,4 +191,10 @@ double Swarm::BatteryV(int robot) const
     return members_[static_cast<size_t>(robot)].battery_V;
 }
 
+Picture Swarm::LastPicture(int robot) const
+{
+    const auto &eye = members_[static_cast<size_t>(robot)].eye;
+    return eye ? eye->LastPicture() : Picture{};
+}
+
 }  // namespace twin

@@ -30,8 +30,10 @@ public:
     void Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
                 fw_output &out) override;
 
-    // The frame drawn last, YUYV; empty before the first.
-    const std::vector<uint8_t> &frame() const { return frame_; }
+    Picture LastPicture() const override
+    {
+        return {frame_, world_.settings.width_px, world_.settings.height_px};
+    }
 
 protected:
     // Exposes at every call. Draws the newest frame that is due; none if no further one is.

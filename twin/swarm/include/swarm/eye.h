@@ -12,6 +12,13 @@
 namespace twin
 {
 
+// Rows of YUYV without padding.
+struct Picture
+{
+    std::span<const uint8_t> yuyv;
+    int width_px = 0, height_px = 0;
+};
+
 class Eye
 {
 public:
@@ -20,6 +27,8 @@ public:
     // written. `now_us` is the robots' clock.
     virtual void Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
                         fw_output &out) = 0;
+    // What was drawn last, empty before; valid until the next Decide().
+    virtual Picture LastPicture() const = 0;
 };
 
 }  // namespace twin

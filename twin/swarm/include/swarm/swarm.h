@@ -72,6 +72,8 @@ public:
     // What the firmware decided last.
     const fw_output &Output(int robot) const;
     double BatteryV(int robot) const;
+    // What the robot's eye saw last; empty if the cone decides.
+    Picture LastPicture(int robot) const;
 
 private:
     struct Member

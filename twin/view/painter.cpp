@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "painter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace twin
+{
+namespace
+{
+
+constexpr int kMaxGeoms = 20000;
+constexpr int kFanSteps = 12;
+constexpr double kFanHeight_m = 0.004;  // above the floor
+constexpr float kSeen[4] = {0.15f, 0.85f, 0.3f, 0.35f}, kUnseen[4] = {0.95f, 0.6f, 0.15f, 0.22f};
+constexpr int kCornerGap_px = 12;
+constexpr int kHullGroup = 3;  // what collides, in turbopi.xml
+
+// A triangle as MuJoCo draws it: two sides from a corner, and the normal.
+void InitTriangle(mjvGeom *geom, const mjtNum a[3], const mjtNum b[3], const mjtNum c[3],
+                  const float rgba[4])
+{
+    mjtNum sides[3][3], lengths[3], mat[9];
+    mju_sub3(sides[0], b, a);
+    mju_sub3(sides[1], c, a);
+    mju_cross(sides[2], sides[0], sides[1]);
+    for (int k = 0; k < 3; ++k)
+    {
+        lengths[k] = mju_normalize3(sides[k]);
+        for (int row = 0; row < 3; ++row)
+            mat[3 * row + k] = sides[k][row];
+    }
+    mjv_initGeom(geom, mjGEOM_TRIANGLE, lengths, a, mat, rgba);
+}
+
+// Every second pixel of a YUYV frame as RGB (BT.601), the lowest row first.
+void HalveToRgb(const Picture &picture, std::vector<uint8_t> &rgb)
+{
+    rgb.clear();
+    const auto byte = [](double value) {
+        return static_cast<uint8_t>(std::clamp(value, 0.0, 255.0));
+    };
+    for (int row = picture.height_px - 2; row >= 0; row -= 2)
+        for (int pair = 0; pair < picture.width_px / 2; ++pair)
+        {
+            const uint8_t *p =
+                picture.yuyv.data() + 2 * static_cast<size_t>(row * picture.width_px + 2 * pair);
+            const double y = 1.164 * (p[0] - 16), u = p[1] - 128, v = p[3] - 128;
+            rgb.push_back(byte(y + 1.596 * v));
+            rgb.push_back(byte(y - 0.392 * u - 0.813 * v));
+            rgb.push_back(byte(y + 2.017 * u));
+        }
+}
+
+}  // namespace
+
+Painter::Painter(Figures &figures, const std::vector<ViewCone> &cones)
+    : figures_(figures), cones_(cones)
+{
+    mjv_defaultScene(&scene_);
+    mjv_defaultCamera(&camera_);
+    mjv_defaultOption(&option_);
+    mjr_defaultContext(&context_);
+    option_.geomgroup[kHullGroup] = 0;
+    camera_.azimuth = 120;
+    camera_.elevation = -42;
+    mjv_makeScene(figures.model(), &scene_, kMaxGeoms);
+    scene_.flags[mjRND_SHADOW] = 0;  // its map is too coarse for a whole swarm
+    mjr_makeContext(figures.model(), &context_, mjFONTSCALE_100);
+}
+
+Painter::~Painter()
+{
+    mjr_freeContext(&context_);
+    mjv_freeScene(&scene_);
+}
+
+// About the middle of the robots; never nearer than before, so that a video does not pump.
+void Painter::Frame(const Swarm &swarm)
+{
+    constexpr double kMargin_m = 1.2, kDistancePerRadius = 2.2;
+    double x_m = 0, y_m = 0, radius_m = 0;
+    for (int i = 0; i < swarm.Size(); ++i)
+    {
+        x_m += swarm.State(i).pose.x_m / swarm.Size();
+        y_m += swarm.State(i).pose.y_m / swarm.Size();
+    }
+    for (int i = 0; i < swarm.Size(); ++i)
+        radius_m = std::max(
+            radius_m, std::hypot(swarm.State(i).pose.x_m - x_m, swarm.State(i).pose.y_m - y_m));
+    camera_.lookat[0] = x_m;
+    camera_.lookat[1] = y_m;
+    camera_.distance = std::max(camera_.distance, kMargin_m + kDistancePerRadius * radius_m);
+}
+
+void Painter::AddCone(const RobotState &state, const ViewCone &cone, bool detected)
+{
+    const auto rim = [&](int step, mjtNum at[3]) {
+        const double angle_rad =
+            state.pose.theta_rad + cone.angle_rad * (static_cast<double>(step) / kFanSteps - 0.5);
+        at[0] = state.pose.x_m + cone.range_m * std::cos(angle_rad);
+        at[1] = state.pose.y_m + cone.range_m * std::sin(angle_rad);
+        at[2] = kFanHeight_m;
+    };
+    const mjtNum tip[3] = {state.pose.x_m, state.pose.y_m, kFanHeight_m};
+    for (int step = 0; step < kFanSteps && scene_.ngeom < scene_.maxgeom; ++step)
+    {
+        mjtNum a[3], b[3];
+        rim(step, a);
+        rim(step + 1, b);
+        InitTriangle(&scene_.geoms[scene_.ngeom], tip, a, b, detected ? kSeen : kUnseen);
+        scene_.geoms[scene_.ngeom++].category = mjCAT_DECOR;
+    }
+}
+
+void Painter::Draw(const Swarm &swarm, int robot_in_corner, const std::string &note,
+                   const mjrRect &area)
+{
+    figures_.Place(swarm);
+    camera_.type = mjCAMERA_FREE;
+    mjv_updateScene(figures_.model(), figures_.data(), &option_, nullptr, &camera_, mjCAT_ALL,
+                    &scene_);
+    for (int i = 0; i < swarm.Size(); ++i)
+        AddCone(swarm.State(i), cones_[static_cast<size_t>(i)], swarm.Output(i).detected);
+    mjr_render(area, &scene_, &context_);
+    DrawCorner(swarm, robot_in_corner, area);
+    char time[32];
+    std::snprintf(time, sizeof time, "%.2f s", swarm.TimeS());
+    mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, area, time, note.c_str(), &context_);
+}
+
+// The frame that the firmware was given; for robots without one, what MuJoCo's camera shows.
+void Painter::DrawCorner(const Swarm &swarm, int robot, const mjrRect &area)
+{
+    const Picture picture = swarm.LastPicture(robot);
+    mjrRect corner{0, kCornerGap_px, 320, 240};
+    if (!picture.yuyv.empty())
+    {
+        corner.width = picture.width_px / 2;
+        corner.height = picture.height_px / 2;
+    }
+    corner.left = area.width - corner.width - kCornerGap_px;
+    const int camera = figures_.CameraOf(robot);
+    if (!picture.yuyv.empty())
+    {
+        HalveToRgb(picture, corner_rgb_);
+        // The rectangle leaves the flat state that mjr_drawPixels needs after mjr_render.
+        mjr_rectangle(corner, 0, 0, 0, 1);
+        mjr_drawPixels(corner_rgb_.data(), nullptr, corner, &context_);
+    }
+    else if (camera >= 0)
+    {
+        mjvCamera view = camera_;
+        view.type = mjCAMERA_FIXED;
+        view.fixedcamid = camera;
+        mjv_updateScene(figures_.model(), figures_.data(), &option_, nullptr, &view, mjCAT_ALL,
+                        &scene_);
+        mjr_render(corner, &scene_, &context_);
+    }
+    char name[32];
+    const fw_output &out = swarm.Output(robot);
+    std::snprintf(name, sizeof name, "R%02d %s", robot, out.detected ? "sees" : "sees nothing");
+    mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, corner, name, nullptr, &context_);
+}
+
+void Painter::UseOffscreen(int width_px, int height_px)
+{
+    if (context_.offWidth != width_px || context_.offHeight != height_px)
+        mjr_resizeOffscreen(width_px, height_px, &context_);
+    mjr_setBuffer(mjFB_OFFSCREEN, &context_);
+}
+
+void Painter::UseWindow()
+{
+    mjr_setBuffer(mjFB_WINDOW, &context_);
+}
+
+void Painter::Read(std::vector<uint8_t> &rgb, const mjrRect &area) const
+{
+    rgb.resize(3 * static_cast<size_t>(area.width) * static_cast<size_t>(area.height));
+    mjr_readPixels(rgb.data(), nullptr, area, &context_);
+}
+
+}  // namespace twin
