@@ -147,16 +147,20 @@ static void count_gap(struct camera_v4l2 *camera, uint32_t sequence)
 }
 
 // Exposure time. A frame is stamped on arrival if its driver did not stamp it by the monotonic
-// clock, or with what is no time at all.
+// clock, or with what is no time at all, or ahead of time, as drivers do that compute when a frame
+// was due: what is here was not exposed later.
 static int64_t utime_us(const struct camera_v4l2 *camera, const struct v4l2_buffer *buffer)
 {
+    const int64_t arrived_us = hal_clock_monotonic_us(&camera->clock);
     if ((buffer->flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC ||
         buffer->timestamp.tv_sec < 0 || buffer->timestamp.tv_sec > INT32_MAX ||
         buffer->timestamp.tv_usec < 0 || buffer->timestamp.tv_usec >= 1000000)
     {
-        return hal_clock_monotonic_us(&camera->clock);
+        return arrived_us;
     }
-    return (int64_t)buffer->timestamp.tv_sec * 1000000 + buffer->timestamp.tv_usec;
+    const int64_t stamp_us =
+        (int64_t)buffer->timestamp.tv_sec * 1000000 + buffer->timestamp.tv_usec;
+    return stamp_us < arrived_us ? stamp_us : arrived_us;
 }
 
 // Gives back what is held, then takes the newest buffer that is whole.

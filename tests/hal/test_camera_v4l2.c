@@ -147,6 +147,16 @@ static void test_time_that_is_none_is_replaced_by_the_arrival(void)
     }
 }
 
+// The kernel's own test camera does so, by up to half a frame period.
+static void test_time_that_runs_ahead_is_replaced_by_the_arrival(void)
+{
+    open_camera();
+    fake_arrive(0, MONOTONIC, FRAME_BYTES, 5016000);
+    struct fw_frame frame;
+    TEST_ASSERT_EQUAL(FW_OK, hal_camera_take(&camera, &frame));
+    TEST_ASSERT_EQUAL_INT64(5000000, frame.utime_us);
+}
+
 static void test_half_a_frame_says_how_long_it_is(void)
 {
     open_camera();
@@ -245,6 +255,7 @@ int main(void)
     RUN_TEST(test_frame_has_the_drivers_time_number_and_bytes);
     RUN_TEST(test_time_of_another_clock_is_replaced_by_the_arrival);
     RUN_TEST(test_time_that_is_none_is_replaced_by_the_arrival);
+    RUN_TEST(test_time_that_runs_ahead_is_replaced_by_the_arrival);
     RUN_TEST(test_half_a_frame_says_how_long_it_is);
     RUN_TEST(test_newest_of_several_is_taken_and_the_others_are_dropped);
     RUN_TEST(test_gap_in_the_numbers_counts_as_dropped);
