@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agent.h"
+
+#include <arpa/inet.h>
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/reboot.h>
+#include <sys/signalfd.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#define PORT_NAME "hil.0"
+#define PORT_PATIENCE_MS 10000
+#define LCM_GROUP "239.255.76.67"
+#define LCM_PORT 7667
+#define PACKET_MAX_BYTES 65536
+
+static int port, board, bus, dead_children;
+
+uint64_t now_ns(void)
+{
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000000000 + (uint64_t)now.tv_nsec;
+}
+
+void complain(const char *what)
+{
+    (void)fprintf(stderr, "hil agent: %s: %s\n", what, strerror(errno));
+}
+
+static _Noreturn void die(const char *what)
+{
+    complain(what);
+    _exit(1);
+}
+
+static void receive(void *to, size_t length)
+{
+    for (size_t got = 0; got < length;)
+    {
+        const ssize_t more = read(port, (uint8_t *)to + got, length - got);
+        if (more < 0 && errno != EINTR)
+        {
+            die("reading the port");
+        }
+        if (more == 0)
+        {
+            (void)poll(NULL, 0, 5);  // the host is not there yet
+        }
+        got += more > 0 ? (size_t)more : 0;
+    }
+}
+
+static void send_message(uint8_t type, const void *payload, size_t length)
+{
+    static uint8_t message[sizeof(struct agent_header) + PACKET_MAX_BYTES];
+    const struct agent_header header = {.type = type, .length = (uint32_t)length};
+    memcpy(message, &header, sizeof header);
+    memcpy(message + sizeof header, payload, length);
+    for (size_t sent = 0; sent < sizeof header + length;)
+    {
+        const ssize_t more = write(port, message + sent, sizeof header + length - sent);
+        if (more < 0 && errno != EINTR)
+        {
+            die("writing the port");
+        }
+        sent += more > 0 ? (size_t)more : 0;
+    }
+}
+
+static int spawn(char **arguments)
+{
+    const pid_t pid = fork();
+    if (pid == 0)
+    {
+        sigset_t none;
+        sigemptyset(&none);
+        (void)sigprocmask(SIG_SETMASK, &none, NULL);
+        (void)setsid();
+        (void)execv(arguments[0], arguments);
+        die(arguments[0]);
+    }
+    return pid;
+}
+
+// @return the first child of a process: the one that drives, if it is the robot's program.
+static long child_of(const char *pid)
+{
+    char path[64];
+    long child = -1;
+    (void)snprintf(path, sizeof path, "/proc/%s/task/%s/children", pid, pid);
+    FILE *children = fopen(path, "r");
+    if (children == NULL || fscanf(children, "%ld", &child) != 1)
+    {
+        errno = ESRCH;
+    }
+    if (children != NULL)
+    {
+        (void)fclose(children);
+    }
+    return child;
+}
+
+// Commands of words: their number follows from what they are.
+static long obey_words(uint8_t type, char **word, int count)
+{
+    switch (type)
+    {
+        case 'x': return count > 0 ? spawn(word) : -1;
+        case 'k': return count == 2 ? kill(atoi(word[0]), atoi(word[1])) : -1;
+        case 'd': return count == 1 ? child_of(word[0]) : -1;
+        case 'o': return count == 3 ? camera_open(word[0], atoi(word[1]), atoi(word[2])) : -1;
+        case 'c': return count == 3 ? camera_control(word[0], word[1], word[2]) : -1;
+        case 'l': return count == 2 ? load_module(word[0], word[1]) : -1;
+        case 'u': return count == 1 ? syscall(SYS_delete_module, word[0], O_NONBLOCK) : -1;
+        case 'q': return reboot(RB_POWER_OFF);
+        default: errno = ENOSYS; return -1;
+    }
+}
+
+static long obey(uint8_t type, uint8_t *payload, size_t length)
+{
+    switch (type)
+    {
+        case 'f': return camera_write(payload, length);
+        case 'b': return write(board, payload, length);
+        default: break;
+    }
+    char *words[AGENT_MAX_ARGUMENTS + 1] = {NULL};
+    int count = 0;
+    for (size_t at = 0; at < length && count < AGENT_MAX_ARGUMENTS;
+         at += strlen((char *)payload + at) + 1)
+    {
+        words[count++] = (char *)payload + at;
+    }
+    return obey_words(type, words, count);
+}
+
+// Does one command and says when it began and what came of it.
+static void take_command(void)
+{
+    static uint8_t payload[2 * 1280 * 1024 + 1];
+    struct agent_header header;
+    receive(&header, sizeof header);
+    if (header.length >= sizeof payload)
+    {
+        errno = EMSGSIZE;
+        die("command");
+    }
+    receive(payload, header.length);
+    payload[header.length] = '\0';
+    struct
+    {
+        int64_t result;
+        uint64_t t_ns;
+    } answer = {.t_ns = now_ns()};
+    answer.result = obey(header.type, payload, header.length);
+    answer.result = answer.result < 0 ? -errno : answer.result;
+    send_message('a', &answer, sizeof answer);
+}
+
+static void report_board(void)
+{
+    uint8_t event[32];
+    while (read(board, event, sizeof event) == sizeof event)
+    {
+        send_message('h', event, sizeof event);
+    }
+}
+
+// What the board was told before a packet went out is reported before it, too.
+static void report_packet(void)
+{
+    static uint8_t packet[PACKET_MAX_BYTES];
+    const ssize_t length = recv(bus, packet, sizeof packet, MSG_DONTWAIT);
+    report_board();
+    if (length > 0)
+    {
+        send_message('t', packet, (size_t)length);
+    }
+}
+
+static void report_dead_children(void)
+{
+    struct signalfd_siginfo info;
+    (void)!read(dead_children, &info, sizeof info);
+    struct
+    {
+        int32_t pid, status;
+        uint64_t t_ns;
+    } end;
+    int status;
+    while ((end.pid = waitpid(-1, &status, WNOHANG)) > 0)
+    {
+        end.status = status;
+        end.t_ns = now_ns();
+        send_message('e', &end, sizeof end);
+    }
+}
+
+// The port that QEMU gave our name; it comes up late.
+static int open_port(void)
+{
+    for (int waited_ms = 0; waited_ms < PORT_PATIENCE_MS; waited_ms += 50)
+    {
+        DIR *ports = opendir("/sys/class/virtio-ports");
+        for (struct dirent *entry; ports != NULL && (entry = readdir(ports)) != NULL;)
+        {
+            char path[300], name[16] = "";
+            (void)snprintf(path, sizeof path, "/sys/class/virtio-ports/%s/name", entry->d_name);
+            FILE *file = fopen(path, "r");
+            if (file == NULL)
+            {
+                continue;
+            }
+            const char *got = fgets(name, sizeof name, file);
+            (void)fclose(file);
+            if (got != NULL && strncmp(name, PORT_NAME, strlen(PORT_NAME)) == 0)
+            {
+                (void)snprintf(path, sizeof path, "/dev/%s", entry->d_name);
+                return open(path, O_RDWR | O_CLOEXEC);
+            }
+        }
+        (void)poll(NULL, 0, 50);
+    }
+    return -1;
+}
+
+static int open_bus(void)
+{
+    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), on = 1;
+    const struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons(LCM_PORT)};
+    const struct ip_mreq group = {.imr_multiaddr.s_addr = inet_addr(LCM_GROUP),
+                                  .imr_interface.s_addr = htonl(INADDR_LOOPBACK)};
+    (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    const bool joined = bind(fd, (const struct sockaddr *)&address, sizeof address) == 0 &&
+                        setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group) == 0;
+    return joined ? fd : -1;
+}
+
+static int watch_children(void)
+{
+    sigset_t signals;
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGCHLD);
+    (void)sigprocmask(SIG_BLOCK, &signals, NULL);
+    return signalfd(-1, &signals, SFD_NONBLOCK | SFD_CLOEXEC);
+}
+
+int main(void)
+{
+    if (getpid() == 1)
+    {
+        boot_mount();
+    }
+    boot_load_modules();
+    boot_join_multicast_to_lo();
+    port = open_port();
+    board = open("/dev/hilboard", O_RDWR | O_NONBLOCK | O_CLOEXEC);
+    bus = open_bus();
+    dead_children = watch_children();
+    if (port < 0 || board < 0 || bus < 0 || dead_children < 0)
+    {
+        die("port, board or bus");
+    }
+    send_message('r', "", 0);
+    for (;;)
+    {
+        struct pollfd fds[] = {{.fd = port, .events = POLLIN},
+                               {.fd = board, .events = POLLIN},
+                               {.fd = bus, .events = POLLIN},
+                               {.fd = dead_children, .events = POLLIN}};
+        (void)poll(fds, 4, -1);
+        void (*const take[])(void) = {take_command, report_board, report_packet,
+                                      report_dead_children};
+        for (int i = 3; i >= 0; --i)
+        {
+            if (fds[i].revents & POLLIN)
+            {
+                take[i]();
+            }
+        }
+    }
+}
