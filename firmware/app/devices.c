@@ -155,6 +155,31 @@ static void use_camera(const struct app_config *config, struct loop_devices *dev
     }
 }
 
+bool devices_check_recording(const struct app_config *config, const struct loop_devices *devices,
+                             char error[CONFIG_ERROR_MAX])
+{
+    const char *path = after(config->camera, "stub:");
+    if (path == NULL || after(path, "unix:") != NULL)
+    {
+        return true;
+    }
+    struct hal_camera_format format;
+    const enum fw_err err = hal_camera_open(&devices->camera, &format);
+    hal_camera_close(&devices->camera);
+    if (err == FW_ERR_FORMAT)
+    {
+        (void)snprintf(error, CONFIG_ERROR_MAX,
+                       "camera: '%.100s': holds no whole number of YUYV frames of %dx%d: set "
+                       "width_px and height_px to their size",
+                       path, (int)config->width_px, (int)config->height_px);
+    }
+    else if (err != FW_OK)
+    {
+        (void)snprintf(error, CONFIG_ERROR_MAX, "camera: '%.100s': the file cannot be read", path);
+    }
+    return err == FW_OK;
+}
+
 static bool use_panel(const struct app_config *config, bool dry_run, struct loop_devices *devices,
                       char *error)
 {

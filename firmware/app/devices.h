@@ -13,6 +13,11 @@
 bool devices_make(const struct app_config *config, bool dry_run, struct loop_devices *devices,
                   char error[CONFIG_ERROR_MAX]);
 
+// A camera or board may come back; a recording that cannot be played never does. Other cameras
+// pass.
+bool devices_check_recording(const struct app_config *config, const struct loop_devices *devices,
+                             char error[CONFIG_ERROR_MAX]);
+
 // The motor board alone, for a process that only stops it.
 bool devices_make_board(const struct app_config *config, bool dry_run, struct loop_devices *devices,
                         char error[CONFIG_ERROR_MAX]);

@@ -30,7 +30,12 @@ static int prepare(const struct options *options, struct loop *loop,
         (void)fprintf(stderr, "turbopi: configuration: %s\n", fw_err_str(err));
         return EXIT_USAGE;
     }
-    char reason[LINK_REASON_MAX];
+    char error[CONFIG_ERROR_MAX], reason[LINK_REASON_MAX];
+    if (!devices_check_recording(config, devices, error))
+    {
+        (void)fprintf(stderr, "turbopi: %s\n", error);
+        return EXIT_USAGE;
+    }
     if (config->script[0] != '\0' && !loop_load_script(loop, config->script, reason))
     {
         (void)fprintf(stderr, "turbopi: %s: %s\n", config->script, reason);

@@ -316,6 +316,8 @@ def test_telemetry_comes_back_with_the_network(bus_session):
         (["--config", "/nowhere.conf"], "cannot be read"),
         (["--board", "parallel"], "must be auto, i2c, uart"),
         (["--script", "/nowhere.csv"], "cannot be read"),
+        (["--camera", "stub:/nowhere.yuyv"], "cannot be read"),
+        (["--camera", "stub:/dev/null"], "no whole number of YUYV frames of 640x480"),
         (["frames"], "not an option"),
     ],
 )
