@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 import lcm
 import pytest
+import turbopi
 
 TWIN_RUN = os.environ.get("TWIN_RUN", "")
 # A network without any other machine, in which multicast stays on the loopback device.
@@ -79,3 +80,26 @@ def test_lcm_logger_hears_what_twin_run_logs_and_lcm_logplayer_says_it_again(tmp
     assert len({channel for channel, _ in said}) == 12  # 3 robots: telemetry, pose, run, truth
     assert events(heard) == said
     assert events(again) == said
+
+
+def test_malformed_command_does_not_end_twin_run(tmp_path):
+    command = turbopi.swarm_command_t()
+    command.robot_id, command.behavior = -1, "orbit"
+    whole = command.encode()
+    at = len(whole) - len("orbit\0") - 4  # the text's length, big-endian
+    bad = tmp_path / "bad"
+    log = lcm.EventLog(str(bad), "w")
+    for i, length in enumerate((0, -1, 5, 7, 2**31 - 1)):
+        data = whole[:at] + length.to_bytes(4, "big", signed=True) + whole[at + 4 :]
+        log.write_event(i * 10_000, "SWARM_COMMAND", data)
+    log.write_event(100_000, "SWARM_COMMAND", whole[:20])
+    log.close()
+    bus = "udpm://239.255.76.67:7667?ttl=0"
+    in_one_network(
+        [
+            f"{TWIN_RUN} --plant planar --n 2 --duration-s 2 --lcm-url '{bus}' & twin=$!",
+            f"sleep {SETTLE_S}",
+            f"lcm-logplayer {bad}",
+            "wait $twin",
+        ]
+    )

@@ -44,13 +44,23 @@ void Commands::Obey()
     }
 }
 
-void Commands::OnCommand(const lcm::ReceiveBuffer *, const std::string &,
-                         const turbopi::swarm_command_t *message)
+// Anyone may send, and LCM's decoder throws at a text that says it has less than no characters.
+void Commands::OnCommand(const lcm::ReceiveBuffer *buffer, const std::string &)
 {
-    const fw_command order{message->utime_us, message->seq, message->verb, message->start_utime_us};
+    turbopi::swarm_command_t message;
+    try
+    {
+        if (message.decode(buffer->data, 0, static_cast<int>(buffer->data_size)) < 0)
+            return;
+    }
+    catch (const std::length_error &)
+    {
+        return;
+    }
+    const fw_command order{message.utime_us, message.seq, message.verb, message.start_utime_us};
     for (int id = 0; id < swarm_.Size(); ++id)
-        if (message->robot_id == -1 || message->robot_id == id)
-            Answer(id, order, message->behavior);
+        if (message.robot_id == -1 || message.robot_id == id)
+            Answer(id, order, message.behavior);
 }
 
 void Commands::Answer(int id, const fw_command &order, const std::string &name)

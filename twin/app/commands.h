@@ -42,8 +42,7 @@ private:
         int64_t start_utime_us = 0, script_end_utime_us = 0;
         std::shared_ptr<const Script> script;
     };
-    void OnCommand(const lcm::ReceiveBuffer *, const std::string &channel,
-                   const turbopi::swarm_command_t *message);
+    void OnCommand(const lcm::ReceiveBuffer *buffer, const std::string &channel);
     void Answer(int id, const fw_command &order, const std::string &name);
     // Throws std::exception with the reason if the robot cannot.
     void ObeyOne(int id, const fw_command &order, const std::string &name);
