@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import twinmill_native as native
-from twinmill.calibration.log import LogError, read_log
+from twinmill.calibration.log import LogError, RobotLog, read_log
 from twinmill.calibration.steady.sheet import Sheet, is_sheet, read_sheets
+from twinmill.calibration.time_base import TimeBase, find_time_base, retimed
 from twinmill.calibration.track import SILENCE_S, SMOOTH_S, Track, local_line, make_track
 
+MOST_POSES = 40_000  # of all logs together, about: ten minutes at 60 Hz
+SLOWEST = 4  # frames of which one is kept: the shortest horizon must hold some
 SHORTEST_LOG_S = 10.0  # below it no regime is seen twice
 
 
@@ -24,6 +27,7 @@ class Measurement:
             stops it, so a zero command is put in.
         warnings: sentences of reading and cleaning.
         recorded_utime_us: earliest stamp in the log, us since the Unix epoch.
+        time_base: of the log, where it was not what the stamps say; `track` has it put right.
     """
 
     log_name: str
@@ -32,6 +36,7 @@ class Measurement:
     played: native.Track
     warnings: list[str]
     recorded_utime_us: int
+    time_base: TimeBase | None = None
 
     @property
     def label(self) -> str:
@@ -58,7 +63,8 @@ def load_measurements(paths: list[Path]) -> list[Measurement | Sheet]:
             continue
         log = read_log(path)
         for robot in log.robots.values():
-            track = make_track(robot)
+            base = find_time_base(robot)
+            track = make_track(thinned(retimed(robot, base) if base else robot, len(paths)))
             _check_length(path, track)
             measurements.append(
                 Measurement(
@@ -66,11 +72,21 @@ def load_measurements(paths: list[Path]) -> list[Measurement | Sheet]:
                     log.sha256,
                     track,
                     _played(track),
-                    [*log.warnings, *track.notes],
+                    [*log.warnings, *([f"{base}; put right."] if base else []), *track.notes],
                     log.t0_utime_us,
+                    base,
                 )
             )
     return measurements
+
+
+def thinned(robot: RobotLog, logs: int) -> RobotLog:
+    """The robot with every k-th pose where there are more in so many logs than a fit needs."""
+    every = min(len(robot.pose_t_s) * logs // MOST_POSES, SLOWEST)
+    if logs < 2 or every < 2:
+        return robot
+    pose = {k: getattr(robot, k)[::every] for k in ("pose_t_s", "pose", "z_m", "valid")}
+    return replace(robot, **pose)
 
 
 def _check_length(path: Path, track: Track) -> None:

@@ -122,10 +122,12 @@ class System:
 
     def _whitened(self, rows: np.ndarray) -> np.ndarray:
         """(B, P) unknowns to (B, R) whitened errors of all scenes, then the prior's rows."""
-        parts = [
-            scene.whitened(self._names(i), rows[:, self.columns[i]])[:, mask].reshape(len(rows), -1)
-            for i, (scene, mask) in enumerate(zip(self.scenes, self.masks, strict=True))
-        ]
+        parts = []
+        for i, (scene, mask) in enumerate(zip(self.scenes, self.masks, strict=True)):
+            # Rows that differ only in other scenes' clocks are one to this scene.
+            own, place = np.unique(rows[:, self.columns[i]], axis=0, return_inverse=True)
+            white = scene.whitened(self._names(i), own)[:, mask].reshape(len(own), -1)
+            parts.append(white[place.ravel()])
         return np.concatenate([*parts, (rows - self.centre) / self.prior], axis=1)
 
     def residuals(self, x: np.ndarray) -> np.ndarray:

@@ -78,8 +78,13 @@ def cells(robots: list[SteadyComparison]) -> Table:
                 Cell(number(predicted[c]), "" if np.isfinite(measured[c]) else "dim"),
                 Cell("-" if np.isnan(spread[c]) else f"{100 * spread[c]:.0f} %", "dim"),
             ]
-        rows.append([*row, Cell("a side stood still" if still else ""),
-                     Cell(number(ratio), tone(max(ratio, 1.0)))])  # fmt: skip
+        rows.append(
+            [
+                *row,
+                Cell("a side stood still" if still else ""),
+                Cell(number(ratio), tone(max(ratio, 1.0))),
+            ]
+        )
     rest = len(entries) - len(rows)
     return Table(
         "By input",
@@ -95,7 +100,7 @@ def cells(robots: list[SteadyComparison]) -> Table:
             "robots",
             "seen",
             "ratio",
-        ],  # fmt: skip
+        ],
         rows,
         "Inputs as the vendor writes them (90° is forward, turn positive clockwise); rates are "
         "positive counter-clockwise. Robots: how much they differ. Worst first"

@@ -106,8 +106,9 @@ class SteadyScene:
         forward, left = _direction(self.measurement.inputs)
         sign = np.where(vx * forward + vy * left < 0, -1.0, 1.0)
         sides = np.stack([rim[..., [0, 2]].mean(-1), rim[..., [1, 3]].mean(-1)], -1)
-        asked = np.stack([np.abs(self.commands[:, [0, 2]]).mean(1),
-                          np.abs(self.commands[:, [1, 3]]).mean(1)], -1)  # fmt: skip
+        asked = np.stack(
+            [np.abs(self.commands[:, [0, 2]]).mean(1), np.abs(self.commands[:, [1, 3]]).mean(1)], -1
+        )
         slow = np.take_along_axis(sides, asked.argmin(-1)[None, :, None], -1)[..., 0]
         return np.stack([sign * np.hypot(vx, vy), turn, np.abs(slow)], -1)
 
