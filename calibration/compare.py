@@ -82,6 +82,7 @@ class RobotComparison:
             "errors": self.error_rows(),
             "where": [r.to_json() for r in self.where],
             "time_offset_s": self.time_offset_s,
+            "time_base": base.to_json() if (base := self.scene.measurement.time_base) else None,
         }
 
 

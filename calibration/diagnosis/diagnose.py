@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from twinmill.calibration.compare import GOOD, Comparison, comparison, open_scenes
+from twinmill.calibration.diagnosis.encoders import geometry_notes, time_base_notes
 from twinmill.calibration.diagnosis.evidence import State, over
 from twinmill.calibration.diagnosis.omnibus import NOTHING, Omnibus, unexplained
 from twinmill.calibration.diagnosis.ranking import Ranked, groups_of, rank
@@ -77,6 +78,11 @@ class Diagnosis:
             },
             "steps": [{"effect": e, "score_heldout": s} for e, s in self.steps],
             "next_experiment": self.next_experiment,
+            "time_base": [
+                {"log": r.scene.measurement.log_name, **r.scene.measurement.time_base.to_json()}
+                for r in self.before.robots
+                if r.scene.measurement.time_base
+            ],
             "notes": self.notes,
         }
 
@@ -117,6 +123,7 @@ def diagnose(
     names = effect_names(final.model)[len(model_file.model.effects) :]
     ranking = rank(done, names, explained + omnibus.gain, floors)
     noises = _noisier(model_file, final)
+    told_apart = ["clock_rate"] if any(m.time_base for m in measurements) else []
     verdict = _verdict(before.score, fitted.score, names, ranking, share, bool(noises))
     return Diagnosis(
         verdict,
@@ -125,12 +132,12 @@ def diagnose(
         fitted.score,
         names,
         ranking,
-        [*_not_identifiable(done), *unseen.items()],
+        [*(e for e in _not_identifiable(done) if e[0] not in told_apart), *unseen.items()],
         omnibus,
         float(share),
         final,
         _steps(done, floors),
-        noises + _clock_notes(final),
+        noises + time_base_notes(final.scenes) + geometry_notes(final.model) + _clock_notes(final),
         _next_experiment(verdict, ranking, done),
     )
 

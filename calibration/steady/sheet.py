@@ -66,6 +66,7 @@ class Sheet:
     fold: int | None
     warnings: list[str]
     recorded_utime_us: int = 0
+    time_base: None = None
 
     @property
     def label(self) -> str:

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Robots of other makers: known by measured wheel speeds or by commanded velocities."""
+
+import csv
+import gzip
+
+import numpy as np
+import pytest
+from twinmill.calibration import measurement
+from twinmill.calibration.add import add
+from twinmill.calibration.diagnosis.diagnose import diagnose
+from twinmill.calibration.diagnosis.encoders import geometry_notes
+from twinmill.calibration.log import RobotLog
+from twinmill.calibration.measurement import load_measurements
+from twinmill.calibration.model_file import ModelFile
+from twinmill.calibration.time_base import find_time_base, retimed
+from twinmill.tools.import_log import ImportOptions, import_log
+
+OMNI4 = """
+name = "omni4"
+[robot]
+wheel_radius_m = 0.03
+half_wheelbase_m = 0.1
+half_track_m = 0.1
+body_radius_m = 0.2
+[base]
+drive = "wheel_speed"
+wheels = "mecanum"
+control_period_s = 0.01
+"""
+CART = """
+name = "cart"
+[robot]
+half_track_m = 0.1
+body_radius_m = 0.15
+[base]
+drive = "twist"
+wheels = "differential"
+control_period_s = 0.05
+"""
+
+
+def model_file(folder, text):
+    path = folder / "model.toml"
+    path.write_text(text)
+    return ModelFile.load(str(path))
+
+
+def drive_legs(count, random, straight_mps, turn_radps):
+    """(count, 2) forward and turn: straights, turns on the spot, rests of about a second each."""
+    rows = []
+    while len(rows) < count:
+        leg = [(random.choice(straight_mps), 0), (0, random.choice(turn_radps)), (0, 0)]
+        rows += [leg[random.integers(3)]] * int(random.integers(60, 160))
+    return np.array(rows[:count], float)
+
+
+def encoder_log(straight, turning, offset_s, seed=1):
+    """Wheel speeds in rows of 10 ms that lasted longer, and poses at 100 Hz of capture's clock."""
+    random = np.random.default_rng(seed)
+    legs = drive_legs(4000, random, (-0.1, 0.07, 0.1), (-0.5, 0.5))
+    radius_m, lever_m = 0.03, 0.2
+    left, right = legs[:, 0] - lever_m * legs[:, 1], legs[:, 0] + lever_m * legs[:, 1]
+    wheels = np.column_stack([left, right, left, right]) / radius_m
+    lasted_s = 0.01 * np.where(legs[:, 1] != 0, turning, straight)
+    heading = np.cumsum(legs[:, 1] * lasted_s)
+    x, y = (np.cumsum(legs[:, 0] * f(heading) * lasted_s) for f in (np.cos, np.sin))
+    capture_s = offset_s + np.cumsum(lasted_s)
+    seen_s = np.arange(0, capture_s[-1] + 1, 0.01)
+    pose = np.column_stack([np.interp(seen_s, capture_s, v) for v in (x, y, heading)])
+    pose += random.normal(size=pose.shape) * (1e-4, 1e-4, 1e-3)
+    nothing, count = np.empty(0), len(legs)
+    return RobotLog(
+        1, "robot", "", "wheel_speed", 0.01 * np.arange(count), wheels, np.full(count, np.nan),
+        nothing, nothing, nothing, nothing, nothing, seen_s, pose, np.zeros(len(seen_s)),
+        np.ones(len(seen_s), bool),
+    )  # fmt: skip
+
+
+def test_rows_that_last_longer_are_found_on_straights_and_in_turns():
+    robot = encoder_log(1.12, 1.07, 2.5)
+    base = find_time_base(robot)
+    assert base.straight == pytest.approx(1.12, abs=0.01)
+    assert base.turning == pytest.approx(1.07, abs=0.01)
+    assert base.offset_s == pytest.approx(2.5, abs=0.05)
+    assert find_time_base(retimed(robot, base)) is None
+
+
+def test_a_log_whose_stamps_are_right_keeps_them():
+    assert find_time_base(encoder_log(1.0, 1.0, 0.1)) is None
+
+
+@pytest.fixture(scope="module")
+def omni4(data_dir, tmp_path_factory):
+    """One square along the body's x, one along its y."""
+    folder = data_dir / "mecanum_optiodom"
+    if not folder.is_dir():
+        pytest.skip(f"no recordings at {folder}")
+    out, logs = tmp_path_factory.mktemp("omni4"), []
+    for run in ("01", "07"):
+        stem = f"square_080920201810_run-{run}"
+        commands, log = out / "commands.csv", out / f"{run}.lcmlog"
+        write_wheel_speeds(folder / f"{stem}_odo.csv.gz", commands)
+        options = ImportOptions(
+            robot_id=1, rename={"yaw_rad": "theta_rad"}, heading_offset_rad=np.radians(-159)
+        )
+        import_log(folder / f"{stem}_mocap.csv.gz", commands, log, options=options)
+        logs.append(log)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measurement, "MOST_POSES", 4000)
+        return load_measurements(logs)
+
+
+def write_wheel_speeds(source, out):
+    """Revolutions in a row of 10 ms to rad/s; its wheels are ours with signs -, +, -, +."""
+    with gzip.open(source, "rt") as text:
+        rows = [[float(cell) for cell in row.values()] for row in csv.DictReader(text)]
+    speed = 2 * np.pi * np.array(rows)[:, 1:] * (-1, 1, -1, 1) / 0.01
+    lines = ["t_s,w1_radps,w2_radps,w3_radps,w4_radps"]
+    lines += [f"{0.01 * k:.2f}," + ",".join(f"{w:.6f}" for w in row) for k, row in enumerate(speed)]
+    out.write_text("\n".join(lines) + "\n")
+
+
+def test_a_real_encoder_log_shows_its_time_base(omni4):
+    for run in omni4:
+        # By hand: moving time over row time, on camera's clock.
+        assert run.time_base.straight == pytest.approx(1.12, abs=0.015)
+        assert run.time_base.turning == pytest.approx(1.075, abs=0.02)
+
+
+def test_a_real_mecanum_robot_loses_sideways_and_its_tracked_point_is_off(omni4, tmp_path):
+    result = add("marker_offset", omni4, model_file(tmp_path, OMNI4), tmp_path / "m2.toml", "")
+    assert result.heldout_after.score < 0.6 * result.heldout_refit.score
+    model = ModelFile.load(str(tmp_path / "m2.toml")).model
+    # By hand, from distances alone, which need no common clock.
+    assert model.get("base.forward_gain") == pytest.approx(1.0255, abs=0.01)
+    assert model.get("base.sideways_gain") == pytest.approx(0.981, abs=0.01)
+    assert 0.4 / model.get("base.yaw_gain") == pytest.approx(0.411, abs=0.008)
+    offset_m = np.hypot(model.get("marker_offset.x_m"), model.get("marker_offset.y_m"))
+    assert offset_m == pytest.approx(0.05, abs=0.01)
+    assert "4." in geometry_notes(model)[0]
+
+
+def test_a_robot_told_velocities_is_seen_to_turn_faster_to_the_left(tmp_path):
+    random = np.random.default_rng(3)
+    period_s, asymmetry = 0.02, 0.12
+    legs = drive_legs(2500, random, (-0.2, 0.15, 0.25), (-1.0, -0.6, 0.6, 1.0))
+    turn = legs[:, 1] + asymmetry * np.abs(legs[:, 1])
+    heading = np.cumsum(turn) * period_s
+    middle = heading - turn * period_s / 2
+    x, y = (np.cumsum(legs[:, 0] * f(middle)) * period_s for f in (np.cos, np.sin))
+    pose = np.column_stack([x, y, heading]) + random.normal(size=(len(x), 3)) * (3e-4, 3e-4, 2e-3)
+    t_s = period_s * np.arange(len(x))
+    write_csv(tmp_path / "c.csv", "t_s,vx_mps,vy_mps,omega_radps",
+              np.column_stack([t_s, legs[:, 0], 0 * t_s, legs[:, 1]]))  # fmt: skip
+    write_csv(tmp_path / "p.csv", "t_s,x_m,y_m,theta_rad", np.column_stack([t_s + period_s, pose]))
+    log = tmp_path / "run.lcmlog"
+    import_log(tmp_path / "p.csv", tmp_path / "c.csv", log, options=ImportOptions(robot_id=2))
+    found = diagnose(load_measurements([log]), model_file(tmp_path, CART))
+    assert found.found == ["turn_asymmetry"]
+    (parameter,) = found.ranking[0].parameters
+    assert parameter.value == pytest.approx(asymmetry, abs=0.02)
+
+
+def write_csv(path, header, rows):
+    np.savetxt(path, rows, fmt="%.6f", delimiter=",", header=header, comments="")
