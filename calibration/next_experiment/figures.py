@@ -4,6 +4,7 @@
 import numpy as np
 from matplotlib.patches import Rectangle
 from twinmill.calibration.next_experiment.design import ENOUGH_CHI2, Plan
+from twinmill.calibration.next_experiment.power import percent
 from twinmill.calibration.report import Figure
 from twinmill.calibration.report.canvas import (
     BEFORE,
@@ -77,7 +78,7 @@ def margins(plan: Plan) -> Figure:
         axes.barh(at + 0.2, after - low, left=low, height=0.36, color=FLOOR, label="with this run")
         for y, chance, margin in zip(at, plan.chances, after, strict=True):
             axes.annotate(
-                f"{100 * chance.power:.0f} %",
+                percent(chance.power),
                 (margin, y + 0.2),
                 xytext=(3, 0),
                 textcoords="offset points",

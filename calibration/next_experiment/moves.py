@@ -44,28 +44,30 @@ class Move:
 
 def family(max_duty: float) -> list[Move]:
     """All moves whose duties are at most `max_duty` (0..1)."""
+    axes = {name: max_duty * axis for name, axis in AXES.items()}
     moves = []
-    for name, axis in AXES.items():
+    for name, axis in axes.items():
         for level in LEVELS:
             moves += [*_steps(name, axis, level), *_steps(f"{name}, reversed", -axis, level)]
         moves += [_stairs(name, axis), _stairs(f"{name}, reversed", -axis)]
     for side, word in ((1, "left"), (-1, "right")):
         for level in (0.5, 0.8):
-            moves.append(_arc(f"arc {word}", level, 0.35 * side))
+            forward, spin = level * axes["straight"], 0.35 * side * axes["spin"]
+            moves.append(_arc(f"arc {word}", forward, spin, max_duty))
     random = np.random.default_rng(1)
-    moves += [_random(random) for _ in range(RANDOM_MOVES)]
-    return [Move(m.name, m.hold_s, np.rint(100 * max_duty * m.duty) / 100) for m in moves]
+    moves += [_random(random, axes, max_duty) for _ in range(RANDOM_MOVES)]
+    return [Move(m.name, m.hold_s, np.rint(100 * m.duty) / 100) for m in moves]
 
 
 def _move(name: str, steps: list[tuple[float, np.ndarray]]) -> Move:
     hold_s, duty = zip(*steps, (REST_S, np.zeros(4)), strict=True)
-    return Move(name, np.array(hold_s), np.clip(np.array(duty), -1, 1))
+    return Move(name, np.array(hold_s), np.array(duty))
 
 
 def _steps(name: str, axis: np.ndarray, level: float) -> list[Move]:
     """Out and back, once with a stop between and once through zero."""
     out, rest = level * axis, (REST_S, np.zeros(4))
-    percent = f"{100 * level:.0f} %"
+    percent = f"{100 * np.abs(out).max():.0f} %"
     return [
         _move(f"{name} from rest, {percent}", [(HOLD_S, out), rest, (HOLD_S, -out)]),
         _move(f"{name} through zero, {percent}", [(HOLD_S, out), (HOLD_S, -out)]),
@@ -78,21 +80,22 @@ def _stairs(name: str, axis: np.ndarray) -> Move:
     return _move(f"{name}, stairs", [(0.25, s * level * axis) for s in (1, -1) for level in levels])
 
 
-def _arc(name: str, level: float, turn: float) -> Move:
-    forward, spin = level * AXES["straight"], turn * AXES["spin"]
+def _arc(name: str, forward: np.ndarray, spin: np.ndarray, max_duty: float) -> Move:
+    """An arc and back on it, then a piece of another."""
+    steps = [(1.2, forward + spin), (1.2, -forward - spin), (0.6, forward - spin)]
     return _move(
-        f"{name}, {100 * level:.0f} %",
-        [(1.2, forward + spin), (1.2, -forward - spin), (0.6, forward - spin)],
+        f"{name}, {100 * np.abs(forward).max():.0f} %",
+        [(hold_s, np.clip(duty, -max_duty, max_duty)) for hold_s, duty in steps],
     )
 
 
-def _random(random: np.random.Generator) -> Move:
+def _random(random: np.random.Generator, axes: dict[str, np.ndarray], max_duty: float) -> Move:
     """Random levels on all axes at once, each once forward and once, in another order, back."""
     mixes = random.choice([-1, 0, 1], (RANDOM_HOLDS // 2, 3)) * random.choice(
         LEVELS, (RANDOM_HOLDS // 2, 3)
     )
-    mixes = np.concatenate([mixes, -random.permutation(mixes)]) @ np.array(list(AXES.values()))
-    mixes /= np.maximum(1, np.abs(mixes).max(axis=1, keepdims=True))
+    mixes = np.concatenate([mixes, -random.permutation(mixes)]) @ np.array(list(axes.values()))
+    mixes /= np.maximum(1, np.abs(mixes).max(axis=1, keepdims=True) / max_duty)
     holds_s = np.rint(100 * random.uniform(0.2, 0.6, len(mixes) // 2)) / 100
     holds_s = np.concatenate([holds_s, random.permutation(holds_s)])
     return _move("random on all axes", list(zip(holds_s, mixes, strict=True)))

@@ -21,6 +21,7 @@ def power(margins: np.ndarray, parameters: np.ndarray, candidates: int) -> np.nd
     Fitted to one half of the data and judged on the other, an effect's fall of chi2 is short by
     three times its number of parameters of that where it was fitted, a noncentral chi-square.
     Against a rival the difference of two fits decides: normal, of variance four times its mean.
+    That the robot is otherwise as the model says is taken for granted.
     """
     whole, against = margins[:, 0], margins[:, 1:]
     threshold = 2 * np.log(candidates / ALPHA) + 3 * parameters
@@ -29,3 +30,10 @@ def power(margins: np.ndarray, parameters: np.ndarray, candidates: int) -> np.nd
     tied = nearest < (1 - ALIKE) * whole
     ahead = (nearest - np.where(tied, TIE_CHI2, 0.0)) / (2 * np.sqrt(np.maximum(nearest, 1e-9)))
     return np.minimum(accepted, norm.cdf(ahead))
+
+
+def percent(chance: float) -> str:
+    """A chance for people; none is certain."""
+    return (
+        "over 99 %" if chance > 0.99 else "under 1 %" if chance < 0.01 else f"{100 * chance:.0f} %"
+    )

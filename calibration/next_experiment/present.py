@@ -9,6 +9,7 @@ from twinmill.calibration import show
 from twinmill.calibration.freedom import catalogue
 from twinmill.calibration.next_experiment import figures
 from twinmill.calibration.next_experiment.design import Chance, Plan
+from twinmill.calibration.next_experiment.power import percent
 from twinmill.calibration.report import Section
 from twinmill.calibration.tables import Cell, Table, Tone, number
 
@@ -31,7 +32,7 @@ def section(plan: Plan, how: list[str]) -> Section:
     power = plan.predicted_power
     return Section(
         "The next run",
-        [("predicted power", f"{100 * power:.0f} %", _tone(power))],
+        [("predicted power", percent(power), _tone(power))],
         f"{plan.why} {_outlook(plan)}",
         [("run", _length(plan))],
         [figures.duties(plan), figures.floor(plan), figures.margins(plan)],
@@ -53,7 +54,7 @@ def _outlook(plan: Plan) -> str:
     told, asked = len(plan.separates), len(plan.chances)
     return (
         f"The run tells {told} of these {asked}; the right name comes with a chance of "
-        f"{100 * plan.predicted_power:.0f} %."
+        f"{percent(plan.predicted_power)}, if the robot is otherwise like the model."
     )
 
 
@@ -88,8 +89,8 @@ def _chances(plan: Plan) -> Table:
             Cell(c.rival or "none"),
             Cell(number(c.margin_before)),
             Cell(number(c.margin)),
-            Cell(f"{100 * c.power_before:.0f} %"),
-            Cell(f"{100 * c.power:.0f} %", _tone(c.power)),
+            Cell(percent(c.power_before)),
+            Cell(percent(c.power), _tone(c.power)),
         ]
         for c in plan.chances
     ]
