@@ -10,7 +10,7 @@ import twinmill_native as native
 import typer
 from twinmill.calibration.log import read_log
 from twinmill.calibration.report import Figure, Section, write_report
-from twinmill.calibration.report.canvas import MEASURED, PREDICTED, draw
+from twinmill.calibration.report.canvas import MEASURED, PREDICTED, draw, plain_ticks
 from twinmill.calibration.swarm_metrics import SwarmSeries, swarm_metrics
 from twinmill.tools.calibrate import DEFAULT_MODEL, Model, Out, command_line, open_model, provenance
 from twinmill.tools.output import AsJson, busy, deliver
@@ -113,7 +113,8 @@ def _over_time(series: SwarmSeries) -> Figure:
                 series.t_s, series.values[:, native.METRICS.index(name)], color=MEASURED, lw=1
             )
             axes.set_ylabel(label)
-        rest[0].set(yscale="symlog", ylim=(0, None))
+        rest[0].set(yscale="log", ylim=(0.02, None))
+        plain_ticks(rest[0].yaxis)
         for level in (0.2, 1):
             rest[0].axhline(level, color=PREDICTED, lw=0.8)
         rest[3].axhline(1, color=PREDICTED, lw=0.8)

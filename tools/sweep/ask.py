@@ -162,7 +162,10 @@ def _ask(
     curves = [curve_of(request, wanted) for request in requests]
     sentences = [curve.sentence(wanted, at_least) for curve in curves]
     words = ["twinmill", "ask", question, "--behavior", behavior, "--model", model]
-    words += ["--seeds", str(seeds)]
+    words += ["--seeds", str(seeds), "--duration-s", f"{duration_s:g}", "--goal", wanted]
+    words += ["--n", str(n)] if n else []
+    words += [] if target_radius_m is None else ["--target-radius-m", f"{target_radius_m:g}"]
+    words += ["--start", start, "--at-least", f"{at_least:g}"]
     source = Provenance(
         shlex.join(words),
         f"twinmill {requests[0].version}",
