@@ -59,6 +59,12 @@ class Phase:
         """(C, 2) 95 % interval of the probability of the goal."""
         return np.array([interval(hits, self.seeds) for hits in self.hits])
 
+    def where(self, cell: int, axes: int | None = None) -> str:
+        """A cell in words, of the first so many axes; what is the same in all cells is left out."""
+        pairs = list(zip(self.axes, self.points[cell], strict=True))[:axes]
+        varied = [f"{axis.name} {value:g}" for axis, value in pairs if len(axis.values) > 1]
+        return ", ".join(varied) or "the only cell"
+
     def slice(self, at: dict[str, float]) -> np.ndarray:
         """(rows, columns) cells over the second and first axis; the others at values near `at`."""
         index = np.arange(len(self.points)).reshape(self.shape)

@@ -130,7 +130,7 @@ def _section(
     share = phase.hits[best] / phase.seeds
     score = [(f"best '{phase.goal}'", f"{100 * share:.0f} %", "")]
     verdict = (
-        f"'{phase.goal}' is most probable at {_words(phase, best)}: {100 * share:.0f} % of "
+        f"'{phase.goal}' is most probable at {phase.where(best)}: {100 * share:.0f} % of "
         f"{phase.seeds} runs (95 % interval {100 * low:.0f} to {100 * high:.0f} %)."
     )
     tables = [_next_table(phase, worth, has_rival)] if worth else []
@@ -143,7 +143,7 @@ def _section(
         tables.insert(0, _run_table(phase, runs))
     figures = [map_figure(phase, place, runs, worth), probability_figure(phase, place)]
     figures += [thumbnail_figure(phase, place), slider_figure(phase)]
-    first = f"Run {_words(phase, worth[0]['cell'])} next: " if worth else ""
+    first = f"Run {phase.where(worth[0]['cell'])} next: " if worth else ""
     why = "there the two models disagree most." if has_rival else "there it is least sure."
     return Section(
         title=f"Phase diagram of {phase.request.behavior}",
@@ -157,12 +157,6 @@ def _section(
         figures=figures,
         tables=tables,
         next_step=first + why if worth else "",
-    )
-
-
-def _words(phase: Phase, cell: int) -> str:
-    return ", ".join(
-        f"{axis.name} {value:g}" for axis, value in zip(phase.axes, phase.points[cell], strict=True)
     )
 
 
@@ -191,10 +185,11 @@ def _run_table(phase: Phase, runs: list[Experiment]) -> Table:
 
 
 def _next_table(phase: Phase, worth: list[dict], has_rival: bool) -> Table:
+    names = [axis.name for axis in phase.axes if len(axis.values) > 1]
     rows = [
         [
             Cell(str(rank)),
-            *(Cell(f"{item[axis.name]:g}") for axis in phase.axes),
+            *(Cell(f"{item[name]:g}") for name in names),
             Cell(
                 ", ".join(
                     f"{CLASSES[k]} {100 * share:.0f} %"
@@ -211,7 +206,6 @@ def _next_table(phase: Phase, worth: list[dict], has_rival: bool) -> Table:
         if has_rival
         else "Entropy of the class: 0 is certain."
     )
-    names = [axis.name for axis in phase.axes]
     return Table(
         "Worth the next experiments",
         ["", *names, "this model says", "bit"],

@@ -201,10 +201,7 @@ def thumbnail_figure(phase: Phase, at: dict[str, float]) -> Figure:
     def paint(panels) -> None:
         for axes, (k, cell) in zip(np.ravel(panels), picks, strict=True):
             _paint_paths(axes, _typical(phase, cell, k), COLORS[CLASSES[k]])
-            where = ", ".join(
-                f"{axis.name} {value:g}"
-                for axis, value in zip(phase.axes, phase.points[cell], strict=True)
-            )
+            where = phase.where(cell, 2).replace(", ", "\n")
             axes.set_title(f"{CLASSES[k]}\n{where}", fontsize=7)
 
     return Figure(

@@ -21,7 +21,8 @@
   const controls = make(box, "div"), picture = make(box, "div"), told = make(box, "p", { className: "note" });
   const describe = (place) => {
     const cell = cellOf(place);
-    const where = P.axes.map((axis, k) => `${axis.label} ${format(axis.values[place[k]])}`).join(", ");
+    const where = P.axes.map((axis, k) => [axis, place[k]]).filter(([axis]) => axis.values.length > 1)
+      .map(([axis, i]) => `${axis.label} ${format(axis.values[i])}`).join(", ");
     const what = P.classes.map(([name], k) => [name, P.counts[cell][k]]).filter(([, count]) => count > 0)
       .sort((a, b) => b[1] - a[1]).map(([name, count]) => `${name} ${count}`).join(", ");
     told.textContent = `${where}: ${what} of ${P.seeds}; '${P.goal}' ${P.hits[cell]}`;
@@ -70,7 +71,7 @@
       chooser("up", up, (k) => { if (k === across) across = up; up = k; });
     }
     P.axes.forEach((axis, k) => {
-      if (k === across || k === up) return;
+      if (k === across || k === up || axis.values.length === 1) return;
       const line = make(make(controls, "div"), "label"), name = make(line, "span");
       const tell = () => { name.textContent = `${axis.label}: ${format(axis.values[order(k)[+slider.value]])} `; };
       const slider = make(line, "input", { type: "range", min: 0, max: axis.values.length - 1, step: 1 });

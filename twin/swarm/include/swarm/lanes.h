@@ -7,6 +7,9 @@
 #define SWARM_LANES_H
 
 #include <stdint.h>
+#ifdef __AVX512F__
+#include <immintrin.h>
+#endif
 
 namespace twin
 {
@@ -45,6 +48,10 @@ struct Lanes
     }
     static bool Any(Mask mask)
     {
+#ifdef __AVX512F__
+        if constexpr (W == 8)
+            return _mm512_test_epi64_mask((__m512i)mask, (__m512i)mask) != 0;
+#endif
         int64_t any = 0;
         for (int i = 0; i < W; ++i)
             any |= mask[i];
