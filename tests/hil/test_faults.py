@@ -28,41 +28,50 @@ def driving(rig):
         yield robot
 
 
+@pytest.fixture
+def blind(rig):
+    """The same, but it would drive on for ten seconds without a frame."""
+    patience = ("--set", "frame_timeout_ms=10000")
+    with Robot(rig, "--start", "--set", "restart_ms=-1", *patience) as robot:
+        robot.drive_until(LEFT)
+        yield robot
+
+
 def wait_for_zero(robot, since_s):
     """Waits until the board has four zeros. Returns how long it took."""
     robot.rig.wait(lambda: robot.wire() == ZERO, what="zero")
     return robot.stopped_s(since_s) - since_s
 
 
-def test_kill_9_of_the_driving_process_stops_the_motors(driving):
-    killed_s = driving.rig.kill(driving.driver(), signal.SIGKILL)
-    assert driving.wait_for_end().code == 1
-    assert wait_for_zero(driving, killed_s) < WATCHDOG_S
+def test_kill_9_of_the_driving_process_stops_the_motors(blind):
+    killed_s = blind.rig.kill(blind.driver(), signal.SIGKILL)
+    assert blind.wait_for_end().code == 1
+    assert wait_for_zero(blind, killed_s) < WATCHDOG_S
 
 
-def test_kill_9_of_the_parent_stops_the_motors(driving):
-    killed_s = driving.rig.kill(driving.pid, signal.SIGKILL)
-    assert driving.wait_for_end().code == -signal.SIGKILL
-    assert wait_for_zero(driving, killed_s) < WATCHDOG_S
+def test_kill_9_of_the_parent_stops_the_motors(blind):
+    killed_s = blind.rig.kill(blind.pid, signal.SIGKILL)
+    assert blind.wait_for_end().code == -signal.SIGKILL
+    assert wait_for_zero(blind, killed_s) < WATCHDOG_S
 
 
-def test_hanging_process_is_killed_and_the_motors_stop(driving):
-    stopped_s = driving.rig.kill(driving.driver(), signal.SIGSTOP)
-    assert driving.wait_for_end().code == 1
-    assert wait_for_zero(driving, stopped_s) < WATCHDOG_S + SLACK_S
+def test_hanging_process_is_killed_and_the_motors_stop(blind):
+    stopped_s = blind.rig.kill(blind.driver(), signal.SIGSTOP)
+    assert blind.wait_for_end().code == 1
+    assert wait_for_zero(blind, stopped_s) < WATCHDOG_S + SLACK_S
 
 
-def test_stop_option_stops_what_a_double_kill_left(driving):
-    driver = driving.driver()
+def test_stop_option_stops_what_a_double_kill_left(blind):
+    driver = blind.driver()
     for number in (signal.SIGSTOP, signal.SIGKILL):
-        for pid in (driving.pid, driver):
-            driving.rig.kill(pid, number)
-    driving.wait_for_end()
-    assert driving.wire() == LEFT
-    pid = driving.rig.start(PROGRAM, *SETTINGS, "--stop")
-    driving.rig.wait(lambda: pid in driving.rig.ends)
-    assert driving.rig.ends[pid].code == 0
-    assert driving.wire() == ZERO
+        for pid in (blind.pid, driver):
+            blind.rig.kill(pid, number)
+    blind.wait_for_end()
+    assert blind.wire() == LEFT
+    pid = blind.rig.start(PROGRAM, *SETTINGS, "--stop")
+    blind.rig.wait(lambda: pid in blind.rig.ends)
+    assert blind.rig.ends[pid].code == 0
+    assert blind.wire() == ZERO
 
 
 def test_killed_program_gets_its_camera_and_board_back(rig):
