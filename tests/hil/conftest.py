@@ -1,21 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """One guest for all tests of a run; without one they are skipped, and say why."""
 
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
 import pytest
-from rig import CannotRun, Rig, prepare
+from rig import KERNEL, CannotRun, Rig, prepare, prepare_system
 
 
-@pytest.fixture(scope="session")
-def image():
+def boot(image: Callable[[], Path], name: str, **options) -> Iterator[Rig]:
+    """Boots what a function of rig.py has built."""
     try:
-        return prepare()
+        built = image()
     except CannotRun as reason:
         print(f"hil: skipped: {reason}")
         pytest.skip(str(reason))
+    with Rig(built, name, **options) as rig:
+        print(f"hil: {rig.boot_s:.1f} s to boot; console: {rig.console}")
+        yield rig
 
 
 @pytest.fixture(scope="session")
-def rig(image):
-    with Rig(image, "drive") as rig:
-        print(f"hil: {rig.boot_s:.1f} s to boot; console: {rig.console}")
-        yield rig
+def rig():
+    yield from boot(prepare, f"drive.{KERNEL}")
+
+
+@pytest.fixture(scope="session")
+def system():
+    yield from boot(prepare_system, "system", memory_mb=1024)

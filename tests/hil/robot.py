@@ -5,7 +5,7 @@ import signal
 import time
 from collections.abc import Callable
 
-from rig import ZERO, Duties, End, Rig
+from rig import BUTTON_LINE, PRESSED, RELEASED, ZERO, Duties, End, Rig
 
 PROGRAM = "/usr/bin/turbopi"
 WIDTH_PX, HEIGHT_PX = 160, 120
@@ -25,10 +25,10 @@ SETTINGS = (
 )
 
 
-class Robot:
-    """The running program; as a context it is ended at the end, and the motors are at zero."""
+class Watched:
+    """A robot whose camera shows `view`, whoever started its program."""
 
-    def __init__(self, rig: Rig, *arguments: str, camera: str = LOOPBACK):
+    def __init__(self, rig: Rig, camera: str = LOOPBACK):
         self.rig = rig
         self.view = GREEN
         rig.mend()
@@ -36,33 +36,12 @@ class Robot:
             self._open_loopback()
         self.first = len(rig.duties)
         self.telemetry_first = len(rig.telemetry)
-        self.pid = rig.start(PROGRAM, *SETTINGS, "--camera", camera, *arguments)
 
     def _open_loopback(self):
         result, _ = self.rig.words("o", LOOPBACK, WIDTH_PX, HEIGHT_PX)
         assert result == 0
         # Without a first frame the driver refuses its readers; half a one decides nothing.
         self.show(RED[: len(RED) // 2])
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        if self.pid not in self.rig.ends:
-            self.rig.kill(self.pid, signal.SIGTERM)
-            self.wait_for_end()
-        assert self.rig.duties[-1].wire == ZERO
-
-    def wait_for_end(self) -> End:
-        """Waits until the program has ended."""
-        self.rig.wait(lambda: self.pid in self.rig.ends, what="the program's end")
-        return self.rig.ends[self.pid]
-
-    def driver(self) -> int:
-        """Returns the pid of the process that drives: the program's child."""
-        pid, _ = self.rig.words("d", self.pid)
-        assert pid > 0
-        return pid
 
     def show(self, frame: bytes) -> float:
         """Gives the camera one frame, or a part of one. Returns when (guest, s)."""
@@ -103,3 +82,38 @@ class Robot:
     def has(self, flag: int) -> bool:
         """Tells whether the newest telemetry has one of its STATUS flags."""
         return bool(self.telemetry()) and bool(self.telemetry()[-1].status_flags & flag)
+
+    def press(self):
+        """Holds the button for ten frames, then lets it go."""
+        for outside in (PRESSED, RELEASED):
+            self.rig.board(b"P", BUTTON_LINE, outside)
+            end = len(self.telemetry()) + 10
+            self.show_until(lambda end=end: len(self.telemetry()) >= end)
+
+
+class Robot(Watched):
+    """The running program; as a context it is ended at the end, and the motors are at zero."""
+
+    def __init__(self, rig: Rig, *arguments: str, camera: str = LOOPBACK):
+        super().__init__(rig, camera)
+        self.pid = rig.start(PROGRAM, *SETTINGS, "--camera", camera, *arguments)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.pid not in self.rig.ends:
+            self.rig.kill(self.pid, signal.SIGTERM)
+            self.wait_for_end()
+        assert self.rig.duties[-1].wire == ZERO
+
+    def wait_for_end(self) -> End:
+        """Waits until the program has ended."""
+        self.rig.wait(lambda: self.pid in self.rig.ends, what="the program's end")
+        return self.rig.ends[self.pid]
+
+    def driver(self) -> int:
+        """Returns the pid of the process that drives: the program's child."""
+        pid, _ = self.rig.words("d", self.pid)
+        assert pid > 0
+        return pid

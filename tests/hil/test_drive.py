@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot's program under a real kernel: it drives by what it sees and as a person says."""
 
-from rig import BATTERY_REGISTER, BUTTON_LINE, PACK_MV, PRESSED, RELEASED, ZERO
+from rig import BATTERY_REGISTER, PACK_MV, ZERO
 from robot import GREEN, LEFT, RED, RIGHT, SIGNS, Robot
 
 # BCM lines of the vendor's board.
@@ -13,14 +13,6 @@ def level(rig, line):
     """What the program shows at a line now."""
     values = [change.value for change in rig.levels if change.line == line]
     return values[-1] if values else 0
-
-
-def press(robot):
-    """Holds the button for ten frames."""
-    for outside in (PRESSED, RELEASED):
-        robot.rig.board(b"P", BUTTON_LINE, outside)
-        end = len(robot.telemetry()) + 10
-        robot.show_until(lambda end=end: len(robot.telemetry()) >= end)
 
 
 def test_green_turns_left_and_red_turns_right(rig):
@@ -36,9 +28,9 @@ def test_button_starts_and_stops(rig):
     with Robot(rig) as robot:
         robot.show_until(lambda: len(robot.telemetry()) > 20)
         assert {duties.wire for duties in robot.since(0)} == {ZERO}
-        press(robot)
+        robot.press()
         assert robot.wire() == LEFT and level(rig, RUNNING_LINE) == 1
-        press(robot)
+        robot.press()
         assert robot.wire() == ZERO and level(rig, RUNNING_LINE) == 0
 
 
@@ -67,5 +59,5 @@ def test_empty_battery_stops_for_good_and_sounds(rig):
         robot.show_until(lambda: level(rig, BUZZER_LINE) == 1)
         assert robot.wire() == ZERO
         rig.mend()
-        press(robot)
+        robot.press()
         assert robot.wire() == ZERO

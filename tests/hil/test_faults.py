@@ -68,9 +68,7 @@ def test_stop_option_stops_what_a_double_kill_left(blind):
             blind.rig.kill(pid, number)
     blind.wait_for_end()
     assert blind.wire() == LEFT
-    pid = blind.rig.start(PROGRAM, *SETTINGS, "--stop")
-    blind.rig.wait(lambda: pid in blind.rig.ends)
-    assert blind.rig.ends[pid].code == 0
+    assert blind.rig.run(PROGRAM, *SETTINGS, "--stop").code == 0
     assert blind.wire() == ZERO
 
 
