@@ -13,6 +13,7 @@ from twinmill.tools.deploy import flash
 from twinmill.tools.swarm import commands as swarm
 from twinmill.tools.sweep import ask
 from twinmill.tools.sweep import phase_command as phase
+from twinmill.tools.threshold import command as threshold
 
 app = typer.Typer(
     add_completion=False,
@@ -31,6 +32,7 @@ characterise.register(app)
 metrics.register(app)
 phase.register(app)
 ask.register(app)
+threshold.register(app)
 
 
 def _show_version(wanted: bool) -> None:

@@ -14,8 +14,10 @@ from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
 
+import numpy as np
 from ssh_robots import SshRobot, make_package
 from twinmill.tools import cli
+from twinmill.tools.threshold.pictures import from_rgb
 
 
 def let_in(folder: Path) -> Path:
@@ -83,6 +85,22 @@ def failures(flash: Flasher, robot: SshRobot, package: Path) -> dict:
     return run
 
 
+def threshold(robot: SshRobot, config: Path) -> dict:
+    """Limits from frames of the robot's camera, put into its configuration."""
+    x, y = np.meshgrid(np.arange(320), np.arange(240))
+    rgb = np.where(
+        ((x - 100) ** 2 + (y - 90) ** 2 < 900)[..., None], (40, 170, 60), (128, 120, 125)
+    )
+    noise = np.random.default_rng(1).normal(0, 3, (2, *rgb.shape))
+    frames = [from_rgb("", np.clip(rgb + n, 0, 255)).yuyv.tobytes() for n in noise]
+    (robot.folder / "camera.yuyv").write_bytes(b"".join(frames))
+    said = StringIO()
+    arguments = ["--robot", robot.name, "--size", "320x240", "--write", "--json"]
+    with redirect_stdout(said):
+        code = cli.run(["threshold", *arguments, "--ssh-config", str(config)])
+    return {"code": code, **json.loads(said.getvalue()), "config": robot.config.read_text()}
+
+
 def main(folder: Path) -> dict:
     program = Path(os.environ["TURBOPI"])
     key = let_in(folder)
@@ -114,6 +132,7 @@ def main(folder: Path) -> dict:
         result["mixed"] = flash.run("robot03", "robot09", "robot08", "nobody7.invalid",
                                     "--package", new)  # fmt: skip
         result["failures"] = failures(flash, robots[2], new)
+        result["threshold"] = threshold(robots[1], config)
         result["same_number"] = flash.run("robot03", "robot04=3", "--package", new)
         result["left_in_tmp"] = sorted(path.name for path in Path("/tmp").glob("turbopi.??????"))
     finally:

@@ -39,8 +39,10 @@ case $1 in
         [ -e "$ROBOT/dies" ] && exit 0
         turbopi --config "$ROBOT/root/etc/turbopi/turbopi.conf" >"$ROBOT/journal" 2>&1 &
         echo $! >"$ROBOT/pid" ;;
+    stop) kill "$(cat "$ROBOT/pid")" ;;
     is-active) kill -0 "$(cat "$ROBOT/pid" 2>/dev/null || echo none)" 2>/dev/null ;;
 esac""",
+    "v4l2-ctl": 'cat "$ROBOT/camera.yuyv"',
     "journalctl": 'echo "turbopi: cannot do it"',
 }
 SETTINGS = """\

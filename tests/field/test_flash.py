@@ -90,6 +90,15 @@ def test_bad_configuration_leaves_the_old_one(session):
     assert "milling" in only(session["failures"]["bad configuration"])["sentence"]
 
 
+def test_limits_of_colour_come_from_the_robots_camera_into_its_configuration(session):
+    told = session["threshold"]
+    assert told["code"] == 0 and told["separable"] and len(told["pictures"]) == 2
+    # Where the disc was drawn.
+    assert told["pictures"][0]["ball_px"] == pytest.approx([100, 90, 30], abs=2)
+    lines = told["config"].splitlines()
+    assert all(f"{key} = {value}" in lines for key, value in told["box"].items())
+
+
 def test_two_robots_of_one_number_are_refused(session):
     assert session["same_number"]["code"] == 1
     assert "would both be robot 3" in session["same_number"]["complaint"]

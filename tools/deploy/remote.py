@@ -58,7 +58,8 @@ class Remote:
         """
         command = "sh -s -- " + shlex.join([step, *arguments])
         said = self._ssh(command, ROBOT_SCRIPT.read_bytes(), timeout_s)
-        return dict(line.split("=", 1) for line in said.splitlines() if "=" in line)
+        lines = said.decode(errors="replace").splitlines()
+        return dict(line.split("=", 1) for line in lines if "=" in line)
 
     def copy(self, source: Path, target: str, timeout_s: float = 300) -> None:
         """Copies a file to a path there that the user may write; removed again if it fails.
@@ -70,7 +71,16 @@ class Remote:
         command = f"cat > {to} || {{ code=$?; rm -f {to}; exit $code; }}"
         self._ssh(command, source.read_bytes(), timeout_s)
 
-    def _ssh(self, command: str, text: bytes, timeout_s: float) -> str:
+    def fetch(self, path: str, timeout_s: float = 300) -> bytes:
+        """Takes a file from there, and removes it there.
+
+        Raises:
+            RemoteError: it failed.
+        """
+        at = shlex.quote(path)
+        return self._ssh(f"cat {at} && rm -f {at}", b"", timeout_s)
+
+    def _ssh(self, command: str, text: bytes, timeout_s: float) -> bytes:
         if not shutil.which("ssh"):
             raise RemoteError("no ssh", "ssh is not installed here: install openssh-client.")
         options = ["-o", "BatchMode=yes", "-o", f"ConnectTimeout={CONNECT_S}"]
@@ -90,7 +100,7 @@ class Remote:
             raise _ssh_failure(said)
         if done.returncode != 0:
             raise _step_failure(said)
-        return done.stdout.decode(errors="replace")
+        return done.stdout
 
 
 def _ssh_failure(said: str) -> RemoteError:

@@ -138,6 +138,29 @@ script()
     rm -f "$2"
 }
 
+# frames WIDTH HEIGHT COUNT SKIP: raw YUYV of the camera; the robot's program stands aside.
+frames()
+{
+    may_be_root
+    command -v v4l2-ctl >/dev/null || fail "no v4l2-ctl" "install v4l-utils on it."
+    device=$(sed -n 's/^camera *= *"\{0,1\}\([^"# ]*\).*/\1/p' "$config" | tail -n 1)
+    file=$(mktemp /tmp/turbopi.XXXXXX)
+    log=$(mktemp)
+    as_root systemctl stop turbopi.service
+    taken=yes
+    as_root v4l2-ctl --device="${device:-/dev/video0}" --stream-mmap --stream-to=- \
+        --set-fmt-video="width=$1,height=$2,pixelformat=YUYV" \
+        --stream-count="$3" --stream-skip="$4" >"$file" 2>"$log" || taken=
+    restart
+    why=$(tail -n 1 "$log")
+    rm -f "$log"
+    if [ -z "$taken" ]; then
+        rm -f "$file"
+        fail "no camera" "v4l2-ctl: $why"
+    fi
+    echo "frames=$file"
+}
+
 # upload: a new file that this user may write.
 upload() { echo "upload=$(mktemp /tmp/turbopi.XXXXXX)"; }
 
@@ -146,7 +169,7 @@ main()
     step=$1
     shift
     case $step in
-        probe | install | rollback | configure | restart | script | upload) "$step" "$@" ;;
+        probe | install | rollback | configure | restart | frames | script | upload) "$step" "$@" ;;
         *) fail "bad step" "$step" ;;
     esac
 }

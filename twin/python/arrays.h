@@ -38,6 +38,9 @@ inline Array ToNumpy(std::vector<double> &&values, std::initializer_list<size_t>
 // Adds what the module knows of swarms.
 void BindSwarms(nb::module_ &m);
 
+// Adds the firmware's look at pictures.
+void BindThreshold(nb::module_ &m);
+
 }  // namespace twin
 
 #endif

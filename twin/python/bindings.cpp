@@ -259,4 +259,5 @@ NB_MODULE(twinmill_native, m)
         "(N, 3) poses had this model, with its noise, been driven.");
 
     BindSwarms(m);
+    BindThreshold(m);
 }
