@@ -42,7 +42,9 @@ const struct config_key config_keys[] = {
     INTEGER(rate_Hz, 1, 240, "frame rate asked for"),
     INTEGER(exposure_100us, -1, 100000, "0: locked as it is, -1: automatic"),
     INTEGER(white_balance_K, -1, 10000, "0: locked as it is, -1: automatic"),
-    TEXT(board, "auto, i2c (Pi 4 kit), uart (Pi 5 kit), stub or stub:FILE that records duties"),
+    TEXT(board,
+         "auto, i2c (Pi 4 kit), uart (Pi 5 kit), stub, stub:FILE that records duties, stub:camera "
+         "that answers them through the camera's socket"),
     TEXT(i2c_device, "bus of the Pi 4 kit's board"),
     TEXT(uart_device, "serial line of the Pi 5 kit's board"),
     YES_NO(i2c_burst, "true: four duties in one transfer; false: one by one"),

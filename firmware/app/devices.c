@@ -14,6 +14,9 @@
 
 #define STUB_PACK_MV 8000
 
+// The stub board may answer through it.
+static struct stub_camera stub_camera;
+
 // @return what follows the prefix, or NULL.
 static const char *after(const char *text, const char *prefix)
 {
@@ -37,11 +40,15 @@ static void use_uart(struct motors_uart *board, const struct hal_motors *motors,
     devices->board = "uart";
 }
 
-static void use_stub(const char *record_path, struct loop_devices *devices)
+// `where`: a file that records, "camera" to answer through the camera's socket, or NULL.
+static void use_stub(const char *where, struct loop_devices *devices)
 {
     static struct stub_board board;
-    board = (struct stub_board){
-        .record_path = record_path, .clock = devices->clock, .pack_mV = STUB_PACK_MV};
+    const bool answers = where != NULL && strcmp(where, "camera") == 0;
+    board = (struct stub_board){.record_path = answers ? NULL : where,
+                                .clock = devices->clock,
+                                .answers_to = answers ? &stub_camera : NULL,
+                                .pack_mV = STUB_PACK_MV};
     devices->motors = stub_board_motors(&board);
     devices->battery = stub_board_battery(&board);
 }
@@ -78,7 +85,7 @@ static bool use_board(const struct app_config *config, struct loop_devices *devi
     else if (strcmp(config->board, "i2c") != 0 && strcmp(config->board, "uart") != 0)
     {
         (void)snprintf(error, CONFIG_ERROR_MAX,
-                       "board: '%.100s': must be auto, i2c, uart, stub or stub:FILE",
+                       "board: '%.100s': must be auto, i2c, uart, stub, stub:FILE or stub:camera",
                        config->board);
         return false;
     }
@@ -97,10 +104,10 @@ bool devices_make_board(const struct app_config *config, bool dry_run, struct lo
                         char error[CONFIG_ERROR_MAX])
 {
     devices->clock = clock_linux();
-    const char *record_path = after(config->board, "stub:");
-    if (dry_run || record_path != NULL || strcmp(config->board, "stub") == 0)
+    const char *where = after(config->board, "stub:");
+    if (dry_run || where != NULL || strcmp(config->board, "stub") == 0)
     {
-        use_stub(dry_run ? NULL : record_path, devices);
+        use_stub(dry_run ? NULL : where, devices);
         return true;
     }
     return use_board(config, devices, error);
@@ -124,7 +131,6 @@ void devices_settle_board(struct app_config *config, bool dry_run)
 static void use_camera(const struct app_config *config, struct loop_devices *devices)
 {
     static struct camera_v4l2 v4l2;
-    static struct stub_camera stub;
     const char *socket_path = after(config->camera, "stub:unix:");
     const char *file_path = after(config->camera, "stub:");
     const struct stub_camera_config stub_config = {
@@ -135,11 +141,11 @@ static void use_camera(const struct app_config *config, struct loop_devices *dev
     };
     if (socket_path != NULL)
     {
-        devices->camera = stub_camera_socket(&stub, &stub_config, &devices->clock, NULL);
+        devices->camera = stub_camera_socket(&stub_camera, &stub_config, &devices->clock, NULL);
     }
     else if (file_path != NULL)
     {
-        devices->camera = stub_camera_file(&stub, &stub_config, &devices->clock, NULL);
+        devices->camera = stub_camera_file(&stub_camera, &stub_config, &devices->clock, NULL);
     }
     else
     {

@@ -17,7 +17,7 @@ static const char help[] =
     "  -c, --config FILE     keys and values (" DEFAULT_FILE
     ", if it is there)\n"
     "      --camera DEVICE   V4L2 device, stub:FILE or stub:unix:SOCKET (/dev/video0)\n"
-    "      --board KIND      auto, i2c, uart, stub or stub:FILE (auto)\n"
+    "      --board KIND      auto, i2c, uart, stub, stub:FILE or stub:camera (auto)\n"
     "      --script FILE     plays CSV inputs or duties once instead of the table\n"
     "      --io-tsv FILE     also logs in the format of the authors' robots\n"
     "      --lcm-url URL     where telemetry goes (udpm://239.255.76.67:7667?ttl=0)\n"

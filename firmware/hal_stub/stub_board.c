@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hal_stub/stub_board.h"
 
+#include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 // One line in one write, so that several processes may record into one file.
@@ -30,6 +32,22 @@ static enum fw_err record(const struct stub_board *board)
     return err;
 }
 
+// The camera may not be connected yet, or no more: then nobody waits for an answer.
+static enum fw_err answer(const struct stub_board *board)
+{
+    const struct stub_camera *camera = board->answers_to;
+    if (camera == NULL || camera->config.path == NULL || camera->fd < 0)
+    {
+        return FW_OK;
+    }
+    const uint32_t taken = camera->seq;
+    uint8_t bytes[8] = {(uint8_t)taken, (uint8_t)(taken >> 8), (uint8_t)(taken >> 16),
+                        (uint8_t)(taken >> 24)};
+    memcpy(bytes + 4, board->wheel_duty_pct, FW_WHEEL_COUNT);
+    const ssize_t sent = send(camera->fd, bytes, sizeof bytes, MSG_NOSIGNAL | MSG_DONTWAIT);
+    return sent == sizeof bytes || errno == EPIPE || errno == ECONNRESET ? FW_OK : FW_ERR_IO;
+}
+
 static enum fw_err put(struct stub_board *board, const int8_t wheel_duty_pct[FW_WHEEL_COUNT])
 {
     const enum fw_err err = stub_faults_next(board->faults);
@@ -38,7 +56,9 @@ static enum fw_err put(struct stub_board *board, const int8_t wheel_duty_pct[FW_
         return err;
     }
     memcpy(board->wheel_duty_pct, wheel_duty_pct, sizeof board->wheel_duty_pct);
-    return record(board);
+    const enum fw_err recorded = record(board);
+    const enum fw_err answered = answer(board);
+    return recorded != FW_OK ? recorded : answered;
 }
 
 static enum fw_err write_duties(void *device, const int8_t wheel_duty_pct[FW_WHEEL_COUNT])

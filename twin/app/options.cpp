@@ -113,6 +113,7 @@ Options ParseOptions(int argc, const char *const *argv)
     app.set_version_flag("--version", "twin_run " TWINMILL_VERSION);
     AddWorld(app, options);
     AddCameraOptions(app, options.camera);
+    AddHilOptions(app, options.hil);
     AddOutput(app, options);
     try
     {
@@ -148,8 +149,9 @@ std::string CommandLine(const Options &o, size_t robots, int64_t epoch_us)
          << " --behavior " << o.behavior << " --seed " << o.seed << " --start "
          << NameOf(kStarts, o.start) << " --spread-m " << o.spread_m << " --pose-rate-hz "
          << o.pose_rate_hz << " --epoch-us " << epoch_us;
-    if (o.sensor == "camera")
+    if (o.sensor == "camera" || o.hil.robots > 0)
         line << CameraWords(o.camera);
+    line << HilWords(o.hil);
     if (o.dt_s)
         line << " --dt-s " << *o.dt_s;
     if (o.duration_s)

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "camera_options.h"
+#include "hil_options.h"
 #include "swarm/starts.h"
 
 namespace twin
@@ -25,6 +26,7 @@ struct Options
     PlantKind plant = PlantKind::kMujoco;
     std::string sensor = "cone";
     CameraOptions camera;
+    HilOptions hil;
     std::optional<int> n;
     uint64_t seed = 1;
     StartShape start = StartShape::kSquare;

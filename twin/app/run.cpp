@@ -89,9 +89,11 @@ Swarm MakeSwarm(const Options &options, const Setup &setup,
                 {options.seed, setup.start_utime_us, kMaxStep_s});
     for (int robot = 0; robot < swarm.Size(); ++robot)
         swarm.Play(robot, script);
+    const CameraWorld world =
+        MakeCameraWorld(options.camera, kRing * options.spread_m, options.seed);
     if (options.sensor == "camera")
-        UseCameras(swarm, MakeCameraWorld(options.camera, kRing * options.spread_m, options.seed),
-                   setup.robots, options.seed);
+        UseCameras(swarm, world, setup.robots, options.seed);
+    UseFirmware(swarm, options.hil, world, setup.robots, setup.behaviors, options.seed);
     return swarm;
 }
 

@@ -6,6 +6,7 @@
 #include "hal/battery.h"
 #include "hal/clock.h"
 #include "hal/motors.h"
+#include "hal_stub/stub_camera.h"
 #include "hal_stub/stub_faults.h"
 
 struct stub_board
@@ -15,6 +16,10 @@ struct stub_board
     // clock; NULL: not recorded.
     const char *record_path;
     struct hal_clock clock;
+    // Every duty written is also sent back through this camera's socket, as 8 bytes: how many
+    // frames it has given out so far (little endian), then fl,fr,rl,rr in percent. A program that
+    // sends frames thus knows which of them decided. NULL: not sent.
+    const struct stub_camera *answers_to;
     // As on the real board: what was written last stays.
     int8_t wheel_duty_pct[FW_WHEEL_COUNT];
     // Calls that succeeded, and calls of stop that were tried.

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Hardware in the loop: a robot of the swarm whose decisions the robot's own program makes. It runs
+// as a process with a stub camera, to which the twin sends what it draws, and a stub board, whose
+// bytes drive the wheels.
+#ifndef HIL_FIRMWARE_EYE_H
+#define HIL_FIRMWARE_EYE_H
+
+#include <memory>
+#include <string>
+
+#include "swarm/camera_eye.h"
+
+namespace twin
+{
+
+struct FirmwareOptions
+{
+    std::string program;  // turbopi
+    std::string behavior;
+    int vote_frames = 1;
+    // Waits for the answer to each frame: same seed, same run. Else takes the newest answer there
+    // is, as the wheels of a robot would.
+    bool lockstep = true;
+};
+
+class FirmwareEye final : public CameraEye
+{
+public:
+    // Starts the program. Throws std::runtime_error in one sentence if it does not come up.
+    FirmwareEye(const FirmwareOptions &options, const CameraWorld &world, int robot, double delay_s,
+                uint64_t seed);
+    ~FirmwareEye() override;
+
+    // All but the duties is what the built-in firmware says of the same frame. Throws
+    // std::runtime_error if the program is gone or silent.
+    void Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
+                fw_output &out) override;
+
+private:
+    class Process;
+    std::unique_ptr<Process> process_;
+    bool lockstep_;
+};
+
+}  // namespace twin
+
+#endif
