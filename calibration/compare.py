@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares a model with measurements: how wrong it is, against the log's own floor, and where."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from twinmill.calibration.bits.compare import BitComparison, compare_bits
+from twinmill.calibration.bits.scene import bit_scenes
 from twinmill.calibration.floor import Floor, measure_floor
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import ModelFile
@@ -88,11 +90,12 @@ class RobotComparison:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All robots of all logs and tables against one model."""
+    """All robots of all logs and tables against one model; `bits`: of their cameras, or None."""
 
     model_name: str
     robots: list[RobotComparison | SteadyComparison]
     warnings: list[str]
+    bits: BitComparison | None = None
 
     @property
     def score(self) -> float:
@@ -129,6 +132,7 @@ class Comparison:
             "score": self.score,
             "verdict": self.verdict,
             "robots": [r.to_json() for r in self.robots],
+            "bits": self.bits.to_json() if self.bits else None,
             "warnings": self.warnings,
         }
 
@@ -178,4 +182,6 @@ def compare(measurements: list[Measurement], model_file: ModelFile) -> Compariso
 
     A clock offset that the model knows is used; else each log's own is estimated.
     """
-    return comparison(model_file, open_scenes(measurements, model_file))
+    scenes = open_scenes(measurements, model_file)
+    bits = compare_bits(bit_scenes(scenes), model_file.model)
+    return replace(comparison(model_file, scenes), bits=bits)

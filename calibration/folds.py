@@ -25,7 +25,12 @@ def halves(scene: Scene) -> np.ndarray:
     """
     edges = _edges(scene)
     drive = np.searchsorted(edges[1:], scene.measurement.track.pose_t_s, side="right")
-    return np.array([bin(int(d)).count("1") % 2 for d in drive])
+    return thue_morse(drive)
+
+
+def thue_morse(number: np.ndarray) -> np.ndarray:
+    """(N,) 0 or 1: the sequence 0 1 1 0 1 0 0 1 ... at these places."""
+    return np.array([bin(int(n)).count("1") % 2 for n in number])
 
 
 def _edges(scene: Scene) -> np.ndarray:

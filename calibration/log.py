@@ -35,6 +35,8 @@ class RobotLog:
             the order front-left, front-right, rear-left, rear-right; twist: vx_mps, vy_mps,
             omega_radps, 0.
         battery_V: (M,) NaN where not measured.
+        frame_t_s: (M,) time stamp of the camera frame, robot's clock; NaN where there was none;
+            (0,) without telemetry.
         mode, detected_raw, detected: (M,) int8 as in telemetry_t; (0,) without telemetry.
         speed_input, turn_input: (M,) as in telemetry_t; (0,) without telemetry.
         pose_t_s: (N,) motion capture's clock, ascending.
@@ -50,6 +52,7 @@ class RobotLog:
     command_t_s: np.ndarray
     command: np.ndarray
     battery_V: np.ndarray
+    frame_t_s: np.ndarray
     mode: np.ndarray
     detected_raw: np.ndarray
     detected: np.ndarray
@@ -240,6 +243,7 @@ def _command_series(
         "command_t_s": np.empty(0),
         "command": np.empty((0, 4)),
         "battery_V": np.full(count, np.nan),
+        "frame_t_s": np.empty(0),
         "mode": np.empty(0, np.int8),
         "detected_raw": np.empty(0, np.int8),
         "detected": np.empty(0, np.int8),
@@ -256,6 +260,8 @@ def _command_series(
         series["battery_V"] = messages["battery_V"].astype(float)
         for name in ("mode", "detected_raw", "detected"):
             series[name] = messages[name].copy()
+        stamp_us = messages["frame_utime_us"].astype(np.int64)
+        series["frame_t_s"] = np.where(stamp_us > 0, (stamp_us - t0_us) / 1e6, np.nan)
         for name in ("speed_input", "turn_input"):
             series[name] = messages[name].astype(float)
     if not np.isfinite(command).all():

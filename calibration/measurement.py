@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import twinmill_native as native
+from twinmill.calibration.bits.frames import Frames, frames_of
 from twinmill.calibration.log import LogError, RobotLog, read_log
 from twinmill.calibration.steady.sheet import Sheet, is_sheet, read_sheets
 from twinmill.calibration.time_base import TimeBase, find_time_base, retimed
@@ -28,6 +29,7 @@ class Measurement:
         warnings: sentences of reading and cleaning.
         recorded_utime_us: earliest stamp in the log, us since the Unix epoch.
         time_base: of the log, where it was not what the stamps say; `track` has it put right.
+        frames: of the robot's camera; None if the log tells of none.
     """
 
     log_name: str
@@ -37,6 +39,7 @@ class Measurement:
     warnings: list[str]
     recorded_utime_us: int
     time_base: TimeBase | None = None
+    frames: Frames | None = None
 
     @property
     def label(self) -> str:
@@ -75,6 +78,7 @@ def load_measurements(paths: list[Path]) -> list[Measurement | Sheet]:
                     [*log.warnings, *([f"{base}; put right."] if base else []), *track.notes],
                     log.t0_utime_us,
                     base,
+                    frames_of(robot),
                 )
             )
     return measurements

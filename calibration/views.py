@@ -2,6 +2,7 @@
 """Facts and tables of a comparison, whatever was measured: logs, steady-state tables, or both."""
 
 from twinmill.calibration import tables
+from twinmill.calibration.bits.tables import bit_tables
 from twinmill.calibration.compare import Comparison
 from twinmill.calibration.steady import present
 from twinmill.calibration.steady.compare import SteadyComparison
@@ -27,4 +28,6 @@ def robot_tables(comparison: Comparison) -> list[Table]:
         made += [tables.errors(comparison.main), tables.where(comparison.main)]
     if steady := sheets(comparison):
         made += [present.errors(steady), present.cells(steady)]
+    if comparison.bits:
+        made += bit_tables(comparison.bits)
     return made

@@ -10,6 +10,8 @@ import typer
 from rich.console import RenderableType
 from twinmill.calibration import show
 from twinmill.calibration.add import AddResult, add
+from twinmill.calibration.bits import present as bits
+from twinmill.calibration.bits.add import BitAddition, add_to_camera, is_of_camera
 from twinmill.calibration.compare import Comparison, compare
 from twinmill.calibration.fit import FitResult, fit
 from twinmill.calibration.measurement import load_measurements
@@ -122,7 +124,7 @@ def _add(
     force: Force = False,
     as_json: AsJson = False,
     out: Out = None,
-) -> AddResult:
+) -> AddResult | BitAddition:
     """Add an effect to a model, fit it with all the rest, and judge it on data not fitted to.
 
     Example: twinmill add coasting run.lcmlog --model fitted.toml -o better.toml
@@ -132,6 +134,14 @@ def _add(
         command_line(f"add {effect}", logs, model, output), model_file := open_model(model, out)
     )
     check_output(output, model_file, force)
+    if is_of_camera(effect):
+        with busy(f"adding {effect} to {model}"):
+            seen = add_to_camera(
+                effect, load_measurements(logs), model_file, output, source.command
+            )
+        section = bits.addition_section(seen, model_file.path.name)
+        finish(seen.to_json(), bits.addition(seen), source, section, as_json, out)
+        return seen
     with busy(f"adding {effect} to {model}"):
         result = add(effect, load_measurements(logs), model_file, output, source.command)
     section = added_section(result)

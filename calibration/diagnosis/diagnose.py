@@ -5,6 +5,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
+from twinmill.calibration.bits.compare import BitComparison
+from twinmill.calibration.bits.merge import with_bits
 from twinmill.calibration.compare import GOOD, Comparison, comparison, open_scenes
 from twinmill.calibration.diagnosis.encoders import geometry_notes, time_base_notes
 from twinmill.calibration.diagnosis.evidence import State, over
@@ -16,7 +18,7 @@ from twinmill.calibration.floor import floor_of
 from twinmill.calibration.freedom import base_quantities, effect_names, effect_quantities
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import ModelFile
-from twinmill.calibration.solve import excited
+from twinmill.calibration.solve import Estimate, excited
 from twinmill.calibration.steady.limits import unseen_by_tables
 
 HELPED = 0.95  # a refit that lowers the score below this share of it was worth it
@@ -40,6 +42,8 @@ class Diagnosis:
         state: scenes with the model that has the found effects.
         notes: sentences on what to keep in mind.
         next_experiment: which run would settle what this log leaves open, or None.
+        bits: of the robots' cameras with the model as given, or None.
+        bit_estimates: of all effects of the camera, with what was found.
     """
 
     verdict: str
@@ -55,6 +59,8 @@ class Diagnosis:
     steps: list[tuple[str | None, float]]
     notes: list[str]
     next_experiment: dict | None
+    bits: BitComparison | None = None
+    bit_estimates: tuple[Estimate, ...] = ()
 
     def to_json(self) -> dict:
         """The interface's object."""
@@ -83,6 +89,7 @@ class Diagnosis:
                 for r in self.before.robots
                 if r.scene.measurement.time_base
             ],
+            "bits": self.bits.to_json() if self.bits else None,
             "notes": self.notes,
         }
 
@@ -125,7 +132,7 @@ def diagnose(
     noises = _noisier(model_file, final)
     told_apart = ["clock_rate"] if any(m.time_base for m in measurements) else []
     verdict = _verdict(before.score, fitted.score, names, ranking, share, bool(noises))
-    return Diagnosis(
+    of_motion = Diagnosis(
         verdict,
         _sentence(verdict, names, ranking, omnibus, noises),
         before,
@@ -140,6 +147,7 @@ def diagnose(
         noises + time_base_notes(final.scenes) + geometry_notes(final.model) + _clock_notes(final),
         _next_experiment(verdict, ranking, done),
     )
+    return with_bits(of_motion, given, model_file, say, barred)
 
 
 def _last(done: Search) -> float:

@@ -67,12 +67,13 @@ def explain(
     model = model_file.model.copy()
     for effect in diagnosis.found:
         model.add_effect(effect.split("#")[0])
-    for estimate in solution.estimates:
+    estimates = [*solution.estimates, *diagnosis.bit_estimates]
+    for estimate in estimates:
         model.set(estimate.name, estimate.value)
     logs = {m.log_name: m.log_sha256 for m in measurements}
     fitted = Fitted(
         model,
-        solution.estimates,
+        estimates,
         logs,
         diagnosis.before.score,
         after.score,
@@ -81,4 +82,4 @@ def explain(
         bool(model_file.told_by_others(logs.values())),
     )
     write_child(model_file, fitted, out, command)
-    return Explanation(diagnosis, after, solution.estimates, Path(out))
+    return Explanation(diagnosis, after, estimates, Path(out))

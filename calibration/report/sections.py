@@ -6,6 +6,7 @@ from twinmill.calibration.add import AddResult
 from twinmill.calibration.advice import advice
 from twinmill.calibration.compare import Comparison
 from twinmill.calibration.fit import FitResult
+from twinmill.calibration.report.bits_figures import field_of_view
 from twinmill.calibration.report.error_figures import error_growth, regimes, waterfall
 from twinmill.calibration.report.html import Figure, Section
 from twinmill.calibration.report.motion_figures import floor_map, path, speeds
@@ -22,7 +23,10 @@ def comparison_section(result: Comparison) -> Section:
         [_score("score", result.score)],
         result.verdict,
         views.facts(result),
-        _pictures(result, [("this model", robot)]),
+        [
+            *_pictures(result, [("this model", robot)]),
+            *([field_of_view(result.bits)] if result.bits else []),
+        ],
         views.robot_tables(result),
         advice(result),
         result.warnings,

@@ -93,6 +93,7 @@ def driven() -> Callable[..., RobotLog]:
             command_t_s=command_t_s,
             command=np.tile([0.5, 0.8, 0.5, 0.8], (count, 1)),
             battery_V=np.full(count, 8.0),
+            frame_t_s=np.full(count, np.nan),
             mode=flags,
             detected_raw=flags,
             detected=flags,

@@ -72,7 +72,7 @@ def encoder_log(straight, turning, offset_s, seed=1):
     nothing, count = np.empty(0), len(legs)
     return RobotLog(
         1, "robot", "", "wheel_speed", 0.01 * np.arange(count), wheels, np.full(count, np.nan),
-        nothing, nothing, nothing, nothing, nothing, seen_s, pose, np.zeros(len(seen_s)),
+        nothing, nothing, nothing, nothing, nothing, nothing, seen_s, pose, np.zeros(len(seen_s)),
         np.ones(len(seen_s), bool),
     )  # fmt: skip
 

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The camera's bit: predicted from measured poses, compared with what robots reported."""

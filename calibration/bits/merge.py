@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Puts what the camera's bits tell into a diagnosis of the motion."""
+
+from collections.abc import Callable, Collection
+from dataclasses import replace
+
+from twinmill.calibration.bits.compare import BitComparison, compare_bits
+from twinmill.calibration.bits.scene import bit_scenes
+from twinmill.calibration.bits.search import BitSearch, Round, Trial, search_bits
+from twinmill.calibration.diagnosis.ranking import Ranked
+from twinmill.calibration.model_file import ModelFile
+
+ADEQUATE = ("model_adequate", "refit_enough")
+
+
+def with_bits(
+    diagnosis,
+    scenes: list,
+    model_file: ModelFile,
+    say: Callable[[str], None],
+    barred: Collection[str] = (),
+):
+    """The diagnosis with the camera's effects in it; unchanged if no robot reported bits.
+
+    Args:
+        diagnosis: of the motion.
+        scenes: measurements with their clocks.
+        model_file: the model as given.
+        say: told in words what is being done.
+        barred: effects that are not to be thought of.
+    """
+    seen = bit_scenes(scenes)
+    if not seen:
+        return diagnosis
+    say("comparing the camera's bits")
+    bits = compare_bits(seen, model_file.model)
+    done = search_bits(seen, model_file.model, say, barred)
+    group = max((r.group or 0 for r in diagnosis.ranking), default=0)
+    ranking = rank_bits(done, group)
+    tied = any(r.tied for r in done.rounds)
+    verdict = diagnosis.verdict
+    if done.found and verdict in (*ADEQUATE, "effect_missing"):
+        verdict = "ambiguous" if tied else "effect_missing"
+    return replace(
+        diagnosis,
+        verdict=verdict,
+        sentence=_sentence(diagnosis, done),
+        found=[*diagnosis.found, *done.found],
+        ranking=[*ranking, *diagnosis.ranking] if done.found else [*diagnosis.ranking, *ranking],
+        not_identifiable=[*diagnosis.not_identifiable, *done.hidden],
+        notes=[*diagnosis.notes, *_notes(bits)],
+        bits=bits,
+        bit_estimates=done.estimates,
+    )
+
+
+def rank_bits(done: BitSearch, group: int) -> list[Ranked]:
+    """Accepted effects with those that do as well, then the first round's rest."""
+    total = sum(r.accepted.gain for r in done.rounds if r.accepted)
+    ranking = []
+    for this in done.rounds:
+        if this.accepted is None:
+            continue
+        number = None
+        if this.tied:
+            group += 1
+            number = group
+        ranking += [_entry(t, done, total, number) for t in (this.accepted, *this.tied)]
+    named = {r.effect for r in ranking}
+    rest = [t for t in done.rounds[0].trials if t.effect not in named]
+    return ranking + [_entry(t, done, total, None) for t in rest]
+
+
+def _entry(trial: Trial, done: BitSearch, total: float, group: int | None) -> Ranked:
+    return Ranked(
+        trial.effect or "",
+        trial.score,
+        max(trial.gain, 0.0) / max(total, trial.gain, 1e-9),
+        trial.p_value(len(done.candidates)),
+        trial.log_ratio,
+        list(trial.own),
+        group,
+    )
+
+
+def _sentence(diagnosis, done: BitSearch) -> str:
+    if not done.found:
+        return diagnosis.sentence
+    told = " ".join(_of_round(r) for r in done.rounds if r.accepted)
+    return told if diagnosis.verdict in ADEQUATE else f"{diagnosis.sentence} {told}"
+
+
+def _of_round(this: Round) -> str:
+    assert this.accepted is not None
+    if this.tied:
+        names = " or ".join(str(t.effect) for t in (this.accepted, *this.tied))
+        return f"The camera's bits lack one of {names}; these logs cannot tell which."
+    values = ", ".join(_value(e) for e in this.accepted.own)
+    return f"The camera's bits lack {this.accepted.effect} ({values})."
+
+
+def _value(estimate) -> str:
+    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
+    return f"{estimate.name.split('.')[1]} {estimate.value:.3g}{unit}"
+
+
+def _notes(bits: BitComparison | None) -> list[str]:
+    if bits and not bits.raw:
+        return ["The logs keep the voted bits alone: delays and misses blur into the vote."]
+    return []
