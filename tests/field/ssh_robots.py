@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots to flash: a real ssh server each, and below it a pretended Debian with the real program.
 
-Each robot is a folder: `root` is its file system (robot.sh's TURBOPI_ROOT), `bin` has stand-ins for
-what would change this machine. The package is unpacked by the real dpkg-deb, and the service is the
+Each robot is a folder: `system` is its file system (robot.sh's TURBOPI_ROOT), `bin` has stand-ins
+for what would change this machine. The package is unpacked by the real dpkg-deb, and the service is the
 program that it brought.
 """
 
@@ -24,9 +24,10 @@ case $1 in
             echo "dpkg: dependency problems: turbopi depends on liblcm1" >&2
             exit 1
         fi
-        cp -a "$ROBOT/root/etc/turbopi/turbopi.conf" "$ROBOT/kept.conf" || true
-        dpkg-deb --extract "$package" "$ROBOT/root"
-        [ ! -e "$ROBOT/kept.conf" ] || mv "$ROBOT/kept.conf" "$ROBOT/root/etc/turbopi/turbopi.conf"
+        conf=$ROBOT/system/etc/turbopi/turbopi.conf
+        cp -a "$conf" "$ROBOT/kept.conf"
+        dpkg-deb --extract "$package" "$ROBOT/system"
+        mv "$ROBOT/kept.conf" "$conf"
         dpkg-deb --field "$package" Version >"$ROBOT/installed" ;;
 esac""",
     "apt-get": "exit 100",
@@ -37,7 +38,7 @@ case $1 in
     restart)
         [ ! -e "$ROBOT/pid" ] || kill "$(cat "$ROBOT/pid")" 2>/dev/null || true
         [ -e "$ROBOT/dies" ] && exit 0
-        turbopi --config "$ROBOT/root/etc/turbopi/turbopi.conf" >"$ROBOT/journal" 2>&1 &
+        turbopi --config "$ROBOT/system/etc/turbopi/turbopi.conf" >"$ROBOT/journal" 2>&1 &
         echo $! >"$ROBOT/pid" ;;
     stop) kill "$(cat "$ROBOT/pid")" ;;
     is-active) kill -0 "$(cat "$ROBOT/pid" 2>/dev/null || echo none)" 2>/dev/null ;;
@@ -78,7 +79,7 @@ class SshRobot:
 
     def __init__(self, folder: Path, name: str, port: int, key: Path):
         self.folder, self.name, self.port = folder / name, name, port
-        for path in ("bin", "root/var/lib", "root/usr/bin", "root/etc/turbopi"):
+        for path in ("bin", "system/var/lib", "system/usr/bin", "system/etc/turbopi"):
             (self.folder / path).mkdir(parents=True)
         for stub, text in STUBS.items():
             path = self.folder / "bin" / stub
@@ -92,9 +93,9 @@ class SshRobot:
         subprocess.run(
             ["dropbearkey", "-t", "ed25519", "-f", host_key], check=True, capture_output=True
         )
-        path = f"{self.folder}/bin:{self.folder}/root/usr/bin:{os.environ['PATH']}"
+        path = f"{self.folder}/bin:{self.folder}/system/usr/bin:{os.environ['PATH']}"
         forced = (
-            f"env ROBOT={self.folder} TURBOPI_ROOT={self.folder}/root PATH={path} "
+            f"env ROBOT={self.folder} TURBOPI_ROOT={self.folder}/system PATH={path} "
             'sh -c "$SSH_ORIGINAL_COMMAND"'
         )
         server = ["dropbear", "-F", "-e", "-s", "-p", f"127.0.0.1:{port}", "-r", str(host_key)]
@@ -109,7 +110,7 @@ class SshRobot:
 
     @property
     def config(self) -> Path:
-        return self.folder / "root/etc/turbopi/turbopi.conf"
+        return self.folder / "system/etc/turbopi/turbopi.conf"
 
     def write(self, **files: str) -> None:
         """Sets what the stand-ins answer."""

@@ -149,8 +149,8 @@ def start(
             stop(fleet, robots)
         else:
             fleet.listen(instant_s - time.monotonic())
-            fleet.listen(0.5, lambda: all(not stands(fleet.robots[a.robot_id]) for a in given
-                                          if a.accepted))  # fmt: skip
+            accepted = [fleet.robots[a.robot_id] for a in given if a.accepted]
+            fleet.listen(0.5, lambda: not any(map(stands, accepted)))
     except BaseException:
         stop(fleet, robots)
         raise
