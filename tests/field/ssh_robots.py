@@ -2,8 +2,8 @@
 """Robots to flash: a real ssh server each, and below it a pretended Debian with the real program.
 
 Each robot is a folder: `system` is its file system (robot.sh's TURBOPI_ROOT), `bin` has stand-ins
-for what would change this machine. The package is unpacked by the real dpkg-deb, and the service is the
-program that it brought.
+for what would change this machine. The package is unpacked by the real dpkg-deb, and the service is
+the program that it brought.
 """
 
 import os

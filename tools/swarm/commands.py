@@ -188,7 +188,7 @@ def status_table(robots: list[Robot]) -> Table | Text:
     """One row a robot."""
     if not robots:
         return Text("No robot is heard.")
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    table = Table(box=None, padding=(0, 1, 0, 0))
     for column in ("robot", "source", "version", "behaviour", "mode", "battery", "camera"):
         table.add_column(column, no_wrap=True)
     for column in ("sees", "clock", "silent"):
@@ -203,7 +203,10 @@ def status_table(robots: list[Robot]) -> Table | Text:
             _battery(t),
             Text(robot.camera, "red" if robot.camera in ("lost", "no frames") else ""),
             _sees(robot),
-            Text(f"{robot.clock_s:+.2f} s", "red" if abs(robot.clock_s) > CLOCK_WARN_S else ""),
+            Text(
+                f"{round(robot.clock_s, 2) + 0:+.2f} s",
+                "red" if abs(robot.clock_s) > CLOCK_WARN_S else "",
+            ),
             Text(f"{silent_s:.1f} s", "" if robot.is_here else "red"),
         )
     return table
@@ -220,4 +223,4 @@ def _sees(robot: Robot) -> Text:
     if not robot.recent:
         return Text("?")
     mark = "● " if robot.telemetry.detected else "○ "
-    return Text(f"{mark}{100 * robot.detected_frac:3.0f} %")
+    return Text(f"{mark}{100 * robot.detected_frac:.0f} %")
