@@ -72,7 +72,7 @@ def _script(name: str, limit_s: float = SETUP_LIMIT_S) -> str:
         [HERE / name, KERNEL], capture_output=True, text=True, timeout=limit_s, check=False
     )
     if done.returncode == CANNOT:
-        raise CannotRun(done.stderr.strip().splitlines()[-1])
+        raise CannotRun(done.stderr.strip().splitlines()[-1].removeprefix("hil: "))
     if done.returncode:
         raise RuntimeError(f"{name} failed:\n{done.stdout}{done.stderr}")
     return done.stdout.strip()
