@@ -14,11 +14,11 @@ build:
 
 # All tests in C, C++ and Python, and the lint.
 check: build
-	@$(CTEST) --label-exclude long
+	@$(CTEST) --label-exclude '^long$$'
 
 # What takes minutes and seldom fails: the emulated robot with a newer kernel and a whole system.
 check-long: build
-	@$(CTEST) --label-regex long
+	@$(CTEST) --label-regex '^long$$'
 
 demo: build
 	@$(PYTHON) -m twinmill.tools.demo

@@ -28,20 +28,25 @@ SETTINGS = (
 class Watched:
     """A robot whose camera shows `view`, whoever started its program."""
 
-    def __init__(self, rig: Rig, camera: str = LOOPBACK):
+    def __init__(
+        self,
+        rig: Rig,
+        camera: str = LOOPBACK,
+        size_px: tuple[int, int] = (WIDTH_PX, HEIGHT_PX),
+    ):
         self.rig = rig
         self.view = GREEN
         rig.mend()
         if camera == LOOPBACK:
-            self._open_loopback()
+            self._open_loopback(size_px)
         self.first = len(rig.duties)
         self.telemetry_first = len(rig.telemetry)
 
-    def _open_loopback(self):
-        result, _ = self.rig.words("o", LOOPBACK, WIDTH_PX, HEIGHT_PX)
+    def _open_loopback(self, size_px: tuple[int, int]):
+        result, _ = self.rig.words("o", LOOPBACK, *size_px)
         assert result == 0
-        # Without a first frame the driver refuses its readers; half a one decides nothing.
-        self.show(RED[: len(RED) // 2])
+        # Without a first frame the driver refuses its readers; a part of one decides nothing.
+        self.show(RED[:4])
 
     def show(self, frame: bytes) -> float:
         """Gives the camera one frame, or a part of one. Returns when (guest, s)."""
@@ -94,8 +99,8 @@ class Watched:
 class Robot(Watched):
     """The running program; as a context it is ended at the end, and the motors are at zero."""
 
-    def __init__(self, rig: Rig, *arguments: str, camera: str = LOOPBACK):
-        super().__init__(rig, camera)
+    def __init__(self, rig: Rig, *arguments: str, camera: str = LOOPBACK, **watching):
+        super().__init__(rig, camera, **watching)
         self.pid = rig.start(PROGRAM, *SETTINGS, "--camera", camera, *arguments)
 
     def __enter__(self):
