@@ -126,7 +126,9 @@ class Rig:
         kernel = ROOT / ".deps/hil" / KERNEL / "vmlinuz"
         port = f"{self._folder}/port"
         command = (
-            "qemu-system-aarch64 -M virt -accel tcg,thread=multi -cpu cortex-a53 -nodefaults"
+            # Even if this process is killed, QEMU does not outlive it.
+            "setpriv --pdeathsig KILL qemu-system-aarch64"
+            " -M virt -accel tcg,thread=multi -cpu cortex-a53 -nodefaults"
             f" -m {memory_mb}M -display none -monitor none -no-reboot -device virtio-serial-pci"
             " -device virtserialport,chardev=port,name=hil.0"
         ).split()
