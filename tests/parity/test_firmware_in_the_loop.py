@@ -51,6 +51,8 @@ def test_a_delayed_sensor_delays_the_program_alike(tmp_path):
     model = tmp_path / "late.toml"
     installed = Path(__file__).parents[2] / "twin/models/turbopi/turbopi.toml"
     text = installed.read_text().replace("vote_frames = 10", "vote_frames = 3\ndelay_s = 0.1")
+    effects = {"view_pan": "pan_rad = 0.2\n", "vote": "extra_frames = 1\n"}
+    text += "".join(f'[[effect]]\nname = "{name}"\n{rest}' for name, rest in effects.items())
     model.write_text(text)
     alone, looped = tmp_path / "alone.lcmlog", tmp_path / "looped.lcmlog"
     assert run(alone, "--model", model).returncode == 0

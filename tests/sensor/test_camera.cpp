@@ -193,10 +193,35 @@ TEST(Camera, SameSeedSameBytes)
     EXPECT_NE(draw(1, 2), draw(1, 3));
 }
 
+// A target straight ahead of a camera that looks left by the pan lands right of the middle.
+TEST(CameraEye, LooksWhereItsPanSays)
+{
+    Sight sight;
+    sight.pan_rad = 0.3;
+    CameraEye eye({}, 0, sight, 1);
+    const fw_config config = fw_config_default();
+    fw_ctx firmware{};
+    ASSERT_EQ(fw_init(&firmware, &config), FW_OK);
+    fw_output out;
+    eye.Decide(std::vector<Pose2>{{}, {0.8, 0, 0}}, 1, firmware, out);
+    const Picture picture = eye.LastPicture();
+    double columns = 0, count = 0;
+    for (size_t i = 3; i < picture.yuyv.size(); i += 4)
+        if (picture.yuyv[i] < 100)
+        {
+            columns += static_cast<double>(i % 1280) / 2;
+            ++count;
+        }
+    const Lens lens;
+    EXPECT_NEAR(columns / count, 320 + lens.focal_px * lens.Radius(0.3), 4);
+}
+
 TEST(CameraEye, AFrameArrivesAfterItsDelay)
 {
     const CameraWorld world;
-    CameraEye eye(world, 0, 0.05, 1);
+    Sight sight;
+    sight.delay_s = 0.05;
+    CameraEye eye(world, 0, sight, 1);
     fw_config config = fw_config_default();
     fw_ctx firmware{};
     ASSERT_EQ(fw_init(&firmware, &config), FW_OK);

@@ -44,8 +44,8 @@ void UseCameras(Swarm &swarm, const CameraWorld &world, const std::vector<Model>
 {
     for (int i = 0; i < swarm.Size(); ++i)
     {
-        const double delay_s = robots[static_cast<size_t>(i)].sensor.delay_s;
-        swarm.LookThrough(i, std::make_unique<CameraEye>(world, i, delay_s, seed));
+        const Sight sight = robots[static_cast<size_t>(i)].MakeSight();
+        swarm.LookThrough(i, std::make_unique<CameraEye>(world, i, sight, seed));
     }
 }
 

@@ -2,7 +2,6 @@
 #include "hil_options.h"
 
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <filesystem>
 
 #include "hil/firmware_eye.h"
@@ -49,12 +48,9 @@ void UseFirmware(Swarm &swarm, const HilOptions &options, const CameraWorld &wor
     for (int i = 0; i < options.robots; ++i)
     {
         const size_t k = static_cast<size_t>(i);
-        const Sensor &sensor = robots[k].sensor;
-        const FirmwareOptions firmware{program, behaviors[k]->name,
-                                       static_cast<int>(std::lround(sensor.vote_frames)),
-                                       !options.free_run};
-        swarm.LookThrough(i,
-                          std::make_unique<FirmwareEye>(firmware, world, i, sensor.delay_s, seed));
+        const Sight sight = robots[k].MakeSight();
+        const FirmwareOptions firmware{program, behaviors[k]->name, !options.free_run};
+        swarm.LookThrough(i, std::make_unique<FirmwareEye>(firmware, world, i, sight, seed));
     }
 }
 

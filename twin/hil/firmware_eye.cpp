@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/firmware_eye.h"
 
+#include <cmath>
 #include <cstring>
 
 #include "process.h"
@@ -9,9 +10,10 @@ namespace twin
 {
 
 FirmwareEye::FirmwareEye(const FirmwareOptions &options, const CameraWorld &world, int robot,
-                         double delay_s, uint64_t seed)
-    : CameraEye(world, robot, delay_s, seed),
-      process_(std::make_unique<Process>(options, world.settings, robot)),
+                         const Sight &sight, uint64_t seed)
+    : CameraEye(world, robot, sight, seed),
+      process_(std::make_unique<Process>(options, world.settings, robot,
+                                         static_cast<int>(std::lround(sight.vote_frames)))),
       lockstep_(options.lockstep)
 {
 }

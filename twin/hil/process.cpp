@@ -27,7 +27,7 @@ constexpr int kPatience_ms = 10000, kEndPatience_ms = 2000, kPoll_ms = 10;
 constexpr size_t kAnswerBytes = 8;
 
 std::vector<std::string> CommandLine(const FirmwareOptions &options, const CameraSettings &camera,
-                                     int robot, const std::string &socket)
+                                     int robot, int vote_frames, const std::string &socket)
 {
     const auto set = [](const std::string &key, int value) {
         return key + "=" + std::to_string(value);
@@ -47,7 +47,7 @@ std::vector<std::string> CommandLine(const FirmwareOptions &options, const Camer
                                    "--start"};
     for (const std::string &pair :
          {set("robot_id", robot), set("width_px", camera.width_px),
-          set("height_px", camera.height_px), set("vote_frames", options.vote_frames),
+          set("height_px", camera.height_px), set("vote_frames", vote_frames),
           set("vote_window_ms", 0), set("frame_timeout_ms", kPatience_ms), set("restart_ms", -1),
           std::string("panel=none")})
     {
@@ -60,7 +60,7 @@ std::vector<std::string> CommandLine(const FirmwareOptions &options, const Camer
 }  // namespace
 
 FirmwareEye::Process::Process(const FirmwareOptions &options, const CameraSettings &camera,
-                              int robot)
+                              int robot, int vote_frames)
     : name_("robot " + std::to_string(robot) + ", " + options.program)
 {
     if (access(options.program.c_str(), X_OK) != 0)
@@ -68,7 +68,7 @@ FirmwareEye::Process::Process(const FirmwareOptions &options, const CameraSettin
                                  ": is no program that can be run: build turbopi, or name it");
     try
     {
-        Start(options, camera, robot);
+        Start(options, camera, robot, vote_frames);
         Accept();
     }
     catch (...)
@@ -89,7 +89,7 @@ void FirmwareEye::Process::Fail(const std::string &what) const
 }
 
 void FirmwareEye::Process::Start(const FirmwareOptions &options, const CameraSettings &camera,
-                                 int robot)
+                                 int robot, int vote_frames)
 {
     std::string folder = (std::filesystem::temp_directory_path() / "twin_hil_XXXXXX").string();
     if (!mkdtemp(folder.data()))
@@ -104,7 +104,7 @@ void FirmwareEye::Process::Start(const FirmwareOptions &options, const CameraSet
         listen(listener_, 1) != 0)
         Fail("no socket at " + path + ": " + std::strerror(errno));
 
-    std::vector<std::string> words = CommandLine(options, camera, robot, path);
+    std::vector<std::string> words = CommandLine(options, camera, robot, vote_frames, path);
     std::vector<char *> arguments;
     for (std::string &word : words)
         arguments.push_back(word.data());

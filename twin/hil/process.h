@@ -19,7 +19,8 @@ namespace twin
 class FirmwareEye::Process
 {
 public:
-    Process(const FirmwareOptions &options, const CameraSettings &camera, int robot);
+    Process(const FirmwareOptions &options, const CameraSettings &camera, int robot,
+            int vote_frames);
     ~Process();
     Process(const Process &) = delete;
 
@@ -29,7 +30,8 @@ public:
     const std::array<int8_t, FW_WHEEL_COUNT> &wheel_duty_pct() const { return wheel_duty_pct_; }
 
 private:
-    void Start(const FirmwareOptions &options, const CameraSettings &camera, int robot);
+    void Start(const FirmwareOptions &options, const CameraSettings &camera, int robot,
+               int vote_frames);
     void Accept();
     void End();
     [[noreturn]] void Fail(const std::string &what) const;

@@ -6,17 +6,29 @@
 namespace twin
 {
 
-CameraEye::CameraEye(const CameraWorld &world, int robot, double delay_s, uint64_t seed)
+namespace
+{
+
+CameraSettings Panned(CameraSettings settings, double pan_rad)
+{
+    settings.pan_rad += pan_rad;
+    return settings;
+}
+
+}  // namespace
+
+CameraEye::CameraEye(const CameraWorld &world, int robot, const Sight &sight, uint64_t seed)
     : world_(world),
       self_(static_cast<size_t>(robot)),
-      camera_(world.settings, robot, seed),
-      delay_us_(std::llround(delay_s * 1e6))
+      camera_(Panned(world.settings, sight.pan_rad), robot, seed),
+      age_us_(std::llround(sight.age_s * 1e6)),
+      delay_us_(std::llround(sight.delay_s * 1e6))
 {
 }
 
 std::optional<fw_frame> CameraEye::NextFrame(std::span<const Pose2> poses, int64_t now_us)
 {
-    on_the_way_.push_back({{poses.begin(), poses.end()}, now_us, seq_++});
+    on_the_way_.push_back({{poses.begin(), poses.end()}, now_us + age_us_, seq_++});
     std::optional<Exposure> due;
     while (!on_the_way_.empty() && on_the_way_.front().utime_us + delay_us_ <= now_us)
     {

@@ -97,8 +97,8 @@ void Painter::Frame(const Swarm &swarm)
 void Painter::AddCone(const RobotState &state, const ViewCone &cone, bool detected)
 {
     const auto rim = [&](int step, mjtNum at[3]) {
-        const double angle_rad =
-            state.pose.theta_rad + cone.angle_rad * (static_cast<double>(step) / kFanSteps - 0.5);
+        const double part = static_cast<double>(step) / kFanSteps - 0.5;
+        const double angle_rad = state.pose.theta_rad + cone.pan_rad + cone.angle_rad * part;
         at[0] = state.pose.x_m + cone.range_m * std::cos(angle_rad);
         at[1] = state.pose.y_m + cone.range_m * std::sin(angle_rad);
         at[2] = kFanHeight_m;

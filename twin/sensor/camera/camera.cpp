@@ -23,11 +23,17 @@ void CheckSettings(const CameraSettings &s)
                                     " pixels: the width must be even, both above zero");
 }
 
-// From the camera's axes to the robot's: it looks down by the tilt.
-Eigen::Matrix3d CameraToBody(double tilt_rad)
+Eigen::Matrix3d Turn(double yaw_rad)
+{
+    const double c = std::cos(yaw_rad), s = std::sin(yaw_rad);
+    return Eigen::Matrix3d{{c, -s, 0}, {s, c, 0}, {0, 0, 1}};
+}
+
+// From the camera's axes to the robot's: it looks left by the pan, then down by the tilt.
+Eigen::Matrix3d CameraToBody(double pan_rad, double tilt_rad)
 {
     const double c = std::cos(tilt_rad), s = std::sin(tilt_rad);
-    return Eigen::Matrix3d{{c, 0, s}, {0, 1, 0}, {-s, 0, c}};
+    return Turn(pan_rad) * Eigen::Matrix3d{{c, 0, s}, {0, 1, 0}, {-s, 0, c}};
 }
 
 // `value` times gain_256 / 256 about `zero`, plus noise, within what BT.601 allows.
@@ -35,12 +41,6 @@ uint8_t Exposed(int value, int zero, int gain_256, int noise)
 {
     const int scaled = zero + (((value - zero) * gain_256 + 128) >> 8) + noise;
     return static_cast<uint8_t>(std::clamp(scaled, 1, 254));
-}
-
-Eigen::Matrix3d Turn(double yaw_rad)
-{
-    const double c = std::cos(yaw_rad), s = std::sin(yaw_rad);
-    return Eigen::Matrix3d{{c, -s, 0}, {s, c, 0}, {0, 0, 1}};
 }
 
 }  // namespace
@@ -68,7 +68,7 @@ const std::vector<uint8_t> &Camera::Draw(const Scene &scene, const Pose2 &robot)
 {
     const Eigen::Matrix3d body_to_world = Turn(robot.theta_rad);
     const Eigen::Matrix3d world_to_camera =
-        (body_to_world * CameraToBody(settings_.tilt_rad)).transpose();
+        (body_to_world * CameraToBody(settings_.pan_rad, settings_.tilt_rad)).transpose();
     const Eigen::Vector3d eye_m =
         Eigen::Vector3d(robot.x_m, robot.y_m, 0) +
         body_to_world * Eigen::Vector3d(settings_.forward_m, 0, settings_.height_m);

@@ -17,7 +17,6 @@ struct FirmwareOptions
 {
     std::string program;  // turbopi
     std::string behavior;
-    int vote_frames = 1;
     // Waits for the answer to each frame: same seed, same run. Else takes the newest answer there
     // is, as the wheels of a robot would.
     bool lockstep = true;
@@ -27,8 +26,8 @@ class FirmwareEye final : public CameraEye
 {
 public:
     // Starts the program. Throws std::runtime_error in one sentence if it does not come up.
-    FirmwareEye(const FirmwareOptions &options, const CameraWorld &world, int robot, double delay_s,
-                uint64_t seed);
+    FirmwareEye(const FirmwareOptions &options, const CameraWorld &world, int robot,
+                const Sight &sight, uint64_t seed);
     ~FirmwareEye() override;
 
     // All but the duties is what the built-in firmware says of the same frame. Throws

@@ -17,8 +17,8 @@ struct CameraSettings
 {
     int width_px = 640, height_px = 480;
     Lens lens;
-    // Place on the robot, as in turbopi.xml; looks ahead, and down by the tilt.
-    double forward_m = 0.073, height_m = 0.125, tilt_rad = 0;
+    // Place on the robot, as in turbopi.xml; looks ahead, but left by the pan and down by the tilt.
+    double forward_m = 0.073, height_m = 0.125, pan_rad = 0, tilt_rad = 0;
     // Brightness differs by this from robot to robot, and from frame to frame (assumed).
     double exposure_std = 0.05, flicker_std = 0.01;
     // White noise of each byte (assumed).

@@ -24,8 +24,9 @@ struct CameraWorld
 class CameraEye : public Eye
 {
 public:
-    // A frame reaches the firmware `delay_s` after its exposure.
-    CameraEye(const CameraWorld &world, int robot, double delay_s, uint64_t seed);
+    // Of `sight`, a picture has the pan and the delays: a frame's time stamp is age_s after its
+    // exposure, and it reaches the firmware delay_s after that. The rest is in the pixels.
+    CameraEye(const CameraWorld &world, int robot, const Sight &sight, uint64_t seed);
 
     void Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
                 fw_output &out) override;
@@ -43,13 +44,13 @@ private:
     struct Exposure
     {
         std::vector<Pose2> poses;
-        int64_t utime_us;
+        int64_t utime_us;  // time stamp
         uint32_t seq;
     };
     CameraWorld world_;
     size_t self_;
     Camera camera_;
-    int64_t delay_us_;
+    int64_t age_us_, delay_us_;
     uint32_t seq_ = 0;
     std::deque<Exposure> on_the_way_;
     std::vector<uint8_t> frame_;

@@ -15,7 +15,7 @@ namespace twin
 // What a robot looks over, drawn on the floor.
 struct ViewCone
 {
-    double range_m, angle_rad;
+    double range_m, angle_rad, pan_rad;
 };
 
 struct ViewOptions
