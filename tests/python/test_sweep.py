@@ -164,3 +164,11 @@ def test_effects_take_the_full_path_and_say_so(tmp_path: Path):
     assert data["kernels"] == {"full": 2}
     assert data["why_full"]
     assert pq.read_table(tmp_path / "s" / "sweep.parquet")["kernel"].to_pylist() == ["full"] * 2
+
+
+def test_the_program_tells_what_is_wrong_in_one_line(tmp_path: Path):
+    command = [sys.executable, "-m", "twinmill.tools.sweep.command", "--x", "speed=1:2:3"]
+    done = subprocess.run([*command, "--out", tmp_path / "s"], capture_output=True, text=True)
+    assert done.returncode == 1 and done.stdout == ""
+    assert done.stderr.startswith("twin_sweep: there is no axis 'speed'")
+    assert done.stderr.count("\n") == 1 and not (tmp_path / "s").exists()

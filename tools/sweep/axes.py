@@ -62,6 +62,11 @@ class Axis:
         """For people."""
         return QUANTITIES[self.name].label if self.name in QUANTITIES else self.name
 
+    @property
+    def whole(self) -> bool:
+        """Whether it counts."""
+        return self.name in QUANTITIES and QUANTITIES[self.name].whole
+
 
 def parse_axis(text: str, model: native.Model) -> Axis:
     """`name=from:to:count` or `name=value,value,...`.
@@ -74,13 +79,13 @@ def parse_axis(text: str, model: native.Model) -> Axis:
     if not equals:
         raise ValueError(f"'{text}': write an axis as name=from:to:count or name=value,value,...")
     _check_name(name, model)
-    values = _values(text, rest)
-    if name in QUANTITIES and QUANTITIES[name].whole and any(v != round(v) for v in values):
+    axis = Axis(name, _values(text, rest))
+    if axis.whole and any(value != round(value) for value in axis.values):
         raise ValueError(
             f"'{text}': {name} counts in whole numbers, but this asks for "
-            f"{', '.join(f'{v:g}' for v in values[:4])} ...; choose from, to and count to fit."
+            f"{', '.join(f'{v:g}' for v in axis.values[:4])} ...; choose from, to and count to fit."
         )
-    return Axis(name, values)
+    return axis
 
 
 def _check_name(name: str, model: native.Model) -> None:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The program twin_sweep. Python drives it, for tables, clusters and progress; C++ simulates."""
 
-import os
 import sys
 import time
 from collections import Counter
@@ -19,6 +18,7 @@ from twinmill.tools.sweep.request import Request
 from twinmill.tools.sweep.store import Store, read_sweep
 from twinmill.tools.sweep.workers import run_here, run_on_dask
 
+INTERRUPTED = 130  # what typer makes of Ctrl-C
 AXIS_HELP = "name=from:to:count or name=value,value,..."
 app = typer.Typer(
     add_completion=False,
@@ -218,9 +218,8 @@ def main() -> None:
     except (ValueError, OSError) as error:
         code = 1
         print(f"twin_sweep: {' '.join(str(error).split())}", file=sys.stderr)
-    except KeyboardInterrupt:
+    if code == INTERRUPTED:
         print("twin_sweep: stopped; the same command goes on from here.", file=sys.stderr)
-        os._exit(130)
     sys.exit(code)
 
 

@@ -121,11 +121,11 @@ def next_cells(phase: Phase, rival: Phase | None, done: set[int]) -> list[dict]:
         ValueError: the rival's axes are others.
     """
     if rival is None:
-        worth = entropy_bits(phase.share)
+        worth = entropy_bits(phase.outcomes)
     else:
         if rival.axes != phase.axes:
             raise ValueError("--rival: that sweep has other axes; run it with the same ones.")
-        worth = divergence_bits(phase.share, rival.share)
+        worth = divergence_bits(phase.outcomes, rival.outcomes)
     chosen = []
     for cell in np.argsort(-worth, kind="stable"):
         if worth[cell] <= 0 or len(chosen) == NEXT:

@@ -55,6 +55,14 @@ class Phase:
         """(C, classes) probability of each class."""
         return self.counts / self.seeds
 
+    @property
+    def outcomes(self) -> np.ndarray:
+        """(C, kinds) probabilities of what a run can show: the classes, or goal and no goal."""
+        if self.goal in CLASSES:
+            return self.share
+        hit = self.hits / self.seeds
+        return np.stack([hit, 1 - hit], axis=1)
+
     def intervals(self) -> np.ndarray:
         """(C, 2) 95 % interval of the probability of the goal."""
         return np.array([interval(hits, self.seeds) for hits in self.hits])

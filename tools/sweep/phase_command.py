@@ -96,7 +96,8 @@ def _phase(
         **source.to_json(),
         "report": str(report),
     }
-    deliver(data, f"{section.verdict}\n{section.next_step}\nReport: {report}".strip(), as_json)
+    lines = [section.verdict, section.next_step, f"Report: {report}"]
+    deliver(data, "\n".join(filter(None, lines)), as_json)
     return data
 
 

@@ -151,9 +151,9 @@ def run_part(request: Request, worlds: range) -> dict[str, list]:
     )
     columns: dict[str, list] = {"cell": cell_of.tolist(), "seed": seeds.tolist()}
     for a, axis in enumerate(request.axes):
-        columns[axis.name] = [points[c][a] for c in cell_of]
-    if "n" not in columns:
-        columns["n"] = [float(request.robots(points[c])) for c in cell_of]
+        kind = int if axis.whole else float
+        columns[axis.name] = [kind(points[c][a]) for c in cell_of]
+    columns["n"] = [request.robots(points[c]) for c in cell_of]
     for k, name in enumerate([*native.METRICS, "least_diffusion"]):
         columns[name] = rows[:, k].tolist()
     columns["class"] = native.classify(rows)

@@ -34,6 +34,12 @@ double Random::Uniform()
     return static_cast<double>(engine_() >> 11) * 0x1p-53;
 }
 
+void Random::Uniform(double *first, size_t stride, int count)
+{
+    for (int i = 0; i < count; ++i)
+        first[static_cast<size_t>(i) * stride] = static_cast<double>(engine_() >> 11) * 0x1p-53;
+}
+
 double Random::Normal()
 {
     if (has_spare_)

@@ -105,10 +105,8 @@ public:
         double *aligned = Aligned(chances);
         for (int from = 0; from < steps_; from += kBlock)
         {
-            double *next = aligned;
-            for (int step = 0; step < kBlock; ++step)
-                for (Random &stream : streams)
-                    *next++ = stream.Uniform();
+            for (size_t i = 0; i < streams.size(); ++i)
+                streams[i].Uniform(aligned + i, streams.size(), kBlock);
             advance_(plan_, numbers_, aligned, from, std::min(from + kBlock, steps_));
         }
     }

@@ -3,6 +3,7 @@
 #ifndef PLANT_RANDOM_H
 #define PLANT_RANDOM_H
 
+#include <cstddef>
 #include <cstdint>
 #include <random>
 #include <string_view>
@@ -16,7 +17,9 @@ class Random
 public:
     Random(uint64_t seed, int robot, std::string_view name);
     double Uniform();  // [0, 1)
-    double Normal();   // mean 0, standard deviation 1 (Box and Muller 1958)
+    // The next `count` of them, each `stride` after the one before.
+    void Uniform(double *first, size_t stride, int count);
+    double Normal();  // mean 0, standard deviation 1 (Box and Muller 1958)
 
 private:
     std::mt19937_64 engine_;
