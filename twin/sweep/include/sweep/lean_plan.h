@@ -86,7 +86,8 @@ struct LeanPlan
 // frames on the way, frames that vote.
 struct LeanLayout
 {
-    explicit LeanLayout(const LeanPlan &p)
+    // Always inlined: see lanes.h on inline functions that are compiled for several processors.
+    [[gnu::always_inline]] explicit LeanLayout(const LeanPlan &p)
         : range(kLeanColumns * p.n),
           sums(range + 1),
           seen(sums + kLeanSums),
