@@ -27,9 +27,10 @@ demo: build
 bench: build
 	@[ -d .deps/bench/cv2 ] || $(PYTHON) -m pip install --quiet --no-deps --target .deps/bench \
 	    --requirement benchmarks/requirements.txt
-	@cmake --build build --target bench bench_sweep >/dev/null
+	@cmake --build build --target bench bench_plant bench_sweep >/dev/null
 	@PYTHONPATH=.deps/bench $(PYTHON) benchmarks/run.py
 	@build/bin/bench_sweep
+	@build/bin/bench_plant
 
 format: build
 	@tools/lint --fix

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "plant_mujoco/mujoco_plant.h"
+#include "roller_robot.h"
 
 namespace twin
 {
@@ -34,43 +35,6 @@ Wheels Rates(const Twist &twist)
     return rates;
 }
 
-// A roller's barrel touches the rim all along: its profile at t off its middle is
-// R - sqrt(d^2 + t^2 / 2), here an ellipsoid that fits in the middle and where the next takes over.
-std::string RollerWheel(size_t k)
-{
-    constexpr double kRoller_m = 0.0065, kHub_m = kRadius_m - kRoller_m;
-    const double t_m = kHub_m * std::tan(M_PI / 10) / std::sqrt(2);
-    const double end_m = kRadius_m - std::sqrt(kHub_m * kHub_m + t_m * t_m / 2);
-    const double half_m = t_m / std::sqrt(1 - std::pow(end_m / kRoller_m, 2));
-    std::ostringstream text;
-    text << "<body pos='" << kX[k] * kHalfWheelbase_m << " " << kY[k] * kHalfTrack_m << " "
-         << kRadius_m << "'><inertial pos='0 0 0' mass='0.0227' diaginertia='7e-6 3.5e-6 7e-6'/>"
-         << "<joint name='w" << k << "' axis='0 1 0' armature='1.5e-4'/>"
-         << "<replicate count='10' euler='0 " << M_PI / 5 << " 0'><body pos='0 0 " << -kHub_m
-         << "'><inertial pos='0 0 0' mass='0.0015' diaginertia='5e-8 5e-8 5e-8'/><joint axis='1 "
-         << kSide[k] << " 0' armature='2e-7' damping='2e-6' frictionloss='3.9e-4'/>"
-         << "<geom type='ellipsoid' size='" << kRoller_m << " " << kRoller_m << " " << half_m
-         << "' zaxis='1 " << kSide[k] << " 0' mass='0' friction='0.8' contype='0' conaffinity='1' "
-         << "solref='0.005 1'/></body></replicate></body>";
-    return text.str();
-}
-
-std::string RollerRobot()
-{
-    std::ostringstream text;
-    text << "<mujoco><compiler angle='radian'/><option timestep='0.002' integrator='implicitfast' "
-            "cone='elliptic' impratio='10'/><worldbody><geom type='plane' size='9 9 1' "
-            "contype='1' conaffinity='0' friction='0.8' solref='0.005 1'/><body><freejoint/>"
-            "<inertial pos='0.001 0 0.051' mass='1.049' diaginertia='1.8e-3 3.3e-3 4.0e-3'/>";
-    for (size_t k = 0; k < kWheels; ++k)
-        text << RollerWheel(k);
-    text << "</body></worldbody><actuator>";
-    for (size_t k = 0; k < kWheels; ++k)
-        text << "<velocity joint='w" << k << "' kv='" << kMotor_Nms << "' forcerange='-0.1 0.1'/>";
-    text << "</actuator></mujoco>";
-    return text.str();
-}
-
 double Yaw(const mjtNum *q)
 {
     return std::atan2(2 * (q[3] * q[6] + q[4] * q[5]), 1 - 2 * (q[5] * q[5] + q[6] * q[6]));
@@ -79,7 +43,7 @@ double Yaw(const mjtNum *q)
 // Forward, left and heading after driving from rest.
 std::array<double, 3> DriveRollers(const Twist &twist)
 {
-    mjSpec *spec = mj_parseXMLString(RollerRobot().c_str(), nullptr, nullptr, 0);
+    mjSpec *spec = mj_parseXMLString(RollerRobots(1, kMotor_Nms).c_str(), nullptr, nullptr, 0);
     EXPECT_NE(spec, nullptr);
     mjModel *m = mj_compile(spec, nullptr);
     mjData *d = mj_makeData(m);
