@@ -10,7 +10,7 @@ from twinmill.calibration.freedom import base_quantities, effect_names, effect_q
 from twinmill.calibration.heldout import HeldOut, held_out
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import Fitted, ModelFile, write_child
-from twinmill.calibration.solve import Estimate, excited
+from twinmill.calibration.solve import Estimate, excited, solve
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,12 @@ def add(
     share_noise(grown, scenes)
     before, after = comparison(model_file, scenes), comparison(model_file, grown)
     floors = [r.floor.rms for r in after.robots]
+    refitted = [scene.with_model(model_file.model) for scene in scenes]
+    solve(refitted, old)
     held = [
-        held_out(clocked, model, quantities, floors)
-        for clocked, model, quantities in (
-            (scenes, model_file.model, []),
-            (scenes, model_file.model, old),
-            (grown, richer, free),
-        )
+        held_out(scenes, [], floors),
+        held_out(refitted, old, floors),
+        held_out(grown, free, floors),
     ]
     for estimate in solution.estimates:
         richer.set(estimate.name, estimate.value)

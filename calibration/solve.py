@@ -13,6 +13,7 @@ BLOCK_S = 4.0  # errors of one block may hang together; blocks do not
 SEEN = 0.5  # times the prior's width: a wider estimate is the prior's, not the log's
 RATE_PRIOR_PPM = 30.0  # of ordinary crystals against each other
 AT_BOUND = 0.01  # share of the range that counts as at the bound
+CHORDS = 3  # steps with the same slopes
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ def solve(
     free: list[Free],
     masks: list[np.ndarray] | None = None,
     rounds: int = 40,
+    precision: float = 1e-9,
 ) -> Solution:
     """Fits, and leaves the values in the scenes' models.
 
@@ -56,6 +58,7 @@ def solve(
         free: quantities shared by all.
         masks: (S,) bool per scene: the steps to fit on; all if None.
         rounds: at most so many evaluations.
+        precision: relative change of chi2 at which the fit ends.
     """
     system = System(scenes, free, masks)
     found = least_squares(
@@ -67,7 +70,7 @@ def solve(
         bounds=(system.low, system.high),
         x_scale=np.maximum(system.step, 1e-9),
         xtol=1e-7,
-        ftol=1e-9,
+        ftol=precision,
         max_nfev=rounds,
     )
     system.store(found.x)
@@ -89,6 +92,12 @@ def _clock_quantities(scene: Scene) -> list[Free]:
         Free(CLOCK, "s", offset_s, offset_s - 0.3, offset_s + 0.3, 0.3, 0.002),
         Free(CLOCK_RATE, "ppm", 0.0, -500.0, 500.0, RATE_PRIOR_PPM, 5.0, rate_ppm),
     ]
+
+
+def huber(z: np.ndarray) -> float:
+    """Robust chi2 of whitened errors (Huber 1964)."""
+    size = np.abs(z)
+    return float(np.where(size < HUBER_SIGMA, z**2, HUBER_SIGMA * (2 * size - HUBER_SIGMA)).sum())
 
 
 class System:
@@ -139,6 +148,27 @@ class System:
         step = np.where(x + self.step <= self.high, self.step, -self.step)
         values = self._whitened(np.vstack([x, x + np.diag(step)]))
         return ((values[1:] - values[0]) / step[:, None]).T
+
+    def newton(self, slopes: np.ndarray, masks: list[np.ndarray]) -> np.ndarray:
+        """Unknowns that fit the masked steps, from the start by Newton steps of these slopes.
+
+        Args:
+            slopes: (R, P) jacobian at the start, all steps.
+            masks: (S,) bool per scene.
+        """
+        rows = np.concatenate([np.repeat(m, 3) for m in masks] + [np.ones(len(self.start), bool)])
+        own, x, left = slopes[rows], self.start, self.residuals(self.start)[rows]
+        for _ in range(CHORDS):
+            weight = np.minimum(1, HUBER_SIGMA / np.maximum(np.abs(left), 1e-12))
+            normal = own.T @ (own * weight[:, None])
+            moved = np.clip(
+                x - np.linalg.solve(normal, own.T @ (left * weight)), self.low, self.high
+            )
+            then = self.residuals(moved)[rows]
+            if huber(then) >= huber(left):
+                break
+            x, left = moved, then
+        return x
 
     def store(self, x: np.ndarray) -> None:
         """Puts the unknowns into the scenes' models."""

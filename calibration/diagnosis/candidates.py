@@ -35,19 +35,21 @@ class Candidate:
     strength: np.ndarray
     corner: bool
 
-    def columns(self, scenes: list[Scene], priors: int) -> np.ndarray:
-        """(R, k) fall of the whitened errors per unit of each column, then zeros for the priors."""
+    def columns(self, scenes: list[Scene], without: list[np.ndarray]) -> np.ndarray:
+        """(R, k) fall of the whitened errors per unit of each column.
+
+        Args:
+            scenes: measurements with their models.
+            without: (S, 3) whitened errors of each without the effect: those at its neutral values.
+        """
         parts = []
-        for scene in scenes:
+        for scene, white in zip(scenes, without, strict=True):
             model = scene.model.copy()
             model.add_effect(self.effect)
-            richer = scene.with_model(model)
-            rows = np.array([self.origin, *self.target])
             names = [f"{_instance(model, self.effect)}.{n}" for n in self.names]
-            white = richer.whitened(names, rows).reshape(len(rows), -1)
-            parts.append((white[0] - white[1:]).T)
-        columns = np.concatenate(parts)
-        return np.concatenate([columns, np.zeros((priors, columns.shape[1]))]) / self._scale()
+            moved = scene.with_model(model).whitened(names, np.array(self.target))
+            parts.append((white - moved).reshape(len(moved), -1).T)
+        return np.concatenate(parts) / self._scale()
 
     def _scale(self) -> np.ndarray:
         """Length of each step, in the parameter's unit; 1 for a corner."""
@@ -63,14 +65,15 @@ def _instance(model: native.Model, effect: str) -> str:
 
 def candidates(
     scenes: list[Scene], barred: Collection[str] = ()
-) -> tuple[list[Candidate], list[str]]:
-    """Candidates for the scenes' model, and effects that leave no trace in these logs.
+) -> tuple[list[tuple[Candidate, np.ndarray]], list[str]]:
+    """Candidates with their columns (R, k), and effects that leave no trace in these logs.
 
     Args:
         scenes: measurements with their models.
         barred: effects that are not to be thought of.
     """
     model = scenes[0].model
+    without = [s.white_errors() for s in scenes]
     found, blind = [], []
     for name, entry in catalogue().items():
         if name in model.effects or name in barred or entry["stage"] not in STAGES:
@@ -79,27 +82,32 @@ def candidates(
             continue
         if entry["texts"]:  # a formula is the user's own, and no candidate
             continue
-        candidate, energy = _best_columns(scenes, entry)
-        if np.any(energy > BLIND):
-            found.append(candidate)
+        candidate, columns = _best_columns(scenes, entry, without)
+        if np.any(_energy(candidate, columns) > BLIND):
+            found.append((candidate, columns))
         else:
             blind.append(name)
     return found, blind
 
 
-def _best_columns(scenes: list[Scene], entry: dict) -> tuple[Candidate, np.ndarray]:
+def _best_columns(
+    scenes: list[Scene], entry: dict, without: list[np.ndarray]
+) -> tuple[Candidate, np.ndarray]:
     """Derivatives at the neutral value, or the way to the default where these say nothing of it."""
     smooth, corner = _smooth(entry), _corner(entry)
-    columns, whole = smooth.columns(scenes, 0), corner.columns(scenes, 0)[:, 0]
-    energy = np.sum(columns**2, axis=0) * smooth.strength**2
+    columns, whole = smooth.columns(scenes, without), corner.columns(scenes, without)
     foreseen = columns @ smooth.strength
-    alike = foreseen @ whole / max(np.linalg.norm(foreseen) * np.linalg.norm(whole), 1e-12)
-    longer = np.linalg.norm(foreseen) / max(np.linalg.norm(whole), 1e-12)
-    if alike < ALIKE or not 1 / MISJUDGED < longer < MISJUDGED:
-        return corner, np.array([whole @ whole])
-    if not np.all(energy > BLIND):
-        return _smooth(entry, energy > BLIND), energy
-    return smooth, energy
+    size, reached = np.linalg.norm(foreseen), np.linalg.norm(whole)
+    alike = foreseen @ whole[:, 0] / max(size * reached, 1e-12)
+    if alike < ALIKE or not 1 / MISJUDGED < size / max(reached, 1e-12) < MISJUDGED:
+        return corner, whole
+    shown = _energy(smooth, columns) > BLIND
+    return (smooth, columns) if shown.all() else (_smooth(entry, shown), columns[:, shown])
+
+
+def _energy(candidate: Candidate, columns: np.ndarray) -> np.ndarray:
+    """(k,) fall of chi2 if each parameter had its plausible strength."""
+    return np.sum(columns**2, axis=0) * candidate.strength**2
 
 
 def _smooth(entry: dict, shown: np.ndarray | None = None) -> Candidate:

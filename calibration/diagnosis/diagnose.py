@@ -2,14 +2,14 @@
 """Names what a model lacks, says so when nothing is missing, and when the log cannot tell."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from twinmill.calibration.bits.compare import BitComparison
 from twinmill.calibration.bits.merge import with_bits
 from twinmill.calibration.compare import GOOD, Comparison, comparison, open_scenes
 from twinmill.calibration.diagnosis.encoders import geometry_notes, time_base_notes
-from twinmill.calibration.diagnosis.evidence import State, over
+from twinmill.calibration.diagnosis.evidence import State
 from twinmill.calibration.diagnosis.omnibus import NOTHING, Omnibus, unexplained
 from twinmill.calibration.diagnosis.ranking import Ranked, groups_of, rank
 from twinmill.calibration.diagnosis.search import ALPHA, Search, search
@@ -122,6 +122,7 @@ def diagnose(
         share_noise(final.scenes, earlier)
     before, fitted = comparison(model_file, given), comparison(model_file, scenes)
     floors = [r.floor.rms for r in fitted.robots]
+    final = replace(final, floors=floors)
     say("looking for what no effect explains")
     logs = [s for s in final.scenes if s.noise]
     omnibus = unexplained(logs, final.free) if logs else NOTHING
@@ -157,11 +158,11 @@ def _last(done: Search) -> float:
 
 
 def _steps(done: Search, floors: list[np.ndarray]) -> list[tuple[str | None, float]]:
-    steps: list[tuple[str | None, float]] = [(None, over(done.rounds[0].before.rms, floors))]
+    steps: list[tuple[str | None, float]] = [(None, done.rounds[0].before.held.over(floors))]
     for this in done.rounds:
         if this.accepted:
             trial = this.accepted.trial
-            steps.append((" + ".join(trial.effects), over(trial.rms, floors)))
+            steps.append((" + ".join(trial.effects), trial.held.over(floors)))
     return steps
 
 

@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import twinmill_native as native
-from twinmill.calibration.folds import halves, held_errors, step_mask
 from twinmill.calibration.freedom import Free, effect_names, effect_quantities
+from twinmill.calibration.heldout import HeldOut, held_out
 from twinmill.calibration.problem import Scene
-from twinmill.calibration.solve import HUBER_SIGMA, Estimate, solve
-from twinmill.calibration.windows import rms
+from twinmill.calibration.solve import Estimate, solve
 
-ROUNDS, REFINED = 8, 3  # of a trial's fit, and of the halves that start from it
+ROUNDS, PRECISION = 8, 1e-6  # of a trial's fit
 
 
 @dataclass(frozen=True)
@@ -50,19 +49,25 @@ class Trial:
 
     Attributes:
         effects: what was added.
-        chi2: held-out robust chi2, both ways.
-        rms: (H, 3) held-out errors per scene.
-        score: of these over the state's floors.
+        held: errors of each half, fitted on the other.
         scenes: with the model fitted to all.
         estimates: of the added effects' parameters, fitted to all.
     """
 
     effects: tuple[str, ...]
-    chi2: float
-    rms: list[np.ndarray]
-    score: float
+    held: HeldOut
     scenes: list[Scene]
     estimates: list[Estimate]
+
+    @property
+    def chi2(self) -> float:
+        """Held-out robust chi2."""
+        return self.held.chi2
+
+    @property
+    def score(self) -> float:
+        """Held-out errors over the state's floors."""
+        return self.held.score
 
 
 def attempt(state: State, effects: tuple[str, ...]) -> Trial:
@@ -79,19 +84,11 @@ def attempt(state: State, effects: tuple[str, ...]) -> Trial:
         name = effect_names(model)[-1]
         fresh += [f for f in effect_quantities(model, name) if f.name.startswith(f"{name}.")]
     scenes = [s.with_model(model) for s in state.scenes]
-    solution = solve(scenes, state.free + fresh, rounds=ROUNDS)
-    again = [replace(f, begin=scenes[0].model.get(f.name)) for f in state.free + fresh]
-    chi2, held = _cross(scenes, again)
+    solution = solve(scenes, state.free + fresh, rounds=ROUNDS, precision=PRECISION)
+    held = held_out(scenes, state.free + fresh, state.floors)
     names = {f.name for f in fresh}
     estimates = [e for e in solution.estimates if e.name in names]
-    return Trial(effects, chi2, held, over(held, state.floors), scenes, estimates)
-
-
-def over(errors: list[np.ndarray], floors: list[np.ndarray]) -> float:
-    """Score of (H, 3) RMS errors over floors, both per scene."""
-    return float(
-        np.sqrt(np.mean([np.nanmean((e / f) ** 2) for e, f in zip(errors, floors, strict=True)]))
-    )
+    return Trial(effects, held, scenes, estimates)
 
 
 def without(state: State, index: int) -> Trial:
@@ -101,30 +98,3 @@ def without(state: State, index: int) -> Trial:
     scenes = [s.with_model(model) for s in state.scenes]
     reduced = State(scenes, state.base, state.floors)
     return attempt(reduced, ())
-
-
-def _cross(scenes: list[Scene], free: list[Free]) -> tuple[float, list[np.ndarray]]:
-    """Held-out chi2 and (H, 3) RMS errors per scene, both ways."""
-    halves_of = [halves(s) for s in scenes]
-    chi2, errors = 0.0, [[] for _ in scenes]
-    for which in (0, 1):
-        tried = [replace(s, model=s.model.copy()) for s in scenes]
-        own, other = (
-            [step_mask(s, h, w) for s, h in zip(tried, halves_of, strict=True)]
-            for w in (which, 1 - which)
-        )
-        solve(tried, free, own, REFINED)
-        chi2 += _chi2(tried, other)
-        for i, (scene, half) in enumerate(zip(tried, halves_of, strict=True)):
-            errors[i].append(held_errors(scene, half, 1 - which))
-    return chi2, [rms(np.concatenate(e)) for e in errors]
-
-
-def _chi2(scenes: list[Scene], masks: list[np.ndarray]) -> float:
-    """Robust chi2 of the masked steps (Huber 1964)."""
-    total = 0.0
-    for scene, mask in zip(scenes, masks, strict=True):
-        z = np.abs(scene.white_errors()[mask])
-        robust = np.where(z < HUBER_SIGMA, z**2, HUBER_SIGMA * (2 * z - HUBER_SIGMA))
-        total += float(robust.sum())
-    return total

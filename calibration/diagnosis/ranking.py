@@ -4,7 +4,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from twinmill.calibration.diagnosis.evidence import over
 from twinmill.calibration.diagnosis.screen import Screening
 from twinmill.calibration.diagnosis.search import Judged, Round, Search
 from twinmill.calibration.solve import Estimate
@@ -79,7 +78,7 @@ def _entries(
         entries.append(
             Ranked(
                 effect,
-                over(trial.rms, floors),
+                trial.held.over(floors),
                 float(share),
                 judged.p_value,
                 judged.evidence,

@@ -58,12 +58,16 @@ class Screening:
         return _explained(self.signatures[j], wanted) / max(float(wanted @ wanted), 1e-12)
 
 
-def screen(scenes: list[Scene], base: list[Free], candidates: list[Candidate]) -> Screening:
-    """Tests all candidates at once against what the scenes' models leave."""
+def screen(
+    scenes: list[Scene], base: list[Free], found: list[tuple[Candidate, np.ndarray]]
+) -> Screening:
+    """Tests all candidates, given with their columns, against what the scenes' models leave."""
     system = System(scenes, base)
     left, basis = project_out(system)
     blocks = np.append(system.blocks(), np.full(len(system.unknowns), -1))
-    signatures = [c.columns(scenes, len(system.unknowns)) for c in candidates]
+    candidates = [c for c, _ in found]
+    of_priors = len(system.unknowns)
+    signatures = [np.pad(columns, ((0, of_priors), (0, 0))) for _, columns in found]
     signatures = [s - basis @ (basis.T @ s) for s in signatures]
     flips = np.random.default_rng(1).choice([-1.0, 1.0], (SIGNS, blocks.max() + 1))
     tests = [
@@ -71,14 +75,14 @@ def screen(scenes: list[Scene], base: list[Free], candidates: list[Candidate]) -
         for s, c in zip(signatures, candidates, strict=True)
     ]
     highest = np.max([null for *_, null in tests], axis=0)
-    found = []
+    screened = []
     for candidate, signature, (gain, excess, delta, _) in zip(
         candidates, signatures, tests, strict=True
     ):
         alone = np.sum(signature**2, axis=0) * candidate.strength**2
-        p_value = (1 + np.count_nonzero(highest >= gain / excess)) / (1 + SIGNS)
-        found.append(Screened(candidate, gain, excess, delta, float(alone.max()), float(p_value)))
-    return Screening(found, signatures, left)
+        p_value = float((1 + np.count_nonzero(highest >= gain / excess)) / (1 + SIGNS))
+        screened.append(Screened(candidate, gain, excess, delta, float(alone.max()), p_value))
+    return Screening(screened, signatures, left)
 
 
 def project_out(system: System) -> tuple[np.ndarray, np.ndarray]:

@@ -13,6 +13,7 @@ from twinmill.calibration.freedom import catalogue, effect_names
 
 ALPHA = 0.01  # chance of accepting anything if nothing is missing, over all candidates
 TRIED, PAIRED = 6, 8
+SURE, BEHIND = 2, 0.2  # so many are tried in any case, others above this share of the best gain
 CLOSE = 1.02  # held-out scores whose ratio is nearer to 1 are decided by chi2
 MOST = 4
 WORTH = 0.998  # an effect must lower the held-out score below this share: certain is not important
@@ -66,7 +67,7 @@ def search(
         limit = np.log(max(len(found), 1) / ALPHA)
         this = Round(before, screening, [])
         done.rounds.append(this)
-        for i in _promising(screening, limit)[:TRIED]:
+        for i in _worth_trying(screening, limit):
             say(f"round {number + 1}: trying {screening.found[i].candidate.effect}")
             this.judged.append(_judge(state, before, screening, (i,)))
         this.accepted = _best(before, this.judged, limit)
@@ -88,6 +89,13 @@ def _promising(screening: Screening, least: float) -> list[int]:
     """Candidates whose linear gain leaves a chance of acceptance, best first."""
     worth = [s.gain / s.excess for s in screening.found]
     return [i for i in np.argsort(worth)[::-1] if worth[i] > least]
+
+
+def _worth_trying(screening: Screening, least: float) -> list[int]:
+    """The best few, and of the next those that are not far behind."""
+    top = _promising(screening, least)[:TRIED]
+    worth = [screening.found[i].gain / screening.found[i].excess for i in top]
+    return [i for k, i in enumerate(top) if k < SURE or worth[k] > BEHIND * worth[0]]
 
 
 def _judge(state: State, before: Trial, screening: Screening, which: tuple[int, ...]) -> Judged:

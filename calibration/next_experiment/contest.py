@@ -86,7 +86,9 @@ def question(
 
 def subjects(scenes: list[Scene], planned: Scene, state: State, asked: Contest) -> list[Subject]:
     """Every effect that the logs or the planned run show, at its fitted or its usual strength."""
-    found, _ = candidates([*scenes, planned])
+    shown, _ = candidates([*scenes, planned])
+    without = [s.white_errors() for s in scenes]
+    found = [(candidate, candidate.columns(scenes, without)) for candidate, _ in shown]
     tested = screen(scenes, state.free, found).found
     return [
         Subject(t.candidate, _whole(t.candidate.effect, asked.fitted), t.excess) for t in tested

@@ -105,6 +105,9 @@ class Ledger:
         clock = np.zeros((len(jacobian), CLOCKS))
         if scene.clock_free:
             clock = jacobian[:, -CLOCKS:]
-        effects = [c.columns([scene], 0) for s in self.subjects for c in (s.candidate, s.whole)]
+        without = [scene.white_errors()]
+        effects = [
+            c.columns([scene], without) for s in self.subjects for c in (s.candidate, s.whole)
+        ]
         prior = 1 / system.prior[-CLOCKS:] ** 2 if scene.clock_free else np.ones(CLOCKS)
         return np.hstack([jacobian[:, : len(self.free)], *effects, clock]), prior

@@ -3,7 +3,8 @@
 
 import json
 import subprocess
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,26 @@ from twinmill.calibration.freedom import catalogue
 KINDS = ("none", "one", "one", "two", "outside")
 STRENGTHS = {"weak": 0.4, "medium": 1.0, "strong": 2.5}  # times the effect's default
 PLANTS = ("planar", "mujoco")
-# A clock offset and a delay are one thing to a log, and so is a lag of the base and one more.
-BARRED = ("clock_offset", "clock_rate", "equation")
+# A clock offset and a delay are one thing to a log; a formula is for cases outside the catalogue.
+NOT_DRAWN = ("clock_offset", "clock_rate", "equation")
+# Outside the catalogue: effects that diagnosis is not told of, and formulas that it cannot know.
+WITHHELD = (
+    "carpet_grain",
+    "gain_slope",
+    "reversal_dead_time",
+    "reverse_asymmetry",
+    "slew_limit",
+    "turn_asymmetry",
+    "wheel_eccentricity",
+)
+FORMULAS = (
+    ("vx_mps", "p0*vx*sin(0.2*t)", 0.1),
+    ("vx_mps", "p0*moves*sin(3*theta)", 0.012),
+    ("vy_mps", "p0*vx*abs(omega)", 0.04),
+    ("omega_radps", "p0*moves*cos(theta)", 0.08),
+    ("omega_radps", "p0*vx*vx", 0.8),
+    ("omega_radps", "p0*vx*vy", 1.5),
+)
 ROBOT = """
 [base]
 duty_pct = [0, 12.5, 25, 37.5, 50, 75, 100]
@@ -37,26 +56,59 @@ offset_s = -0.06
 
 
 @dataclass(frozen=True)
+class Hidden:
+    """One hidden effect."""
+
+    effect: str
+    parameters: dict[str, float]
+    texts: dict[str, str]
+
+    @property
+    def label(self) -> str:
+        """Its name, or its formula."""
+        return " += ".join(self.texts.values()) or self.effect
+
+
+@dataclass(frozen=True)
 class Case:
-    """One sealed log: which plant makes it, and what is hidden in it (name to parameters)."""
+    """One sealed log: which plant makes it, and what is hidden in it.
+
+    Attributes:
+        withheld: effects that diagnosis is not told of.
+    """
 
     number: int
     plant: str
     kind: str
     strength: str
-    hidden: dict[str, dict[str, float]]
+    hidden: tuple[Hidden, ...] = ()
+    withheld: tuple[str, ...] = ()
 
 
-def draw(number: int, seed: int) -> Case:
-    """Draws a case; the same numbers give the same case."""
+def draw(number: int, seed: int, known: dict[str, Collection[str]]) -> Case:
+    """Draws a case; the same numbers give the same case.
+
+    Args:
+        number: of the case.
+        seed: of all cases.
+        known: per plant the effects that its base model has already: they are not hidden again.
+    """
     random = np.random.default_rng([seed, number])
-    kind = KINDS[number % len(KINDS)]
+    plant, kind = PLANTS[number // len(KINDS) % len(PLANTS)], KINDS[number % len(KINDS)]
     strength = str(random.choice(list(STRENGTHS)))
-    entries = {n: e for n, e in catalogue().items() if _drawable(e)}
-    count = {"none": 0, "two": 2}.get(kind, 1)
-    names = random.choice(sorted(entries), count, replace=False) if count else []
-    hidden = {str(n): _parameters(entries[n], STRENGTHS[strength], random) for n in names}
-    return Case(number, PLANTS[number // len(KINDS) % 2], kind, strength, hidden)
+    if kind == "none":
+        return Case(number, plant, kind, strength)
+    if kind == "outside" and random.random() < 0.5:
+        hidden = (_formula(STRENGTHS[strength], random),)
+        return Case(number, plant, kind, strength, hidden)
+    entries = {n: e for n, e in catalogue().items() if _drawable(e) and n not in known[plant]}
+    names = sorted(set(WITHHELD) & set(entries)) if kind == "outside" else sorted(entries)
+    drawn = random.choice(names, 2 if kind == "two" else 1, replace=False)
+    hidden = tuple(
+        Hidden(str(n), _parameters(entries[n], STRENGTHS[strength], random), {}) for n in drawn
+    )
+    withheld = tuple(h.effect for h in hidden) if kind == "outside" else ()
+    return Case(number, plant, kind, strength, hidden, withheld)
 
 
 def make_log(program: Path, folder: Path, name: str, case: Case, script: Path) -> Path:
@@ -66,12 +118,13 @@ def make_log(program: Path, folder: Path, name: str, case: Case, script: Path) -
         ValueError: the twin failed; its own sentence.
     """
     model, log = folder / f"{name}.hidden.toml", folder / f"{name}.lcmlog"
-    model.write_text(ROBOT + "".join(_table(n, p) for n, p in case.hidden.items()))
+    model.write_text(ROBOT + "".join(map(_table, case.hidden)))
     command = [
         program, "--plant", case.plant, "--model", model, "--n", "1", "--seed", 1 + case.number,
         "--script", script, "--log", log,
     ]  # fmt: skip
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+    model.unlink()
     if done.returncode:
         raise ValueError(f"{program}: {done.stderr.strip() or 'failed'}")
     return log
@@ -79,16 +132,17 @@ def make_log(program: Path, folder: Path, name: str, case: Case, script: Path) -
 
 def seal(cases: list[Case]) -> str:
     """The answers as text, whose hash is shown before anything is diagnosed."""
-    return json.dumps([vars(c) for c in cases], indent=1, sort_keys=True)
+    return json.dumps([asdict(c) for c in cases], indent=1, sort_keys=True)
 
 
 def _drawable(entry: dict) -> bool:
-    return (
-        bool(entry["parameters"])
-        and entry["stage"] in STAGES
-        and entry["name"] not in BARRED
-        and not entry["name"].startswith("view")
-    )
+    return bool(entry["parameters"]) and entry["stage"] in STAGES and entry["name"] not in NOT_DRAWN
+
+
+def _formula(strength: float, random: np.random.Generator) -> Hidden:
+    adds_to, formula, usual = FORMULAS[random.integers(len(FORMULAS))]
+    p0 = usual * strength * random.uniform(0.8, 1.2) * random.choice([-1, 1])
+    return Hidden("equation", {"p0": float(p0)}, {"adds_to": adds_to, "formula": formula})
 
 
 def _parameters(entry: dict, strength: float, random: np.random.Generator) -> dict[str, float]:
@@ -105,6 +159,6 @@ def _parameters(entry: dict, strength: float, random: np.random.Generator) -> di
     return values
 
 
-def _table(name: str, parameters: dict[str, float]) -> str:
-    lines = "".join(f"{key} = {value!r}\n" for key, value in parameters.items())
-    return f'\n[[effect]]\nname = "{name}"\n{lines}'
+def _table(hidden: Hidden) -> str:
+    values = {"name": hidden.effect, **hidden.texts, **hidden.parameters}
+    return "\n[[effect]]\n" + "".join(f"{k} = {json.dumps(v)}\n" for k, v in values.items())

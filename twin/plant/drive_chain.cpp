@@ -78,6 +78,16 @@ Relaxed Relax(double v, double target, double tau_s, double max_decel_mps2, doub
     return {rest.end, (linear_mean * linear_s + rest.mean * rest_s) / dt_s};
 }
 
+Signals Seen(const Pose2 &pose, double t_s)
+{
+    Signals s;
+    s.x_m = pose.x_m;
+    s.y_m = pose.y_m;
+    s.theta_rad = pose.theta_rad;
+    s.observed_t_s = t_s;
+    return s;
+}
+
 }  // namespace
 
 DriveChain::DriveChain(const Model &model)
@@ -201,14 +211,26 @@ Twist DriveChain::BodyTwist(const Wheels &rim_mps, double t_s, double dt_s, Robo
     twist.vy_mps *= base_.sideways_gain * theta_a1_;
     twist.omega_radps *= base_.yaw_gain * theta_a2_;
 
+    const bool moves = std::any_of(rim_mps.begin(), rim_mps.end(),
+                                   [](double v) { return std::abs(v) > kStandstill_mps; });
+    if (random && moves)
+        Disturb(twist, dt_s, state, *random);
+    if (!ground_.empty())
+        ActOnGround(twist, rim_mps, moves, t_s, dt_s, state);
+    state.vx_mps = twist.vx_mps;
+    state.vy_mps = twist.vy_mps;
+    state.omega_radps = twist.omega_radps;
+    return twist;
+}
+
+void DriveChain::ActOnGround(Twist &twist, const Wheels &rim_mps, bool moves, double t_s,
+                             double dt_s, RobotState &state) const
+{
     Signals s;
     s.t_s = t_s;
     s.dt_s = dt_s;
     s.rim_mps = rim_mps;
-    s.moves = std::any_of(rim_mps.begin(), rim_mps.end(),
-                          [](double v) { return std::abs(v) > kStandstill_mps; });
-    if (random && s.moves)
-        Disturb(twist, dt_s, state, *random);
+    s.moves = moves;
     s.x_m = state.pose.x_m;
     s.y_m = state.pose.y_m;
     s.theta_rad = state.pose.theta_rad;
@@ -216,32 +238,28 @@ Twist DriveChain::BodyTwist(const Wheels &rim_mps, double t_s, double dt_s, Robo
     s.vy_mps = twist.vy_mps;
     s.omega_radps = twist.omega_radps;
     Run(ground_, s, state);
-    state.vx_mps = s.vx_mps;
-    state.vy_mps = s.vy_mps;
-    state.omega_radps = s.omega_radps;
-    return {s.vx_mps, s.vy_mps, s.omega_radps};
+    twist = {s.vx_mps, s.vy_mps, s.omega_radps};
 }
 
 void DriveChain::Observe(Pose2 &pose, double &t_s) const
 {
-    Signals s;
-    s.x_m = pose.x_m;
-    s.y_m = pose.y_m;
-    s.theta_rad = pose.theta_rad;
-    s.observed_t_s = t_s;
-    for (const Bound &bound : observe_)
-        bound.effect->Step(s, nullptr);
-    pose = {s.x_m, s.y_m, s.theta_rad};
-    t_s = s.observed_t_s * (1 + clock_.rate_ppm * 1e-6) + clock_.offset_s;
+    if (!observe_.empty())
+    {
+        Signals s = Seen(pose, t_s);
+        for (const Bound &bound : observe_)
+            bound.effect->Step(s, nullptr);
+        pose = {s.x_m, s.y_m, s.theta_rad};
+        t_s = s.observed_t_s;
+    }
+    t_s = t_s * (1 + clock_.rate_ppm * 1e-6) + clock_.offset_s;
 }
 
 void DriveChain::Invert(Pose2 &pose, double &t_s) const
 {
-    Signals s;
-    s.x_m = pose.x_m;
-    s.y_m = pose.y_m;
-    s.theta_rad = pose.theta_rad;
-    s.observed_t_s = (t_s - clock_.offset_s) / (1 + clock_.rate_ppm * 1e-6);
+    t_s = (t_s - clock_.offset_s) / (1 + clock_.rate_ppm * 1e-6);
+    if (observe_.empty())
+        return;
+    Signals s = Seen(pose, t_s);
     for (auto bound = observe_.rbegin(); bound != observe_.rend(); ++bound)
         bound->effect->Invert(s);
     pose = {s.x_m, s.y_m, s.theta_rad};

@@ -6,6 +6,19 @@
 namespace twin
 {
 
+namespace
+{
+
+// sin(a) / a; below 0.05 rad by its series, whose next term is under 1e-15.
+double SinOver(double a)
+{
+    const double square = a * a;
+    return square < 0.0025 ? 1 - square / 6 * (1 - square / 20 * (1 - square / 42))
+                           : std::sin(a) / a;
+}
+
+}  // namespace
+
 void PlanarStep(const DriveChain &chain, const Command &command, double t_s, double dt_s,
                 RobotState &state, Random *random)
 {
@@ -13,7 +26,7 @@ void PlanarStep(const DriveChain &chain, const Command &command, double t_s, dou
     const Twist v = chain.BodyTwist(rim_mps, t_s, dt_s, state, random);
     // Chord of the arc: its direction is the middle heading, its length shrinks by sin(a)/a.
     const double half_rad = v.omega_radps * dt_s / 2;
-    const double chord_s = dt_s * (std::abs(half_rad) > 1e-6 ? std::sin(half_rad) / half_rad : 1);
+    const double chord_s = dt_s * SinOver(half_rad);
     const double middle_rad = state.pose.theta_rad + half_rad;
     const double c = std::cos(middle_rad), s = std::sin(middle_rad);
     state.pose.x_m += chord_s * (c * v.vx_mps - s * v.vy_mps);

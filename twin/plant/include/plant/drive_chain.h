@@ -44,6 +44,8 @@ private:
     };
     void Run(const std::vector<Bound> &stage, Signals &signals, RobotState &state) const;
     Wheels Target(const Wheels &command) const;
+    void ActOnGround(Twist &twist, const Wheels &rim_mps, bool moves, double t_s, double dt_s,
+                     RobotState &state) const;
     void Disturb(Twist &twist, double dt_s, RobotState &state, Random &random) const;
 
     Base base_;
