@@ -50,16 +50,29 @@ class AddResult:
 
 
 def add(
-    effect: str, measurements: list[Measurement], model_file: ModelFile, out: Path, command: str
+    effect: str,
+    measurements: list[Measurement],
+    model_file: ModelFile,
+    out: Path,
+    command: str,
+    texts: dict[str, str] | None = None,
 ) -> AddResult:
     """Adds an effect and writes the new model.
 
+    Args:
+        effect: its name.
+        measurements: what it is fitted to.
+        model_file: the model that lacks it.
+        out: the new model file.
+        command: recorded in it.
+        texts: the effect's formula and the like, by name.
+
     Raises:
-        ValueError: no such effect, or it is made for another drive.
+        ValueError: no such effect, it is made for another drive, or a text makes no sense.
         ModelError: the new file cannot be written.
     """
     richer = model_file.model.copy()
-    richer.add_effect(effect)
+    richer.add_effect(effect, texts or {})
     name = effect_names(richer)[-1]
     scenes = open_scenes(measurements, model_file)
     known = effect_quantities(model_file.model)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which quantities of a model a fit may change, and how far they may be from what is known."""
 
+import re
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -79,16 +80,22 @@ def base_quantities(model: native.Model, told: Collection[str]) -> list[Free]:
 
 
 def effect_quantities(model: native.Model, fresh: str | None = None) -> list[Free]:
-    """Free quantities of a model's effects on motion; those of `fresh` begin at their defaults."""
+    """Free quantities of a model's effects on motion; those of `fresh` begin at their defaults.
+
+    Of a formula only those parameters that it names are free, and nothing is known of their size.
+    """
     entries = catalogue()
     bounds = {v["name"]: (v["min"], v["max"]) for v in model.values()}
     free = []
-    for instance in effect_names(model):
+    for instance, texts in zip(effect_names(model), model.texts, strict=True):
         entry = entries[instance.split("#")[0]]
         if entry["stage"] not in MOTION_STAGES:
             continue
         for p in entry["parameters"]:
+            if texts and not any(p["name"] in words(text) for text in texts.values()):
+                continue
             name = f"{instance}.{p['name']}"
+            low, high = bounds[name]
             reach = abs(p["default"] - p["neutral"])
             is_fresh = instance == fresh
             free.append(
@@ -96,10 +103,16 @@ def effect_quantities(model: native.Model, fresh: str | None = None) -> list[Fre
                     name,
                     p["unit"],
                     p["neutral"] if is_fresh else model.get(name),
-                    *bounds[name],
-                    EFFECT_PRIOR * reach,
+                    low,
+                    high,
+                    high - low if texts else EFFECT_PRIOR * reach,
                     min(STEP * reach, 0.05 * max(abs(p["default"]), 1e-6)),
                     p["default"] if is_fresh else None,
                 )
             )
     return free
+
+
+def words(formula: str) -> set[str]:
+    """Names in a formula."""
+    return set(re.findall(r"[A-Za-z_]\w*", formula))

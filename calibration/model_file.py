@@ -61,6 +61,13 @@ class ModelFile:
             )
         return told
 
+    def left_over(self, log_sha256: Collection[str]) -> dict[str, float]:
+        """What the model left in other logs: fall of chi2 per step by what it depends on."""
+        table = tomlkit.parse(self.text).get("fit", {}).get("left_over", {})
+        if set(table.get("fitted_on", [])) & set(log_sha256):
+            return {}
+        return {str(g): float(v) for g, v in table.items() if g != "fitted_on"}
+
     @property
     def hash(self) -> str:
         """Of the text, as a child names its parent."""
@@ -79,6 +86,7 @@ class Fitted:
         noise: of the first log, or None to leave the old.
         clock: offset and rate that the logs share, by name; empty if they do not agree.
         base_told: the base was held near what other logs told; they keep the credit.
+        left_over: what a diagnosis found that no effect explains; None if there was none.
     """
 
     model: native.Model
@@ -89,6 +97,7 @@ class Fitted:
     noise: Noise | None = None
     clock: dict[str, Estimate] = field(default_factory=dict)
     base_told: bool = False
+    left_over: dict[str, float] | None = None
 
 
 def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> None:
@@ -111,11 +120,17 @@ def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> 
         section.update({key: _short(e.value) for key, e in clock.items()})
         section["std"] = {key: _short(e.std) for key, e in clock.items()}
         section["fitted_on"] = list(fitted.logs.values())
+    old = document.get("fit", {}).get("left_over", {})
     document["fit"] = {
         "logs": list(fitted.logs),
         "score_before": _short(fitted.score_before),
         "score_after": _short(fitted.score_after),
     }
+    if fitted.left_over is not None:
+        left = {group: _short(value) for group, value in fitted.left_over.items()}
+        old = {**left, "fitted_on": list(fitted.logs.values())} if left else {}
+    if old:
+        document["fit"]["left_over"] = old
     write_whole(Path(path), tomlkit.dumps(document))
 
 
@@ -162,10 +177,12 @@ def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
     entries, stds = catalogue(), {e.name: e.std for e in fitted.estimates}
     old = list(document.get("effect", []))
     tables = tomlkit.aot()
-    for i, instance in enumerate(effect_names(fitted.model)):
+    instances = zip(effect_names(fitted.model), fitted.model.texts, strict=True)
+    for i, (instance, texts) in enumerate(instances):
         table = tomlkit.table() if i >= len(old) else old[i]
         name = instance.split("#")[0]
         table["name"] = name
+        table.update(texts)
         keys = [p["name"] for p in entries[name]["parameters"]]
         for key in keys:
             table[key] = _short(fitted.model.get(f"{instance}.{key}"))

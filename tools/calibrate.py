@@ -122,6 +122,12 @@ def _add(
     output: NewModel,
     model: Model = DEFAULT_MODEL,
     force: Force = False,
+    adds_to: Annotated[
+        str | None, typer.Option("--adds-to", help="Of an equation: vx_mps, rim_mps and others.")
+    ] = None,
+    formula: Annotated[
+        str | None, typer.Option("--formula", help="Of an equation: what is added, of p0 to p3.")
+    ] = None,
     as_json: AsJson = False,
     out: Out = None,
 ) -> AddResult | BitAddition:
@@ -129,9 +135,17 @@ def _add(
 
     Example: twinmill add coasting run.lcmlog --model fitted.toml -o better.toml
     """
-    find_effect(effect)
+    known = [text["name"] for text in find_effect(effect)["texts"]]
+    texts = {"adds_to": adds_to, "formula": formula}
+    texts = {name: text for name, text in texts.items() if text is not None}
+    if extra := [name for name in texts if name not in known]:
+        option = f"--{extra[0].replace('_', '-')}"
+        raise ValueError(f"{option}: {effect} has none; it is for `twinmill add equation`.")
+    verb = f"add {effect}" + "".join(
+        f" --{name.replace('_', '-')} {shlex.quote(text)}" for name, text in texts.items()
+    )
     source = provenance(
-        command_line(f"add {effect}", logs, model, output), model_file := open_model(model, out)
+        command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
     check_output(output, model_file, force)
     if is_of_camera(effect):
@@ -143,7 +157,7 @@ def _add(
         finish(seen.to_json(), bits.addition(seen), source, section, as_json, out)
         return seen
     with busy(f"adding {effect} to {model}"):
-        result = add(effect, load_measurements(logs), model_file, output, source.command)
+        result = add(effect, load_measurements(logs), model_file, output, source.command, texts)
     section = added_section(result)
     finish(result.to_json(), show.added(result), source, section, as_json, out)
     return result
@@ -151,7 +165,7 @@ def _add(
 
 def command_line(verb: str, logs: list[Path], model: str, output: Path | None = None) -> str:
     """The command line that does this again, without what only changes where and how it is told."""
-    words = ["twinmill", *verb.split(), *map(str, logs), "--model", model]
+    words = ["twinmill", *shlex.split(verb), *map(str, logs), "--model", model]
     return shlex.join(words + (["-o", str(output)] if output else []))
 
 

@@ -23,7 +23,7 @@ from twinmill.calibration.steady.limits import unseen_by_tables
 
 HELPED = 0.95  # a refit that lowers the score below this share of it was worth it
 NOISIER = 2.0  # drive noise over that of the model file, beyond which it is a finding
-OUTSIDE = 0.25  # share of what could be explained that no effect does
+OUTSIDE = 0.1  # share of what could be explained that no effect does
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,9 @@ class Diagnosis:
             "unexplained": {
                 "depends_on": [g.group for g in self.omnibus.groups],
                 "share": self.share_unexplained,
-                "formula": f"{term.channel} += p0 * {term.formula}" if term else None,
+                "formula": f"{term.adds_to} += p0 * {term.formula}" if term else None,
                 "p0": self.omnibus.coefficient if term else None,
+                "equation": self.omnibus.equation,
             },
             "steps": [{"effect": e, "score_heldout": s} for e, s in self.steps],
             "next_experiment": self.next_experiment,
@@ -125,7 +126,8 @@ def diagnose(
     final = replace(final, floors=floors)
     say("looking for what no effect explains")
     logs = [s for s in final.scenes if s.noise]
-    omnibus = unexplained(logs, final.free) if logs else NOTHING
+    known = model_file.left_over([m.log_sha256 for m in measurements])
+    omnibus = unexplained(logs, final.free, known) if logs else NOTHING
     explained = done.rounds[0].before.chi2 - _last(done)
     share = omnibus.gain / max(omnibus.gain + explained, 1e-9) if omnibus.groups else 0.0
     names = effect_names(final.model)[len(model_file.model.effects) :]
@@ -145,7 +147,13 @@ def diagnose(
         float(share),
         final,
         _steps(done, floors),
-        noises + time_base_notes(final.scenes) + geometry_notes(final.model) + _clock_notes(final),
+        [
+            *noises,
+            *time_base_notes(final.scenes),
+            *geometry_notes(final.model),
+            *_clock_notes(final),
+            *_known_notes(omnibus),
+        ],
         _next_experiment(verdict, ranking, done),
     )
     return with_bits(of_motion, given, model_file, say, barred)
@@ -210,6 +218,16 @@ def _clock_notes(state: State) -> list[str]:
             "told from it; a calibration log on the same clocks would part them."
         ]
     return []
+
+
+def _known_notes(omnibus: Omnibus) -> list[str]:
+    """What is left, and was left before."""
+    if not omnibus.old:
+        return []
+    return [
+        f"What still depends on {' and '.join(omnibus.old)} was left by this model before, in the "
+        "log that it was fitted to."
+    ]
 
 
 def _not_identifiable(done: Search) -> list[tuple[str, str]]:

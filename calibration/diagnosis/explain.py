@@ -80,6 +80,7 @@ def explain(
         state.scenes[0].noise,
         common_clock(solution),
         bool(model_file.told_by_others(logs.values())),
+        diagnosis.omnibus.left_over,
     )
     write_child(model_file, fitted, out, command)
     return Explanation(diagnosis, after, estimates, Path(out))

@@ -5,38 +5,63 @@ Its groups say what the rest depends on. Ridge regression of the whitened errors
 of 4 s that it was not fitted to.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from twinmill.calibration.diagnosis.screen import project_out
-from twinmill.calibration.freedom import Free
+from twinmill.calibration.freedom import Free, words
 from twinmill.calibration.problem import CLOCK, Scene
 from twinmill.calibration.residual import body_velocity, rotate
 from twinmill.calibration.solve import System
 from twinmill.calibration.track import command_at
 
 FOLDS = 5
-SIGNIFICANT = 4.0  # standard errors of the held-out gain, over blocks
+AGAIN = 2.0  # times what was left elsewhere that is no news
+FLIPS = 499  # random signs of blocks that make the null distribution
+ALPHA = 0.01  # chance of naming anything if nothing is left, over all that is tested
 TYPICAL = (0.01, 0.01, 0.05)  # m/s, m/s, rad/s: what a term of full size may add
+NO_NAMES = {"dvx", "dvy", "domega", "V"}  # rates and voltage: not at hand in a body's formula
+CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
 LEFT_OVER = 0.02  # share of a term's norm that must survive the projection
 
 
 @dataclass(frozen=True)
 class Term:
-    """One candidate formula: adds p0 times `formula` to the velocity `channel` of the body."""
+    """One candidate formula: adds p0 times `formula` to a velocity of the body.
+
+    Attributes:
+        group: what it depends on.
+        adds_to, formula: as the effect `equation` takes them, but for names in NO_NAMES.
+        size: of the formula's values, 95th percentile.
+    """
 
     group: str
-    channel: str
+    adds_to: str
     formula: str
+    size: float
+
+    @property
+    def addable(self) -> bool:
+        """The effect `equation` knows all its names."""
+        return not words(self.formula) & NO_NAMES
 
 
 @dataclass(frozen=True)
 class Dependence:
-    """A group of terms, the held-out fall of chi2 that it brings alone, its standard error."""
+    """A group of terms.
+
+    Attributes:
+        gain: held-out fall of chi2 that it brings alone.
+        excess: that over its spread by chance.
+        sure: more than chance would bring.
+    """
 
     group: str
     gain: float
-    error: float
+    excess: float
+    sure: bool
 
 
 @dataclass(frozen=True)
@@ -44,17 +69,27 @@ class Omnibus:
     """What the library still explains.
 
     Attributes:
-        gain, error: held-out fall of chi2 by all groups that help, and its standard error.
+        gain: held-out fall of chi2 by all groups that help.
         groups: those that help significantly, best first.
         term: the best single formula and its coefficient; None if no group helps.
         coefficient: of that term, in its unit.
+        left_over: fall of chi2 per step by every group that brings any, known or not.
+        old: groups that help beyond chance, but no more than they did elsewhere.
     """
 
     gain: float
-    error: float
     groups: list[Dependence]
     term: Term | None
     coefficient: float
+    left_over: dict[str, float]
+    old: tuple[str, ...] = ()
+
+    @property
+    def equation(self) -> dict[str, str] | None:
+        """Texts of an effect `equation` that adds the best formula to a model; None if none can."""
+        if not self.term or not self.term.addable:
+            return None
+        return {"adds_to": self.term.adds_to, "formula": f"p0*{self.term.formula}"}
 
     @property
     def significant(self) -> bool:
@@ -62,11 +97,20 @@ class Omnibus:
         return bool(self.groups)
 
 
-NOTHING = Omnibus(0.0, 0.0, [], None, 0.0)
+NOTHING = Omnibus(0.0, [], None, 0.0, {})
 
 
-def unexplained(scenes: list[Scene], free: list[Free]) -> Omnibus:
-    """Tests the library on what the scenes' models leave."""
+def unexplained(
+    scenes: list[Scene], free: list[Free], known: Mapping[str, float] | None = None
+) -> Omnibus:
+    """Tests the library on what the scenes' models leave.
+
+    Args:
+        scenes: measurements with their models.
+        free: what was fitted.
+        known: fall of chi2 per step by group that the models left in other logs already: what is no
+            more than a few times that is not counted again.
+    """
     system = System(scenes, free)
     left, basis = project_out(system)
     rows = len(left) - len(system.unknowns)
@@ -75,46 +119,77 @@ def unexplained(scenes: list[Scene], free: list[Free]) -> Omnibus:
     columns = columns - basis[:rows] @ (basis[:rows].T @ columns)
     keep = np.linalg.norm(columns, axis=0) > LEFT_OVER * np.maximum(before, 1e-12)
     terms = [t for t, k in zip(terms, keep, strict=True) if k]
-    columns, left, blocks = columns[:, keep], left[:rows], system.blocks()
-    groups = []
-    for group in dict.fromkeys(t.group for t in terms):
-        own = np.array([t.group == group for t in terms])
-        gain, error = _held_out(columns[:, own], left, blocks)
-        if gain > SIGNIFICANT * error:
-            groups.append(Dependence(group, gain, error))
-    groups.sort(key=lambda g: -g.gain)
-    helps = np.array([any(t.group == g.group for g in groups) for t in terms])
+    products = _Products(columns[:, keep], left[:rows], system.blocks())
+    every = _dependences(terms, products)
+    left_over = {g.group: 3 * g.gain / rows for g in every if g.gain > 0}
+    news = [g for g in every if 3 * g.gain / rows > AGAIN * (known or {}).get(g.group, 0.0)]
+    groups = [g for g in news if g.sure]
+    old = tuple(g.group for g in every if g.sure and g not in news)
     if not groups:
-        return NOTHING
-    gain, error = _held_out(columns[:, helps], left, blocks)
-    best, coefficient = _best_term(terms, columns, left, groups[0].group)
-    return Omnibus(max(gain, groups[0].gain), error, groups, best, coefficient)
+        return replace(NOTHING, left_over=left_over, old=old)
+    helps = np.array([any(t.group == g.group for g in groups) for t in terms])
+    gain, _ = products.held_out(helps)
+    best, coefficient = _best_term(terms, products, groups[0].group)
+    return Omnibus(max(gain, groups[0].gain), groups, best, coefficient, left_over, old)
 
 
-def _held_out(columns: np.ndarray, left: np.ndarray, blocks: np.ndarray) -> tuple[float, float]:
-    """Fall of chi2 on blocks not fitted to, and its standard error over blocks."""
-    count = blocks.max() + 1
-    fold = np.arange(count) % FOLDS
-    gain = np.zeros(count)
-    for k in range(FOLDS):
-        test = fold[blocks] == k
-        x, y = columns[~test], left[~test]
-        gram = x.T @ x + np.eye(x.shape[1])  # unit prior: columns are in typical strengths
-        fitted = columns[test] @ np.linalg.solve(gram, x.T @ y)
-        np.add.at(gain, blocks[test], left[test] ** 2 - (left[test] - fitted) ** 2)
-    return float(gain.sum()), float(np.sqrt(count) * gain.std())
+def _dependences(terms: list[Term], products: "_Products") -> list[Dependence]:
+    """What each group brings, as a whole or by one formula, and whether that is beyond chance.
+
+    It is if it is more than the largest of all that is tested is under random signs of blocks, each
+    over its own spread there.
+    """
+    tested: list[tuple[str, np.ndarray]] = []
+    for group in dict.fromkeys(t.group for t in terms):
+        own = dict.fromkeys(t.formula for t in terms if t.group == group)
+        tested.append((group, np.array([t.group == group for t in terms])))
+        tested += [(group, np.array([t.formula == f for t in terms])) for f in own]
+    found = [products.held_out(own) for _, own in tested]
+    spread = np.array([null.std() for _, null in found])
+    highest = np.max([null / s for (_, null), s in zip(found, spread, strict=True)], axis=0)
+    least = np.quantile(highest, 1 - ALPHA)
+    best: dict[str, Dependence] = {}
+    for (group, _), (gain, _), scale in zip(tested, found, spread, strict=True):
+        this = Dependence(group, gain, float(gain / scale), bool(gain / scale > least))
+        if group not in best or (this.sure, gain) > (best[group].sure, best[group].gain):
+            best[group] = this
+    return sorted(best.values(), key=lambda g: -g.gain)
 
 
-def _best_term(
-    terms: list[Term], columns: np.ndarray, left: np.ndarray, group: str
-) -> tuple[Term, float]:
+class _Products:
+    """Products of the library's columns with each other and with the errors, block by block."""
+
+    def __init__(self, columns: np.ndarray, left: np.ndarray, blocks: np.ndarray) -> None:
+        order = np.argsort(blocks, kind="stable")
+        edges = np.searchsorted(blocks[order], np.arange(blocks.max() + 2))
+        parts = [order[a:b] for a, b in pairwise(edges)]
+        self.grams = np.array([columns[p].T @ columns[p] for p in parts])
+        self.moments = np.array([columns[p].T @ left[p] for p in parts])
+
+    def held_out(self, own: np.ndarray) -> tuple[float, np.ndarray]:
+        """Fall of chi2 by these columns on blocks not fitted to, and (F,) under random signs."""
+        grams, moments = self.grams[:, own][:, :, own], self.moments[:, own]
+        signs = np.random.default_rng(1).choice([-1.0, 1.0], (FLIPS, len(grams), 1))
+        moments = np.concatenate([moments[None], signs * moments])
+        fold = np.arange(len(grams)) % FOLDS
+        gain = np.zeros(1 + FLIPS)
+        for k in range(FOLDS):
+            test = fold == k
+            gram = grams[~test].sum(0) + np.eye(own.sum())  # columns are in typical strengths
+            fitted = np.linalg.solve(gram, moments[:, ~test].sum(1).T).T
+            gain += 2 * np.sum(moments[:, test].sum(1) * fitted, axis=1)
+            gain -= np.sum(fitted @ grams[test].sum(0) * fitted, axis=1)
+        return float(gain[0]), gain[1:]
+
+
+def _best_term(terms: list[Term], products: _Products, group: str) -> tuple[Term, float]:
     """The single term of a group that explains most, and its coefficient in its own unit."""
     own = [i for i, t in enumerate(terms) if t.group == group]
-    moment = columns[:, own].T @ left
-    energy = np.sum(columns[:, own] ** 2, axis=0) + 1.0
+    moment = products.moments.sum(0)[own]
+    energy = np.diag(products.grams.sum(0))[own] + 1.0
     best = int(np.argmax(moment**2 / energy))
     term = terms[own[best]]
-    typical = TYPICAL[("forward", "left", "turn").index(term.channel)]
+    typical = TYPICAL[CHANNELS.index(term.adds_to)] / term.size
     return term, float(moment[best] / energy[best] * typical)
 
 
@@ -126,8 +201,8 @@ def _library(scenes: list[Scene], rows: int) -> tuple[list[Term], np.ndarray]:
         terms, columns = [], []
         for (group, formula), values in named.items():
             size = max(np.percentile(np.abs(values), 95), 1e-9)
-            for axis, channel in enumerate(("forward", "left", "turn")):
-                terms.append(Term(group, channel, f"{formula} / {size:.3g}"))
+            for axis, channel in enumerate(CHANNELS):
+                terms.append(Term(group, channel, formula, float(size)))
                 columns.append(_whitened(scene, values / size, axis))
         parts.append(np.stack(columns, -1).reshape(-1, len(terms)))
     stacked = np.concatenate(parts)
@@ -155,9 +230,8 @@ def _named_terms(scene: Scene) -> dict[tuple[str, str], np.ndarray]:
     track, grid = scene.measurement.track, scene.grid
     vx, vy, turn = body_velocity(scene.measurement, grid, scene.model).T
     theta = track.heading_smooth[grid.source]
-    x, y = (track.pose[grid.source, k] - np.mean(track.pose[grid.source, k]) for k in (0, 1))
+    x, y = (track.pose[grid.source, k] for k in (0, 1))
     t_s = grid.t_s - scene.model.get(CLOCK)
-    hours = (t_s - t_s.mean()) / max(np.ptp(t_s), 1.0)
     voltage = command_at(t_s, track.command_t_s, np.nan_to_num(track.battery_V)[:, None])[:, 0]
     moving = (np.hypot(vx, vy) + 0.1 * np.abs(turn) > 0.01) * 1.0
     change = [_rate(v, grid) for v in (vx, vy, turn)]
@@ -177,27 +251,31 @@ def _named_terms(scene: Scene) -> dict[tuple[str, str], np.ndarray]:
         ("coupling of the axes", "vx*abs(omega)"): vx * np.abs(turn),
         ("coupling of the axes", "vx*abs(vy)"): vx * np.abs(vy),
         ("coupling of the axes", "vy*abs(vx)"): vy * np.abs(vx),
+        ("coupling of the axes", "vy*abs(omega)"): vy * np.abs(turn),
+        ("coupling of the axes", "omega*abs(vx)"): turn * np.abs(vx),
+        ("coupling of the axes", "omega*abs(vy)"): turn * np.abs(vy),
         ("change of the command", "dvx"): change[0],
         ("change of the command", "dvy"): change[1],
         ("change of the command", "domega"): change[2],
         ("change of the command", "abs(dvx)"): np.abs(change[0]),
+        ("change of the command", "abs(dvy)"): np.abs(change[1]),
         ("change of the command", "abs(domega)"): np.abs(change[2]),
-        ("battery voltage", "(V-V0)*vx"): (voltage - voltage.mean()) * vx,
-        ("battery voltage", "(V-V0)*vy"): (voltage - voltage.mean()) * vy,
-        ("battery voltage", "(V-V0)*omega"): (voltage - voltage.mean()) * turn,
-        ("time", "t*vx"): hours * vx,
-        ("time", "t*vy"): hours * vy,
-        ("time", "t*omega"): hours * turn,
     }
-    for n in (1, 2):
+    speeds = (("vx", vx), ("vy", vy), ("omega", turn))
+    for n in (1, 2, 3):
         for name, wave in (("cos", np.cos(n * theta)), ("sin", np.sin(n * theta))):
-            terms["heading", f"{name}({n}*theta)"] = wave * moving
-            terms["heading", f"{name}({n}*theta)*vx"] = wave * vx
-    for axis, at in (("x", x), ("y", y)):
-        terms["place", f"{axis}*vx"] = at * vx
-        terms["place", f"{axis}*vy"] = at * vy
-        terms["place", f"{axis}*omega"] = at * turn
-        terms["place", f"{axis}*{axis}*vx"] = (at**2 - np.mean(at**2)) * vx
+            for carrier, values in (("moves", moving), *speeds):
+                terms["heading", f"{name}({n}*theta)*{carrier}"] = wave * values
+    for group, name, values in (
+        ("place", "x", x), ("place", "y", y), ("time", "t", t_s), ("battery voltage", "V", voltage)
+    ):  # fmt: skip
+        middle = float(f"{np.mean(values):.4g}")
+        away = values - middle
+        text = f"({name} - {middle:g})"
+        for carrier, speed in speeds:
+            terms[group, f"{text}*{carrier}"] = away * speed
+            if group == "place":
+                terms[group, f"{text}*{text}*{carrier}"] = away**2 * speed
     return {key: values for key, values in terms.items() if np.ptp(values) > 0}
 
 

@@ -61,7 +61,12 @@ def lines(diagnosis: Diagnosis) -> list[str]:
         told.append(
             f"{100 * diagnosis.share_unexplained:.0f} % of what could be explained depends on "
             f"{' and '.join(g.group for g in diagnosis.omnibus.groups)}; best formula: "
-            f"{term.channel} velocity += {diagnosis.omnibus.coefficient:.3g} * {term.formula}."
+            f"{term.adds_to} += {diagnosis.omnibus.coefficient:.3g} * {term.formula}."
+        )
+    if equation := diagnosis.omnibus.equation:
+        told.append(
+            f"To add it: twinmill add equation LOG --adds-to {equation['adds_to']} --formula "
+            f"'{equation['formula']}', with the same logs and model."
         )
     if diagnosis.next_experiment:
         told.append(

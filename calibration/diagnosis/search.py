@@ -16,7 +16,7 @@ TRIED, PAIRED = 6, 8
 SURE, BEHIND = 2, 0.2  # so many are tried in any case, others above this share of the best gain
 CLOSE = 1.02  # held-out scores whose ratio is nearer to 1 are decided by chi2
 MOST = 4
-WORTH = 0.998  # an effect must lower the held-out score below this share: certain is not important
+WORTH = 0.98  # each effect must lower the held-out score to this share: certain is not important
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,11 @@ def _judge(state: State, before: Trial, screening: Screening, which: tuple[int, 
 
 def _best(before: Trial, judged: list[Judged], limit: float) -> Judged | None:
     """Of those with enough evidence, and that matter, the one with the smallest held-out error."""
-    good = [j for j in judged if j.evidence > limit and j.trial.score < WORTH * before.score]
+    good = [
+        j
+        for j in judged
+        if j.evidence > limit and j.trial.score < WORTH ** len(j.trial.effects) * before.score
+    ]
     if not good:
         return None
     smallest = min(j.trial.score for j in good)

@@ -26,14 +26,15 @@ WITHHELD = (
     "turn_asymmetry",
     "wheel_eccentricity",
 )
-FORMULAS = (
-    ("vx_mps", "p0*vx*sin(0.2*t)", 0.1),
-    ("vx_mps", "p0*moves*sin(3*theta)", 0.012),
-    ("vy_mps", "p0*vx*abs(omega)", 0.04),
-    ("omega_radps", "p0*moves*cos(theta)", 0.08),
-    ("omega_radps", "p0*vx*vx", 0.8),
-    ("omega_radps", "p0*vx*vy", 1.5),
-)
+# A formula is a quantity that it adds to, times a carrier, times what modulates it. Sizes are what
+# a script of many drives gives them, so that a usual formula adds USUAL to the velocity.
+USUAL = {"vx_mps": 0.012, "vy_mps": 0.012, "omega_radps": 0.07}
+CARRIERS = {"vx": 0.2, "vy": 0.2, "omega": 1.2, "moves": 1.0}
+MODULATORS = {
+    "abs(vx)": 0.2, "abs(vy)": 0.2, "abs(omega)": 1.2, "vx": 0.2, "vy": 0.2, "omega": 1.2,
+    "sin(theta + {phase})": 0.7, "sin(2*theta + {phase})": 0.7, "sin(3*theta + {phase})": 0.7,
+    "(x*{part} + y*{rest})": 0.4, "sin(t/{slow} + {phase})": 0.7,
+}  # fmt: skip
 ROBOT = """
 [base]
 duty_pct = [0, 12.5, 25, 37.5, 50, 75, 100]
@@ -140,9 +141,22 @@ def _drawable(entry: dict) -> bool:
 
 
 def _formula(strength: float, random: np.random.Generator) -> Hidden:
-    adds_to, formula, usual = FORMULAS[random.integers(len(FORMULAS))]
-    p0 = usual * strength * random.uniform(0.8, 1.2) * random.choice([-1, 1])
-    return Hidden("equation", {"p0": float(p0)}, {"adds_to": adds_to, "formula": formula})
+    """A product drawn at random; it may resemble an effect of the catalogue by chance."""
+    adds_to, carrier, modulator = (
+        str(random.choice(list(d))) for d in (USUAL, CARRIERS, MODULATORS)
+    )
+    size = CARRIERS[carrier] * MODULATORS[modulator]
+    phase, turned, slow = random.uniform(0, 2 * np.pi, 3)
+    shape = modulator.format(
+        phase=f"{phase:.2f}",
+        part=f"{np.cos(turned):.2f}",
+        rest=f"{np.sin(turned):.2f}",
+        slow=f"{5 + 5 * slow:.1f}",
+    )
+    p0 = USUAL[adds_to] / size * strength * random.uniform(0.8, 1.2) * random.choice([-1, 1])
+    return Hidden(
+        "equation", {"p0": float(p0)}, {"adds_to": adds_to, "formula": f"p0*{carrier}*{shape}"}
+    )
 
 
 def _parameters(entry: dict, strength: float, random: np.random.Generator) -> dict[str, float]:

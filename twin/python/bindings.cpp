@@ -184,6 +184,19 @@ Array OneStepBatch(const Model &model, const PyTrack &track, const std::vector<s
     return ToNumpy(std::move(predicted), {values.shape(0), track.pose_t_s.size(), 3});
 }
 
+nb::list TextsList(const Model &model)
+{
+    nb::list rows;
+    for (const EffectInstance &effect : model.effects)
+    {
+        nb::dict row;
+        for (size_t i = 0; i < effect.texts.size(); ++i)
+            row[effect.spec->texts[i].name] = effect.texts[i];
+        rows.append(row);
+    }
+    return rows;
+}
+
 Array Steady(const Model &model, Matrix commands, const std::vector<std::string> &names,
              Matrix values)
 {
@@ -228,6 +241,7 @@ NB_MODULE(twinmill_native, m)
         .def("copy", [](const Model &model) { return Model(model); })
         .def_prop_ro("drive", &DriveName)
         .def_prop_ro("clock_known", [](const Model &model) { return model.clock.known; })
+        .def_prop_ro("texts", &TextsList, "By effect in their order: its texts by name.")
         .def_prop_ro("effects", [](const Model &model) {
             nb::list names;
             for (const EffectInstance &effect : model.effects)
