@@ -20,6 +20,7 @@ from twinmill.calibration.track import command_at
 FOLDS = 5
 AGAIN = 2.0  # times what was left elsewhere that is no news
 FLIPS = 499  # random signs of blocks that make the null distribution
+BESIDE = 0.1  # share by which a group must raise what better groups bring
 ALPHA = 0.01  # chance of naming anything if nothing is left, over all that is tested
 TYPICAL = (0.01, 0.01, 0.05)  # m/s, m/s, rad/s: what a term of full size may add
 NO_NAMES = {"dvx", "dvy", "domega", "V"}  # rates and voltage: not at hand in a body's formula
@@ -127,10 +128,22 @@ def unexplained(
     old = tuple(g.group for g in every if g.sure and g not in news)
     if not groups:
         return replace(NOTHING, left_over=left_over, old=old)
-    helps = np.array([any(t.group == g.group for g in groups) for t in terms])
-    gain, _ = products.held_out(helps)
+    groups, gain = _without_shadows(groups, terms, products)
     best, coefficient = _best_term(terms, products, groups[0].group)
     return Omnibus(max(gain, groups[0].gain), groups, best, coefficient, left_over, old)
+
+
+def _without_shadows(
+    groups: list[Dependence], terms: list[Term], products: "_Products"
+) -> tuple[list[Dependence], float]:
+    """Those groups that bring something beside the better ones, and what they bring together."""
+    kept, gain = [], 0.0
+    for group in groups:
+        names = {g.group for g in [*kept, group]}
+        together, _ = products.held_out(np.array([t.group in names for t in terms]))
+        if not kept or together > (1 + BESIDE) * gain:
+            kept, gain = [*kept, group], together
+    return kept, gain
 
 
 def _dependences(terms: list[Term], products: "_Products") -> list[Dependence]:
