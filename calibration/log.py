@@ -96,10 +96,7 @@ def read_log(path: str | Path, channel_prefix: str = "") -> Log:
             another type.
     """
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise LogError(f"{path}: cannot be read ({error.strerror}); check the name.") from error
+    data = read_bytes(path)
     events = split_events(data, path.name)
     warnings = list(events.warnings)
     channels = _robot_channels(events.by_channel, channel_prefix, warnings)
@@ -127,6 +124,18 @@ def read_log(path: str | Path, channel_prefix: str = "") -> Log:
             **_pose_series(poses, t0_us, robot_id, warnings),
         )
     return Log(path, hashlib.sha256(data).hexdigest(), t0_us, robots, warnings)
+
+
+def read_bytes(path: Path) -> bytes:
+    """The file's.
+
+    Raises:
+        LogError: it cannot be read.
+    """
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read ({error.strerror}); check the name.") from error
 
 
 def _robot_channels(

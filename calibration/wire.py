@@ -67,9 +67,16 @@ class LogError(ValueError):
 
 @dataclass
 class Events:
-    """Payloads by channel in file order, and what was wrong with the container (sentences)."""
+    """Events in file order.
+
+    Attributes:
+        by_channel: payloads.
+        stamps_us: when each was logged, us since the Unix epoch, recorder's clock.
+        warnings: what was wrong with the container.
+    """
 
     by_channel: dict[str, list[bytes]] = field(default_factory=dict)
+    stamps_us: dict[str, list[int]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
 
 
@@ -100,10 +107,11 @@ def split_events(data: bytes, name: str) -> Events:
                 )
             position = following
             continue
-        channel_size = HEADER.unpack_from(data, position)[3]
+        _, _, stamp_us, channel_size, _ = HEADER.unpack_from(data, position)
         start = position + HEADER.size
         channel = data[start : start + channel_size].decode("utf-8", "replace")
         events.by_channel.setdefault(channel, []).append(data[start + channel_size : end])
+        events.stamps_us.setdefault(channel, []).append(stamp_us)
         position = end
     if not events.by_channel:
         raise LogError(

@@ -10,6 +10,7 @@ from twinmill.tools import calibrate, characterise, diagnose, effects, import_lo
 from twinmill.tools import next as next_run
 from twinmill.tools.challenge import run as challenge
 from twinmill.tools.deploy import flash
+from twinmill.tools.export import command as export
 from twinmill.tools.swarm import commands as swarm
 from twinmill.tools.sweep import ask
 from twinmill.tools.sweep import phase_command as phase
@@ -21,6 +22,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 import_log.register(app)
+export.register(app)
 calibrate.register(app)
 diagnose.register(app)
 next_run.register(app)

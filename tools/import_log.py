@@ -3,10 +3,6 @@
 
 import hashlib
 import json
-import os
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -23,7 +19,7 @@ from twinmill.tools.import_io_tsv import read_io_tsv
 from twinmill.tools.import_motive import read_motive
 from twinmill.tools.import_plain import read_commands, read_poses
 from twinmill.tools.log_writer import write_log
-from twinmill.tools.output import check_new_file
+from twinmill.tools.output import replacing
 from twinmill.tools.series import CommandSeries, PoseSeries, multiply
 
 LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
@@ -103,7 +99,7 @@ def import_log(
     )
     _check_times(pose_series, command_series)
     sources = [path for path in (poses, motive, commands, *io_tsv) if path is not None]
-    with _replacing(out, options.force) as temporary:
+    with replacing(out, options.force) as temporary:
         write_log(temporary, pose_series, command_series, _provenance(sources, options))
         warnings = [text for series in command_series for text in series.warnings]
         return _summary(read_log(temporary), out, warnings)
@@ -170,24 +166,6 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
             }
         }
     )
-
-
-@contextmanager
-def _replacing(out: Path, force: bool) -> Iterator[Path]:
-    """A temporary file beside `out` that takes its place if the block succeeds."""
-    check_new_file(out, force)
-    handle, name = tempfile.mkstemp(prefix=f".{out.name}.", dir=out.parent)
-    os.close(handle)
-    try:
-        yield Path(name)
-        os.chmod(name, 0o644)
-        os.replace(name, out)
-    except OSError as error:
-        raise LogError(
-            f"{out}: cannot be written ({error.strerror}); choose another place."
-        ) from error
-    finally:
-        Path(name).unlink(missing_ok=True)
 
 
 def _summary(log: Log, out: Path, warnings: list[str]) -> dict:

@@ -77,7 +77,7 @@ def read_commands(path: Path, rename: dict[str, str], robot_id: int | None) -> l
     ids, utime_us = _robot_ids(table, robot_id), _utime_us(table)
     kind = _kind(table)
     inputs = (
-        np.column_stack([table.finite(name) for name in INPUTS])
+        np.column_stack([_input(table, name) for name in INPUTS])
         if kind == "duty" and table.has(*INPUTS)
         else np.full((len(ids), 2), np.nan)
     )
@@ -101,6 +101,11 @@ def read_commands(path: Path, rename: dict[str, str], robot_id: int | None) -> l
         for number in np.unique(ids).tolist()
         for rows in [ids == number]
     ]
+
+
+def _input(table: Table, name: str) -> np.ndarray:
+    """(rows,) of one input; beside duties it need not be known."""
+    return table.numbers(name, True) if table.has(*VALUES["duty"]) else table.finite(name)
 
 
 def _kind(table: Table) -> CommandKind:

@@ -70,6 +70,28 @@ def check_new_file(path: Path, force: bool) -> None:
     _check_folder(path, path.parent)
 
 
+@contextmanager
+def replacing(out: Path, force: bool) -> Iterator[Path]:
+    """A temporary file beside `out` that takes its place if the block succeeds.
+
+    Raises:
+        ValueError: a file cannot be written there.
+    """
+    check_new_file(out, force)
+    handle, name = tempfile.mkstemp(prefix=f".{out.name}.", dir=out.parent)
+    os.close(handle)
+    try:
+        yield Path(name)
+        os.chmod(name, 0o644)
+        os.replace(name, out)
+    except OSError as error:
+        raise ValueError(
+            f"{out}: cannot be written ({error.strerror}); choose another place."
+        ) from error
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
 def check_new_folder(path: Path) -> None:
     """Raises ValueError if a folder could not be made or written here."""
     existing = path

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tools/export: other programs find what LCM's own reader finds."""
+
+import json
+import math
+
+import lcm
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import turbopi
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+from twinmill.calibration.log import read_log
+from twinmill.calibration.track import command_at
+from twinmill.tools.cli import run
+from twinmill.tools.import_log import import_log
+
+T0_US = 1_700_000_000_000_000
+
+
+@pytest.fixture
+def log(write_log, message):
+    """Every type of message, two robots, one of them the twin's; a robot turns to the left."""
+    events = [
+        ("R01_RUN", message("run", utime_us=T0_US, source="robot", config_toml='a = "b,\\nc"')),
+        (
+            "SWARM_COMMAND",
+            message("swarm_command", utime_us=T0_US, robot_id=-1, behavior="milling"),
+        ),
+        ("R01_ACK", message("ack", utime_us=T0_US + 1, robot_id=1, reason="flat, said it")),
+        ("TWIN_TRUTH_R02", message("truth", utime_us=T0_US + 2, wheel_radps=[1.5, -2, 0.25, 3])),
+        ("TWIN_R02_POSE", message("pose", utime_us=T0_US + 3, robot_id=2)),
+    ]
+    for k in range(40):
+        utime_us, half_rad = T0_US + 10_000 * k, 0.02 * k
+        pose = message("pose", utime_us=utime_us, robot_id=1, seq=k)
+        pose.position_m = [0.1 * k, 1 / 3, 0.106]
+        pose.orientation_wxyz = [math.cos(half_rad), 0.0, 0.0, math.sin(half_rad)]
+        telemetry = message("telemetry", utime_us=utime_us + 5, robot_id=1, seq=k)
+        telemetry.wheel_duty_pct = [k, -k, 100, -100]
+        telemetry.detected, telemetry.battery_V = k // 20, math.nan
+        telemetry.speed_input = telemetry.turn_input = math.nan
+        events += [("R01_POSE", pose), ("R01_TELEMETRY", telemetry)]
+    lost = message("pose", utime_us=T0_US + 400_000, robot_id=1, position_m=[math.nan] * 3)
+    lost.valid = 0
+    return write_log(*events, ("R01_POSE", lost))
+
+
+def lcm_events(path):
+    kinds = {k._get_packed_fingerprint(): k for n, k in vars(turbopi).items() if n.endswith("_t")}
+    return [
+        (e.channel, e.timestamp, kinds[e.data[:8]].decode(e.data))
+        for e in lcm.EventLog(str(path), "r")
+    ]
+
+
+def mcap_messages(path):
+    with open(path, "rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        return list(reader.iter_decoded_messages(log_time_order=False))
+
+
+def test_mcap_holds_every_field_of_every_message(log, tmp_path):
+    run(["export", str(log), "--to", "mcap", "-o", str(tmp_path / "o.mcap")])
+    said = lcm_events(log)
+    found = [m for m in mcap_messages(tmp_path / "o.mcap") if m.schema.name.startswith("turbopi.")]
+    assert len(found) == len(said) == 86
+    for (channel, stamp_us, sent), got in zip(said, found, strict=True):
+        assert (channel, 1000 * stamp_us) == (got.channel.topic, got.message.log_time)
+        assert got.message.publish_time == 1000 * sent.utime_us
+        assert got.schema.name == f"turbopi.{type(sent).__name__}"
+        for field in sent.__slots__:
+            value, copy = getattr(sent, field), getattr(got.decoded_message, field)
+            if isinstance(value, str):
+                assert copy == value
+            else:
+                np.testing.assert_array_equal(np.array(copy), value)
+
+
+def test_foxglove_sees_the_robot_where_and_as_it_stood(log, tmp_path):
+    run(["export", str(log), "--to", "mcap", "-o", str(tmp_path / "o.mcap")])
+    found = mcap_messages(tmp_path / "o.mcap")
+    frames = [m.decoded_message for m in found if m.schema.name == "foxglove.FrameTransform"]
+    own = [f for f in frames if f.child_frame_id == "R01"]
+    assert len(own) == 40 and len(frames) == 41  # the lost pose moves nothing
+    turned_rad = [2 * math.atan2(f.rotation.z, f.rotation.w) for f in own]
+    np.testing.assert_allclose(turned_rad, 0.04 * np.arange(40), atol=1e-12)
+    np.testing.assert_array_equal([f.translation.x for f in own], 0.1 * np.arange(40))
+    scenes = [m.decoded_message.entities[0] for m in found if m.channel.topic == "/scene"]
+    bodies = [s for s in scenes if s.id == "R01 robot"]
+    views = [s.lines[2].color for s in bodies]
+    assert views[-1].g > views[-1].r  # it sees: green
+    assert all(s.frame_id == "R01" for s in bodies)
+
+
+def test_import_reads_poses_and_commands_back(log, tmp_path):
+    run(["export", str(log), "--to", "csv", "-o", str(tmp_path / "tables")])
+    import_log(
+        tmp_path / "tables" / "pose.csv",
+        tmp_path / "tables" / "telemetry.csv",
+        tmp_path / "again.lcmlog",
+    )
+    before, after = (read_log(path).robots[1] for path in (log, tmp_path / "again.lcmlog"))
+    np.testing.assert_allclose(after.pose_t_s, before.pose_t_s, atol=1e-9)
+    np.testing.assert_array_equal(after.valid, before.valid)
+    np.testing.assert_allclose(after.pose, before.pose, atol=1e-12)
+    at_s = before.command_t_s + 1e-6
+    np.testing.assert_array_equal(
+        command_at(at_s, after.command_t_s, after.command), before.command
+    )
+
+
+@pytest.mark.parametrize("kind", [0, 1, 2])
+def test_import_reads_other_makers_commands_back(write_log, message, tmp_path, kind):
+    value = [[10, -20, 30, -40], [1.5, 2.5, -3.25, 4.0], [0.3, -0.1, 0.7, 0]][kind]
+    poses = [("R07_POSE", message("pose", utime_us=10_000 * k, robot_id=7)) for k in range(9)]
+    drive = message("drive", robot_id=7, kind=kind, value=[float(v) for v in value])
+    log = write_log(("R07_DRIVE", drive), *poses)
+    run(["export", str(log), "--to", "csv", "-o", str(tmp_path / "t")])
+    import_log(tmp_path / "t" / "pose.csv", tmp_path / "t" / "drive.csv", tmp_path / "again.lcmlog")
+    before, after = (read_log(path).robots[7] for path in (log, tmp_path / "again.lcmlog"))
+    assert after.command_kind == before.command_kind
+    np.testing.assert_array_equal(after.command[0], before.command[0])
+
+
+def test_parquet_keeps_integers_and_where_it_comes_from(log, tmp_path):
+    run(["export", str(log), "--to", "parquet", "-o", str(tmp_path / "t")])
+    assert {file.name for file in (tmp_path / "t").iterdir()} == {
+        f"{name}.parquet"
+        for name in ("run", "swarm_command", "ack", "truth", "twin_pose", "pose", "telemetry")
+    }
+    table = pq.read_table(tmp_path / "t" / "telemetry.parquet")
+    stamps = [m.utime_us for channel, _, m in lcm_events(log) if channel == "R01_TELEMETRY"]
+    assert table["utime_us"].to_pylist() == stamps
+    assert table["fr_pct"].to_pylist() == [-k for k in range(40)]
+    assert json.loads(table.schema.metadata[b"twinmill"])["log_sha256"] == read_log(log).sha256
+
+
+def test_a_log_that_breaks_off_is_read_up_to_there(log, tmp_path, capsys):
+    broken = tmp_path / "broken.lcmlog"
+    broken.write_bytes(log.read_bytes()[:-5])
+    run(["export", str(broken), "--to", "mcap", "-o", str(tmp_path / "o.mcap"), "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert said["messages"] == 85
+    assert "breaks off" in said["warnings"][0]
+    found = [m for m in mcap_messages(tmp_path / "o.mcap") if m.schema.name.startswith("turbopi.")]
+    assert len(found) == 85
+
+
+@pytest.mark.parametrize("to", ["mcap", "csv"])
+def test_bad_input_is_one_sentence_and_nothing_is_written(log, write_log, tmp_path, to):
+    out = tmp_path / "o"
+    strange = write_log(("CHATTER", b"12345678"), name="strange.lcmlog")
+    (tmp_path / "text").write_text("t_s,x_m\n")
+    before = set(tmp_path.iterdir())
+    for path, sentence in (
+        (tmp_path / "none", "cannot be read"),
+        (tmp_path / "text", "no LCM log"),
+        (strange, "no message of the types"),
+    ):
+        with pytest.raises(ValueError, match=sentence):
+            run(["export", str(path), "--to", to, "-o", str(out)])
+    with pytest.raises(ValueError, match=r"--force|Not a directory"):
+        run(["export", str(log), "--to", to, "-o", str(log)])
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_same_log_same_bytes(log, tmp_path):
+    out = tmp_path / "o.mcap"
+    made = []
+    for _ in range(2):
+        run(["export", str(log), "--to", "mcap", "-o", str(out), "--force"])
+        made.append(out.read_bytes())
+    assert made[0] == made[1]
