@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 import turbopi
-from twinmill.calibration.wire import LogError, decode, split_events
+from twinmill.calibration.wire import Events, LogError, decode, split_events
 
 __all__ = ["Log", "LogError", "RobotLog", "read_log"]
 
@@ -98,6 +98,11 @@ def read_log(path: str | Path, channel_prefix: str = "") -> Log:
     path = Path(path)
     data = read_bytes(path)
     events = split_events(data, path.name)
+    return decode_log(events, path, hashlib.sha256(data).hexdigest(), channel_prefix)
+
+
+def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = "") -> Log:
+    """What read_log does, of events that were cut out of a file or heard on a bus."""
     warnings = list(events.warnings)
     channels = _robot_channels(events.by_channel, channel_prefix, warnings)
     if not channels:
@@ -123,7 +128,7 @@ def read_log(path: str | Path, channel_prefix: str = "") -> Log:
             **_command_series(commands, t0_us, robot_id, warnings),
             **_pose_series(poses, t0_us, robot_id, warnings),
         )
-    return Log(path, hashlib.sha256(data).hexdigest(), t0_us, robots, warnings)
+    return Log(path, sha256, t0_us, robots, warnings)
 
 
 def read_bytes(path: Path) -> bytes:

@@ -76,7 +76,7 @@ def swarm_metrics(
         )
     order = sorted(set(robots) - set(odd)) + sorted(odd)
     t_s = _times(robots)
-    columns = [_resample(robots[i], t_s) for i in order]
+    columns = [resample(robots[i], t_s) for i in order]
     pose, velocity = (np.stack(part, axis=1) for part in zip(*columns, strict=True))
     whole = np.isfinite(pose).all(axis=(1, 2)) & np.isfinite(velocity).all(axis=(1, 2))
     if not whole.any():
@@ -108,7 +108,7 @@ def _times(robots: dict[int, RobotLog]) -> np.ndarray:
     return np.arange(first, last, STEP_S)
 
 
-def _resample(robot: RobotLog, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def resample(robot: RobotLog, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(T, 3) poses and (T, 3) body velocities; NaN in gaps."""
     known_t_s, known = robot.pose_t_s[robot.valid], robot.pose[robot.valid]
     pose = np.column_stack([np.interp(t_s, known_t_s, known[:, k]) for k in range(3)])

@@ -6,7 +6,7 @@ from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
-from twinmill.tools import calibrate, characterise, diagnose, effects, import_log, metrics
+from twinmill.tools import calibrate, characterise, diagnose, effects, import_log, metrics, plot
 from twinmill.tools import next as next_run
 from twinmill.tools.challenge import run as challenge
 from twinmill.tools.deploy import flash
@@ -23,6 +23,7 @@ app = typer.Typer(
 )
 import_log.register(app)
 export.register(app)
+plot.register(app)
 calibrate.register(app)
 diagnose.register(app)
 next_run.register(app)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The HTML report: one file that needs no other, for people who did not run the comparison."""
 
-from twinmill.calibration.report.html import Figure, Provenance, Section, write_report
+from twinmill.calibration.report.html import Figure, Provenance, Section, render_page, write_report
 from twinmill.calibration.report.sections import (
     added_section,
     comparison_section,
@@ -16,6 +16,7 @@ __all__ = [
     "added_section",
     "comparison_section",
     "fit_section",
+    "render_page",
     "steps_section",
     "write_report",
 ]

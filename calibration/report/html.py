@@ -11,7 +11,7 @@ from twinmill.calibration.tables import Table, Tone
 
 @dataclass(frozen=True)
 class Provenance:
-    """What every output carries."""
+    """What every output carries; the model's hash is empty where none was used."""
 
     command: str
     version: str
@@ -79,6 +79,14 @@ def write_report(
     Raises:
         ModelError: it cannot be written.
     """
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    path = Path(folder) / "index.html"
+    write_whole(path, render_page(title, source, sections, note))
+    return path
+
+
+def render_page(title: str, source: Provenance, sections: list[Section], note: str) -> str:
+    """The HTML text; the same input gives the same."""
     environment = Environment(
         loader=PackageLoader("twinmill.calibration.report", "."),
         autoescape=True,
@@ -86,10 +94,6 @@ def write_report(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page = environment.get_template("report.html.j2").render(
+    return environment.get_template("report.html.j2").render(
         title=title, source=source, sections=sections, note=note
     )
-    Path(folder).mkdir(parents=True, exist_ok=True)
-    path = Path(folder) / "index.html"
-    write_whole(path, page)
-    return path

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tools/plot: what is drawn is what was driven."""
+
+from dataclasses import replace
+
+import matplotlib.colors
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+from twinmill.tools.cli import run
+from twinmill.tools.everyone import Actor, read_everyone
+from twinmill.tools.plot_figures import Drawing
+
+
+@pytest.fixture
+def log(write_log, message):
+    """A robot at 0.25 m/s along x, and its twin, which starts a second later, along y."""
+    events = []
+    for k in range(300):
+        utime_us = 1_700_000_000_000_000 + 10_000 * k
+        robot = message("pose", utime_us=utime_us, robot_id=1)
+        robot.position_m = [0.0025 * k, 0.0, 0.1]
+        twin = message("pose", utime_us=utime_us + 1_000_000, robot_id=1)
+        twin.position_m = [0.0, 0.0025 * k, 0.1]
+        telemetry = message("telemetry", utime_us=utime_us, robot_id=1, detected=k // 150)
+        telemetry.wheel_duty_pct = [-50, 100, -50, 100]
+        events += [("R01_POSE", robot), ("R01_TELEMETRY", telemetry), ("TWIN_R01_POSE", twin)]
+    return write_log(*events)
+
+
+def painted(actors, name):
+    axes = Figure().subplots()
+    getattr(Drawing(actors), name)(axes)
+    return axes
+
+
+def test_speed_and_turn_of_a_circle(driven):
+    robot = Actor("", driven())
+    (speed,), (turn,) = (painted([robot], name).lines for name in ("speed", "turn"))
+    # Parabolas over 0.4 s cut the corner of a circle by less than 0.5 %.
+    np.testing.assert_allclose(speed.get_ydata(), 0.3, rtol=5e-3)
+    np.testing.assert_allclose(turn.get_ydata(), np.degrees(0.5), rtol=1e-3)
+
+
+def test_robot_and_twin_are_drawn_on_one_time_axis(log):
+    actors = read_everyone(log).actors
+    assert [actor.name for actor in actors] == ["R01", "TWIN_R01"]
+    robot, twin = painted(actors, "speed").lines
+    assert (robot.get_xdata()[0], twin.get_xdata()[0]) == (0.0, 1.0)
+    assert (robot.get_linestyle(), twin.get_linestyle()) == ("-", "--")
+    along = painted(actors, "paths").lines[0]
+    assert np.ptp(along.get_xdata()) == pytest.approx(0.7475, abs=0.13)
+    assert np.ptp(along.get_ydata()) == 0
+
+
+def test_bits_are_green_from_when_it_sees_and_commands_have_their_signs(log):
+    actors = read_everyone(log).actors
+    (bits,) = painted(actors, "bits").images
+    row = bits.get_array()[0]
+    green = (row == matplotlib.colors.to_rgb("#009e73")).all(axis=1)
+    cell_s = bits.get_extent()[1] / len(row)
+    assert green.argmax() * cell_s == pytest.approx(1.5, abs=2 * cell_s)
+    (duties,) = painted(actors, "commands").images
+    assert np.array(duties.get_array())[:, 5].tolist() == [-50, 100, -50, 100]
+
+
+def test_a_robot_that_fell_silent_is_neither_blind_nor_driven(driven):
+    robot = driven()
+    speaks = robot.command_t_s < 5
+    quiet = ("command_t_s", "command", "battery_V", "frame_t_s", "mode", "detected_raw", "detected")
+    silent = replace(robot, **{name: getattr(robot, name)[speaks] for name in quiet})
+    (duties,) = painted([Actor("", silent)], "commands").images
+    known = np.isfinite(np.ma.filled(duties.get_array().astype(float), np.nan)[0])
+    assert known[:100].all() and not known[106:].any()
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "html"])
+def test_same_log_same_picture(log, tmp_path, suffix):
+    out, made = tmp_path / f"o.{suffix}", []
+    for _ in range(2):
+        run(["plot", str(log), "-o", str(out), "--force"])
+        made.append(out.read_bytes())
+    assert made[0] == made[1]
+    if suffix == "png":
+        assert len(Image.open(out).convert("RGB").getcolors(1 << 24)) > 10
+
+
+def test_bad_input_is_one_sentence_and_nothing_is_written(log, write_log, message, tmp_path):
+    write_log(("R01_RUN", message("run", robot_id=1)), name="empty.lcmlog")
+    before = set(tmp_path.iterdir())
+    for name, out, sentence in (
+        ("made.lcmlog", "o.jpg", r"o\.jpg: must end in"),
+        ("empty.lcmlog", "o.png", "no channel"),
+        ("none", "o.png", "cannot be read"),
+    ):
+        with pytest.raises(ValueError, match=sentence):
+            run(["plot", str(tmp_path / name), "-o", str(tmp_path / out)])
+    assert set(tmp_path.iterdir()) == before
