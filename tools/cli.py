@@ -10,6 +10,7 @@ from twinmill.tools import calibrate, characterise, diagnose, effects, import_lo
 from twinmill.tools import next as next_run
 from twinmill.tools.challenge import run as challenge
 from twinmill.tools.deploy import flash
+from twinmill.tools.discover import command as discover
 from twinmill.tools.export import command as export
 from twinmill.tools.swarm import commands as swarm
 from twinmill.tools.sweep import ask
@@ -35,6 +36,7 @@ characterise.register(app)
 metrics.register(app)
 phase.register(app)
 ask.register(app)
+discover.register(app)
 threshold.register(app)
 
 

@@ -269,8 +269,13 @@ size_t config_print(const struct app_config *config, bool with_docs, char *text,
 
 enum fw_err config_core(const struct app_config *config, struct fw_config *core)
 {
+    struct fw_table table;
     const struct fw_behavior *behavior = fw_behavior_find(config->behavior);
-    if (behavior == NULL)
+    if (config->table[0] == '\0' && behavior != NULL)
+    {
+        table = behavior->table;
+    }
+    else if (!fw_table_parse(config->table, &table))
     {
         return FW_ERR_INPUT_RANGE;
     }
@@ -282,7 +287,7 @@ enum fw_err config_core(const struct app_config *config, struct fw_config *core)
         .min_blob_px = config->min_blob_px,
         .vote = {config->vote_frames,
                  config->vote_window_ms == 0 ? INT64_MAX : (int64_t)config->vote_window_ms * 1000},
-        .table = behavior->table,
+        .table = table,
         .frame_timeout_us = (int64_t)config->frame_timeout_ms * 1000,
         .duty_cap_pct = config->duty_cap_pct,
     };

@@ -17,7 +17,7 @@
 struct app_config
 {
     int32_t robot_id;
-    char behavior[CONFIG_TEXT_MAX];
+    char behavior[CONFIG_TEXT_MAX], table[CONFIG_TEXT_MAX];
     bool autostart;
 
     int32_t y_min, y_max, u_min, u_max, v_min, v_max;

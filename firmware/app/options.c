@@ -152,7 +152,16 @@ static bool apply(int code, struct options *options, enum options_action *action
 
 static bool check(const struct app_config *config, char *error)
 {
-    if (fw_behavior_find(config->behavior) == NULL)
+    struct fw_table own;
+    if (config->table[0] != '\0' && !fw_table_parse(config->table, &own))
+    {
+        (void)snprintf(error, CONFIG_ERROR_MAX,
+                       "table: '%.60s': must be speed,turn,speed,turn, for nothing seen and for "
+                       "seen, as in 100,-0.5,100,0.5 (speed -100..100, turn -2..2)",
+                       config->table);
+        return false;
+    }
+    if (config->table[0] == '\0' && fw_behavior_find(config->behavior) == NULL)
     {
         int used = snprintf(error, CONFIG_ERROR_MAX, "behavior: '%.60s': must be one of",
                             config->behavior);

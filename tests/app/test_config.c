@@ -86,6 +86,13 @@ static void test_core_gets_what_was_set(void)
     TEST_ASSERT_EQUAL(60, core.duty_cap_pct);
     TEST_ASSERT_EQUAL(100, core.box.u_max);
     TEST_ASSERT_EQUAL_MEMORY(&fw_behavior_find("orbit")->table, &core.table, sizeof core.table);
+    TEST_ASSERT_TRUE(parse("behavior = found_3\ntable = \"-7,1.25,80,0\"\n"));
+    TEST_ASSERT_EQUAL(FW_OK, config_core(&config, &core));
+    TEST_ASSERT_EQUAL(-7, core.table.unseen.speed_input_pct);
+    TEST_ASSERT_EQUAL(1250, core.table.unseen.turn_input_milli);
+    TEST_ASSERT_TRUE(parse("table = 1,2,3\n"));
+    TEST_ASSERT_EQUAL(FW_ERR_INPUT_RANGE, config_core(&config, &core));
+    TEST_ASSERT_TRUE(parse("behavior = orbit\ntable = \"\"\n"));
     TEST_ASSERT_TRUE(parse("u_min = 101\n"));
     TEST_ASSERT_EQUAL(FW_ERR_BOX, config_core(&config, &core));
 }

@@ -39,11 +39,40 @@ static void test_check_looks_at_both_rows(void)
     TEST_ASSERT_EQUAL_INT(FW_ERR_INPUT_RANGE, fw_table_check(&bad_seen));
 }
 
+// The notation is the command line's; the numbers are milling's as published, and the ends.
+static void test_parse_reads_inputs(void)
+{
+    struct fw_table table;
+    TEST_ASSERT_TRUE(fw_table_parse("100,-0.5,100,0.5", &table));
+    TEST_ASSERT_EQUAL_INT(100, table.unseen.speed_input_pct);
+    TEST_ASSERT_EQUAL_INT(-500, table.unseen.turn_input_milli);
+    TEST_ASSERT_EQUAL_INT(100, table.seen.speed_input_pct);
+    TEST_ASSERT_EQUAL_INT(500, table.seen.turn_input_milli);
+    TEST_ASSERT_TRUE(fw_table_parse("-100,2,0,-2", &table));
+    TEST_ASSERT_EQUAL_INT(2000, table.unseen.turn_input_milli);
+}
+
+static void test_parse_refuses_all_else_and_touches_nothing(void)
+{
+    struct fw_table table = {{1, 2}, {3, 4}};
+    const char *const bad[] = {"",          "1,1,1",       "1,1,1,1,1", "1,1,1,",
+                               "101,0,0,0", "0,2.001,0,0", "0,0,0,-3",  "a,0,0,0",
+                               "0,0,0,0 x", "1e12,0,0,0"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i)
+    {
+        TEST_ASSERT_FALSE_MESSAGE(fw_table_parse(bad[i], &table), bad[i]);
+    }
+    TEST_ASSERT_EQUAL_INT(1, table.unseen.speed_input_pct);
+    TEST_ASSERT_EQUAL_INT(4, table.seen.turn_input_milli);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_lookup_takes_the_row_of_the_bit);
     RUN_TEST(test_check_takes_the_ends_of_the_range_and_nothing_beyond);
     RUN_TEST(test_check_looks_at_both_rows);
+    RUN_TEST(test_parse_reads_inputs);
+    RUN_TEST(test_parse_refuses_all_else_and_touches_nothing);
     return UNITY_END();
 }

@@ -11,6 +11,7 @@ from rich.console import Console, Group
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
+from twinmill.tools.behaviors import find_table
 from twinmill.tools.deploy.package import Package, build_package, read_package
 from twinmill.tools.deploy.remote import SshConfig
 from twinmill.tools.deploy.robot_update import Outcome, Target, Wish, parse_target, update
@@ -34,7 +35,9 @@ def _flash(
             help="Robots by ssh name; ID: the number in the name, if not given.",
         ),
     ],
-    behavior: Annotated[str, typer.Option("--behavior", "-b", help="Play it: milling.")] = "",
+    behavior: Annotated[
+        str, typer.Option("--behavior", "-b", help="Play it: milling, or one of behaviors.toml.")
+    ] = "",
     package: Annotated[
         Path | None, typer.Option("--package", metavar="DEB", help="This one; default: build it.")
     ] = None,
@@ -63,7 +66,9 @@ def _flash(
     """
     targets = [parse_target(host) for host in hosts]
     _refuse_twins(targets)
-    settings = _parse_settings(setting or []) | ({"behavior": behavior} if behavior else {})
+    settings = _parse_settings(setting or [])
+    if behavior:
+        settings |= {"behavior": behavior, "table": find_table(behavior)}
     if rollback and (settings or package):
         raise ValueError("--rollback changes nothing else: give no --behavior, --set, --package.")
     fleet = Fleet(lcm_url)

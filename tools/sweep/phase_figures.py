@@ -200,7 +200,7 @@ def thumbnail_figure(phase: Phase, at: dict[str, float]) -> Figure:
 
     def paint(panels) -> None:
         for axes, (k, cell) in zip(np.ravel(panels), picks, strict=True):
-            _paint_paths(axes, _typical(phase, cell, k), COLORS[CLASSES[k]])
+            paint_paths(axes, _typical(phase, cell, k), COLORS[CLASSES[k]])
             where = phase.where(cell, 2).replace(", ", "\n")
             axes.set_title(f"{CLASSES[k]}\n{where}", fontsize=7)
 
@@ -225,10 +225,13 @@ def _typical(phase: Phase, cell: int, k: int) -> np.ndarray:
     return trace[-int(TRACE_S / TRACE_EVERY_S) :]
 
 
-def _paint_paths(axes: Axes, trace: np.ndarray, color: str) -> None:
-    for robot in trace.transpose(1, 0, 2):
+def paint_paths(axes: Axes, trace: np.ndarray, color: str, odd: int = 0) -> None:
+    """Paths of a (T, n, 3) trace, dots at their ends, hollow for the last `odd`; a bar of 1 m."""
+    robots = trace.shape[1]
+    for k, robot in enumerate(trace.transpose(1, 0, 2)):
+        fill = "white" if k >= robots - odd else DARK
         axes.plot(robot[:, 0], robot[:, 1], color=color, lw=1)
-        axes.plot(robot[-1, 0], robot[-1, 1], "o", ms=3.5, color=DARK)
+        axes.plot(robot[-1, 0], robot[-1, 1], "o", ms=3.5, color=DARK, mfc=fill)
     middle = (trace[..., :2].min(axis=(0, 1)) + trace[..., :2].max(axis=(0, 1))) / 2
     half = max(0.8, 1.08 * float(np.abs(trace[..., :2] - middle).max()))
     axes.set(

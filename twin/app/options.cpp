@@ -54,6 +54,10 @@ void AddWorld(CLI::App &app, Options &o)
         ->check(CLI::Range(1, 100));
     app.add_option("--behavior", o.behavior, "one for all, or milling:5,self_centering:1")
         ->capture_default_str();
+    app.add_option("--behaviors", o.behaviors,
+                   "TOML file of tables of your own; default: behaviors.toml here, else in "
+                   "~/.config/twinmill")
+        ->check(CLI::ExistingFile);
     app.add_option("--script", o.script, "CSV of inputs or duties that all play instead")
         ->check(CLI::ExistingFile);
     app.add_option("--seed", o.seed, "same seed, same run")->capture_default_str();
@@ -156,6 +160,8 @@ std::string CommandLine(const Options &o, size_t robots, int64_t epoch_us)
         line << " --dt-s " << *o.dt_s;
     if (o.duration_s)
         line << " --duration-s " << *o.duration_s;
+    if (!o.behaviors.empty())
+        line << " --behaviors " << o.behaviors;
     if (!o.script.empty())
         line << " --script " << o.script;
     if (!o.channel_prefix.empty())

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <thread>
 
+#include "behaviors.h"
 #include "commands.h"
 #include "plant_mujoco/mujoco_plant.h"
 #include "publisher.h"
@@ -41,6 +42,7 @@ struct Setup
 {
     Model model;
     std::vector<Model> robots;
+    OwnBehaviors own;
     std::vector<const fw_behavior *> behaviors;
     int64_t start_utime_us;
     std::string command_line;
@@ -61,7 +63,8 @@ Setup Prepare(const Options &options)
     Setup setup;
     setup.model = Model::Load(options.model);
     setup.model.base.control_period_s = options.dt_s.value_or(setup.model.base.control_period_s);
-    setup.behaviors = ParseSpecies(options.behavior, options.n);
+    setup.own = OwnBehaviors(options.behaviors);
+    setup.behaviors = ParseSpecies(options.behavior, options.n, setup.own.All());
     const int n = static_cast<int>(setup.behaviors.size());
     setup.robots = DrawRobots(setup.model, n, options.seed);
     setup.start_utime_us = StartUtimeUs(options);

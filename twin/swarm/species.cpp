@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "swarm/species.h"
 
+#include <algorithm>
 #include <charconv>
 #include <sstream>
 #include <stdexcept>
@@ -11,6 +12,7 @@ namespace
 {
 
 constexpr int kMaxRobots = 100;
+constexpr size_t kNamesShown = 10;
 
 const fw_behavior *FindBehavior(const std::string &name, std::span<const fw_behavior> own)
 {
@@ -22,8 +24,14 @@ const fw_behavior *FindBehavior(const std::string &name, std::span<const fw_beha
     std::string known;
     for (size_t i = 0; i < fw_behavior_count(); ++i)
         known += (i ? ", " : "") + std::string(fw_behavior_at(i)->name);
+    std::string more;
+    for (const fw_behavior &behavior : own.first(std::min(own.size(), kNamesShown)))
+        more += std::string(", ") + behavior.name;
+    if (own.size() > kNamesShown)
+        more += " and " + std::to_string(own.size() - kNamesShown) + " more";
     throw std::invalid_argument("--behavior: there is no behaviour '" + name +
-                                "'; the firmware has " + known);
+                                "'; the firmware has " + known +
+                                (own.empty() ? "" : "; your own are " + more.substr(2)));
 }
 
 int ParseCount(const std::string &part, const std::string &digits)

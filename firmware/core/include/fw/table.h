@@ -33,6 +33,10 @@ struct fw_table
 enum fw_err FW_MUST_CHECK fw_input_check(const struct fw_input *input);
 enum fw_err FW_MUST_CHECK fw_table_check(const struct fw_table *table);
 
+// Reads "unseen speed,unseen turn,seen speed,seen turn" in inputs, as in 100,-0.5,100,0.5.
+// @return false, and table untouched, if the text is none or its table is out of range.
+bool fw_table_parse(const char *text, struct fw_table *table);
+
 // Takes the row that the bit selects.
 struct fw_input fw_table_lookup(const struct fw_table *table, bool detected);
 

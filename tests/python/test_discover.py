@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A search that is told nothing finds what is published, and everything in it can be run."""
+
+import os
+import subprocess
+import tomllib
+from collections import Counter
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from twinmill.tools.behaviors import find_table
+from twinmill.tools.cli import run
+from twinmill.tools.discover.genes import decode
+from twinmill.tools.discover.kinds import COLUMNS, MEASURES, kinds, measures
+
+BODIES = ["--set", "robot.body_radius_m=0.1", "--set", "target_radius_m=0.1"]
+# 14 generations of 108 swarms; three kinds of published behaviour and one odd-robot ring.
+BUDGET = ["--generations", "14", "--show", "2", "--confirm", "10"]
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("found") / "found"
+    return folder, run(["discover", *BODIES, *BUDGET, "--out", str(folder)])
+
+
+def test_it_finds_what_is_published_without_being_told(archive):
+    _, found = archive
+    count = Counter(entry.kind for entry in found)
+    print(count)
+    # Milling, diffusing and self-centering: Vega et al. 2024. Aggregation: Gauci et al. 2014.
+    assert {"milling", "diffusion", "bull's-eye", "aggregation"} <= set(count)
+
+
+def test_fresh_seeds_confirm_the_best(archive):
+    _, found = archive
+    for kind in ("milling", "diffusion", "bull's-eye", "aggregation"):
+        best = max(e.share for e in found if e.kind == kind and e.confirmed)
+        print(kind, best)
+        assert best >= 0.7
+
+
+def test_the_same_search_gives_the_same_bytes_and_goes_on_where_it_was(archive, tmp_path):
+    folder, _ = archive
+    again = tmp_path / "again"
+    short = [*BODIES, "--show", "2", "--confirm", "10", "--out", str(again)]
+    run(["discover", *short, "--generations", "3"])
+    first = sorted(again.glob("generations/*"))
+    ages = [path.stat().st_mtime_ns for path in first]
+    run(["discover", *short, "--generations", "5"])
+    assert [path.stat().st_mtime_ns for path in first] == ages
+    whole = sorted(folder.glob("generations/*"))
+    assert [p.read_bytes() for p in sorted(again.glob("generations/*"))] == [
+        p.read_bytes() for p in whole[:5]
+    ]
+    table = (again / "archive.parquet").read_bytes()
+    (again / "generations" / "000004.parquet").unlink()
+    run(["discover", *short, "--generations", "5"])
+    assert (again / "archive.parquet").read_bytes() == table
+
+
+def test_another_search_into_the_same_folder_is_refused(archive):
+    folder, _ = archive
+    with pytest.raises(ValueError, match="other parameters"):
+        run(["discover", "--out", str(folder)])
+    with pytest.raises(ValueError, match="one value"):
+        run(["discover", "--set", "range_m=1,2", "--out", str(folder)])
+
+
+def test_every_cell_is_kept_once_and_every_table_is_the_robots(archive):
+    folder, found = archive
+    bounds = np.array([b[:2] for b in MEASURES.values()])
+    cells = np.array([b[2] for b in MEASURES.values()])
+    at = np.array([entry.measures for entry in found])
+    place = np.floor((at - bounds[:, 0]) / (bounds[:, 1] - bounds[:, 0]) * cells + 1e-6)
+    assert len({tuple(row) for row in np.minimum(place, cells - 1)}) == len(found)
+    tables = tomllib.loads((folder / "behaviors.toml").read_text())
+    assert len(tables) == sum(1 + (entry.mix.odd_count > 0) for entry in found)
+    assert pq.read_table(folder / "archive.parquet").num_rows == len(found)
+
+
+@pytest.mark.skipif(not os.environ.get("TWIN_RUN"), reason="TWIN_RUN does not name the program")
+def test_an_entry_runs_by_name_and_does_what_it_is_called(archive, tmp_path):
+    folder, found = archive
+    mill = next(e for e in found if e.kind == "milling" and e.share > 0.9)
+    words = [
+        *mill.command.split()[1:],
+        "--duration-s",
+        "120",
+        "--json",
+        "--log",
+        tmp_path / "a.log",
+    ]
+    done = subprocess.run(
+        [os.environ["TWIN_RUN"], *map(str, words)], cwd=folder, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert '"milling"' in done.stdout
+
+
+def test_a_robot_takes_the_table_by_name(archive, monkeypatch):
+    folder, found = archive
+    monkeypatch.chdir(folder)
+    assert find_table(found[0].name).count(",") == 3
+    assert find_table("milling") == ""
+
+
+def test_genes_reach_all_that_the_firmware_takes():
+    low, high = decode(np.zeros(9), 6), decode(np.ones(9), 6)
+    assert low.ring == low.odd == [-100, -2000, -100, -2000] and low.odd_count == 0
+    assert high.ring == high.odd == [100, 2000, 100, 2000] and high.odd_count == 3
+
+
+def test_seeds_that_agree_are_wholly_alike_and_two_extremes_are_not():
+    row = dict.fromkeys(COLUMNS, 1.0) | {"circliness": 0.1, "odd_ratio": np.nan}
+    same = np.array([[list(row.values())] * 4])
+    at, alike = measures(same)
+    assert alike[0] == 1 and at[0, 0] == pytest.approx(-1)
+    other = same.copy()
+    other[0, :2, COLUMNS.index("rotation")] = -1
+    # One of five measures at both ends of its range: a standard deviation of half of it.
+    assert measures(other)[1][0] == pytest.approx(1 - 0.5 / 5)
+
+
+def test_names_follow_their_definitions():
+    def kind(**values):
+        row = dict.fromkeys(COLUMNS, 0.0) | {"odd_ratio": np.nan, "groups": 1.0} | values
+        return kinds(np.array([list(row.values())]), start_scatter_m2=0.24, range_m=1.1)[0]
+
+    ring = {"circliness": 0.1, "rotation": 1.0, "scatter_m2": 1.0}
+    assert kind(**ring) == "milling"
+    assert kind(**ring, odd_ratio=0.5) == "bull's-eye"
+    assert kind(**ring, odd_ratio=1.5) == "milling"
+    wild = {"circliness": 5.0, "scatter_m2": 1.0}
+    assert kind(**wild, least_diffusion=1.1) == "diffusion"
+    assert kind(circliness=5.0, scatter_m2=90.0, least_diffusion=1.1) == "dispersal"
+    assert kind(circliness=5.0, scatter_m2=0.07) == "aggregation"
+    assert kind(**wild) == "cluster"

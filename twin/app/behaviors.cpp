@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "behaviors.h"
+
+#include <toml++/toml.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+
+namespace twin
+{
+namespace
+{
+
+namespace fs = std::filesystem;
+
+constexpr const char *kFileName = "behaviors.toml";
+
+std::string FindFile()
+{
+    const char *config = std::getenv("XDG_CONFIG_HOME"), *home = std::getenv("HOME");
+    fs::path user = config && *config ? fs::path(config) : fs::path(home ? home : "") / ".config";
+    for (const fs::path &path : {fs::path(kFileName), user / "twinmill" / kFileName})
+        if (fs::is_regular_file(path))
+            return path.string();
+    return "";
+}
+
+toml::table Parse(const std::string &path)
+{
+    try
+    {
+        return toml::parse_file(path);
+    }
+    catch (const toml::parse_error &error)
+    {
+        throw std::invalid_argument(path + ", line " + std::to_string(error.source().begin.line) +
+                                    ": " + std::string(error.description()));
+    }
+}
+
+}  // namespace
+
+OwnBehaviors::OwnBehaviors(const std::string &path)
+{
+    const std::string file = path.empty() ? FindFile() : path;
+    if (file.empty())
+        return;
+    for (const auto &[key, value] : Parse(file))
+    {
+        const std::optional<std::string> text = value.value<std::string>();
+        fw_table table;
+        if (!text || !fw_table_parse(text->c_str(), &table))
+            throw std::invalid_argument(
+                file + ": '" + std::string(key.str()) +
+                "' must be \"speed,turn,speed,turn\", for nothing seen and for seen, as in "
+                "\"100,-0.5,100,0.5\" (speed -100 to 100, turn -2 to 2)");
+        names_.emplace_back(key.str());
+        behaviors_.push_back({names_.back().c_str(), "", table});
+    }
+}
+
+}  // namespace twin
