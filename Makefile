@@ -23,12 +23,13 @@ check-long: build
 demo: build
 	@$(PYTHON) -m twinmill.tools.demo
 
-# The robot's program against named alternatives, which are installed into .deps, not .venv.
+# Ourselves against named alternatives, which are installed into .deps, not .venv.
 bench: build
-	@[ -d .deps/bench/cv2 ] || $(PYTHON) -m pip install --quiet --no-deps --target .deps/bench \
-	    --requirement benchmarks/requirements.txt
+	@cmp -s benchmarks/requirements.txt .deps/bench/requirements.txt || { rm -rf .deps/bench && \
+	    $(PYTHON) -m pip install --quiet --no-deps --target .deps/bench \
+	    --requirement benchmarks/requirements.txt && cp benchmarks/requirements.txt .deps/bench; }
 	@cmake --build build --target bench bench_plant bench_sweep >/dev/null
-	@PYTHONPATH=.deps/bench $(PYTHON) benchmarks/run.py
+	@OPENBLAS_NUM_THREADS=1 PYTHONPATH=.deps/bench $(PYTHON) benchmarks/run.py
 	@build/bin/bench_sweep
 	@build/bin/bench_plant
 

@@ -20,6 +20,7 @@ class Ratio:
     at_least: float | None = None
     at_most: float | None = None
     skipped: str = ""
+    says: str = ""  # in its own words
 
     @property
     def met(self) -> bool:
@@ -42,7 +43,7 @@ def paired(name: str, a: np.ndarray, b: np.ndarray, unit: str, **goal: float) ->
     return Ratio(name, float(np.median(a)), float(np.median(b)), unit, low, middle, high, **goal)
 
 
-def single(name: str, a: float, b: float, unit: str, **goal: float) -> Ratio:
+def single(name: str, a: float, b: float, unit: str, **goal: float | str) -> Ratio:
     """A / b of two numbers that do not vary."""
     return Ratio(name, a, b, unit, a / b, a / b, a / b, **goal)
 

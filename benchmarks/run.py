@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the robot's program against named alternatives: `make bench`.
+"""Measures the robot's program and the diagnosis against named alternatives: `make bench`.
 
 Every figure is a ratio of two things measured in turn in the same minute, so that a busy machine
 makes both slower; its spread is the 10th and 90th percentile of the pairs.
@@ -15,9 +15,11 @@ from typing import Annotated
 import arm64
 import decision
 import delay
+import diagnosis
 import footprint
 import typer
 from ratio import Ratio
+from rich.console import Group, RenderableType
 from rich.table import Table
 from twinmill.tools.output import AsJson, busy, deliver
 
@@ -31,6 +33,7 @@ class Part(StrEnum):
     DELAY = "delay"
     FOOTPRINT = "footprint"
     ARM64 = "arm64"
+    DIAGNOSIS = "diagnosis"
 
 
 def main(
@@ -47,15 +50,21 @@ def main(
         Part.DELAY: lambda: delay.measure(build),
         Part.FOOTPRINT: lambda: footprint.measure(build, arm64_program),
         Part.ARM64: arm64.measure,
+        Part.DIAGNOSIS: lambda: diagnosis.measure(build),
     }
     ratios: list[Ratio] = []
     for part in only or list(Part):
         with busy(f"measuring {part}"):
             ratios += parts[part]()
     found = [{**asdict(ratio), "met": ratio.met} for ratio in ratios]
-    deliver({"ratios": found}, _table(ratios), as_json)
+    deliver({"ratios": found}, _shown(ratios), as_json)
     if not all(ratio.met or ratio.skipped for ratio in ratios):
         raise typer.Exit(1)
+
+
+def _shown(ratios: list[Ratio]) -> RenderableType:
+    said = [f"{r.name.split(' : ')[0]}: {r.says}" for r in ratios if r.says]
+    return Group(_table(ratios), *said)
 
 
 def _table(ratios: list[Ratio]) -> Table:
@@ -68,7 +77,9 @@ def _table(ratios: list[Ratio]) -> Table:
             continue
         spread = "" if r.low == r.high else f"{r.low:.2g}..{r.high:.2g}"
         goal = f"{r.goal} {'met' if r.met else 'MISSED'}" if r.goal else ""
-        table.add_row(r.name, f"{r.a:.0f} {r.unit}", f"{r.ratio:.3g}", spread, goal)
+        table.add_row(
+            r.name, f"{r.a:.{0 if r.a >= 10 else 1}f} {r.unit}", f"{r.ratio:.3g}", spread, goal
+        )
     return table
 
 

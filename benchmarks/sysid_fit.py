@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""mujoco.sysid on the run of a mecanum robot: fits its three gains and the wheels' lag.
+
+A body on two slides and a hinge. Each wheel is an actuator with a first-order filter, whose force
+pushes the body as its rollers would; the body's damping is so large that it follows at once. Runs
+start at rest, where the whole state is known.
+"""
+
+from contextlib import redirect_stdout
+from io import StringIO
+
+import numpy as np
+from mujoco import MjSpec, sysid
+from mujoco.sysid.report.sections.insights import AutomatedInsights
+
+BODY = """
+<mujoco>
+  <option timestep="{step_s}" gravity="0 0 0" integrator="implicitfast"/>
+  <worldbody>
+    <body>
+      <joint name="x" type="slide" axis="1 0 0" damping="{damping}"/>
+      <joint name="y" type="slide" axis="0 1 0" damping="{damping}"/>
+      <joint name="yaw" type="hinge" axis="0 0 1" damping="{damping}"/>
+      <geom type="sphere" size="0.1" mass="1" contype="0" conaffinity="0"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+      <site name="robot"/>
+    </body>
+  </worldbody>
+  <actuator>{wheels}</actuator>
+  <sensor>{sensors}</sensor>
+</mujoco>
+"""
+WHEEL = '<general name="{}" site="robot" gear="1 0 0 0 0 0" dyntype="filter" dynprm="{}"/>'
+# Forward, left and turn of front-left, front-right, rear-left and rear-right.
+SIGNS = {"fl": (1, -1, -1), "fr": (1, 1, 1), "rl": (1, 1, -1), "rr": (1, -1, 1)}
+DAMPING = 1e4  # per s: follows within a step
+
+
+def fit(
+    runs: list[tuple[np.ndarray, np.ndarray, np.ndarray]],
+    start: dict[str, float],
+    lever_m: float,
+    rad_in_m: float,
+) -> dict:
+    """Fits and says what its report says.
+
+    Args:
+        runs: from rest, each (N,) s on an even grid, (N, 4) rim speeds asked for (m/s), and (N, 3)
+            poses (m, m, rad).
+        start: where forward, sideways, yaw (gains) and lag_s begin.
+        lever_m: half wheelbase and half track.
+        rad_in_m: how many m an error of 1 rad weighs.
+
+    Returns:
+        values by name, RMS error of the position in m, titles of the report's automated insights.
+    """
+    spec = MjSpec.from_string(_xml(runs[0][0], start["lag_s"]))
+    model = spec.compile()
+    sequences = sysid.ModelSequences(
+        "robot",
+        spec,
+        [f"run {i}" for i in range(len(runs))],
+        [sysid.create_initial_state(model, pose[0]) for _, _, pose in runs],
+        [sysid.TimeSeries.from_control_names(t_s, rims, model) for t_s, rims, _ in runs],
+        [sysid.TimeSeries.from_names(t_s, pose, model) for t_s, _, pose in runs],
+    )
+    parameters = sysid.ParameterDict(
+        {
+            name: sysid.Parameter(name, value, 0.2 * value, 5 * value)
+            for name, value in start.items()
+        }
+    )
+    residual = sysid.build_residual_fn(
+        models_sequences=[sequences],
+        build_model=lambda values, spec: _compiled(values, spec, lever_m),
+        sensor_weights={"x": 1.0, "y": 1.0, "yaw": rad_in_m},
+    )
+    with redirect_stdout(StringIO()):  # it prints every step
+        found, result = sysid.optimize(parameters, residual, verbose=False, x_scale="jac")
+    left, predicted, measured = residual(result.x, found)
+    sysid.calculate_intervals(left, result.jac)
+    off_m = [
+        (m.data - p.data)[:, :2]
+        for own, seen in zip(predicted, measured, strict=True)
+        for p, m in zip(own, seen, strict=True)
+    ]
+    insights = AutomatedInsights("insights", found).get_context()["insights"]
+    return {
+        "values": {name: float(found[name].value[0]) for name in start},
+        "rms_m": float(np.sqrt(2 * np.mean(np.square(np.concatenate(off_m))))),
+        "insights": [insight["title"] for insight in insights],
+    }
+
+
+def _xml(t_s: np.ndarray, lag_s: float) -> str:
+    wheels = "".join(WHEEL.format(name, lag_s) for name in SIGNS)
+    sensors = "".join(f'<jointpos name="{axis}" joint="{axis}"/>' for axis in ("x", "y", "yaw"))
+    return BODY.format(step_s=t_s[1] - t_s[0], damping=DAMPING, wheels=wheels, sensors=sensors)
+
+
+def _compiled(values: sysid.ParameterDict, spec: MjSpec, lever_m: float):
+    forward, sideways, yaw, lag_s = (
+        values[name].value[0] for name in ("forward", "sideways", "yaw", "lag_s")
+    )
+    push = DAMPING / 4 * np.array([forward, sideways, yaw / lever_m])
+    for actuator in spec.actuators:
+        x, y, turn = push * SIGNS[actuator.name]
+        actuator.gear = [x, y, 0, 0, 0, turn]
+        actuator.dynprm[0] = lag_s
+    return spec.compile()
