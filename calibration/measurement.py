@@ -41,6 +41,11 @@ class Measurement:
     time_base: TimeBase | None = None
     frames: Frames | None = None
 
+    @classmethod
+    def live(cls, track: Track) -> "Measurement":
+        """Of a robot that is heard now: from no file."""
+        return cls("live", "", track, _played(track), track.notes, 0)
+
     @property
     def label(self) -> str:
         """Short name of log and robot."""

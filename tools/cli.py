@@ -16,6 +16,7 @@ from twinmill.tools.swarm import commands as swarm
 from twinmill.tools.sweep import ask
 from twinmill.tools.sweep import phase_command as phase
 from twinmill.tools.threshold import command as threshold
+from twinmill.tools.watch import command as watch
 
 app = typer.Typer(
     add_completion=False,
@@ -25,6 +26,7 @@ app = typer.Typer(
 import_log.register(app)
 export.register(app)
 plot.register(app)
+watch.register(app)
 calibrate.register(app)
 diagnose.register(app)
 next_run.register(app)

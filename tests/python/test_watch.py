@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tools/watch: what the viewer is given is what was said. Read back with the viewer's own reader."""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import lcm
+import numpy as np
+import pytest
+from twinmill.calibration.model_file import ModelFile
+from twinmill.calibration.wire import split_events
+from twinmill.tools.cli import run
+from twinmill.tools.everyone import Actor, everyone_in
+from twinmill.tools.watch import command
+from twinmill.tools.watch.judge import WINDOW_S, Judge
+from twinmill.tools.watch.source import Window, from_log
+
+needs_viewer = pytest.mark.skipif(
+    command.find_spec("rerun") is None, reason=f"no viewer: pip install {command.RERUN}"
+)
+SEEN_FROM = 70  # pose from which on the robot sees a neighbour
+
+
+@pytest.fixture
+def log(write_log, message):
+    """Two seconds of a robot on a line along x, and of its twin on a line along y."""
+    path = write_log()
+    writer = lcm.EventLog(str(path), "w", overwrite=True)
+    for k in range(200):
+        utime_us = 1_700_000_000_000_000 + 10_000 * k
+        for prefix, place_m in (("", [0.002 * k, 0.0, 0.1]), ("TWIN_", [0.0, 0.001 * k, 0.1])):
+            pose = message("pose", utime_us=utime_us, robot_id=1, position_m=place_m)
+            pose.orientation_wxyz = [math.cos(0.3), 0.0, 0.0, math.sin(0.3)]
+            said = message("telemetry", utime_us=utime_us, robot_id=1)
+            said.detected, said.wheel_duty_pct = int(k >= SEEN_FROM), [50, 50, 50, 50]
+            writer.write_event(utime_us, f"{prefix}R01_POSE", pose.encode())
+            writer.write_event(utime_us, f"{prefix}R01_TELEMETRY", said.encode())
+    writer.close()
+    return path
+
+
+def read_back(path, entity, component):
+    """(times in s, values) of one component of one entity."""
+    from rerun.chunk import RrdReader
+
+    rows = []
+    for chunk in RrdReader(path).stream().collect().stream():
+        batch = chunk.to_record_batch()
+        names = [n for n in batch.schema.names if n.split("/")[-1].endswith(component)]
+        if chunk.entity_path == entity and names and "time" in batch.schema.names:
+            at_s = batch["time"].cast("int64").to_numpy() / 1e9
+            rows += zip(at_s.tolist(), batch[names[0]].to_pylist(), strict=True)
+    rows.sort(key=lambda row: row[0])
+    return np.array([at_s for at_s, _ in rows]), [value[0] for _, value in rows]
+
+
+@needs_viewer
+def test_poses_bits_and_headings_come_back_from_the_recording(log, tmp_path, capsys):
+    out = tmp_path / "o.rrd"
+    run(["watch", str(log), "--save", str(out), "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert said["robots"] == ["R01", "TWIN_R01"] and said["messages"] == 800
+    for entity, axis, step_m in (("/robots/R01", 0, 0.002), ("/twins/R01", 1, 0.001)):
+        at_s, place_m = read_back(out, entity, "translation")
+        np.testing.assert_allclose(at_s, 0.01 * np.arange(200), atol=1e-9)
+        np.testing.assert_allclose(np.array(place_m)[:, axis], step_m * np.arange(200), atol=1e-6)
+        _, turned = read_back(out, entity, "quaternion")
+        np.testing.assert_allclose(turned[0], [0, 0, math.sin(0.3), math.cos(0.3)], atol=1e-6)
+    at_s, states = read_back(out, "/bits/R01", "state")
+    assert states == ["sees none", "sees one"]
+    np.testing.assert_allclose(at_s, [0, 0.01 * SEEN_FROM])
+
+
+@needs_viewer
+def test_the_viewers_own_program_finds_no_fault(log, tmp_path):
+    run(["watch", str(log), "--save", str(tmp_path / "o.rrd")])
+    checked = subprocess.run(
+        [Path(sys.executable).with_name("rerun"), "rrd", "verify", tmp_path / "o.rrd"],
+        capture_output=True,
+        text=True,
+    )
+    assert checked.returncode == 0, checked.stderr
+
+
+@needs_viewer
+def test_a_bus_is_shown_as_a_log_is(log, tmp_path, capsys):
+    out = tmp_path / "o.rrd"
+    url = f"file://{log}?speed=0"  # LCM plays it
+    run(["watch", "--lcm-url", url, "--duration-s", "1", "--save", str(out), "--json"])
+    assert json.loads(capsys.readouterr().out)["robots"] == ["R01", "TWIN_R01"]
+    _, place_m = read_back(out, "/robots/R01", "translation")
+    np.testing.assert_allclose(np.array(place_m)[:, 0], 0.002 * np.arange(200), atol=1e-6)
+
+
+def scores(log, model):
+    """By `Judge`, every 4 s of a log."""
+    judge, window, found = Judge(ModelFile.load(str(model))), Window(WINDOW_S), []
+    batches = from_log(log, [])
+    for number, (now_us, batch) in enumerate(batches, start=1):
+        window.add(now_us, batch)
+        if number % 40 == 0 and number * 0.1 >= WINDOW_S:
+            (actor,) = everyone_in(window.events(), log).actors
+            judgement = judge.judge(actor)
+            found.append(judgement.score)
+            error_m = np.linalg.norm(judgement.predicted[-1, :2] - actor.log.pose[-1, :2])
+            assert error_m < 0.2
+    return np.array(found)
+
+
+def test_score_is_one_for_the_model_that_drove_and_more_without_its_effect(coasting_robot):
+    true = scores(coasting_robot.log, coasting_robot.true_model)
+    poor = scores(coasting_robot.log, coasting_robot.model)
+    assert len(true) > 20
+    assert 0.7 < np.median(true) < 1.3
+    assert np.median(poor) > 2 * np.median(true)
+
+
+def test_a_robot_that_stands_has_no_score(driven):
+    robot = driven()
+    robot.command[:] = 0
+    assert Judge(ModelFile.load("turbopi.toml")).judge(Actor("", robot)) is None
+
+
+def test_window_forgets_what_is_old(log):
+    window = Window(0.5)
+    for now_us, batch in from_log(log, []):
+        window.add(now_us, batch)
+    kept = sum(len(payloads) for payloads in window.events().by_channel.values())
+    whole = sum(len(p) for p in split_events(log.read_bytes(), "").by_channel.values())
+    assert whole == 800
+    assert kept == pytest.approx(200, abs=8)
+
+
+def test_without_the_viewer_one_sentence_says_how_to_get_it(log, tmp_path, monkeypatch):
+    monkeypatch.setattr(command, "find_spec", lambda name: None)
+    with pytest.raises(ValueError, match=r"install it with: .* -m pip install rerun-sdk=="):
+        run(["watch", str(log), "--save", str(tmp_path / "o.rrd")])
+    assert not (tmp_path / "o.rrd").exists()
+
+
+@needs_viewer
+def test_bad_input_is_one_sentence_and_nothing_is_written(log, tmp_path):
+    before = set(tmp_path.iterdir())
+    for arguments, sentence in (
+        (["none.lcmlog", "--save", str(tmp_path / "o.rrd")], "cannot be read"),
+        ([str(log), "--save", str(log)], "--force"),
+        ([str(log), "--save", "o.rrd", "--spawn"], "one of them"),
+        ([str(log), "--model", "none.toml", "--save", "o.rrd"], r"none\.toml"),
+    ):
+        with pytest.raises(ValueError, match=sentence):
+            run(["watch", *arguments])
+    assert set(tmp_path.iterdir()) == before
