@@ -112,15 +112,19 @@ def resample(robot: RobotLog, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(T, 3) poses and (T, 3) body velocities; NaN in gaps."""
     known_t_s, known = robot.pose_t_s[robot.valid], robot.pose[robot.valid]
     pose = np.column_stack([np.interp(t_s, known_t_s, known[:, k]) for k in range(3)])
-    rate = savgol_filter(pose, SMOOTH, 2, deriv=1, delta=STEP_S, axis=0)
-    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    omega = np.where(np.abs(rate[:, 2]) < STILL_RADPS, 0.0, rate[:, 2])
-    velocity = np.column_stack(
-        [c * rate[:, 0] + s * rate[:, 1], c * rate[:, 1] - s * rate[:, 0], omega]
-    )
+    velocity = body_velocity(pose)
     after = np.clip(np.searchsorted(known_t_s, t_s), 1, len(known_t_s) - 1)
     pose[known_t_s[after] - known_t_s[after - 1] > LONGEST_GAP_S] = np.nan
     return pose, velocity
+
+
+def body_velocity(pose: np.ndarray) -> np.ndarray:
+    """(T, ..., 3) forward, left, turn in m/s and rad/s, of poses STEP_S apart, angles unwrapped."""
+    rate = savgol_filter(pose, SMOOTH, 2, deriv=1, delta=STEP_S, axis=0)
+    c, s = np.cos(pose[..., 2]), np.sin(pose[..., 2])
+    omega = np.where(np.abs(rate[..., 2]) < STILL_RADPS, 0.0, rate[..., 2])
+    ahead, left = c * rate[..., 0] + s * rate[..., 1], c * rate[..., 1] - s * rate[..., 0]
+    return np.stack([ahead, left, omega], axis=-1)
 
 
 def _moving_mean(t_s: np.ndarray, values: np.ndarray) -> np.ndarray:

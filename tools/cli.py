@@ -6,7 +6,16 @@ from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
-from twinmill.tools import calibrate, characterise, diagnose, effects, import_log, metrics, plot
+from twinmill.tools import (
+    calibrate,
+    characterise,
+    compare_swarm,
+    diagnose,
+    effects,
+    import_log,
+    metrics,
+    plot,
+)
 from twinmill.tools import next as next_run
 from twinmill.tools.challenge import run as challenge
 from twinmill.tools.deploy import flash
@@ -36,6 +45,7 @@ swarm.register(app)
 flash.register(app)
 characterise.register(app)
 metrics.register(app)
+compare_swarm.register(app)
 phase.register(app)
 ask.register(app)
 discover.register(app)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill diagnose` and `explain`: which physical effect a model lacks."""
 
+from dataclasses import replace
+
 import typer
 from twinmill.calibration.diagnosis import present
 from twinmill.calibration.diagnosis.diagnose import Diagnosis, diagnose
@@ -21,6 +23,11 @@ from twinmill.tools.calibrate import (
 )
 from twinmill.tools.output import AsJson, telling
 
+SWARM = (
+    "Each robot was judged by itself; what only a swarm shows (collisions, hidden robots, one that "
+    "is blind), `twinmill compare-swarm` looks for in the same log."
+)
+
 
 def register(app: typer.Typer) -> None:
     """Adds the commands to the application."""
@@ -40,7 +47,10 @@ def _diagnose(
     """
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with telling(f"diagnosing with {model}") as say:
-        result = diagnose(load_measurements(logs), model_file, say)
+        measurements = load_measurements(logs)
+        result = diagnose(measurements, model_file, say)
+    if len({m.label for m in measurements if m.log_name == logs[0].name}) > 1:
+        result = replace(result, notes=[*result.notes, SWARM])
     data = result.to_json()
     if data["next_experiment"]:  # the script comes from a command of its own
         data["next_experiment"]["command"] = command_line("next", logs, model)

@@ -59,7 +59,7 @@ def _metrics(
             read_log(log),
             model_file.model.get("sensor.range_m"),
             model_file.model.get("robot.body_radius_m"),
-            _ids(odd),
+            robot_ids(odd),
         )
     section = _section(series)
     report = write_report(out, section.title, source, [section], NOTE) if out else None
@@ -69,7 +69,12 @@ def _metrics(
     return series
 
 
-def _ids(text: str | None) -> list[int] | None:
+def robot_ids(text: str | None) -> list[int] | None:
+    """Numbers from `5` or `R05,R06`; None stays.
+
+    Raises:
+        ValueError: it is neither.
+    """
     if text is None:
         return None
     words = text.split(",")

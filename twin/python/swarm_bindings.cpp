@@ -76,14 +76,19 @@ NamedTables Species(const std::string &text, std::optional<int> n, const NamedTa
 }
 
 Cell MakeCell(const Model &model, const Tables &rows, size_t ring_size, const std::string &start,
-              double spread_m)
+              double spread_m, const std::vector<std::array<double, 3>> &poses)
 {
+    if (!poses.empty() && poses.size() != rows.size())
+        throw std::invalid_argument("poses must be none, or one for each table");
     if (ring_size < 1 || ring_size > rows.size())
         throw std::invalid_argument("ring_size must be 1 to the number of tables");
     std::vector<fw_table> tables;
     for (const auto &row : rows)
         tables.push_back(TableOf(row));
-    return {model, std::move(tables), ring_size, StartNamed(start), spread_m};
+    std::vector<Pose2> starts;
+    for (const auto &[x_m, y_m, theta_rad] : poses)
+        starts.push_back({x_m, y_m, theta_rad});
+    return {model, std::move(tables), ring_size, StartNamed(start), spread_m, std::move(starts)};
 }
 
 // (W, 9): the metrics, and the least diffusion.
@@ -174,10 +179,13 @@ void BindSwarms(nb::module_ &m)
         .def(
             "__init__",
             [](Cell *self, const Model &model, const Tables &tables, size_t ring_size,
-               const std::string &start, double spread_m) {
-                new (self) Cell(MakeCell(model, tables, ring_size, start, spread_m));
+               const std::string &start, double spread_m,
+               const std::vector<std::array<double, 3>> &poses) {
+                new (self) Cell(MakeCell(model, tables, ring_size, start, spread_m, poses));
             },
-            "model"_a, "tables"_a, "ring_size"_a, "start"_a = "square", "spread_m"_a = 1.2)
+            "model"_a, "tables"_a, "ring_size"_a, "start"_a = "square", "spread_m"_a = 1.2,
+            "poses"_a = std::vector<std::array<double, 3>>())
+        .def_prop_ro("period_s", [](const Cell &cell) { return cell.model.base.control_period_s; })
         .def_prop_ro("why_not_lean", [](const Cell &cell) { return WhyNotLean(cell.model); });
     m.def(
         "run_worlds", &Run, "cells"_a, "cell"_a, "seeds"_a, "duration_s"_a, "full"_a = false,

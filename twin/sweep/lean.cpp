@@ -140,8 +140,7 @@ private:
     {
         const Cell &cell = *world.cell;
         const auto robots = DrawRobots(cell.model, plan_.n, world.seed);
-        const auto starts = StartPoses(cell.start, plan_.n, cell.spread_m,
-                                       cell.model.robot.body_radius_m, world.seed);
+        const auto starts = StartsOf(cell, world.seed);
         for (size_t i = 0; i < robots.size(); ++i)
         {
             At(kX, i, lane) = starts[i].x_m;

@@ -22,8 +22,7 @@ Swarm MakeSwarm(const World &world)
     const Cell &cell = *world.cell;
     const int n = static_cast<int>(cell.tables.size());
     const auto robots = DrawRobots(cell.model, n, world.seed);
-    const auto starts =
-        StartPoses(cell.start, n, cell.spread_m, cell.model.robot.body_radius_m, world.seed);
+    const auto starts = StartsOf(cell, world.seed);
     return Swarm(std::make_unique<PlanarBodies>(robots, starts, world.seed), robots, cell.tables,
                  {.seed = world.seed});
 }
@@ -65,6 +64,14 @@ size_t BatchSize(std::span<const World> worlds)
 }
 
 }  // namespace
+
+std::vector<Pose2> StartsOf(const Cell &cell, uint64_t seed)
+{
+    if (!cell.poses.empty())
+        return cell.poses;
+    return StartPoses(cell.start, static_cast<int>(cell.tables.size()), cell.spread_m,
+                      cell.model.robot.body_radius_m, seed);
+}
 
 std::string WhyNotLean(const Model &model)
 {

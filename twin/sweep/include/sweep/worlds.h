@@ -23,7 +23,11 @@ struct Cell
     size_t ring_size;
     StartShape start = StartShape::kSquare;
     double spread_m = 1.2;
+    std::vector<Pose2> poses = {};  // where they start whatever the seed; empty: drawn
 };
+
+// Where the robots of a world start.
+std::vector<Pose2> StartsOf(const Cell &cell, uint64_t seed);
 
 struct World
 {
