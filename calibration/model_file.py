@@ -87,6 +87,7 @@ class Fitted:
         clock: offset and rate that the logs share, by name; empty if they do not agree.
         base_told: the base was held near what other logs told; they keep the credit.
         left_over: what a diagnosis found that no effect explains; None if there was none.
+        robots: what is a robot's own, by its number.
     """
 
     model: native.Model
@@ -98,6 +99,7 @@ class Fitted:
     clock: dict[str, Estimate] = field(default_factory=dict)
     base_told: bool = False
     left_over: dict[str, float] | None = None
+    robots: dict[int, list[Estimate]] = field(default_factory=dict)
 
 
 def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> None:
@@ -111,6 +113,7 @@ def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> 
     document["created_by"] = command
     _write_base(document, fitted)
     _write_effects(document, fitted)
+    _write_robots(document, fitted)
     if fitted.noise:
         section = document.setdefault("noise", tomlkit.table())
         section.update({k: _short(v) for k, v in fitted.noise.to_json().items()})
@@ -171,6 +174,17 @@ def _write_base(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
     if stds and not fitted.base_told:
         base["std"] = stds
         base["fitted_on"] = list(fitted.logs.values())
+
+
+def _write_robots(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
+    """What is one robot's own, as [robots.R03]."""
+    for robot_id, estimates in sorted(fitted.robots.items()):
+        robots = document.setdefault("robots", tomlkit.table(is_super_table=True))
+        own = robots.setdefault(f"R{robot_id:02d}", tomlkit.table())
+        for estimate in estimates:
+            *effect, key = estimate.name.split(".")
+            place = own.setdefault(effect[0], tomlkit.inline_table()) if effect else own
+            place[key] = _short(estimate.value)
 
 
 def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:

@@ -14,17 +14,29 @@ from twinmill.calibration.residual import StepGrid
 from twinmill.calibration.track import command_at
 
 CLOCK, CLOCK_RATE = "clock.offset_s", "clock.rate_ppm"
+GAINS = ("theta_a1", "theta_a2")  # of one robot: speed, and rate of turn
 
 
 @dataclass
 class Scene:
-    """One measurement with the model of its own robot and clock, its step grid and its noise."""
+    """One measurement with the model of its own robot and clock, its step grid and its noise.
+
+    Attributes:
+        clock_free: offset and rate of the clock are fitted.
+        gains_free: the robot's own gains are fitted: robots of a kind differ by a few percent.
+    """
 
     measurement: Measurement
     model: native.Model
     grid: StepGrid
     clock_free: bool
     noise: Noise | None = None
+    gains_free: bool = False
+
+    @property
+    def stated(self) -> set[str]:
+        """Names that the model file states of this robot alone: no fit of all robots moves them."""
+        return stated_names(self.model, self.measurement.track.robot_id)
 
     @classmethod
     def of(cls, measurement: Measurement, model: native.Model, clock_free: bool) -> "Scene":
@@ -40,7 +52,7 @@ class Scene:
     def with_model(self, model: native.Model) -> "Scene":
         """The same measurement, clock and noise with another model."""
         model = model.for_robot(self.measurement.track.robot_id)
-        for name in (CLOCK, CLOCK_RATE):
+        for name in (CLOCK, CLOCK_RATE, *(GAINS if self.gains_free else ())):
             model.set(name, self.model.get(name))
         return replace(self, model=model)
 
@@ -84,3 +96,9 @@ class Scene:
             self.model, self.measurement.played, names, np.ascontiguousarray(rows)
         )
         return self.noise.whiten(self.grid.errors(predicted, self.measurement), self.grid)
+
+
+def stated_names(model: native.Model, robot_id: int) -> set[str]:
+    """Quantities, by name, that [robots.Rnn] states of one robot."""
+    keys = model.stated_of(robot_id)
+    return {k if "." in k or k in GAINS else f"base.{k}" for k in keys}

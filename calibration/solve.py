@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 from twinmill.calibration.freedom import Free
-from twinmill.calibration.problem import CLOCK, CLOCK_RATE, Scene
+from twinmill.calibration.problem import CLOCK, CLOCK_RATE, GAINS, Scene
 
 HUBER_SIGMA = 3.5
 BLOCK_S = 4.0  # errors of one block may hang together; blocks do not
 SEEN = 0.5  # times the prior's width: a wider estimate is the prior's, not the log's
 RATE_PRIOR_PPM = 30.0  # of ordinary crystals against each other
+ALIKE = 0.03  # standard deviation of gains among robots of a kind where the model tells none
 AT_BOUND = 0.01  # share of the range that counts as at the bound
 CHORDS = 3  # steps with the same slopes
 
@@ -34,14 +35,19 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Solution:
-    """Result of a fit: estimates of the shared quantities, clocks by measurement, chi2.
+    """Result of a fit: estimates of the shared quantities, each measurement's own, chi2.
 
-    A clock is its offset and rate by name; empty where it was not free.
+    The own ones are clock and gains, by name, where these were free.
     """
 
     estimates: list[Estimate]
-    clocks: list[dict[str, Estimate]]
+    own: list[dict[str, Estimate]]
     chi2: float
+
+    @property
+    def clocks(self) -> list[dict[str, Estimate]]:
+        """Offset and rate by measurement; empty where they were not free."""
+        return [{k: e for k, e in own.items() if k in (CLOCK, CLOCK_RATE)} for own in self.own]
 
 
 def solve(
@@ -54,13 +60,17 @@ def solve(
     """Fits, and leaves the values in the scenes' models.
 
     Args:
-        scenes: measurements; each with a free clock gets an offset and a rate of its own.
-        free: quantities shared by all.
+        scenes: measurements; each with a free clock gets an offset and a rate of its own, each with
+            free gains these.
+        free: quantities shared by all, but for a robot of which the model states its own.
         masks: (S,) bool per scene: the steps to fit on; all if None.
         rounds: at most so many evaluations.
         precision: relative change of chi2 at which the fit ends.
     """
     system = System(scenes, free, masks)
+    if not system.unknowns:
+        left = np.clip(system.residuals(system.start), -HUBER_SIGMA, HUBER_SIGMA)
+        return Solution([], [{} for _ in scenes], float(np.mean(left**2)))
     found = least_squares(
         system.residuals,
         system.start,
@@ -94,6 +104,21 @@ def _clock_quantities(scene: Scene) -> list[Free]:
     ]
 
 
+def gain_spread(model, name: str) -> float:
+    """Standard deviation of one of GAINS among robots: the model's, or a usual one."""
+    return model.get(f"idiosyncrasy.{name}_std") or ALIKE
+
+
+def _gain_quantities(scene: Scene) -> list[Free]:
+    """What is one robot's own, not stated by the model file."""
+    model = scene.model
+    return [
+        Free(n, "1", 1.0, 0.2, 3.0, gain_spread(model, n), 0.002, model.get(n))
+        for n in GAINS
+        if n not in scene.stated
+    ]
+
+
 def huber(z: np.ndarray) -> float:
     """Robust chi2 of whitened errors (Huber 1964)."""
     size = np.abs(z)
@@ -111,10 +136,12 @@ class System:
         self.columns = []  # per scene: places of its names in the vector of unknowns
         unknowns = list(free)
         for scene in scenes:
-            own = list(range(len(free)))
-            if scene.clock_free:
-                own += [len(unknowns), len(unknowns) + 1]
-                unknowns += _clock_quantities(scene)
+            stated = scene.stated
+            own = [i for i, f in enumerate(free) if f.name not in stated]
+            alone = _clock_quantities(scene) if scene.clock_free else []
+            alone += _gain_quantities(scene) if scene.gains_free else []
+            own += range(len(unknowns), len(unknowns) + len(alone))
+            unknowns += alone
             self.columns.append(own)
         self.unknowns = unknowns
         self.low, self.high, self.step, self.prior, centre = (
@@ -182,9 +209,9 @@ class System:
         std = self._standard_errors(self.jacobian(x), residual)
         estimates = [self._estimate(u, x[p], std[p]) for p, u in enumerate(self.unknowns)]
         shared = len(self.free)
-        clocks = [{estimates[c].name: estimates[c] for c in own[shared:]} for own in self.columns]
+        own = [{estimates[c].name: estimates[c] for c in cs if c >= shared} for cs in self.columns]
         data = np.clip(residual[: -len(x)], -HUBER_SIGMA, HUBER_SIGMA)
-        return Solution(estimates[:shared], clocks, float(np.mean(data**2)))
+        return Solution(estimates[:shared], own, float(np.mean(data**2)))
 
     def _estimate(self, unknown: Free, value: float, std: float) -> Estimate:
         near = AT_BOUND * (unknown.max - unknown.min)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Collection
 from dataclasses import replace
 
 from twinmill.calibration.bits.compare import BitComparison, compare_bits
+from twinmill.calibration.bits.robots import judge_cameras, odd_cameras
 from twinmill.calibration.bits.scene import bit_scenes
 from twinmill.calibration.bits.search import BitSearch, Round, Trial, search_bits
 from twinmill.calibration.diagnosis.ranking import Ranked
@@ -34,7 +35,10 @@ def with_bits(
         return diagnosis
     say("comparing the camera's bits")
     bits = compare_bits(seen, model_file.model)
-    done = search_bits(seen, model_file.model, say, barred)
+    out = odd_cameras(seen, model_file.model)
+    alike, odd = ([s for s in seen if (s.robot_id in out) == o] for o in (False, True))
+    done = search_bits(alike, model_file.model, say, barred)
+    off = judge_cameras(alike, odd, done.rounds[-1].before.model, say, barred)
     group = max((r.group or 0 for r in diagnosis.ranking), default=0)
     ranking = rank_bits(done, group)
     tied = any(r.tied for r in done.rounds)
@@ -51,6 +55,7 @@ def with_bits(
         notes=[*diagnosis.notes, *_notes(bits)],
         bits=bits,
         bit_estimates=done.estimates,
+        robots_off=(*diagnosis.robots_off, *off),
     )
 
 

@@ -8,11 +8,13 @@ import numpy as np
 from twinmill.calibration.bits.compare import BitComparison
 from twinmill.calibration.bits.merge import with_bits
 from twinmill.calibration.compare import GOOD, Comparison, comparison, open_scenes
+from twinmill.calibration.diagnosis.alike import free_gains, search_alike
 from twinmill.calibration.diagnosis.encoders import geometry_notes, time_base_notes
 from twinmill.calibration.diagnosis.evidence import State
 from twinmill.calibration.diagnosis.omnibus import NOTHING, Omnibus, unexplained
 from twinmill.calibration.diagnosis.ranking import Ranked, groups_of, rank
-from twinmill.calibration.diagnosis.search import ALPHA, Search, search
+from twinmill.calibration.diagnosis.robots import RobotOff, judge, sentence
+from twinmill.calibration.diagnosis.search import ALPHA, Search
 from twinmill.calibration.fit import refit, share_noise
 from twinmill.calibration.floor import floor_of
 from twinmill.calibration.freedom import base_quantities, effect_names, effect_quantities
@@ -44,6 +46,7 @@ class Diagnosis:
         next_experiment: which run would settle what this log leaves open, or None.
         bits: of the robots' cameras with the model as given, or None.
         bit_estimates: of all effects of the camera, with what was found.
+        robots_off: those that differ from the others; `state` is without them.
     """
 
     verdict: str
@@ -61,6 +64,7 @@ class Diagnosis:
     next_experiment: dict | None
     bits: BitComparison | None = None
     bit_estimates: tuple[Estimate, ...] = ()
+    robots_off: tuple[RobotOff, ...] = ()
 
     def to_json(self) -> dict:
         """The interface's object."""
@@ -90,6 +94,7 @@ class Diagnosis:
                 for r in self.before.robots
                 if r.scene.measurement.time_base
             ],
+            "robots_off": [r.to_json() for r in self.robots_off],
             "bits": self.bits.to_json() if self.bits else None,
             "notes": self.notes,
         }
@@ -114,16 +119,20 @@ def diagnose(
     given = open_scenes(measurements, model_file)
     known = effect_quantities(model_file.model)
     base = excited(given, base_quantities(model_file.model, told), known)
-    scenes = [s.with_model(model_file.model) for s in given]
+    scenes = free_gains([s.with_model(model_file.model) for s in given])
     refit(scenes, base + known)
     floors = [floor_of(s).rms for s in scenes]
     unseen = unseen_by_tables(measurements)
-    done, final = search(State(scenes, base, floors), say, {*barred, *unseen})
-    for earlier in (given, scenes):
+    hidden = {*barred, *unseen}
+    common = search_alike(scenes, base + known, base, floors, say, hidden)
+    done, final = common.done, common.state
+    odd, scenes = [scenes[i] for i in common.odd], [scenes[i] for i in common.alike]
+    for earlier in ([given[i] for i in common.alike], scenes):
         share_noise(final.scenes, earlier)
     before, fitted = comparison(model_file, given), comparison(model_file, scenes)
     floors = [r.floor.rms for r in fitted.robots]
     final = replace(final, floors=floors)
+    off = judge(final, odd, say, hidden)
     say("looking for what no effect explains")
     logs = [s for s in final.scenes if s.noise]
     known = model_file.left_over([m.log_sha256 for m in measurements])
@@ -134,7 +143,8 @@ def diagnose(
     ranking = rank(done, names, explained + omnibus.gain, floors)
     noises = _noisier(model_file, final)
     told_apart = ["clock_rate"] if any(m.time_base for m in measurements) else []
-    verdict = _verdict(before.score, fitted.score, names, ranking, share, bool(noises))
+    alike = float(np.sqrt(np.mean([before.robots[i].score ** 2 for i in common.alike])))
+    verdict = _verdict(alike, fitted.score, names, ranking, share, bool(noises))
     of_motion = Diagnosis(
         verdict,
         _sentence(verdict, names, ranking, omnibus, noises),
@@ -155,8 +165,10 @@ def diagnose(
             *_known_notes(omnibus),
         ],
         _next_experiment(verdict, ranking, done),
+        robots_off=tuple(off),
     )
-    return with_bits(of_motion, given, model_file, say, barred)
+    whole = with_bits(of_motion, given, model_file, say, barred)
+    return replace(whole, sentence=" ".join([whole.sentence, *map(sentence, whole.robots_off)]))
 
 
 def _last(done: Search) -> float:

@@ -25,22 +25,24 @@ class State:
         scenes: measurements with the model so far.
         base: free base quantities.
         floors: (H, 3) per scene.
+        held: names of quantities that are taken as they are.
     """
 
     scenes: list[Scene]
     base: list[Free]
     floors: list[np.ndarray]
+    held: frozenset[str] = frozenset()
 
     @property
     def model(self) -> native.Model:
-        """The model so far."""
-        return self.scenes[0].model
+        """The model so far: of a robot of which nothing special is stated, if there is one."""
+        return min(self.scenes, key=lambda s: len(s.stated)).model
 
     @property
     def free(self) -> list[Free]:
         """Everything that is fitted together; widths of the prior about the values so far."""
         base = [replace(f, begin=self.model.get(f.name)) for f in self.base]
-        return base + effect_quantities(self.model)
+        return [f for f in base + effect_quantities(self.model) if f.name not in self.held]
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,17 @@ class Trial:
         return self.held.score
 
 
+def grown(state: State, effects: tuple[str, ...]) -> tuple[list[Scene], list[Free]]:
+    """The state's scenes with `effects` added at neutral values, and what is free of these."""
+    model = state.model.copy()
+    fresh: list[Free] = []
+    for effect in effects:
+        model.add_effect(effect)
+        name = effect_names(model)[-1]
+        fresh += [f for f in effect_quantities(model, name) if f.name.startswith(f"{name}.")]
+    return [s.with_model(model) for s in state.scenes], fresh
+
+
 def attempt(state: State, effects: tuple[str, ...]) -> Trial:
     """Fits the state's model with `effects` added.
 
@@ -77,13 +90,7 @@ def attempt(state: State, effects: tuple[str, ...]) -> Trial:
         state: the model so far.
         effects: names.
     """
-    model = state.model.copy()
-    fresh: list[Free] = []
-    for effect in effects:
-        model.add_effect(effect)
-        name = effect_names(model)[-1]
-        fresh += [f for f in effect_quantities(model, name) if f.name.startswith(f"{name}.")]
-    scenes = [s.with_model(model) for s in state.scenes]
+    scenes, fresh = grown(state, effects)
     solution = solve(scenes, state.free + fresh, rounds=ROUNDS, precision=PRECISION)
     held = held_out(scenes, state.free + fresh, state.floors)
     names = {f.name for f in fresh}
@@ -96,5 +103,4 @@ def without(state: State, index: int) -> Trial:
     model = state.model.copy()
     model.remove_effect(index)
     scenes = [s.with_model(model) for s in state.scenes]
-    reduced = State(scenes, state.base, state.floors)
-    return attempt(reduced, ())
+    return attempt(replace(state, scenes=scenes), ())

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from twinmill.calibration.compare import Comparison, comparison
 from twinmill.calibration.diagnosis.diagnose import Diagnosis, diagnose
+from twinmill.calibration.diagnosis.robots import own_effects, own_values
 from twinmill.calibration.fit import common_clock, refit
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import Fitted, ModelFile, write_child
@@ -63,9 +64,10 @@ def explain(
     diagnosis = diagnose(measurements, model_file, say)
     state = diagnosis.state
     solution = refit(state.scenes, state.free)
-    after = comparison(model_file, state.scenes)
+    off = diagnosis.robots_off
+    after = comparison(model_file, [*state.scenes, *(s for r in off for s in r.scenes)])
     model = model_file.model.copy()
-    for effect in diagnosis.found:
+    for effect in [*diagnosis.found, *own_effects(off)]:
         model.add_effect(effect.split("#")[0])
     estimates = [*solution.estimates, *diagnosis.bit_estimates]
     for estimate in estimates:
@@ -81,6 +83,7 @@ def explain(
         common_clock(solution),
         bool(model_file.told_by_others(logs.values())),
         diagnosis.omnibus.left_over,
+        own_values(state.scenes, solution, off),
     )
     write_child(model_file, fitted, out, command)
     return Explanation(diagnosis, after, estimates, Path(out))

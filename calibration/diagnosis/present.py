@@ -53,6 +53,29 @@ def unseen(diagnosis: Diagnosis) -> Table:
     return Table("What this log cannot show", ["effect", "why"], rows, words=(0, 1))
 
 
+def robots_off(diagnosis: Diagnosis) -> Table:
+    """Robots that differ from the others."""
+    rows = [
+        [
+            Cell(off.label, "bad"),
+            Cell(off.effect or "not in the catalogue"),
+            Cell(number(off.score_before), tone(off.score_before)),
+            Cell(number(off.score_after), tone(off.score_after)),
+            Cell(f"{off.p_value:.1g}"),
+            Cell(", ".join(_estimate(e) for e in off.parameters)),
+        ]
+        for off in diagnosis.robots_off
+    ]
+    return Table(
+        "Robots that differ from the others",
+        ["robot", "in", "score\nas all", "score\nown", "p", "estimates"],
+        rows,
+        "Scores are of drives that were not fitted to: with the model of all, and with the robot's "
+        "own. What the others lack was looked for without these robots.",
+        words=(1, 5),
+    )
+
+
 def lines(diagnosis: Diagnosis) -> list[str]:
     """What the tables do not say."""
     told = list(diagnosis.notes)
@@ -120,7 +143,7 @@ def section(diagnosis: Diagnosis) -> Section:
 
 
 def _tables(diagnosis: Diagnosis) -> list[Table]:
-    return [t for t in (ranking(diagnosis), unseen(diagnosis)) if t.rows]
+    return [t for t in (robots_off(diagnosis), ranking(diagnosis), unseen(diagnosis)) if t.rows]
 
 
 def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
@@ -132,6 +155,6 @@ def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
 
 
 def _estimate(estimate: Estimate) -> str:
-    name = estimate.name.split(".", 1)[1]
+    name = estimate.name.split(".", 1)[-1]
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
     return f"{name} {estimate.value:.3g} ± {estimate.std:.1g}{unit}"

@@ -9,6 +9,7 @@ from twinmill.calibration.floor import Floor, floor_of
 from twinmill.calibration.folds import halves, held_errors, step_mask
 from twinmill.calibration.log import LogError
 from twinmill.calibration.mixing import duties_from_vendor_move
+from twinmill.calibration.problem import stated_names
 from twinmill.calibration.solve import BLOCK_S
 from twinmill.calibration.steady.sheet import STILL_MPS, Sheet
 
@@ -43,6 +44,7 @@ class SteadyScene:
     commands: np.ndarray
     grid: SteadyGrid
     clock_free: bool = False
+    gains_free: bool = False
     noise: None = None
 
     @classmethod
@@ -60,6 +62,11 @@ class SteadyScene:
     def with_model(self, model: native.Model) -> "SteadyScene":
         """The same table with another model."""
         return replace(self, model=model.for_robot(self.measurement.robot_id))
+
+    @property
+    def stated(self) -> set[str]:
+        """Names that the model file states of this robot alone."""
+        return stated_names(self.model, self.measurement.robot_id)
 
     def settle_noise(self) -> None:
         """Nothing: the scatter of a table does not depend on the model."""

@@ -237,6 +237,14 @@ NB_MODULE(twinmill_native, m)
              "Appends an effect at its neutral values; texts: its formula and the like, by name.")
         .def("remove_effect", &Model::RemoveEffect, "index"_a)
         .def("for_robot", &Model::ForRobot, "robot_id"_a)
+        .def(
+            "stated_of",
+            [](const Model &model, int robot_id) {
+                const auto found = model.robot_overrides.find(robot_id);
+                return found == model.robot_overrides.end() ? std::map<std::string, double>()
+                                                            : found->second;
+            },
+            "robot_id"_a, "What [robots.Rnn] states of this robot: values by field or name.")
         .def("sight", &SightDict, "What the robot's camera sees and how it errs, effects included.")
         .def("copy", [](const Model &model) { return Model(model); })
         .def_prop_ro("drive", &DriveName)

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One robot of several that is off is named, with what was planted in it; like robots are not."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from twinmill.calibration.compare import compare
+from twinmill.calibration.diagnosis.diagnose import diagnose
+from twinmill.calibration.diagnosis.explain import explain
+from twinmill.calibration.measurement import load_measurements
+from twinmill.calibration.model_file import ModelFile
+from twinmill.tools.challenge.script import write_rich_script
+
+ROOT = Path(__file__).resolve().parents[3]
+TWIN_RUN = os.environ.get("TWIN_RUN", str(ROOT / "build/bin/twin_run"))
+ROBOTS, DURATION_S = 3, 30
+PLAIN = """
+name = "plain"
+[robot]
+wheel_radius_m = 0.0325
+half_wheelbase_m = 0.059
+half_track_m = 0.067
+body_radius_m = 0.1
+battery_nominal_V = 7.4
+[base]
+drive = "duty"
+wheels = "mecanum"
+duty_pct = [0, 100]
+wheel_speed_mps = [0, 0.36]
+motor_lag_s = 0.06
+control_period_s = 0.022
+"""
+REAL = """
+[noise]
+sensor_m = 0.0003
+sensor_rad = 0.0017
+drive_mps = 0.003
+drive_radps = 0.03
+drive_s = 0.15
+drive_turn_s = 0.15
+[idiosyncrasy]
+theta_a1_std = 0.02
+theta_a2_std = 0.02
+"""
+WHEELS = "[[effect]]\nname = 'wheel_gain'\nfl = 0\nfr = 0\nrl = 0\nrr = 0\n"
+
+
+@pytest.fixture
+def logged(tmp_path):
+    """Measurements of robots that a model with planted effects drives, and the plain model."""
+
+    def make(planted: str, seed: int = 5):
+        script, model, log = (tmp_path / n for n in ("s.csv", "real.toml", "run.lcmlog"))
+        write_rich_script(script, DURATION_S, 3)
+        model.write_text(PLAIN + REAL + planted)
+        plain = tmp_path / "plain.toml"
+        plain.write_text(PLAIN)
+        command = [TWIN_RUN, "--plant", "planar", "--model", model, "--n", ROBOTS, "--seed", seed]
+        command += ["--script", script, "--spread-m", 6, "--duration-s", DURATION_S, "--log", log]
+        subprocess.run([str(c) for c in command], check=True, capture_output=True)
+        return load_measurements([log]), ModelFile.load(str(plain))
+
+    return make
+
+
+def test_robots_with_gains_of_their_own_are_not_off(logged):
+    found = diagnose(*logged(""))
+    assert found.robots_off == ()
+    assert found.found == []
+
+
+def test_a_wheel_of_one_robot_is_named_beside_what_all_lack(logged):
+    planted = "[[effect]]\nname = 'dead_zone'\nwidth = 0.08\n" + WHEELS
+    found = diagnose(*logged(planted + "[robots.R01]\nwheel_gain.fl = -0.1\n"))
+    assert found.found == ["dead_zone"]
+    assert [(r.robot_id, r.effect) for r in found.robots_off] == [(1, "wheel_gain")]
+    off = found.to_json()["robots_off"][0]
+    assert off["score_after"] < 0.7 * off["score_before"]
+    assert off["p_value"] < 0.01
+    own = {e["name"]: e["value"] for e in off["parameters"]}
+    # A common change of all wheels is the robot's gain, which is known to 3 %: the contrast counts.
+    others = sum(own[f"wheel_gain.{w}"] for w in ("fr", "rl", "rr")) / 3
+    assert own["wheel_gain.fl"] - others == pytest.approx(-0.1, abs=0.01)
+    assert "R01 differs: wheel_gain.fl" in found.sentence
+
+
+def test_explain_writes_the_difference_as_that_robots_own(logged, tmp_path):
+    planted = "[[effect]]\nname = 'motor_lag'\nextra_s = 0\n"
+    measurements, plain = logged(planted + "[robots.R02]\nmotor_lag.extra_s = 0.06\n")
+    told = explain(measurements, plain, tmp_path / "own.toml", "test")
+    assert [r.robot_id for r in told.diagnosis.robots_off] == [2]
+    model = ModelFile.load(str(tmp_path / "own.toml"))
+    lag_s = [
+        model.model.for_robot(i).get("base.motor_lag_s")
+        + model.model.for_robot(i).get("motor_lag.extra_s")
+        for i in range(ROBOTS)
+    ]
+    assert lag_s == pytest.approx([0.06, 0.06, 0.12], abs=0.005)
+    assert compare(measurements, model).score < 1.15
