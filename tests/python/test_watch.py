@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/watch: what the viewer is given is what was said. Read back with the viewer's own reader."""
+"""tools/watch: the viewer is given what was said, read back with the viewer's own reader."""
 
 import json
 import math
