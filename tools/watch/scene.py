@@ -22,7 +22,7 @@ PATH_S, POINT_S = 10.0, 0.05  # of the path behind a robot: its length, and betw
 GROUPS = {"": "robots", TWIN: "twins"}
 COLORS = {"": BEFORE, TWIN: PREDICTED}
 WIDE, THIN = -2.5, -1.5  # of lines: below zero are pixels for Rerun
-WORDS = ("sees none", "sees one")
+WORDS = ("none", "sees")
 
 
 @dataclass
@@ -51,6 +51,9 @@ class Shown:
         self.to.log(f"{self.entity}/view", view, static=True)
         label = rr.Points3D([[0, 0, 0]], labels=self.label, colors=self.color, radii=-4)
         self.to.log(f"{self.entity}/name", label, static=True)
+        colors = [_rgb(BLIND), _rgb(SEES)]
+        states = rr.StateConfiguration(values=WORDS, labels=WORDS, colors=colors)
+        self.to.log(f"bits/{self.label}", states, static=True)
 
     @property
     def entity(self) -> str:
