@@ -12,7 +12,7 @@ from twinmill.calibration.steady.sheet import Sheet, is_sheet, read_sheets
 from twinmill.calibration.time_base import TimeBase, find_time_base, retimed
 from twinmill.calibration.track import SILENCE_S, SMOOTH_S, Track, local_line, make_track
 
-MOST_POSES = 40_000  # of all logs together, about: ten minutes at 60 Hz
+MOST_POSES = 20_000  # of all robots in all logs, about: more make no fit better, and all slower
 SLOWEST = 4  # frames of which one is kept: the shortest horizon must hold some
 SHORTEST_LOG_S = 10.0  # below it no regime is seen twice
 
@@ -70,9 +70,10 @@ def load_measurements(paths: list[Path]) -> list[Measurement | Sheet]:
             measurements += read_sheets(path)
             continue
         log = read_log(path)
+        runs = len(paths) * len(log.robots)
         for robot in log.robots.values():
             base = find_time_base(robot)
-            track = make_track(thinned(retimed(robot, base) if base else robot, len(paths)))
+            track = make_track(thinned(retimed(robot, base) if base else robot, runs))
             _check_length(path, track)
             measurements.append(
                 Measurement(
@@ -89,10 +90,10 @@ def load_measurements(paths: list[Path]) -> list[Measurement | Sheet]:
     return measurements
 
 
-def thinned(robot: RobotLog, logs: int) -> RobotLog:
-    """The robot with every k-th pose where there are more in so many logs than a fit needs."""
-    every = min(len(robot.pose_t_s) * logs // MOST_POSES, SLOWEST)
-    if logs < 2 or every < 2:
+def thinned(robot: RobotLog, runs: int) -> RobotLog:
+    """The robot with every k-th pose where there are more in so many runs than a fit needs."""
+    every = min(len(robot.pose_t_s) * runs // MOST_POSES, SLOWEST)
+    if runs < 2 or every < 2:
         return robot
     pose = {k: getattr(robot, k)[::every] for k in ("pose_t_s", "pose", "z_m", "valid")}
     return replace(robot, **pose)
