@@ -85,16 +85,6 @@ def test_the_viewers_own_program_finds_no_fault(log, tmp_path):
     assert checked.returncode == 0, checked.stderr
 
 
-@needs_viewer
-def test_a_bus_is_shown_as_a_log_is(log, tmp_path, capsys):
-    out = tmp_path / "o.rrd"
-    url = f"file://{log}?speed=0"  # LCM plays it
-    run(["watch", "--lcm-url", url, "--duration-s", "5", "--save", str(out), "--json"])
-    assert json.loads(capsys.readouterr().out)["robots"] == ["R01", "TWIN_R01"]
-    _, place_m = read_back(out, "/robots/R01", "translation")
-    np.testing.assert_allclose(np.array(place_m)[:, 0], 0.002 * np.arange(200), atol=1e-6)
-
-
 def scores(log, model):
     """By `Judge`, every 4 s of a log."""
     judge, window, found = Judge(ModelFile.load(str(model))), Window(WINDOW_S), []
