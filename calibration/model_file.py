@@ -61,6 +61,16 @@ class ModelFile:
             )
         return told
 
+    def usual_score(self, log_sha256: Collection[str]) -> float | None:
+        """Score that the model reached on the other logs it was fitted to; None if there are none.
+
+        No less than 1: on its own log a fit can look better than it is.
+        """
+        score = tomlkit.parse(self.text).get("fit", {}).get("score_after")
+        if score is None or not self.told_by_others(log_sha256):
+            return None
+        return max(1.0, float(score))
+
     def left_over(self, log_sha256: Collection[str]) -> dict[str, float]:
         """What the model left in other logs: fall of chi2 per step by what it depends on."""
         table = tomlkit.parse(self.text).get("fit", {}).get("left_over", {})

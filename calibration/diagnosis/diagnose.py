@@ -144,7 +144,10 @@ def diagnose(
     noises = _noisier(model_file, final)
     told_apart = ["clock_rate"] if any(m.time_base for m in measurements) else []
     alike = float(np.sqrt(np.mean([before.robots[i].score ** 2 for i in common.alike])))
-    verdict = _verdict(alike, fitted.score, names, ranking, share, bool(noises))
+    usual = model_file.usual_score([m.log_sha256 for m in measurements])
+    left = usual is not None and _steps(done, floors)[-1][1] > GOOD * usual
+    outside = share > OUTSIDE or left or (bool(noises) and not names)
+    verdict = _verdict(alike, fitted.score, names, ranking, outside)
     of_motion = Diagnosis(
         verdict,
         _sentence(verdict, names, ranking, omnibus, noises),
@@ -191,10 +194,9 @@ def _verdict(
     score_refit: float,
     names: list[str],
     ranking: list[Ranked],
-    share: float,
-    noisy: bool,
+    outside: bool,
 ) -> str:
-    if share > OUTSIDE or (noisy and not names):
+    if outside:
         return "outside_catalogue"
     if names:
         tied = {r.group for r in ranking if r.effect in names and r.group is not None}
@@ -289,9 +291,10 @@ def _sentence(
         return f"Missing: one of {' or '.join(same)}; these logs cannot tell which."
     if not omnibus.groups and noises:
         return "Something random disturbs the motion that no effect of the catalogue describes."
+    depends = f"it depends on {depends}" if depends else "no formula that was tried describes it"
     also = (
         f" {' and '.join(names)} explain{'s' if len(names) == 1 else ''} part of it."
         if names
         else ""
     )
-    return f"Something outside the catalogue is there; it depends on {depends}.{also}"
+    return f"Something outside the catalogue is there; {depends}.{also}"

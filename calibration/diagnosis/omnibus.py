@@ -180,15 +180,20 @@ class _Products:
         self.moments = np.array([columns[p].T @ left[p] for p in parts])
 
     def held_out(self, own: np.ndarray) -> tuple[float, np.ndarray]:
-        """Fall of chi2 by these columns on blocks not fitted to, and (F,) under random signs."""
+        """Fall of chi2 by these columns on blocks not fitted to, and (F,) that chance would bring.
+
+        Chance: random signs of what each block still scatters after the columns are fitted to all.
+        """
         grams, moments = self.grams[:, own][:, :, own], self.moments[:, own]
         signs = np.random.default_rng(1).choice([-1.0, 1.0], (FLIPS, len(grams), 1))
-        moments = np.concatenate([moments[None], signs * moments])
+        prior = np.eye(own.sum())  # columns are in typical strengths
+        scatter = moments - grams @ np.linalg.solve(grams.sum(0) + prior, moments.sum(0))
+        moments = np.concatenate([moments[None], signs * scatter])
         fold = np.arange(len(grams)) % FOLDS
         gain = np.zeros(1 + FLIPS)
         for k in range(FOLDS):
             test = fold == k
-            gram = grams[~test].sum(0) + np.eye(own.sum())  # columns are in typical strengths
+            gram = grams[~test].sum(0) + prior
             fitted = np.linalg.solve(gram, moments[:, ~test].sum(1).T).T
             gain += 2 * np.sum(moments[:, test].sum(1) * fitted, axis=1)
             gain -= np.sum(fitted @ grams[test].sum(0) * fitted, axis=1)
