@@ -115,7 +115,8 @@ def diagnose(
         barred: effects that are not to be thought of.
     """
     say("refitting the base")
-    told = model_file.told_by_others([m.log_sha256 for m in measurements])
+    hashes = [m.log_sha256 for m in measurements]
+    told = model_file.told_by_others(hashes)
     given = open_scenes(measurements, model_file)
     known = effect_quantities(model_file.model)
     base = excited(given, base_quantities(model_file.model, told), known)
@@ -134,9 +135,7 @@ def diagnose(
     final = replace(final, floors=floors)
     off = judge(final, odd, say, hidden)
     say("looking for what no effect explains")
-    logs = [s for s in final.scenes if s.noise]
-    known = model_file.left_over([m.log_sha256 for m in measurements])
-    omnibus = unexplained(logs, final.free, known) if logs else NOTHING
+    omnibus = _rest(final, model_file.left_over(hashes))
     explained = done.rounds[0].before.chi2 - _last(done)
     share = omnibus.gain / max(omnibus.gain + explained, 1e-9) if omnibus.groups else 0.0
     names = effect_names(final.model)[len(model_file.model.effects) :]
@@ -144,8 +143,8 @@ def diagnose(
     noises = _noisier(model_file, final)
     told_apart = ["clock_rate"] if any(m.time_base for m in measurements) else []
     alike = float(np.sqrt(np.mean([before.robots[i].score ** 2 for i in common.alike])))
-    usual = model_file.usual_score([m.log_sha256 for m in measurements])
-    left = usual is not None and _steps(done, floors)[-1][1] > GOOD * usual
+    steps = _steps(done, floors)
+    left = steps[-1][1] > GOOD * model_file.usual_score(hashes)
     outside = share > OUTSIDE or left or (bool(noises) and not names)
     verdict = _verdict(alike, fitted.score, names, ranking, outside)
     of_motion = Diagnosis(
@@ -159,14 +158,8 @@ def diagnose(
         omnibus,
         float(share),
         final,
-        _steps(done, floors),
-        [
-            *noises,
-            *time_base_notes(final.scenes),
-            *geometry_notes(final.model),
-            *_clock_notes(final),
-            *_known_notes(omnibus),
-        ],
+        steps,
+        noises + _notes(final, omnibus),
         _next_experiment(verdict, ranking, done),
         robots_off=tuple(off),
     )
@@ -232,6 +225,21 @@ def _clock_notes(state: State) -> list[str]:
             "told from it; a calibration log on the same clocks would part them."
         ]
     return []
+
+
+def _rest(state: State, left_before: dict[str, float]) -> Omnibus:
+    """What the effects leave of the logs; tables have no such test."""
+    logs = [s for s in state.scenes if s.noise]
+    return unexplained(logs, state.free, left_before) if logs else NOTHING
+
+
+def _notes(state: State, omnibus: Omnibus) -> list[str]:
+    return [
+        *time_base_notes(state.scenes),
+        *geometry_notes(state.model),
+        *_clock_notes(state),
+        *_known_notes(omnibus),
+    ]
 
 
 def _known_notes(omnibus: Omnibus) -> list[str]:
