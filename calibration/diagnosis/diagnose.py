@@ -25,6 +25,7 @@ from twinmill.calibration.steady.limits import unseen_by_tables
 
 HELPED = 0.95  # a refit that lowers the score below this share of it was worth it
 NOISIER = 2.0  # drive noise over that of the model file, beyond which it is a finding
+WORSE = 1.5  # score over that of the logs the model was fitted to, beyond which it is a finding
 OUTSIDE = 0.1  # share of what could be explained that no effect does
 
 
@@ -144,7 +145,7 @@ def diagnose(
     told_apart = ["clock_rate"] if any(m.time_base for m in measurements) else []
     alike = float(np.sqrt(np.mean([before.robots[i].score ** 2 for i in common.alike])))
     steps = _steps(done, floors)
-    left = steps[-1][1] > GOOD * model_file.usual_score(hashes)
+    left = steps[-1][1] > WORSE * model_file.usual_score(hashes)
     outside = share > OUTSIDE or left or (bool(noises) and not names)
     verdict = _verdict(alike, fitted.score, names, ranking, outside)
     of_motion = Diagnosis(

@@ -150,7 +150,7 @@ def _dependences(terms: list[Term], products: "_Products") -> list[Dependence]:
     """What each group brings, as a whole or by one formula, and whether that is beyond chance.
 
     It is if it is more than the largest of all that is tested is under random signs of blocks, each
-    over its own spread there.
+    over its own spread there, and if it is evidence enough for one of so many (as of an effect).
     """
     tested: list[tuple[str, np.ndarray]] = []
     for group in dict.fromkeys(t.group for t in terms):
@@ -160,10 +160,11 @@ def _dependences(terms: list[Term], products: "_Products") -> list[Dependence]:
     found = [products.held_out(own) for _, own in tested]
     spread = np.array([null.std() for _, null in found])
     highest = np.max([null / s for (_, null), s in zip(found, spread, strict=True)], axis=0)
-    least = np.quantile(highest, 1 - ALPHA)
+    least, least_gain = np.quantile(highest, 1 - ALPHA), 2 * np.log(len(tested) / ALPHA)
     best: dict[str, Dependence] = {}
     for (group, _), (gain, _), scale in zip(tested, found, spread, strict=True):
-        this = Dependence(group, gain, float(gain / scale), bool(gain / scale > least))
+        sure = bool(gain / scale > least and gain > least_gain)
+        this = Dependence(group, gain, float(gain / scale), sure)
         if group not in best or (this.sure, gain) > (best[group].sure, best[group].gain):
             best[group] = this
     return sorted(best.values(), key=lambda g: -g.gain)
