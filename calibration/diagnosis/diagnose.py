@@ -15,6 +15,7 @@ from twinmill.calibration.diagnosis.omnibus import NOTHING, Omnibus, unexplained
 from twinmill.calibration.diagnosis.ranking import Ranked, groups_of, rank
 from twinmill.calibration.diagnosis.robots import RobotOff, judge, sentence
 from twinmill.calibration.diagnosis.search import ALPHA, Search
+from twinmill.calibration.diagnosis.settled import Settled, Sum
 from twinmill.calibration.fit import refit, share_noise
 from twinmill.calibration.floor import floor_of
 from twinmill.calibration.freedom import base_quantities, effect_names, effect_quantities
@@ -45,6 +46,7 @@ class Diagnosis:
         state: scenes with the model that has the found effects.
         notes: sentences on what to keep in mind.
         next_experiment: which run would settle what this log leaves open, or None.
+        sums: of found effects that are firmer than their parts.
         bits: of the robots' cameras with the model as given, or None.
         bit_estimates: of all effects of the camera, with what was found.
         robots_off: those that differ from the others; `state` is without them.
@@ -63,6 +65,7 @@ class Diagnosis:
     steps: list[tuple[str | None, float]]
     notes: list[str]
     next_experiment: dict | None
+    sums: list[Sum]
     bits: BitComparison | None = None
     bit_estimates: tuple[Estimate, ...] = ()
     robots_off: tuple[RobotOff, ...] = ()
@@ -89,6 +92,7 @@ class Diagnosis:
                 "equation": self.omnibus.equation,
             },
             "steps": [{"effect": e, "score_heldout": s} for e, s in self.steps],
+            "sums": [s.to_json() for s in self.sums],
             "next_experiment": self.next_experiment,
             "time_base": [
                 {"log": r.scene.measurement.log_name, **r.scene.measurement.time_base.to_json()}
@@ -140,7 +144,8 @@ def diagnose(
     explained = done.rounds[0].before.chi2 - _last(done)
     share = omnibus.gain / max(omnibus.gain + explained, 1e-9) if omnibus.groups else 0.0
     names = effect_names(final.model)[len(model_file.model.effects) :]
-    ranking = rank(done, names, explained + omnibus.gain, floors)
+    settled = Settled.of(final)
+    ranking = settled.put_into(rank(done, names, explained + omnibus.gain, floors), names)
     noises = _noisier(model_file, final)
     told_apart = ["clock_rate"] if any(m.time_base for m in measurements) else []
     alike = float(np.sqrt(np.mean([before.robots[i].score ** 2 for i in common.alike])))
@@ -160,8 +165,9 @@ def diagnose(
         float(share),
         final,
         steps,
-        noises + _notes(final, omnibus),
+        settled.notes(names) + noises + _notes(final, omnibus),
         _next_experiment(verdict, ranking, done),
+        settled.sums,
         robots_off=tuple(off),
     )
     whole = with_bits(of_motion, given, model_file, say, barred)
