@@ -139,7 +139,7 @@ def test_a_signal_finishes_the_log(tmp_path, stop):
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (["--view"], 2, "--view"),
+        (["--viev"], 2, "--viev"),
         (["--sensor", "lidar"], 2, "lidar"),
         (["--n", 0], 2, "--n"),
         (["--n", 101], 2, "--n"),
