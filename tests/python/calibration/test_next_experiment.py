@@ -140,7 +140,8 @@ def at_steps(rows: Rows) -> np.ndarray:
 def test_the_run_names_what_milling_alone_cannot(designed, measure):
     """Without strafing a heading bias and unequal wheels are one thing, by algebra.
 
-    The curve between the duties of the model's table may be named besides, since it is truly there.
+    One more may be named: the robot's curve is bent between the duties of the model's table, so that
+    milling's inner wheels, whose duty is no node of it, truly do not do what the model says.
     """
     assert designed.before.verdict == "ambiguous"
     asked = {c.effect for c in designed.plan.chances}
@@ -150,7 +151,7 @@ def test_the_run_names_what_milling_alone_cannot(designed, measure):
     run = measure(seed=3, script_pct=at_steps(designed.plan.rows), spoil=turned)
     after = diagnose([designed.milling, run], designed.model)
     assert after.verdict == "effect_missing" and after.found[0] == "heading_bias"
-    assert set(after.found) <= {"heading_bias", "speed_curve"}
+    assert "wheel_gain" not in after.found and len(after.found) <= 2
     assert abs(after.ranking[0].parameters[0].value) == pytest.approx(BIAS_RAD, rel=0.15)
 
 
