@@ -140,7 +140,7 @@ def at_steps(rows: Rows) -> np.ndarray:
 def test_the_run_names_what_milling_alone_cannot(designed, measure):
     """Without strafing a heading bias and unequal wheels are one thing, by algebra.
 
-    One more may be named: the robot's curve is bent between the duties of the model's table, so that
+    One more may be named: the robot's curve is bent between the duties of the model's table, so
     milling's inner wheels, whose duty is no node of it, truly do not do what the model says.
     """
     assert designed.before.verdict == "ambiguous"
