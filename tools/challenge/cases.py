@@ -35,9 +35,10 @@ MODULATORS = {
     "sin(theta + {phase})": 0.7, "sin(2*theta + {phase})": 0.7, "sin(3*theta + {phase})": 0.7,
     "(x*{part} + y*{rest})": 0.4, "sin(t/{slow} + {phase})": 0.7,
 }  # fmt: skip
-ROBOT = """
+DUTY_PCT = [0, 12.5, 25, 37.5, 50, 75, 100]
+ROBOT = f"""
 [base]
-duty_pct = [0, 12.5, 25, 37.5, 50, 75, 100]
+duty_pct = {DUTY_PCT}
 wheel_speed_mps = [0, 0.11, 0.18, 0.24, 0.28, 0.33, 0.37]
 sideways_gain = 0.89
 yaw_gain = 0.85
@@ -50,7 +51,8 @@ drive_mps = 0.003
 drive_radps = 0.03
 drive_s = 0.15
 drive_turn_s = 0.15
-
+"""
+CLOCK = """
 [clock]
 offset_s = -0.06
 """
@@ -119,7 +121,7 @@ def make_log(program: Path, folder: Path, name: str, case: Case, script: Path) -
         ValueError: the twin failed; its own sentence.
     """
     model, log = folder / f"{name}.hidden.toml", folder / f"{name}.lcmlog"
-    model.write_text(ROBOT + "".join(map(_table, case.hidden)))
+    model.write_text(ROBOT + CLOCK + "".join(map(_table, case.hidden)))
     command = [
         program, "--plant", case.plant, "--model", model, "--n", "1", "--seed", 1 + case.number,
         "--script", script, "--log", log,

@@ -122,7 +122,6 @@ def _all(
     setting: Setting, cases: list[Case], workers: int, console: Console
 ) -> Iterator[tuple[int, dict, float]]:
     """Every case as it is done: number, result, time; shows progress and the time left."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers share the cores already
     columns = (*Progress.get_default_columns()[:-1], MofNCompleteColumn(), TimeRemainingColumn())
     pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
     with (
