@@ -77,10 +77,12 @@ class Case:
     """One sealed log: which plant makes it, and what is hidden in it.
 
     Attributes:
+        noise_seed: of the twin; other cases and other seeds of the challenge have other noise.
         withheld: effects that diagnosis is not told of.
     """
 
     number: int
+    noise_seed: int
     plant: str
     kind: str
     strength: str
@@ -97,13 +99,14 @@ def draw(number: int, seed: int, known: dict[str, Collection[str]]) -> Case:
         known: per plant the effects that its base model has already: they are not hidden again.
     """
     random = np.random.default_rng([seed, number])
+    noise_seed = noise_seed_of(number, seed)
     plant, kind = PLANTS[number // len(KINDS) % len(PLANTS)], KINDS[number % len(KINDS)]
     strength = str(random.choice(list(STRENGTHS)))
     if kind == "none":
-        return Case(number, plant, kind, strength)
+        return Case(number, noise_seed, plant, kind, strength)
     if kind == "outside" and random.random() < 0.5:
         hidden = (_formula(STRENGTHS[strength], random),)
-        return Case(number, plant, kind, strength, hidden)
+        return Case(number, noise_seed, plant, kind, strength, hidden)
     entries = {n: e for n, e in catalogue().items() if _drawable(e) and n not in known[plant]}
     names = sorted(set(WITHHELD) & set(entries)) if kind == "outside" else sorted(entries)
     drawn = random.choice(names, 2 if kind == "two" else 1, replace=False)
@@ -111,7 +114,12 @@ def draw(number: int, seed: int, known: dict[str, Collection[str]]) -> Case:
         Hidden(str(n), _parameters(entries[n], STRENGTHS[strength], random), {}) for n in drawn
     )
     withheld = tuple(h.effect for h in hidden) if kind == "outside" else ()
-    return Case(number, plant, kind, strength, hidden, withheld)
+    return Case(number, noise_seed, plant, kind, strength, hidden, withheld)
+
+
+def noise_seed_of(number: int, seed: int) -> int:
+    """The twin's seed for one log of one challenge."""
+    return seed * 1_000_000 + number
 
 
 def make_log(program: Path, folder: Path, name: str, case: Case, script: Path) -> Path:
@@ -123,7 +131,7 @@ def make_log(program: Path, folder: Path, name: str, case: Case, script: Path) -
     model, log = folder / f"{name}.hidden.toml", folder / f"{name}.lcmlog"
     model.write_text(ROBOT + CLOCK + "".join(map(_table, case.hidden)))
     command = [
-        program, "--plant", case.plant, "--model", model, "--n", "1", "--seed", 1 + case.number,
+        program, "--plant", case.plant, "--model", model, "--n", "1", "--seed", case.noise_seed,
         "--script", script, "--log", log,
     ]  # fmt: skip
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)

@@ -23,7 +23,7 @@ from twinmill.calibration.freedom import effect_names
 from twinmill.calibration.measurement import load_measurements
 from twinmill.calibration.model_file import ModelFile, write_whole
 from twinmill.tools.challenge import page
-from twinmill.tools.challenge.cases import PLANTS, ROBOT, Case, draw, make_log, seal
+from twinmill.tools.challenge.cases import PLANTS, ROBOT, Case, draw, make_log, noise_seed_of, seal
 from twinmill.tools.challenge.scoring import scored, summary
 from twinmill.tools.challenge.script import write_rich_script
 from twinmill.tools.challenge.truth import truth
@@ -75,7 +75,7 @@ def _challenge(
     console = Console(stderr=True)
     script = out / "script.csv"
     write_rich_script(script, duration_s, seed)
-    bases = {plant: _base(twin_run, out, plant, script) for plant in PLANTS}
+    bases = {plant: _base(twin_run, out, plant, script, seed) for plant in PLANTS}
     setting = Setting(twin_run, out, script, bases)
     known = {p: effect_names(ModelFile.load(str(path)).model) for p, path in bases.items()}
     cases = [draw(number, seed, known) for number in range(count)]
@@ -101,13 +101,13 @@ def _find_program() -> Path:
     return Path(found)
 
 
-def _base(program: Path, folder: Path, plant: str, script: Path) -> Path:
+def _base(program: Path, folder: Path, plant: str, script: Path, seed: int) -> Path:
     """A model of the robot with nothing hidden: fitted, and made adequate for that plant."""
     rough, fitted = folder / f"rough_{plant}.toml", folder / f"fitted_{plant}.toml"
     speeds = "wheel_speed_mps = [0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4]"
     lines = [line for line in ROBOT.splitlines() if line.startswith(("[base]", "duty_pct"))]
     write_whole(rough, "\n".join([*lines, speeds]) + "\n")
-    nothing = Case(NOTHING, plant, "none", "medium")
+    nothing = Case(NOTHING, noise_seed_of(NOTHING, seed), plant, "none", "medium")
     log = make_log(program, folder, f"calibration_{plant}", nothing, script)
     measured = load_measurements([log])
     fit(measured, ModelFile.load(str(rough)), fitted, "twinmill challenge")
