@@ -14,11 +14,11 @@ from twinmill.tools.challenge.scoring import AS_GOOD, BINS
 
 # Key, what it says, the goal, whether more is better.
 RATES = (
-    ("false_alarm", "false alarm where nothing was hidden", 0.05, False),
-    ("right_first", "the one hidden effect first, or in its group", 0.95, True),
+    ("false_alarm", "false alarm, nothing hidden", 0.05, False),
+    ("right_first", "one effect: first, or in its group", 0.95, True),
     ("both_of_two", "both of two found", 0.80, True),
-    ("outside_called", "outside the catalogue, and called so", 0.80, True),
-    ("as_good_as_true", f"score within {AS_GOOD} of the true model's", 0.95, True),
+    ("outside_called", "outside the catalogue, called so", 0.80, True),
+    ("as_good_as_true", f"score within {AS_GOOD} of the truth's", 0.95, True),
 )
 COLOURS = {"one": BEFORE, "two": FLOOR, "outside": PREDICTED}
 
