@@ -8,27 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "log_writer.h"
+
 namespace twin
 {
-
-// A log that stands under its name only once it is whole: written beside it, renamed by Finish().
-class LogWriter
-{
-public:
-    // Throws std::runtime_error in one sentence if the file cannot be made.
-    explicit LogWriter(const std::string &path);
-    ~LogWriter();
-    LogWriter(const LogWriter &) = delete;
-    LogWriter &operator=(const LogWriter &) = delete;
-
-    // Throws std::runtime_error if the disk is full.
-    void Write(int64_t utime_us, const std::string &channel, std::vector<uint8_t> &bytes);
-    void Finish();
-
-private:
-    std::string path_, partial_path_;
-    std::unique_ptr<lcm::LogFile> file_;
-};
 
 class Outlet
 {
@@ -36,8 +19,14 @@ public:
     // Opens a bus; an empty `url` is LCM's default on this machine alone. Throws std::runtime_error
     // in one sentence if messages cannot be sent there.
     void OpenBus(const std::string &url);
-    void OpenLog(const std::string &path) { log_ = std::make_unique<LogWriter>(path); }
+    // As LogWriter's constructor.
+    void OpenLog(const std::string &path, bool resume)
+    {
+        log_ = std::make_unique<LogWriter>(path, resume);
+    }
     void Finish();
+    // What is said was said before, by a run that was interrupted.
+    bool Repeats() { return log_ && log_->Repeats(); }
     // nullptr if there is none.
     lcm::LCM *Bus() { return bus_.get(); }
 

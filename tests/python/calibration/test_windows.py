@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import twinmill_native as native
 from twinmill.calibration.measurement import Measurement, _played
 from twinmill.calibration.problem import Scene
 from twinmill.calibration.residual import StepGrid
@@ -54,6 +55,18 @@ def test_predicted_displacement_on_a_circle(driven, scene_of):
     whole = np.isfinite(predicted).all(axis=(1, 2))
     # Steps of 1/120 s and shorter, each an arc: only rounding is left.
     assert predicted[whole] == pytest.approx(np.tile(circle_m_rad(), (whole.sum(), 1, 1)), abs=1e-7)
+
+
+def test_any_number_of_threads_predicts_the_same_bytes(driven, scene_of):
+    scene = scene_of(driven())
+    rows = np.linspace(0.5, 1.5, 16)[:, None]
+
+    def predict(part):  # no more threads than rows
+        return native.one_step_batch(scene.model, scene.measurement.played, ["base.yaw_gain"], part)
+
+    alone = np.concatenate([predict(rows[[i]]) for i in range(len(rows))])
+    assert predict(rows).tobytes() == alone.tobytes()
+    assert len(np.unique(alone[:, -1], axis=0)) == len(rows)
 
 
 @pytest.mark.parametrize("angle_rad", [0.7, 3.0, -2.0])
