@@ -6,50 +6,121 @@ from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
-from twinmill.tools import (
-    calibrate,
-    characterise,
-    compare_swarm,
-    diagnose,
-    effects,
-    import_log,
-    metrics,
-    plot,
+from twinmill.tools.lazy import Later
+from typer.core import TyperGroup
+
+# Name, module and what it does, in the order of the help. The modules are imported when called.
+COMMANDS = (
+    ("import", "import_log", "Make a log from motion capture exports and command tables."),
+    ("export", "export.command", "Write a log as MCAP for Foxglove, or as tables, CSV or Parquet."),
+    ("plot", "plot", "Draw paths, speeds, bits and wheel commands of all robots in a log."),
+    (
+        "watch",
+        "watch.command",
+        "Show robots and their twins (channels TWIN_...) side by side in the viewer Rerun.",
+    ),
+    (
+        "compare",
+        "calibrate",
+        "Tell how well a model predicts logs, against the log's own noise, and where it fails.",
+    ),
+    (
+        "fit",
+        "calibrate",
+        "Fit all quantities of a model to logs; writes a new model file and leaves the old one.",
+    ),
+    (
+        "add",
+        "calibrate",
+        "Add an effect to a model, fit it with all the rest, and judge it on data not fitted to.",
+    ),
+    (
+        "diagnose",
+        "diagnose",
+        "Name the physical effect that a model lacks, or say that none is or "
+        "that the log cannot tell.",
+    ),
+    (
+        "explain",
+        "diagnose",
+        "Diagnose, add what is found, and write the model that has it; every "
+        "step on held-out data.",
+    ),
+    (
+        "next",
+        "next",
+        "Design the run that best tells apart what these logs cannot, and write its script.",
+    ),
+    (
+        "challenge",
+        "challenge.run",
+        "Draw effects at random, seal the answers, let the twin make logs, "
+        "diagnose, unseal, score.",
+    ),
+    (
+        "effects",
+        "effects",
+        "List the physical effects that a model can have, or show one with its equation.",
+    ),
+    (
+        "flash",
+        "deploy.flash",
+        "Install the robot's program on robots, all at once, and see that each runs.",
+    ),
+    (
+        "characterise",
+        "characterise",
+        "Play an input script on one robot's wheels, and log its telemetry and poses.",
+    ),
+    (
+        "metrics",
+        "metrics",
+        "Tell what the swarm in a log does: metrics over time, and its class at the end.",
+    ),
+    (
+        "compare-swarm",
+        "compare_swarm",
+        "Tell whether a recorded swarm behaves as the twin's swarms do, and since when not.",
+    ),
+    (
+        "phase",
+        "sweep.phase_command",
+        "Draw what becomes of the swarm over a sweep's grid, and where to experiment next.",
+    ),
+    ("ask", "sweep.ask", "Answer one of the four design questions with a curve and a sentence."),
+    (
+        "discover",
+        "discover.command",
+        "Search tables and mixes of two tables for behaviours that differ, and name what is known.",
+    ),
+    (
+        "threshold",
+        "threshold.command",
+        "Find the limits of colour that hold the green ball, and nothing else.",
+    ),
+    (
+        "swarm",
+        "swarm.commands",
+        "Start, stop and watch the robots on the network, or those of twin_run.",
+    ),
 )
-from twinmill.tools import next as next_run
-from twinmill.tools.challenge import run as challenge
-from twinmill.tools.deploy import flash
-from twinmill.tools.discover import command as discover
-from twinmill.tools.export import command as export
-from twinmill.tools.swarm import commands as swarm
-from twinmill.tools.sweep import ask
-from twinmill.tools.sweep import phase_command as phase
-from twinmill.tools.threshold import command as threshold
-from twinmill.tools.watch import command as watch
+
+
+class Commands(TyperGroup):
+    """All of them."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        for name, module, summary in COMMANDS:
+            self.add_command(Later(name, f"twinmill.tools.{module}", summary))
+
 
 app = typer.Typer(
+    cls=Commands,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-import_log.register(app)
-export.register(app)
-plot.register(app)
-watch.register(app)
-calibrate.register(app)
-diagnose.register(app)
-next_run.register(app)
-challenge.register(app)
-effects.register(app)
-swarm.register(app)
-flash.register(app)
-characterise.register(app)
-metrics.register(app)
-compare_swarm.register(app)
-phase.register(app)
-ask.register(app)
-discover.register(app)
-threshold.register(app)
 
 
 def _show_version(wanted: bool) -> None:

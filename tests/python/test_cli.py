@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import hashlib
 import json
+import subprocess
 import sys
 from importlib.metadata import version
 
@@ -9,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from twinmill.calibration.tables import number
 from twinmill.tools import cli
+from twinmill.tools.lazy import Later
 from twinmill.tools.output import plain
 
 
@@ -218,3 +220,17 @@ def test_json_holds_no_nan_and_no_numpy():
 @given(st.floats(-1e9, 1e9))
 def test_numbers_are_shown_to_three_digits(value):
     assert float(number(value)) == pytest.approx(value, rel=5.1e-3, abs=1e-12)
+
+
+@pytest.mark.parametrize(("name", "module", "summary"), cli.COMMANDS)
+def test_the_list_of_commands_says_what_each_says_of_itself(name, module, summary):
+    command = Later(name, f"twinmill.tools.{module}", summary).command()
+    assert " ".join((command.short_help or command.help).split("\n\n")[0].split()) == summary
+
+
+def test_help_needs_no_numbers():
+    code = "import sys; from twinmill.tools.cli import run; run(['--help']); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split("\n")[-2].split())
+    assert "typer" in loaded
+    assert not loaded & {"numpy", "scipy", "matplotlib", "ribs", "twinmill_native"}
