@@ -8,11 +8,12 @@ from typing import Annotated
 
 import numpy as np
 import typer
+from twinmill.calibration.compare import open_scenes
 from twinmill.calibration.diagnosis.diagnose import diagnose
 from twinmill.calibration.measurement import load_measurements
 from twinmill.calibration.model_file import write_whole
 from twinmill.calibration.next_experiment import present
-from twinmill.calibration.next_experiment.design import Limits, Plan, design
+from twinmill.calibration.next_experiment.design import Limits, Plan, check, design
 from twinmill.calibration.next_experiment.script_file import csv_text
 from twinmill.tools.calibrate import (
     DEFAULT_MODEL,
@@ -38,9 +39,7 @@ def _next(
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="SCRIPT", help="The new script (.csv).")
     ] = Path("script.csv"),
-    duration_s: Annotated[
-        float, typer.Option("--duration-s", min=5, max=600, help="Longest run.")
-    ] = 30,
+    duration_s: Annotated[float, typer.Option("--duration-s", max=600, help="Longest run.")] = 30,
     floor_m: Annotated[
         str, typer.Option("--floor-m", metavar="LxW", help="Free floor, along and across.")
     ] = "2x2",
@@ -66,7 +65,10 @@ def _next(
     )
     check_new_file(output, force)
     with telling(f"designing a run with {model}") as say:
-        plan = design(diagnose(load_measurements(logs), model_file, say), limits, say)
+        measurements = load_measurements(logs)
+        check(open_scenes(measurements, model_file), limits)
+        usual = model_file.usual_score([m.log_sha256 for m in measurements])
+        plan = design(diagnose(measurements, model_file, say), limits, usual, say)
     write_whole(output, csv_text(plan.rows))
     how = _how(plan, logs, model, output)
     data = {"script": str(output), **plan.to_json()}

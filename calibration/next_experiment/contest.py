@@ -84,14 +84,20 @@ def question(
     return weakest, f"These logs tell all effects apart; least {', '.join(weakest)}."
 
 
-def subjects(scenes: list[Scene], planned: Scene, state: State, asked: Contest) -> list[Subject]:
-    """Every effect that the logs or the planned run show, at its fitted or its usual strength."""
+def subjects(
+    scenes: list[Scene], planned: Scene, state: State, asked: Contest, usual: float
+) -> list[Subject]:
+    """Every effect that the logs or the planned run show, at its fitted or its usual strength.
+
+    Errors of the next run scatter no less over their noise than the score `usual` says.
+    """
     shown, _ = candidates([*scenes, planned])
     without = [s.white_errors() for s in scenes]
     found = [(candidate, candidate.columns(scenes, without)) for candidate, _ in shown]
     tested = screen(scenes, state.free, found).found
     return [
-        Subject(t.candidate, _whole(t.candidate.effect, asked.fitted), t.excess) for t in tested
+        Subject(t.candidate, _whole(t.candidate.effect, asked.fitted), max(t.excess, usual**2))
+        for t in tested
     ]
 
 

@@ -7,18 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 from twinmill.calibration.diagnosis.diagnose import Diagnosis
-from twinmill.calibration.diagnosis.evidence import State
 from twinmill.calibration.freedom import catalogue
-from twinmill.calibration.next_experiment.contest import contest, question, subjects
+from twinmill.calibration.measurement import SHORTEST_LOG_S
+from twinmill.calibration.next_experiment.contest import Contest, contest, question, subjects
 from twinmill.calibration.next_experiment.foresight import LEAD_S, Played, Rows, rows_of
 from twinmill.calibration.next_experiment.information import Ledger, Subject
 from twinmill.calibration.next_experiment.moves import Move, family
 from twinmill.calibration.next_experiment.power import power
+from twinmill.calibration.next_experiment.relevance import relevance
 from twinmill.calibration.problem import Scene
+from twinmill.calibration.windows import Windows, score
 
 ENOUGH_CHI2 = 20.0  # a margin of this is about what an acceptance needs
 BESIDES = 0.05  # weight of effects that are not in question: once these are seen, they count
 WANDER_M = 0.08  # of a real robot from the predicted path within a minute, beside the candidates'
+SHORTEST_RUN_S = SHORTEST_LOG_S + 3  # as much may be left where no further move fits
 CENTRE = np.zeros(3)
 
 
@@ -102,40 +105,45 @@ class Plan:
         }
 
 
-def design(diagnosis: Diagnosis, limits: Limits, say: Callable[[str], None]) -> Plan:
+def design(diagnosis: Diagnosis, limits: Limits, usual: float, say: Callable[[str], None]) -> Plan:
     """Designs the run that best names what the diagnosis leaves open.
 
     Args:
         diagnosis: of the logs so far.
-        limits: time, floor, duty.
+        limits: time, floor, duty; as `check` let them pass.
+        usual: score of the model on the logs that it was fitted to; what it lacks in drives that
+            the logs so far do not have. Infinite if that is not known.
         say: told in words what is being done.
 
     Raises:
-        ValueError: there is no log, no duty to drive by, or no move that has room and time.
+        ValueError: there is no log, or no move shows what is in question.
     """
+    usual = usual if np.isfinite(usual) else 1.0
     moves = family(limits.max_duty)
-    _check(_log_of(diagnosis.state), limits, moves)
     say("playing the moves in the twin")
     asked = contest(diagnosis)
-    scene = _log_of(asked.state)
-    played = Played.of([[m] for m in moves], scene)
-    foreseen = played.scene(scene, CENTRE)
-    known = subjects(asked.state.scenes, foreseen, asked.state, asked)
+    scene = log_of(asked.state.scenes)
+    foreseen = Played.of([[m] for m in moves], scene).scene(scene, CENTRE)
+    known = subjects(asked.state.scenes, foreseen, asked.state, asked, usual)
     ledger = Ledger(asked.state.free, known)
     told = np.sum([ledger.told(s) for s in asked.state.scenes], axis=0)
     names, why = question(asked, known, _tempered(ledger, told), ENOUGH_CHI2)
-    wanted = [i for i, s in enumerate(known) if s.name in names]
+    wanted = {i: with_effect(scene.model, s) for i, s in enumerate(known) if s.name in names}
+    if not wanted:
+        raise ValueError(f"{why} No move that the twin can play shows any of them.")
     say("choosing moves")
-    floor = _Floor(limits, scene, [known[i] for i in wanted])
-    chosen = _choose(moves, ledger, told, ledger.foreseen(foreseen), wanted, floor)
+    floor = _Floor(limits, scene, list(wanted.values()))
+    chosen = _choose(moves, ledger, told, ledger.foreseen(foreseen), list(wanted), floor)
     say("checking the whole script")
     whole = Played.of([chosen], scene)
-    after = told + ledger.foreseen(whole.scene(scene, CENTRE))[0]
+    planned = whole.scene(scene, CENTRE)
+    after = told + ledger.foreseen(planned)[0]
+    outlook = _Outlook(asked, ledger, wanted, usual)
     return Plan(
         why,
         chosen,
         rows_of(chosen),
-        _chances(ledger, told, after, wanted),
+        outlook.chances(told, after, planned),
         whole.pose_t_s - whole.pose_t_s[0],
         np.array([whole.path(m, CENTRE) for m in floor.models]),
         limits,
@@ -144,9 +152,13 @@ def design(diagnosis: Diagnosis, limits: Limits, say: Callable[[str], None]) -> 
     )
 
 
-def _log_of(state: State) -> Scene:
-    """The first log: clock, noise and rate of poses are taken to be the same in the next."""
-    logs = [scene for scene in state.scenes if scene.noise]
+def log_of(scenes: list[Scene]) -> Scene:
+    """The first log: clock, noise and rate of poses are taken to be the same in the next.
+
+    Raises:
+        ValueError: there is none.
+    """
+    logs = [scene for scene in scenes if scene.noise]
     if not logs:
         raise ValueError(
             "only steady-state tables were given; the next run is designed for the noise and the "
@@ -155,29 +167,35 @@ def _log_of(state: State) -> Scene:
     return logs[0]
 
 
-def _check(scene: Scene, limits: Limits, moves: list[Move]) -> None:
+def check(scenes: list[Scene], limits: Limits) -> None:
     """Raises ValueError, before the long work, where no script can be."""
+    scene = log_of(scenes)
     if scene.model.drive != "duty":
         raise ValueError(
             f"the model is driven by {scene.model.drive}; scripts are made of wheel duties, so "
             "they can be designed for a robot driven by duty alone."
         )
-    floor = _Floor(limits, scene, [])
-    short = [m for m in moves if m.duration_s + 2 * LEAD_S <= limits.duration_s]
-    if not any(floor.holds([m]) for m in short):
-        size = "x".join(f"{side:g}" for side in limits.floor_m)
+    if limits.duration_s < SHORTEST_RUN_S:
         raise ValueError(
-            f"no move fits into {limits.duration_s:g} s and a floor of {size} m; allow more of "
-            "either."
+            f"a run of {limits.duration_s:g} s is too short: no model is judged on less than "
+            f"{SHORTEST_LOG_S:g} s, and moves come whole; allow {SHORTEST_RUN_S:g} s."
+        )
+    floor = _Floor(limits, scene, [])
+    if not any(floor.holds([m]) for m in family(limits.max_duty)):
+        size = "x".join(f"{side:g}" for side in limits.floor_m)
+        need_m = 2 * (scene.model.get("robot.body_radius_m") + WANDER_M)
+        raise ValueError(
+            f"no move fits on a floor of {size} m: the robot's body and what it may stray take "
+            f"{need_m:.2g} m each way; allow more."
         )
 
 
 class _Floor:
     """Keeps the robot on the floor, whichever of the effects it has."""
 
-    def __init__(self, limits: Limits, scene: Scene, effects: list[Subject]) -> None:
+    def __init__(self, limits: Limits, scene: Scene, richer: list[native.Model]) -> None:
         self.scene, self.limits = scene, limits
-        self.models = [scene.model, *(_with(scene.model, e) for e in effects)]
+        self.models = [scene.model, *richer]
         radius_m = scene.model.get("robot.body_radius_m")
         self.room_m = np.array(limits.floor_m) / 2 - radius_m - WANDER_M
 
@@ -190,7 +208,7 @@ class _Floor:
         )
 
 
-def _with(model: native.Model, effect: Subject) -> native.Model:
+def with_effect(model: native.Model, effect: Subject) -> native.Model:
     """The model with the effect at its strength."""
     richer = model.copy()
     richer.add_effect(effect.name)
@@ -237,24 +255,55 @@ def _tempered(ledger: Ledger, grams: np.ndarray) -> np.ndarray:
     return ledger.margins(grams) / excess[:, None]
 
 
-def _chances(
-    ledger: Ledger, told: np.ndarray, after: np.ndarray, wanted: list[int]
-) -> list[Chance]:
-    before_chi2, chi2 = (_tempered(ledger, g)[wanted] for g in (told, after))
-    parameters = np.array([len(catalogue()[ledger.subjects[i].name]["parameters"]) for i in wanted])
-    count = len(ledger.subjects)
-    before, then = (power(m, parameters, count) for m in (before_chi2, chi2))
-    chances = []
-    for row, i in enumerate(wanted):
-        nearest = int(chi2[row].argmin())
-        chances.append(
-            Chance(
-                ledger.subjects[i].name,
-                ledger.subjects[nearest - 1].name if nearest else None,
-                float(before_chi2[row].min()),
-                float(chi2[row].min()),
-                float(before[row]),
-                float(then[row]),
+@dataclass(frozen=True)
+class _Outlook:
+    """What is foreseen of the effects in question.
+
+    Attributes:
+        asked, ledger: the question, and what runs tell of all effects.
+        wanted: by place in the ledger the model with the effect.
+        usual: score of the model on the logs that it was fitted to.
+    """
+
+    asked: Contest
+    ledger: Ledger
+    wanted: dict[int, native.Model]
+    usual: float
+
+    def chances(self, told: np.ndarray, after: np.ndarray, planned: Scene) -> list[Chance]:
+        """Of each effect before and after the planned run, surest first."""
+        before_chi2, before = self._power(told, [])
+        chi2, then = self._power(after, [planned])
+        chances = []
+        for row, place in enumerate(self.wanted):
+            nearest = int(chi2[row].argmin())
+            chances.append(
+                Chance(
+                    self.ledger.subjects[place].name,
+                    self.ledger.subjects[nearest - 1].name if nearest else None,
+                    float(before_chi2[row].min()),
+                    float(chi2[row].min()),
+                    float(before[row]),
+                    float(then[row]),
+                )
             )
+        return sorted(chances, key=lambda c: -c.power)
+
+    def _power(self, grams: np.ndarray, planned: list[Scene]) -> tuple[np.ndarray, np.ndarray]:
+        """(T, 1 + J) margins of the wanted over the scatter, and (T,) chances to be named."""
+        state, subjects = self.asked.state, self.ledger.subjects
+        margins = _tempered(self.ledger, grams)[list(self.wanted)]
+        logs = [(s, f) for s, f in zip(state.scenes, state.floors, strict=True) if s.noise]
+        scores = [score(Windows.of(s.measurement.track).errors(s), f) for s, f in logs]
+        scenes = [*(s for s, _ in logs), *planned]
+        floors = [*(f for _, f in logs), *(logs[0][1] for _ in planned)]
+        scores += [max(1.0, self.usual, *scores) for _ in planned]
+        matter = relevance(scenes, floors, scores, self.ledger, grams, self.wanted)
+        entries = [catalogue()[subjects[i].name] for i in self.wanted]
+        return margins, power(
+            margins,
+            np.array([len(e["parameters"]) for e in entries]),
+            len(subjects),
+            matter,
+            np.array([e["name"] in self.asked.fitted for e in entries]),
         )
-    return sorted(chances, key=lambda c: -c.power)

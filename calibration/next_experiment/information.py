@@ -89,13 +89,22 @@ class Ledger:
             margins.append(margin)
         return np.maximum(np.stack(margins, axis=-1), 0.0)
 
+    def shifts(self, grams: np.ndarray) -> np.ndarray:
+        """(C, C) to (T, F) changes of the free quantities that imitate each whole step best."""
+        at = self.nuisance
+        found = np.linalg.solve(self._inner(grams), grams[at][:, self.steps])
+        return -found[: len(self.free)].T
+
     def _without_nuisance(self, grams: np.ndarray) -> np.ndarray:
         """Products after the free quantities and the planned run's clock are projected out."""
+        cross = grams[..., self.nuisance, :]
+        return grams - np.swapaxes(cross, -1, -2) @ np.linalg.solve(self._inner(grams), cross)
+
+    def _inner(self, grams: np.ndarray) -> np.ndarray:
+        """Products of the free quantities and the clock, with their priors."""
         at = self.nuisance
         widths = np.array([f.prior_std for f in self.free] + [np.inf] * CLOCKS)
-        inner = grams[..., at[:, None], at] + np.diag(1 / widths**2 + 1e-9)
-        cross = grams[..., at, :]
-        return grams - np.swapaxes(cross, -1, -2) @ np.linalg.solve(inner, cross)
+        return grams[..., at[:, None], at] + np.diag(1 / widths**2 + 1e-9)
 
     def _columns(self, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
         """(R, C) columns of a run, and (2,) 1 / variance of its clock's priors."""

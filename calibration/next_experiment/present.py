@@ -54,7 +54,7 @@ def _outlook(plan: Plan) -> str:
     told, asked = len(plan.separates), len(plan.chances)
     return (
         f"The run tells {told} of these {asked}; the right name comes with a chance of "
-        f"{percent(plan.predicted_power)}, if the robot is otherwise like the model."
+        f"{percent(plan.predicted_power)}, if it is one of these that is missing."
     )
 
 
@@ -99,7 +99,9 @@ def _chances(plan: Plan) -> Table:
         ["effect", "best\nimitation", "margin\nso far", "with\nthis run", "named\nso far", "then"],
         rows,
         "Margin: chi2 of the effect's trace that no rival and no change of the base could leave, "
-        "at its fitted strength or else its usual one; named: chance that it is, if it is the one.",
+        "at its fitted strength or else its usual one. Named: chance that it is, if it is the one: "
+        "it must stand out, be told from its rivals and lower the score by 2 %. Where no log tells "
+        "its strength, that is the mean over weak, usual and strong (0.4, 1, 2.5 times).",
         words=(0, 1),
     )
 

@@ -16,11 +16,12 @@ from twinmill.calibration.freedom import Free
 from twinmill.calibration.log import read_log
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import ModelFile
-from twinmill.calibration.next_experiment.design import Limits, Plan, design
+from twinmill.calibration.next_experiment.design import Limits, Plan, check, design
 from twinmill.calibration.next_experiment.foresight import Rows, rows_of
 from twinmill.calibration.next_experiment.information import CLOCKS, Ledger
 from twinmill.calibration.next_experiment.moves import AXES, family
-from twinmill.calibration.next_experiment.power import power
+from twinmill.calibration.next_experiment.power import told_apart
+from twinmill.calibration.next_experiment.relevance import Relevance
 from twinmill.calibration.next_experiment.script_file import csv_text
 from twinmill.tools import cli
 from twinmill.tools import next as next_run
@@ -58,6 +59,28 @@ def test_a_margin_is_what_least_squares_leaves_of_the_trace():
             assert margins[i, 1 + j] == pytest.approx(expected, rel=1e-6)
 
 
+def test_the_base_shifts_as_least_squares_fits_it_to_the_trace():
+    random = np.random.default_rng(5)
+    ledger = ledger_of([0.5, 2.0], [1, 3])
+    columns = random.normal(size=(300, ledger.shared + CLOCKS))
+    free = columns[:, [0, 1, ledger.shared, ledger.shared + 1]]
+    free = np.vstack([free, np.diag([2.0, 0.5, 0, 0])])
+    for step, shift in zip(ledger.steps, ledger.shifts(columns.T @ columns), strict=True):
+        left = np.append(-columns[:, step], np.zeros(4))
+        assert shift == pytest.approx(np.linalg.lstsq(free, left)[0][:2], rel=1e-5)
+
+
+@pytest.mark.parametrize("added", [0.1, 0.2, 0.3, 0.5])
+def test_promised_chance_to_matter_is_that_of_simulated_scores(added):
+    """Of unit errors and what an effect adds: a diagnosis asks that it takes 2 % of the score."""
+    random = np.random.default_rng(6)
+    left = random.normal(size=(4000, 40))
+    own = added * np.resize([1.0, -1.0], 40)
+    ratio = np.sqrt(np.mean(left**2, axis=1) / np.mean((left + own) ** 2, axis=1))
+    promised = Relevance(1.0, np.array([added**2]), 40.0).chance(1.0)[0]
+    assert promised == pytest.approx(np.mean(ratio < 0.98), abs=0.08)
+
+
 def test_two_runs_tell_more_than_either():
     random = np.random.default_rng(2)
     ledger = ledger_of([1.0], [2, 1])
@@ -86,7 +109,7 @@ def test_promised_chance_is_that_of_a_simulated_trial(energy, alike):
         lead = 6.0 if alike > 0.9 else 0.0
         named += enough and left["rival"] - left["true"] > lead
     margins = np.array([[energy, np.inf, energy * (1 - alike)]])
-    assert power(margins, np.array([1]), 28)[0] == pytest.approx(named / trials, abs=0.08)
+    assert told_apart(margins, np.array([1]), 28)[0] == pytest.approx(named / trials, abs=0.08)
 
 
 def test_each_move_comes_to_rest_and_keeps_the_duty_cap():
@@ -127,7 +150,7 @@ def designed(run_log, measure, model_file, tmp_path_factory) -> Designed:
     model = ModelFile.load(str(fitted))
     milling = measure(seed=2, script_pct=milling_pct(60), spoil=turned)
     before = diagnose([milling], model)
-    return Designed(model, milling, before, design(before, Limits(15, (2.0, 1.5), 0.8), print))
+    return Designed(model, milling, before, design(before, Limits(15, (2.0, 1.5), 0.8), 1.0, print))
 
 
 def at_steps(rows: Rows) -> np.ndarray:
@@ -219,7 +242,9 @@ def test_a_floor_that_is_none_is_refused_in_one_sentence(floor, tmp_path):
         cli.run(["next", "no.lcmlog", "--floor-m", floor, "-o", str(tmp_path / "s.csv")])
 
 
-@pytest.mark.parametrize("limits", [(15, (0.3, 2.0), 1.0), (3, (2.0, 2.0), 1.0)])
-def test_where_no_move_fits_it_is_said_at_once(designed, limits):
-    with pytest.raises(ValueError, match="no move fits"):
-        design(designed.before, Limits(*limits), print)
+@pytest.mark.parametrize(
+    ("limits", "words"), [((15, (0.3, 2.0), 1.0), "no move fits"), ((8, (2.0, 2.0), 1.0), "short")]
+)
+def test_where_no_move_fits_it_is_said_at_once(designed, limits, words):
+    with pytest.raises(ValueError, match=words):
+        check(designed.before.state.scenes, Limits(*limits))
