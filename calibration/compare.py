@@ -7,6 +7,7 @@ import numpy as np
 from twinmill.calibration.bits.compare import BitComparison, compare_bits
 from twinmill.calibration.bits.scene import bit_scenes
 from twinmill.calibration.floor import Floor, measure_floor
+from twinmill.calibration.log import LogError
 from twinmill.calibration.measurement import Measurement
 from twinmill.calibration.model_file import ModelFile
 from twinmill.calibration.problem import CLOCK, Scene
@@ -155,20 +156,48 @@ def open_scenes(
     """Scenes of the model as it is, each with its clock aligned.
 
     A clock offset that another log told is kept: only so can a delay be told from it. One that this
-    very log told, with whatever model that was, is found anew.
+    very log told, with whatever model that was, is found anew. A robot whose own run does not tell
+    it (one that saw nobody all the while has one command) takes that of the others in its log.
+
+    Raises:
+        LogError: no robot of a log tells the clock offset.
     """
-    scenes = []
-    for measurement in measurements:
-        if isinstance(measurement, Sheet):
-            scenes.append(SteadyScene.of(measurement, model_file.model))
-            continue
-        other = model_file.model.clock_known and measurement.log_sha256 not in model_file.clock_logs
-        scene = Scene.of(measurement, model_file.model, clock_free=not other)
-        if scene.clock_free:
-            solve([scene], [])
-            scene.settle_noise()
-        scenes.append(scene)
+    scenes: list[Scene | SteadyScene | None] = []
+    mute: dict[int, LogError] = {}
+    for i, measurement in enumerate(measurements):
+        try:
+            scenes.append(_open(measurement, model_file))
+        except LogError as error:
+            scenes.append(None)
+            mute[i] = error
+    for i, error in mute.items():
+        log = measurements[i].log_sha256
+        known = [s for s in scenes if isinstance(s, Scene) and s.measurement.log_sha256 == log]
+        if not known:
+            raise error
+        offset_s = float(np.median([s.model.get(CLOCK) for s in known]))
+        scenes[i] = _on_clock_of_others(measurements[i], model_file, offset_s)
     return scenes
+
+
+def _open(measurement: Measurement | Sheet, model_file: ModelFile) -> Scene | SteadyScene:
+    if isinstance(measurement, Sheet):
+        return SteadyScene.of(measurement, model_file.model)
+    other = model_file.model.clock_known and measurement.log_sha256 not in model_file.clock_logs
+    scene = Scene.of(measurement, model_file.model, clock_free=not other)
+    if scene.clock_free:
+        solve([scene], [])
+        scene.settle_noise()
+    return scene
+
+
+def _on_clock_of_others(measurement: Measurement, model_file: ModelFile, offset_s: float) -> Scene:
+    told = (
+        f"its commands do not tell its clock offset; that of the log's other robots is taken "
+        f"({offset_s:.3f} s)."
+    )
+    measurement = replace(measurement, warnings=[*measurement.warnings, told])
+    return Scene.of(measurement, model_file.model, clock_free=False, offset_s=offset_s)
 
 
 def comparison(model_file: ModelFile, scenes: list[Scene]) -> Comparison:

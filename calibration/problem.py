@@ -39,10 +39,22 @@ class Scene:
         return stated_names(self.model, self.measurement.track.robot_id)
 
     @classmethod
-    def of(cls, measurement: Measurement, model: native.Model, clock_free: bool) -> "Scene":
-        """Starts from the model's clock if it is known there, else estimates it from the log."""
+    def of(
+        cls,
+        measurement: Measurement,
+        model: native.Model,
+        clock_free: bool,
+        offset_s: float | None = None,
+    ) -> "Scene":
+        """Starts from the offset given, else the model's if it is known there, else the log's own.
+
+        Raises:
+            LogError: the log's own cannot be told.
+        """
         own = model.for_robot(measurement.track.robot_id)
-        if not own.clock_known:
+        if offset_s is not None:
+            own.set(CLOCK, offset_s)
+        elif not own.clock_known:
             own.set(CLOCK, estimate_offset(measurement.track).offset_s)
         scene = cls(measurement, own, StepGrid.of(measurement), clock_free)
         scene.noise = scene._own_noise()

@@ -44,6 +44,15 @@ def test_known_offset_and_lag_are_found(steps, offset_s):
     assert found.explained > 0.95
 
 
+@pytest.mark.parametrize("every", [4, 5])
+def test_a_slow_camera_shows_the_offset_too(steps, every):
+    """Of 120 Hz only 30 or 24 Hz are kept: neighbours are farther apart than the usual window."""
+    robot = steps(0.05)
+    slow = {k: getattr(robot, k)[::every] for k in ("pose_t_s", "pose", "z_m", "valid")}
+    found = estimate_offset(make_track(replace(robot, **slow)))
+    assert found.offset_s == pytest.approx(0.05, abs=0.01)  # a quarter of a frame
+
+
 def test_recordings_on_the_same_clocks_agree(data_dir):
     paths = sorted((data_dir / "hidden_effects").glob("case_[a-f].lcmlog"))
     offsets_s = [estimate_offset(make_track(read_log(path).robots[3])).offset_s for path in paths]

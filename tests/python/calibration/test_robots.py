@@ -3,12 +3,15 @@
 
 import os
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from twinmill.calibration.compare import compare
+from twinmill.calibration.compare import compare, open_scenes
 from twinmill.calibration.diagnosis.diagnose import diagnose
 from twinmill.calibration.diagnosis.explain import explain
+from twinmill.calibration.log import LogError
 from twinmill.calibration.measurement import load_measurements
 from twinmill.calibration.model_file import ModelFile
 from twinmill.tools.challenge.script import write_rich_script
@@ -99,3 +102,22 @@ def test_explain_writes_the_difference_as_that_robots_own(logged, tmp_path):
     ]
     assert lag_s == pytest.approx([0.06, 0.06, 0.12], abs=0.005)
     assert compare(measurements, model).score < 1.15
+
+
+def test_a_robot_of_one_command_takes_the_clock_of_the_others(tanh_robot, measure, model_file):
+    robot = tanh_robot(offset_s=0.06)
+    lively = measure(robot, 1, 30.0)
+    circling = measure(robot, 2, script_pct=np.tile([50, 100, 50, 100], (1440, 1)))
+    circling = replace(circling, track=mute(circling.track))
+    with pytest.raises(LogError, match="never change"):
+        open_scenes([circling], model_file())
+    together = [lively, replace(circling, log_sha256=lively.log_sha256)]
+    scenes = open_scenes(together, model_file())
+    own, taken = (s.model.get("clock.offset_s") for s in scenes)
+    assert taken == own == pytest.approx(0.06, abs=0.02)  # the guessed lag is 0.04 s too short
+    assert "clock" in scenes[1].measurement.warnings[-1]
+
+
+def mute(track):
+    """The track without the rests at its ends."""
+    return replace(track, command=np.tile(track.command[100], (len(track.command), 1)))
