@@ -4,7 +4,7 @@
 PYTHON := .venv/bin/python
 CTEST := ctest --test-dir build --output-on-failure --no-tests=error --parallel $(shell nproc)
 
-.PHONY: bench build check check-long demo format lint clean
+.PHONY: bench build check check-long claims demo format lint clean
 
 build:
 	@tools/setup
@@ -19,6 +19,10 @@ check: build
 # What takes minutes and seldom fails: the emulated robot with a newer kernel and a whole system.
 check-long: build
 	@$(CTEST) --label-regex '^long$$'
+
+# What was published of these swarms, checked, with figures.
+claims: build
+	@.venv/bin/twinmill claims --out claims
 
 demo: build
 	@$(PYTHON) -m twinmill.tools.demo

@@ -89,6 +89,11 @@ COMMANDS = (
     ),
     ("ask", "sweep.ask", "Answer one of the four design questions with a curve and a sentence."),
     (
+        "claims",
+        "claims.command",
+        "Check what was published of these swarms, with a figure of each claim.",
+    ),
+    (
         "discover",
         "discover.command",
         "Search tables and mixes of two tables for behaviours that differ, and name what is known.",

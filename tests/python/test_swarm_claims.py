@@ -1,118 +1,103 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was published of these swarms, and what an independent program makes of the same equations.
+"""The published claims against their references, and that a wrong number would be found."""
 
-The reference is a C program of Vega et al. 2024 (arXiv 2410.16444), 100 seeds a cell unless said;
-"mills" there is circliness below 0.2 over the last 10 of 120 s, started in a square of 1.2 m.
-`disc`: a target of 0.1 m radius and bodies that push apart. `robot`: a point target, bodies, 4 %
-missed and 10 % false detections, a vote of 10. Both with a spread of 0.04.
-"""
+import json
 
 import numpy as np
 import pytest
-from twinmill.tools.sweep.command import make_request
-from twinmill.tools.sweep.request import run_part
+from twinmill.tools import cli
+from twinmill.tools.claims import claims, rows
+from twinmill.tools.claims.claims import CLAIMS
+from twinmill.tools.claims.swarms import KINDS, run
 
-BODIES = ["robot.body_radius_m=0.1"]
-DISC = [*BODIES, "target_radius_m=0.1"]
-ROBOT = [*BODIES, "miss_rate=0.04", "false_rate=0.1", "vote=10"]
-V_MPS = (0.10, 0.15, 0.20, 0.25, 0.30, 0.35)
 SEEDS = 100
 
 
-def run(axes: list[str], **changes) -> dict[str, np.ndarray]:
-    """Columns of a sweep, rows in its order."""
-    given = {"seeds": SEEDS, **changes}
-    request = make_request(given.pop("behavior", "milling"), "paper.toml", axes, **given)
-    columns = run_part(request, range(request.world_count))
-    return {name: np.array(values) for name, values in columns.items()}
+@pytest.mark.parametrize("name", CLAIMS)
+def test_a_published_claim_holds(name):
+    claim = CLAIMS[name](SEEDS)
+    for row in claim.rows:
+        print(row.what, row.value, row.reference, row.agrees, row.rule)
+    assert claim.holds
+    assert claim.count[1] >= 4
+    assert claim.count[0] >= claim.count[1] - len(claims.KNOWN_MORE)
+    off = [float(row.rule.split()[0]) for row in claim.rows if row.rule.endswith("deviations")]
+    assert np.sqrt(np.mean(np.square(off or [0]))) < 1.5
+    assert all("<svg" in figure.svg for figure in claim.figures)
 
 
-def mills(rows: dict[str, np.ndarray]) -> np.ndarray:
-    """(cells,) share by the reference's criterion."""
-    return (rows["circliness"].reshape(-1, SEEDS) < 0.2).mean(axis=1)
+@pytest.mark.parametrize(("table", "key", "wrong"), [
+    (claims.MILLING, ("disc", 0.04), (0.5, 1000, 1.06)),
+    (claims.MILLING, ("disc", 0.04), (0.978, 1000, 0.9)),
+    (claims.ALIKE, 0.03, 0.1),
+])  # fmt: skip
+def test_a_wrong_number_is_found(monkeypatch, table, key, wrong):
+    monkeypatch.setitem(table, key, wrong)
+    assert not CLAIMS["milling" if table is claims.MILLING else "alike"](SEEDS).holds
 
 
-def off_by(ours: np.ndarray, reference: np.ndarray, reference_seeds: int = 100) -> np.ndarray:
-    """Difference in standard deviations of two binomial samples, pooled, held off 0 and 1."""
-    a, b = SEEDS, reference_seeds
-    pooled = (ours * a + reference * b + 1) / (a + b + 2)
-    return (ours - reference) / np.sqrt(pooled * (1 - pooled) * (1 / a + 1 / b))
+def test_two_samples_of_one_share_differ_as_often_as_they_should():
+    # At 3.5 standard deviations in one of 2000 pairs; at 1.96 in one of 20.
+    draws = np.random.default_rng(1).binomial(100, 0.7, (2000, 2)) / 100
+    off = np.array([rows.off_by(a, 100, b, 100) for a, b in draws])
+    assert 0.03 < (np.abs(off) > 1.96).mean() < 0.07
+    assert (np.abs(off) > 3.5).mean() < 0.005
 
 
-@pytest.mark.parametrize(
-    ("kind", "omega_degps", "percent"),
-    [
-        (DISC, 20, (100, 98, 97, 70, 29, 18)),
-        (DISC, 30, (100, 100, 98, 97, 96, 86)),
-        (DISC, 90, (100, 100, 100, 99, 99, 98)),
-        (ROBOT, 20, (31, 27, 23, 19, 10, 4)),
-        (ROBOT, 30, (100, 71, 66, 59, 64, 53)),
-        (ROBOT, 40, (99, 100, 84, 82, 82, 86)),
-        (ROBOT, 50, (100, 100, 98, 89, 90, 86)),
-    ],
-)
-def test_the_phase_diagram_is_the_references(kind, omega_degps, percent):
-    speeds = "v_mps=" + ",".join(map(str, V_MPS))
-    rows = run([speeds, f"omega_degps={omega_degps}", *kind])
-    off = off_by(mills(rows), np.array(percent) / 100)
-    print(omega_degps, "deg/s:", 100 * mills(rows), "off by", off.round(1), "sigma")
-    assert np.abs(off).max() < 3.5
-    assert np.sqrt(np.mean(off**2)) < 2
+def test_the_interval_of_a_median_holds_it_as_often_as_it_says():
+    draws = np.random.default_rng(2).normal(3, 1, (500, 101))
+    made = [rows.median("", draw, None, 0) for draw in draws]
+    assert 0.92 < np.mean([row.low <= 3 <= row.high for row in made]) < 0.99
 
 
-def test_six_robots_mill_at_the_published_speeds():
-    rows = run(["v_mps=0.25", "omega_degps=45", *DISC])
-    assert abs(off_by(mills(rows), 0.978, 1000)) < 3.5
-    assert np.median(rows["radius_m"]) == pytest.approx(1.06, rel=0.05)
-    assert (rows["class"] == "milling").mean() == pytest.approx(mills(rows)[0], abs=0.02)
+def test_a_page_and_an_exit_code(tmp_path, capsys, monkeypatch):
+    command = ["claims", "--only", "alike", "--seeds", "30", "--json", "--out", str(tmp_path / "a")]
+    assert cli.run(command) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["hold"] and said["claims"][0]["name"] == "alike"
+    assert {path.name for path in (tmp_path / "a").iterdir()} == {
+        "index.html", "claims.json", "alike_1.svg"}  # fmt: skip
+    monkeypatch.setitem(claims.ALIKE, 0.03, 0.1)
+    assert cli.run(["claims", "--only", "alike", "--seeds", "30"]) == 1
+    with pytest.raises(ValueError, match="--only alik: must be one of milling"):
+        cli.run(["claims", "--only", "alik"])
 
 
-def test_more_robots_are_not_always_better():
-    reference = np.array([0.98, 0.99, 0.94, 0.04, 0.0])
-    share = mills(run(["n=5:9:5", *DISC]))
-    assert np.abs(off_by(share, reference)).max() < 3.5
-    assert share[1] > 0.9 > 0.2 > share[3]
+def literally(n: int, seeds: int, spread: float = 0.04) -> float:
+    """Share of mills by the published equations, exact arcs, written once more in NumPy."""
+    random, dt_s, half_rad = np.random.default_rng(1), 0.022, np.radians(49) / 2
+    z = random.uniform(-0.6, 0.6, (seeds, n)) + 1j * random.uniform(-0.6, 0.6, (seeds, n))
+    heading = random.uniform(-np.pi, np.pi, (seeds, n))
+    speed, turn = random.normal(1, spread, (2, seeds, n)) * [[[0.25]], [[np.radians(45)]]] * dt_s
+    last, steps = [], int(120 / dt_s)
+    for k in range(steps):
+        ahead = (z[:, None, :] - z[:, :, None]) * np.exp(-1j * heading)[:, :, None]
+        size = np.abs(ahead)
+        seen = ((size < 1.1) & (size > 0) & (ahead.real > np.cos(half_rad) * size)).any(axis=2)
+        by = np.where(seen, turn, -turn)
+        z = z + speed * np.exp(1j * (heading + by / 2))
+        heading = heading + by
+        if k * dt_s >= 110:
+            r = np.abs(z - z.mean(axis=1, keepdims=True))
+            last.append((r.max(axis=1) - r.min(axis=1)) / r.min(axis=1))
+    return float((np.mean(last, axis=0) < 0.2).mean())
 
 
-def test_unlike_speeds_shear_the_ring_in_proportion():
-    # A locked ring has radii in proportion to speeds: circliness is the mean range of six standard
-    # normal numbers, 2.53 (Tippett 1925), times the spread.
-    rows = run(["theta_a=0.01,0.02,0.03", *DISC])
-    found = np.array([c[c < 0.2].mean() for c in rows["circliness"].reshape(-1, SEEDS)])
-    assert found == pytest.approx(2.53 * np.array([0.01, 0.02, 0.03]), rel=0.12)
+def test_where_we_differ_from_the_reference_the_equations_are_with_us():
+    for kind, n in claims.KNOWN_MORE:
+        assert kind == "point"
+        ours = run([f"n={n}"], seeds=400).mills.mean()
+        assert abs(rows.off_by(ours, 400, literally(n, 80), 80)) < 3.5
 
 
-@pytest.mark.parametrize(("duration_s", "reference"), [(30.0, 0.98), (120.0, 1.0)])
-def test_eight_robots_diffuse(duration_s, reference):
-    rows = run(["v_mps=0.3", "omega_degps=150"], behavior="diffusing", n=8, duration_s=duration_s)
-    assert abs(off_by((rows["least_diffusion"] > 1).mean(), reference)) < 3.5
-
-
-# The published sign, -3 times the turn rate of milling, gives an inner orbit at 0.76 of the ring's
-# radius in the reference; +3 times gives 0.34 to 0.62, by variant. Both are to 0.04.
-@pytest.mark.parametrize(("turn", "ratio"), [(-1.5, (0.72, 0.80)), (1.5, (0.30, 0.66))])
-def test_one_odd_robot_orbits_inside_the_mill(turn, ratio):
-    rows = run(
-        ["theta_a=0", *DISC],
-        behavior="milling:5,odd:1",
-        tables=[f"odd=0,{turn},100,0.5"],
-        duration_s=180.0,
-    )
-    inside = np.median(rows["odd_ratio"])
-    print("odd robot at", inside, "of the ring's radius", np.median(rows["radius_m"]))
-    assert ratio[0] < inside < ratio[1]
-    if turn < 0:
-        assert np.median(rows["radius_m"]) == pytest.approx(0.59, rel=0.05)
-
-
-def test_a_slice_over_speed_and_turn_rate_has_the_four_published_classes():
-    rows = run(["v_mps=0.1:0.35:7", "omega_degps=20:90:8"], seeds=20)
-    assert {"milling", "ellipsoidal", "cluster", "separated"} <= set(rows["class"])
+def test_round_is_a_mill_by_both_criteria():
+    runs = run(["v_mps=0.25", "omega_degps=45", *KINDS["disc"]])
+    assert (runs["class"] == "milling").mean() == pytest.approx(runs.mills.mean(), abs=0.02)
 
 
 def test_bodies_in_contact_are_no_mill_however_round():
     # At 0.1 m/s and 40 deg/s and more the reference's mills are six bodies in contact on 0.2 m.
-    rows = run(["v_mps=0.1", "omega_degps=60", *ROBOT])
-    assert mills(rows)[0] > 0.9
-    assert np.median(rows["radius_m"]) == pytest.approx(0.2, abs=0.01)
-    assert (rows["class"] == "jammed").mean() > 0.9
+    runs = run(["v_mps=0.1", "omega_degps=60", *KINDS["robot"]])
+    assert runs.mills.mean() > 0.9
+    assert np.median(runs["radius_m"]) == pytest.approx(0.2, abs=0.01)
+    assert (runs["class"] == "jammed").mean() > 0.9
