@@ -18,6 +18,7 @@ from twinmill.calibration.steady.scene import SteadyScene
 from twinmill.calibration.steady.sheet import Sheet
 from twinmill.calibration.windows import CHANNELS, HORIZONS_S, Windows, rms, score
 
+SHORT_S = 40.0  # so long a log must be for noise of its own
 GOOD, MISSING, SUSPECT = (
     1.15,
     1.3,
@@ -177,6 +178,7 @@ def open_scenes(
             raise error
         offset_s = float(np.median([s.model.get(CLOCK) for s in known]))
         scenes[i] = _on_clock_of_others(measurements[i], model_file, offset_s)
+    _lend_noise([s for s in scenes if isinstance(s, Scene)])
     return scenes
 
 
@@ -198,6 +200,22 @@ def _on_clock_of_others(measurement: Measurement, model_file: ModelFile, offset_
     )
     measurement = replace(measurement, warnings=[*measurement.warnings, told])
     return Scene.of(measurement, model_file.model, clock_free=False, offset_s=offset_s)
+
+
+def _lend_noise(scenes: list[Scene]) -> None:
+    """Short logs take the noise of the robot's longest log, if that is quieter.
+
+    A short log cannot tell noise from what a model lacks: any response flexible enough to explain
+    its motion is fitted to its noise. If it is truly noisier, its errors scatter more than the
+    noise says, which all tests allow for.
+    """
+    for scene in scenes:
+        track, period_s = scene.measurement.track, scene.grid.period_s
+        same = [s for s in scenes if s.measurement.track.robot_id == track.robot_id]
+        longest = max(same, key=lambda s: np.ptp(s.measurement.track.pose_t_s)).noise
+        short = np.ptp(track.pose_t_s) < SHORT_S
+        if short and longest.loudness(period_s) < scene.noise.loudness(period_s):
+            scene.noise = longest
 
 
 def comparison(model_file: ModelFile, scenes: list[Scene]) -> Comparison:

@@ -67,8 +67,7 @@ def _next(
     with telling(f"designing a run with {model}") as say:
         measurements = load_measurements(logs)
         check(open_scenes(measurements, model_file), limits)
-        usual = model_file.usual_score([m.log_sha256 for m in measurements])
-        plan = design(diagnose(measurements, model_file, say), limits, usual, say)
+        plan = design(diagnose(measurements, model_file, say), model_file, limits, say)
     write_whole(output, csv_text(plan.rows))
     how = _how(plan, logs, model, output)
     data = {"script": str(output), **plan.to_json()}

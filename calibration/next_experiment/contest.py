@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which effects the next run must part, and the model without them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from twinmill.calibration.diagnosis.candidates import Candidate, candidates
@@ -10,7 +10,7 @@ from twinmill.calibration.diagnosis.evidence import State
 from twinmill.calibration.diagnosis.ranking import Ranked
 from twinmill.calibration.diagnosis.screen import screen
 from twinmill.calibration.fit import refit
-from twinmill.calibration.freedom import catalogue
+from twinmill.calibration.freedom import Free, catalogue
 from twinmill.calibration.next_experiment.information import Subject
 from twinmill.calibration.problem import Scene
 
@@ -26,7 +26,8 @@ class Contest:
         named: effects that it named; in question if another could imitate one of them after all.
         hidden: effects that would not show.
         closest: the two most probable, for want of other questions.
-        state: of the diagnosis, the effects alike or named taken out and the rest refitted.
+        state: of the diagnosis, the effects alike or named taken out and the rest refitted; free
+            is all of the base that the next run may show.
         fitted: parameters by effect, of those that the logs tell.
     """
 
@@ -38,15 +39,15 @@ class Contest:
     fitted: dict[str, dict[str, float]]
 
 
-def contest(diagnosis: Diagnosis) -> Contest:
-    """What a diagnosis leaves open."""
+def contest(diagnosis: Diagnosis, base: list[Free]) -> Contest:
+    """What a diagnosis leaves open; `base`: of the model, also what these logs do not tell."""
     ranking = diagnosis.ranking
     top = next((r.group for r in ranking if r.group is not None), None)
     alike = [r.effect for r in ranking if r.group == top and top is not None]
     named = [] if alike else diagnosis.found
     hidden = [effect for effect, _ in diagnosis.not_identifiable]
     closest = [r.effect for r in ranking[:2]]
-    state = _without(diagnosis, [*alike, *named])
+    state = replace(_without(diagnosis, [*alike, *named]), base=base)
     told = [r for r in ranking if r.effect in (*alike, *named)]
     return Contest(alike, named, hidden, closest, state, _values(told))
 

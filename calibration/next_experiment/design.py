@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 from twinmill.calibration.diagnosis.diagnose import Diagnosis
-from twinmill.calibration.freedom import catalogue
+from twinmill.calibration.freedom import base_quantities, catalogue
 from twinmill.calibration.measurement import SHORTEST_LOG_S
+from twinmill.calibration.model_file import ModelFile
 from twinmill.calibration.next_experiment.contest import Contest, contest, question, subjects
 from twinmill.calibration.next_experiment.foresight import LEAD_S, Played, Rows, rows_of
 from twinmill.calibration.next_experiment.information import Ledger, Subject
@@ -105,23 +106,27 @@ class Plan:
         }
 
 
-def design(diagnosis: Diagnosis, limits: Limits, usual: float, say: Callable[[str], None]) -> Plan:
+def design(
+    diagnosis: Diagnosis, model_file: ModelFile, limits: Limits, say: Callable[[str], None]
+) -> Plan:
     """Designs the run that best names what the diagnosis leaves open.
 
     Args:
         diagnosis: of the logs so far.
+        model_file: that the diagnosis was given. Its score on other logs says what it lacks in
+            drives that these logs do not have; its base is refitted to all that the run shows.
         limits: time, floor, duty; as `check` let them pass.
-        usual: score of the model on the logs that it was fitted to; what it lacks in drives that
-            the logs so far do not have. Infinite if that is not known.
         say: told in words what is being done.
 
     Raises:
         ValueError: there is no log, or no move shows what is in question.
     """
+    hashes = [s.measurement.log_sha256 for s in diagnosis.state.scenes if s.noise]
+    usual = model_file.usual_score(hashes)
     usual = usual if np.isfinite(usual) else 1.0
     moves = family(limits.max_duty)
     say("playing the moves in the twin")
-    asked = contest(diagnosis)
+    asked = contest(diagnosis, base_quantities(model_file.model, model_file.told_by_others(hashes)))
     scene = log_of(asked.state.scenes)
     foreseen = Played.of([[m] for m in moves], scene).scene(scene, CENTRE)
     known = subjects(asked.state.scenes, foreseen, asked.state, asked, usual)

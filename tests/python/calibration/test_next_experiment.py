@@ -150,7 +150,9 @@ def designed(run_log, measure, model_file, tmp_path_factory) -> Designed:
     model = ModelFile.load(str(fitted))
     milling = measure(seed=2, script_pct=milling_pct(60), spoil=turned)
     before = diagnose([milling], model)
-    return Designed(model, milling, before, design(before, Limits(15, (2.0, 1.5), 0.8), 1.0, print))
+    return Designed(
+        model, milling, before, design(before, model, Limits(15, (2.0, 1.5), 0.8), print)
+    )
 
 
 def at_steps(rows: Rows) -> np.ndarray:
