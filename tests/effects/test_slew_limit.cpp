@@ -55,5 +55,21 @@ TEST(SlewLimit, KeepsItsRampWhenADelayCutsSteps)
     EXPECT_NEAR(player.state.pose.x_m, kFull_mps * (1 - 0.033 - 0.15), 1e-12);
 }
 
+// A ramp and a delay may change places: neither depends on when it happens. However short the
+// delay is, it does not cut the ramp.
+TEST(SlewLimit, CommutesWithADelay)
+{
+    for (const double delay_s : {0.033, 1e-7})
+    {
+        Player ramp_last(With("slew_limit", {0.3}, With("input_delay", {delay_s})), 0.02);
+        Player ramp_first(With("input_delay", {delay_s}, With("slew_limit", {0.3})), 0.02);
+        for (Player *player : {&ramp_last, &ramp_first})
+        {
+            player->Play(kForward, 1);
+            EXPECT_NEAR(player->state.pose.x_m, kFull_mps * (1 - delay_s - 0.15), 1e-12);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace twin::test

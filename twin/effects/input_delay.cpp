@@ -39,6 +39,10 @@ class InputDelay final : public Effect
 public:
     explicit InputDelay(std::span<const double> v) : delay_s_(v[0]) {}
 
+    // On commands as they were given, which change at times and not all the time: each change cuts
+    // the step, and a ramp would be cut into pieces as short as the delay.
+    bool ActsFirst() const override { return true; }
+
     int StateSize() const override { return delay_s_ > 0 ? 1 + kSlots * kSlotSize : 0; }
 
     void Step(Signals &s, double *state) const override

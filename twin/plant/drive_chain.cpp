@@ -115,6 +115,8 @@ DriveChain::DriveChain(const Model &model)
             case Stage::kDecide: break;
         }
     }
+    for (auto *stage : {&duty_, &wheel_, &ground_, &observe_})
+        std::ranges::stable_partition(*stage, [](const Bound &b) { return b.effect->ActsFirst(); });
 }
 
 RobotState DriveChain::Start(const Pose2 &pose) const

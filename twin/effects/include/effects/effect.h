@@ -133,6 +133,8 @@ public:
     virtual int StateSize() const { return 0; }
     // Where it acts: the card's stage, unless its texts say otherwise.
     virtual Stage ActsAt(const Card &card) const { return card.stage; }
+    // Acts before the others of its stage, wherever the model file has it.
+    virtual bool ActsFirst() const { return false; }
     // kDuty to kObserve: acts on the signals of one step; `state` holds StateSize() doubles, zero
     // at the start.
     virtual void Step(Signals &, double * /*state*/) const {}
