@@ -8,20 +8,33 @@ from pathlib import Path
 NAME = "behaviors.toml"
 
 
+def find_file() -> Path | None:
+    """Where twin_run looks: in the working directory, else in the user's configuration."""
+    config = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
+    return next(filter(Path.is_file, (Path(NAME), config / "twinmill" / NAME)), None)
+
+
+def read_tables(path: Path) -> dict[str, str]:
+    """All tables of a file, by name.
+
+    Raises:
+        ValueError: it is no TOML, or holds something else.
+    """
+    try:
+        tables = tomllib.loads(path.read_text())
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path}: cannot be read as TOML ({error}).") from error
+    for name, table in tables.items():
+        if not isinstance(table, str):
+            raise ValueError(f"{path}: '{name}' must be \"speed,turn,speed,turn\" in quotes.")
+    return tables
+
+
 def find_table(name: str) -> str:
     """The table of a behaviour of one's own; empty if there is none of that name.
 
-    Looked up where twin_run looks: in the working directory, else in the user's configuration.
-
     Raises:
-        ValueError: a file is no TOML.
+        ValueError: as read_tables().
     """
-    config = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
-    for path in (Path(NAME), config / "twinmill" / NAME):
-        if not path.is_file():
-            continue
-        try:
-            return str(tomllib.loads(path.read_text()).get(name, ""))
-        except tomllib.TOMLDecodeError as error:
-            raise ValueError(f"{path}: is no TOML ({error}).") from error
-    return ""
+    path = find_file()
+    return read_tables(path).get(name, "") if path else ""

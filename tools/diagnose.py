@@ -2,12 +2,15 @@
 """`twinmill diagnose` and `explain`: which physical effect a model lacks."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import typer
 from twinmill.calibration.diagnosis import present
 from twinmill.calibration.diagnosis.diagnose import Diagnosis, diagnose
 from twinmill.calibration.diagnosis.explain import Explanation, explain
+from twinmill.calibration.log import read_log
 from twinmill.calibration.measurement import load_measurements
+from twinmill.calibration.swarm_metrics import swarm_metrics
 from twinmill.tools.calibrate import (
     DEFAULT_MODEL,
     Force,
@@ -21,12 +24,11 @@ from twinmill.tools.calibrate import (
     open_model,
     provenance,
 )
+from twinmill.tools.compare_swarm import LOOK, compare_swarm
 from twinmill.tools.output import AsJson, telling
 
-SWARM = (
-    "Each robot was judged by itself; what only a swarm shows (collisions, hidden robots, one that "
-    "is blind), `twinmill compare-swarm` looks for in the same log."
-)
+TWIN_RUNS = 50
+TABLE = 1  # telemetry_t.mode
 
 
 def register(app: typer.Typer) -> None:
@@ -49,13 +51,37 @@ def _diagnose(
     with telling(f"diagnosing with {model}") as say:
         measurements = load_measurements(logs)
         result = diagnose(measurements, model_file, say)
-    if len({m.label for m in measurements if m.log_name == logs[0].name}) > 1:
-        result = replace(result, notes=[*result.notes, SWARM])
-    data = result.to_json()
+        swarm = None
+        if len({m.label for m in measurements if m.log_name == logs[0].name}) > 1:
+            say("the swarm as a whole")
+            note, swarm = _judge_swarm(logs[0], result)
+            result = replace(result, notes=[*result.notes, note])
+    data = {**result.to_json(), "swarm": swarm}
     if data["next_experiment"]:  # the script comes from a command of its own
         data["next_experiment"]["command"] = command_line("next", logs, model)
     finish(data, present.terminal(result), source, present.section(result), as_json, out)
     return result
+
+
+def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
+    """What no single robot shows: the whole log against swarms of the model that was found.
+
+    Returns:
+        A sentence, and the comparison where there is one.
+    """
+    log, model = read_log(path), result.state.model
+    if not all((robot.mode == TABLE).any() for robot in log.robots.values()):
+        return "Each robot was judged by itself: not all play a table, as a swarm does.", None
+    scale = model.get("sensor.range_m"), model.get("robot.body_radius_m")
+    try:
+        series = swarm_metrics(log, *scale)
+        found = compare_swarm(log, series, model, scale, range(1, TWIN_RUNS + 1))
+    except ValueError as error:
+        return f"Each robot was judged by itself; the swarm as a whole cannot be: {error}", None
+    done = "with what was found" if result.found else "with this model, its base refitted"
+    if not found.judgement.differs:
+        return f"The swarm as a whole, {done}: {found.verdict}", found.to_json()
+    return f"The swarm as a whole, {done}: {found.verdict} {LOOK.capitalize()}", found.to_json()
 
 
 def _explain(

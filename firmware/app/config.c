@@ -10,13 +10,12 @@
 #include "config_keys.h"
 #include "fw/behavior.h"
 
-#define FILE_MAX_BYTES 16384
-
 void config_default(struct app_config *config)
 {
     const struct fw_config core = fw_config_default();
     *config = (struct app_config){
         .behavior = "milling",
+        .behaviors = CONFIG_BEHAVIORS,
         .y_min = core.box.y_min,
         .y_max = core.box.y_max,
         .u_min = core.box.u_min,
@@ -133,101 +132,20 @@ bool config_set(struct app_config *config, const char *key, const char *value,
     return false;
 }
 
-// Cuts white space off both ends, in place.
-static char *trim(char *text)
+static bool take(void *context, const char *key, const char *value, char *error)
 {
-    text += strspn(text, " \t\r");
-    size_t length = strlen(text);
-    while (length > 0 && strchr(" \t\r", text[length - 1]) != NULL)
-    {
-        --length;
-    }
-    text[length] = '\0';
-    return text;
-}
-
-// Takes a value out of its quotes, or cuts the comment after a bare one. @return NULL if neither.
-static char *value_of(char *text)
-{
-    text = trim(text);
-    if (*text != '"')
-    {
-        text[strcspn(text, "#")] = '\0';
-        return trim(text);
-    }
-    char *end = strchr(text + 1, '"');
-    if (end == NULL)
-    {
-        return NULL;
-    }
-    *end = '\0';
-    const char *rest = trim(end + 1);
-    return *rest == '\0' || *rest == '#' ? text + 1 : NULL;
-}
-
-static bool parse_line(struct app_config *config, char *line, char *error)
-{
-    line = trim(line);
-    if (*line == '\0' || *line == '#')
-    {
-        return true;
-    }
-    char *equals = strchr(line, '=');
-    char *value = equals != NULL ? value_of(equals + 1) : NULL;
-    if (value == NULL)
-    {
-        (void)snprintf(error, CONFIG_ERROR_MAX, "'%.60s' is not of the form key = value", line);
-        return false;
-    }
-    *equals = '\0';
-    return config_set(config, trim(line), value, error);
+    return config_set(context, key, value, error);
 }
 
 bool config_parse(struct app_config *config, const char *name, const char *text,
                   char error[CONFIG_ERROR_MAX])
 {
-    for (int number = 1; *text != '\0'; ++number)
-    {
-        char line[256];
-        char cause[CONFIG_ERROR_MAX] = "the line is too long: at most 255 characters";
-        const size_t length = strcspn(text, "\n");
-        const bool fits = length < sizeof line;
-        if (fits)
-        {
-            memcpy(line, text, length);
-            line[length] = '\0';
-        }
-        if (!fits || !parse_line(config, line, cause))
-        {
-            (void)snprintf(error, CONFIG_ERROR_MAX, "%.100s, line %d: %.180s", name, number, cause);
-            return false;
-        }
-        text += length + (text[length] == '\n');
-    }
-    return true;
+    return lines_parse(name, text, take, config, error);
 }
 
 bool config_load(struct app_config *config, const char *path, char error[CONFIG_ERROR_MAX])
 {
-    char text[FILE_MAX_BYTES];
-    FILE *file = fopen(path, "rb");
-    if (file == NULL)
-    {
-        (void)snprintf(error, CONFIG_ERROR_MAX, "%.200s: cannot be read: %s", path,
-                       strerror(errno));
-        return false;
-    }
-    const size_t length = fread(text, 1, sizeof text - 1, file);
-    const bool whole = length < sizeof text - 1 && !ferror(file);
-    (void)fclose(file);
-    text[length] = '\0';
-    if (!whole || strlen(text) != length)
-    {
-        (void)snprintf(error, CONFIG_ERROR_MAX, "%.200s: is no text of at most %d bytes", path,
-                       FILE_MAX_BYTES - 2);
-        return false;
-    }
-    return config_parse(config, path, text, error);
+    return lines_load(path, take, config, error);
 }
 
 static int print_value(const struct app_config *config, const struct config_key *key, char *text,

@@ -10,14 +10,17 @@
 #include "fw/config.h"
 #include "fw/err.h"
 #include "fw/mixing.h"
+#include "lines.h"
 
 #define CONFIG_TEXT_MAX 112
-#define CONFIG_ERROR_MAX 320
+#define CONFIG_ERROR_MAX LINES_ERROR_MAX
+// Where tables of the user's own are; this file alone need not be there.
+#define CONFIG_BEHAVIORS "/etc/turbopi/behaviors.toml"
 
 struct app_config
 {
     int32_t robot_id;
-    char behavior[CONFIG_TEXT_MAX], table[CONFIG_TEXT_MAX];
+    char behavior[CONFIG_TEXT_MAX], table[CONFIG_TEXT_MAX], behaviors[CONFIG_TEXT_MAX];
     bool autostart;
 
     int32_t y_min, y_max, u_min, u_max, v_min, v_max;
@@ -50,12 +53,12 @@ void config_default(struct app_config *config);
 bool config_set(struct app_config *config, const char *key, const char *value,
                 char error[CONFIG_ERROR_MAX]);
 
-// Sets every key of a text of lines `key = value`; # begins a comment, text may stand in quotes.
+// Sets every key of a text: see lines.h.
 // @param name of the text, for the error. @return as config_set(); then config may be half set.
 bool config_parse(struct app_config *config, const char *name, const char *text,
                   char error[CONFIG_ERROR_MAX]);
 
-// The same from a file of at most 16 KB.
+// The same from a file.
 bool config_load(struct app_config *config, const char *path, char error[CONFIG_ERROR_MAX]);
 
 // Writes all keys as lines that config_parse() reads back, valid TOML as well.

@@ -24,9 +24,14 @@
 const struct config_key config_keys[] = {
     INTEGER(robot_id, 0, 99, "number of this robot, in the names of its channels"),
     TEXT(behavior, "name of the table that is played"),
-    TEXT(table,
-         "table of your own, played under the name above: speed and turn input for nothing seen, "
-         "then for seen, as in 100,-0.5,100,0.5; empty: the built-in table of that name"),
+    TEXT(
+        table,
+        "table of your own, played under the name above: speed and turn input for nothing seen, "
+        "then for seen, as in 100,-0.5,100,0.5; empty: that of this name in the file below, or else "
+        "built in"),
+    TEXT(behaviors,
+         "file of such tables, lines name = \"100,-0.5,100,0.5\", which commands can name; empty: "
+         "none"),
     YES_NO(autostart, "true: drive as soon as frames come; false: wait for button or command"),
     INTEGER(y_min, 0, 255, "target's colour, YUV of BT.601, both ends included"),
     INTEGER(y_max, 0, 255, "as above"),

@@ -43,7 +43,8 @@ void loop_regain(struct loop *loop, enum loop_part part)
 }
 
 enum fw_err loop_init(struct loop *loop, const struct app_config *config,
-                      const struct loop_devices *devices, const struct link *link)
+                      const struct own_tables *own, const struct loop_devices *devices,
+                      const struct link *link)
 {
     struct fw_config core;
     enum fw_err err = config_core(config, &core);
@@ -61,6 +62,7 @@ enum fw_err loop_init(struct loop *loop, const struct app_config *config,
     loop->link = *link;
     loop->wake_fd = -1;
     loop->script_dir = config->script_dir;
+    loop->own = own;
     (void)snprintf(loop->behavior, sizeof loop->behavior, "%.*s", LINK_NAME_MAX - 1,
                    config->behavior);
     loop->script.rows = loop->script_rows;

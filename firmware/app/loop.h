@@ -13,6 +13,7 @@
 #include "hal/motors.h"
 #include "hal/panel.h"
 #include "link.h"
+#include "own_tables.h"
 
 #define LOOP_SCRIPT_MAX_ROWS 4096
 #define LOOP_BATTERY_READINGS 5
@@ -47,6 +48,8 @@ struct loop
     struct fw_ctx core;
     char behavior[LINK_NAME_MAX];
     const char *script_dir;
+    // That commands can name.
+    const struct own_tables *own;
 
     // Lost parts, with what, and when they are tried again (monotonic).
     enum fw_err lost[LOOP_PART_COUNT];
@@ -83,9 +86,10 @@ struct loop
     struct fw_script_row script_rows[LOOP_SCRIPT_MAX_ROWS];
 };
 
-// @param config already checked by config_core(); its script_dir is not copied.
+// @param config already checked by config_core(); its script_dir is not copied, nor is own.
 // @return FW_OK, or why the core refuses the configuration.
 enum fw_err FW_MUST_CHECK loop_init(struct loop *loop, const struct app_config *config,
+                                    const struct own_tables *own,
                                     const struct loop_devices *devices, const struct link *link);
 
 // Waits for a frame, a command or the next thing due, then does one control step.

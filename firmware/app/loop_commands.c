@@ -6,7 +6,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "fw/behavior.h"
 #include "loop.h"
 
 #define COMMANDS_PER_STEP 8
@@ -62,8 +61,8 @@ bool loop_load_script(struct loop *loop, const char *path, char reason[LINK_REAS
 
 static bool select_behavior(struct loop *loop, const char *name, char *reason)
 {
-    const struct fw_behavior *behavior = fw_behavior_find(name);
-    if (behavior == NULL || fw_set_table(&loop->core, &behavior->table) != FW_OK)
+    const struct fw_table *table = own_tables_find(loop->own, name);
+    if (table == NULL || fw_set_table(&loop->core, table) != FW_OK)
     {
         (void)snprintf(reason, LINK_REASON_MAX, "no behaviour '%s'", name);
         return false;

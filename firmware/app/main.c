@@ -24,7 +24,7 @@ static int prepare(const struct options *options, struct loop *loop,
                    const struct loop_devices *devices, const struct link *link)
 {
     const struct app_config *config = &options->config;
-    const enum fw_err err = loop_init(loop, config, devices, link);
+    const enum fw_err err = loop_init(loop, config, &options->own, devices, link);
     if (err != FW_OK)
     {
         (void)fprintf(stderr, "turbopi: configuration: %s\n", fw_err_str(err));

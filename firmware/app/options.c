@@ -4,6 +4,7 @@
 #include <getopt.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "fw/behavior.h"
 
@@ -13,7 +14,7 @@ static const char help[] =
     "usage: turbopi [options]\n"
     "Drives a TurboPi by one bit: camera frame to four wheel duties, telemetry on LCM.\n"
     "\n"
-    "  -b, --behavior NAME   table to play (milling)\n"
+    "  -b, --behavior NAME   table to play, built in or of your own (milling)\n"
     "  -c, --config FILE     keys and values (" DEFAULT_FILE
     ", if it is there)\n"
     "      --camera DEVICE   V4L2 device, stub:FILE or stub:unix:SOCKET (/dev/video0)\n"
@@ -150,17 +151,31 @@ static bool apply(int code, struct options *options, enum options_action *action
     return true;
 }
 
-static bool check(const struct app_config *config, char *error)
+static bool take_own(void *context, const char *name, const char *text, char *error)
 {
-    struct fw_table own;
-    if (config->table[0] != '\0' && !fw_table_parse(config->table, &own))
+    struct options *options = context;
+    struct app_config *config = &options->config;
+    const bool plays = config->table[0] == '\0' && strcmp(name, config->behavior) == 0;
+    return own_tables_add(&options->own, name, text, error) &&
+           (!plays || config_set(config, "table", text, error));
+}
+
+// Reads the file of own tables; the one that is to be played comes into the configuration.
+static bool load_own(struct options *options, char *error)
+{
+    const struct app_config *config = &options->config;
+    const bool expected = strcmp(config->behaviors, CONFIG_BEHAVIORS) != 0;
+    if (config->behaviors[0] != '\0' && (expected || access(CONFIG_BEHAVIORS, F_OK) == 0) &&
+        !lines_load(config->behaviors, take_own, options, error))
     {
-        (void)snprintf(error, CONFIG_ERROR_MAX,
-                       "table: '%.60s': must be speed,turn,speed,turn, for nothing seen and for "
-                       "seen, as in 100,-0.5,100,0.5 (speed -100..100, turn -2..2)",
-                       config->table);
         return false;
     }
+    return config->table[0] == '\0' ||
+           own_tables_add(&options->own, config->behavior, config->table, error);
+}
+
+static bool check(const struct app_config *config, char *error)
+{
     if (config->table[0] == '\0' && fw_behavior_find(config->behavior) == NULL)
     {
         int used = snprintf(error, CONFIG_ERROR_MAX, "behavior: '%.60s': must be one of",
@@ -186,6 +201,7 @@ enum options_action parse_options(int argc, char **argv, struct options *options
     char error[CONFIG_ERROR_MAX] = "";
     enum options_action action = OPTIONS_RUN;
     options->dry_run = false;
+    options->own.count = 0;
     config_default(&options->config);
     bool ok = load_file(argc, argv, &options->config, error);
     while (ok && action != OPTIONS_DONE)
@@ -193,7 +209,7 @@ enum options_action parse_options(int argc, char **argv, struct options *options
         const int code = getopt_long(argc, argv, short_options, long_options, NULL);
         if (code == -1)
         {
-            ok = check(&options->config, error);
+            ok = load_own(options, error) && check(&options->config, error);
             break;
         }
         ok = apply(code, options, &action, error);

@@ -4,6 +4,7 @@
 #define APP_OPTIONS_H
 
 #include "config.h"
+#include "own_tables.h"
 
 enum options_action
 {
@@ -20,6 +21,8 @@ enum options_action
 struct options
 {
     struct app_config config;
+    // Of the file that the configuration names, and its own table under its behaviour's name.
+    struct own_tables own;
     bool dry_run;
 };
 

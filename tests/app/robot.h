@@ -36,6 +36,7 @@ static struct robot
     struct stub_panel panel;
     struct loop_devices devices;
     struct app_config config;
+    struct own_tables own;
     struct loop loop;
 
     enum robot_view view;
@@ -172,7 +173,8 @@ static inline void robot_make(void)
 static inline void robot_boot(void)
 {
     const struct link link = {NULL, robot_send_report, robot_send_ack, robot_receive, -1};
-    TEST_ASSERT_EQUAL(FW_OK, loop_init(&robot.loop, &robot.config, &robot.devices, &link));
+    TEST_ASSERT_EQUAL(FW_OK,
+                      loop_init(&robot.loop, &robot.config, &robot.own, &robot.devices, &link));
 }
 
 static inline void robot_steps(int count)

@@ -2,6 +2,7 @@
 // Tests of firmware/app/loop_commands.c
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "robot.h"
@@ -147,6 +148,45 @@ static void test_select_changes_the_table(void)
     ASSERT_DUTIES(((const int8_t[4]){100, 100, 100, 100}));
 }
 
+static void test_tables_of_the_users_own_are_known_by_name(void)
+{
+    char error[LINES_ERROR_MAX];
+    TEST_ASSERT_TRUE(own_tables_add(&robot.own, "ahead", "0,2,100,0", error));
+    TEST_ASSERT_TRUE(own_tables_add(&robot.own, "milling", "0,2,-100,0", error));
+    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, "ahead"));
+    robot_steps(1);
+    ASSERT_DUTIES(((const int8_t[4]){100, 100, 100, 100}));
+    TEST_ASSERT_EQUAL_STRING("ahead", robot.report.behavior);
+    // It goes before a built-in one of its name, and may be given anew.
+    TEST_ASSERT_TRUE(tell(FW_VERB_SELECT, 0, "milling"));
+    robot_steps(1);
+    ASSERT_DUTIES(((const int8_t[4]){-100, -100, -100, -100}));
+    TEST_ASSERT_TRUE(own_tables_add(&robot.own, "milling", "0,2,100,0", error));
+    TEST_ASSERT_EQUAL(2, robot.own.count);
+}
+
+static void test_own_tables_that_are_none_are_refused_in_words(void)
+{
+    char error[LINES_ERROR_MAX];
+    TEST_ASSERT_FALSE(own_tables_add(&robot.own, "fast", "0,2,101,0", error));
+    TEST_ASSERT_NOT_NULL(strstr(error, "'fast' must be speed,turn"));
+    TEST_ASSERT_FALSE(own_tables_add(&robot.own, "", "0,2,100,0", error));
+    char longest[LINK_NAME_MAX + 1] = {0};
+    memset(longest, 'a', LINK_NAME_MAX);
+    TEST_ASSERT_FALSE(own_tables_add(&robot.own, longest, "0,2,100,0", error));
+    TEST_ASSERT_NOT_NULL(strstr(error, "1 to 47 characters"));
+    longest[LINK_NAME_MAX - 1] = '\0';
+    TEST_ASSERT_TRUE(own_tables_add(&robot.own, longest, "0,2,100,0", error));
+    for (int i = 1; i < OWN_TABLES_MAX; ++i)
+    {
+        char name[16];
+        snprintf(name, sizeof name, "t%d", i);
+        TEST_ASSERT_TRUE(own_tables_add(&robot.own, name, "0,2,100,0", error));
+    }
+    TEST_ASSERT_FALSE(own_tables_add(&robot.own, "more", "0,2,100,0", error));
+    TEST_ASSERT_NOT_NULL(strstr(error, "one too many"));
+}
+
 static void test_script_is_played_at_its_times_and_ends_in_a_stop(void)
 {
     write_script(
@@ -203,6 +243,8 @@ int main(void)
     RUN_TEST(test_late_copy_of_a_start_does_not_undo_a_stop);
     RUN_TEST(test_stop_is_obeyed_however_old);
     RUN_TEST(test_select_changes_the_table);
+    RUN_TEST(test_tables_of_the_users_own_are_known_by_name);
+    RUN_TEST(test_own_tables_that_are_none_are_refused_in_words);
     RUN_TEST(test_script_is_played_at_its_times_and_ends_in_a_stop);
     RUN_TEST(test_bad_scripts_are_refused_in_words);
     RUN_TEST(test_unknown_verb_is_refused);

@@ -312,6 +312,8 @@ def test_telemetry_comes_back_with_the_network(bus_session):
     [
         (["--behavior", "dance"], "must be one of"),
         (["--set", "robot_id=100"], "0..99"),
+        (["--set", "behaviors=/nowhere.toml"], "cannot be read"),
+        (["--set", "table=1,2,3"], "'milling' must be speed,turn,speed,turn"),
         (["--set", "speed=1"], "is no key"),
         (["--config", "/nowhere.conf"], "cannot be read"),
         (["--board", "parallel"], "must be auto, i2c, uart"),
@@ -326,6 +328,17 @@ def test_mistakes_get_one_sentence(arguments, words):
     done = run(*config, "--board", "stub", "--lcm-url", "", "--set", "restart_ms=-1", *arguments)
     assert done.returncode in (1, 2)
     assert words in done.stderr and done.stdout == ""
+
+
+def test_tables_of_ones_own_come_from_a_file(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text('# mine\nspin = "0,2,100,0.5"  # to the left\n')
+    own = ("--config", "/dev/null", "--set", f"behaviors={path}", "--print-config")
+    assert 'table = "0,2,100,0.5"' in run(*own, "--behavior", "spin").stdout
+    assert 'table = ""' in run(*own, "--behavior", "orbit").stdout
+    assert 'table = "1,1,1,1"' in run(*own, "-b", "spin", "--set", "table=1,1,1,1").stdout
+    path.write_text('good = "0,0,0,0"\nbad = "0,2,200,0"\n')
+    assert f"{path}, line 2: table 'bad' must be" in run(*own).stderr
 
 
 def test_help_version_and_config_go_to_stdout(tmp_path):

@@ -101,6 +101,19 @@ def threshold(robot: SshRobot, config: Path) -> dict:
     return {"code": code, **json.loads(said.getvalue()), "config": robot.config.read_text()}
 
 
+def own_tables(flash: Flasher, robot: SshRobot, folder: Path, package: Path) -> dict:
+    """A table of the user's own is put on a robot; then a file that holds none."""
+    good, bad = folder / "own.toml", folder / "bad.toml"
+    good.write_text('ahead = "0,0.5,100,0"\nspin = "0,2,0,2"\n')
+    bad.write_text('ahead = "0,0.5,101,0"\n')
+    arguments = ("robot04", "--package", package, "--behaviors")
+    there = robot.folder / "system/etc/turbopi/behaviors.toml"
+    put = flash.run(*arguments, good, "--behavior", "spin")
+    refused = flash.run(*arguments, bad)
+    return {"put": put, "bad": refused, "config": robot.config.read_text(),
+            "same": there.read_text() == good.read_text()}  # fmt: skip
+
+
 def main(folder: Path) -> dict:
     program = Path(os.environ["TURBOPI"])
     key = let_in(folder)
@@ -126,6 +139,7 @@ def main(folder: Path) -> dict:
         result["configs"] = [robot.config.read_text() for robot in robots[:2]]
         result["no_previous"] = flash.run("robot03", "--rollback")
         result["second"] = flash.run(*both, "--package", new)
+        result["own"] = own_tables(flash, robots[1], folder, new)
         result["installed"] = [(robot.folder / "installed").read_text().strip() for robot in robots]
         result["rollback"] = flash.run("robot03", "--rollback")
         result["back_to"] = (robots[0].folder / "installed").read_text().strip()

@@ -83,6 +83,21 @@ def one_robot_round(robots: dict) -> list:
     return duties
 
 
+def own_table_round() -> dict:
+    """Robots 1 and 2 know a table of the user's own by name; robot 3 does not."""
+    fleet = Fleet(URL)
+    fleet.listen(0.5)
+    refused = tell.start(fleet, IDS, "ahead", 0.5, partial=False)
+    begun = tell.start(fleet, {1, 2}, "ahead", 0.5, partial=False)
+    fleet.listen(0.3)
+    return {
+        "refused": {a.robot_id: a.reason for a in refused.answers if not a.accepted},
+        "called_off": refused.called_off,
+        "accepted": [a.accepted for a in begun.answers],
+        "stopped": [a.mode for a in tell.stop(fleet, set())],
+    }
+
+
 def answers_to_bad_commands(prefix: str, robot_id: int) -> dict:
     """What a robot answers to each command of PROTOCOL after one that it obeyed."""
     fleet = Fleet(URL, prefix)
@@ -102,24 +117,31 @@ def answers_to_bad_commands(prefix: str, robot_id: int) -> dict:
 
 def main(folder: Path) -> dict:
     turbopi, result = shlex.split(os.environ["TURBOPI"]), {}
+    tables = folder / "behaviors.toml"
+    tables.write_text('ahead = "0,0.5,100,0"\n')
     with ExitStack() as stack:
         robots = {}
         for robot_id in sorted(IDS):
             (folder / str(robot_id)).mkdir()
-            options = ("--lcm-url", URL, "--set", f"robot_id={robot_id}")
+            options = ["--lcm-url", URL, "--set", f"robot_id={robot_id}"]
+            options += ["--set", f"behaviors={tables}"] if robot_id < 3 else []
             robots[robot_id] = stack.enter_context(Robot(turbopi, folder / str(robot_id), *options))
         time.sleep(1)
         result["rounds"] = [lossy_round(robots, seed) for seed in range(ROUNDS)]
         result["deaf"] = deaf_round(robots)
         result["one_robot"] = one_robot_round(robots)
+        result["own_table"] = own_table_round()
         result["robot_answers"] = answers_to_bad_commands("", 1)
     twin = f"{os.environ['TWIN_RUN']} --plant planar --n 2 --wait --channel-prefix TWIN_"
+    twin += f" --behaviors {tables}"
     with subprocess.Popen(shlex.split(twin), stdout=subprocess.DEVNULL) as process:
         time.sleep(1)
         result["twin_answers"] = answers_to_bad_commands("TWIN_", 1)
         fleet = Fleet(URL, "TWIN_")
-        begun = tell.start(fleet, tell.find(fleet, set()), "", 0.5, partial=False)
+        begun = tell.start(fleet, tell.find(fleet, set()), "ahead", 0.5, partial=False)
         result["twin_modes"] = [a.mode for a in begun.answers]
+        fleet.listen(6, lambda: all(r.run.behavior == "ahead" for r in fleet.robots.values()))
+        result["twin_behaviors"] = [r.run.behavior for r in fleet.robots.values()]
         result["twin_stopped"] = [a.mode for a in tell.stop(fleet, set())]
         process.terminate()
     return result

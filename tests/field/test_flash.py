@@ -61,6 +61,15 @@ def test_number_and_behaviour_are_set_and_the_rest_is_kept(session):
         assert "board = stub" in lines and "width_px = 64" in lines
 
 
+def test_tables_of_ones_own_are_put_on_the_robot(session):
+    own = session["own"]
+    assert own["put"]["code"] == 0 and own["same"]
+    assert "behavior = spin" in own["config"] and "table = 0,2,0,2" in own["config"]
+    robot = only(own["bad"])
+    assert own["bad"]["code"] == 1 and robot["kind"] == "bad behaviours"
+    assert "line 1: table 'ahead' must be" in robot["sentence"]
+
+
 def test_rollback_goes_to_the_package_before(session):
     assert only(session["no_previous"])["kind"] == "no previous"
     assert session["second"]["code"] == 0

@@ -53,6 +53,14 @@ def test_one_robot_can_be_told_alone(session):
 
 
 @needs_programs
+def test_tables_of_ones_own_are_started_by_name_where_they_are_known(session):
+    own = session["own_table"]
+    assert own["refused"] == {"3": "no behaviour 'ahead'"} and own["called_off"]
+    assert own["accepted"] == [True, True] and own["stopped"] == ["stopped"] * 3
+    assert session["twin_behaviors"] == ["ahead"] * 2
+
+
+@needs_programs
 def test_bad_commands_are_refused_with_a_reason_and_stop_never_is(session):
     answers = session["robot_answers"]
     assert {name for name, (accepted, _) in answers.items() if accepted} == {"stop_however_old"}

@@ -14,6 +14,7 @@
 #define MAX_MESSAGES 32
 
 static struct app_config config;
+static struct own_tables own;
 static struct telemetry telemetry;
 static struct loop loop;
 static struct stub_clock hand;
@@ -119,7 +120,7 @@ static void boot(void)
         CLAIM(telemetry.lcm != NULL);
     }
     heard_count = ack_count = 0;
-    CLAIM(loop_init(&loop, &config, &devices, &link) == FW_OK);
+    CLAIM(loop_init(&loop, &config, &own, &devices, &link) == FW_OK);
     loop_step(&loop);
 }
 

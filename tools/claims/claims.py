@@ -199,8 +199,8 @@ def region(seeds: int) -> Claim:
         "The mill's region of speed and turn rate, and four classes",
         "Over 56 pairs of speed and turn rate swarms end as a stable mill (circliness below 0.2), "
         "an ellipsoidal one (up to 1), a colliding cluster or separated groups (above 1).",
-        "All four occur. Slow turns at high speed part the swarm, as the free circle comes near the "
-        "view range; from 40 deg/s nearly all mill, if whole bodies are seen.",
+        "All four occur. Slow turns at high speed part the swarm, as the free circle comes near "
+        "the view range; from 40 deg/s nearly all mill, if whole bodies are seen.",
         rows,
         [
             *figures.maps(maps),

@@ -11,7 +11,7 @@ from rich.console import Console, Group
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
-from twinmill.tools.behaviors import find_table
+from twinmill.tools.behaviors import find_file, read_tables
 from twinmill.tools.deploy.package import Package, build_package, read_package
 from twinmill.tools.deploy.remote import SshConfig
 from twinmill.tools.deploy.robot_update import Outcome, Target, Wish, parse_target, update
@@ -38,6 +38,15 @@ def _flash(
     behavior: Annotated[
         str, typer.Option("--behavior", "-b", help="Play it: milling, or one of behaviors.toml.")
     ] = "",
+    behaviors: Annotated[
+        Path | None,
+        typer.Option(
+            "--behaviors",
+            metavar="FILE",
+            help="Tables of your own, for `twinmill swarm` to name; default: behaviors.toml, if "
+            "--behavior is in it.",
+        ),
+    ] = None,
     package: Annotated[
         Path | None, typer.Option("--package", metavar="DEB", help="This one; default: build it.")
     ] = None,
@@ -67,12 +76,23 @@ def _flash(
     targets = [parse_target(host) for host in hosts]
     _refuse_twins(targets)
     settings = _parse_settings(setting or [])
+    file = behaviors or find_file()
+    tables = read_tables(file) if file and (behaviors or behavior) else {}
     if behavior:
-        settings |= {"behavior": behavior, "table": find_table(behavior)}
-    if rollback and (settings or package):
-        raise ValueError("--rollback changes nothing else: give no --behavior, --set, --package.")
+        settings |= {"behavior": behavior, "table": tables.get(behavior, "")}
+    if rollback and (settings or package or behaviors):
+        raise ValueError(
+            "--rollback changes nothing else: give no --behavior, --behaviors, --set, --package."
+        )
     fleet = Fleet(lcm_url)
-    wish = Wish(None if rollback else _package(package), settings, dry_run, wait_s, ssh_config)
+    wish = Wish(
+        None if rollback else _package(package),
+        settings,
+        file if behaviors or behavior in tables else None,
+        dry_run,
+        wait_s,
+        ssh_config,
+    )
     outcomes = _update_all(targets, wish, fleet)
     data = {
         "ok": all(outcome.ok for outcome in outcomes),

@@ -8,6 +8,7 @@ root=${TURBOPI_ROOT:-}
 config=$root/etc/turbopi/turbopi.conf
 store=$root/var/lib/twinmill
 scripts=$root/etc/turbopi/scripts
+tables=$root/etc/turbopi/behaviors.toml
 
 fail() { echo "failed: $1: $2" >&2; exit 1; }
 as_root() { if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo -n "$@"; fi; }
@@ -111,6 +112,20 @@ configure()
     rm -f "$new"
 }
 
+# behaviors UPLOADED_FILE: tables that commands can name; the program itself says if they are right.
+behaviors()
+{
+    may_be_root
+    if ! said=$(turbopi --config /dev/null --set "behaviors=$1" --print-config 2>&1 >/dev/null); then
+        rm -f "$1"
+        fail "bad behaviours" "$said"
+    fi
+    chmod 644 "$1"
+    as_root cp "$1" "$tables.new"
+    as_root mv "$tables.new" "$tables"
+    rm -f "$1"
+}
+
 # restart: and is it still there after a while?
 restart()
 {
@@ -169,7 +184,7 @@ main()
     step=$1
     shift
     case $step in
-        probe | install | rollback | configure | restart | frames | script | upload) "$step" "$@" ;;
+        probe | install | rollback | behaviors | configure | restart | frames | script | upload) "$step" "$@" ;;
         *) fail "bad step" "$step" ;;
     esac
 }

@@ -46,12 +46,14 @@ class Wish:
     Attributes:
         package: to install; None: go back to the one before.
         settings: of the configuration, KEY to value, besides the robot's number.
+        behaviors: file of tables of the user's own to put there; None: leave what is there.
         dry_run: only look.
         wait_s: for telemetry.
     """
 
     package: Package | None
     settings: dict[str, str]
+    behaviors: Path | None
     dry_run: bool
     wait_s: float
     ssh_config: Path | None
@@ -109,18 +111,19 @@ def _update(
     if package is None and "previous" not in found:
         raise RemoteError("no previous", "no package before is kept on it: give --package FILE.")
     if wish.dry_run:
-        outcome.would = _plan(package, found, settings)
+        outcome.would = _plan(wish, found, settings)
         return
     if package is None:
         say("going back")
         remote.run("rollback", timeout_s=INSTALL_S)
     else:
         say("copying")
-        upload = remote.run("upload")["upload"]
-        remote.copy(package.path, upload)
+        upload = _upload(remote, package.path)
         say("installing")
         remote.run("install", upload, timeout_s=INSTALL_S)
         say("configuring")
+        if wish.behaviors:
+            remote.run("behaviors", _upload(remote, wish.behaviors))
         remote.run("configure", *(f"{key}={value}" for key, value in settings.items()))
     say("restarting")
     restarted_s = time.monotonic()
@@ -130,7 +133,14 @@ def _update(
     _hear(target, version, restarted_s, wish.wait_s, fleet, outcome)
 
 
-def _plan(package: Package | None, found: dict[str, str], settings: dict[str, str]) -> list[str]:
+def _upload(remote: Remote, path: Path) -> str:
+    upload = remote.run("upload")["upload"]
+    remote.copy(path, upload)
+    return upload
+
+
+def _plan(wish: Wish, found: dict[str, str], settings: dict[str, str]) -> list[str]:
+    package = wish.package
     before = found.get("installed") or "nothing"
     if package is None:
         return [f"go back from {before} to {found['previous']}", "restart turbopi.service"]
@@ -138,6 +148,7 @@ def _plan(package: Package | None, found: dict[str, str], settings: dict[str, st
     return [
         f"copy {package.path.name}, {package.path.stat().st_size // 1024} KB",
         f"install {package.version} over {before}",
+        *([f"put {wish.behaviors} there"] if wish.behaviors else []),
         f"set {changed}",
         "restart turbopi.service and wait for telemetry",
     ]

@@ -82,7 +82,7 @@ def _start(
     begun = tell.start(fleet, asked, behavior, in_s, partial)
     ok = all(answer.accepted and answer.mode != "stopped" for answer in begun.answers)
     if begun.called_off:
-        words = "Called off: not all acknowledged in time. All were stopped; --partial starts some."
+        words = f"Called off: {_why(begun.answers)}. All were stopped; --partial starts some."
     else:
         at = datetime.fromtimestamp(begun.utime_us / 1e6).strftime("%H:%M:%S.%f")[:-3]
         words = f"Started at {at}." if ok else f"Started at {at}, but not all: see above."
@@ -125,7 +125,7 @@ def _select(
     command = tell.make_command(tell.VERBS.VERB_SELECT, behavior)
     given = tell.tell(fleet, command, asked, time.monotonic() + 5)
     ok = all(answer.accepted for answer in given)
-    words = f"All chose {behavior}." if ok else "Not all did: see above."
+    words = f"All chose {behavior}." if ok else f"Not all did{_hint(given)}."
     return _finish("select", given, ok, words, {}, as_json)
 
 
@@ -139,6 +139,18 @@ def warn_of_clocks(fleet: Fleet, robots: set[int]) -> None:
                 "will be its start; set it (NTP).",
                 file=sys.stderr,
             )
+
+
+def _why(given: list[tell.Answer]) -> str:
+    """Why not all start."""
+    refused = [answer for answer in given if answer.accepted is False]
+    words = f"{len(refused)} of {len(given)} refused" if refused else "not all acknowledged in time"
+    return words + _hint(given)
+
+
+def _hint(given: list[tell.Answer]) -> str:
+    unknown = any(answer.reason.startswith("no behaviour") for answer in given)
+    return "; `twinmill flash --behaviors FILE` brings tables to robots" if unknown else ""
 
 
 def _finish(

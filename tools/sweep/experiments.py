@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from twinmill.tools.sweep.axes import ALIASES
+from twinmill.tools.sweep.axes import ALIASES, Axis
 from twinmill.tools.sweep.classes import check_goal, interval
 from twinmill.tools.sweep.phase import CLASSES, Phase
 
@@ -114,6 +114,19 @@ def divergence_bits(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return entropy_bits((a + b) / 2) - (entropy_bits(a) + entropy_bits(b)) / 2
 
 
+def varied(phase: Phase) -> list[Axis]:
+    """Axes of more than one value."""
+    return [axis for axis in phase.axes if len(axis.values) > 1]
+
+
+def words(axes: list[Axis]) -> str:
+    """Names, ends and counts."""
+    return ", ".join(
+        f"{axis.name} {axis.values[0]:g} to {axis.values[-1]:g} ({len(axis.values)})"
+        for axis in axes
+    )
+
+
 def next_cells(phase: Phase, rival: Phase | None, done: set[int]) -> list[dict]:
     """Where to run next: where two models disagree most, or else where this one is least sure.
 
@@ -123,8 +136,12 @@ def next_cells(phase: Phase, rival: Phase | None, done: set[int]) -> list[dict]:
     if rival is None:
         worth = entropy_bits(phase.outcomes)
     else:
-        if rival.axes != phase.axes:
-            raise ValueError("--rival: that sweep has other axes; run it with the same ones.")
+        ours, theirs = varied(phase), varied(rival)
+        if ours != theirs:
+            raise ValueError(
+                f"--rival: that sweep varies {words(theirs)}, this one {words(ours)}; run it over "
+                "the same values, with what is to differ in its model or in an axis of one value."
+            )
         worth = divergence_bits(phase.outcomes, rival.outcomes)
     chosen = []
     for cell in np.argsort(-worth, kind="stable"):

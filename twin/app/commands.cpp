@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "fw/behavior.h"
+#include "swarm/species.h"
 #include "turbopi/ack_t.hpp"
 
 namespace twin
@@ -109,7 +109,7 @@ void Commands::ObeyOne(int id, const fw_command &order, const std::string &name)
 
 void Commands::Select(int id, const std::string &name)
 {
-    const fw_behavior *behavior = fw_behavior_find(name.c_str());
+    const fw_behavior *behavior = FindBehavior(name, options_.own);
     if (!behavior)
         throw std::invalid_argument("no behaviour '" + name + "'");
     swarm_.SetTable(id, behavior->table);

@@ -4,9 +4,11 @@
 #define APP_COMMANDS_H
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "fw/behavior.h"
 #include "fw/command.h"
 #include "outlet.h"
 #include "publisher.h"
@@ -19,8 +21,9 @@ namespace twin
 struct CommandOptions
 {
     std::string channel_prefix;
-    std::string script_dir;  // of the scripts that commands name
-    bool wait = false;       // stand until a start
+    std::string script_dir;            // of the scripts that commands name
+    bool wait = false;                 // stand until a start
+    std::span<const fw_behavior> own;  // tables that commands can name beside the firmware's
 };
 
 class Commands

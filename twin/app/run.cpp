@@ -263,7 +263,7 @@ void Run(const Options &options)
     Views views(MakeViewOptions(options, setup.robots));
     Loop loop(options, setup, duration_s, realtime_factor);
     Commands commands(outlet, swarm, publisher, script,
-                      {options.channel_prefix, options.script_dir, options.wait});
+                      {options.channel_prefix, options.script_dir, options.wait, setup.own.All()});
     loop.Turn(swarm, outlet, publisher, commands, views);
     const double wall_s = loop.WallS();
     views.Finish(swarm);

@@ -14,13 +14,10 @@ namespace
 constexpr int kMaxRobots = 100;
 constexpr size_t kNamesShown = 10;
 
-const fw_behavior *FindBehavior(const std::string &name, std::span<const fw_behavior> own)
+const fw_behavior &MustFind(const std::string &name, std::span<const fw_behavior> own)
 {
-    for (const fw_behavior &behavior : own)
-        if (name == behavior.name)
-            return &behavior;
-    if (const fw_behavior *found = fw_behavior_find(name.c_str()))
-        return found;
+    if (const fw_behavior *found = FindBehavior(name, own))
+        return *found;
     std::string known;
     for (size_t i = 0; i < fw_behavior_count(); ++i)
         known += (i ? ", " : "") + std::string(fw_behavior_at(i)->name);
@@ -47,13 +44,21 @@ int ParseCount(const std::string &part, const std::string &digits)
 
 }  // namespace
 
+const fw_behavior *FindBehavior(const std::string &name, std::span<const fw_behavior> own)
+{
+    for (const fw_behavior &behavior : own)
+        if (name == behavior.name)
+            return &behavior;
+    return fw_behavior_find(name.c_str());
+}
+
 std::vector<const fw_behavior *> ParseSpecies(const std::string &text, std::optional<int> n,
                                               std::span<const fw_behavior> own)
 {
     std::vector<const fw_behavior *> robots;
     if (text.find(':') == std::string::npos && text.find(',') == std::string::npos)
     {
-        robots.assign(static_cast<size_t>(n.value_or(6)), FindBehavior(text, own));
+        robots.assign(static_cast<size_t>(n.value_or(6)), &MustFind(text, own));
         return robots;
     }
     std::istringstream parts(text);
@@ -63,7 +68,7 @@ std::vector<const fw_behavior *> ParseSpecies(const std::string &text, std::opti
         const std::string digits = colon == std::string::npos ? "" : part.substr(colon + 1);
         const int count = ParseCount(part, digits);
         robots.insert(robots.end(), static_cast<size_t>(count),
-                      FindBehavior(part.substr(0, colon), own));
+                      &MustFind(part.substr(0, colon), own));
     }
     const size_t wanted = n ? static_cast<size_t>(*n) : robots.size();
     if (robots.size() != wanted || robots.size() > kMaxRobots)

@@ -13,6 +13,9 @@
 namespace twin
 {
 
+// Of exactly this name, of `own` or else the firmware's; nullptr if neither has it.
+const fw_behavior *FindBehavior(const std::string &name, std::span<const fw_behavior> own);
+
 // One behaviour per robot from "milling" (for all) or "milling:5,self_centering:1", in that order.
 // `n` may be left out if counts are given. Throws std::invalid_argument in one sentence if a name
 // is neither the firmware's nor one of `own`, or the counts do not add up to n.
