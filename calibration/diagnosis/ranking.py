@@ -10,6 +10,7 @@ from twinmill.calibration.solve import Estimate
 
 ALIKE = 0.9  # share of a signature that another effect imitates (0.95 as a correlation)
 TIE_CHI2 = 6.0  # difference of held-out chi2, over the excess scatter, that decides nothing
+FAINT_CHI2 = 2 * TIE_CHI2  # of what is not imitated: the difference is often no more than that
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,11 @@ def _entries(
 
 
 def _tied(this: Round) -> list[Judged]:
-    """Other trials of the round that do as well, with a signature that looks the same."""
+    """Other trials of the round that do as well, and do not do it by another trace.
+
+    One that could imitate the other is enough: of an effect with many parameters a part of what is
+    fitted is noise, which one with few cannot imitate. What it cannot may be too faint to tell by.
+    """
     accepted = this.accepted
     assert accepted is not None
     if len(accepted.trial.effects) > 1:
@@ -103,7 +108,9 @@ def _tied(this: Round) -> list[Judged]:
         other = _index(this.screening, judged.trial.effects[0])
         excess = max(this.screening.found[own].excess, this.screening.found[other].excess)
         close = judged.trial.chi2 - accepted.trial.chi2 < TIE_CHI2 * excess
-        if close and this.screening.imitation(own, other) > ALIKE:
+        same = [this.screening.imitation(i, j) for i, j in ((own, other), (other, own))]
+        faint = (1 - same[0]) * this.screening.found[own].gain < FAINT_CHI2 * excess
+        if close and (max(same) > ALIKE or faint):
             tied.append(judged)
     return tied
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 from scipy.stats import ncx2, norm
-from twinmill.calibration.diagnosis.ranking import ALIKE, TIE_CHI2
+from twinmill.calibration.diagnosis.ranking import ALIKE, FAINT_CHI2, TIE_CHI2
 from twinmill.calibration.diagnosis.search import ALPHA
 from twinmill.calibration.next_experiment.relevance import Relevance
 
@@ -50,7 +50,7 @@ def told_apart(margins: np.ndarray, parameters: np.ndarray, candidates: int) -> 
     threshold = 2 * np.log(candidates / ALPHA) + 3 * parameters
     accepted = ncx2.sf(threshold, parameters, np.maximum(whole, 1e-9))
     nearest = against.min(axis=1)
-    tied = nearest < (1 - ALIKE) * whole
+    tied = nearest < np.maximum((1 - ALIKE) * whole, FAINT_CHI2)
     ahead = (nearest - np.where(tied, TIE_CHI2, 0.0)) / (2 * np.sqrt(np.maximum(nearest, 1e-9)))
     return np.minimum(accepted, norm.cdf(ahead))
 

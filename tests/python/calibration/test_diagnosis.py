@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Diagnosis of logs that another program made; the answers are in their README."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from twinmill.calibration.diagnosis.diagnose import diagnose
 from twinmill.calibration.diagnosis.explain import explain
+from twinmill.calibration.diagnosis.ranking import rank
+from twinmill.calibration.diagnosis.screen import Screened, Screening
 from twinmill.calibration.fit import fit
 from twinmill.calibration.measurement import load_measurements
 from twinmill.calibration.model_file import ModelFile
@@ -82,3 +86,35 @@ def test_explain_writes_a_model_that_predicts_the_log(calibrated, case, tmp_path
     assert [s["effect"] for s in steps] == [None, "refit", "battery_sag"]
     scores = [s["score_heldout"] for s in steps]
     assert scores == sorted(scores, reverse=True)
+
+
+@pytest.mark.parametrize(("behind", "tied"), [(1.0, True), (20.0, False)])
+def test_an_effect_that_can_do_all_that_another_can_is_not_named_before_it(behind, tied):
+    """Four directions of noise and a trace in the first: by algebra the first alone fits as well.
+
+    What the four fit besides the trace is noise, so the one cannot imitate all of it.
+    """
+    many = np.eye(4)
+    left = many @ [5.0, 3.0, -3.0, 3.0]  # noise of size 3 but for the trace
+    signatures = [many, many[:, :1]]
+    screened = [
+        Screened(SimpleNamespace(effect=name), 52.0, 1.0, s.T @ left, 20.0, 0.001)
+        for name, s in zip(("many", "one"), signatures, strict=True)
+    ]
+    held = SimpleNamespace(over=lambda _: 1.0)
+    judged = [
+        SimpleNamespace(
+            trial=SimpleNamespace(effects=(name,), chi2=chi2, estimates=[], held=held),
+            evidence=9.0,
+            p_value=0.001,
+        )
+        for name, chi2 in (("many", 100.0), ("one", 100.0 + behind))
+    ]
+    this = SimpleNamespace(
+        before=SimpleNamespace(chi2=130.0),
+        screening=Screening(screened, signatures, left),
+        judged=judged,
+        accepted=judged[0],
+    )
+    ranking = rank(SimpleNamespace(rounds=[this]), ["many"], 30.0, [])
+    assert [r.group for r in ranking] == ([1, 1] if tied else [None, None])
