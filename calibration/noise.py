@@ -18,6 +18,10 @@ CHUNK = 256  # steps of one periodogram: 2 s at 120 Hz, a few times the disturba
 FEWEST_CHUNKS = 6
 FINER = 2  # frequencies per bin at which the spectrum is taken: exact up to memories of a stretch
 TRANSIENT = 20  # steps after a break in which the filter settles
+# Sensor and drive of position and heading that no capture and no floor are below: what a log made
+# without any noise leaves is the arithmetic of its maker, of which nothing can be learned.
+LEAST = ((1e-5, 1e-4), (1e-4, 1e-3))
+LEAST_MEMORY_S = 0.15
 
 
 @dataclass(frozen=True)
@@ -106,8 +110,8 @@ def fit_noise(errors: list[np.ndarray], moving: np.ndarray, grid: StepGrid) -> N
     bins = _bins(chunk)
     power = np.mean([_median_power(e, pieces, bins) for e in errors], axis=0)
     return Noise(
-        _fit_channel(power[:, :2].mean(1), bins, grid.period_s),
-        _fit_channel(power[:, 2], bins, grid.period_s),
+        _fit_channel(power[:, :2].mean(1), bins, grid.period_s, LEAST[0]),
+        _fit_channel(power[:, 2], bins, grid.period_s, LEAST[1]),
     )
 
 
@@ -148,7 +152,9 @@ def _median_of_exponentials(count: int) -> float:
     return float(waits[[(count - 1) // 2, count // 2]].mean())
 
 
-def _fit_channel(power: np.ndarray, bins: np.ndarray, period_s: float) -> ChannelNoise:
+def _fit_channel(
+    power: np.ndarray, bins: np.ndarray, period_s: float, least: tuple[float, float]
+) -> ChannelNoise:
     """Whittle's likelihood over sensor, drive and memory, with what each bin takes in from others.
 
     Debiased as by Sykulski et al. 2019, Biometrika 106(2): a short stretch blurs the spectrum, and
@@ -157,6 +163,8 @@ def _fit_channel(power: np.ndarray, bins: np.ndarray, period_s: float) -> Channe
     count = FINER * bins.shape[1]
     taken = np.abs(np.fft.fft(bins, count, axis=1)) ** 2 / count
     frequency_Hz = np.fft.fftfreq(count, period_s)
+    quiet = ChannelNoise(*least, LEAST_MEMORY_S)
+    power = np.maximum(power, taken @ quiet.spectrum(frequency_Hz, period_s))
     sensor = np.sqrt(power[-len(power) // 4 :].mean() / 4)
     drive = np.sqrt(power[: len(power) // 8].mean()) / period_s / 5
 

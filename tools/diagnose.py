@@ -6,8 +6,9 @@ from pathlib import Path
 
 import typer
 from twinmill.calibration.diagnosis import present
-from twinmill.calibration.diagnosis.diagnose import Diagnosis, diagnose
+from twinmill.calibration.diagnosis.diagnose import diagnose
 from twinmill.calibration.diagnosis.explain import Explanation, explain
+from twinmill.calibration.diagnosis.result import Diagnosis
 from twinmill.calibration.log import read_log
 from twinmill.calibration.measurement import load_measurements
 from twinmill.calibration.swarm_metrics import swarm_metrics

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from twinmill.calibration.compare import Comparison, comparison
-from twinmill.calibration.diagnosis.diagnose import Diagnosis, diagnose
+from twinmill.calibration.diagnosis.diagnose import diagnose
+from twinmill.calibration.diagnosis.result import Diagnosis
 from twinmill.calibration.diagnosis.robots import own_effects, own_values
 from twinmill.calibration.fit import common_clock, refit
 from twinmill.calibration.measurement import Measurement

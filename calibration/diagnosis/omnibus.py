@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from twinmill.calibration.diagnosis.changes import change_columns
 from twinmill.calibration.diagnosis.screen import project_out
 from twinmill.calibration.freedom import Free, words
 from twinmill.calibration.problem import CLOCK, Scene
@@ -17,6 +18,8 @@ from twinmill.calibration.residual import body_velocity, rotate
 from twinmill.calibration.solve import System
 from twinmill.calibration.track import command_at
 
+CHANGE = "change of the command"
+NO_VELOCITY = ""  # what a term adds to that only tells of a dependence
 FOLDS = 5
 AGAIN = 2.0  # times what was left elsewhere that is no news
 FLIPS = 499  # random signs of blocks that make the null distribution
@@ -203,7 +206,7 @@ class _Products:
 
 def _best_term(terms: list[Term], products: _Products, group: str) -> tuple[Term, float]:
     """The single term of a group that explains most, and its coefficient in its own unit."""
-    own = [i for i, t in enumerate(terms) if t.group == group]
+    own = [i for i, t in enumerate(terms) if t.group == group and t.adds_to != NO_VELOCITY]
     moment = products.moments.sum(0)[own]
     energy = np.diag(products.grams.sum(0))[own] + 1.0
     best = int(np.argmax(moment**2 / energy))
@@ -223,7 +226,9 @@ def _library(scenes: list[Scene], rows: int) -> tuple[list[Term], np.ndarray]:
             for axis, channel in enumerate(CHANNELS):
                 terms.append(Term(group, channel, formula, float(size)))
                 columns.append(_whitened(scene, values / size, axis))
-        parts.append(np.stack(columns, -1).reshape(-1, len(terms)))
+        kinds, more = change_columns(scene)
+        terms += [Term(CHANGE, NO_VELOCITY, kind, 1.0) for kind in kinds]
+        parts.append(np.hstack([np.stack(columns, -1).reshape(-1, len(named) * 3), more]))
     stacked = np.concatenate(parts)
     if len(stacked) != rows:
         raise ValueError(f"library has {len(stacked)} rows where the errors have {rows}")
@@ -273,12 +278,12 @@ def _named_terms(scene: Scene) -> dict[tuple[str, str], np.ndarray]:
         ("coupling of the axes", "vy*abs(omega)"): vy * np.abs(turn),
         ("coupling of the axes", "omega*abs(vx)"): turn * np.abs(vx),
         ("coupling of the axes", "omega*abs(vy)"): turn * np.abs(vy),
-        ("change of the command", "dvx"): change[0],
-        ("change of the command", "dvy"): change[1],
-        ("change of the command", "domega"): change[2],
-        ("change of the command", "abs(dvx)"): np.abs(change[0]),
-        ("change of the command", "abs(dvy)"): np.abs(change[1]),
-        ("change of the command", "abs(domega)"): np.abs(change[2]),
+        (CHANGE, "dvx"): change[0],
+        (CHANGE, "dvy"): change[1],
+        (CHANGE, "domega"): change[2],
+        (CHANGE, "abs(dvx)"): np.abs(change[0]),
+        (CHANGE, "abs(dvy)"): np.abs(change[1]),
+        (CHANGE, "abs(domega)"): np.abs(change[2]),
     }
     speeds = (("vx", vx), ("vy", vy), ("omega", turn))
     for n in (1, 2, 3):

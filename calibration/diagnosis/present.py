@@ -4,8 +4,8 @@
 from rich.console import Group, RenderableType
 from rich.text import Text
 from twinmill.calibration import show, tables, views
-from twinmill.calibration.diagnosis.diagnose import Diagnosis
 from twinmill.calibration.diagnosis.explain import Explanation, steps
+from twinmill.calibration.diagnosis.result import Diagnosis
 from twinmill.calibration.report import Section
 from twinmill.calibration.report.error_figures import waterfall
 from twinmill.calibration.report.sections import robot_pictures

@@ -5,11 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from twinmill.calibration.diagnosis.screen import Screening
-from twinmill.calibration.diagnosis.search import Judged, Round, Search
+from twinmill.calibration.diagnosis.search import (
+    CLOCK_OFF,
+    DELAY,
+    TIE_CHI2,
+    Judged,
+    Round,
+    Search,
+)
 from twinmill.calibration.solve import Estimate
 
 ALIKE = 0.9  # share of a signature that another effect imitates (0.95 as a correlation)
-TIE_CHI2 = 6.0  # difference of held-out chi2, over the excess scatter, that decides nothing
 FAINT_CHI2 = 2 * TIE_CHI2  # of what is not imitated: the difference is often no more than that
 
 
@@ -105,6 +111,8 @@ def _tied(this: Round) -> list[Judged]:
     for judged in this.judged:
         if judged is accepted or len(judged.trial.effects) > 1:
             continue
+        if (*accepted.trial.effects, *judged.trial.effects) == (DELAY, CLOCK_OFF):
+            continue  # the clocks are known, as far as a log can tell them
         other = _index(this.screening, judged.trial.effects[0])
         excess = max(this.screening.found[own].excess, this.screening.found[other].excess)
         close = judged.trial.chi2 - accepted.trial.chi2 < TIE_CHI2 * excess

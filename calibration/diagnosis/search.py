@@ -15,6 +15,8 @@ ALPHA = 0.01  # chance of accepting anything if nothing is missing, over all can
 TRIED, PAIRED = 6, 8
 SURE, BEHIND = 2, 0.2  # so many are tried in any case, others above this share of the best gain
 CLOSE = 1.02  # held-out scores whose ratio is nearer to 1 are decided by chi2
+TIE_CHI2 = 6.0  # difference of held-out chi2, over the excess scatter, that decides nothing
+DELAY, CLOCK_OFF = "input_delay", "clock_offset"
 MOST = 4
 WORTH = 0.98  # each effect must lower the held-out score to this share: certain is not important
 
@@ -77,6 +79,7 @@ def search(
             for pair in _drive_pairs(screening) if _only_tables(state) else likely:
                 this.judged.append(_judge(state, before, screening, pair))
             this.accepted = _best(before, this.judged, limit + np.log(len(found)))
+        this.accepted = _delay_for_clock(this)
         this.judged.sort(key=lambda j: j.trial.score)
         if this.accepted is None:
             break
@@ -118,6 +121,19 @@ def _best(before: Trial, judged: list[Judged], limit: float) -> Judged | None:
     smallest = min(j.trial.score for j in good)
     close = [j for j in good if j.trial.score <= CLOSE * smallest]
     return min(close, key=lambda j: j.trial.chi2)
+
+
+def _delay_for_clock(this: Round) -> Judged | None:
+    """A delay in place of a clock that is off, where both explain the same.
+
+    The clock's offset is in question only if a calibration log told it: it is then the delay that
+    is new.
+    """
+    if this.accepted is None or this.accepted.trial.effects != (CLOCK_OFF,):
+        return this.accepted
+    enough = this.accepted.evidence - TIE_CHI2 / 2
+    delays = [j for j in this.judged if j.trial.effects == (DELAY,) and j.evidence > enough]
+    return delays[0] if delays else this.accepted
 
 
 def _pairs(screening: Screening, least: float) -> list[tuple[int, int]]:

@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from twinmill.calibration.diagnosis.evidence import State
 from twinmill.calibration.diagnosis.ranking import Ranked
+from twinmill.calibration.freedom import catalogue
 from twinmill.calibration.solve import Estimate, System
 
 # A delay, a clock and a lag all hold a response back: a log tells their sum before their parts.
 LATE = ("input_delay.delay_s", "clock_offset.offset_s", "motor_lag.extra_s")
 LAG = "base.motor_lag_s"
+NEUTRAL = 1e-3  # so far from where an effect does nothing a bound is one
 
 
 @dataclass(frozen=True)
@@ -71,11 +73,23 @@ class Settled:
             for r in ranking
         ]
 
+    def at_bound(self, names: list[str]) -> list[Estimate]:
+        """Those of the found effects that are at a bound, unless it is where nothing happens."""
+        neutral = {
+            f"{name}.{p['name']}": p["neutral"]
+            for name in names
+            for p in catalogue()[name.split("#")[0]]["parameters"]
+        }
+        return [
+            e
+            for e in self.estimates.values()
+            if e.at_bound and abs(e.value - neutral.get(e.name, e.value)) > NEUTRAL
+        ]
+
     def notes(self, names: list[str]) -> list[str]:
         """Sentences on sums, and on found effects whose estimate is worth little."""
         bound = [
             f"{e.name} is at its bound ({e.value:.3g} {e.unit}): the effect may stand for another."
-            for e in self.estimates.values()
-            if e.at_bound and e.name.split(".")[0] in names
+            for e in self.at_bound(names)
         ]
         return [*(str(s) for s in self.sums), *bound]

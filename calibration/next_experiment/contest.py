@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from twinmill.calibration.diagnosis.candidates import Candidate, candidates
-from twinmill.calibration.diagnosis.diagnose import Diagnosis
 from twinmill.calibration.diagnosis.evidence import State
 from twinmill.calibration.diagnosis.ranking import Ranked
+from twinmill.calibration.diagnosis.result import Diagnosis
 from twinmill.calibration.diagnosis.screen import screen
 from twinmill.calibration.fit import refit
 from twinmill.calibration.freedom import Free, catalogue

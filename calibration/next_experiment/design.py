@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
-from twinmill.calibration.diagnosis.diagnose import Diagnosis
+from twinmill.calibration.diagnosis.result import Diagnosis
 from twinmill.calibration.freedom import base_quantities, catalogue
 from twinmill.calibration.measurement import SHORTEST_LOG_S
 from twinmill.calibration.model_file import ModelFile

@@ -3,8 +3,8 @@
 
 import numpy as np
 from scipy.stats import ncx2, norm
-from twinmill.calibration.diagnosis.ranking import ALIKE, FAINT_CHI2, TIE_CHI2
-from twinmill.calibration.diagnosis.search import ALPHA
+from twinmill.calibration.diagnosis.ranking import ALIKE, FAINT_CHI2
+from twinmill.calibration.diagnosis.search import ALPHA, TIE_CHI2
 from twinmill.calibration.next_experiment.relevance import Relevance
 
 STRENGTHS = (0.4, 1.0, 2.5)  # times the usual, each as probable

@@ -14,8 +14,29 @@ import twinmill_native as native
 from twinmill.calibration.log import RobotLog
 from twinmill.tools.import_log import ImportOptions, import_log
 
-BASE_MODEL = """
-name = "coaster"
+NOISE = """
+[noise]
+sensor_m = 0.0003
+sensor_rad = 0.0017
+drive_mps = 0.005
+drive_radps = 0.03
+"""
+
+
+@pytest.fixture(scope="session")
+def model_text() -> Callable[..., str]:
+    """Text of a model file: four mecanum wheels under a body of TurboPi's size."""
+
+    def make(name: str, **base: float | list[float]) -> str:
+        usual = {
+            "duty_pct": [0, 100],
+            "wheel_speed_mps": [0, 0.36],
+            "motor_lag_s": 0.06,
+            "control_period_s": 0.022,
+        }
+        keys = "".join(f"{key} = {value}\n" for key, value in (usual | base).items())
+        return f"""
+name = "{name}"
 [robot]
 wheel_radius_m = 0.0325
 half_wheelbase_m = 0.059
@@ -25,16 +46,9 @@ battery_nominal_V = 7.4
 [base]
 drive = "duty"
 wheels = "mecanum"
-duty_pct = [0, 100]
-wheel_speed_mps = [0, 0.36]
-motor_lag_s = 0.06
-control_period_s = 0.022
-[noise]
-sensor_m = 0.0003
-sensor_rad = 0.0017
-drive_mps = 0.005
-drive_radps = 0.03
-"""
+{keys}"""
+
+    return make
 
 
 @pytest.fixture(scope="session")
@@ -126,12 +140,13 @@ class CoastingRobot:
 
 
 @pytest.fixture(scope="session")
-def coasting_robot(tmp_path_factory) -> CoastingRobot:
+def coasting_robot(tmp_path_factory, model_text) -> CoastingRobot:
     """A robot with noise that rolls on after each stop; the user's model knows all but that."""
     folder = tmp_path_factory.mktemp("coasting")
     effect = '[[effect]]\nname = "coasting"\ndeceleration_mps2 = 0.7\n'
-    (folder / "model.toml").write_text(BASE_MODEL)
-    (folder / "true.toml").write_text(BASE_MODEL + effect)
+    known = model_text("coaster") + NOISE
+    (folder / "model.toml").write_text(known)
+    (folder / "true.toml").write_text(known + effect)
     command_t_s = np.arange(0, 120, 0.022)
     legs = np.random.default_rng(1).choice([-1, -0.8, -0.6, 0.6, 0.8, 1], (80, 2))
     legs[::2] = 0

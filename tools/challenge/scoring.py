@@ -4,7 +4,7 @@
 from collections import Counter
 
 from scipy.stats import binomtest
-from twinmill.calibration.diagnosis.diagnose import Diagnosis
+from twinmill.calibration.diagnosis.result import Diagnosis
 from twinmill.tools.challenge.cases import Case
 from twinmill.tools.challenge.truth import Truth
 

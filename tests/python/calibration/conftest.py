@@ -21,23 +21,12 @@ POSE_EVERY, COMMAND_EVERY = 4, 10  # 120 Hz and 48 Hz
 STANDSTILL_MPS = 1e-3
 EPOCH_US = 1_700_000_000_000_000
 LEVELS_PCT = (25, 50, 75, 100)
-
-MODEL = """
-name = "guess"
-[robot]
-wheel_radius_m = 0.0325
-half_wheelbase_m = 0.059
-half_track_m = 0.067
-body_radius_m = 0.1
-battery_nominal_V = 7.4
-[base]
-drive = "duty"
-wheels = "mecanum"
-duty_pct = [0, 25, 50, 75, 100]
-wheel_speed_mps = [0, 0.1, 0.2, 0.3, 0.4]
-motor_lag_s = 0.05
-control_period_s = 0.0208
-"""
+GUESS = {
+    "duty_pct": [0, 25, 50, 75, 100],
+    "wheel_speed_mps": [0, 0.1, 0.2, 0.3, 0.4],
+    "motor_lag_s": 0.05,
+    "control_period_s": 0.0208,
+}
 
 
 @dataclass(frozen=True)
@@ -180,11 +169,11 @@ def tanh_robot() -> type[TanhRobot]:
 
 
 @pytest.fixture(scope="session")
-def model_file(tmp_path_factory) -> Callable[..., ModelFile]:
+def model_file(tmp_path_factory, model_text) -> Callable[..., ModelFile]:
     """A model of the robot: all speeds, gains and lags guessed, but for the text put in."""
 
     def make(*changes: tuple[str, str], extra: str = "", name: str = "guess.toml") -> ModelFile:
-        text = MODEL
+        text = model_text("guess", **GUESS)
         for old, new in changes:
             assert old in text
             text = text.replace(old, new)

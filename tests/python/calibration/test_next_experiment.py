@@ -9,7 +9,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from twinmill.calibration.diagnosis.diagnose import Diagnosis, diagnose
+from twinmill.calibration.diagnosis.diagnose import diagnose
+from twinmill.calibration.diagnosis.result import Diagnosis
 from twinmill.calibration.diagnosis.search import ALPHA
 from twinmill.calibration.fit import fit
 from twinmill.calibration.freedom import Free

@@ -19,22 +19,6 @@ from twinmill.tools.challenge.script import write_rich_script
 ROOT = Path(__file__).resolve().parents[3]
 TWIN_RUN = os.environ.get("TWIN_RUN", str(ROOT / "build/bin/twin_run"))
 ROBOTS, DURATION_S = 3, 30
-PLAIN = """
-name = "plain"
-[robot]
-wheel_radius_m = 0.0325
-half_wheelbase_m = 0.059
-half_track_m = 0.067
-body_radius_m = 0.1
-battery_nominal_V = 7.4
-[base]
-drive = "duty"
-wheels = "mecanum"
-duty_pct = [0, 100]
-wheel_speed_mps = [0, 0.36]
-motor_lag_s = 0.06
-control_period_s = 0.022
-"""
 REAL = """
 [noise]
 sensor_m = 0.0003
@@ -51,15 +35,16 @@ WHEELS = "[[effect]]\nname = 'wheel_gain'\nfl = 0\nfr = 0\nrl = 0\nrr = 0\n"
 
 
 @pytest.fixture
-def logged(tmp_path):
+def logged(tmp_path, model_text):
     """Measurements of robots that a model with planted effects drives, and the plain model."""
 
     def make(planted: str, seed: int = 5):
         script, model, log = (tmp_path / n for n in ("s.csv", "real.toml", "run.lcmlog"))
         write_rich_script(script, DURATION_S, 3)
-        model.write_text(PLAIN + REAL + planted)
+        plain_text = model_text("plain")
+        model.write_text(plain_text + REAL + planted)
         plain = tmp_path / "plain.toml"
-        plain.write_text(PLAIN)
+        plain.write_text(plain_text)
         command = [TWIN_RUN, "--plant", "planar", "--model", model, "--n", ROBOTS, "--seed", seed]
         command += ["--script", script, "--spread-m", 6, "--duration-s", DURATION_S, "--log", log]
         subprocess.run([str(c) for c in command], check=True, capture_output=True)
