@@ -196,6 +196,44 @@ def test_a_patch_searched_over_the_floor_wins_on_fit_and_is_no_evidence(
         assert evidence[best] < np.log(len(catalogue()) / ALPHA)
 
 
+RAMP_S, PLAY_S = 0.1, 0.05
+
+
+def slewed(duty: np.ndarray) -> np.ndarray:
+    """Duties that take 0.1 s from 0 to 1."""
+    now, limited = np.zeros(4), np.empty_like(duty)
+    for k, wanted in enumerate(duty):
+        now = now + np.clip(wanted - now, -EULER_S / RAMP_S, EULER_S / RAMP_S)
+        limited[k] = now
+    return limited
+
+
+def with_play(duty: np.ndarray) -> np.ndarray:
+    """Duties that wait for 0.05 s at zero where a wheel changes its direction."""
+    played, side, left_s = np.empty_like(duty), np.zeros(4), np.zeros(4)
+    for k, wanted in enumerate(duty):
+        turned = (wanted * side < 0) & (wanted != 0)
+        side = np.where(wanted != 0, np.sign(wanted), side)
+        left_s = np.where(turned, PLAY_S, np.maximum(left_s - EULER_S, 0))
+        played[k] = np.where(left_s > 0, 0, wanted)
+    return played
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "name"), [(slewed, "slew_limit"), (with_play, "reversal_dead_time")]
+)
+def test_what_only_resembles_a_lag_is_not_called_one(tanh_robot, measure, fitted, spoilt, name):
+    """With its own name unknown, a lag or a delay explains most, but differs from step to step."""
+
+    class Odd(tanh_robot):
+        def wheels_mps(self, duty):
+            return super().wheels_mps(spoilt(duty))
+
+    found = diagnose([measure(Odd(), 15, 30.0)], fitted, barred=(name,))
+    assert found.verdict == "outside_catalogue"
+    assert "change of the command" in [g.group for g in found.omnibus.groups]
+
+
 def test_dead_zone_and_curve_are_both_found_in_a_log(tanh_robot, measure, model_file):
     """Wheels stand below 0.2 of the duty and then rise as a root; the base is a straight line."""
 
