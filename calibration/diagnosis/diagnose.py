@@ -31,8 +31,6 @@ from twinmill.calibration.problem import Scene
 from twinmill.calibration.solve import excited
 from twinmill.calibration.steady.limits import unseen_by_tables
 
-WORSE = 1.5  # score over that of the logs the model was fitted to, beyond which it is a finding
-
 
 def diagnose(
     measurements: list[Measurement],
@@ -109,7 +107,8 @@ def _concluded(
         settled.put_into(rank(done, names, explained + omnibus.gain, final.floors), names),
         omnibus,
         share,
-        steps[-1][1] > WORSE * model_file.usual_score(hashes),
+        steps[-1][1],
+        model_file.usual_score(hashes),
         noisier(model_file, final),
         settled.at_bound(names),
     )

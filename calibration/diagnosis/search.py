@@ -17,6 +17,7 @@ SURE, BEHIND = 2, 0.2  # so many are tried in any case, others above this share 
 CLOSE = 1.02  # held-out scores whose ratio is nearer to 1 are decided by chi2
 TIE_CHI2 = 6.0  # difference of held-out chi2, over the excess scatter, that decides nothing
 DELAY, CLOCK_OFF = "input_delay", "clock_offset"
+SILENT = 0.5  # score below which the rest is arithmetic of who made the log, and no physics
 MOST = 4
 WORTH = 0.98  # each effect must lower the held-out score to this share: certain is not important
 
@@ -69,6 +70,8 @@ def search(
         limit = np.log(max(len(found), 1) / ALPHA)
         this = Round(before, screening, [])
         done.rounds.append(this)
+        if before.score < SILENT:
+            break
         for i in _worth_trying(screening, limit):
             say(f"round {number + 1}: trying {screening.found[i].candidate.effect}")
             this.judged.append(_judge(state, before, screening, (i,)))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from twinmill.calibration.compare import GOOD
 from twinmill.calibration.diagnosis.omnibus import CHANGE, Omnibus
 from twinmill.calibration.diagnosis.ranking import Ranked, groups_of
+from twinmill.calibration.diagnosis.search import SILENT
 from twinmill.calibration.solve import Estimate
 
 HELPED = 0.95  # a refit that lowers the score below this share of it was worth it
@@ -20,6 +21,7 @@ LATE = {
     "reversal_dead_time",
     "coasting",
 }
+WORSE = 1.5  # score over the usual one, beyond which it is a finding
 IMITATED = 0.02  # the same share, of what depends on the kind of change, where one of LATE is found
 
 
@@ -31,7 +33,8 @@ class Weighed:
         score, score_refit: of the model as given, and with its base refitted.
         names: of the effects found.
         share: of what could be explained, unexplained by them.
-        worse: the score is left far above what the model has on the logs it was fitted to.
+        left: held-out score with the effects found.
+        usual: score of the model on the logs that it was fitted to.
         noises: what was said of unusual noise.
         at_bound: estimates of found effects that are at their bounds.
     """
@@ -42,7 +45,8 @@ class Weighed:
     ranking: list[Ranked]
     omnibus: Omnibus
     share: float
-    worse: bool
+    left: float
+    usual: float
     noises: list[str]
     at_bound: list[Estimate]
 
@@ -63,7 +67,8 @@ class Weighed:
         changes = any(g.group == CHANGE for g in self.omnibus.groups)
         imitated = changes and bool(LATE & set(self.names)) and self.share > IMITATED
         random = bool(self.noises) and not self.names
-        return self.share > OUTSIDE or imitated or self.worse or random
+        unexplained = (self.share > OUTSIDE or imitated) and self.left > SILENT
+        return unexplained or self.left > WORSE * self.usual or random
 
     @property
     def sentence(self) -> str:

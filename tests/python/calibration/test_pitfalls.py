@@ -161,10 +161,13 @@ def test_an_estimate_at_its_bound_is_said_to_be_worth_little(tanh_robot, measure
     assert f"{drag.name} is at its bound" in found.sentence
 
 
-def test_a_log_without_any_noise_tells_no_more_than_there_is(tanh_robot, measure, fitted):
+def test_a_log_without_any_noise_tells_no_more_than_there_is(
+    tanh_robot, measure, model_file, tmp_path
+):
     """What is left is 480 Hz Euler against the twin's own step: micrometres, and no physics."""
     silent = tanh_robot(sensor_m=0, sensor_rad=0, drive_mps=0, drive_radps=0)
-    found = diagnose([measure(silent, 14, 30.0)], fitted)
+    fit([measure(silent, 13, 30.0)], model_file(), tmp_path / "silent.toml", "")
+    found = diagnose([measure(silent, 14, 30.0)], ModelFile.load(str(tmp_path / "silent.toml")))
     assert found.verdict in ("model_adequate", "refit_enough") and found.found == []
 
 
@@ -177,7 +180,7 @@ def test_a_patch_searched_over_the_floor_wins_on_fit_and_is_no_evidence(
     """Nothing is hidden. The best of many places fits the noise there, and tells nothing of it."""
     for seed in (300, 301):
         scenes = open_scenes([measure(tanh_robot(), seed, 20.0)], fitted)
-        base = base_quantities(fitted.model, ())
+        base = base_quantities(fitted.model, fitted.told_by_others([]))
         refit(scenes, base)
         state = State(scenes, base, [np.ones((5, 3))])
         before = huber(scenes[0].white_errors())
@@ -187,7 +190,7 @@ def test_a_patch_searched_over_the_floor_wins_on_fit_and_is_no_evidence(
         for place in pose[:: len(pose) // PLACES, :2]:
             grown_scenes, fresh = grown(state, ("floor_patch",))
             at = dict(zip(("floor_patch.x_m", "floor_patch.y_m"), place, strict=True))
-            free = base + [replace(f, begin=at.get(f.name, f.begin)) for f in fresh]
+            free = state.free + [replace(f, begin=at.get(f.name, f.begin)) for f in fresh]
             solve(grown_scenes, free, rounds=8)
             gains.append(before - huber(grown_scenes[0].white_errors()))
             evidence.append((held - held_out(grown_scenes, free, state.floors).chi2) / 2)
