@@ -12,7 +12,7 @@ import twinmill_native as native
 from twinmill.calibration.freedom import Free, effect_names, effect_quantities
 from twinmill.calibration.heldout import HeldOut, held_out
 from twinmill.calibration.problem import Scene
-from twinmill.calibration.solve import Estimate, solve
+from twinmill.calibration.solve import Estimate, huber, solve
 
 ROUNDS, PRECISION = 8, 1e-6  # of a trial's fit
 
@@ -54,12 +54,14 @@ class Trial:
         held: errors of each half, fitted on the other.
         scenes: with the model fitted to all.
         estimates: of the added effects' parameters, fitted to all.
+        fitted_chi2: robust chi2 where it is fitted to all.
     """
 
     effects: tuple[str, ...]
     held: HeldOut
     scenes: list[Scene]
     estimates: list[Estimate]
+    fitted_chi2: float
 
     @property
     def chi2(self) -> float:
@@ -95,7 +97,16 @@ def attempt(state: State, effects: tuple[str, ...]) -> Trial:
     held = held_out(scenes, state.free + fresh, state.floors)
     names = {f.name for f in fresh}
     estimates = [e for e in solution.estimates if e.name in names]
-    return Trial(effects, held, scenes, estimates)
+    fitted_chi2 = sum(huber(s.white_errors()) for s in scenes)
+    return Trial(effects, held, scenes, estimates, fitted_chi2)
+
+
+def fall(less: Trial, more: Trial) -> float:
+    """Fall of chi2 by a richer model on drives that it was not fitted to.
+
+    It counts no further than on those it was fitted to: there it gains more, but for chance.
+    """
+    return min(less.chi2 - more.chi2, less.fitted_chi2 - more.fitted_chi2)
 
 
 def without(state: State, index: int) -> Trial:

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 from twinmill.calibration.diagnosis.candidates import candidates
-from twinmill.calibration.diagnosis.evidence import State, Trial, attempt, without
+from twinmill.calibration.diagnosis.evidence import State, Trial, attempt, fall, without
 from twinmill.calibration.diagnosis.screen import Screening, screen
 from twinmill.calibration.freedom import catalogue, effect_names
 
@@ -108,7 +108,7 @@ def _judge(state: State, before: Trial, screening: Screening, which: tuple[int, 
     found = [screening.found[i] for i in which]
     trial = attempt(state, tuple(f.candidate.effect for f in found))
     excess = max(f.excess for f in found)
-    evidence = (before.chi2 - trial.chi2) / (2 * excess)
+    evidence = fall(before, trial) / (2 * excess)
     return Judged(trial, evidence, min(f.p_value for f in found))
 
 
@@ -186,7 +186,7 @@ def _prune(state: State, done: Search, limit: float) -> State:
     whole = attempt(state, ()) if fresh > given else None
     for index in range(fresh - 1, given - 1, -1):
         less = without(state, index)
-        if (less.chi2 - whole.chi2) / 2 < limit:
+        if fall(less, whole) / 2 < limit:
             done.dropped.append(names[index])
             state, whole = replace(state, scenes=less.scenes), less
     return state

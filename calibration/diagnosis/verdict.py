@@ -85,7 +85,7 @@ class Weighed:
         if verdict == "ambiguous":
             same = " or ".join(groups_of(self.ranking, self.names))
             return f"Missing: one of {same}; these logs cannot tell which.{self._doubt}"
-        if not self.omnibus.groups and self.noises:
+        if self.noises and not self.names and (self.left < GOOD or not self.omnibus.groups):
             return "Something random disturbs the motion that no effect of the catalogue describes."
         on = " and ".join(g.group for g in self.omnibus.groups)
         depends = f"it depends on {on}" if on else "no formula that was tried describes it"
