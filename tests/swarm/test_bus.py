@@ -103,3 +103,42 @@ def test_malformed_command_does_not_end_twin_run(tmp_path):
             "wait $twin",
         ]
     )
+
+
+def test_selected_behaviour_reaches_the_robots_own_program(tmp_path):
+    """Robots 0 and 1 are driven by the program, 2 and 3 by the built-in firmware."""
+    begin_us, select = 1_700_000_000_000_000, turbopi.swarm_command_t()
+    select.utime_us, select.robot_id, select.seq = begin_us, -1, 1
+    select.verb, select.behavior = select.VERB_SELECT, "diffusing"
+    order, own = tmp_path / "order", tmp_path / "own"
+    log = lcm.EventLog(str(order), "w")
+    for i in range(100):  # until it is heard; copies are not obeyed again
+        log.write_event(i * 50_000, "SWARM_COMMAND", select.encode())
+    log.close()
+    bus = "udpm://239.255.76.67:7667?ttl=0"
+    in_one_network(
+        [
+            f"{TWIN_RUN} --plant planar --sensor camera --n 4 --hil 2 --spread-m 0.8 "
+            f"--duration-s 6 --epoch-us {begin_us} --log {own} --lcm-url '{bus}' & twin=$!",
+            f"sleep {2 * SETTLE_S}",
+            f"lcm-logplayer {order} & player=$!",
+            "wait $twin",
+            "kill $player || true",
+        ]
+    )
+    acks, rows = {}, {}
+    for channel, data in events(own):
+        if channel.endswith("_ACK"):
+            acks.setdefault(channel[:3], turbopi.ack_t.decode(data))
+        elif channel.endswith("_TELEMETRY") and channel[:3] in acks:
+            said = turbopi.telemetry_t.decode(data)
+            duties = tuple(said.wheel_duty_pct)
+            rows.setdefault(said.robot_id >= 2, {}).setdefault(said.detected, set()).add(duties)
+    assert sorted(acks) == ["R00", "R01", "R02", "R03"] and all(a.accepted for a in acks.values())
+    program, built_in = rows[False], rows[True]
+    assert set(program) & set(built_in), "no bit that both kinds saw"
+    for bit, duties in program.items():
+        assert len(duties) == 1  # of the first frame on
+        assert bit not in built_in or duties == built_in[bit]
+    # Milling would turn on the way: 37 and 100 %.
+    assert all(37 not in map(abs, row) for duties in program.values() for row in duties)

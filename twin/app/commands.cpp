@@ -112,7 +112,7 @@ void Commands::Select(int id, const std::string &name)
     const fw_behavior *behavior = FindBehavior(name, options_.own);
     if (!behavior)
         throw std::invalid_argument("no behaviour '" + name + "'");
-    swarm_.SetTable(id, behavior->table);
+    swarm_.Select(id, *behavior);
     swarm_.Play(id, robots_[static_cast<size_t>(id)].script = nullptr);
     publisher_.SetBehavior(id, name);
 }

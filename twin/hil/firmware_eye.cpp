@@ -12,13 +12,35 @@ namespace twin
 FirmwareEye::FirmwareEye(const FirmwareOptions &options, const CameraWorld &world, int robot,
                          const Sight &sight, uint64_t seed)
     : CameraEye(world, robot, sight, seed),
-      process_(std::make_unique<Process>(options, world.settings, robot,
-                                         static_cast<int>(std::lround(sight.vote_frames)))),
-      lockstep_(options.lockstep)
+      options_(options),
+      camera_(world.settings),
+      robot_(robot),
+      vote_frames_(static_cast<int>(std::lround(sight.vote_frames))),
+      process_(std::make_unique<Process>(options_, camera_, robot_, vote_frames_))
 {
 }
 
 FirmwareEye::~FirmwareEye() = default;
+
+void FirmwareEye::Select(const fw_behavior &behavior)
+{
+    options_.behavior = behavior.name;
+    process_.reset();
+    process_ = std::make_unique<Process>(options_, camera_, robot_, vote_frames_);
+    for (const std::vector<uint8_t> &frame : recent_)
+    {
+        process_->Send(frame);
+        process_->Receive(true);
+    }
+}
+
+void FirmwareEye::Show(std::span<const uint8_t> frame)
+{
+    if (recent_.size() == static_cast<size_t>(vote_frames_))
+        recent_.pop_front();
+    recent_.emplace_back(frame.begin(), frame.end());
+    process_->Send(frame);
+}
 
 void FirmwareEye::Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
                          fw_output &out)
@@ -26,8 +48,8 @@ void FirmwareEye::Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &f
     const std::optional<fw_frame> frame = NextFrame(poses, now_us);
     fw_step(&firmware, frame ? &*frame : nullptr, now_us, &out);
     if (frame)
-        process_->Send({frame->yuyv, frame->length_bytes});
-    process_->Receive(lockstep_);
+        Show({frame->yuyv, frame->length_bytes});
+    process_->Receive(options_.lockstep);
     // A robot that an operator holds stands, though its program does not know.
     if (out.mode == FW_MODE_TABLE)
         std::memcpy(out.wheel_duty_pct, process_->wheel_duty_pct().data(),

@@ -101,10 +101,13 @@ void Swarm::SetRunning(int robot, bool running)
     fw_set_running(&members_[static_cast<size_t>(robot)].firmware, running);
 }
 
-void Swarm::SetTable(int robot, const fw_table &table)
+void Swarm::Select(int robot, const fw_behavior &behavior)
 {
-    if (fw_set_table(&members_[static_cast<size_t>(robot)].firmware, &table) != FW_OK)
+    Member &member = members_[static_cast<size_t>(robot)];
+    if (fw_set_table(&member.firmware, &behavior.table) != FW_OK)
         throw std::invalid_argument("the firmware refuses the table");
+    if (member.eye)
+        member.eye->Select(behavior);
 }
 
 void Swarm::LookThrough(int robot, std::unique_ptr<Eye> eye)

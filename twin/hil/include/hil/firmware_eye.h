@@ -5,8 +5,11 @@
 #ifndef HIL_FIRMWARE_EYE_H
 #define HIL_FIRMWARE_EYE_H
 
+#include <deque>
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "swarm/camera_eye.h"
 
@@ -34,11 +37,19 @@ public:
     // std::runtime_error if the program is gone or silent.
     void Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
                 fw_output &out) override;
+    // Starts the program anew with that behaviour, and shows it the frames that its vote is about:
+    // it then decides as one that was told while it ran.
+    void Select(const fw_behavior &behavior) override;
 
 private:
     class Process;
+    void Show(std::span<const uint8_t> frame);
+
+    FirmwareOptions options_;
+    CameraSettings camera_;
+    int robot_, vote_frames_;
     std::unique_ptr<Process> process_;
-    bool lockstep_;
+    std::deque<std::vector<uint8_t>> recent_;
 };
 
 }  // namespace twin

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "fw/behavior.h"
 #include "fw/step.h"
 #include "plant/plant.h"
 
@@ -27,6 +28,8 @@ public:
     // written. `now_us` is the robots' clock.
     virtual void Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
                         fw_output &out) = 0;
+    // The robot plays `behavior` from now on: for those who do not leave that to its `firmware`.
+    virtual void Select(const fw_behavior &) {}
     // What was drawn last, empty before; valid until the next Decide().
     virtual Picture LastPicture() const = 0;
 };

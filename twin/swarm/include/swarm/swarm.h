@@ -47,7 +47,7 @@ public:
     // What an operator may tell a robot: stand or go, and which table. Throws std::invalid_argument
     // if the firmware refuses the table.
     void SetRunning(int robot, bool running);
-    void SetTable(int robot, const fw_table &table);
+    void Select(int robot, const fw_behavior &behavior);
 
     // From now on `robot` decides by `eye` instead of the cone.
     void LookThrough(int robot, std::unique_ptr<Eye> eye);
