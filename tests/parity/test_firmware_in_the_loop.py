@@ -47,11 +47,20 @@ def test_program_gives_the_duties_of_the_built_in_firmware(tmp_path, n, argument
     assert len({tuple(t.wheel_duty_pct) for t in telemetry(alone)}) > 1
 
 
-def test_a_delayed_sensor_delays_the_program_alike(tmp_path):
-    model = tmp_path / "late.toml"
+def test_effects_of_the_sensor_act_on_the_program_alike(tmp_path):
+    model = tmp_path / "poor.toml"
     installed = Path(__file__).parents[2] / "twin/models/turbopi/turbopi.toml"
     text = installed.read_text().replace("vote_frames = 10", "vote_frames = 3\ndelay_s = 0.1")
-    effects = {"view_pan": "pan_rad = 0.2\n", "vote": "extra_frames = 1\n"}
+    effects = {
+        "view_pan": "pan_rad = 0.2\n",
+        "vote": "extra_frames = 1\n",
+        "view_range": "factor = 1.5\nsoftness_m = 0.1\n",
+        "view_angle": "factor = 1.3\n",
+        "missed_detection": "rate = 0.3\n",
+        "false_detection": "rate = 0.2\n",
+        "occlusion": "radius_m = 0.1\n",
+        "sensor_delay": "delay_s = 0.05\n",
+    }
     text += "".join(f'[[effect]]\nname = "{name}"\n{rest}' for name, rest in effects.items())
     model.write_text(text)
     alone, looped = tmp_path / "alone.lcmlog", tmp_path / "looped.lcmlog"

@@ -196,7 +196,7 @@ TEST(Camera, SameSeedSameBytes)
 // A target straight ahead of a camera that looks left by the pan lands right of the middle.
 TEST(CameraEye, LooksWhereItsPanSays)
 {
-    Sight sight;
+    Sight sight = CameraSight({}, {});
     sight.pan_rad = 0.3;
     CameraEye eye({}, 0, sight, 1);
     const fw_config config = fw_config_default();
@@ -219,7 +219,7 @@ TEST(CameraEye, LooksWhereItsPanSays)
 TEST(CameraEye, AFrameArrivesAfterItsDelay)
 {
     const CameraWorld world;
-    Sight sight;
+    Sight sight = CameraSight({}, world);
     sight.delay_s = 0.05;
     CameraEye eye(world, 0, sight, 1);
     fw_config config = fw_config_default();

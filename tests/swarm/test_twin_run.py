@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import lcm
 import numpy as np
@@ -191,3 +192,43 @@ def test_camera_draws_frames_and_decides_by_them(tmp_path):
     assert {t.detected_raw for t in telemetry} == {0, 1}
     # The authors' limit on the blob's size.
     assert all((t.blob_px > 300) == t.detected_raw for t in telemetry)
+
+
+# What each effect does to the share of frames in which robots that stand see another one.
+EFFECTS_OF_SIGHT = {
+    "missed_detection": ("rate = 0.5", lambda shares: shares / 2),
+    "false_detection": ("rate = 0.5", lambda shares: np.maximum(shares, 0.5)),
+    "view_range": ("factor = 0.05", lambda shares: 0 * shares),
+    "view_angle": ("factor = 0.05", lambda shares: 0 * shares),
+    "sensor_delay": ("delay_s = 0.2", lambda shares: 0.8 * shares),  # of one second
+}
+
+
+@pytest.mark.parametrize("plant", ["planar", "mujoco"])
+def test_effects_of_the_model_act_in_drawn_frames(tmp_path, plant):
+    nobody_moves = tmp_path / "own.toml"
+    nobody_moves.write_text('stand = "0,0,0,0"\n')
+    installed = Path(__file__).parents[2] / "twin/models/turbopi/turbopi.toml"
+
+    def shares(effect=""):
+        model, log = tmp_path / "m.toml", tmp_path / "a.lcmlog"
+        model.write_text(installed.read_text() + effect)
+        words = "--sensor camera --n 4 --spread-m 0.8 --seed 2 --duration-s 1 --behavior stand"
+        done = run(
+            *(*words.split(), "--behaviors", nobody_moves, "--log", log), plant=plant, model=model
+        )
+        assert done.returncode == 0, done.stderr
+        said = [read(log)[0][f"R{i:02d}_TELEMETRY"] for i in range(4)]
+        return np.array([np.mean([t.detected_raw for t in robot]) for robot in said])
+
+    plain = shares()
+    assert set(plain) == {0, 1}
+    for name, (values, expected) in EFFECTS_OF_SIGHT.items():
+        found = shares(f'[[effect]]\nname = "{name}"\n{values}\n')
+        # Three standard deviations of a share of 45 frames at 1/2.
+        np.testing.assert_allclose(found, expected(plain), atol=0.23, err_msg=name)
+        certain = (expected(plain) == 0) | (expected(plain) == 1)
+        np.testing.assert_array_equal(found[certain], expected(plain)[certain], err_msg=name)
+    # A body that wide hides whatever is not the nearest.
+    hidden = shares('[[effect]]\nname = "occlusion"\nradius_m = 0.5\n')
+    assert (hidden <= plain).all() and hidden.sum() < plain.sum()

@@ -48,7 +48,7 @@ void UseFirmware(Swarm &swarm, const HilOptions &options, const CameraWorld &wor
     for (int i = 0; i < options.robots; ++i)
     {
         const size_t k = static_cast<size_t>(i);
-        const Sight sight = robots[k].MakeSight();
+        const Sight sight = CameraSight(robots[k], world);
         const FirmwareOptions firmware{program, behaviors[k]->name, !options.free_run};
         swarm.LookThrough(i, std::make_unique<FirmwareEye>(firmware, world, i, sight, seed));
     }

@@ -97,6 +97,11 @@ bool InView(const Pose2 &eye, const Pose2 &target, const Sight &sight)
            sight.target_radius_m;
 }
 
+bool Hidden(std::span<const Pose2> poses, size_t self, size_t target, const Sight &sight)
+{
+    return Clear(poses, self, target, sight, {}) == 0;
+}
+
 double ViewProbability(std::span<const Pose2> poses, size_t self, const Sight &sight,
                        const Blur &blur)
 {

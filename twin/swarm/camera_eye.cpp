@@ -6,21 +6,10 @@
 namespace twin
 {
 
-namespace
-{
-
-CameraSettings Panned(CameraSettings settings, double pan_rad)
-{
-    settings.pan_rad += pan_rad;
-    return settings;
-}
-
-}  // namespace
-
 CameraEye::CameraEye(const CameraWorld &world, int robot, const Sight &sight, uint64_t seed)
-    : world_(world),
-      self_(static_cast<size_t>(robot)),
-      camera_(Panned(world.settings, sight.pan_rad), robot, seed),
+    : self_(static_cast<size_t>(robot)),
+      sightings_(world, robot, sight, seed),
+      camera_(sightings_.settings(), robot, seed),
       age_us_(std::llround(sight.age_s * 1e6)),
       delay_us_(std::llround(sight.delay_s * 1e6))
 {
@@ -37,13 +26,11 @@ std::optional<fw_frame> CameraEye::NextFrame(std::span<const Pose2> poses, int64
     }
     if (!due)
         return std::nullopt;
-    Scene scene = RobotsSeenBy(self_, due->poses, world_.target);
-    scene.balls.insert(scene.balls.end(), world_.distractors.begin(), world_.distractors.end());
-    frame_ = camera_.Draw(scene, due->poses[self_]);
+    frame_ = camera_.Draw(sightings_.Next(due->poses), due->poses[self_]);
     fw_frame frame{};
     frame.yuyv = frame_.data();
-    frame.width_px = world_.settings.width_px;
-    frame.height_px = world_.settings.height_px;
+    frame.width_px = sightings_.settings().width_px;
+    frame.height_px = sightings_.settings().height_px;
     frame.stride_bytes = 2 * frame.width_px;
     frame.utime_us = due->utime_us;
     frame.seq = due->seq;

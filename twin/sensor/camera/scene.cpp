@@ -56,7 +56,21 @@ Colour Colour::FromRgb(double red, double green, double blue)
             Byte(128 + 224 * (red - luma) / 1.402)};
 }
 
-Scene RobotsSeenBy(size_t self, std::span<const Pose2> poses, Target target)
+double TargetArea(Target target)
+{
+    if (target == Target::kBall)
+        return std::numbers::pi * kBallRadius_m * kBallRadius_m;
+    // A turned rectangle is as wide as its outline over pi, on average (Cauchy).
+    return 4 * (kCover.half_m.x() + kCover.half_m.y()) / std::numbers::pi * 2 * kCover.half_m.z();
+}
+
+Colour TargetColour()
+{
+    return kGreen;
+}
+
+Scene RobotsSeenBy(size_t self, std::span<const Pose2> poses, Target target,
+                   std::span<const double> target_scales)
 {
     static const std::vector<Part> parts = BodyParts();
     Scene scene;
@@ -76,10 +90,13 @@ Scene RobotsSeenBy(size_t self, std::span<const Pose2> poses, Target target)
         };
         for (const Part &part : parts)
             add(part);
+        const double scale = target_scales.empty() ? 1 : target_scales[i];
+        if (scale == 0)
+            continue;
         if (target == Target::kCover)
-            add(kCover);
+            add({kCover.centre_m, scale * kCover.half_m, kCover.colour});
         else
-            scene.balls.push_back({in_world(kBallAt_m), kBallRadius_m, kGreen});
+            scene.balls.push_back({in_world(kBallAt_m), scale * kBallRadius_m, kGreen});
     }
     return scene;
 }

@@ -49,8 +49,14 @@ enum class Target
     kCover  // a box over the upper deck
 };
 
+// Mean area of a target as seen from its own height, in m^2.
+double TargetArea(Target target);
+Colour TargetColour();
+
 // What robot `self` may see of all the robots: the rest of them, sizes as in turbopi.xml.
-Scene RobotsSeenBy(size_t self, std::span<const Pose2> poses, Target target);
+// `target_scales`, one per robot, enlarge or shrink their targets; 0: none. Without: 1.
+Scene RobotsSeenBy(size_t self, std::span<const Pose2> poses, Target target,
+                   std::span<const double> target_scales = {});
 
 // Coloured balls, none of them green, that lie on the floor in a ring about the origin.
 std::vector<Ball> Distractors(int count, double ring_radius_m, uint64_t seed);

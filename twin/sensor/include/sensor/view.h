@@ -17,6 +17,9 @@ namespace twin
 // may be in the cone. Edges are sharp, and nothing hides the target.
 bool InView(const Pose2 &eye, const Pose2 &target, const Sight &sight);
 
+// Whether the body of another robot, of hide_radius_m, hides robot `target` from `self`.
+bool Hidden(std::span<const Pose2> poses, size_t self, size_t target, const Sight &sight);
+
 // How well poses are known: standard deviations. All zero: exactly.
 struct Blur
 {

@@ -8,24 +8,17 @@
 #include <vector>
 
 #include "sensor/camera.h"
+#include "swarm/camera_sight.h"
 #include "swarm/eye.h"
 
 namespace twin
 {
 
-// What all cameras of a swarm share.
-struct CameraWorld
-{
-    Target target = Target::kBall;
-    std::vector<Ball> distractors;
-    CameraSettings settings;
-};
-
 class CameraEye : public Eye
 {
 public:
-    // Of `sight`, a picture has the pan and the delays: a frame's time stamp is age_s after its
-    // exposure, and it reaches the firmware delay_s after that. The rest is in the pixels.
+    // `sight` by CameraSight(): a frame's time stamp is age_s after its exposure, and it reaches
+    // the firmware delay_s after that. The rest is in the pixels.
     CameraEye(const CameraWorld &world, int robot, const Sight &sight, uint64_t seed);
 
     void Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
@@ -33,7 +26,7 @@ public:
 
     Picture LastPicture() const override
     {
-        return {frame_, world_.settings.width_px, world_.settings.height_px};
+        return {frame_, sightings_.settings().width_px, sightings_.settings().height_px};
     }
 
 protected:
@@ -47,8 +40,8 @@ private:
         int64_t utime_us;  // time stamp
         uint32_t seq;
     };
-    CameraWorld world_;
     size_t self_;
+    CameraSightings sightings_;
     Camera camera_;
     int64_t age_us_, delay_us_;
     uint32_t seq_ = 0;

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// The effects of view and decide in drawn frames. All act in the picture, so that the firmware's
+// threshold, built in or in a program of its own, finds what the effect says.
+#ifndef SWARM_CAMERA_SIGHT_H
+#define SWARM_CAMERA_SIGHT_H
+
+#include <span>
+#include <vector>
+
+#include "model_file/model.h"
+#include "plant/random.h"
+#include "sensor/camera.h"
+
+namespace twin
+{
+
+// What all cameras of a swarm share.
+struct CameraWorld
+{
+    Target target = Target::kBall;
+    std::vector<Ball> distractors;
+    CameraSettings settings;
+};
+
+// What such a camera sees by itself, without errors, changed by the effects of `robot`. Of the
+// model's [sensor], which describes the cone, it takes delay and vote alone. Throws
+// std::invalid_argument in one sentence if no picture can show what the effects ask for.
+Sight CameraSight(const Model &robot, const CameraWorld &world);
+
+// Draws what camera `robot` is given to see, by CameraSight:
+// pan      the camera is turned;
+// cone     a lens of another focal length, and targets that keep their size in the picture;
+// range    more or less of a target is green, so that it fills the firmware's limit at that range;
+//          a soft edge draws the range anew for each target and frame;
+// hiding   a target behind a body of that radius is not drawn;
+// misses   no target is drawn; false detections: a green spot twice the limit in the middle.
+class CameraSightings
+{
+public:
+    CameraSightings(const CameraWorld &world, int robot, const Sight &sight, uint64_t seed);
+
+    const CameraSettings &settings() const { return settings_; }
+    // The scene of the next frame while robots are at `poses`.
+    Scene Next(std::span<const Pose2> poses);
+
+private:
+    double TargetScale(std::span<const Pose2> poses, size_t target);
+    Ball FalseTarget(const Pose2 &pose) const;
+
+    CameraWorld world_;
+    size_t self_;
+    Sight sight_;
+    CameraSettings settings_;
+    double own_range_m_, scale_of_lens_;
+    Random random_;
+    std::vector<double> scales_;
+};
+
+}  // namespace twin
+
+#endif
