@@ -57,14 +57,16 @@ def watch(save: Path) -> dict:
 
 
 def main(folder: Path) -> dict:
-    drivers = [drive(folder / "robots", "", 1), drive(folder / "twins", TWIN, 2)]
-    result = {"actors": listen(folder / "heard")}
-    if find_spec("rerun"):
-        result["said"] = watch(folder / "shown.rrd")
-    for driver in drivers:
-        driver.send_signal(signal.SIGINT)
-        if driver.wait(timeout=20):
-            raise RuntimeError("twin_run failed")
+    with drive(folder / "robots", "", 1) as robots, drive(folder / "twins", TWIN, 2) as twins:
+        try:
+            result = {"actors": listen(folder / "heard")}
+            if find_spec("rerun"):
+                result["said"] = watch(folder / "shown.rrd")
+        finally:
+            for driver in (robots, twins):
+                driver.send_signal(signal.SIGINT)
+    if robots.returncode or twins.returncode:
+        raise RuntimeError("twin_run failed")
     return result
 
 
