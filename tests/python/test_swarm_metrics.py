@@ -81,7 +81,8 @@ def test_the_log_tells_what_the_twin_told(tmp_path: Path, capsys):
     if not program.exists():
         pytest.skip(f"no {program}: set TWINMILL_BIN")
     log = tmp_path / "run.lcmlog"
-    command = [program, "--plant", "planar", "--model", "paper.toml", "--duration-s", "40"]
+    command = [program, "--plant", "planar", "--model", "paper.toml", "--behavior"]
+    command += ["milling", "--duration-s", "40"]
     told = json.loads(
         subprocess.check_output([*command, "--n", "6", "--log", log, "--json"], text=True)
     )

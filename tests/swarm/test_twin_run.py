@@ -36,7 +36,8 @@ def read(path):
 
 def test_log_holds_what_real_robots_would_say(tmp_path):
     log = tmp_path / "a.lcmlog"
-    assert run("--n", 3, "--duration-s", 11, "--log", log).returncode == 0
+    result = run("--n", 3, "--behavior", "milling", "--duration-s", 11, "--log", log)
+    assert result.returncode == 0
     messages, stamps = read(log)
     assert set(messages) == {
         name
@@ -65,7 +66,7 @@ def test_log_holds_what_real_robots_would_say(tmp_path):
 
 def test_poses_follow_the_unicycle_between_decisions(tmp_path):
     log = tmp_path / "a.lcmlog"
-    run("--n", 1, "--duration-s", 5, "--log", log)
+    run("--n", 1, "--behavior", "milling", "--duration-s", 5, "--log", log)
     poses = read(log)[0]["R00_POSE"]
     xy = np.array([p.position_m[:2] for p in poses])
     theta = np.unwrap([2 * np.arctan2(p.orientation_wxyz[3], p.orientation_wxyz[0]) for p in poses])
@@ -183,7 +184,8 @@ def test_camera_draws_frames_and_decides_by_them(tmp_path):
     logs = []
     for seed in (1, 1, 2):
         log = tmp_path / f"{len(logs)}.lcmlog"
-        done = run("--sensor", "camera", "--n", 3, "--duration-s", 1, "--seed", seed, "--log", log)
+        where = ("--start", "square", "--n", 3, "--seed", seed)
+        done = run("--sensor", "camera", *where, "--duration-s", 1, "--log", log)
         assert done.returncode == 0, done.stderr
         logs.append(log.read_bytes())
     assert logs[0] == logs[1] != logs[2]

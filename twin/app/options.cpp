@@ -61,7 +61,8 @@ void AddWorld(CLI::App &app, Options &o)
     app.add_option("--script", o.script, "CSV of inputs or duties that all play instead")
         ->check(CLI::ExistingFile);
     app.add_option("--seed", o.seed, "same seed, same run")->capture_default_str();
-    AddChoice(app, "--start", o.start, kStarts, "where they start");
+    AddChoice(app, "--start", o.start, kStarts,
+              "where they start; default with --spread-m: square");
     app.add_option("--spread-m", o.spread_m, "side of the square, diameter of the disc")
         ->check(CLI::Range(0.01, 1000.0))
         ->capture_default_str();
@@ -129,6 +130,8 @@ Options ParseOptions(int argc, const char *const *argv)
     try
     {
         app.parse(argc, argv);
+        if (app.count("--spread-m") > 0 && app.count("--start") == 0)
+            options.start = StartShape::kSquare;
     }
     catch (const CLI::CallForVersion &)
     {

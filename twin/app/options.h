@@ -22,15 +22,15 @@ enum class PlantKind
 
 struct Options
 {
-    std::string mjcf = "turbopi.xml", model = "turbopi.toml", behavior = "milling";
+    std::string mjcf = "turbopi.xml", model = "turbopi.toml", behavior = "milling_cmaes";
     PlantKind plant = PlantKind::kMujoco;
     std::string sensor = "cone";
     CameraOptions camera;
     HilOptions hil;
     std::optional<int> n;
     uint64_t seed = 1;
-    StartShape start = StartShape::kSquare;
-    double spread_m = 1.2;
+    StartShape start = StartShape::kFacingOut;
+    double spread_m = 1.2;  // of square and disc
     std::optional<double> duration_s, dt_s, realtime_factor;
     double pose_rate_hz = 120;
     std::string script, behaviors, log, channel_prefix, script_dir = ".";
