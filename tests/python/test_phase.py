@@ -97,6 +97,7 @@ def test_experiments_belong_to_the_cell_around_them_or_to_none():
         ("v_mps,class\n0.1,milling\n", "no column 'omega_degps'"),
         ("v_mps,omega_degps,class\n0.1,30,miling\n", "nearest is 'milling'"),
         ("v_mps,omega_degps,class\n0.1,fast,milling\n", "line 2"),
+        ("v_mps,omega_degps,class\nnan,30,milling\n", "v_mps is .nan.: it must be a number"),
         ("v_mps,omega_degps,class\n", "no experiment"),
     ],
 )

@@ -61,6 +61,8 @@ def test_a_page_and_an_exit_code(tmp_path, capsys, monkeypatch):
     assert cli.run(["claims", "--only", "alike", "--seeds", "30"]) == 1
     with pytest.raises(ValueError, match="--only alik: must be one of milling"):
         cli.run(["claims", "--only", "alik"])
+    with pytest.raises(ValueError, match="--odd-turn nan: must be from -4 to 4"):
+        cli.run(["claims", "--only", "bullseye", "--odd-turn", "nan"])
 
 
 def literally(n: int, seeds: int, spread: float = 0.04) -> float:

@@ -27,6 +27,8 @@ NOTE = (
     "within 5 %, as the reference's own change by 9 % with its time step."
 )
 
+MOST_TURN = 4  # the ring's turn input is 0.5, and 2 is the most
+
 
 def register(app: typer.Typer) -> None:
     """Adds the command to the application."""
@@ -57,6 +59,8 @@ def _claims(
     names = only or list(CLAIMS)
     if unknown := [name for name in names if name not in CLAIMS]:
         raise ValueError(f"--only {unknown[0]}: must be one of {', '.join(CLAIMS)}.")
+    if strange := [turn for turn in odd_turn or [] if not abs(turn) <= MOST_TURN]:
+        raise ValueError(f"--odd-turn {strange[0]:g}: must be from -{MOST_TURN} to {MOST_TURN}.")
     if out:
         check_new_folder(out)
     found = []

@@ -101,16 +101,16 @@ def _table(shown: list[Entry]) -> Table:
             Cell(f"{100 * entry.share:.0f}"),
             Cell(number(entry.alike, 2)),
             *(Cell(number(value, 2)) for value in entry.measures),
-            Cell(entry.command),
+            Cell(entry.mix.behavior(entry.name)),
         ]
         for entry in shown
     ]
     runs = shown[0].confirmed
     return Table(
         "The most repeatable of each kind",
-        ["name", "kind", "% of its kind", "alike", *MEASURES, "run it"],
+        ["name", "kind", "% of its kind", "alike", *MEASURES, "behaviour"],
         rows,
         f"The share is of {runs} runs with fresh seeds. Alike: 1 is the same whatever the seed. "
-        "Circliness and scatter are powers of 10.",
+        "Circliness and scatter are powers of 10. The last column goes after --behavior.",
         words=(0, 1, 4 + len(MEASURES)),
     )

@@ -174,10 +174,12 @@ def _ask(
     section = Section(
         title=f"{question.replace('-', ' ').capitalize()}? {behavior}",
         score=[],
-        verdict=" ".join(sentences),
+        verdict=_capital(sentences[0])
+        if len(sentences) == 1
+        else f"What each of these {len(sentences)} allows stands under its figure.",
         facts=[("model", model), ("runs", f"{seeds} of {duration_s:g} s at each value")],
         figures=[
-            _figure(curve, wanted, sentence, at_least)
+            _figure(curve, wanted, _capital(sentence) if len(curves) > 1 else "", at_least)
             for curve, sentence in zip(curves, sentences, strict=True)
         ],
     )
@@ -204,4 +206,9 @@ def _figure(curve: Curve, goal: str, sentence: str, at_least: float) -> Figure:
         axes.axhline(at_least, color=MEASURED, lw=0.8, ls="--")
         axes.set(ylim=(0, 1.03), xlabel=curve.axis.label, ylabel=f"share that ends '{goal}'")
 
-    return Figure(draw(2.8, paint), curve.axis.label.capitalize(), sentence)
+    dashed = f" Dashed: {100 * at_least:.0f} %."
+    return Figure(draw(2.8, paint), _capital(curve.axis.label), sentence + dashed)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

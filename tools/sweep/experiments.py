@@ -2,6 +2,7 @@
 """Outcomes of real runs against a phase diagram, and where the next run tells most."""
 
 import csv
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,14 +49,24 @@ def read_experiments(path: Path, phase: Phase) -> list[Experiment]:
         found = []
         for row in reader:
             try:
-                point = tuple(float(row[names[axis.name]]) for axis in phase.axes)
+                point = tuple(_number(row[names[axis.name]], axis.name) for axis in phase.axes)
                 observed = check_goal((row[names["class"]] or "").strip())
-            except (TypeError, ValueError) as error:
+            except ValueError as error:
                 raise ValueError(f"{path}, line {reader.line_num}: {error}") from None
             found.append(_judge(point, observed, row.get(names.get("note", ""), "") or "", phase))
     if not found:
         raise ValueError(f"{path}: holds no experiment.")
     return found
+
+
+def _number(text: str | None, name: str) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"{name} is '{text or ''}': it must be a number.")
+    return value
 
 
 def _judge(point: tuple[float, ...], observed: str, note: str, phase: Phase) -> Experiment:

@@ -91,7 +91,8 @@ def map_figure(
         axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
         _mark(axes, phase, cells, runs, worth)
         _label(axes, phase)
-        shown = sorted(set(phase.mode[cells.flat].tolist()))
+        seen = {CLASSES.index(run.observed) for run in runs if run.observed in CLASSES}
+        shown = sorted(seen | set(phase.mode[cells.flat].tolist()))
         axes.legend(
             handles=[Patch(color=COLORS[CLASSES[k]], label=CLASSES[k]) for k in shown],
             loc="lower left",
