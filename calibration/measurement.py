@@ -57,6 +57,19 @@ class Measurement:
         track = replace(self.track, pose=pose, heading_smooth=smooth_rad)
         return replace(self, track=track, played=_played(track))
 
+    def without(self, stretches_s: list[tuple[float, float]], why: str) -> "Measurement":
+        """The same run cut: poses within stretches of capture's clock are not used."""
+        t_s, segment = self.track.pose_t_s, self.track.segment
+        inside = np.zeros(len(t_s), bool)
+        for begin_s, end_s in stretches_s:
+            inside |= (t_s >= begin_s) & (t_s <= end_s)
+        kept = np.where(inside, -1, segment)
+        begins = (kept >= 0) & (np.diff(kept, prepend=-1) != 0)
+        number = np.where(kept >= 0, np.cumsum(begins) - 1, -1)
+        smooth_rad = np.where(inside, np.nan, self.track.heading_smooth)
+        track = replace(self.track, segment=number, heading_smooth=smooth_rad)
+        return replace(self, track=track, played=_played(track), warnings=[*self.warnings, why])
+
 
 def load_measurements(paths: list[Path]) -> list[Measurement | Sheet]:
     """Reads logs and cleans every robot in them; reads steady-state tables (.csv).

@@ -52,12 +52,13 @@ class Scene:
             LogError: the log's own cannot be told.
         """
         own = model.for_robot(measurement.track.robot_id)
+        alone_s = _own_offset(measurement, needed=offset_s is None and not own.clock_known)
         if offset_s is not None:
             own.set(CLOCK, offset_s)
         elif not own.clock_known:
-            own.set(CLOCK, estimate_offset(measurement.track).offset_s)
+            own.set(CLOCK, alone_s)
         scene = cls(measurement, own, StepGrid.of(measurement), clock_free)
-        scene.noise = scene._own_noise()
+        scene.noise = scene._own_noise(own.get(CLOCK) if alone_s is None else alone_s)
         scene.settle_noise()
         return scene
 
@@ -90,15 +91,11 @@ class Scene:
         t_s = self.grid.t_s - self.model.get(CLOCK)
         return np.any(command_at(t_s, track.command_t_s, track.command) != 0, axis=1)
 
-    def _own_noise(self) -> Noise:
+    def _own_noise(self, offset_s: float) -> Noise:
         """Noise of the log, whatever the model: what no response to the commands explains.
 
         By the log's own clock: with a wrong one from elsewhere all motion would count as noise.
         """
-        try:
-            offset_s = estimate_offset(self.measurement.track).offset_s
-        except LogError:
-            offset_s = self.model.get(CLOCK)
         errors = unexplained(self.measurement, self.grid, offset_s)
         return fit_noise(errors, self._moving(), self.grid)
 
@@ -108,6 +105,16 @@ class Scene:
             self.model, self.measurement.played, names, np.ascontiguousarray(rows)
         )
         return self.noise.whiten(self.grid.errors(predicted, self.measurement), self.grid)
+
+
+def _own_offset(measurement: Measurement, needed: bool) -> float | None:
+    """What the log itself tells; None if it tells none and need not."""
+    try:
+        return estimate_offset(measurement.track).offset_s
+    except LogError:
+        if needed:
+            raise
+        return None
 
 
 def stated_names(model: native.Model, robot_id: int) -> set[str]:

@@ -105,6 +105,7 @@ class BitComparison:
                             "range_m": [range_edges[i], range_edges[i + 1]],
                             "bearing_rad": [bearing_edges[k], bearing_edges[k + 1]],
                             **Confusion.of(self.in_view[here], self.measured[here]).to_json(),
+                            "frames": int(here.sum()),
                             "predicted_share": float(self.predicted[here].mean()),
                             "measured_share": float(self.measured[here].mean()),
                         }

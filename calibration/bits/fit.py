@@ -14,7 +14,10 @@ from twinmill.calibration.solve import Estimate
 STAGES = ("view", "decide")
 MOST_FRAMES = 10000  # a fit takes every so-manieth frame beyond
 STRENGTHS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0)  # times the usual one: where a fit may begin
+FAR = (5.0, 10.0)  # more of them where only one quantity is looked for
 MOST_EXTRA = 20  # frames of a vote beyond the model's
+WIDER = 6  # times a step is doubled until the likelihood falls by more than its grain
+FALL = 1.0  # of the log likelihood on both sides together: less may be the grain of frames
 REACH = 0.5  # times the usual strength: how far a fit goes from where it begins
 
 
@@ -29,13 +32,12 @@ class Knob:
     min: float
     max: float
 
-    @property
-    def grid(self) -> list[float]:
+    def grid(self, far: bool) -> list[float]:
         """Neutral and values on both sides of it, within bounds."""
         if self.name.endswith("_frames"):  # whole numbers
             return [float(n) for n in range(-MOST_EXTRA, MOST_EXTRA + 1)]
-        steps = [0.0, *STRENGTHS, *(-s for s in STRENGTHS)]
-        values = {self.neutral + s * self.strength for s in steps}
+        steps = [*STRENGTHS, *(FAR if far else ())]
+        values = {self.neutral + s * self.strength for s in [0.0, *steps, *(-s for s in steps)]}
         return sorted({float(np.clip(v, self.min, self.max)) for v in values})
 
 
@@ -96,7 +98,8 @@ class Likelihood:
 def start(likelihood: Likelihood, fresh: list[Knob], values: np.ndarray) -> np.ndarray:
     """The best of a grid of values of `fresh`, the last of the free knobs; the rest as given."""
     head = values[: len(values) - len(fresh)]
-    rows = [np.concatenate([head, row]) for row in product(*(k.grid for k in fresh))]
+    grids = [k.grid(far=len(fresh) == 1) for k in fresh]
+    rows = [np.concatenate([head, row]) for row in product(*grids)]
     return max(rows, key=likelihood.total)
 
 
@@ -126,16 +129,25 @@ def estimates(likelihood: Likelihood, values: np.ndarray) -> list[Estimate]:
     made = []
     middle = likelihood.total(values, thin=False)
     for i, knob in enumerate(likelihood.free):
-        step = 0.1 * abs(knob.strength)
-        sides = [
-            likelihood.total(values + sign * step * (np.arange(len(values)) == i), thin=False)
-            for sign in (-1, 1)
-        ]
-        fall = 2 * middle - sum(sides)
-        std = step / np.sqrt(fall) if fall > 0 else np.nan
+        std = _std(likelihood, values, i, middle)
         at_bound = bool(values[i] in (knob.min, knob.max))
-        made.append(
-            Estimate(knob.name, float(values[i]), float(std), knob.unit, at_bound, fall > 0)
-        )
+        known = bool(np.isfinite(std))
+        made.append(Estimate(knob.name, float(values[i]), std, knob.unit, at_bound, known))
     likelihood.set(values)
     return made
+
+
+def _std(likelihood: Likelihood, values: np.ndarray, i: int, middle: float) -> float:
+    """Of one value: from the shortest steps to both sides that fall by more than the grain."""
+    knob = likelihood.free[i]
+    for k in range(WIDER):
+        step = 0.1 * abs(knob.strength) * 2**k
+        sides = np.clip(values[i] + np.array([-step, step]), knob.min, knob.max)
+        fall = 2 * middle
+        for side in sides:
+            moved = values.copy()
+            moved[i] = side
+            fall -= likelihood.total(moved, thin=False)
+        if fall > FALL:
+            return float(np.sqrt(np.sum((sides - values[i]) ** 2) / (2 * fall)))
+    return float("nan")

@@ -4,6 +4,7 @@
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
+import numpy as np
 from twinmill.calibration.bits.compare import BitComparison, compare_bits
 from twinmill.calibration.bits.robots import judge_cameras, odd_cameras
 from twinmill.calibration.bits.scene import bit_scenes
@@ -54,9 +55,16 @@ def with_bits(
         not_identifiable=[*diagnosis.not_identifiable, *done.hidden],
         notes=[*diagnosis.notes, *_notes(bits)],
         bits=bits,
+        bits_after=compare_bits(alike, done.rounds[-1].before.model) if done.found else None,
+        bit_steps=[(None, done.rounds[0].before.score), *_steps(done)],
         bit_estimates=done.estimates,
         robots_off=(*diagnosis.robots_off, *off),
     )
+
+
+def _steps(done: BitSearch) -> list[tuple[str | None, float]]:
+    """Each accepted effect and the bits' held-out score with it."""
+    return [(r.accepted.effect, r.accepted.score) for r in done.rounds if r.accepted]
 
 
 def rank_bits(done: BitSearch, group: int) -> list[Ranked]:
@@ -92,6 +100,8 @@ def _sentence(diagnosis, done: BitSearch) -> str:
     if not done.found:
         return diagnosis.sentence
     told = " ".join(_of_round(r) for r in done.rounds if r.accepted)
+    if diagnosis.verdict == "refit_enough":
+        told += " The base model's numbers are stale too; for the motion a refit is enough."
     return told if diagnosis.verdict in ADEQUATE else f"{diagnosis.sentence} {told}"
 
 
@@ -106,7 +116,8 @@ def _of_round(this: Round) -> str:
 
 def _value(estimate) -> str:
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    return f"{estimate.name.split('.')[1]} {estimate.value:.3g}{unit}"
+    spread = f" ± {estimate.std:.1g}" if np.isfinite(estimate.std) else ""
+    return f"{estimate.name.split('.')[1]} {estimate.value:.3g}{spread}{unit}"
 
 
 def _notes(bits: BitComparison | None) -> list[str]:

@@ -47,11 +47,16 @@ class BitScene:
     block: np.ndarray
     half: np.ndarray
     _seen: tuple = field(default=(None, None), repr=False)
+    _placed: tuple = field(default=(None, None), repr=False)
 
     def poses(self, age_s: float, pick: slice = slice(None)) -> np.ndarray:
         """(K, N, 3) poses of all robots when the pictures were taken; NaN where untracked."""
-        t_s = self._capture_s(age_s)[pick]
-        return np.stack([pose_at(track, t_s) for track in self.tracks], axis=1)
+        key = (pick.step, age_s)
+        if self._placed[0] != key:
+            t_s = self._capture_s(age_s)[pick]
+            placed = np.stack([pose_at(track, t_s) for track in self.tracks], axis=1)
+            self._placed = (key, placed)
+        return self._placed[1]
 
     def view(self, model: native.Model, pick: slice = slice(None)) -> np.ndarray:
         """(K,) probability that the robot of `model` (its own) has another in view."""
@@ -60,7 +65,7 @@ class BitScene:
         geometry = ("range_m", "softness_m", "cone_rad", "pan_rad", "hide_radius_m")
         key = (pick.step, age_s, *(sight[g] for g in geometry))
         if self._seen[0] != key:
-            poses = np.ascontiguousarray(self.poses(age_s, pick))
+            poses = self.poses(age_s, pick)
             self._seen = (key, native.in_view(model, self.own, poses, *self.blur))
         return self._seen[1]
 

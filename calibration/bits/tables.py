@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Predicted and measured bits as tables."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -9,6 +10,21 @@ from twinmill.calibration.tables import Cell, Table, number, tone
 
 BINS = 6
 COLUMNS = ["seen\nboth", "missed", "false", "unseen\nboth", "agree"]
+
+
+def bit_steps(steps: Sequence[tuple[str | None, float]]) -> Table:
+    """The camera's effects as they were found, on frames that were not fitted to."""
+    rows = [
+        [Cell(f"+ {effect}" if effect else "as given"), Cell(number(score, 4), tone(score))]
+        for effect, score in steps
+    ]
+    return Table(
+        "The bits, step by step",
+        ["step", "held-out\nscore"],
+        rows,
+        "On frames that were not fitted to: 1.0 is right.",
+        words=(0,),
+    )
 
 
 def bit_tables(bits: BitComparison) -> list[Table]:
@@ -21,6 +37,9 @@ def _by_robot(bits: BitComparison) -> Table:
         [Cell(label), *_counts(confusion), Cell(number(score), tone(score))]
         for label, confusion, score in bits.by_robot()
     ]
+    if len(rows) > 1:
+        total = [Cell("all"), *_counts(bits.confusion), Cell(number(bits.score), tone(bits.score))]
+        rows.append(total)
     vote = (
         ""
         if bits.vote_agreement is None

@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
+from twinmill.calibration.diagnosis.bumps import spared
 from twinmill.calibration.diagnosis.evidence import State
 from twinmill.calibration.diagnosis.search import Search, search
 from twinmill.calibration.fit import refit
@@ -45,10 +46,12 @@ class Common:
     """What the robots that are alike have in common.
 
     Attributes:
+        scenes: all, those that stood out without their bumps.
         alike, odd: places among the scenes.
         done, state: the search over those that are alike, and where it ended.
     """
 
+    scenes: list
     alike: list[int]
     odd: list[int]
     done: Search
@@ -74,6 +77,9 @@ def search_alike(
         barred: effects that are not to be thought of.
     """
     out: set[int] = odd_robots(scenes, floors)
+    if out:
+        scenes = [spared(s) if robot_of(s) in out else s for s in scenes]
+        out = odd_robots(scenes, floors)
     for last in (False, True):
         alike = [i for i, s in enumerate(scenes) if not out or robot_of(s) not in out]
         own = [scenes[i] for i in alike]
@@ -85,7 +91,8 @@ def search_alike(
         if last or not more:
             break
         out |= more
-    return Common(alike, [i for i in range(len(scenes)) if i not in alike], done, state)
+        scenes = [spared(s) if robot_of(s) in more else s for s in scenes]
+    return Common(scenes, alike, [i for i in range(len(scenes)) if i not in alike], done, state)
 
 
 def odd_robots(scenes: list[Scene], floors: list[np.ndarray]) -> set[int]:

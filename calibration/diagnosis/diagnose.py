@@ -8,6 +8,7 @@ import numpy as np
 from twinmill.calibration.bits.merge import with_bits
 from twinmill.calibration.compare import Comparison, comparison, open_scenes
 from twinmill.calibration.diagnosis.alike import Common, free_gains, search_alike
+from twinmill.calibration.diagnosis.bumps import bump_notes
 from twinmill.calibration.diagnosis.evidence import State
 from twinmill.calibration.diagnosis.omnibus import NOTHING, Omnibus, unexplained
 from twinmill.calibration.diagnosis.ranking import rank
@@ -53,7 +54,8 @@ def diagnose(
     unseen = unseen_by_tables(measurements)
     hidden = {*barred, *unseen}
     common = search_alike(scenes, base + known, base, floors, say, hidden)
-    odd, alike = ([scenes[i] for i in which] for which in (common.odd, common.alike))
+    bumped = bump_notes(*([s.measurement for s in part] for part in (common.scenes, scenes)))
+    odd, alike = ([common.scenes[i] for i in which] for which in (common.odd, common.alike))
     for earlier in ([given[i] for i in common.alike], alike):
         share_noise(common.state.scenes, earlier)
     before, fitted = comparison(model_file, given), comparison(model_file, alike)
@@ -61,7 +63,8 @@ def diagnose(
     off = judge(final, odd, say, hidden)
     say("looking for what no effect explains")
     found = _concluded(replace(common, state=final), model_file, before, fitted, unseen)
-    whole = with_bits(replace(found, robots_off=tuple(off)), given, model_file, say, barred)
+    found = replace(found, notes=[*found.notes, *bumped], robots_off=tuple(off))
+    whole = with_bits(found, given, model_file, say, barred)
     return replace(whole, sentence=" ".join([whole.sentence, *map(sentence, whole.robots_off)]))
 
 

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """A diagnosis as tables, for the terminal and as a section of a report."""
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 from twinmill.calibration import show, tables, views
+from twinmill.calibration.bits.tables import bit_steps, bit_tables
 from twinmill.calibration.diagnosis.explain import Explanation, steps
 from twinmill.calibration.diagnosis.result import Diagnosis
-from twinmill.calibration.report import Section
+from twinmill.calibration.report import Figure, Section
+from twinmill.calibration.report.bits_figures import field_of_view
 from twinmill.calibration.report.error_figures import waterfall
 from twinmill.calibration.report.sections import robot_pictures
 from twinmill.calibration.solve import Estimate
@@ -109,7 +112,7 @@ def terminal(diagnosis: Diagnosis) -> RenderableType:
         ),
         Text(),
     ]
-    parts += [show.table(t) for t in _tables(diagnosis)]
+    parts += [show.table(t) for t in (*_tables(diagnosis), *_bit_steps(diagnosis))]
     parts += [Text(line) for line in lines(diagnosis)]
     return Group(*parts)
 
@@ -127,23 +130,43 @@ def terminal_explanation(result: Explanation) -> RenderableType:
 
 def section(diagnosis: Diagnosis) -> Section:
     """Of a report."""
+    before = diagnosis.before
+    scores = [("as given", before.score), ("base refitted", diagnosis.score_refit)]
+    if len(diagnosis.bit_steps) > 1:
+        scores += [("bits", diagnosis.bit_steps[0][1]), ("bits, found", diagnosis.bit_steps[-1][1])]
     return Section(
-        f"What {diagnosis.before.model_name} lacks",
-        [
-            ("as given", number(diagnosis.before.score), tone(diagnosis.before.score)),
-            ("base refitted", number(diagnosis.score_refit), tone(diagnosis.score_refit)),
-        ],
+        f"What {before.model_name} lacks",
+        [(label, number(value), tone(value)) for label, value in scores],
         diagnosis.sentence,
-        views.facts(diagnosis.before),
-        [waterfall(_labelled(diagnosis)), *robot_pictures(diagnosis.before)],
-        _tables(diagnosis),
+        views.facts(before),
+        [*_bit_figures(diagnosis), waterfall(_labelled(diagnosis)), *robot_pictures(before)],
+        [*_tables(diagnosis), *_bit_steps(diagnosis), *_bit_tables(diagnosis)],
         " ".join(lines(diagnosis)),
-        diagnosis.before.warnings,
+        before.warnings,
     )
 
 
 def _tables(diagnosis: Diagnosis) -> list[Table]:
     return [t for t in (robots_off(diagnosis), ranking(diagnosis), unseen(diagnosis)) if t.rows]
+
+
+def _bit_steps(diagnosis: Diagnosis) -> list[Table]:
+    return [bit_steps(diagnosis.bit_steps)] if len(diagnosis.bit_steps) > 1 else []
+
+
+def _bit_tables(diagnosis: Diagnosis) -> list[Table]:
+    """Predicted and measured bits, with the effects that were found if there are any."""
+    bits = diagnosis.bits_after or diagnosis.bits
+    return bit_tables(bits) if bits else []
+
+
+def _bit_figures(diagnosis: Diagnosis) -> list[Figure]:
+    """What the camera sees, with the model as given and with what was found."""
+    if not diagnosis.bits:
+        return []
+    after = diagnosis.bits_after
+    found = [field_of_view(after, "What the camera sees, effects added")] if after else []
+    return [field_of_view(diagnosis.bits), *found]
 
 
 def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
@@ -157,4 +180,5 @@ def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
 def _estimate(estimate: Estimate) -> str:
     name = estimate.name.split(".", 1)[-1]
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    return f"{name} {estimate.value:.3g} ± {estimate.std:.1g}{unit}"
+    spread = f" ± {estimate.std:.1g}" if np.isfinite(estimate.std) else ""
+    return f"{name} {estimate.value:.3g}{spread}{unit}"

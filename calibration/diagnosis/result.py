@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a diagnosis tells."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from twinmill.calibration.bits.compare import BitComparison
@@ -31,6 +32,9 @@ class Diagnosis:
         next_experiment: which run would settle what this log leaves open, or None.
         sums: of found effects that are firmer than their parts.
         bits: of the robots' cameras with the model as given, or None.
+        bits_after: with the effects of the camera that were found; None if there are none.
+        bit_steps: the camera's effects as found, each with the bits' score on held-out frames; the
+            first is the model without them.
         bit_estimates: of all effects of the camera, with what was found.
         robots_off: those that differ from the others; `state` is without them.
     """
@@ -50,6 +54,8 @@ class Diagnosis:
     next_experiment: dict | None
     sums: list[Sum]
     bits: BitComparison | None = None
+    bits_after: BitComparison | None = None
+    bit_steps: Sequence[tuple[str | None, float]] = ()
     bit_estimates: tuple[Estimate, ...] = ()
     robots_off: tuple[RobotOff, ...] = ()
 
@@ -84,5 +90,7 @@ class Diagnosis:
             ],
             "robots_off": [r.to_json() for r in self.robots_off],
             "bits": self.bits.to_json() if self.bits else None,
+            "bits_after": self.bits_after.to_json() if self.bits_after else None,
+            "bit_steps": [{"effect": e, "score_heldout": s} for e, s in self.bit_steps],
             "notes": self.notes,
         }

@@ -6,15 +6,17 @@ from twinmill.calibration.bits.compare import BitComparison
 from twinmill.calibration.report.canvas import draw
 from twinmill.calibration.report.html import Figure
 
+FEWEST = 10  # frames of a place that tell a share
 
-def field_of_view(bits: BitComparison) -> Figure:
+
+def field_of_view(bits: BitComparison, title: str = "What the camera sees") -> Figure:
     """Share of frames that see, over range and bearing of the nearest robot."""
     cells = bits.cells()
     ranges = sorted({r for c in cells for r in c["range_m"]})
     bearings = np.degrees(sorted({b for c in cells for b in c["bearing_rad"]}))
     kinds = ("measured", "predicted")
     shares = {kind: np.full((len(ranges) - 1, len(bearings) - 1), np.nan) for kind in kinds}
-    for cell in cells:
+    for cell in (c for c in cells if c["frames"] >= FEWEST):
         r = ranges.index(cell["range_m"][0])
         b = int(np.searchsorted(bearings, np.degrees(cell["bearing_rad"][0]) - 1e-6))
         for kind in kinds:
@@ -37,8 +39,9 @@ def field_of_view(bits: BitComparison) -> Figure:
 
     return Figure(
         draw(3.0, paint, ncols=2, sharey=True),
-        "What the camera sees",
+        title,
         "Share of frames whose bit is 1, by where the nearest robot was. Inside the orange line "
         "the model's camera sees. Both pictures should be alike; light outside the line is a false "
-        "or a farther robot's detection, dark inside a missed one.",
+        "or a farther robot's detection, dark inside a missed one. Places of fewer than "
+        f"{FEWEST} frames are left white.",
     )

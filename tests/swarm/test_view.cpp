@@ -141,6 +141,10 @@ TEST(Decide, RatesAddUpAsChancesDo)
     model.Set("false_detection.rate", 0.5);
     EXPECT_NEAR(model.MakeSight().miss_rate, 1 - 0.9 * 0.5, 1e-15);
     EXPECT_NEAR(model.MakeSight().false_rate, 1 - 0.8 * 0.5, 1e-15);
+    model.Set("missed_detection.rate", -0.25);
+    model.Set("false_detection.rate", -1);
+    EXPECT_NEAR(model.MakeSight().miss_rate, 0.1 * 0.75, 1e-15);
+    EXPECT_EQ(model.MakeSight().false_rate, 0);
 }
 
 TEST(Decide, VoteIsAWholeNumberOfFramesThatTheFirmwareTakes)

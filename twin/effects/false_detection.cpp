@@ -10,8 +10,10 @@ constexpr Card kCard = {
     .name = "false_detection",
     .stage = Stage::kDecide,
     .drives = kAnyDrive,
-    .summary = "Some frames show a target that is not there.",
-    .equation = "P(bit | nothing in view) = false', false' = false + rate (1 - false)",
+    .summary = "More or fewer frames than the model says show a target that is not there.",
+    .equation =
+        "P(bit | nothing in view) = false', false' = false + rate (1 - false), below 0: "
+        "(1 + rate) false",
     .leaves_out = "false targets at one place of the room, as a green bottle",
     .measure = "one robot alone in the room, many frames",
     .reference =
@@ -19,7 +21,8 @@ constexpr Card kCard = {
 };
 
 constexpr Parameter kParameters[] = {
-    {"rate", "1", 0, 0.1, 0, 1, "share of frames beyond those of the model"},
+    {"rate", "1", 0, 0.1, -1, 1,
+     "share of frames beyond those of the model; below 0: share of the model's that are right"},
 };
 
 class FalseDetection final : public Effect
@@ -27,7 +30,10 @@ class FalseDetection final : public Effect
 public:
     explicit FalseDetection(std::span<const double> v) : rate_(v[0]) {}
 
-    void Look(Sight &s) const override { s.false_rate += rate_ * (1 - s.false_rate); }
+    void Look(Sight &s) const override
+    {
+        s.false_rate += rate_ * (rate_ > 0 ? 1 - s.false_rate : s.false_rate);
+    }
 
 private:
     double rate_;

@@ -10,8 +10,10 @@ constexpr Card kCard = {
     .name = "missed_detection",
     .stage = Stage::kDecide,
     .drives = kAnyDrive,
-    .summary = "Some frames miss a target that is in view.",
-    .equation = "P(bit | in view) = 1 - miss', miss' = miss + rate (1 - miss)",
+    .summary = "More or fewer frames than the model says miss a target that is in view.",
+    .equation =
+        "P(bit | in view) = 1 - miss', miss' = miss + rate (1 - miss), below 0: "
+        "(1 + rate) miss",
     .leaves_out = "misses that come in bursts, as behind a reflection",
     .measure = "two robots at rest, well in view, many frames",
     .reference =
@@ -19,7 +21,8 @@ constexpr Card kCard = {
 };
 
 constexpr Parameter kParameters[] = {
-    {"rate", "1", 0, 0.1, 0, 1, "share of frames missed beyond those of the model"},
+    {"rate", "1", 0, 0.1, -1, 1,
+     "share of frames missed beyond those of the model; below 0: share of the model's that are not"},
 };
 
 class MissedDetection final : public Effect
@@ -27,7 +30,10 @@ class MissedDetection final : public Effect
 public:
     explicit MissedDetection(std::span<const double> v) : rate_(v[0]) {}
 
-    void Look(Sight &s) const override { s.miss_rate += rate_ * (1 - s.miss_rate); }
+    void Look(Sight &s) const override
+    {
+        s.miss_rate += rate_ * (rate_ > 0 ? 1 - s.miss_rate : s.miss_rate);
+    }
 
 private:
     double rate_;

@@ -182,6 +182,15 @@ def test_a_hidden_effect_is_named_with_its_value(effect, make_scenes):
     assert sampling < 0.5 * abs(true)
 
 
+@pytest.mark.parametrize(("effect", "clean"), [("false_detection", "false"),
+                                               ("missed_detection", "miss")])  # fmt: skip
+def test_a_camera_better_than_the_model_is_named_too(effect, clean, make_scenes):
+    worse = native.Model.from_toml(MODEL.replace("rate = 0.05", "rate = 0.15"), "test")
+    done = search_bits(make_scenes(64, **{"miss": 0.15, clean: 0.0}), worse)
+    assert done.found == [effect]
+    assert done.rounds[0].accepted.own[0].value == pytest.approx(-1, abs=0.05)
+
+
 def test_nothing_is_named_where_nothing_is_hidden(make_scenes):
     """Each log may name something with a chance of 5 %: 2 of 5 would be one case in 45."""
     named = [search_bits(make_scenes(seed), model()).found for seed in range(70, 75)]

@@ -59,6 +59,24 @@ def test_robots_with_gains_of_their_own_are_not_off(logged):
     assert found.found == []
 
 
+def pushed(measurement, at_s, move_m, turn_rad):
+    """The measurement of a robot that somebody shoved and turned within 1.5 s."""
+    track = measurement.track
+    t_s, pose = track.pose_t_s - track.pose_t_s[0] - at_s, track.pose.copy()
+    share = np.clip(t_s / 1.5, 0, 1) ** 2 * (3 - 2 * np.clip(t_s / 1.5, 0, 1))
+    begin, after = pose[np.searchsorted(t_s, 0)].copy(), t_s >= 0
+    way = (pose[:, :2] - begin[:2]) @ [1, 1j] * np.exp(1j * turn_rad * share) + move_m * share
+    pose[after, :2] = begin[:2] + np.column_stack([way.real, way.imag])[after]
+    pose[:, 2] += turn_rad * share
+    return measurement.with_pose(pose)
+
+
+def test_a_robot_that_was_pushed_once_is_like_the_others(logged):
+    (*others, last), plain = logged("")
+    found = diagnose([*others, pushed(last, 13.0, 0.3, 0.8)], plain)
+    assert found.robots_off == ()
+
+
 def test_a_wheel_of_one_robot_is_named_beside_what_all_lack(logged):
     planted = "[[effect]]\nname = 'dead_zone'\nwidth = 0.08\n" + WHEELS
     found = diagnose(*logged(planted + "[robots.R01]\nwheel_gain.fl = -0.1\n"))
