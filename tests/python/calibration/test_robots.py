@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from twinmill.calibration.compare import compare, open_scenes
+from twinmill.calibration.diagnosis.bumps import bumps, spared
 from twinmill.calibration.diagnosis.diagnose import diagnose
 from twinmill.calibration.diagnosis.explain import explain
 from twinmill.calibration.log import LogError
@@ -71,10 +72,21 @@ def pushed(measurement, at_s, move_m, turn_rad):
     return measurement.with_pose(pose)
 
 
-def test_a_robot_that_was_pushed_once_is_like_the_others(logged):
-    (*others, last), plain = logged("")
-    found = diagnose([*others, pushed(last, 13.0, 0.3, 0.8)], plain)
-    assert found.robots_off == ()
+def test_a_push_is_found_when_it_was_and_is_no_trait(logged):
+    measurements, plain = logged("")
+    scenes = open_scenes(measurements, plain)
+    assert [bumps(s) for s in scenes] == [[], [], []]
+    shoved = [pushed(s.measurement, 13.0, 0.3, 0.8) for s in scenes[2:]]
+    (scene,) = open_scenes(shoved, plain)
+    ((begin_s, end_s),) = bumps(scene)
+    first_s = scene.measurement.track.pose_t_s[0]
+    assert begin_s - first_s == pytest.approx(12.5, abs=0.75)  # predictions go half a second ahead
+    assert end_s - first_s == pytest.approx(14.75, abs=0.75)
+    calm = spared(scene)
+    assert bumps(calm) == []
+    assert "bumped" in calm.measurement.warnings[-1]
+    for name in ("theta_a1", "theta_a2"):
+        assert calm.model.get(name) == pytest.approx(scenes[2].model.get(name), abs=0.01)
 
 
 def test_a_wheel_of_one_robot_is_named_beside_what_all_lack(logged):
