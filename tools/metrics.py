@@ -155,7 +155,8 @@ def _paths(series: SwarmSeries) -> Figure:
             path = series.pose[last, k]
             odd = robot in series.odd
             axes.plot(path[:, 0], path[:, 1], lw=1.2, color=PREDICTED if odd else MEASURED)
-            axes.annotate(str(robot), path[-1, :2], fontsize=8)
+            end = {"xytext": (5, 5), "textcoords": "offset points"}
+            axes.annotate(str(robot), path[-1, :2], fontsize=8, **end)
             axes.plot(*path[-1, :2], "o", ms=4, color=PREDICTED if odd else MEASURED)
         axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
 
