@@ -70,6 +70,11 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
     Returns:
         A sentence, and the comparison where there is one.
     """
+    if result.verdict in ("ambiguous", "outside_catalogue"):
+        return (
+            "Each robot was judged by itself; the swarm as a whole can be once the model predicts "
+            "each robot: `twinmill compare-swarm`."
+        ), None
     log, model = read_log(path), result.state.model
     if not all((robot.mode == TABLE).any() for robot in log.robots.values()):
         return "Each robot was judged by itself: not all play a table, as a swarm does.", None

@@ -32,7 +32,12 @@ def true() -> str:
 def judged(tmp_path: Path, log: Path, model: str, found=()) -> tuple[str, dict | None]:
     (tmp_path / "judge.toml").write_text(model)
     state = SimpleNamespace(model=ModelFile.load(str(tmp_path / "judge.toml")).model)
-    return _judge_swarm(log, SimpleNamespace(state=state, found=list(found)))
+    return _judge_swarm(log, SimpleNamespace(verdict="", state=state, found=list(found)))
+
+
+def test_a_model_that_fails_each_robot_is_not_held_against_the_swarm():
+    note, swarm = _judge_swarm(Path("none"), SimpleNamespace(verdict="outside_catalogue"))
+    assert swarm is None and "once the model predicts each robot" in note
 
 
 def test_a_true_model_makes_swarms_like_the_recorded_one(tmp_path, true):
