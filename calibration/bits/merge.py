@@ -122,5 +122,8 @@ def _value(estimate) -> str:
 
 def _notes(bits: BitComparison | None) -> list[str]:
     if bits and not bits.raw:
-        return ["The logs keep the voted bits alone: delays and misses blur into the vote."]
+        return [
+            "The logs keep the voted bits alone: misses blur into the vote, and what is named "
+            "sensor_delay may be a longer vote. Raw bits in the telemetry would tell them apart."
+        ]
     return []
