@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "plant/random.h"
+#include "plant/split_mix.h"
 
 namespace twin::test
 {
@@ -30,6 +31,24 @@ double Kolmogorov(Draw draw, Distribution distribution)
                              static_cast<double>(i + 1) / kDraws - expected});
     }
     return distance * std::sqrt(kDraws);
+}
+
+// The first numbers from 1234567 of Vigna's splitmix64.c (2015), as Rosetta Code lists them.
+TEST(Random, BitsAreThoseOfTheReference)
+{
+    uint64_t state = 1234567;
+    for (const uint64_t bits : {6457827717110365317u, 3203168211198807973u, 9817491932198370423u,
+                                4593380528125082431u, 16408922859458223821u})
+        EXPECT_EQ(SplitMix(state), bits);
+}
+
+// Sweeps take seeds 1, 2, 3 and so on.
+TEST(Random, FirstNumbersOfSuccessiveSeedsAreUniform)
+{
+    uint64_t seed = 0;
+    EXPECT_LT(Kolmogorov([&] { return Random(++seed, 0, "test").Uniform(); },
+                         [](double x) { return x; }),
+              1.95);
 }
 
 TEST(Random, UniformIsUniform)

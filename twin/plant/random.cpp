@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "plant/split_mix.h"
+
 namespace twin
 {
 namespace
@@ -25,19 +27,11 @@ uint64_t Hash(uint64_t seed, int robot, std::string_view name)
 
 }  // namespace
 
-Random::Random(uint64_t seed, int robot, std::string_view name) : engine_(Hash(seed, robot, name))
-{
-}
+Random::Random(uint64_t seed, int robot, std::string_view name) : state_(Hash(seed, robot, name)) {}
 
 double Random::Uniform()
 {
-    return static_cast<double>(engine_() >> 11) * 0x1p-53;
-}
-
-void Random::Uniform(double *first, size_t stride, int count)
-{
-    for (int i = 0; i < count; ++i)
-        first[static_cast<size_t>(i) * stride] = static_cast<double>(engine_() >> 11) * 0x1p-53;
+    return static_cast<double>(SplitMix(state_) >> 11) * 0x1p-53;
 }
 
 double Random::Normal()

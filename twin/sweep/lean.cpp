@@ -2,6 +2,7 @@
 #include "sweep/lean.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -17,7 +18,6 @@ namespace
 {
 
 constexpr double kWindow_s = 10;
-constexpr int kBlock = 32;  // steps for which uniform numbers are drawn at once
 constexpr size_t kAlign = 64;
 
 std::vector<LeanWidth> UsableWidths()
@@ -32,6 +32,12 @@ std::vector<LeanWidth> UsableWidths()
 #endif
     widths.push_back({2, LeanAdvance2});
     return widths;
+}
+
+// How many numbers in [0, 2^53) are below `rate` as fractions, as the bits of a double.
+double BelowRate(double rate)
+{
+    return std::bit_cast<double>(static_cast<int64_t>(std::ceil(std::ldexp(rate, 53))));
 }
 
 double StepS(const Base &base)
@@ -92,24 +98,7 @@ public:
             FillLane(lane, worlds[lane < worlds.size() ? lane : 0]);
     }
 
-    void Run()
-    {
-        if (!plan_.errors)
-            return advance_(plan_, numbers_, nullptr, 0, steps_);
-        std::vector<Random> streams;
-        for (int robot = 0; robot < plan_.n; ++robot)
-            for (size_t lane = 0; lane < lanes_; ++lane)
-                streams.emplace_back(worlds_[lane < worlds_.size() ? lane : 0].seed, robot,
-                                     "sensor");
-        std::vector<double> chances(kBlock * streams.size() + kAlign / sizeof(double));
-        double *aligned = Aligned(chances);
-        for (int from = 0; from < steps_; from += kBlock)
-        {
-            for (size_t i = 0; i < streams.size(); ++i)
-                streams[i].Uniform(aligned + i, streams.size(), kBlock);
-            advance_(plan_, numbers_, aligned, from, std::min(from + kBlock, steps_));
-        }
-    }
+    void Run() { advance_(plan_, numbers_, 0, steps_); }
 
     Outcome OutcomeOf(size_t lane) const
     {
@@ -148,6 +137,8 @@ private:
             At(kCos, i, lane) = std::cos(starts[i].theta_rad);
             At(kSin, i, lane) = std::sin(starts[i].theta_rad);
             FillSensor(i, lane, robots[i].sensor);
+            At(kDice, i, lane) =
+                std::bit_cast<double>(Random(world.seed, static_cast<int>(i), "sensor").State());
             const DriveChain chain(robots[i]);
             FillRow(i, lane, kUnseenX, kUnseenVx, chain, robots[i].base, cell.tables[i].unseen);
             FillRow(i, lane, kSeenX, kSeenVx, chain, robots[i].base, cell.tables[i].seen);
@@ -165,8 +156,8 @@ private:
         At(kHalfCos, robot, lane) = half_cos;
         At(kHalfSin, robot, lane) = std::sin(sensor.cone_rad / 2);
         At(kTarget2, robot, lane) = sensor.target_radius_m * sensor.target_radius_m;
-        At(kMiss, robot, lane) = sensor.false_negative_rate;
-        At(kFalse, robot, lane) = sensor.false_positive_rate;
+        At(kMiss, robot, lane) = BelowRate(sensor.false_negative_rate);
+        At(kFalse, robot, lane) = BelowRate(sensor.false_positive_rate);
         plan_.target_is_disc |= sensor.target_radius_m > 0;
         plan_.errors |= sensor.false_negative_rate > 0 || sensor.false_positive_rate > 0;
     }

@@ -2,8 +2,7 @@
 // 2 worlds at once: the vectors of any processor.
 #include "lean_kernel.h"
 
-void twin::LeanAdvance2(const LeanPlan &plan, double *numbers, const double *chances, int from,
-                        int to)
+void twin::LeanAdvance2(const LeanPlan &plan, double *numbers, int from, int to)
 {
-    LeanKernel<2>(plan, numbers).Advance(chances, from, to);
+    LeanKernel<2>(plan, numbers).Advance(from, to);
 }

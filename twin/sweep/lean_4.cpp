@@ -2,8 +2,7 @@
 // 4 worlds at once: compiled for AVX2.
 #include "lean_kernel.h"
 
-void twin::LeanAdvance4(const LeanPlan &plan, double *numbers, const double *chances, int from,
-                        int to)
+void twin::LeanAdvance4(const LeanPlan &plan, double *numbers, int from, int to)
 {
-    LeanKernel<4>(plan, numbers).Advance(chances, from, to);
+    LeanKernel<4>(plan, numbers).Advance(from, to);
 }

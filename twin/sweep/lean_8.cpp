@@ -2,8 +2,7 @@
 // 8 worlds at once: compiled for AVX-512.
 #include "lean_kernel.h"
 
-void twin::LeanAdvance8(const LeanPlan &plan, double *numbers, const double *chances, int from,
-                        int to)
+void twin::LeanAdvance8(const LeanPlan &plan, double *numbers, int from, int to)
 {
-    LeanKernel<8>(plan, numbers).Advance(chances, from, to);
+    LeanKernel<8>(plan, numbers).Advance(from, to);
 }

@@ -5,6 +5,7 @@
 #ifndef SWEEP_LEAN_KERNEL_H
 #define SWEEP_LEAN_KERNEL_H
 
+#include "plant/split_mix.h"
 #include "swarm/metrics_lanes.h"
 #include "sweep/lean_plan.h"
 
@@ -17,6 +18,7 @@ class LeanKernel
     using L = Lanes<W>;
     using Real = typename L::Real;
     using Mask = typename L::Mask;
+    using Bits = typename L::Bits;
 
 public:
     LeanKernel(const LeanPlan &plan, double *numbers)
@@ -24,9 +26,8 @@ public:
     {
     }
 
-    void Advance(const double *chances, int from, int to)
+    void Advance(int from, int to)
     {
-        const Real *chance = reinterpret_cast<const Real *>(chances);
         for (int step = from; step < to; ++step)
         {
             if (p_.target_is_disc)
@@ -34,7 +35,7 @@ public:
             else
                 Sense<false>();
             if (p_.errors)
-                Err(chance + (step - from) * n_);
+                Err();
             Decide(step);
             const bool moves = p_.steps[step].frame >= 0;
             for (int i = 0; moves && i < p_.substeps; ++i)
@@ -49,7 +50,7 @@ public:
 
 private:
     Real *Column(int column) const { return numbers_ + column * n_; }
-    Mask *Bits(int at) const { return reinterpret_cast<Mask *>(numbers_ + at); }
+    Mask *BitsAt(int at) const { return reinterpret_cast<Mask *>(numbers_ + at); }
 
     // InView() of the cone sensor, both ways for each pair. Its ahead > cos * distance is squared
     // with the signs kept, which spares the root.
@@ -58,7 +59,7 @@ private:
     {
         const Real *x = Column(kX), *y = Column(kY), *c = Column(kCos), *s = Column(kSin);
         const Real *range2 = Column(kRange2), *cone = Column(kCone);
-        Mask *seen = Bits(at_.seen);
+        Mask *seen = BitsAt(at_.seen);
         const int n = n_;
         for (int i = 0; i < n; ++i)
             seen[i] = Mask{};
@@ -94,12 +95,14 @@ private:
         return over * over + off * off < Column(kTarget2)[robot];
     }
 
-    void Err(const Real *chance)
+    void Err()
     {
-        Mask *seen = Bits(at_.seen);
-        const Real *miss = Column(kMiss), *imagined = Column(kFalse);
+        Mask *seen = BitsAt(at_.seen);
+        Bits *dice = reinterpret_cast<Bits *>(Column(kDice));
+        const Mask *miss = reinterpret_cast<Mask *>(Column(kMiss));
+        const Mask *imagined = reinterpret_cast<Mask *>(Column(kFalse));
         for (int i = 0; i < n_; ++i)
-            seen[i] ^= chance[i] < (seen[i] ? miss[i] : imagined[i]);
+            seen[i] ^= (Mask)(SplitMix(dice[i]) >> 11) < (seen[i] ? miss[i] : imagined[i]);
     }
 
     // Frames travel, then vote. The firmware takes the newest frame alone, once.
@@ -107,13 +110,13 @@ private:
     {
         if (p_.kept_frames == 1 && p_.vote_frames == 1)
             return;
-        Mask *seen = Bits(at_.seen), *ones = Bits(at_.ones);
-        Mask *sent = Bits(at_.frames) + (step % p_.kept_frames) * n_;
+        Mask *seen = BitsAt(at_.seen), *ones = BitsAt(at_.ones);
+        Mask *sent = BitsAt(at_.frames) + (step % p_.kept_frames) * n_;
         for (int i = 0; i < n_; ++i)
             sent[i] = seen[i];
         const LeanStep now = p_.steps[step];
-        const Mask *arrived = Bits(at_.frames) + now.frame * n_;
-        Mask *slot = Bits(at_.votes) + now.slot * n_;
+        const Mask *arrived = BitsAt(at_.frames) + now.frame * n_;
+        Mask *slot = BitsAt(at_.votes) + now.slot * n_;
         for (int i = 0; now.slot >= 0 && i < n_; ++i)
         {
             ones[i] += slot[i] - arrived[i];  // a set bit is -1
@@ -126,7 +129,7 @@ private:
     void Move()
     {
         const int n = n_;
-        const Mask *seen = Bits(at_.seen);
+        const Mask *seen = BitsAt(at_.seen);
         const Real *unseen_row = Column(kUnseenX), *seen_row = Column(kSeenX);
         Real *x = Column(kX), *y = Column(kY), *c = Column(kCos), *s = Column(kSin);
         for (int i = 0; i < n; ++i)
@@ -173,7 +176,7 @@ private:
 
     void Measure(bool moves)
     {
-        const Mask *seen = Bits(at_.seen);
+        const Mask *seen = BitsAt(at_.seen);
         Real *vx = Column(kScratch), *vy = Column(kScratch + 1), *omega = Column(kScratch + 2);
         for (int i = 0; i < n_; ++i)
         {

@@ -3,9 +3,7 @@
 #ifndef PLANT_RANDOM_H
 #define PLANT_RANDOM_H
 
-#include <cstddef>
 #include <cstdint>
-#include <random>
 #include <string_view>
 
 namespace twin
@@ -17,12 +15,12 @@ class Random
 public:
     Random(uint64_t seed, int robot, std::string_view name);
     double Uniform();  // [0, 1)
-    // The next `count` of them, each `stride` after the one before.
-    void Uniform(double *first, size_t stride, int count);
-    double Normal();  // mean 0, standard deviation 1 (Box and Muller 1958)
+    double Normal();   // mean 0, standard deviation 1 (Box and Muller 1958)
+    // Where SplitMix() goes on; Uniform() is its upper 53 bits times 2^-53.
+    uint64_t State() const { return state_; }
 
 private:
-    std::mt19937_64 engine_;
+    uint64_t state_;
     double spare_ = 0;
     bool has_spare_ = false;
 };

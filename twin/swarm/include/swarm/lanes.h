@@ -17,12 +17,13 @@ namespace twin
 template <int W>
 struct LaneTypes;
 
-#define TWIN_LANE_TYPES(W)                                                   \
-    template <>                                                              \
-    struct LaneTypes<W>                                                      \
-    {                                                                        \
-        typedef double Real __attribute__((vector_size(8 * W), may_alias));  \
-        typedef int64_t Mask __attribute__((vector_size(8 * W), may_alias)); \
+#define TWIN_LANE_TYPES(W)                                                    \
+    template <>                                                               \
+    struct LaneTypes<W>                                                       \
+    {                                                                         \
+        typedef double Real __attribute__((vector_size(8 * W), may_alias));   \
+        typedef int64_t Mask __attribute__((vector_size(8 * W), may_alias));  \
+        typedef uint64_t Bits __attribute__((vector_size(8 * W), may_alias)); \
     };
 TWIN_LANE_TYPES(1)
 TWIN_LANE_TYPES(2)
@@ -35,6 +36,7 @@ struct Lanes
 {
     using Real = typename LaneTypes<W>::Real;
     using Mask = typename LaneTypes<W>::Mask;  // of each lane all bits, or none
+    using Bits = typename LaneTypes<W>::Bits;
 
     static Real All(double value) { return value - Real{}; }
     static Real Abs(Real a) { return (Real)((Mask)a & INT64_MAX); }

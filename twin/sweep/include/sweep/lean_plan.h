@@ -24,6 +24,9 @@ enum LeanColumn
     kHalfCos,
     kHalfSin,
     kTarget2,
+    // Integers: the stream of the sensor's errors, and from which of its numbers in [0, 2^53) on a
+    // frame is right when something is in view, when nothing is.
+    kDice,
     kMiss,
     kFalse,
     // A row of the table: displacement in the body frame and rotation in one substep.
@@ -101,14 +104,12 @@ struct LeanLayout
 };
 
 // Runs steps [from, to) of W worlds. `numbers`: LeanLayout::size * W doubles, aligned to 64 bytes.
-// `chances`: with errors, one uniform number for each step from `from`, robot and lane.
-using LeanAdvance = void (*)(const LeanPlan &, double *numbers, const double *chances, int from,
-                             int to);
+using LeanAdvance = void (*)(const LeanPlan &, double *numbers, int from, int to);
 
-void LeanAdvance2(const LeanPlan &, double *numbers, const double *chances, int from, int to);
+void LeanAdvance2(const LeanPlan &, double *numbers, int from, int to);
 #ifdef __x86_64__
-void LeanAdvance4(const LeanPlan &, double *numbers, const double *chances, int from, int to);
-void LeanAdvance8(const LeanPlan &, double *numbers, const double *chances, int from, int to);
+void LeanAdvance4(const LeanPlan &, double *numbers, int from, int to);
+void LeanAdvance8(const LeanPlan &, double *numbers, int from, int to);
 #endif
 
 }  // namespace twin
