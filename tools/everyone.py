@@ -48,7 +48,9 @@ def read_everyone(path: Path) -> Cast:
 
 def everyone_in(events: Events, path: Path, sha256: str = "") -> Cast:
     """The same of events; `path` names them in messages."""
-    present = [p for p in PREFIXES if any(re.match(rf"{p}R\d\d_", c) for c in events.by_channel)]
+    present = [
+        p for p in PREFIXES if any(re.match(rf"{p}R\d{{2,4}}_", c) for c in events.by_channel)
+    ]
     logs = {prefix: decode_log(events, path, sha256, prefix) for prefix in present or [""]}
     t0_us = min(log.t0_utime_us for log in logs.values())
     actors = [

@@ -46,9 +46,9 @@ TEST(Random, BitsAreThoseOfTheReference)
 TEST(Random, FirstNumbersOfSuccessiveSeedsAreUniform)
 {
     uint64_t seed = 0;
-    EXPECT_LT(Kolmogorov([&] { return Random(++seed, 0, "test").Uniform(); },
-                         [](double x) { return x; }),
-              1.95);
+    EXPECT_LT(
+        Kolmogorov([&] { return Random(++seed, 0, "test").Uniform(); }, [](double x) { return x; }),
+        1.95);
 }
 
 TEST(Random, UniformIsUniform)

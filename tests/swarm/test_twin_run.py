@@ -144,7 +144,7 @@ def test_a_signal_finishes_the_log(tmp_path, stop):
         (["--viev"], 2, "--viev"),
         (["--sensor", "lidar"], 2, "lidar"),
         (["--n", 0], 2, "--n"),
-        (["--n", 101], 2, "--n"),
+        (["--n", 1001], 2, "--n"),
         (["--duration-s", -1], 2, "--duration-s"),
         (["--behavior", "miling"], 1, "miling"),
         (["--behavior", "milling:2,shell:1", "--n", 4], 1, "--n"),

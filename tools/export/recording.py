@@ -17,7 +17,7 @@ TYPES = {
     for name, kind in sorted(vars(turbopi).items())
     if name.endswith("_t") and isinstance(kind, type)
 }
-OF_ROBOT = re.compile(r"(?P<prefix>.*?)(?P<robot>R\d\d)_[A-Z]+")
+OF_ROBOT = re.compile(r"(?P<prefix>.*?)(?P<robot>R\d{2,4})_[A-Z]+")
 
 
 @dataclass(frozen=True)

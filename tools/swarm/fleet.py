@@ -128,7 +128,7 @@ class Fleet:
         self._prefix = channel_prefix
         try:
             self.bus = connect(url)
-            channels = re.escape(channel_prefix) + "R[0-9][0-9]_(TELEMETRY|RUN|ACK)"
+            channels = re.escape(channel_prefix) + "R[0-9][0-9]+_(TELEMETRY|RUN|ACK)"
             self.bus.subscribe(channels, self._on_message).set_queue_capacity(1000)
         except RuntimeError as error:
             raise ValueError(

@@ -11,7 +11,7 @@ import numpy as np
 import twinmill_native as native
 from twinmill.tools.sweep.axes import QUANTITIES, Axis, set_speeds
 
-MAX_ROBOTS = 100
+MAX_ROBOTS = 1000
 # Agent-steps in one part: about a second's work. The lean kernel is a hundred times faster.
 PART_LEAN, PART_FULL = 50_000_000, 1_000_000
 

@@ -17,7 +17,7 @@ from twinmill.tools.watch.source import Batch, Window
 
 JUDGE_EVERY_S = 1.0
 PATH_EVERY_S = 0.2
-ROBOT = re.compile(rf"({'|'.join(p for p in GROUPS if p)})?(R\d\d)_(TELEMETRY|POSE|DRIVE|RUN)")
+ROBOT = re.compile(rf"({'|'.join(p for p in GROUPS if p)})?(R\d{{2,4}})_(TELEMETRY|POSE|DRIVE|RUN)")
 
 
 def open_stream(

@@ -12,7 +12,7 @@ from twinmill.calibration.log import read_bytes
 from twinmill.calibration.wire import Events, split_events
 
 BATCH_S = 0.1
-CHANNELS = ".*R[0-9][0-9]_(TELEMETRY|POSE|DRIVE|RUN)"
+CHANNELS = ".*R[0-9][0-9]+_(TELEMETRY|POSE|DRIVE|RUN)"
 
 Message = tuple[int, str, bytes]  # when it was logged or heard (us), channel, payload
 

@@ -5,6 +5,8 @@
 #include <map>
 #include <sstream>
 
+#include "plant/plant.h"
+
 namespace twin
 {
 namespace
@@ -51,7 +53,7 @@ void AddWorld(CLI::App &app, Options &o)
         ->check(CLI::IsMember({"cone", "camera"}))
         ->capture_default_str();
     app.add_option("--n", o.n, "robots; default 6, or the sum of the counts in --behavior")
-        ->check(CLI::Range(1, 100));
+        ->check(CLI::Range(1, kMaxRobots));
     app.add_option("--behavior", o.behavior, "one for all, or milling:5,self_centering:1")
         ->capture_default_str();
     app.add_option("--behaviors", o.behaviors,

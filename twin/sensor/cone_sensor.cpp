@@ -2,6 +2,7 @@
 #include "sensor/cone_sensor.h"
 
 #include <cmath>
+#include <limits>
 
 namespace twin
 {
@@ -17,17 +18,23 @@ ConeSensor::ConeSensor(const Sight &sight, int robot, uint64_t seed)
 
 // One draw per frame whatever is seen, two with a soft edge, so that streams of two runs stay in
 // step.
-bool ConeSensor::Seen(std::span<const Pose2> poses)
+bool ConeSensor::Seen(std::span<const Pose2> poses, size_t self)
 {
-    const double sure = ViewProbability(poses, self_, sight_, {});
+    const double sure = ViewProbability(poses, self, sight_, {});
     const bool in_view = sight_.softness_m > 0 ? random_.Uniform() < sure : sure > 0;
     const bool errs = random_.Uniform() < (in_view ? sight_.miss_rate : sight_.false_rate);
     return in_view != errs;
 }
 
-std::optional<SensorFrame> ConeSensor::Expose(std::span<const Pose2> poses, int64_t utime_us)
+double ConeSensor::ReachM() const
 {
-    on_the_way_.push_back({Seen(poses), seq_++, utime_us + age_us_});
+    return sight_.softness_m > 0 ? std::numeric_limits<double>::infinity() : sight_.range_m;
+}
+
+std::optional<SensorFrame> ConeSensor::Expose(std::span<const Pose2> poses, size_t self,
+                                              int64_t utime_us)
+{
+    on_the_way_.push_back({Seen(poses, self), seq_++, utime_us + age_us_});
     std::optional<SensorFrame> newest;
     while (!on_the_way_.empty() && on_the_way_.front().utime_us + delay_us_ <= utime_us)
     {

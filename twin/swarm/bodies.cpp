@@ -28,42 +28,73 @@ Shift TakenBack(const Shift &i, const Shift &j, double n_x, double n_y, double m
     return {-n_y * back_m, n_x * back_m};
 }
 
+double Distance2(const Pose2 &i, const Pose2 &j)
+{
+    const double dx_m = j.x_m - i.x_m, dy_m = j.y_m - i.y_m;
+    return dx_m * dx_m + dy_m * dy_m;
+}
+
+bool Touch(const Pose2 &i, const Pose2 &j, const Body &a, const Body &b)
+{
+    const double touch_m = a.radius_m + b.radius_m, distance2 = Distance2(i, j);
+    return distance2 < touch_m * touch_m && distance2 != 0;
+}
+
+// How far body j, which touches body i, is pushed, and i the other way. `i_moved`, `j_moved`: since
+// the step before.
+Shift HalfPush(const Pose2 &i, const Pose2 &j, const Shift &i_moved, const Shift &j_moved,
+               const Body &a, const Body &b)
+{
+    const double touch_m = a.radius_m + b.radius_m;
+    const double dx_m = j.x_m - i.x_m, dy_m = j.y_m - i.y_m, distance2 = Distance2(i, j);
+    const double push = (touch_m / std::sqrt(distance2) - 1) / 2;
+    Shift half{push * dx_m, push * dy_m};
+    const double friction = std::max(a.friction, b.friction);
+    if (friction > 0)
+    {
+        const double distance_m = std::sqrt(distance2);
+        const Shift back = TakenBack(i_moved, j_moved, dx_m / distance_m, dy_m / distance_m,
+                                     friction * (touch_m - distance_m));
+        half = {half.x_m - back.x_m / 2, half.y_m - back.y_m / 2};
+    }
+    return half;
+}
+
 }  // namespace
 
 void PushApart(std::vector<Pose2> &poses, const std::vector<Pose2> &before,
-               const std::vector<Body> &bodies)
+               const std::vector<Body> &bodies, CellGrid *grid)
 {
     const std::vector<Pose2> now = poses;
+    const auto push = [&](size_t i, size_t j) {
+        const Shift half = HalfPush(now[i], now[j], Moved(now[i], before[i]),
+                                    Moved(now[j], before[j]), bodies[i], bodies[j]);
+        poses[i].x_m -= half.x_m;
+        poses[i].y_m -= half.y_m;
+        poses[j].x_m += half.x_m;
+        poses[j].y_m += half.y_m;
+    };
+    if (grid)
+        grid->Fill(now, 2 * std::ranges::max(bodies, {}, &Body::radius_m).radius_m);
     for (size_t i = 0; i < now.size(); ++i)
-        for (size_t j = i + 1; j < now.size(); ++j)
+        if (grid)
         {
-            const double touch_m = bodies[i].radius_m + bodies[j].radius_m;
-            const double dx_m = now[j].x_m - now[i].x_m;
-            const double dy_m = now[j].y_m - now[i].y_m;
-            const double distance2 = dx_m * dx_m + dy_m * dy_m;
-            if (!(distance2 < touch_m * touch_m) || distance2 == 0)
-                continue;
-            const double push = (touch_m / std::sqrt(distance2) - 1) / 2;
-            Shift half{push * dx_m, push * dy_m};
-            const double friction = std::max(bodies[i].friction, bodies[j].friction);
-            if (friction > 0)
-            {
-                const double distance_m = std::sqrt(distance2);
-                const Shift back =
-                    TakenBack(Moved(now[i], before[i]), Moved(now[j], before[j]), dx_m / distance_m,
-                              dy_m / distance_m, friction * (touch_m - distance_m));
-                half = {half.x_m - back.x_m / 2, half.y_m - back.y_m / 2};
-            }
-            poses[i].x_m -= half.x_m;
-            poses[i].y_m -= half.y_m;
-            poses[j].x_m += half.x_m;
-            poses[j].y_m += half.y_m;
+            for (const size_t j : grid->Near(i))
+                if (j > i && Touch(now[i], now[j], bodies[i], bodies[j]))
+                    push(i, j);
         }
+        else
+            for (size_t j = i + 1; j < now.size(); ++j)
+                if (Touch(now[i], now[j], bodies[i], bodies[j]))
+                    push(i, j);
 }
 
 PlanarBodies::PlanarBodies(const std::vector<Model> &models, const std::vector<Pose2> &starts,
-                           uint64_t seed)
-    : PlanarPlant(models, starts, seed), before_(models.size()), poses_(models.size())
+                           uint64_t seed, size_t grid_from)
+    : PlanarPlant(models, starts, seed),
+      before_(models.size()),
+      poses_(models.size()),
+      grid_from_(grid_from)
 {
     for (const Model &model : models)
         bodies_.push_back(model.MakeBody());
@@ -80,7 +111,7 @@ void PlanarBodies::Step(double dt_s)
         return;
     for (int i = 0; i < Size(); ++i)
         poses_[static_cast<size_t>(i)] = State(i).pose;
-    PushApart(poses_, before_, bodies_);
+    PushApart(poses_, before_, bodies_, poses_.size() >= grid_from_ ? &grid_ : nullptr);
     for (int i = 0; i < Size(); ++i)
         Move(i, poses_[static_cast<size_t>(i)]);
 }

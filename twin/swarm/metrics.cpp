@@ -26,13 +26,15 @@ public:
         for (size_t i = 0; i < n_; ++i)
         {
             const RobotState &r = robots[i];
+            const Course course = CourseOf(r.vx_mps, r.vy_mps, r.omega_radps);
             const double row[]{r.pose.x_m,
                                r.pose.y_m,
                                std::cos(r.pose.theta_rad),
                                std::sin(r.pose.theta_rad),
-                               r.vx_mps,
-                               r.vy_mps,
-                               r.omega_radps};
+                               course[kTravelX],
+                               course[kTravelY],
+                               course[kTurnX],
+                               course[kTurnY]};
             for (size_t column = 0; column < std::size(row); ++column)
                 values_[column * n_ + i] = row[column];
         }
@@ -43,20 +45,35 @@ public:
     }
 
 private:
-    static constexpr size_t kCount = 10;
+    static constexpr size_t kCount = 11;
     size_t n_;
     std::vector<double> values_;
 };
 
 }  // namespace
 
+Course CourseOf(double vx_mps, double vy_mps, double omega_radps)
+{
+    static_assert(std::tuple_size<Course>() == kCourse);
+    const double speed_mps = std::hypot(vx_mps, vy_mps);
+    Course course{};
+    if (speed_mps > 0)
+        course = {vx_mps / speed_mps, vy_mps / speed_mps, 0, 0};
+    if (omega_radps != 0)
+    {
+        course[kTurnX] = -vy_mps / omega_radps;
+        course[kTurnY] = vx_mps / omega_radps;
+    }
+    return course;
+}
+
 Metrics Measure(std::span<const RobotState> robots, size_t ring_size, const MetricScale &scale)
 {
     Columns at(robots);
     const auto m = MetricFormulas<1>::Measure(
         {static_cast<int>(robots.size()), static_cast<int>(ring_size), at.At(0), at.At(1), at.At(2),
-         at.At(3), at.At(4), at.At(5), at.At(6), at.At(7), at.At(8), at.At(9),
-         Lanes<1>::All(scale.range_m), 2 * scale.body_radius_m * kTouch});
+         at.At(3), at.At(4), at.At(8), at.At(9), at.At(10), Lanes<1>::All(scale.range_m),
+         2 * scale.body_radius_m * kTouch});
     return {m.circliness[0], m.radius_m[0],  m.scatter_m2[0], m.rotation[0],
             m.odd_ratio[0],  m.diffusion[0], m.groups[0],     m.contacts[0]};
 }

@@ -6,12 +6,13 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "plant/plant.h"
+
 namespace twin
 {
 namespace
 {
 
-constexpr int kMaxRobots = 100;
 constexpr size_t kNamesShown = 10;
 
 const fw_behavior &MustFind(const std::string &name, std::span<const fw_behavior> own)
@@ -38,7 +39,8 @@ int ParseCount(const std::string &part, const std::string &digits)
     const auto [stop, error] = std::from_chars(digits.data(), end, count);
     if (error != std::errc() || stop != end || count < 1 || count > kMaxRobots)
         throw std::invalid_argument("--behavior: '" + part +
-                                    "' must be name:count with a count of 1 to 100");
+                                    "' must be name:count with a count of 1 to " +
+                                    std::to_string(kMaxRobots));
     return count;
 }
 

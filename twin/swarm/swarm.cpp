@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "swarm/swarm.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -62,6 +63,7 @@ Swarm::Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
              const std::vector<fw_table> &tables, const SwarmOptions &options)
     : plant_(std::move(plant)),
       poses_(models.size()),
+      grid_from_(options.grid_from),
       period_s_(models.front().base.control_period_s),
       substeps_(SubstepCount(period_s_, options.max_step_s)),
       start_utime_us_(options.start_utime_us)
@@ -79,6 +81,7 @@ Swarm::Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
                             nullptr,
                             nullptr,
                             0});
+        reach_m_ = std::max(reach_m_, members_.back().sensor.ReachM());
         if (const fw_err error = fw_init(&members_.back().firmware, &config); error != FW_OK)
             throw std::invalid_argument(std::string("the firmware refuses its configuration: ") +
                                         fw_err_str(error));
@@ -127,10 +130,12 @@ void Swarm::Decide()
     for (int i = 0; i < Size(); ++i)
         poses_[static_cast<size_t>(i)] = plant_->State(i).pose;
     const int64_t now_us = UtimeUs();
+    if (UsesGrid())
+        grid_.Fill(poses_, reach_m_);
     for (int i = 0; i < Size(); ++i)
     {
         Member &member = members_[static_cast<size_t>(i)];
-        DecideOne(member, now_us);
+        DecideOne(member, Sense(i, now_us), now_us);
         const fw_output &out = member.output;
         Command command = CommandFor(member.base, {out.speed_input_pct, out.turn_input_milli},
                                      out.wheel_duty_pct);
@@ -140,9 +145,29 @@ void Swarm::Decide()
     ++step_count_;
 }
 
-void Swarm::DecideOne(Member &member, int64_t now_us)
+bool Swarm::UsesGrid() const
 {
-    const auto frame = member.sensor.Expose(poses_, now_us);
+    return members_.size() >= grid_from_ && reach_m_ > 0 && std::isfinite(reach_m_);
+}
+
+std::optional<SensorFrame> Swarm::Sense(int robot, int64_t now_us)
+{
+    ConeSensor &sensor = members_[static_cast<size_t>(robot)].sensor;
+    if (!UsesGrid())
+        return sensor.Expose(poses_, now_us);
+    near_poses_.clear();
+    size_t self = 0;
+    for (const size_t i : grid_.Near(static_cast<size_t>(robot)))
+    {
+        if (i == static_cast<size_t>(robot))
+            self = near_poses_.size();
+        near_poses_.push_back(poses_[i]);
+    }
+    return sensor.Expose(near_poses_, self, now_us);
+}
+
+void Swarm::DecideOne(Member &member, const std::optional<SensorFrame> &frame, int64_t now_us)
+{
     if (member.script)
     {
         const ScriptRow idle{};

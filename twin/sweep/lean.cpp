@@ -26,11 +26,11 @@ std::vector<LeanWidth> UsableWidths()
 #ifdef __x86_64__
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512vl"))
-        widths.push_back({8, LeanAdvance8});
+        widths.push_back({16, LeanAdvance16});
     if (__builtin_cpu_supports("avx2"))
-        widths.push_back({4, LeanAdvance4});
+        widths.push_back({8, LeanAdvance8});
 #endif
-    widths.push_back({2, LeanAdvance2});
+    widths.push_back({4, LeanAdvance4});
     return widths;
 }
 
@@ -53,13 +53,13 @@ std::vector<LeanStep> Schedule(const Model &model, int steps, int vote_frames, i
     };
     const int64_t delay_us = std::llround(model.sensor.delay_s * 1e6);
     std::vector<LeanStep> schedule;
-    std::vector<int> newest;
+    schedule.reserve(static_cast<size_t>(steps));
     int frame = -1, pushed = 0;
     kept_frames = 1;
     for (int step = 0; step < steps; ++step)
     {
         const int before = frame;
-        while (frame < step && utime_us(frame + 1) + delay_us <= utime_us(step))
+        while (frame < step && (delay_us == 0 || utime_us(frame + 1) + delay_us <= utime_us(step)))
             ++frame;
         const bool fresh = frame > before;
         const int slot = fresh ? pushed++ % vote_frames : -1;
@@ -74,31 +74,32 @@ std::vector<LeanStep> Schedule(const Model &model, int steps, int vote_frames, i
 class Batch
 {
 public:
-    Batch(const LeanWidth &width, std::span<const World> worlds, double duration_s)
+    Batch(const LeanWidth &width, std::span<const World> worlds, double duration_s, bool screens)
         : worlds_(worlds), lanes_(width.lanes), advance_(width.advance)
     {
         const Cell &cell = *worlds.front().cell;
         const Model &model = cell.model;
         const StepCount count = CountSteps(model.base.control_period_s, duration_s);
-        steps_ = count.steps;
         measured_ = count.steps - count.first_measured;
         plan_.n = static_cast<int>(cell.tables.size());
         plan_.ring = static_cast<int>(cell.ring_size);
+        plan_.step_count = count.steps;
+        plan_.screens = screens;
         plan_.substeps = SubstepCount(model.base.control_period_s, SwarmOptions{}.max_step_s);
         plan_.first_measured = count.first_measured;
         plan_.vote_frames = static_cast<int>(std::lround(model.sensor.vote_frames));
-        schedule_ = Schedule(model, steps_, plan_.vote_frames, plan_.kept_frames);
+        schedule_ = Schedule(model, count.steps, plan_.vote_frames, plan_.kept_frames);
         plan_.steps = schedule_.data();
         plan_.body_m = 2 * model.robot.body_radius_m;
         plan_.touch_m = plan_.body_m * kTouch;
-        const size_t size = static_cast<size_t>(LeanLayout(plan_).size) * lanes_;
+        const size_t size = static_cast<size_t>(LeanLayout(plan_).total) * lanes_ / 2;
         memory_.assign(size + kAlign / sizeof(double), 0.0);
         numbers_ = Aligned(memory_);
         for (size_t lane = 0; lane < lanes_; ++lane)  // idle lanes repeat the first world
             FillLane(lane, worlds[lane < worlds.size() ? lane : 0]);
     }
 
-    void Run() { advance_(plan_, numbers_, 0, steps_); }
+    void Run() { advance_(plan_, numbers_); }
 
     Outcome OutcomeOf(size_t lane) const
     {
@@ -115,15 +116,19 @@ private:
         return memory.data() + (kAlign - address % kAlign) % kAlign / sizeof(double);
     }
 
-    double &At(int column, size_t robot, size_t lane)
+    // A number of a lane, `at` that of LeanLayout.
+    double &Number(int at, size_t lane) const
     {
-        return numbers_[(static_cast<size_t>(column * plan_.n) + robot) * lanes_ + lane];
+        const size_t half = lanes_ / 2, size = static_cast<size_t>(LeanLayout(plan_).size);
+        return numbers_[(lane / half * size + static_cast<size_t>(at)) * half + lane % half];
     }
 
-    double &Sum(int sum, size_t lane) const
+    double &At(int column, size_t robot, size_t lane)
     {
-        return numbers_[static_cast<size_t>(LeanLayout(plan_).sums + sum) * lanes_ + lane];
+        return Number(column * plan_.n + static_cast<int>(robot), lane);
     }
+
+    double &Sum(int sum, size_t lane) const { return Number(LeanLayout(plan_).sums + sum, lane); }
 
     void FillLane(size_t lane, const World &world)
     {
@@ -140,11 +145,10 @@ private:
             At(kDice, i, lane) =
                 std::bit_cast<double>(Random(world.seed, static_cast<int>(i), "sensor").State());
             const DriveChain chain(robots[i]);
-            FillRow(i, lane, kUnseenX, kUnseenVx, chain, robots[i].base, cell.tables[i].unseen);
-            FillRow(i, lane, kSeenX, kSeenVx, chain, robots[i].base, cell.tables[i].seen);
+            FillRow(i, lane, kUnseenX, kUnseenCourse, chain, robots[i].base, cell.tables[i].unseen);
+            FillRow(i, lane, kSeenX, kSeenCourse, chain, robots[i].base, cell.tables[i].seen);
         }
-        numbers_[static_cast<size_t>(LeanLayout(plan_).range) * lanes_ + lane] =
-            cell.model.sensor.range_m;
+        Number(LeanLayout(plan_).range, lane) = cell.model.sensor.range_m;
         Sum(kLeastDiffusion, lane) = std::numeric_limits<double>::infinity();
     }
 
@@ -162,33 +166,31 @@ private:
         plan_.errors |= sensor.false_negative_rate > 0 || sensor.false_positive_rate > 0;
     }
 
-    // The velocity that a row of the table gives this robot, and one substep of it: the chord of
-    // the arc, in the body frame, and the turn.
-    void FillRow(size_t robot, size_t lane, int move, int velocity, const DriveChain &chain,
+    // The course that a row of the table gives this robot, and one substep of it: the chord of the
+    // arc, in the body frame, and the turn.
+    void FillRow(size_t robot, size_t lane, int move, int course, const DriveChain &chain,
                  const Base &base, const fw_input &input)
     {
         const double dt_s = StepS(base);
         RobotState state = chain.Start({});
         int8_t duty_pct[FW_WHEEL_COUNT];
         fw_mix(&input, duty_pct);
-        const Command command = CommandFor(base, input, duty_pct);
-        const Twist v =
-            chain.BodyTwist(chain.DriveWheels(command, 0, dt_s, state), 0, dt_s, state, nullptr);
-        state = chain.Start({});
-        PlanarStep(chain, command, 0, dt_s, state, nullptr);
+        PlanarStep(chain, CommandFor(base, input, duty_pct), 0, dt_s, state, nullptr);
+        const double length_m = std::hypot(state.pose.x_m, state.pose.y_m);
+        plan_.most_m = std::max(plan_.most_m, 1.01 * plan_.substeps * length_m);
         At(move, robot, lane) = state.pose.x_m;
         At(move + 1, robot, lane) = state.pose.y_m;
         At(move + 2, robot, lane) = std::cos(state.pose.theta_rad);
         At(move + 3, robot, lane) = std::sin(state.pose.theta_rad);
-        At(velocity, robot, lane) = v.vx_mps;
-        At(velocity + 1, robot, lane) = v.vy_mps;
-        At(velocity + 2, robot, lane) = v.omega_radps;
+        const Course taken = CourseOf(state.vx_mps, state.vy_mps, state.omega_radps);
+        for (size_t k = 0; k < taken.size(); ++k)
+            At(course + static_cast<int>(k), robot, lane) = taken[k];
     }
 
     std::span<const World> worlds_;
     size_t lanes_;
     LeanAdvance advance_;
-    int steps_ = 0, measured_ = 0;
+    int measured_ = 0;
     LeanPlan plan_{};
     std::vector<LeanStep> schedule_;
     std::vector<double> memory_;
@@ -222,9 +224,9 @@ StepCount CountSteps(double period_s, double duration_s)
 }
 
 void RunLean(const LeanWidth &width, std::span<const World> worlds, double duration_s,
-             std::span<Outcome> outcomes)
+             std::span<Outcome> outcomes, bool screens)
 {
-    Batch batch(width, worlds, duration_s);
+    Batch batch(width, worlds, duration_s, screens);
     batch.Run();
     for (size_t lane = 0; lane < worlds.size(); ++lane)
         outcomes[lane] = batch.OutcomeOf(lane);

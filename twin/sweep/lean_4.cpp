@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// 4 worlds at once: compiled for AVX2.
-#include "lean_kernel.h"
+// 4 worlds at once: in vectors of 2 doubles: any processor.
+#include "lean_batch.h"
 
-void twin::LeanAdvance4(const LeanPlan &plan, double *numbers, int from, int to)
+void twin::LeanAdvance4(const LeanPlan &plan, double *numbers)
 {
-    LeanKernel<4>(plan, numbers).Advance(from, to);
+    LeanBatch<2>(plan, numbers).Run();
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// 8 worlds at once: compiled for AVX-512.
-#include "lean_kernel.h"
+// 8 worlds at once: compiled for AVX2.
+#include "lean_batch.h"
 
-void twin::LeanAdvance8(const LeanPlan &plan, double *numbers, int from, int to)
+void twin::LeanAdvance8(const LeanPlan &plan, double *numbers)
 {
-    LeanKernel<8>(plan, numbers).Advance(from, to);
+    LeanBatch<4>(plan, numbers).Run();
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many worlds of robots without memory in their drive: a table row is a constant velocity, so that
+// W worlds of robots without memory in their drive: a table row is a constant velocity, so that
 // a step is a rotation and a displacement worked out beforehand. Same rules as Swarm, PlanarBodies
 // and ConeSensor; differences are those of rounding.
 #ifndef SWEEP_LEAN_KERNEL_H
@@ -26,65 +26,51 @@ public:
     {
     }
 
-    void Advance(int from, int to)
+    const Real *Columns() const { return numbers_; }
+    Mask *Seen() const { return BitsAt(at_.seen); }
+
+    // InView() of the cone sensor for one robot. Its ahead > cos * distance is squared with the
+    // signs kept, which spares the root.
+    template <bool kDisc>
+    void Sense(int robot)
     {
-        for (int step = from; step < to; ++step)
+        const Real *x = Column(kX), *y = Column(kY);
+        const Real c = Column(kCos)[robot], s = Column(kSin)[robot];
+        const Real range2 = Column(kRange2)[robot], cone = Column(kCone)[robot];
+        Mask seen{};
+        for (int j = 0; j < n_; ++j)
         {
-            if (p_.target_is_disc)
-                Sense<true>();
-            else
-                Sense<false>();
-            if (p_.errors)
-                Err();
-            Decide(step);
-            const bool moves = p_.steps[step].frame >= 0;
-            for (int i = 0; moves && i < p_.substeps; ++i)
-            {
-                Move();
-                PushApart();
-            }
-            if (step >= p_.first_measured)
-                Measure(moves);
+            if (j == robot)
+                continue;
+            const Real dx = x[j] - x[robot], dy = y[j] - y[robot], d2 = dx * dx + dy * dy;
+            const Real ahead = c * dx + s * dy;
+            Mask inside = ahead * L::Abs(ahead) > cone * d2;
+            if constexpr (kDisc)
+                inside |= Edge(robot, ahead, L::Abs(c * dy - s * dx));
+            seen |= inside & (d2 < range2);
         }
+        Seen()[robot] = seen;
+    }
+
+    // The rest of a step once it is clear what robots see.
+    void Finish(int step)
+    {
+        if (p_.errors)
+            Err();
+        Decide(step);
+        const bool moves = p_.steps[step].frame >= 0;
+        for (int i = 0; moves && i < p_.substeps; ++i)
+        {
+            Move();
+            PushApart();
+        }
+        if (step >= p_.first_measured)
+            Measure(moves);
     }
 
 private:
     Real *Column(int column) const { return numbers_ + column * n_; }
     Mask *BitsAt(int at) const { return reinterpret_cast<Mask *>(numbers_ + at); }
-
-    // InView() of the cone sensor, both ways for each pair. Its ahead > cos * distance is squared
-    // with the signs kept, which spares the root.
-    template <bool kDisc>
-    void Sense()
-    {
-        const Real *x = Column(kX), *y = Column(kY), *c = Column(kCos), *s = Column(kSin);
-        const Real *range2 = Column(kRange2), *cone = Column(kCone);
-        Mask *seen = BitsAt(at_.seen);
-        const int n = n_;
-        for (int i = 0; i < n; ++i)
-            seen[i] = Mask{};
-        for (int i = 0; i < n; ++i)
-        {
-            const Real xi = x[i], yi = y[i], ci = c[i], si = s[i], range2i = range2[i],
-                       conei = cone[i];
-            Mask seen_i = seen[i];
-            for (int j = i + 1; j < n; ++j)
-            {
-                const Real dx = x[j] - xi, dy = y[j] - yi, d2 = dx * dx + dy * dy;
-                const Real ahead_i = ci * dx + si * dy, behind_j = c[j] * dx + s[j] * dy;
-                Mask in_i = ahead_i * L::Abs(ahead_i) > conei * d2;
-                Mask in_j = behind_j * L::Abs(behind_j) < -cone[j] * d2;
-                if constexpr (kDisc)
-                {
-                    in_i |= Edge(i, ahead_i, L::Abs(ci * dy - si * dx));
-                    in_j |= Edge(j, -behind_j, L::Abs(c[j] * dy - s[j] * dx));
-                }
-                seen_i |= in_i & (d2 < range2i);
-                seen[j] |= in_j & (d2 < range2[j]);
-            }
-            seen[i] = seen_i;
-        }
-    }
 
     // Whether the disc reaches over the edge of the cone of `robot`.
     Mask Edge(int robot, Real ahead, Real aside) const
@@ -177,17 +163,15 @@ private:
     void Measure(bool moves)
     {
         const Mask *seen = BitsAt(at_.seen);
-        Real *vx = Column(kScratch), *vy = Column(kScratch + 1), *omega = Column(kScratch + 2);
+        Real *course = Column(kCourseNow);
         for (int i = 0; i < n_; ++i)
-        {
-            const Real zero{};
-            vx[i] = !moves ? zero : seen[i] ? Column(kSeenVx)[i] : Column(kUnseenVx)[i];
-            vy[i] = !moves ? zero : seen[i] ? Column(kSeenVy)[i] : Column(kUnseenVy)[i];
-            omega[i] = !moves ? zero : seen[i] ? Column(kSeenOmega)[i] : Column(kUnseenOmega)[i];
-        }
+            for (int k = 0; k < kCourse; ++k)
+                course[k * n_ + i] = !moves    ? Real{}
+                                     : seen[i] ? Column(kSeenCourse + k)[i]
+                                               : Column(kUnseenCourse + k)[i];
         const MetricLanes<W> m = MetricFormulas<W>::Measure(
-            {n_, p_.ring, Column(kX), Column(kY), Column(kCos), Column(kSin), vx, vy, omega,
-             Column(kScratch + 3), Column(kScratch + 4), Column(kScratch + 5), numbers_[at_.range],
+            {n_, p_.ring, Column(kX), Column(kY), Column(kCos), Column(kSin), course,
+             Column(kScratch), Column(kScratch + 1), Column(kScratch + 2), numbers_[at_.range],
              p_.touch_m});
         Real *sums = numbers_ + at_.sums;
         sums[kCirclinessSum] += m.circliness;

@@ -30,11 +30,11 @@ void PrintWarning(const char *text)
 void CheckInputs(const std::vector<Model> &models, const std::vector<Pose2> &starts,
                  const MujocoOptions &options)
 {
-    if (models.empty() || models.size() > 100 || models.size() != starts.size())
-        throw std::invalid_argument(
-            "mujoco plant: " + std::to_string(models.size()) + " models and " +
-            std::to_string(starts.size()) +
-            " start poses: give one of each per robot, for 1 to 100 robots");
+    if (models.empty() || models.size() > kMaxRobots || models.size() != starts.size())
+        throw std::invalid_argument("mujoco plant: " + std::to_string(models.size()) +
+                                    " models and " + std::to_string(starts.size()) +
+                                    " start poses: give one of each per robot, for 1 to " +
+                                    std::to_string(kMaxRobots) + " robots");
     if (!(options.timestep_s > 0 && options.timestep_s <= 0.01))
         throw std::invalid_argument(
             "mujoco plant: timestep_s " + std::to_string(options.timestep_s) +

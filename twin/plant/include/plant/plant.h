@@ -12,6 +12,9 @@
 namespace twin
 {
 
+// In one swarm.
+constexpr int kMaxRobots = 1000;
+
 struct Pose2
 {
     double x_m = 0, y_m = 0, theta_rad = 0;

@@ -31,10 +31,19 @@ public:
     // Exposes a frame at `utime_us`, misses and imagines targets at the given rates, and stamps it
     // age_s later. Returns the newest frame whose stamp is delay_s old or older; none if no further
     // one has arrived.
-    std::optional<SensorFrame> Expose(std::span<const Pose2> poses, int64_t utime_us);
+    std::optional<SensorFrame> Expose(std::span<const Pose2> poses, int64_t utime_us)
+    {
+        return Expose(poses, self_, utime_us);
+    }
+    // The same where `self` is this robot's place in `poses`, which may leave out robots that are
+    // ReachM() away or farther.
+    std::optional<SensorFrame> Expose(std::span<const Pose2> poses, size_t self, int64_t utime_us);
+
+    // Robots farther away do not matter; infinite if the range has a soft edge.
+    double ReachM() const;
 
 private:
-    bool Seen(std::span<const Pose2> poses);
+    bool Seen(std::span<const Pose2> poses, size_t self);
 
     Sight sight_;
     size_t self_;

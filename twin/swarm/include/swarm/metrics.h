@@ -3,6 +3,7 @@
 #ifndef SWARM_METRICS_H
 #define SWARM_METRICS_H
 
+#include <array>
 #include <deque>
 #include <span>
 
@@ -38,6 +39,10 @@ struct MetricScale
     double range_m;
     double body_radius_m;  // 0: nothing touches
 };
+
+// How a robot with this velocity in its own frame moves, see CourseColumn.
+using Course = std::array<double, 4>;
+Course CourseOf(double vx_mps, double vy_mps, double omega_radps);
 
 // The first `ring_size` robots make the ring; those after them are odd.
 Metrics Measure(std::span<const RobotState> robots, size_t ring_size, const MetricScale &scale);

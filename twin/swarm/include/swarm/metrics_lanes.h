@@ -8,14 +8,25 @@
 namespace twin
 {
 
-// Arrays of n robots. Scratch: centre_x, centre_y, label.
+// How a robot moves, in its own frame: the unit vector of its travel (0 if it stands) and where the
+// centre of its turn is (0 if it does not turn), ahead and left each.
+enum CourseColumn
+{
+    kTravelX,
+    kTravelY,
+    kTurnX,
+    kTurnY,
+    kCourse,
+};
+
+// Arrays of n robots; `course`: kCourse of them in turn. Scratch: centre_x, centre_y, label.
 template <int W>
 struct SwarmLanes
 {
     using Real = typename Lanes<W>::Real;
     int n, ring;
     const Real *x_m, *y_m, *cos_theta, *sin_theta;
-    const Real *vx_mps, *vy_mps, *omega_radps;  // body frame
+    const Real *course;
     Real *centre_x_m, *centre_y_m, *label;
     Real range_m;
     double touch_m;  // bodies whose centres are nearer touch
@@ -52,14 +63,15 @@ struct MetricFormulas
         for (int i = 0; i < s.ring; ++i)
         {
             const Real rx = s.x_m[i] - mean_x, ry = s.y_m[i] - mean_y, r2 = rx * rx + ry * ry;
-            const Real ux = s.cos_theta[i] * s.vx_mps[i] - s.sin_theta[i] * s.vy_mps[i];
-            const Real uy = s.sin_theta[i] * s.vx_mps[i] + s.cos_theta[i] * s.vy_mps[i];
-            const Real r = L::Sqrt(r2), ru = L::Sqrt(r2 * (ux * ux + uy * uy));
+            const Real along = s.course[kTravelX * s.n + i], left = s.course[kTravelY * s.n + i];
+            const Real ux = s.cos_theta[i] * along - s.sin_theta[i] * left;
+            const Real uy = s.sin_theta[i] * along + s.cos_theta[i] * left;
+            const Real r = L::Sqrt(r2);
             least = L::Min(least, r);
             most = L::Max(most, r);
             m.radius_m += r;
             m.scatter_m2 += r2;
-            m.rotation += ru > 0 ? (rx * uy - ry * ux) / ru : L::All(0);
+            m.rotation += r > 0 ? (rx * uy - ry * ux) / r : L::All(0);
         }
         m.radius_m /= n;
         m.scatter_m2 /= n;
@@ -75,60 +87,45 @@ struct MetricFormulas
     {
         for (int i = 0; i < s.n; ++i)
         {
-            const Real ux = s.cos_theta[i] * s.vx_mps[i] - s.sin_theta[i] * s.vy_mps[i];
-            const Real uy = s.sin_theta[i] * s.vx_mps[i] + s.cos_theta[i] * s.vy_mps[i];
-            const Mask turns = s.omega_radps[i] != 0;
-            s.centre_x_m[i] = turns ? s.x_m[i] - uy / s.omega_radps[i] : s.x_m[i];
-            s.centre_y_m[i] = turns ? s.y_m[i] + ux / s.omega_radps[i] : s.y_m[i];
+            const Real ahead = s.course[kTurnX * s.n + i], left = s.course[kTurnY * s.n + i];
+            s.centre_x_m[i] = s.x_m[i] + s.cos_theta[i] * ahead - s.sin_theta[i] * left;
+            s.centre_y_m[i] = s.y_m[i] + s.sin_theta[i] * ahead + s.cos_theta[i] * left;
         }
     }
 
-    // Robots in view range of each other take the smaller label until none changes: one label is
-    // left for each group.
-    static Real Groups(const SwarmLanes<W> &s)
+    // Gives the group of robot j the label of robot i's, in the lanes of the mask.
+    static void Join(const SwarmLanes<W> &s, Mask lanes, int i, int j)
     {
-        for (int i = 0; i < s.n; ++i)
-            s.label[i] = L::All(i);
-        for (bool changed = true; changed;)
-        {
-            Mask moved{};
-            for (int i = 0; i < s.n; ++i)
-                for (int j = i + 1; j < s.n; ++j)
-                {
-                    const Mask near = Norm2(s, i, j) < s.range_m * s.range_m;
-                    const Real least = L::Min(s.label[i], s.label[j]);
-                    moved |= near & (s.label[i] != s.label[j]);
-                    s.label[i] = near ? least : s.label[i];
-                    s.label[j] = near ? least : s.label[j];
-                }
-            changed = L::Any(moved);
-        }
-        Real groups{};
-        for (int i = 0; i < s.n; ++i)
-            groups += L::One(s.label[i] == L::All(i));
-        return groups;
-    }
-
-    static Real Norm2(const SwarmLanes<W> &s, int i, int j)
-    {
-        const Real dx = s.x_m[i] - s.x_m[j], dy = s.y_m[i] - s.y_m[j];
-        return dx * dx + dy * dy;
+        const Real kept = s.label[i], dropped = s.label[j];
+        for (int k = 0; k < s.n; ++k)
+            s.label[k] = lanes & (s.label[k] == dropped) ? kept : s.label[k];
     }
 
     static void Pairs(const SwarmLanes<W> &s, MetricLanes<W> &m)
     {
         Centres(s);
+        for (int i = 0; i < s.n; ++i)
+            s.label[i] = L::All(i);
+        m.groups = L::All(s.n);
+        const Real range2 = s.range_m * s.range_m;
         Real nearest2 = L::All(s.n > 1 ? __builtin_inf() : __builtin_nan(""));
         for (int i = 0; i < s.n; ++i)
             for (int j = i + 1; j < s.n; ++j)
             {
                 const Real cx = s.centre_x_m[i] - s.centre_x_m[j];
                 const Real cy = s.centre_y_m[i] - s.centre_y_m[j];
+                const Real dx = s.x_m[i] - s.x_m[j], dy = s.y_m[i] - s.y_m[j];
+                const Real distance2 = dx * dx + dy * dy;
                 nearest2 = L::Min(nearest2, cx * cx + cy * cy);
-                m.contacts += L::One(Norm2(s, i, j) < s.touch_m * s.touch_m);
+                if (s.touch_m > 0)
+                    m.contacts += L::One(distance2 < s.touch_m * s.touch_m);
+                const Mask joins = (distance2 < range2) & (s.label[i] != s.label[j]);
+                if (!L::Any(joins))
+                    continue;
+                m.groups -= L::One(joins);
+                Join(s, joins, i, j);
             }
         m.diffusion = L::Sqrt(nearest2) / s.range_m;
-        m.groups = Groups(s);
     }
 
     static MetricLanes<W> Measure(const SwarmLanes<W> &s)

@@ -11,6 +11,7 @@
 #include "model_file/model.h"
 #include "plant/plant.h"
 #include "sensor/cone_sensor.h"
+#include "swarm/cell_grid.h"
 #include "swarm/eye.h"
 #include "swarm/script.h"
 
@@ -24,6 +25,8 @@ struct SwarmOptions
     // Longest step of the plant; a control period is split evenly. With motor lag, 22 ms moves a
     // path by micrometres; shorter steps serve those who want to know poses in between.
     double max_step_s = 0.025;
+    // From this many robots on, neighbours are found with a grid; results are the same to the bit.
+    size_t grid_from = kGridPays;
 };
 
 // Into how many substeps of at most `max_step_s` a control period is split.
@@ -87,11 +90,16 @@ private:
         std::shared_ptr<const Script> script;
         double script_begin_s;
     };
-    void DecideOne(Member &member, int64_t now_us);
+    bool UsesGrid() const;
+    std::optional<SensorFrame> Sense(int robot, int64_t now_us);
+    void DecideOne(Member &member, const std::optional<SensorFrame> &frame, int64_t now_us);
 
     std::unique_ptr<Plant> plant_;
     std::vector<Member> members_;
-    std::vector<Pose2> poses_;
+    std::vector<Pose2> poses_, near_poses_;
+    CellGrid grid_;
+    size_t grid_from_;
+    double reach_m_ = 0;  // of the sensors; infinite: no grid
     double period_s_;
     int substeps_;
     int64_t start_utime_us_;

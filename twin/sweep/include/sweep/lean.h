@@ -23,9 +23,9 @@ std::span<const LeanWidth> LeanWidths();
 // Whether both may be lanes of one batch.
 bool SameBatch(const Cell &a, const Cell &b);
 
-// Runs up to width.lanes worlds that may share a batch.
+// Runs up to width.lanes worlds that may share a batch. `screens`: LeanPlan::screens.
 void RunLean(const LeanWidth &width, std::span<const World> worlds, double duration_s,
-             std::span<Outcome> outcomes);
+             std::span<Outcome> outcomes, bool screens = true);
 
 // Steps of a run, and the first that counts for the metrics' window.
 struct StepCount

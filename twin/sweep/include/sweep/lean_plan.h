@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the lean kernel works on: plain numbers, laid out by the caller. Only C headers, see
-// lanes.h.
+// What the lean kernel works on: plain numbers, laid out by the caller. No headers of
+// the library, see lanes.h.
 #ifndef SWEEP_LEAN_PLAN_H
 #define SWEEP_LEAN_PLAN_H
 
 #include <stdint.h>
+
+#include "swarm/metrics_lanes.h"
 
 namespace twin
 {
@@ -38,16 +40,29 @@ enum LeanColumn
     kSeenY,
     kSeenCos,
     kSeenSin,
-    // And its velocities in the body frame.
-    kUnseenVx,
-    kUnseenVy,
-    kUnseenOmega,
-    kSeenVx,
-    kSeenVy,
-    kSeenOmega,
+    // And its course, see swarm/metrics_lanes.h.
+    kUnseenCourse,
+    kSeenCourse = kUnseenCourse + kCourse,
+    kCourseNow = kSeenCourse + kCourse,
     // Scratch.
-    kScratch,
-    kLeanColumns = kScratch + 6,
+    kScratch = kCourseNow + kCourse,
+    kLeanColumns = kScratch + 3,
+};
+
+// Columns of n robots in single precision, 2 W worlds.
+enum ScreenColumn
+{
+    kScreenX,
+    kScreenY,
+    kScreenCos,
+    kScreenSin,
+    kScreenRange2,
+    kScreenCone,
+    kScreenHalfCos,
+    kScreenHalfSin,
+    kScreenTarget2,
+    kScreenMargin,
+    kScreenColumns,
 };
 
 enum LeanSum
@@ -75,18 +90,20 @@ struct LeanStep
 // What all lanes of a batch share.
 struct LeanPlan
 {
-    int n, ring, substeps;
+    int n, ring, step_count, substeps;
     int first_measured;  // step
     int vote_frames;     // majority over this many
     int kept_frames;     // of the sensor, newest included
     const LeanStep *steps;
     bool target_is_disc, errors;
+    bool screens;    // in single precision first; results are the same to the bit
+    double most_m;   // that a robot may drive in a step
     double body_m;   // diameter; 0: no bodies
     double touch_m;  // nearer bodies count as in contact
 };
 
 // Numbers of one lane, in units of the lane count: columns, range, sums, bits seen, votes' ones,
-// frames on the way, frames that vote.
+// frames on the way, frames that vote. `total`: of two halves of a batch and their screen.
 struct LeanLayout
 {
     // Always inlined: see lanes.h on inline functions that are compiled for several processors.
@@ -97,19 +114,21 @@ struct LeanLayout
           ones(seen + p.n),
           frames(ones + p.n),
           votes(frames + p.kept_frames * p.n),
-          size(votes + p.vote_frames * p.n)
+          size(votes + p.vote_frames * p.n),
+          total(2 * size + kScreenColumns * p.n)
     {
     }
-    int range, sums, seen, ones, frames, votes, size;
+    int range, sums, seen, ones, frames, votes, size, total;
 };
 
-// Runs steps [from, to) of W worlds. `numbers`: LeanLayout::size * W doubles, aligned to 64 bytes.
-using LeanAdvance = void (*)(const LeanPlan &, double *numbers, int from, int to);
+// Runs all steps of 2 W worlds. `numbers`: LeanLayout::total * W doubles, aligned to 64 bytes:
+// those of the first W worlds, of the others, of the screen.
+using LeanAdvance = void (*)(const LeanPlan &, double *numbers);
 
-void LeanAdvance2(const LeanPlan &, double *numbers, int from, int to);
+void LeanAdvance4(const LeanPlan &, double *numbers);
 #ifdef __x86_64__
-void LeanAdvance4(const LeanPlan &, double *numbers, int from, int to);
-void LeanAdvance8(const LeanPlan &, double *numbers, int from, int to);
+void LeanAdvance8(const LeanPlan &, double *numbers);
+void LeanAdvance16(const LeanPlan &, double *numbers);
 #endif
 
 }  // namespace twin
