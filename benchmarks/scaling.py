@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws what `bench_scaling` prints: build/bin/bench_scaling | python benchmarks/scaling.py docs"""
+"""Draws what `build/bin/bench_scaling` prints: ... | python benchmarks/scaling.py docs."""
 
 import csv
 import sys
