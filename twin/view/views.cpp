@@ -3,6 +3,8 @@
 
 #include <chrono>
 #include <optional>
+#include <stdexcept>
+#include <string>
 #include <thread>
 
 #include "figures.h"
@@ -20,6 +22,8 @@ using WallClock = std::chrono::steady_clock;
 
 constexpr int kWidth_px = 1280, kHeight_px = 720, kVideoRate_Hz = 30;
 constexpr std::chrono::milliseconds kRedraw{33};
+// What MuJoCo's renderer has materials for: 12 a robot.
+constexpr size_t kMostShown = 80;
 
 }  // namespace
 
@@ -77,8 +81,13 @@ struct Views::Parts
 
 Views::Views(const ViewOptions &options)
 {
-    if (options.window || !options.picture.empty() || !options.video.empty())
-        parts_ = std::make_unique<Parts>(options);
+    if (!options.window && options.picture.empty() && options.video.empty())
+        return;
+    if (options.cones.size() > kMostShown)
+        throw std::runtime_error(
+            std::to_string(options.cones.size()) + " robots cannot be shown, only up to " +
+            std::to_string(kMostShown) + ": leave out --view, --picture and --video, or lower --n");
+    parts_ = std::make_unique<Parts>(options);
 }
 
 Views::~Views() = default;

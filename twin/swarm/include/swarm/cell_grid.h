@@ -12,7 +12,7 @@ namespace twin
 {
 
 // From this many robots on a grid is faster than trying all pairs (benchmarks/README.md).
-constexpr size_t kGridPays = 48;
+constexpr size_t kGridPays = 400;
 
 class CellGrid
 {
