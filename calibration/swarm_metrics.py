@@ -58,8 +58,8 @@ def swarm_metrics(
 ) -> SwarmSeries:
     """Metrics of all robots of a log that have poses.
 
-    Velocities come from the poses, so real robots and the twin's are treated alike. Robots whose
-    behaviour is not that of most are odd, unless `odd` names them.
+    Velocities come from the poses, so real robots and the twin's are treated alike. Robots that
+    name another behaviour than most are odd, unless `odd` names them.
 
     Raises:
         LogError: there are not two robots with poses at the same time, or `odd` is not in the log.
@@ -95,9 +95,9 @@ def swarm_metrics(
 
 
 def _odd(robots: dict[int, RobotLog]) -> list[int]:
-    names = [robot.behavior for robot in robots.values()]
-    usual = max(set(names), key=lambda name: (names.count(name), name))
-    return [i for i, robot in robots.items() if robot.behavior != usual]
+    names = [robot.behavior for robot in robots.values() if robot.behavior]
+    usual = max(set(names), key=lambda name: (names.count(name), name), default="")
+    return [i for i, robot in robots.items() if robot.behavior not in ("", usual)]
 
 
 def _times(robots: dict[int, RobotLog]) -> np.ndarray:
@@ -129,7 +129,7 @@ def body_velocity(pose: np.ndarray) -> np.ndarray:
 
 def _moving_mean(t_s: np.ndarray, values: np.ndarray) -> np.ndarray:
     """(T, metrics) mean over the last 10 s; NaN, so undefined, in the first half of that."""
-    first = np.searchsorted(t_s, t_s - WINDOW_S, side="right")
+    first = np.searchsorted(t_s, t_s - WINDOW_S + STEP_S / 2)  # whatever the times' last digits
     means = np.array([values[f : k + 1].mean(axis=0) for k, f in enumerate(first)])
     short = t_s - t_s[0] < min(WINDOW_S, t_s[-1] - t_s[0]) / 2
     means[short] = np.nan

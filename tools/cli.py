@@ -75,7 +75,7 @@ COMMANDS = (
     (
         "metrics",
         "metrics",
-        "Tell what the swarm in a log does: metrics over time, and its class at the end.",
+        "Tell what the swarm in a log or on the bus does: metrics over time, and its class.",
     ),
     (
         "compare-swarm",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill metrics`: what the swarm in a log does, real or simulated."""
+"""`twinmill metrics`: what the swarm in a log or on the bus does, real or simulated."""
 
 import re
 from pathlib import Path
@@ -13,8 +13,12 @@ from twinmill.calibration.report import Figure, Section, write_report
 from twinmill.calibration.report.canvas import MEASURED, PREDICTED, draw, plain_ticks
 from twinmill.calibration.swarm_metrics import SwarmSeries, swarm_metrics
 from twinmill.tools.calibrate import DEFAULT_MODEL, Model, Out, command_line, open_model, provenance
+from twinmill.tools.metrics_live import Question
+from twinmill.tools.metrics_screen import follow
 from twinmill.tools.output import AsJson, busy, deliver
+from twinmill.tools.swarm.fleet import URL, LcmUrl
 from twinmill.tools.sweep.classes import COLORS, WORDS
+from twinmill.tools.watch.source import FOREVER_S, DurationS
 
 LAST_S = 10.0
 NOTE = (
@@ -36,7 +40,16 @@ def register(app: typer.Typer) -> None:
 
 
 def _metrics(
-    log: Annotated[Path, typer.Argument(metavar="LOG", show_default=False)],
+    log: Annotated[Path | None, typer.Argument(metavar="LOG", show_default=False)] = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="The robots on the bus instead of a log.")
+    ] = False,
+    lcm_url: LcmUrl = URL,
+    channel_prefix: Annotated[
+        str | None,
+        typer.Option("--channel-prefix", help="Only this swarm of the bus, as TWIN_; else all."),
+    ] = None,
+    duration_s: DurationS = FOREVER_S,
     model: Model = DEFAULT_MODEL,
     odd: Annotated[
         str | None,
@@ -44,23 +57,32 @@ def _metrics(
     ] = None,
     as_json: AsJson = False,
     out: Out = None,
-) -> SwarmSeries:
-    """Tell what the swarm in a log does: metrics over time, and its class at the end.
+) -> SwarmSeries | int:
+    """Tell what the swarm in a log or on the bus does: metrics over time, and its class.
+
+    With --live the same of the last 10 s of the bus, robots and twins (channels
+    TWIN_...), once a second until Ctrl-C; --json then prints an object a line.
 
     View range and body size are the model's. The sums that lead to circliness,
     diffusion and class are those of twin_run and twin_sweep.
 
     Example: twinmill metrics run.lcmlog --out report
+
+    Example: twinmill metrics --live
     """
+    if live == (log is not None):
+        raise ValueError("give either a LOG or --live.")
+    if live and out:
+        raise ValueError("--out: a report is of a log; record the bus with lcm-logger.")
     model_file = open_model(model, out)
+    scale = tuple(model_file.model.get(n) for n in ("sensor.range_m", "robot.body_radius_m"))
+    if live:
+        question = Question(channel_prefix, *scale, robot_ids(odd))
+        source = provenance(command_line("metrics --live", [], model), model_file)
+        return follow(lcm_url, duration_s, question, source.to_json(), as_json)
     source = provenance(command_line("metrics", [log], model), model_file)
     with busy(f"reading {log}"):
-        series = swarm_metrics(
-            read_log(log),
-            model_file.model.get("sensor.range_m"),
-            model_file.model.get("robot.body_radius_m"),
-            robot_ids(odd),
-        )
+        series = swarm_metrics(read_log(log), *scale, robot_ids(odd))
     section = _section(series)
     report = write_report(out, section.title, source, [section], NOTE) if out else None
     data = {**series.to_json(), **source.to_json(), "report": str(report) if report else None}

@@ -22,9 +22,9 @@ URL = "udpm://239.255.76.67:7667?ttl=0"
 LISTEN_S = 4.0
 
 
-def drive(log: Path, prefix: str, seed: int) -> subprocess.Popen:
-    """Two robots, or twins, in real time until they are told to stop."""
-    words = f"--plant planar --n 2 --spread-m 0.8 --seed {seed} --lcm-url {URL} --log {log}"
+def drive(log: Path, prefix: str, seed: int, n: int = 2) -> subprocess.Popen:
+    """Some robots, or twins, in real time until they are told to stop."""
+    words = f"--plant planar --n {n} --spread-m 0.8 --seed {seed} --lcm-url {URL} --log {log}"
     prefix_words = ["--channel-prefix", prefix] if prefix else []
     return subprocess.Popen(
         [os.environ["TWIN_RUN"], *words.split(), *prefix_words], stdout=subprocess.DEVNULL

@@ -17,10 +17,9 @@ from twinmill.tools.calibrate import DEFAULT_MODEL, Model, open_model
 from twinmill.tools.everyone import PREFIXES
 from twinmill.tools.output import AsJson, check_new_file, deliver, replacing
 from twinmill.tools.swarm.fleet import URL, LcmUrl
-from twinmill.tools.watch.source import from_bus, from_log
+from twinmill.tools.watch.source import FOREVER_S, DurationS, from_bus, from_log
 
 RERUN = "rerun-sdk==0.41.0"
-FOREVER_S = 1e9
 
 
 def register(app: typer.Typer) -> None:
@@ -45,9 +44,7 @@ def _watch(
     spawn: Annotated[
         bool, typer.Option("--spawn", help="Start the viewer here; so it is without the others.")
     ] = False,
-    duration_s: Annotated[
-        float, typer.Option("--duration-s", min=0.1, help="Of the bus; else until Ctrl-C.")
-    ] = FOREVER_S,
+    duration_s: DurationS = FOREVER_S,
     force: Annotated[bool, typer.Option("--force", help="Replace FILE if it exists.")] = False,
     as_json: AsJson = False,
 ) -> dict:

@@ -6,14 +6,20 @@ from collections import deque
 from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
+from typing import Annotated
 
 import lcm
+import typer
 from twinmill.calibration.log import read_bytes
 from twinmill.calibration.wire import Events, split_events
 
 BATCH_S = 0.1
+FOREVER_S = 1e9
 CHANNELS = ".*R[0-9][0-9]+_(TELEMETRY|POSE|DRIVE|RUN)"
 
+DurationS = Annotated[
+    float, typer.Option("--duration-s", min=0.1, help="Of the bus; else until Ctrl-C.")
+]
 Message = tuple[int, str, bytes]  # when it was logged or heard (us), channel, payload
 
 
