@@ -149,6 +149,29 @@ TEST(LeanKernel, GivesTheSameBytesInAnyWidth)
     }
 }
 
+// Samples end with the run, lie in its last 10 s and fill them, 0.1 s or less apart unless a
+// control period is longer.
+TEST(CountSteps, MeasuresTheLastTenSeconds)
+{
+    for (const double period_s : {0.01, 0.0133333, 0.02, 0.022, 0.06, 0.1, 0.25})
+    {
+        SCOPED_TRACE(period_s);
+        const StepCount count = CountSteps(period_s, 120);
+        const double end_s = count.steps * period_s, gap_s = std::max(0.1, period_s);
+        std::vector<double> times_s;
+        for (int step = 0; step < count.steps; ++step)
+            if (count.Measures(step))
+                times_s.push_back((step + 1) * period_s);
+        ASSERT_EQ(times_s.size(), static_cast<size_t>(count.Measured()));
+        EXPECT_EQ(times_s.back(), end_s);
+        EXPECT_GT(times_s.front(), end_s - 10 - 1e-9);
+        EXPECT_LE(times_s.front(), end_s - 10 + gap_s + 1e-9);
+        for (size_t i = 1; i < times_s.size(); ++i)
+            EXPECT_LE(times_s[i] - times_s[i - 1], gap_s + 1e-9);
+    }
+    EXPECT_EQ(CountSteps(0.022, 0.01).Measured(), 1);
+}
+
 // What single precision cannot tell is left to doubles: near and far from the origin, discs, wide
 // cones, and robots that stand in one place.
 TEST(LeanKernel, GivesTheSameBytesWithoutItsScreen)

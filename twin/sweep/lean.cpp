@@ -17,7 +17,8 @@ namespace twin
 namespace
 {
 
-constexpr double kWindow_s = 10;
+// Swarms change little within a sample; what is measured costs more than a step.
+constexpr double kWindow_s = 10, kSample_s = 0.1;
 constexpr size_t kAlign = 64;
 
 std::vector<LeanWidth> UsableWidths()
@@ -46,24 +47,25 @@ double StepS(const Base &base)
 }
 
 // The firmware's view of time: which frame has arrived, which votes are in.
-std::vector<LeanStep> Schedule(const Model &model, int steps, int vote_frames, int &kept_frames)
+std::vector<LeanStep> Schedule(const Model &model, const StepCount &count, int vote_frames,
+                               int &kept_frames)
 {
     const auto utime_us = [&](int step) {
         return std::llround(step * model.base.control_period_s * 1e6);
     };
     const int64_t delay_us = std::llround(model.sensor.delay_s * 1e6);
     std::vector<LeanStep> schedule;
-    schedule.reserve(static_cast<size_t>(steps));
+    schedule.reserve(static_cast<size_t>(count.steps));
     int frame = -1, pushed = 0;
     kept_frames = 1;
-    for (int step = 0; step < steps; ++step)
+    for (int step = 0; step < count.steps; ++step)
     {
         const int before = frame;
         while (frame < step && (delay_us == 0 || utime_us(frame + 1) + delay_us <= utime_us(step)))
             ++frame;
         const bool fresh = frame > before;
         const int slot = fresh ? pushed++ % vote_frames : -1;
-        schedule.push_back({frame, slot, std::min(pushed, vote_frames)});
+        schedule.push_back({frame, slot, std::min(pushed, vote_frames), count.Measures(step)});
         kept_frames = std::max(kept_frames, step - std::max(frame, 0) + 1);
     }
     for (LeanStep &step : schedule)
@@ -80,15 +82,14 @@ public:
         const Cell &cell = *worlds.front().cell;
         const Model &model = cell.model;
         const StepCount count = CountSteps(model.base.control_period_s, duration_s);
-        measured_ = count.steps - count.first_measured;
+        measured_ = count.Measured();
         plan_.n = static_cast<int>(cell.tables.size());
         plan_.ring = static_cast<int>(cell.ring_size);
         plan_.step_count = count.steps;
         plan_.screens = screens;
         plan_.substeps = SubstepCount(model.base.control_period_s, SwarmOptions{}.max_step_s);
-        plan_.first_measured = count.first_measured;
         plan_.vote_frames = static_cast<int>(std::lround(model.sensor.vote_frames));
-        schedule_ = Schedule(model, count.steps, plan_.vote_frames, plan_.kept_frames);
+        schedule_ = Schedule(model, count, plan_.vote_frames, plan_.kept_frames);
         plan_.steps = schedule_.data();
         plan_.body_m = 2 * model.robot.body_radius_m;
         plan_.touch_m = plan_.body_m * kTouch;
@@ -217,10 +218,11 @@ bool SameBatch(const Cell &a, const Cell &b)
 StepCount CountSteps(double period_s, double duration_s)
 {
     const int steps = std::max(1, static_cast<int>(std::ceil(duration_s / period_s - 0.5)));
+    const int stride = std::max(1, static_cast<int>(kSample_s / period_s));
     int first = steps - 1;
-    while (first > 0 && first * period_s > steps * period_s - kWindow_s)
-        --first;
-    return {steps, first};
+    while (first >= stride && (first - stride + 1) * period_s > steps * period_s - kWindow_s)
+        first -= stride;
+    return {steps, first, stride};
 }
 
 void RunLean(const LeanWidth &width, std::span<const World> worlds, double duration_s,

@@ -64,7 +64,7 @@ public:
             Move();
             PushApart();
         }
-        if (step >= p_.first_measured)
+        if (p_.steps[step].measured)
             Measure(moves);
     }
 

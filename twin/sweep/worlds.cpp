@@ -39,7 +39,7 @@ Outcome RunFull(const World &world, double duration_s)
     for (int step = 0; step < count.steps; ++step)
     {
         swarm.Step();
-        if (step < count.first_measured)
+        if (!count.Measures(step))
             continue;
         for (size_t i = 0; i < states.size(); ++i)
             states[i] = swarm.State(static_cast<int>(i));

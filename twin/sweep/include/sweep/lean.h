@@ -27,10 +27,15 @@ bool SameBatch(const Cell &a, const Cell &b);
 void RunLean(const LeanWidth &width, std::span<const World> worlds, double duration_s,
              std::span<Outcome> outcomes, bool screens = true);
 
-// Steps of a run, and the first that counts for the metrics' window.
+// Steps of a run, and those that are measured: from `first_measured` every `stride`-th to the last.
 struct StepCount
 {
-    int steps, first_measured;
+    int steps, first_measured, stride;
+    bool Measures(int step) const
+    {
+        return step >= first_measured && (step - first_measured) % stride == 0;
+    }
+    int Measured() const { return (steps - 1 - first_measured) / stride + 1; }
 };
 StepCount CountSteps(double period_s, double duration_s);
 

@@ -85,15 +85,15 @@ struct LeanStep
     int32_t frame;   // newest that has reached it, modulo kept_frames; -1: none so far
     int32_t slot;    // of the vote that it takes; -1: it voted before
     int32_t voters;  // frames that count
+    bool measured;
 };
 
 // What all lanes of a batch share.
 struct LeanPlan
 {
     int n, ring, step_count, substeps;
-    int first_measured;  // step
-    int vote_frames;     // majority over this many
-    int kept_frames;     // of the sensor, newest included
+    int vote_frames;  // majority over this many
+    int kept_frames;  // of the sensor, newest included
     const LeanStep *steps;
     bool target_is_disc, errors;
     bool screens;    // in single precision first; results are the same to the bit

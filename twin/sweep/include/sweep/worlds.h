@@ -37,8 +37,8 @@ struct World
 
 struct Outcome
 {
-    Metrics mean;                // over the last 10 s, every control period
-    double least_diffusion = 0;  // over the same
+    Metrics mean;                // over the last 10 s, every 0.1 s or a little more often
+    double least_diffusion = 0;  // of the same samples
 };
 
 enum class Path
