@@ -69,7 +69,7 @@ def _steps(done: BitSearch) -> list[tuple[str | None, float]]:
 
 def rank_bits(done: BitSearch, group: int) -> list[Ranked]:
     """Accepted effects with those that do as well, then the first round's rest."""
-    total = sum(r.accepted.gain for r in done.rounds if r.accepted)
+    total = sum(r.accepted.evidence.gain for r in done.rounds if r.accepted)
     ranking = []
     for this in done.rounds:
         if this.accepted is None:
@@ -88,9 +88,9 @@ def _entry(trial: Trial, done: BitSearch, total: float, group: int | None) -> Ra
     return Ranked(
         trial.effect or "",
         trial.score,
-        max(trial.gain, 0.0) / max(total, trial.gain, 1e-9),
-        trial.p_value(len(done.candidates)),
-        trial.log_ratio,
+        max(trial.evidence.gain, 0.0) / max(total, trial.evidence.gain, 1e-9),
+        trial.evidence.p_value(len(done.candidates)),
+        trial.evidence.worth,
         list(trial.own),
         group,
     )

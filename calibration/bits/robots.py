@@ -75,7 +75,7 @@ def _judge_camera(
     before, after = done.rounds[0].before, done.rounds[-1].before
     first = done.rounds[0].accepted
     p_value = (
-        count * first.p_value(len(done.candidates))
+        count * first.evidence.p_value(len(done.candidates))
         if first
         else count * t.sf(away[robot_id], count - 1)
     )

@@ -2,17 +2,16 @@
 """Looks for the camera effects that a model lacks, judged on bits that were not fitted to.
 
 An effect is accepted if the held-out likelihood ratio is beyond what any of the candidates reaches
-by chance (split likelihood ratio: Wasserman, Ramdas and Balakrishnan 2020), if it helps over 4 s
-blocks and not by a few of them, and if it changes enough bits to matter.
+by chance, and if it changes enough bits to matter.
 """
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import twinmill_native as native
-from scipy.stats import norm
 from twinmill.calibration.bits.compare import brier_ratio
+from twinmill.calibration.bits.evidence import ALPHA, Evidence, HeldOut, weigh
 from twinmill.calibration.bits.fit import (
     Likelihood,
     camera_effects,
@@ -25,12 +24,12 @@ from twinmill.calibration.bits.fit import (
 from twinmill.calibration.bits.scene import BitScene
 from twinmill.calibration.solve import Estimate
 
-ALPHA = 0.05
-MATTERS = 0.005  # share of the bits that an effect must change
+MATTERS = 0.005  # share of the bits that an effect must change,
+RARE = 0.02  # or of the frames with a robot in view (or without), if that is less
 SCREEN = 2.0  # log likelihood that an effect must gain before it is judged
 MOST = 4  # effects of one search
 CLOCK_S = 0.025  # delays below it may be a wrong clock offset, if the log told that itself
-TIE_SIGMA = 2.0
+TIE = 3.0  # log likelihood over its excess that decides nothing between two effects
 
 
 @dataclass(frozen=True)
@@ -41,30 +40,21 @@ class Trial:
         effect: what was added; None if nothing.
         model: fitted to all frames.
         values: of all camera knobs.
-        blocks: held-out log likelihood of each 4 s block of each robot.
-        halves: the same, summed by the half that was predicted.
-        gain, z: of `blocks` over those of the model before; in all, and in units of their scatter.
-        log_ratio: mean of the likelihood ratios of both halves, its logarithm.
-        changed: share of the bits that the effect changes.
-        score: of the held-out half.
+        heldout: what fits to either half say of the other.
+        score: of these.
         own: estimates of the added effect's quantities.
+        evidence: against the model before.
+        changed: share of the bits that the effect changes.
     """
 
     effect: str | None
     model: native.Model
     values: np.ndarray
-    blocks: np.ndarray
-    halves: np.ndarray
-    gain: float = 0.0
-    z: float = 0.0
-    log_ratio: float = 0.0
+    heldout: HeldOut
+    score: float
+    own: tuple[Estimate, ...]
+    evidence: Evidence = field(default_factory=Evidence)
     changed: float = 0.0
-    score: float = np.nan
-    own: tuple[Estimate, ...] = ()
-
-    def p_value(self, candidates: int) -> float:
-        """Chance of such a gain if nothing were missing, for all candidates together."""
-        return float(min(1.0, candidates * norm.sf(self.z)))
 
 
 @dataclass(frozen=True)
@@ -148,39 +138,18 @@ def attempt(scenes: list[BitScene], model: native.Model, effect: str | None) -> 
     if fresh:
         values = start(likelihood, fresh, values)
     values = climb(likelihood, values) if free else values
-    blocks, halves = [], np.zeros(2)
-    errors: list[tuple[np.ndarray, np.ndarray]] = []
-    for half in (0, 1):
-        own = climb(likelihood, values, 1 - half) if free else values
-        told = likelihood.frames(own)
-        for scene, t in zip(scenes, told, strict=True):
-            held = scene.half == half
-            sums = np.bincount(scene.block[held], np.nan_to_num(t[held]), scene.block[-1] + 1)
-            blocks.append(sums)
-            halves[half] += sums.sum()
-            errors.append(_chances(scene, likelihood.model, held))
-    likelihood.set(values)
-    chance, bit = (np.concatenate(c) for c in zip(*errors, strict=True))
+    fits = [climb(likelihood, values, 1 - half) if free else values for half in (0, 1)]
+    heldout = HeldOut.of(scenes, tuple(likelihood.set(own).copy() for own in fits))
     own = [e for e in estimates(likelihood, values) if effect and e.name.startswith(f"{effect}.")]
-    return Trial(
-        effect,
-        likelihood.model,
-        values,
-        np.concatenate(blocks),
-        halves,
-        score=brier_ratio(chance, bit),
-        own=tuple(own),
-    )
+    model = likelihood.set(values)
+    return Trial(effect, model, values, heldout, _score(scenes, heldout), tuple(own))
 
 
-def _chances(
-    scene: BitScene, model: native.Model, held: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Predicted and measured bits of the held-out frames."""
-    own, use = model.for_robot(scene.robot_id), held & scene.usable
-    raw = scene.frames.has_raw
-    bit = scene.frames.raw if raw else scene.frames.voted
-    return scene.reported(own, raw)[use], bit[use]
+def _score(scenes: list[BitScene], heldout: HeldOut) -> float:
+    """Of the bits of all frames that count."""
+    chance = [c[s.usable] for s, c in zip(scenes, heldout.chance, strict=True)]
+    bits = [(s.frames.raw if s.frames.has_raw else s.frames.voted)[s.usable] for s in scenes]
+    return brier_ratio(np.concatenate(chance), np.concatenate(bits))
 
 
 def _round(
@@ -198,10 +167,11 @@ def _round(
             continue
         say(f"trying {name} on the camera's bits")
         trials.append(_judged(scenes, state, attempt(scenes, state.model, name)))
-    trials.sort(key=lambda t: -t.gain)
-    passing = [t for t in trials if _passes(scenes, t, count)]
+    trials.sort(key=lambda t: -t.evidence.gain)
+    least = _least(scenes, state.model)
+    passing = [t for t in trials if _passes(scenes, t, count, least)]
     accepted = passing[0] if passing else None
-    tied = [t for t in passing[1:] if _ties(accepted, t)]
+    tied = [t for t in passing[1:] if _ties(scenes, accepted, t)]
     return Round(state, trials, accepted, tied)
 
 
@@ -216,17 +186,10 @@ def _promise(scenes: list[BitScene], model: native.Model, effect: str) -> float:
 
 
 def _judged(scenes: list[BitScene], before: Trial, trial: Trial) -> Trial:
-    difference = trial.blocks - before.blocks
-    scatter = np.sqrt(np.sum(difference**2))
-    halves = trial.halves - before.halves
-    return Trial(
-        **{
-            **vars(trial),
-            "gain": float(difference.sum()),
-            "z": float(difference.sum() / max(scatter, 1e-12)),
-            "log_ratio": float(np.logaddexp(*halves) - np.log(2)),
-            "changed": _changed(scenes, before.model, trial.model),
-        }
+    return replace(
+        trial,
+        evidence=weigh(scenes, trial.heldout, before.heldout),
+        changed=_changed(scenes, before.model, trial.model),
     )
 
 
@@ -243,20 +206,30 @@ def _changed(scenes: list[BitScene], before: native.Model, after: native.Model) 
     return max(raw, voted) / count
 
 
-def _passes(scenes: list[BitScene], trial: Trial, count: int) -> bool:
+def _passes(scenes: list[BitScene], trial: Trial, count: int, least: float) -> bool:
     late_s = next((abs(e.value) for e in trial.own if e.name == "sensor_delay.delay_s"), np.inf)
     return (
-        trial.log_ratio > np.log(count / ALPHA)
-        and trial.z > norm.isf(ALPHA / count)
-        and trial.changed > MATTERS
+        trial.evidence.p_value(count) < ALPHA
+        and trial.changed > least
         and not (late_s < CLOCK_S and any(s.clock_free for s in scenes))
     )
 
 
-def _ties(best: Trial, other: Trial) -> bool:
-    """Whether the blocks do not tell which of two effects is the better."""
-    difference = best.blocks - other.blocks
-    return bool(difference.sum() < TIE_SIGMA * np.sqrt(np.sum(difference**2)))
+def _least(scenes: list[BitScene], model: native.Model) -> float:
+    """Share of the bits that an effect must change.
+
+    Half a percent, or where few frames have a robot in view 2 % of those: poses, blurred as
+    they are, and a clock that is a few ms wrong change as many.
+    """
+    view = [s.view(model.for_robot(s.robot_id))[s.usable] for s in scenes]
+    share = float(np.mean(np.concatenate(view)))
+    return min(MATTERS, RARE * min(share, 1 - share))
+
+
+def _ties(scenes: list[BitScene], best: Trial, other: Trial) -> bool:
+    """Whether the frames do not tell which of two effects is the better."""
+    between = weigh(scenes, best.heldout, other.heldout)
+    return between.apart < TIE * between.excess
 
 
 def _hidden(scenes: list[BitScene], model: native.Model, names: list[str]) -> list[tuple[str, str]]:
