@@ -60,3 +60,18 @@ def test_both_models_are_one_robot():
     named = [[m.sensor(i).name for i in range(m.nsensor)] for m in (one, other)]
     assert named[0] == named[1] == ["position", "orientation", "velocity", "turn", *WHEELS]
     assert [m.ncam for m in (one, other)] == [1, 1]
+
+
+@pytest.mark.parametrize("scene", ["scene.xml", "scene_omni.xml"])
+def test_home_is_a_robot_that_stands_still(scene):
+    model = mujoco.MjModel.from_xml_path(str(MODELS / scene))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    names = ("free", "pan", "tilt", *WHEELS)
+    assert [model.joint(i).name for i in range(model.njnt)] == list(names)
+    while data.time < 1:
+        mujoco.mj_step(model, data)
+    home = model.key("home").qpos
+    # It settles into the floor by a fraction of a millimetre, and does not creep, turn or tilt.
+    assert np.max(np.abs(data.qpos[:7] - home[:7])) < 1e-3
+    assert np.max(np.abs(data.qpos[7:] - home[7:])) < 0.02
