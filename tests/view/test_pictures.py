@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import turbopi
 from PIL import Image
+from scipy.ndimage import label
 
 TWIN_RUN = os.environ.get("TWIN_RUN", "")
 pytestmark = pytest.mark.skipif(not TWIN_RUN, reason="TWIN_RUN does not name the program")
@@ -35,6 +36,25 @@ def last_blob_px(log):
     events = lcm.EventLog(str(log), "r")
     messages = [turbopi.telemetry_t.decode(e.data) for e in events if "R00_TELEM" in e.channel]
     return messages[-1].blob_px
+
+
+def balls_px(picture):
+    """Sizes of the green balls in a picture outside its corner; a view that sees is paler."""
+    image = np.asarray(Image.open(picture)).astype(int)
+    image[468:, 948:] = 0
+    red, green, blue = np.moveaxis(image, 2, 0)
+    found, _ = label((green > 2 * red) & (green > 2 * blue))
+    return np.bincount(found.ravel())[1:]
+
+
+def test_robots_that_drive_apart_stay_in_view(tmp_path):
+    picture = tmp_path / "a.png"
+    for seed in (1, 2, 3):
+        run(
+            *("--n", 8, "--behavior", "diffusing", "--duration-s", 30, "--seed", seed),
+            *("--log", tmp_path / "a.lcmlog", "--picture", picture),
+        )
+        assert len(balls_px(picture)) == 8, seed
 
 
 def test_picture_shows_the_frame_that_the_firmware_was_given(tmp_path):
@@ -122,6 +142,11 @@ class Screen:
     def press(self, key):
         subprocess.run(["xdotool", "key", "--window", self.window(), key], env=self.env, check=True)
 
+    def zoom_in(self, notches):
+        click = ["click", "--repeat", str(notches), "5"]
+        command = ["xdotool", "mousemove", "--window", self.window(), "300", "300", *click]
+        subprocess.run(command, env=self.env, check=True)
+
     def result(self):
         return json.loads(self.run.communicate(timeout=60)[0])
 
@@ -142,6 +167,19 @@ def test_space_pauses_and_goes_on(tmp_path):
         result = screen.result()
     assert result["simulated_s"] == pytest.approx(4, abs=0.02)
     assert not result["interrupted"]
+
+
+@needs_display
+@pytest.mark.parametrize("zooms", [False, True])
+def test_window_follows_until_the_person_moves_the_camera(tmp_path, zooms):
+    picture = tmp_path / "a.png"
+    run_s = ("--behavior", "diffusing", "--duration-s", 30, "--realtime-factor", 5)
+    with Screen("--n", 6, *run_s, "--log", tmp_path / "a.lcmlog", "--picture", picture) as screen:
+        if zooms:
+            screen.zoom_in(20)
+        screen.result()
+    seen = balls_px(picture)
+    assert len(seen) < 6 if zooms else len(seen) == 6
 
 
 @needs_display

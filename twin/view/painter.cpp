@@ -14,8 +14,9 @@ constexpr int kMaxGeoms = 20000;
 constexpr int kFanSteps = 12;
 constexpr double kFanHeight_m = 0.004;  // above the floor
 constexpr float kSeen[4] = {0.15f, 0.85f, 0.3f, 0.35f}, kUnseen[4] = {0.95f, 0.6f, 0.15f, 0.22f};
-constexpr int kCornerGap_px = 12;
-constexpr int kHullGroup = 3;  // what collides, in turbopi.xml
+constexpr int kCornerGap_px = 12, kCornerWidth_px = 320, kCornerHeight_px = 240;
+constexpr double kRoom_m = 0.25;  // between a robot's middle and the edge of the picture
+constexpr int kHullGroup = 3;     // what collides, in turbopi.xml
 
 // A triangle as MuJoCo draws it: two sides from a corner, and the normal.
 void InitTriangle(mjvGeom *geom, const mjtNum a[3], const mjtNum b[3], const mjtNum c[3],
@@ -76,22 +77,50 @@ Painter::~Painter()
     mjv_freeScene(&scene_);
 }
 
-// About the middle of the robots; never nearer than before, so that a video does not pump.
-void Painter::Frame(const Swarm &swarm)
+// About the middle of the robots; never nearer than before, so that a video does not pump. Robots
+// move without jumps, and so do middle and distance.
+void Painter::Frame(const Swarm &swarm, const mjrRect &area)
 {
-    constexpr double kMargin_m = 1.2, kDistancePerRadius = 2.2;
-    double x_m = 0, y_m = 0, radius_m = 0;
-    for (int i = 0; i < swarm.Size(); ++i)
+    Pose2 low = swarm.State(0).pose, high = low;
+    for (int i = 1; i < swarm.Size(); ++i)
     {
-        x_m += swarm.State(i).pose.x_m / swarm.Size();
-        y_m += swarm.State(i).pose.y_m / swarm.Size();
+        const Pose2 &at = swarm.State(i).pose;
+        low = {std::min(low.x_m, at.x_m), std::min(low.y_m, at.y_m), 0};
+        high = {std::max(high.x_m, at.x_m), std::max(high.y_m, at.y_m), 0};
     }
+    camera_.lookat[0] = (low.x_m + high.x_m) / 2;
+    camera_.lookat[1] = (low.y_m + high.y_m) / 2;
     for (int i = 0; i < swarm.Size(); ++i)
-        radius_m = std::max(
-            radius_m, std::hypot(swarm.State(i).pose.x_m - x_m, swarm.State(i).pose.y_m - y_m));
-    camera_.lookat[0] = x_m;
-    camera_.lookat[1] = y_m;
-    camera_.distance = std::max(camera_.distance, kMargin_m + kDistancePerRadius * radius_m);
+        camera_.distance = std::max(camera_.distance,
+                                    DistanceFor(swarm.State(i).pose.x_m - camera_.lookat[0],
+                                                swarm.State(i).pose.y_m - camera_.lookat[1], area));
+}
+
+// How far off the camera must be for a robot there, from the point looked at, to be in the picture:
+//
+//   |across| <= tan(f / 2) aspect (distance + depth),    |up| <= tan(f / 2) (distance + depth)
+//
+// with the vertical field of view f; to the lower right, where the corner is, left of it or above.
+double Painter::DistanceFor(double x_m, double y_m, const mjrRect &area) const
+{
+    const double azimuth_rad = camera_.azimuth * mjPI / 180,
+                 elevation_rad = camera_.elevation * mjPI / 180;
+    const double ahead_m = x_m * std::cos(azimuth_rad) + y_m * std::sin(azimuth_rad);
+    const double across_m = x_m * std::sin(azimuth_rad) - y_m * std::cos(azimuth_rad);
+    const double depth_m = ahead_m * std::cos(elevation_rad),
+                 up_m = -ahead_m * std::sin(elevation_rad);
+    const double half_up = std::tan(figures_.model()->vis.global.fovy * mjPI / 360);
+    const double half_across = half_up * area.width / area.height;
+    const auto distance_m = [&](double offset_m, double half) {
+        return (std::abs(offset_m) + kRoom_m) / half - depth_m;
+    };
+    const double whole_m = std::max(distance_m(across_m, half_across), distance_m(up_m, half_up));
+    if (across_m <= 0 || up_m >= 0)
+        return whole_m;
+    const double left_of = 1 - 2.0 * (kCornerWidth_px + kCornerGap_px) / area.width;
+    const double above = 1 - 2.0 * (kCornerHeight_px + kCornerGap_px) / area.height;
+    return std::max(whole_m, std::min(distance_m(across_m, half_across * left_of),
+                                      distance_m(up_m, half_up * above)));
 }
 
 void Painter::AddCone(const RobotState &state, const ViewCone &cone, bool detected)
@@ -134,7 +163,7 @@ void Painter::Draw(const Swarm &swarm, int robot_in_corner, const std::string &n
 void Painter::DrawCorner(const Swarm &swarm, int robot, const mjrRect &area)
 {
     const Picture picture = swarm.LastPicture(robot);
-    mjrRect corner{0, kCornerGap_px, 320, 240};
+    mjrRect corner{0, kCornerGap_px, kCornerWidth_px, kCornerHeight_px};
     if (!picture.yuyv.empty())
     {
         corner.width = picture.width_px / 2;

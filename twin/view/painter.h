@@ -17,8 +17,9 @@ public:
     ~Painter();
     Painter(const Painter &) = delete;
 
-    // Moves the point of view so that all robots are in the picture.
-    void Frame(const Swarm &swarm);
+    // Moves the point of view so that all robots are in a picture of this shape, none of them
+    // beneath the corner.
+    void Frame(const Swarm &swarm, const mjrRect &area);
     // Into the current buffer: the window's, or UseOffscreen()'s.
     void Draw(const Swarm &swarm, int robot_in_corner, const std::string &note,
               const mjrRect &area);
@@ -32,6 +33,7 @@ public:
     mjvCamera &camera() { return camera_; }
 
 private:
+    double DistanceFor(double x_m, double y_m, const mjrRect &area) const;
     void AddCone(const RobotState &state, const ViewCone &cone, bool detected);
     void DrawCorner(const Swarm &swarm, int robot, const mjrRect &area);
 

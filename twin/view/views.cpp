@@ -43,11 +43,17 @@ struct Views::Parts
             video.emplace(options.video, kWidth_px, kHeight_px, kVideoRate_Hz);
     }
 
+    // Keeps all robots in view until the person moves the camera.
+    void Follow(const Swarm &swarm, const mjrRect &area)
+    {
+        if (!window || window->follows())
+            painter->Frame(swarm, area);
+    }
+
     void DrawOffscreen(const Swarm &swarm)
     {
         const mjrRect area{0, 0, kWidth_px, kHeight_px};
-        if (!window)
-            painter->Frame(swarm);
+        Follow(swarm, area);
         painter->UseOffscreen(kWidth_px, kHeight_px);
         painter->Draw(swarm, window ? window->robot() : 0, "", area);
         painter->Read(pixels, area);
@@ -55,13 +61,12 @@ struct Views::Parts
 
     void DrawWindow(const Swarm &swarm)
     {
-        if (!framed)
-            painter->Frame(swarm);
-        framed = true;
+        Follow(swarm, window->Area());
         painter->UseWindow();
         painter->Draw(swarm, window->robot(),
-                      window->paused() ? "paused: space goes on, right arrow steps"
-                                       : "space pauses, Tab or digit chooses a robot",
+                      window->paused()
+                          ? "paused: space goes on, right arrow steps"
+                          : "space pauses, Tab or digit chooses a robot, F follows all",
                       window->Area());
         window->Flip();
         drawn = WallClock::now();
@@ -75,7 +80,6 @@ struct Views::Parts
     std::optional<VideoWriter> video;
     std::vector<uint8_t> pixels;
     int64_t video_frames = 0;
-    bool framed = false;
     WallClock::time_point drawn{};
 };
 

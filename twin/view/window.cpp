@@ -95,6 +95,11 @@ void Window::OnKey(int key)
         robot_ = (robot_ + 1) % robots_;
     else if (key >= GLFW_KEY_0 && key <= GLFW_KEY_9 && key - GLFW_KEY_0 < robots_)
         robot_ = key - GLFW_KEY_0;
+    else if (key == GLFW_KEY_F && camera_)
+    {
+        follows_ = true;
+        camera_->distance = 0;  // as near as all are in view
+    }
     else if (key == GLFW_KEY_ESCAPE)
         glfwSetWindowShouldClose(window_, GLFW_TRUE);
 }
@@ -106,20 +111,27 @@ void Window::OnMove(double x_px, double y_px)
     const auto down = [this](int button) { return glfwGetMouseButton(window_, button); };
     int height_px = 0;
     glfwGetWindowSize(window_, nullptr, &height_px);
-    if (!camera_ || height_px == 0)
+    if (height_px == 0)
         return;
     if (down(GLFW_MOUSE_BUTTON_LEFT))
-        mjv_moveCamera(model_, mjMOUSE_ROTATE_V, dx_px / height_px, dy_px / height_px, camera_);
+        MoveCamera(mjMOUSE_ROTATE_V, dx_px / height_px, dy_px / height_px);
     else if (down(GLFW_MOUSE_BUTTON_RIGHT))
-        mjv_moveCamera(model_, mjMOUSE_MOVE_H, dx_px / height_px, dy_px / height_px, camera_);
+        MoveCamera(mjMOUSE_MOVE_H, dx_px / height_px, dy_px / height_px);
     else if (down(GLFW_MOUSE_BUTTON_MIDDLE))
-        mjv_moveCamera(model_, mjMOUSE_ZOOM, 0, dy_px / height_px, camera_);
+        MoveCamera(mjMOUSE_ZOOM, 0, dy_px / height_px);
 }
 
 void Window::OnScroll(double by)
 {
-    if (camera_)
-        mjv_moveCamera(model_, mjMOUSE_ZOOM, 0, kZoomPerNotch * by, camera_);
+    MoveCamera(mjMOUSE_ZOOM, 0, kZoomPerNotch * by);
+}
+
+void Window::MoveCamera(int how, double by_x, double by_y)
+{
+    if (!camera_)
+        return;
+    follows_ = false;
+    mjv_moveCamera(model_, how, by_x, by_y, camera_);
 }
 
 }  // namespace twin
