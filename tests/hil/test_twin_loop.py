@@ -21,6 +21,7 @@ from robot import SIGNS, Robot
 TWIN_RUN = os.environ.get("TWIN_RUN")
 SWARM = (
     *("--plant", "planar", "--sensor", "camera", "--n", "2", "--spread-m", "0.7"),
+    *("--behavior", "milling"),
     *("--duration-s", "6", "--seed", "5"),
 )
 # The host may think as long before the program takes the camera for frozen.

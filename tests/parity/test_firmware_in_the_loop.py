@@ -83,7 +83,7 @@ def test_the_programs_bytes_drive_the_wheels(tmp_path):
 
 def test_without_waiting_it_drives_in_real_time(tmp_path):
     log = tmp_path / "a.lcmlog"
-    done = run(log, "--hil", 1, "--free-run", "--realtime-factor", 1)
+    done = run(log, "--hil", 1, "--free-run", "--realtime-factor", 1, "--behavior", "milling")
     assert done.returncode == 0, done.stderr
     robot = [t for t in telemetry(log) if t.robot_id == 0]
     # The table's two rows, and none before the first answer.

@@ -70,8 +70,9 @@ def test_score_is_the_rms_of_errors_over_their_floors(compared, coasting_robot):
 
 
 def test_score_tells_the_true_model_from_one_that_lacks_an_effect(compared, coasting_robot):
-    # The interface: 1.0 is as good as the log can tell, above 1.3 something is missing.
-    assert 0.9 < compared(coasting_robot.true_model)["score"] < 1.3
+    # The interface: 1.0 is as good as the log can tell, above 1.3 something is missing. Over
+    # replicas the true model's score scatters by 0.1: three of these.
+    assert 0.7 < compared(coasting_robot.true_model)["score"] < 1.3
     poor = compared(coasting_robot.model)
     assert poor["score"] > 1.3
     phases = {row["regime"]: row["ratio"] for row in poor["where"] if row["group"] == "phase"}

@@ -9,7 +9,8 @@ import shutil
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
@@ -29,6 +30,7 @@ from twinmill.tools.challenge.script import write_rich_script
 from twinmill.tools.challenge.truth import truth
 from twinmill.tools.output import AsJson, check_new_folder, deliver
 
+DONE = "done"  # folder of the cases that are done, while others are not
 NOTHING = 9_999  # number of the logs with nothing hidden that the base models are fitted to
 
 
@@ -65,13 +67,13 @@ def _challenge(
     """Draw effects at random, seal the answers, let the twin make logs, diagnose, unseal, score.
 
     Results go to the folder as results.json (the same bytes for the same seed), times.json and
-    index.html.
+    index.html. Stopped half way, the same command goes on where it was.
 
     Example: twinmill challenge --n 20 --out challenge
     """
     check_new_folder(out)
     twin_run = program or _find_program()
-    out.mkdir(parents=True, exist_ok=True)
+    (out / DONE).mkdir(parents=True, exist_ok=True)
     console = Console(stderr=True)
     script = out / "script.csv"
     write_rich_script(script, duration_s, seed)
@@ -90,6 +92,7 @@ def _challenge(
     write_whole(out / "results.json", json.dumps(found, indent=1))
     write_whole(out / "times.json", json.dumps([times_s[case.number] for case in cases]))
     page.write(out, found, list(times_s.values()))
+    shutil.rmtree(out / DONE)
     deliver(found, page.shown(found, list(times_s.values())), as_json)
     return found
 
@@ -134,11 +137,22 @@ def _all(
 
 
 def _one(setting: Setting, case: Case) -> tuple[int, dict, float]:
-    """Makes the log of a case, diagnoses it, and only then looks at the answer."""
+    """Makes the log of a case, diagnoses it, and only then looks at the answer.
+
+    Or takes what a challenge that was stopped found for the same case, base model and script.
+    """
+    base_path = setting.bases[case.plant]
+    asked = [version("twinmill"), asdict(case), base_path.read_text(), setting.script.read_text()]
+    name = hashlib.sha256(json.dumps(asked).encode()).hexdigest()
+    kept = setting.folder / DONE / f"{name}.json"
+    if kept.exists():
+        return case.number, *json.loads(kept.read_text())
     log = make_log(setting.program, setting.folder, f"case{case.number:03d}", case, setting.script)
-    base = ModelFile.load(str(setting.bases[case.plant]))
+    base = ModelFile.load(str(base_path))
     started = time.monotonic()
     found = diagnose(load_measurements([log]), base, barred=case.withheld)
     time_s = time.monotonic() - started
     log.unlink()
-    return case.number, scored(case, found, truth(found.state, base, case.hidden)), time_s
+    result = scored(case, found, truth(found.state, base, case.hidden))
+    write_whole(kept, json.dumps([result, time_s]))
+    return case.number, result, time_s
