@@ -85,16 +85,18 @@ def _sides(text: str) -> tuple[float, float]:
     return float(found[1]), float(found[2])
 
 
-def _how(plan: Plan, logs: list[Path], model: str, script: Path) -> list[str]:
+def _how(plan: Plan, logs: list[Path], model: str, script: Path) -> present.How:
     """How to play the script and what to do then."""
     path, number = shlex.quote(str(script)), plan.robot_id
     cap_pct = round(100 * float(np.abs(plan.rows.duty).max()))
-    return [
+    robot = f"twinmill characterise --robot {number} --script {path} --cap-pct {cap_pct}"
+    twin = f"twin_run --n 1 --model {shlex.quote(model)} --script {path}"
+    return present.How(
         f"Written: {script}. Put the robot in the middle of the floor, its camera along the first "
         "side.",
-        f"On the robot: twinmill characterise --robot {number} --script {path} --cap-pct {cap_pct} "
-        "--out next.lcmlog;",
-        f"in the twin: twin_run --n 1 --model {shlex.quote(model)} --script {path} "
-        "--log next.lcmlog;",
-        f"then: {command_line('diagnose', [*logs, Path('next.lcmlog')], model)}",
-    ]
+        [
+            ("On the robot:", f"{robot} --out next.lcmlog"),
+            ("or in the twin:", f"{twin} --log next.lcmlog"),
+            ("then:", command_line("diagnose", [*logs, Path("next.lcmlog")], model)),
+        ],
+    )

@@ -33,11 +33,11 @@ def plain(value: Any) -> Any:
 
 
 def deliver(data: dict, text: RenderableType, as_json: bool) -> None:
-    """Prints the one or the other on stdout."""
+    """Prints the one or the other on stdout; text that must not wrap is not cut either."""
     if as_json:
         print(json.dumps(plain(data), allow_nan=False))
     else:
-        Console().print(text)
+        Console().print(text, crop=False)
 
 
 @contextmanager

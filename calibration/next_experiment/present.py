@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A planned run for people: terminal and report."""
 
+from dataclasses import dataclass
 from itertools import groupby
 
 from rich.console import Group, RenderableType
@@ -14,8 +15,22 @@ from twinmill.calibration.report import Section
 from twinmill.calibration.tables import Cell, Table, Tone, number
 
 
-def terminal(plan: Plan, how: list[str]) -> RenderableType:
-    """What a person reads; `how`: sentences on how to play it."""
+@dataclass(frozen=True)
+class How:
+    """How to play a script.
+
+    Attributes:
+        first: sentences on what to do before.
+        commands: where or when, and the command line.
+    """
+
+    first: str
+    commands: list[tuple[str, str]]
+
+
+def terminal(plan: Plan, how: How) -> RenderableType:
+    """What a person reads; command lines stay whole, to be copied."""
+    steps = [part for where, command in how.commands for part in (Text(where), _whole(command))]
     return Group(
         Text(plan.why),
         Text(_outlook(plan), show.STYLES[_tone(plan.predicted_power)]),
@@ -23,11 +38,16 @@ def terminal(plan: Plan, how: list[str]) -> RenderableType:
         Text(),
         show.table(_moves(plan)),
         show.table(_chances(plan)),
-        *(Text(line) for line in (*_hidden(plan), *how)),
+        *(Text(line) for line in (*_hidden(plan), how.first)),
+        *steps,
     )
 
 
-def section(plan: Plan, how: list[str]) -> Section:
+def _whole(command: str) -> Text:
+    return Text(f"  {command}", no_wrap=True, overflow="ignore")
+
+
+def section(plan: Plan, how: How) -> Section:
     """Of a report."""
     power = plan.predicted_power
     return Section(
@@ -37,7 +57,8 @@ def section(plan: Plan, how: list[str]) -> Section:
         [("run", _length(plan))],
         [figures.duties(plan), figures.floor(plan), figures.margins(plan)],
         [_chances(plan), _moves(plan)],
-        " ".join(how),
+        how.first,
+        how.commands,
         _hidden(plan),
     )
 

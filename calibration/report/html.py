@@ -42,6 +42,7 @@ class Section:
         facts: label and text.
         figures, tables: in their order.
         next_step: a sentence.
+        commands: where or when, and the command line to type there; below next_step.
         warnings: sentences.
     """
 
@@ -52,6 +53,7 @@ class Section:
     figures: list[Figure] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
     next_step: str = ""
+    commands: list[tuple[str, str]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
 

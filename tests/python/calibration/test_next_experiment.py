@@ -237,6 +237,12 @@ def test_the_command_writes_the_script_and_says_what_it_parts(
     assert np.array_equal(rows[:-1, 1:], np.rint(100 * designed.plan.rows.duty))
     assert not rows[-1, 1:].any() and rows[-1, 0] == pytest.approx(told["duration_s"], abs=1e-3)
     assert (report / "index.html").read_text().count("<svg") == 3
+    monkeypatch.setenv("COLUMNS", "60")  # a narrow terminal does not break what is to be copied
+    cli.run([str(w) for w in [*words, "--force"]])
+    lines = map(str.split, capsys.readouterr().out.splitlines())
+    (command,) = (words for words in lines if words[:2] == ["twinmill", "diagnose"])
+    log, model = str(coasting_robot.log), str(coasting_robot.model)
+    assert command[2:] == [log, "next.lcmlog", "--model", model]
 
 
 @pytest.mark.parametrize("floor", ["2", "2x", "-1x2", "axb"])
