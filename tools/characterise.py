@@ -21,7 +21,7 @@ from twinmill.tools.output import AsJson, check_new_file, deliver
 from twinmill.tools.recorder import Recorder
 from twinmill.tools.swarm import tell
 from twinmill.tools.swarm.commands import warn_of_clocks
-from twinmill.tools.swarm.fleet import URL, Fleet, LcmUrl, Prefix
+from twinmill.tools.swarm.fleet import RUN_PERIOD_S, URL, Fleet, LcmUrl, Prefix
 
 LOST_S = 0.5  # without telemetry, or without a valid pose: stop
 AFTER_S = 1.0  # logged after the end: the robot still rolls
@@ -184,6 +184,8 @@ class Run:
                 f"no pose of robot {self.robot_id} is heard; does motion capture publish "
                 f"R{self.robot_id:02d}_POSE, and does it see the robot?"
             )
+        # So that the log says whose it is.
+        self.fleet.listen(RUN_PERIOD_S, lambda: self.fleet.robots[self.robot_id].run is not None)
 
     def _start(self, script: str, countdown_s: float) -> None:
         begun = tell.start(
@@ -228,11 +230,13 @@ class Run:
                 self.fleet.watch = lambda: None
 
     def _why_stop(self, pressed: Callable[[], bool]) -> str:
-        now_s = time.monotonic()
         if pressed():
             return "a key was pressed"
-        if now_s - self.fleet.robots[self.robot_id].heard_s > LOST_S:
-            return f"no telemetry for {LOST_S:g} s"
-        if now_s - self.pose_s > LOST_S:
-            return f"no pose for {LOST_S:g} s: motion capture has lost the robot"
-        return ""
+        now_s = time.monotonic()
+        heard_s = {"telemetry": self.fleet.robots[self.robot_id].heard_s, "pose": self.pose_s}
+        if now_s - min(heard_s.values()) <= LOST_S:
+            return ""
+        # Where both stop at once, which one came last says nothing.
+        lost = [what for what, at_s in heard_s.items() if now_s - at_s > LOST_S / 2]
+        why = ": motion capture has lost the robot" if lost == ["pose"] else ""
+        return f"no {' and no '.join(lost)} for {LOST_S:g} s{why}"

@@ -115,6 +115,23 @@ def answers_to_bad_commands(prefix: str, robot_id: int) -> dict:
     return given
 
 
+def behaviors(fleet: Fleet) -> list:
+    """What each says that it does; None before it says so."""
+    return [r.run and r.run.behavior for r in fleet.robots.values()]
+
+
+def twin_round() -> dict:
+    """A twin of two, which know the table, is commanded as robots are."""
+    result = {"twin_answers": answers_to_bad_commands("TWIN_", 1)}
+    fleet = Fleet(URL, "TWIN_")
+    begun = tell.start(fleet, tell.find(fleet, set()), "ahead", 0.5, partial=False)
+    result["twin_modes"] = [a.mode for a in begun.answers]
+    fleet.listen(6, lambda: behaviors(fleet) == ["ahead"] * 2)
+    result["twin_behaviors"] = behaviors(fleet)
+    result["twin_stopped"] = [a.mode for a in tell.stop(fleet, set())]
+    return result
+
+
 def main(folder: Path) -> dict:
     turbopi, result = shlex.split(os.environ["TURBOPI"]), {}
     tables = folder / "behaviors.toml"
@@ -135,15 +152,11 @@ def main(folder: Path) -> dict:
     twin = f"{os.environ['TWIN_RUN']} --plant planar --n 2 --wait --channel-prefix TWIN_"
     twin += f" --behaviors {tables}"
     with subprocess.Popen(shlex.split(twin), stdout=subprocess.DEVNULL) as process:
-        time.sleep(1)
-        result["twin_answers"] = answers_to_bad_commands("TWIN_", 1)
-        fleet = Fleet(URL, "TWIN_")
-        begun = tell.start(fleet, tell.find(fleet, set()), "ahead", 0.5, partial=False)
-        result["twin_modes"] = [a.mode for a in begun.answers]
-        fleet.listen(6, lambda: all(r.run.behavior == "ahead" for r in fleet.robots.values()))
-        result["twin_behaviors"] = [r.run.behavior for r in fleet.robots.values()]
-        result["twin_stopped"] = [a.mode for a in tell.stop(fleet, set())]
-        process.terminate()
+        try:
+            time.sleep(1)
+            result |= twin_round()
+        finally:
+            process.terminate()
     return result
 
 

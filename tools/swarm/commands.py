@@ -15,10 +15,9 @@ from rich.table import Table
 from rich.text import Text
 from twinmill.tools.output import AsJson, deliver, plain
 from twinmill.tools.swarm import tell
-from twinmill.tools.swarm.fleet import URL, Fleet, LcmUrl, Prefix, Robot
+from twinmill.tools.swarm.fleet import RUN_PERIOD_S, URL, Fleet, LcmUrl, Prefix, Robot
 
 CLOCK_WARN_S = 0.05
-RUN_PERIOD_S = 5.5  # robots say who they are every 5 s
 
 Robots = Annotated[
     str,

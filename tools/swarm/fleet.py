@@ -13,7 +13,9 @@ import turbopi
 import typer
 
 URL = "udpm://239.255.76.67:7667?ttl=1"
+BACKLOG_S = 0.02  # what waits is taken in for so long at once
 WINDOW_S = 2.0  # over which rates and detections are told
+RUN_PERIOD_S = 5.5  # robots say who they are every 5 s
 GONE_S = 1.0  # a robot that said nothing for so long is not there; it speaks 30 times a second
 MODES = ("stopped", "running", "script", "fault")
 CAMERA_LOST = turbopi.telemetry_t.STATUS_CAMERA_LOST
@@ -155,10 +157,16 @@ class Fleet:
                 robot.recent.popleft()
 
     def listen(self, duration_s: float, enough: Callable[[], bool] = lambda: False) -> None:
-        """Takes in what robots say for some time, or until that is enough."""
+        """Takes in what robots say for some time, or until that is enough.
+
+        What has come already is taken in before anybody judges what has not.
+        """
         end_s = time.monotonic() + duration_s
         while not enough() and (left_s := end_s - time.monotonic()) > 0:
             self.bus.handle_timeout(max(1, min(20, int(1000 * left_s))))
+            backlog_end_s = time.monotonic() + BACKLOG_S
+            while time.monotonic() < backlog_end_s and self.bus.handle_timeout(0):
+                pass
             self.watch()
 
     def send(self, command: Any) -> None:
