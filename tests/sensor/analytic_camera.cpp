@@ -30,18 +30,29 @@ Point ToCamera(const Eigen::Vector3d &p, const Pose2 &robot, const CameraSetting
     return {c * x + d * y - s.forward_m, c * y - d * x, p.z() - s.height_m};
 }
 
+double Dot(const Point &p, const Point &q)
+{
+    return p.ahead * q.ahead + p.left * q.left + p.up * q.up;
+}
+
+// Of a l^2 + b l + c, ascending; none if there are not two.
+std::vector<double> Roots(double a, double b, double c)
+{
+    const double root = b * b - 4 * a * c;
+    if (a == 0 || root <= 0)
+        return {};
+    const double l1 = (-b + std::sqrt(root)) / (2 * a), l2 = (-b - std::sqrt(root)) / (2 * a);
+    return {std::min(l1, l2), std::max(l1, l2)};
+}
+
 // The silhouette of a ball on the line at height `up` of the plane one metre ahead: the roots of
 //   ((1, l, up) c)^2 = (1 + l^2 + up^2) (c^2 - r^2)
 Row BallRow(const Point &c, double radius_m, double up)
 {
-    const double k = c.ahead * c.ahead + c.left * c.left + c.up * c.up - radius_m * radius_m;
-    const double m = c.ahead + up * c.up;
-    const double a = c.left * c.left - k, b = 2 * m * c.left, e = m * m - (1 + up * up) * k;
-    const double root = b * b - 4 * a * e;
-    if (root <= 0 || c.ahead <= radius_m)
-        return {};
-    const double l1 = (-b + std::sqrt(root)) / (2 * a), l2 = (-b - std::sqrt(root)) / (2 * a);
-    return {{std::min(l1, l2), std::max(l1, l2)}};
+    const double k = Dot(c, c) - radius_m * radius_m, m = c.ahead + up * c.up;
+    const std::vector<double> l =
+        Roots(c.left * c.left - k, 2 * m * c.left, m * m - (1 + up * up) * k);
+    return l.empty() || c.ahead <= radius_m ? Row{} : Row{{l[0], l[1]}};
 }
 
 // The part of a box that is ahead is spanned by its corners there and by where chords cross.
@@ -116,19 +127,74 @@ void Add(Row &row, Row more)
     row = joined;
 }
 
-// A box hides a ball if the eye is on the box's side of the plane that parts both.
-bool Hides(const Box &box, const Ball &ball, const Pose2 &robot, const CameraSettings &s)
+// Where the row crosses the circles in which a ball cuts the planes of a box's faces. On the plane
+// n p = d is p = (1, l, up) d / v with v = n (1, l, up), on the ball (p - c)^2 = r^2, so
+//   d^2 (1 + l^2 + up^2) - 2 d v (1, l, up) c + v^2 (c^2 - r^2) = 0
+std::vector<double> Seams(const Box &box, const Ball &ball, double up, const Pose2 &robot,
+                          const CameraSettings &s)
 {
+    const Point c = ToCamera(ball.centre_m, robot, s), at = ToCamera(box.centre_m, robot, s);
+    const double k = Dot(c, c) - ball.radius_m * ball.radius_m, m = c.ahead + up * c.up;
+    const double turn_rad = box.yaw_rad - robot.theta_rad;
+    const double x = std::cos(turn_rad), y = std::sin(turn_rad);
+    const Point normals[] = {{x, y, 0}, {-y, x, 0}, {0, 0, 1}};
+    std::vector<double> seams;
+    for (int i = 0; i < 3; ++i)
+        for (const double side : {-1, 1})
+        {
+            const Point &n = normals[i];
+            const double d = Dot(n, at) + side * box.half_m[i], v = n.ahead + up * n.up;
+            for (const double left : Roots(d * d - 2 * d * n.left * c.left + k * n.left * n.left,
+                                           2 * k * v * n.left - 2 * d * (v * c.left + m * n.left),
+                                           d * d * (1 + up * up) - 2 * d * v * m + k * v * v))
+                seams.push_back(left);
+        }
+    return seams;
+}
+
+// Of a ray that meets both: the ball comes later if the box holds the point where the ray enters
+// the ball, or if the eye is on the box's side of the plane that parts that point from the box.
+bool Hides(const Box &box, const Ball &ball, double left, double up, const Pose2 &robot,
+           const CameraSettings &s)
+{
+    const double cr = std::cos(robot.theta_rad), dr = std::sin(robot.theta_rad);
+    const Eigen::Vector3d eye_m(robot.x_m + s.forward_m * cr, robot.y_m + s.forward_m * dr,
+                                s.height_m);
+    const Eigen::Vector3d ray = Eigen::Vector3d(cr - dr * left, dr + cr * left, up).normalized();
+    const Eigen::Vector3d to_ball = ball.centre_m - eye_m;
+    const double along_m = ray.dot(to_ball);
+    const double within_m = std::sqrt(
+        std::max(0.0, ball.radius_m * ball.radius_m - (to_ball - along_m * ray).squaredNorm()));
     const double c = std::cos(box.yaw_rad), d = std::sin(box.yaw_rad);
     const auto to_box = [&](const Eigen::Vector3d &p) {
         const Eigen::Vector3d v = p - box.centre_m;
         return Eigen::Vector3d(c * v.x() + d * v.y(), c * v.y() - d * v.x(), v.z());
     };
-    const Eigen::Vector3d eye_m(robot.x_m + s.forward_m * std::cos(robot.theta_rad),
-                                robot.y_m + s.forward_m * std::sin(robot.theta_rad), s.height_m);
-    const Eigen::Vector3d centre = to_box(ball.centre_m);
-    const Eigen::Vector3d nearest = centre.cwiseMax(-box.half_m).cwiseMin(box.half_m);
-    return (to_box(eye_m) - nearest).dot(centre - nearest) < 0;
+    const Eigen::Vector3d entry = to_box(eye_m + (along_m - within_m) * ray);
+    const Eigen::Vector3d nearest = entry.cwiseMax(-box.half_m).cwiseMin(box.half_m);
+    return entry == nearest || (to_box(eye_m) - nearest).dot(entry - nearest) < 0;
+}
+
+// The parts of a ball's row that a box hides. Which of both comes first changes at seams alone: a
+// mast may end inside its ball.
+Row HiddenRow(const Row &ball_row, const Row &box_row, const Box &box, const Ball &ball, double up,
+              const Pose2 &robot, const CameraSettings &s)
+{
+    Row hidden;
+    if (ball_row.empty() || box_row.empty())
+        return hidden;
+    const double begin = std::max(ball_row.front().begin, box_row.front().begin);
+    const double end = std::min(ball_row.back().end, box_row.back().end);
+    if (begin >= end)
+        return hidden;
+    std::vector<double> cuts = Seams(box, ball, up, robot, s);
+    std::erase_if(cuts, [&](double left) { return left <= begin || left >= end; });
+    cuts.insert(cuts.end(), {begin, end});
+    std::sort(cuts.begin(), cuts.end());
+    for (size_t i = 1; i < cuts.size(); ++i)
+        if (Hides(box, ball, (cuts[i - 1] + cuts[i]) / 2, up, robot, s))
+            hidden.push_back({cuts[i - 1], cuts[i]});
+    return hidden;
 }
 
 // Sizes of the connected parts' largest. Edges move outward by `edge` and parts join over `gap`.
@@ -199,9 +265,9 @@ Sighting SeeGreen(const Scene &scene, const Pose2 &robot, const CameraSettings &
             row = row.empty() ? row : Subtract(row, {-1e9, -s.width_px / (2 * f)});
             Add(whole[r], row);
             for (size_t b = 0; b < hulls.size() && !row.empty(); ++b)
-                if (Hides(scene.boxes[b], ball, robot, s))
-                    for (const Interval &hidden : PolygonRow(hulls[b], up))
-                        row = Subtract(row, hidden);
+                for (const Interval &hidden :
+                     HiddenRow(row, PolygonRow(hulls[b], up), scene.boxes[b], ball, up, robot, s))
+                    row = Subtract(row, hidden);
             Add(seen[r], row);
         }
     }

@@ -63,17 +63,32 @@ std::vector<Pose2> RandomRobots(Random &random)
     return poses;
 }
 
+// A post that stands about in the way to one of the others: robots alone seldom hide a ball.
+Box RandomPost(const std::vector<Pose2> &poses, const CameraSettings &settings, Random &random)
+{
+    const Pose2 &behind = poses[1 + static_cast<size_t>(random.Uniform() * 3)];
+    const double part = 0.3 + 0.5 * random.Uniform();
+    const double half_m = 0.005 + 0.02 * random.Uniform(), height_m = 0.1 + 0.15 * random.Uniform();
+    const double aside_m = 0.05 * (2 * random.Uniform() - 1);
+    return {{settings.forward_m + part * (behind.x_m - settings.forward_m),
+             part * behind.y_m + aside_m, height_m / 2},
+            {half_m, half_m, height_m / 2},
+            std::numbers::pi * random.Uniform(),
+            Colour::FromRgb(0.8, 0.1, 0.1)};
+}
+
 TEST(Camera, SeesABallExactlyWhenAlgebraSeesIt)
 {
     const CameraSettings settings = Pinhole();
     const int limit_px = fw_config_default().min_blob_px;
-    Random random(1, 0, "scenes");
+    Random random(1, 0, "scenes"), posts(1, 0, "posts");
     Camera camera(settings, 0, 1);
     int disagree = 0, in_band = 0, otherwise = 0, seen = 0, hidden = 0;
     for (int i = 0; i < kScenes; ++i)
     {
         const std::vector<Pose2> poses = RandomRobots(random);
-        const Scene scene = RobotsSeenBy(0, poses, Target::kBall);
+        Scene scene = RobotsSeenBy(0, poses, Target::kBall);
+        scene.boxes.push_back(RandomPost(poses, settings, posts));
         const Sighting sight = SeeGreen(scene, poses[0], settings, kEdge_px);
         const int blob_px = Blob(camera.Draw(scene, poses[0]), settings);
         hidden += sight.area_px < 0.99 * sight.whole_px;
