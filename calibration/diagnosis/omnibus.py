@@ -216,23 +216,34 @@ def _best_term(terms: list[Term], products: _Products, group: str) -> tuple[Term
 
 
 def _library(scenes: list[Scene], rows: int) -> tuple[list[Term], np.ndarray]:
-    """All terms, and their whitened signatures at typical strength, (rows, T)."""
-    parts, terms = [], []
-    for scene in scenes:
-        named = _named_terms(scene)
-        terms, columns = [], []
-        for (group, formula), values in named.items():
-            size = max(np.percentile(np.abs(values), 95), 1e-9)
-            for axis, channel in enumerate(CHANNELS):
-                terms.append(Term(group, channel, formula, float(size)))
-                columns.append(_whitened(scene, values / size, axis))
-        kinds, more = change_columns(scene)
-        terms += [Term(CHANGE, NO_VELOCITY, kind, 1.0) for kind in kinds]
-        parts.append(np.hstack([np.stack(columns, -1).reshape(-1, len(named) * 3), more]))
+    """All terms, and their whitened signatures at typical strength, (rows, T).
+
+    One size for all: a robot that never changes its command has none of its own. Numbers in a
+    formula are those of the last scene.
+    """
+    terms, parts = [], [[] for _ in scenes]
+    named = [_named_terms(scene) for scene in scenes]
+    for (group, formula), values in zip(named[-1], zip(*(n.values() for n in named), strict=True),
+                                        strict=True):  # fmt: skip
+        if not any(np.ptp(v) > 0 for v in values):
+            continue
+        size = _size(np.concatenate(values))
+        for axis, channel in enumerate(CHANNELS):
+            terms.append(Term(group, channel, formula, size))
+            for scene, own, v in zip(scenes, parts, values, strict=True):
+                own.append(_whitened(scene, v / size, axis).ravel())
+    changes = [change_columns(scene) for scene in scenes]
+    terms += [Term(CHANGE, NO_VELOCITY, kind, 1.0) for kind in changes[-1][0]]
+    parts = [np.column_stack([*own, more]) for own, (_, more) in zip(parts, changes, strict=True)]
     stacked = np.concatenate(parts)
     if len(stacked) != rows:
         raise ValueError(f"library has {len(stacked)} rows where the errors have {rows}")
     return terms, stacked
+
+
+def _size(values: np.ndarray) -> float:
+    """What all but the largest are below; of rare ones, which that would call nothing, the RMS."""
+    return max(float(np.percentile(np.abs(values), 95)), float(np.sqrt(np.mean(values**2))), 1e-9)
 
 
 def _whitened(scene: Scene, values: np.ndarray, axis: int) -> np.ndarray:
@@ -300,7 +311,7 @@ def _named_terms(scene: Scene) -> dict[tuple[str, str], np.ndarray]:
             terms[group, f"{text}*{carrier}"] = away * speed
             if group == "place":
                 terms[group, f"{text}*{text}*{carrier}"] = away**2 * speed
-    return {key: values for key, values in terms.items() if np.ptp(values) > 0}
+    return terms
 
 
 def _rate(values: np.ndarray, grid) -> np.ndarray:

@@ -12,6 +12,7 @@ from twinmill.calibration.compare import compare, open_scenes
 from twinmill.calibration.diagnosis.bumps import bumps, spared
 from twinmill.calibration.diagnosis.diagnose import diagnose
 from twinmill.calibration.diagnosis.explain import explain
+from twinmill.calibration.diagnosis.omnibus import unexplained
 from twinmill.calibration.log import LogError
 from twinmill.calibration.measurement import load_measurements
 from twinmill.calibration.model_file import ModelFile
@@ -131,6 +132,15 @@ def test_a_robot_of_one_command_takes_the_clock_of_the_others(tanh_robot, measur
     own, taken = (s.model.get("clock.offset_s") for s in scenes)
     assert taken == own == pytest.approx(0.06, abs=0.02)  # the guessed lag is 0.04 s too short
     assert "clock" in scenes[1].measurement.warnings[-1]
+
+
+def test_a_robot_that_stands_is_no_hindrance_to_what_others_tell(tanh_robot, measure, model_file):
+    robot = tanh_robot(offset_s=0.06)
+    lively = measure(robot, 1, 30.0)
+    still = measure(robot, 2, script_pct=np.zeros((1440, 4)))
+    scenes = open_scenes([lively, replace(still, log_sha256=lively.log_sha256)], model_file())
+    for order in (scenes, scenes[::-1]):
+        assert np.isfinite(unexplained(order, []).gain)
 
 
 def mute(track):
