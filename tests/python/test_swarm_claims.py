@@ -21,7 +21,8 @@ def test_a_published_claim_holds(name):
     assert claim.holds
     assert claim.count[1] >= 4
     assert claim.count[0] >= claim.count[1] - len(claims.KNOWN_MORE)
-    off = [float(row.rule.split()[0]) for row in claim.rows if row.rule.endswith("deviations")]
+    judged = [row for row in claim.rows if row.rule.endswith("deviations") and not row.known]
+    off = [float(row.rule.split()[0]) for row in judged]
     assert np.sqrt(np.mean(np.square(off or [0]))) < 1.5
     assert all("<svg" in figure.svg for figure in claim.figures)
 
@@ -57,7 +58,7 @@ def test_a_page_and_an_exit_code(tmp_path, capsys, monkeypatch):
     assert said["hold"] and said["claims"][0]["name"] == "alike"
     assert {path.name for path in (tmp_path / "a").iterdir()} == {
         "index.html", "claims.json", "alike_1.svg"}  # fmt: skip
-    monkeypatch.setitem(claims.ALIKE, 0.03, 0.1)
+    monkeypatch.setitem(claims.ALIKE, 0.03, 0.3)
     assert cli.run(["claims", "--only", "alike", "--seeds", "30"]) == 1
     with pytest.raises(ValueError, match="--only alik: must be one of milling"):
         cli.run(["claims", "--only", "alik"])
