@@ -215,12 +215,12 @@ def test_effects_of_the_model_act_in_drawn_frames(tmp_path, plant):
     def shares(effect=""):
         model, log = tmp_path / "m.toml", tmp_path / "a.lcmlog"
         model.write_text(installed.read_text() + effect)
-        words = "--sensor camera --n 4 --spread-m 0.8 --seed 2 --duration-s 1 --behavior stand"
+        words = "--sensor camera --n 10 --spread-m 1.5 --seed 2 --duration-s 1 --behavior stand"
         done = run(
             *(*words.split(), "--behaviors", nobody_moves, "--log", log), plant=plant, model=model
         )
         assert done.returncode == 0, done.stderr
-        said = [read(log)[0][f"R{i:02d}_TELEMETRY"] for i in range(4)]
+        said = [read(log)[0][f"R{i:02d}_TELEMETRY"] for i in range(10)]
         return np.array([np.mean([t.detected_raw for t in robot]) for robot in said])
 
     plain = shares()
@@ -230,7 +230,10 @@ def test_effects_of_the_model_act_in_drawn_frames(tmp_path, plant):
         # Three standard deviations of a share of 45 frames at 1/2.
         np.testing.assert_allclose(found, expected(plain), atol=0.23, err_msg=name)
         certain = (expected(plain) == 0) | (expected(plain) == 1)
-        np.testing.assert_array_equal(found[certain], expected(plain)[certain], err_msg=name)
+        # The edge of the range is soft: a frame or two of 45 may see beyond it.
+        np.testing.assert_allclose(
+            found[certain], expected(plain)[certain], atol=0.05, err_msg=name
+        )
     # A body that wide hides whatever is not the nearest.
     hidden = shares('[[effect]]\nname = "occlusion"\nradius_m = 0.5\n')
     assert (hidden <= plain).all() and hidden.sum() < plain.sum()
