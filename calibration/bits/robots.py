@@ -6,14 +6,16 @@ from collections.abc import Callable, Collection
 import numpy as np
 import twinmill_native as native
 from scipy.stats import t
-from twinmill.calibration.bits.compare import compare_bits
+from twinmill.calibration.bits.compare import BitComparison, compare_bits
 from twinmill.calibration.bits.scene import BitScene
 from twinmill.calibration.bits.search import search_bits
 from twinmill.calibration.diagnosis.alike import FEWEST, ODD, middle_and_scale
 from twinmill.calibration.diagnosis.robots import RobotOff
 from twinmill.calibration.solve import Estimate
 
-SPREAD = 0.1  # scatter of the logarithm of scores among cameras that are alike
+# Scatter of the logarithm of errors among cameras that are alike: over all frames, and over those
+# in which another robot is in view, which are few and come in passages.
+SPREAD, SPREAD_IN_VIEW = 0.1, 0.2
 
 
 def odd_cameras(scenes: list[BitScene], model: native.Model) -> set[int]:
@@ -26,13 +28,33 @@ def odd_cameras(scenes: list[BitScene], model: native.Model) -> set[int]:
 
 
 def camera_outliers(scenes: list[BitScene], model: native.Model) -> dict[int, float]:
-    """By robot: how many scales its bits' errors are above the median robot's."""
-    squares: dict[int, list[float]] = {}
-    for scene, score in zip(scenes, _scores(scenes, model), strict=True):
-        squares.setdefault(scene.robot_id, []).append(score**2)
-    size = {i: 0.5 * np.log(np.mean(s)) for i, s in squares.items()}
+    """By robot: how many scales its bits' errors are above the median robot's.
+
+    Over all frames, or over those with a robot in view if they say more: a camera that sees nothing
+    is right in all the others.
+    """
+    found = compare_bits(scenes, model)
+    if found is None:
+        return {}
+    robots = np.array([s.robot_id for s in scenes])[found.robot]
+    over_all = _apart(found, robots, np.ones(len(robots), bool), SPREAD)
+    in_view = _apart(found, robots, found.in_view, SPREAD_IN_VIEW)
+    return {i: max(over_all[i], in_view[i]) for i in over_all}
+
+
+def _apart(
+    found: BitComparison, robots: np.ndarray, which: np.ndarray, spread: float
+) -> dict[int, float]:
+    """By robot: scales from the median, of the errors of its frames among (K,) bool `which`."""
+    squares = (found.measured - found.predicted) ** 2
+    variance = found.predicted * (1 - found.predicted)
+    size = {}
+    for i in np.unique(robots):
+        own = which & (robots == i)
+        # As if there were one more frame, that errs as it should: few frames prove little.
+        size[int(i)] = 0.5 * np.log((1 + squares[own].sum()) / (1 + variance[own].sum()))
     middle, scale = middle_and_scale(list(size.values()))
-    return {i: float((s - middle) / max(scale, SPREAD)) for i, s in size.items()}
+    return {i: float((s - middle) / max(scale, spread)) for i, s in size.items()}
 
 
 def judge_cameras(

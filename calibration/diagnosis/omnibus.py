@@ -25,6 +25,7 @@ AGAIN = 2.0  # times what was left elsewhere that is no news
 FLIPS = 499  # random signs of blocks that make the null distribution
 BESIDE = 0.1  # share by which a group must raise what better groups bring
 ALPHA = 0.01  # chance of naming anything if nothing is left, over all that is tested
+STILL = (0.002, 0.002, 0.01)  # m/s, m/s, rad/s: below it an axis does not move; wheels differ
 TYPICAL = (0.01, 0.01, 0.05)  # m/s, m/s, rad/s: what a term of full size may add
 NO_NAMES = {"dvx", "dvy", "domega", "V"}  # rates and voltage: not at hand in a body's formula
 CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
@@ -263,7 +264,8 @@ def _whitened(scene: Scene, values: np.ndarray, axis: int) -> np.ndarray:
 def _named_terms(scene: Scene) -> dict[tuple[str, str], np.ndarray]:
     """(group, formula) to values (S,) over time."""
     track, grid = scene.measurement.track, scene.grid
-    vx, vy, turn = body_velocity(scene.measurement, grid, scene.model).T
+    velocity = body_velocity(scene.measurement, grid, scene.model)
+    vx, vy, turn = np.where(np.abs(velocity) < STILL, 0.0, velocity).T
     theta = track.heading_smooth[grid.source]
     x, y = (track.pose[grid.source, k] for k in (0, 1))
     t_s = grid.t_s - scene.model.get(CLOCK)

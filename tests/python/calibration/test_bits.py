@@ -9,6 +9,7 @@ import pytest
 import twinmill_native as native
 from twinmill.calibration.bits.compare import compare_bits
 from twinmill.calibration.bits.frames import Frames, frames_of
+from twinmill.calibration.bits.robots import odd_cameras
 from twinmill.calibration.bits.scene import BitScene, majority
 from twinmill.calibration.bits.search import search_bits
 from twinmill.calibration.folds import BLOCK_S, thue_morse
@@ -195,6 +196,14 @@ def test_nothing_is_named_where_nothing_is_hidden(make_scenes):
     """Each log may name something with a chance of 5 %: 2 of 5 would be one case in 45."""
     named = [search_bits(make_scenes(seed), model()).found for seed in range(70, 75)]
     assert sum(bool(n) for n in named) < 2
+
+
+def test_a_blind_camera_is_told_from_its_sisters(make_scenes):
+    # A target is in view in a few per cent of the frames: all others look right.
+    for seed in range(8):
+        alike, blind = make_scenes(100 + seed), make_scenes(100 + seed, miss=1.0)
+        assert odd_cameras(alike, model()) == set()
+        assert odd_cameras([*alike[:2], blind[2], alike[3]], model()) == {alike[2].robot_id}
 
 
 def test_without_raw_bits_the_vote_is_not_judged(make_scenes):
