@@ -51,6 +51,7 @@ def characterise(folder: Path, name: str, script: str, act=lambda: None) -> dict
     ) as process:
         fleet = Fleet(URL)
         fleet.listen(20, lambda: 3 in fleet.robots and fleet.robots[3].mode == "script")
+        fleet.listen(0.3)  # until the command has heard of it, too, and logged it
         act_s = time.time()
         act(keyboard, process)
         said, complaint = process.communicate(timeout=60)

@@ -50,7 +50,8 @@ def test_robots_and_twins_are_told_apart(session):
 def test_all_that_was_said_is_heard_once_and_in_order(session, folder):
     heard = payloads(folder / "heard")
     said = logged(folder, "robots") | logged(folder, "twins")
-    assert set(heard) == set(said)
+    # What runs is told at the start and every 5 s: four seconds may lack it.
+    assert {c for c in said if not c.endswith("_RUN")} <= set(heard) <= set(said)
     for channel, got in heard.items():
         begin = said[channel].index(got[0])
         assert got == said[channel][begin : begin + len(got)], channel
