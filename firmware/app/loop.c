@@ -226,13 +226,18 @@ static void decide(struct loop *loop, const struct fw_frame *frame, struct fw_ou
 // A board that was lost stands still in decide(), so that it is stopped once before it moves again.
 static void drive(struct loop *loop, struct fw_output *out)
 {
+    static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
     const bool moves = out->mode == FW_MODE_TABLE || out->mode == FW_MODE_SCRIPT;
+    const bool turns = moves && memcmp(out->wheel_duty_pct, zero_pct, sizeof zero_pct) != 0;
+    if (turns && !loop->moving && loop->before_moving != NULL)
+    {
+        loop->before_moving(loop->before_moving_context);
+    }
     const enum fw_err err = moves ? hal_motors_write(&loop->devices.motors, out->wheel_duty_pct)
                                   : hal_motors_stop(&loop->devices.motors);
     if (err == FW_OK)
     {
-        static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
-        loop->moving = moves && memcmp(out->wheel_duty_pct, zero_pct, sizeof zero_pct) != 0;
+        loop->moving = turns;
         loop_regain(loop, LOOP_BOARD);
         return;
     }

@@ -78,6 +78,9 @@ struct loop
 
     // Duties that the board was told last are not all zero.
     bool moving;
+    // Called before the board is told to move from standstill, unless NULL.
+    void (*before_moving)(const void *context);
+    const void *before_moving_context;
     // The camera's recording or the script is over.
     bool camera_over, script_over;
     uint32_t lost_report_count;

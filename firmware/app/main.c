@@ -45,10 +45,18 @@ static int prepare(const struct options *options, struct loop *loop,
     return -1;
 }
 
+// Whoever hangs while the wheels start is to be killed as soon as one who drives.
+static void tell_moving(const void *heartbeat)
+{
+    heartbeat_send(heartbeat, true);
+}
+
 static void play(struct loop *loop, const struct options *options,
                  const struct heartbeat *heartbeat, int stop_fd)
 {
     const bool once = options->config.script[0] != '\0';
+    loop->before_moving = tell_moving;
+    loop->before_moving_context = heartbeat;
     while (!asked_to_end(stop_fd) && !loop->camera_over && !(once && loop->script_over))
     {
         loop_step(loop);
