@@ -9,7 +9,7 @@ from scipy.stats import t
 from twinmill.calibration.bits.compare import BitComparison, compare_bits
 from twinmill.calibration.bits.scene import BitScene
 from twinmill.calibration.bits.search import search_bits
-from twinmill.calibration.diagnosis.alike import FEWEST, ODD, middle_and_scale
+from twinmill.calibration.diagnosis.alike import ODD, middle_and_scale, odd_ones
 from twinmill.calibration.diagnosis.robots import RobotOff
 from twinmill.calibration.solve import Estimate
 
@@ -20,11 +20,7 @@ SPREAD, SPREAD_IN_VIEW = 0.1, 0.2
 
 def odd_cameras(scenes: list[BitScene], model: native.Model) -> set[int]:
     """Numbers of the robots whose bits fit the model much worse than the others'; never half."""
-    away = camera_outliers(scenes, model)
-    if len(away) < FEWEST:
-        return set()
-    worst = sorted(away, key=lambda i: -away[i])[: (len(away) - 1) // 2]
-    return {i for i in worst if away[i] > ODD}
+    return odd_ones(camera_outliers(scenes, model))
 
 
 def camera_outliers(scenes: list[BitScene], model: native.Model) -> dict[int, float]:

@@ -108,8 +108,12 @@ def odd_robots(scenes: list[Scene], floors: list[np.ndarray]) -> set[int]:
     for name in GAINS:
         of_gain = gains_apart(scenes, name)
         away = {i: max(z, of_gain[i]) for i, z in away.items()}
-    most = (len(away) - 1) // 2
-    worst = sorted(away, key=lambda i: -away[i])[:most]
+    return odd_ones(away)
+
+
+def odd_ones(away: dict[int, float]) -> set[int]:
+    """Robots that are more than ODD scales off: the worst, and always fewer than half."""
+    worst = sorted(away, key=lambda i: -away[i])[: max(len(away) - 1, 0) // 2]
     return {i for i in worst if away[i] > ODD}
 
 

@@ -29,3 +29,10 @@ def run_session(script: str, *arguments) -> dict:
         pytest.skip(f"no network namespace here: {done.stderr.strip()}")
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
+
+
+def run_twin_session(script: str, *arguments) -> dict:
+    """The same of a session that starts the twin; skips where it is not named."""
+    if not os.environ.get("TWIN_RUN"):
+        pytest.skip("TWIN_RUN does not name the program")
+    return run_session(script, *arguments)

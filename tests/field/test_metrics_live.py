@@ -2,13 +2,12 @@
 """tools/metrics on a live bus, against the logs that the same swarms wrote themselves."""
 
 import json
-import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import twinmill_native as native
-from network import run_session
+from network import run_twin_session
 from twinmill.calibration.log import read_log
 from twinmill.calibration.swarm_metrics import swarm_metrics
 
@@ -25,9 +24,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def session(folder):
     """What happened: see metrics_session.py."""
-    if not os.environ.get("TWIN_RUN"):
-        pytest.skip("TWIN_RUN does not name the program")
-    return run_session("metrics_session.py", folder)
+    return run_twin_session("metrics_session.py", folder)
 
 
 def logged(path, prefix, first_utime_us, last_utime_us):

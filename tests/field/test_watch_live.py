@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """tools/watch on a live bus: robots and twins at once, against what they logged themselves."""
 
-import os
-
 import lcm
 import numpy as np
 import pytest
 import turbopi
-from network import run_session
+from network import run_twin_session
 from twinmill.tools.watch import command
 
 needs_viewer = pytest.mark.skipif(
@@ -25,9 +23,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def session(folder):
     """What happened: see watch_session.py."""
-    if not os.environ.get("TWIN_RUN"):
-        pytest.skip("TWIN_RUN does not name the program")
-    return run_session("watch_session.py", folder)
+    return run_twin_session("watch_session.py", folder)
 
 
 def payloads(log):
