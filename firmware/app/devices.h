@@ -4,7 +4,7 @@
 #define APP_DEVICES_H
 
 #include "config.h"
-#include "loop.h"
+#include "loop_state.h"
 
 // Picks the drivers; no device is opened but to tell boards apart. The drivers' state is static:
 // one robot per process.

@@ -4,43 +4,11 @@
 #include <stdio.h>
 #include <string.h>
 
-#define RETRY_US 500000
+#include "loop_commands.h"
+#include "loop_tend.h"
+
 #define LONGEST_WAIT_US 100000
 #define STOP_TRIES 3
-
-static int64_t now_us(const struct loop *loop)
-{
-    return hal_clock_monotonic_us(&loop->devices.clock);
-}
-
-static const char *const part_names[LOOP_PART_COUNT] = {"camera", "motor board", "battery",
-                                                        "panel"};
-
-void loop_lose(struct loop *loop, enum loop_part part, enum fw_err err)
-{
-    if (loop->lost[part] != err && err != FW_ERR_END)
-    {
-        (void)fprintf(stderr, "turbopi: %s: %s: the robot stands still until it is back\n",
-                      part_names[part], fw_err_str(err));
-    }
-    loop->lost[part] = err;
-    loop->retry_us[part] = now_us(loop) + RETRY_US;
-    const enum fw_err stop_err = hal_motors_stop(&loop->devices.motors);
-    loop->moving = loop->moving && stop_err != FW_OK;
-    if (stop_err != FW_OK && loop->lost[LOOP_BOARD] == FW_OK)
-    {
-        loop->lost[LOOP_BOARD] = stop_err;
-    }
-}
-
-void loop_regain(struct loop *loop, enum loop_part part)
-{
-    if (loop->lost[part] != FW_OK)
-    {
-        (void)fprintf(stderr, "turbopi: %s: works\n", part_names[part]);
-        loop->lost[part] = FW_OK;
-    }
-}
 
 enum fw_err loop_init(struct loop *loop, const struct app_config *config,
                       const struct own_tables *own, const struct loop_devices *devices,
@@ -73,20 +41,6 @@ enum fw_err loop_init(struct loop *loop, const struct app_config *config,
     return FW_OK;
 }
 
-void loop_start(struct loop *loop)
-{
-    loop->running = true;
-    loop->start_pending = false;
-    loop->script_over = false;
-    loop->script_begin_us = now_us(loop);
-}
-
-void loop_stop(struct loop *loop)
-{
-    loop->running = false;
-    loop->start_pending = false;
-}
-
 static int64_t min_us(int64_t a, int64_t b)
 {
     return a < b ? a : b;
@@ -96,7 +50,7 @@ static int64_t min_us(int64_t a, int64_t b)
 // away, so that each happens in time.
 static void wait_for_work(struct loop *loop)
 {
-    const int64_t now = now_us(loop);
+    const int64_t now = loop_now_us(loop);
     int64_t timeout_us = LONGEST_WAIT_US;
     const bool plays_script = loop->running && loop->plays_script;
     if (loop->core.has_frame && !plays_script)
@@ -105,10 +59,9 @@ static void wait_for_work(struct loop *loop)
             loop->core.frame_utime_us + loop->core.config.frame_timeout_us + 1;
         timeout_us = min_us(timeout_us, frame_end_us - now);
     }
-    if (loop->start_pending)
+    if (loop->plan.waits)
     {
-        timeout_us =
-            min_us(timeout_us, loop->start_utime_us - hal_clock_unix_us(&loop->devices.clock));
+        timeout_us = min_us(timeout_us, loop->plan.at_us - now);
     }
     if (plays_script)
     {
@@ -157,7 +110,7 @@ static bool take_frame(struct loop *loop, struct fw_frame *frame)
 {
     if (loop->lost[LOOP_CAMERA] != FW_OK)
     {
-        if (now_us(loop) >= loop->retry_us[LOOP_CAMERA])
+        if (loop_now_us(loop) >= loop->retry_us[LOOP_CAMERA])
         {
             open_camera(loop);
         }
@@ -201,7 +154,7 @@ static void decide_by_script(struct loop *loop, int64_t t_us, struct fw_output *
 
 static void decide(struct loop *loop, const struct fw_frame *frame, struct fw_output *out)
 {
-    const int64_t now = now_us(loop);
+    const int64_t now = loop_now_us(loop);
     const int64_t t_us = now - loop->script_begin_us;
     if (loop->running && loop->plays_script && fw_script_next_us(&loop->script, t_us) == INT64_MAX)
     {
@@ -248,7 +201,7 @@ static void drive(struct loop *loop, struct fw_output *out)
 
 static void report(struct loop *loop, const struct fw_output *out, int64_t begin_us)
 {
-    const int64_t now = now_us(loop);
+    const int64_t now = loop_now_us(loop);
     const int64_t unix_offset_us = hal_clock_unix_us(&loop->devices.clock) - now;
     struct link_report report = {
         .out = *out,
@@ -273,7 +226,7 @@ static void report(struct loop *loop, const struct fw_output *out, int64_t begin
 void loop_step(struct loop *loop)
 {
     wait_for_work(loop);
-    const int64_t begin_us = now_us(loop);
+    const int64_t begin_us = loop_now_us(loop);
     loop_obey_commands(loop);
     struct fw_frame frame;
     struct fw_output out;

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an operator may tell the robot, and what it answers.
+#include "loop_commands.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
-
-#include "loop.h"
 
 #define COMMANDS_PER_STEP 8
 
@@ -59,12 +58,22 @@ bool loop_load_script(struct loop *loop, const char *path, char reason[LINK_REAS
     return true;
 }
 
-static bool select_behavior(struct loop *loop, const char *name, char *reason)
+static bool knows_behavior(const struct loop *loop, const char *name, char *reason)
 {
     const struct fw_table *table = own_tables_find(loop->own, name);
-    if (table == NULL || fw_set_table(&loop->core, table) != FW_OK)
+    const bool known = table != NULL && fw_table_check(table) == FW_OK;
+    if (!known)
     {
         (void)snprintf(reason, LINK_REASON_MAX, "no behaviour '%s'", name);
+    }
+    return known;
+}
+
+static bool select_behavior(struct loop *loop, const char *name, char *reason)
+{
+    if (!knows_behavior(loop, name, reason) ||
+        fw_set_table(&loop->core, own_tables_find(loop->own, name)) != FW_OK)
+    {
         return false;
     }
     loop->plays_script = false;
@@ -72,7 +81,7 @@ static bool select_behavior(struct loop *loop, const char *name, char *reason)
     return true;
 }
 
-static bool select_script(struct loop *loop, const char *name, char *reason)
+static bool load_named_script(struct loop *loop, const char *name, char *reason)
 {
     char path[CONFIG_TEXT_MAX + LINK_NAME_MAX + 2];
     if (name[0] == '\0' || name[0] == '.' || strchr(name, '/') != NULL)
@@ -81,42 +90,72 @@ static bool select_script(struct loop *loop, const char *name, char *reason)
         return false;
     }
     (void)snprintf(path, sizeof path, "%s/%s", loop->script_dir, name);
-    loop->plays_script = loop_load_script(loop, path, reason);
-    return loop->plays_script;
+    return loop_load_script(loop, path, reason);
 }
 
-static bool start_at(struct loop *loop, int64_t start_utime_us, char *reason)
+static bool may_start(const struct loop *loop, char *reason)
 {
     if (loop->battery_low)
     {
         (void)snprintf(reason, LINK_REASON_MAX, "battery low: charge it, then restart");
-        return false;
     }
-    if (start_utime_us <= hal_clock_unix_us(&loop->devices.clock))
+    return !loop->battery_low;
+}
+
+// What a plan will play is checked when it is made: selecting it cannot fail.
+static void start_if_due(struct loop *loop)
+{
+    char reason[LINK_REASON_MAX];
+    struct loop_plan *plan = &loop->plan;
+    if (!plan->waits || loop_now_us(loop) < plan->at_us)
     {
-        loop_start(loop);
-        return true;
+        return;
     }
-    loop->start_pending = true;
-    loop->start_utime_us = start_utime_us;
-    return true;
+    if (plan->behavior[0] != '\0')
+    {
+        (void)select_behavior(loop, plan->behavior, reason);
+    }
+    loop->plays_script = loop->plays_script || plan->plays_script;
+    loop_start(loop);
+}
+
+// Until its instant a start changes nothing, whatever the robot does now.
+static void plan_start(struct loop *loop, const struct link_command *command)
+{
+    const int64_t until_us =
+        command->order.start_utime_us - hal_clock_unix_us(&loop->devices.clock);
+    loop->plan = (struct loop_plan){
+        .waits = true,
+        .at_us = loop_now_us(loop) + (until_us > 0 ? until_us : 0),
+        .plays_script = command->order.verb == FW_VERB_SCRIPT,
+    };
+    if (command->order.verb == FW_VERB_START)
+    {
+        memcpy(loop->plan.behavior, command->name, sizeof loop->plan.behavior);
+    }
+    start_if_due(loop);
 }
 
 static bool obey(struct loop *loop, const struct link_command *command, char *reason)
 {
-    const struct fw_command *order = &command->order;
-    switch ((enum fw_verb)order->verb)
+    bool starts = false;
+    switch ((enum fw_verb)command->order.verb)
     {
         case FW_VERB_STOP: loop_stop(loop); return true;
-        case FW_VERB_START:
-            return (command->name[0] == '\0' || select_behavior(loop, command->name, reason)) &&
-                   start_at(loop, order->start_utime_us, reason);
         case FW_VERB_SELECT: return select_behavior(loop, command->name, reason);
+        case FW_VERB_START:
+            starts = may_start(loop, reason) &&
+                     (command->name[0] == '\0' || knows_behavior(loop, command->name, reason));
+            break;
         case FW_VERB_SCRIPT:
-            return select_script(loop, command->name, reason) &&
-                   start_at(loop, order->start_utime_us, reason);
+            starts = may_start(loop, reason) && load_named_script(loop, command->name, reason);
+            break;
     }
-    return false;
+    if (starts)
+    {
+        plan_start(loop, command);
+    }
+    return starts;
 }
 
 static void answer(struct loop *loop, const struct link_command *command)
@@ -143,8 +182,5 @@ void loop_obey_commands(struct loop *loop)
     {
         answer(loop, &command);
     }
-    if (loop->start_pending && hal_clock_unix_us(&loop->devices.clock) >= loop->start_utime_us)
-    {
-        loop_start(loop);
-    }
+    start_if_due(loop);
 }

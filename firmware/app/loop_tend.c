@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Button, lights and battery.
-#include "loop.h"
+#include "loop_tend.h"
 
 #define BATTERY_PERIOD_US 1000000
 #define BUZZER_HALF_PERIOD_US 500000
@@ -14,7 +13,7 @@ static void press_button(struct loop *loop, bool pressed)
     const bool down = pressed && loop->button_seen;
     if (down && !loop->button_down)
     {
-        if (loop->running || loop->start_pending)
+        if (loop->running || loop->plan.waits)
         {
             loop_stop(loop);
         }
@@ -29,7 +28,7 @@ static void press_button(struct loop *loop, bool pressed)
 
 void loop_tend_panel(struct loop *loop, bool detected)
 {
-    const int64_t now_us = hal_clock_monotonic_us(&loop->devices.clock);
+    const int64_t now_us = loop_now_us(loop);
     if (loop->lost[LOOP_PANEL] != FW_OK && now_us < loop->retry_us[LOOP_PANEL])
     {
         return;
@@ -67,7 +66,7 @@ static void judge_battery(struct loop *loop)
 
 void loop_tend_battery(struct loop *loop)
 {
-    const int64_t now_us = hal_clock_monotonic_us(&loop->devices.clock);
+    const int64_t now_us = loop_now_us(loop);
     if (now_us < loop->battery_next_us)
     {
         return;

@@ -7,6 +7,7 @@
 
 #include "devices.h"
 #include "loop.h"
+#include "loop_commands.h"
 #include "options.h"
 #include "reporter.h"
 #include "supervisor.h"

@@ -11,6 +11,7 @@
 #include "hal_stub/stub_clock.h"
 #include "hal_stub/stub_panel.h"
 #include "loop.h"
+#include "loop_commands.h"
 #include "unity.h"
 
 #define ROBOT_WIDTH_PX 32

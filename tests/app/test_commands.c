@@ -27,7 +27,7 @@ void tearDown(void)
 
 static int64_t unix_us(void)
 {
-    return robot.hand.monotonic_us + ROBOT_UNIX_OFFSET_US;
+    return robot.hand.monotonic_us + robot.hand.unix_offset_us;
 }
 
 // Sends a command stamped `age_us` ago and lets the robot read it. @return true if accepted.
@@ -84,6 +84,51 @@ static void test_start_happens_at_its_instant(void)
         robot_steps(1);
     }
     TEST_ASSERT_EQUAL_INT64(start_us, unix_us());
+}
+
+// What a running robot plays changes at the instant, not when the command comes.
+static void test_start_to_come_leaves_a_running_robot_as_it_is(void)
+{
+    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, ""));
+    const int64_t start_us = unix_us() + 700000;
+    TEST_ASSERT_TRUE(tell(FW_VERB_START, start_us, "diffusing_v2"));
+    while (unix_us() < start_us)
+    {
+        ASSERT_DUTIES(left_pct);
+        TEST_ASSERT_EQUAL_STRING("milling", robot.report.behavior);
+        robot_steps(1);
+    }
+    ASSERT_DUTIES(((const int8_t[4]){100, 100, 100, 100}));
+    TEST_ASSERT_EQUAL_STRING("diffusing_v2", robot.report.behavior);
+}
+
+// The time server sets the clock while a start waits: it comes when it was agreed to come.
+static void test_start_that_waits_is_not_moved_by_a_clock_that_is_set(void)
+{
+    const int64_t steps_us[] = {59000000, -59000000};
+    for (int i = 0; i < 2; ++i)
+    {
+        const int64_t start_us = robot.hand.monotonic_us + 700000;
+        TEST_ASSERT_TRUE(tell(FW_VERB_START, unix_us() + 700000, ""));
+        robot.hand.unix_offset_us += steps_us[i];
+        while (robot_stands())
+        {
+            TEST_ASSERT_LESS_OR_EQUAL_INT64(start_us, robot.hand.monotonic_us);
+            robot_steps(1);
+        }
+        TEST_ASSERT_EQUAL_INT64(start_us, robot.hand.monotonic_us);
+        TEST_ASSERT_TRUE(tell(FW_VERB_STOP, 0, ""));
+    }
+}
+
+static void test_start_with_an_unknown_table_leaves_all_as_it_is(void)
+{
+    TEST_ASSERT_TRUE(tell(FW_VERB_START, unix_us() + 700000, ""));
+    TEST_ASSERT_FALSE(tell(FW_VERB_START, unix_us() + 100000, "dance"));
+    robot_steps(10);
+    TEST_ASSERT_TRUE(robot_stands());
+    robot_steps(20);
+    ASSERT_DUTIES(left_pct);
 }
 
 static void test_stop_cancels_a_start_that_waits(void)
@@ -237,6 +282,9 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_start_and_stop);
     RUN_TEST(test_start_happens_at_its_instant);
+    RUN_TEST(test_start_to_come_leaves_a_running_robot_as_it_is);
+    RUN_TEST(test_start_that_waits_is_not_moved_by_a_clock_that_is_set);
+    RUN_TEST(test_start_with_an_unknown_table_leaves_all_as_it_is);
     RUN_TEST(test_stop_cancels_a_start_that_waits);
     RUN_TEST(test_start_by_a_wrong_clock_is_refused);
     RUN_TEST(test_copy_is_acknowledged_and_changes_nothing);

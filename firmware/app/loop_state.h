@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a robot's control loop knows, and the changes of it that more than one of its parts makes.
+#ifndef APP_LOOP_STATE_H
+#define APP_LOOP_STATE_H
+
+#include "config.h"
+#include "fw/script.h"
+#include "fw/step.h"
+#include "hal/battery.h"
+#include "hal/camera.h"
+#include "hal/clock.h"
+#include "hal/motors.h"
+#include "hal/panel.h"
+#include "link.h"
+#include "own_tables.h"
+
+#define LOOP_SCRIPT_MAX_ROWS 4096
+#define LOOP_BATTERY_READINGS 5
+
+struct loop_devices
+{
+    struct hal_camera camera;
+    struct hal_motors motors;
+    struct hal_battery battery;
+    struct hal_panel panel;
+    struct hal_clock clock;
+    // "i2c" or "uart", as in the configuration; NULL: neither.
+    const char *board;
+};
+
+// The parts that can be lost and come back. A robot that has lost one stands still.
+enum loop_part
+{
+    LOOP_CAMERA,
+    LOOP_BOARD,
+    LOOP_BATTERY,
+    LOOP_PANEL,
+    LOOP_PART_COUNT,
+};
+
+// A start that waits for its instant (monotonic: a clock that is set in between changes nothing),
+// and what will be played then.
+struct loop_plan
+{
+    bool waits;
+    int64_t at_us;
+    bool plays_script;
+    // Table to be selected; empty: the one that is.
+    char behavior[LINK_NAME_MAX];
+};
+
+struct loop
+{
+    struct loop_devices devices;
+    struct link link;
+    // Another descriptor that ends waiting, for signals; -1: none.
+    int wake_fd;
+    struct fw_ctx core;
+    char behavior[LINK_NAME_MAX];
+    const char *script_dir;
+    // That commands can name.
+    const struct own_tables *own;
+
+    // Lost parts, with what, and when they are tried again (monotonic).
+    enum fw_err lost[LOOP_PART_COUNT];
+    int64_t retry_us[LOOP_PART_COUNT];
+
+    // The operator's wish, and the start that it may wait for.
+    bool running;
+    struct loop_plan plan;
+    struct fw_inbox inbox;
+
+    // Playing a script instead of the table, since when (monotonic).
+    bool plays_script;
+    int64_t script_begin_us;
+    struct fw_script script;
+
+    // Newest readings; the battery is low for good when all are below the limit.
+    int32_t battery_low_mV;
+    int32_t battery_mV[LOOP_BATTERY_READINGS];
+    int32_t battery_count;
+    int64_t battery_next_us;
+    bool battery_low;
+
+    // Button, as seen in the last step and as debounced.
+    bool button_seen, button_down;
+
+    // Duties that the board was told last are not all zero.
+    bool moving;
+    // Called before the board is told to move from standstill, unless NULL.
+    void (*before_moving)(const void *context);
+    const void *before_moving_context;
+    // The camera's recording or the script is over.
+    bool camera_over, script_over;
+    uint32_t lost_report_count;
+
+    // Storage of the script.
+    struct fw_script_row script_rows[LOOP_SCRIPT_MAX_ROWS];
+};
+
+int64_t loop_now_us(const struct loop *loop);
+
+// Drives from now on, or stops; also what the button does.
+void loop_start(struct loop *loop);
+void loop_stop(struct loop *loop);
+
+// Notes a failure and stops the motors; the part is tried again later.
+void loop_lose(struct loop *loop, enum loop_part part, enum fw_err err);
+void loop_regain(struct loop *loop, enum loop_part part);
+
+#endif
