@@ -19,6 +19,9 @@ enum link_status
     LINK_STATUS_BATTERY_LOW = 8,
     LINK_STATUS_BOARD_LOST = 16,
     LINK_STATUS_CAMERA_LOST = 32,
+    LINK_STATUS_STOP_UNCONFIRMED = 64,
+    LINK_STATUS_UNGUARDED = 128,
+    LINK_STATUS_LOG_LOST = 256,
 };
 
 // One control step: what telemetry says, and the counters that explain it.
