@@ -22,6 +22,10 @@ enum link_status
     LINK_STATUS_STOP_UNCONFIRMED = 64,
     LINK_STATUS_UNGUARDED = 128,
     LINK_STATUS_LOG_LOST = 256,
+    LINK_STATUS_LINK_LOST = 512,
+    LINK_STATUS_UNTETHERED = 1024,
+    LINK_STATUS_LATCHED = 2048,
+    LINK_STATUS_DOUBLE = 4096,
 };
 
 // One control step: what telemetry says, and the counters that explain it.
