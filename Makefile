@@ -7,7 +7,7 @@ CTEST := ctest --test-dir build --output-on-failure --no-tests=error --parallel 
 .PHONY: bench build check check-long claims demo format lint clean
 
 build:
-	@tools/setup
+	@scripts/setup
 	@cmake --build build
 	@cmake --install build --component python --prefix "$$($(PYTHON) -c \
 	    'import sysconfig; print(sysconfig.get_path("platlib"))')" >/dev/null
@@ -25,7 +25,7 @@ claims: build
 	@.venv/bin/twinmill claims --out claims
 
 demo: build
-	@$(PYTHON) -m twinmill.tools.demo
+	@$(PYTHON) -m twinmill_cli.demo
 
 # Ourselves against named alternatives, which are installed into .deps, not .venv.
 bench: build
@@ -38,10 +38,10 @@ bench: build
 	@build/bin/bench_plant
 
 format: build
-	@tools/lint --fix
+	@scripts/lint --fix
 
 lint: build
-	@tools/lint
+	@scripts/lint
 
 # Removes what was built; `rm -rf .venv .deps` also removes what was installed here.
 clean:

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 import sysid_fit
 from ratio import Ratio, single
-from twinmill.calibration.diagnosis.diagnose import diagnose
-from twinmill.calibration.fit import fit
-from twinmill.calibration.measurement import Measurement, load_measurements
-from twinmill.calibration.model_file import ModelFile
-from twinmill.calibration.track import command_at
-from twinmill.tools.challenge.cases import DUTY_PCT, ROBOT
-from twinmill.tools.challenge.script import write_rich_script
+
+from twinmill.challenge.cases import DUTY_PCT, ROBOT
+from twinmill.challenge.script import write_rich_script
+from twinmill.data.measurement import Measurement, load_measurements
+from twinmill.data.track import command_at
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.fit.fit import fit
+from twinmill.model.model_file import ModelFile
 
 DURATION_S, GOAL_S = 150.0, 10.0
 REST_S = 1.2  # shorter than the script's rests, longer than wheels need to stand

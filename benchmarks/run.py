@@ -21,7 +21,8 @@ import typer
 from ratio import Ratio
 from rich.console import Group, RenderableType
 from rich.table import Table
-from twinmill.tools.output import AsJson, busy, deliver
+
+from twinmill_cli.output import AsJson, busy, deliver
 
 ROOT = Path(__file__).resolve().parents[1]
 

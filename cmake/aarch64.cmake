@@ -1,5 +1,5 @@
 # Tool chain for the robot's arm64 Debian, from any machine with gcc-aarch64-linux-gnu:
-#   tools/cross/make_sysroot SYSROOT
+#   scripts/make_sysroot SYSROOT
 #   cmake -S . -B build-arm64 -G Ninja -DCMAKE_TOOLCHAIN_FILE=cmake/aarch64.cmake \
 #       -DTWINMILL_SYSROOT=SYSROOT -DTWINMILL_BUILD_TWIN=OFF
 # With qemu-aarch64-static installed, tests run, too.
@@ -9,11 +9,11 @@ set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)
 set(CMAKE_CXX_COMPILER aarch64-linux-gnu-g++)
 set(CMAKE_STRIP aarch64-linux-gnu-strip)
 
-set(TWINMILL_SYSROOT "" CACHE PATH "Folder that tools/cross/make_sysroot made")
+set(TWINMILL_SYSROOT "" CACHE PATH "Folder that scripts/make_sysroot made")
 list(APPEND CMAKE_TRY_COMPILE_PLATFORM_VARIABLES TWINMILL_SYSROOT)
 if(NOT IS_DIRECTORY "${TWINMILL_SYSROOT}")
     message(FATAL_ERROR "TWINMILL_SYSROOT='${TWINMILL_SYSROOT}' is no folder: make one with "
-            "tools/cross/make_sysroot")
+            "scripts/make_sysroot")
 endif()
 set(CMAKE_SYSROOT "${TWINMILL_SYSROOT}")
 set(CMAKE_FIND_ROOT_PATH "${TWINMILL_SYSROOT}")

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 import turbopi
 from robot_process import GREEN, GREY, HEIGHT_PX, LEFT, RIGHT, WIDTH_PX, ZERO, Robot, wait_until
-from twinmill.tools.import_io_tsv import read_io_tsv
+
+from twinmill.data.importers.io_tsv import read_io_tsv
 
 # Programs of another machine are run by an emulator, whose command comes first.
 TURBOPI = shlex.split(os.environ.get("TURBOPI", ""))

@@ -18,7 +18,8 @@ from pathlib import Path
 
 import lcm
 import turbopi
-from twinmill.tools.swarm.fleet import URL, Fleet
+
+from twinmill.robots.fleet import URL, Fleet
 
 SCRIPT = (
     "t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,0,0,0,0\n0.4,50,50,50,50\n1.2,-50,-50,-50,-50\n2,0,0,0,0\n"
@@ -42,7 +43,7 @@ def twin(folder: Path, *options: str):
 def characterise(folder: Path, name: str, script: str, act=lambda: None) -> dict:
     """Runs the command at a terminal of its own; does `act` once the robot plays."""
     log = folder / f"{name}.lcmlog"
-    code = "import sys; from twinmill.tools.cli import main; sys.argv[0] = 'twinmill'; main()"
+    code = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
     command = [sys.executable, "-c", code, "characterise", "--robot", "3", "--json"]
     command += ["--script", str(folder / script), "--out", str(log), "--countdown-s", "1"]
     keyboard, terminal = pty.openpty()
@@ -123,7 +124,7 @@ def main(folder: Path) -> dict:
 
 def characterise_fails(folder: Path, script: str) -> dict:
     log = folder / "none.lcmlog"
-    code = "import sys; from twinmill.tools.cli import main; sys.argv[0] = 'twinmill'; main()"
+    code = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
     command = [sys.executable, "-c", code, "characterise", "--robot", "3"]
     done = subprocess.run(
         [*command, "--script", str(folder / script), "--out", str(log)],

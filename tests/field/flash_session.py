@@ -16,8 +16,9 @@ from pathlib import Path
 
 import numpy as np
 from ssh_robots import SshRobot, make_package
-from twinmill.tools import cli
-from twinmill.tools.threshold.pictures import from_rgb
+
+from twinmill.threshold.pictures import from_rgb
+from twinmill_cli import main as cli
 
 
 def let_in(folder: Path) -> Path:

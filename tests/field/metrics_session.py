@@ -13,12 +13,13 @@ import sys
 from itertools import islice
 from pathlib import Path
 
-from twinmill.tools.everyone import TWIN
 from watch_session import URL, drive
+
+from twinmill.data.multi_log import TWIN
 
 LOOKS = 13  # one a second: the last has more than ten seconds behind it
 EMPTY_URL = "udpm://239.255.76.68:7668?ttl=0"
-START = "from twinmill.tools.cli import main; main()"
+START = "from twinmill_cli.main import main; main()"
 
 
 def metrics(*words: str) -> subprocess.Popen:

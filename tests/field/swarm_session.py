@@ -16,8 +16,9 @@ from pathlib import Path
 
 from lossy import DeafBus, LossyBus
 from robot_process import ZERO, Robot
-from twinmill.tools.swarm import tell
-from twinmill.tools.swarm.fleet import URL, Fleet
+
+from twinmill.robots import tell
+from twinmill.robots.fleet import URL, Fleet
 
 IDS = {1, 2, 3}
 ROUNDS = 3

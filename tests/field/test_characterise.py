@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/characterise: plays a script and logs it; stops the robot on whatever goes wrong."""
+"""`twinmill characterise`: plays a script and logs it; stops the robot on whatever goes wrong."""
 
 import os
 
 import pytest
 from network import run_session
-from twinmill.tools.characterise import check_script
+
+from twinmill_cli.characterise import check_script
 
 pytestmark = pytest.mark.skipif(
     not os.environ.get("TWIN_RUN"), reason="TWIN_RUN does not name the program"

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/deploy: the program comes onto robots over a real ssh; each failure has a name."""
+"""`twinmill flash`: the program comes onto robots over a real ssh; each failure has a name."""
 
 import os
 import shutil
 
 import pytest
 from network import run_session
-from twinmill.tools.deploy.remote import _ssh_failure
-from twinmill.tools.deploy.robot_update import parse_target
+
+from twinmill.robots.remote import _ssh_failure
+from twinmill.robots.robot_update import parse_target
 
 REQUIRED = ("dropbear", "dropbearkey", "ssh", "ssh-keygen", "dpkg-deb", "mount")
 FAILURES = (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/metrics on a live bus, against the logs that the same swarms wrote themselves."""
+"""`twinmill metrics` on a live bus, against the logs that the same swarms wrote themselves."""
 
 import json
 from dataclasses import replace
@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import twinmill_native as native
 from network import run_twin_session
-from twinmill.calibration.log import read_log
-from twinmill.calibration.swarm_metrics import swarm_metrics
+
+from twinmill.data.log import read_log
+from twinmill.swarm.metrics import swarm_metrics
 
 DRIVERS = {"robots": "", "twins": "TWIN_"}
 RANGE_M, BODY_RADIUS_M = 1.1, 0.1  # turbopi.toml

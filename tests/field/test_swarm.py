@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/swarm: real robots' programs obey and answer, though half of all packets are lost."""
+"""`twinmill swarm`: real robots' programs obey and answer, though half of all packets are lost."""
 
 import os
 
 import pytest
 from network import run_session
-from twinmill.tools.swarm.commands import parse_robots
-from twinmill.tools.swarm.tell import make_command
+
+from twinmill.robots.tell import make_command
+from twinmill_cli.swarm import parse_robots
 
 needs_programs = pytest.mark.skipif(
     not os.environ.get("TURBOPI"), reason="TURBOPI does not name the program"

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/watch on a live bus: robots and twins at once, against what they logged themselves."""
+"""`twinmill watch` on a live bus: robots and twins at once, against what they logged themselves."""
 
 import lcm
 import numpy as np
 import pytest
 import turbopi
 from network import run_twin_session
-from twinmill.tools.watch import command
+
+from twinmill_cli import watch as command
 
 needs_viewer = pytest.mark.skipif(
     command.find_spec("rerun") is None, reason=f"no viewer: pip install {command.RERUN}"

@@ -15,8 +15,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import lcm
-from twinmill.tools.everyone import TWIN, everyone_in
-from twinmill.tools.watch.source import Window, from_bus
+
+from twinmill.data.multi_log import TWIN, everyone_in
+from twinmill.data.stream import Window, from_bus
 
 URL = "udpm://239.255.76.67:7667?ttl=0"
 LISTEN_S = 4.0
@@ -46,7 +47,7 @@ def listen(heard: Path) -> list[str]:
 def watch(save: Path) -> dict:
     """What the command says of a few seconds of the bus."""
     words = ["watch", "--lcm-url", URL, "--duration-s", str(LISTEN_S), "--save", save, "--json"]
-    start = "from twinmill.tools.cli import run; import sys; run(sys.argv[1:])"
+    start = "from twinmill_cli.main import run; import sys; run(sys.argv[1:])"
     done = subprocess.run(
         [sys.executable, "-c", start, *map(str, words)],
         stdout=subprocess.PIPE,

@@ -17,7 +17,17 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-FOLDERS = ("lcm_types", "firmware", "twin", "calibration", "tools", "benchmarks", "tests", "cmake")
+FOLDERS = (
+    "lcm_types",
+    "firmware",
+    "twin",
+    "calibration",
+    "tools",
+    "scripts",
+    "benchmarks",
+    "tests",
+    "cmake",
+)
 CODE_SUFFIXES = {".c", ".h", ".cpp", ".py"}
 MAX_LINES = 400
 # What the core may ask of its surroundings: no heap, clock or I/O is among it.

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 import turbopi
 import twinmill_native as native
-from twinmill.calibration.log import RobotLog
-from twinmill.tools.import_log import ImportOptions, import_log
+
+from twinmill.data.importers.import_log import ImportOptions, import_log
+from twinmill.data.log import RobotLog
 
 NOISE = """
 [noise]

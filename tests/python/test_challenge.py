@@ -4,9 +4,10 @@
 from collections import Counter
 
 import pytest
-from twinmill.calibration.freedom import catalogue
-from twinmill.tools.challenge.cases import KINDS, NOT_DRAWN, STRENGTHS, WITHHELD, draw, seal
-from twinmill.tools.challenge.scoring import rate
+
+from twinmill.challenge.cases import KINDS, NOT_DRAWN, STRENGTHS, WITHHELD, draw, seal
+from twinmill.challenge.scoring import rate
+from twinmill.model.freedom import catalogue
 
 KNOWN = {"planar": ("motor_lag",), "mujoco": ()}
 CASES = [draw(number, 7, KNOWN) for number in range(200)]

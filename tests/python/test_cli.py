@@ -8,10 +8,11 @@ from importlib.metadata import version
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from twinmill.calibration.tables import number
-from twinmill.tools import cli
-from twinmill.tools.lazy import Later
-from twinmill.tools.output import plain
+
+from twinmill.files import plain
+from twinmill.report.tables import number
+from twinmill_cli import main as cli
+from twinmill_cli.lazy import Later
 
 
 @pytest.fixture
@@ -225,12 +226,12 @@ def test_numbers_are_shown_to_three_digits(value):
 
 @pytest.mark.parametrize(("name", "module", "summary"), cli.COMMANDS)
 def test_the_list_of_commands_says_what_each_says_of_itself(name, module, summary):
-    command = Later(name, f"twinmill.tools.{module}", summary).command()
+    command = Later(name, f"twinmill_cli.{module}", summary).command()
     assert " ".join((command.short_help or command.help).split("\n\n")[0].split()) == summary
 
 
 def test_help_needs_no_numbers():
-    code = "import sys; from twinmill.tools.cli import run; run(['--help']); print(*sys.modules)"
+    code = "import sys; from twinmill_cli.main import run; run(['--help']); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(done.stdout.split("\n")[-2].split())
     assert "typer" in loaded

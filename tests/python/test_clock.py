@@ -3,9 +3,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from twinmill.calibration.clock import estimate_offset
-from twinmill.calibration.log import LogError, read_log
-from twinmill.calibration.track import make_track
+
+from twinmill.data.clock import estimate_offset
+from twinmill.data.log import LogError, read_log
+from twinmill.data.track import make_track
 
 LAG_S = 0.08
 

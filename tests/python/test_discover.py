@@ -9,10 +9,11 @@ from collections import Counter
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from twinmill.tools.behaviors import find_table
-from twinmill.tools.cli import run
-from twinmill.tools.discover.genes import decode
-from twinmill.tools.discover.kinds import COLUMNS, MEASURES, kinds, measures
+
+from twinmill.swarm.behaviors import find_table
+from twinmill.swarm.discover.genes import decode
+from twinmill.swarm.discover.kinds import COLUMNS, MEASURES, kinds, measures
+from twinmill_cli.main import run
 
 BODIES = ["--set", "robot.body_radius_m=0.1", "--set", "target_radius_m=0.1"]
 # 14 generations of 108 swarms; three kinds of published behaviour and one odd-robot ring.

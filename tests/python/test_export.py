@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/export: other programs find what LCM's own reader finds."""
+"""`twinmill export`: other programs find what LCM's own reader finds."""
 
 import json
 import math
@@ -11,10 +11,11 @@ import pytest
 import turbopi
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
-from twinmill.calibration.log import read_log
-from twinmill.calibration.track import command_at
-from twinmill.tools.cli import run
-from twinmill.tools.import_log import import_log
+
+from twinmill.data.importers.import_log import import_log
+from twinmill.data.log import read_log
+from twinmill.data.track import command_at
+from twinmill_cli.main import run
 
 T0_US = 1_700_000_000_000_000
 

@@ -10,10 +10,12 @@ import turbopi
 import typer
 from hypothesis import given
 from hypothesis import strategies as st
-from twinmill.calibration.log import LogError, read_log
-from twinmill.calibration.mixing import duties_from_inputs, duties_from_vendor_move
-from twinmill.tools.import_log import ImportOptions, import_log, register
 from typer.testing import CliRunner
+
+from twinmill.data.importers.import_log import ImportOptions, import_log
+from twinmill.data.log import LogError, read_log
+from twinmill.model.mixing import duties_from_inputs, duties_from_vendor_move
+from twinmill_cli.import_log import register
 
 POSES = "t_s,robot_id,x_m,y_m,theta_rad\n0,4,0,0,3\n0.5,4,0.1,0.2,-3\n1.0,4,0.3,0.2,-2.5\n"
 COMMANDS = "t_s,robot_id,fl_pct,fr_pct,rl_pct,rr_pct\n0,4,0,0,0,0\n0.1,4,10,-20,30,-100\n"

@@ -3,7 +3,8 @@ import lcm
 import numpy as np
 import pytest
 import turbopi
-from twinmill.calibration.log import LogError, read_log
+
+from twinmill.data.log import LogError, read_log
 
 
 def drive_and_pose(message, count=3):

@@ -8,11 +8,9 @@ import numpy as np
 import pyarrow as pa
 import pytest
 import twinmill_native as native
-from twinmill.tools import cli
-from twinmill.tools.sweep.ask import Curve, Question, axes_for, curve_of
-from twinmill.tools.sweep.axes import Axis
-from twinmill.tools.sweep.command import make_request, sweep
-from twinmill.tools.sweep.experiments import (
+
+from twinmill.swarm.axes import Axis
+from twinmill.swarm.experiments import (
     agreement,
     divergence_bits,
     entropy_bits,
@@ -20,8 +18,11 @@ from twinmill.tools.sweep.experiments import (
     next_cells,
     read_experiments,
 )
-from twinmill.tools.sweep.phase import CLASSES, Phase, phase_of
-from twinmill.tools.sweep.request import Request
+from twinmill.swarm.phase import CLASSES, Phase, phase_of
+from twinmill.swarm.request import Request
+from twinmill.swarm.sweep import make_request, sweep
+from twinmill_cli import main as cli
+from twinmill_cli.ask import Curve, Question, axes_for, curve_of
 
 SEEDS = 4
 
@@ -56,7 +57,7 @@ def test_a_cell_is_the_class_of_most_of_its_runs():
 
 def test_intervals_are_wilsons():
     # Newcombe 1998, Statistics in Medicine 17, table I, method 3: 81 of 263.
-    from twinmill.tools.sweep.classes import interval
+    from twinmill.swarm.classes import interval
 
     assert interval(81, 263) == pytest.approx((0.2553, 0.3662), abs=5e-5)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/plot: what is drawn is what was driven."""
+"""`twinmill plot`: what is drawn is what was driven."""
 
 from dataclasses import replace
 
@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
-from twinmill.tools.cli import run
-from twinmill.tools.everyone import Actor, read_everyone
-from twinmill.tools.plot_figures import Drawing
+
+from twinmill.data.multi_log import Actor, read_everyone
+from twinmill.report.log_figures import Drawing
+from twinmill_cli.main import run
 
 
 @pytest.fixture

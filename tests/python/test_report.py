@@ -3,16 +3,11 @@ import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 
 import pytest
-from twinmill.calibration.compare import compare
-from twinmill.calibration.measurement import load_measurements
-from twinmill.calibration.model_file import ModelFile
-from twinmill.calibration.report import (
-    Provenance,
-    Section,
-    comparison_section,
-    steps_section,
-    write_report,
-)
+
+from twinmill.data.measurement import load_measurements
+from twinmill.fit.compare import compare
+from twinmill.model.model_file import ModelFile
+from twinmill.report import Provenance, Section, comparison_section, steps_section, write_report
 
 SOURCE = Provenance("twinmill compare run.lcmlog", "twinmill 0.1.0", "ab" * 32)
 

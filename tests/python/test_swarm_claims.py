@@ -5,10 +5,11 @@ import json
 
 import numpy as np
 import pytest
-from twinmill.tools import cli
-from twinmill.tools.claims import claims, rows
-from twinmill.tools.claims.claims import CLAIMS
-from twinmill.tools.claims.swarms import KINDS, run
+
+from twinmill.swarm.claims import claims, rows
+from twinmill.swarm.claims.claims import CLAIMS
+from twinmill.swarm.claims.swarms import KINDS, run
+from twinmill_cli import main as cli
 
 SEEDS = 100
 

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import twinmill_native as native
-from twinmill.calibration.log import LogError, read_log
-from twinmill.calibration.swarm_metrics import swarm_metrics
-from twinmill.tools import cli
+
+from twinmill.data.log import LogError, read_log
+from twinmill.swarm.metrics import swarm_metrics
+from twinmill_cli import main as cli
 
 PROGRAMS = Path(os.environ.get("TWINMILL_BIN", Path(__file__).parents[2] / "build" / "bin"))
 

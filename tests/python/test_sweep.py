@@ -13,11 +13,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import twinmill_native as native
-from twinmill.tools.sweep import request as request_module
-from twinmill.tools.sweep.axes import parse_axis
-from twinmill.tools.sweep.command import make_request, sweep
-from twinmill.tools.sweep.request import Request
-from twinmill.tools.sweep.store import Store, read_sweep
+
+from twinmill.swarm import request as request_module
+from twinmill.swarm.axes import parse_axis
+from twinmill.swarm.request import Request
+from twinmill.swarm.store import Store, read_sweep
+from twinmill.swarm.sweep import make_request, sweep
 
 AXES = ["v_mps=0.1:0.3:3", "omega_degps=30:90:2"]
 
@@ -55,9 +56,9 @@ def test_every_cell_and_seed_is_a_row(tmp_path: Path):
 
 KILLED = """
 import sys
-from twinmill.tools.sweep import request as r
+from twinmill.swarm import request as r
 r.PART_LEAN = 200000
-from twinmill.tools.sweep.command import make_request, sweep
+from twinmill_cli.twin_sweep import make_request, sweep
 print(sweep(make_request("milling", "paper.toml", ["v_mps=0.1:0.3:40"], seeds=20, duration_s=60.0),
       __import__("pathlib").Path(sys.argv[1]), workers=1)["parts_kept_before"])
 """
@@ -112,7 +113,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(tmp_path: Path, monk
 
 
 def test_nobody_at_the_cluster_is_one_sentence(tmp_path: Path, monkeypatch):
-    monkeypatch.setattr("twinmill.tools.sweep.workers.CONNECT_S", 0.5)
+    monkeypatch.setattr("twinmill.swarm.workers.CONNECT_S", 0.5)
     with pytest.raises(ValueError, match="no scheduler answers"):
         sweep(request(), tmp_path / "s", dask="tcp://127.0.0.1:9")
 
@@ -167,7 +168,7 @@ def test_effects_take_the_full_path_and_say_so(tmp_path: Path):
 
 
 def test_the_program_tells_what_is_wrong_in_one_line(tmp_path: Path):
-    command = [sys.executable, "-m", "twinmill.tools.sweep.command", "--x", "speed=1:2:3"]
+    command = [sys.executable, "-m", "twinmill_cli.twin_sweep", "--x", "speed=1:2:3"]
     done = subprocess.run([*command, "--out", tmp_path / "s"], capture_output=True, text=True)
     assert done.returncode == 1 and done.stdout == ""
     assert done.stderr.startswith("twin_sweep: there is no axis 'speed'")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/threshold: limits of colour from pictures whose truth is known."""
+"""`twinmill threshold`: limits of colour from pictures whose truth is known."""
 
 import json
 
@@ -8,10 +8,11 @@ import pytest
 import twinmill_native as native
 from PIL import Image
 from scipy import ndimage
-from twinmill.tools import cli
-from twinmill.tools.threshold.box import KEYS, Ball, find_ball, fit_box
-from twinmill.tools.threshold.command import write_settings
-from twinmill.tools.threshold.pictures import Picture, from_rgb, read_pictures, split_frames
+
+from twinmill.threshold.box import KEYS, Ball, find_ball, fit_box
+from twinmill.threshold.pictures import Picture, from_rgb, read_pictures, split_frames
+from twinmill_cli import main as cli
+from twinmill_cli.threshold import write_settings
 
 WIDTH_PX, HEIGHT_PX, MIN_BLOB_PX = 320, 240, 300
 GREEN, TEAL, YELLOW, WOOD, GREY = (

@@ -3,8 +3,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from twinmill.calibration.log import LogError, read_log
-from twinmill.calibration.track import local_line, make_track
+
+from twinmill.data.log import LogError, read_log
+from twinmill.data.track import local_line, make_track
 
 
 @pytest.mark.parametrize("name", ["calibration", "case_s", "case_w"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/watch: the viewer is given what was said, read back with the viewer's own reader."""
+"""`twinmill watch`: the viewer is given what was said, read back with the viewer's own reader."""
 
 import json
 import math
@@ -10,13 +10,14 @@ from pathlib import Path
 import lcm
 import numpy as np
 import pytest
-from twinmill.calibration.model_file import ModelFile
-from twinmill.calibration.wire import split_events
-from twinmill.tools.cli import run
-from twinmill.tools.everyone import Actor, everyone_in
-from twinmill.tools.watch import command
-from twinmill.tools.watch.judge import WINDOW_S, Judge
-from twinmill.tools.watch.source import Window, from_log
+
+from twinmill.data.lcm_log import split_events
+from twinmill.data.multi_log import Actor, everyone_in
+from twinmill.data.stream import Window, from_log
+from twinmill.model.model_file import ModelFile
+from twinmill.watch.judge import WINDOW_S, Judge
+from twinmill_cli import watch as command
+from twinmill_cli.main import run
 
 needs_viewer = pytest.mark.skipif(
     command.find_spec("rerun") is None, reason=f"no viewer: pip install {command.RERUN}"

@@ -13,8 +13,9 @@ import lcm
 import numpy as np
 import pytest
 import turbopi
-from twinmill.calibration.measurement import Measurement, load_measurements
-from twinmill.calibration.model_file import ModelFile
+
+from twinmill.data.measurement import Measurement, load_measurements
+from twinmill.model.model_file import ModelFile
 
 STEP_S = 1 / 480
 POSE_EVERY, COMMAND_EVERY = 4, 10  # 120 Hz and 48 Hz

@@ -7,13 +7,14 @@ from itertools import product
 import numpy as np
 import pytest
 import twinmill_native as native
-from twinmill.calibration.bits.compare import compare_bits
-from twinmill.calibration.bits.frames import Frames, frames_of
-from twinmill.calibration.bits.robots import odd_cameras
-from twinmill.calibration.bits.scene import BitScene, majority
-from twinmill.calibration.bits.search import search_bits
-from twinmill.calibration.folds import BLOCK_S, thue_morse
-from twinmill.calibration.track import make_track
+
+from twinmill.data.camera_frames import Frames, frames_of
+from twinmill.data.track import make_track
+from twinmill.diagnosis.detections.robots import odd_cameras
+from twinmill.diagnosis.detections.search import search_bits
+from twinmill.predict.detection_errors import compare_bits
+from twinmill.predict.detections import BitScene, majority
+from twinmill.predict.folds import BLOCK_S, thue_morse
 
 RANGE_M, CONE_RAD, MISS, FALSE = 1.1, 0.855, 0.05, 0.1
 MODEL = f"""

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from twinmill.calibration.bits.evidence import HeldOut, weigh
-from twinmill.calibration.folds import thue_morse
+
+from twinmill.diagnosis.detections.evidence import HeldOut, weigh
+from twinmill.predict.folds import thue_morse
 
 BLOCKS, FRAMES = 400, 60
 ONE, OTHER = 0.4, 0.1

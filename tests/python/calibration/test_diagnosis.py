@@ -5,13 +5,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from twinmill.calibration.diagnosis.diagnose import diagnose
-from twinmill.calibration.diagnosis.explain import explain
-from twinmill.calibration.diagnosis.ranking import rank
-from twinmill.calibration.diagnosis.screen import Screened, Screening
-from twinmill.calibration.fit import fit
-from twinmill.calibration.measurement import load_measurements
-from twinmill.calibration.model_file import ModelFile
+
+from twinmill.data.measurement import load_measurements
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.explain import explain
+from twinmill.diagnosis.ranking import rank
+from twinmill.diagnosis.screen import Screened, Screening
+from twinmill.fit.fit import fit
+from twinmill.model.model_file import ModelFile
 
 TABLE = """
 [base]

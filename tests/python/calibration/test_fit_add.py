@@ -3,12 +3,13 @@
 
 import numpy as np
 import pytest
-from twinmill.calibration.add import add
-from twinmill.calibration.compare import compare
-from twinmill.calibration.fit import fit
-from twinmill.calibration.log import LogError
-from twinmill.calibration.measurement import load_measurements
-from twinmill.calibration.model_file import ModelFile
+
+from twinmill.data.log import LogError
+from twinmill.data.measurement import load_measurements
+from twinmill.fit.add import add
+from twinmill.fit.compare import compare
+from twinmill.fit.fit import fit
+from twinmill.model.model_file import ModelFile
 
 EULER_S = 1 / 480  # the robot's step: times are known to half of it, and lags to as much again
 OFFSET_S = 0.06

@@ -3,14 +3,15 @@
 
 import numpy as np
 import pytest
-from twinmill.calibration.compare import compare, open_scenes
-from twinmill.calibration.floor import measure_floor
-from twinmill.calibration.measurement import Measurement, _played
-from twinmill.calibration.noise import ChannelNoise, Noise
-from twinmill.calibration.problem import Scene
-from twinmill.calibration.residual import StepGrid
-from twinmill.calibration.track import make_track
-from twinmill.calibration.windows import HORIZONS_S, Windows, difference, rms
+
+from twinmill.data.measurement import Measurement, _played
+from twinmill.data.track import make_track
+from twinmill.fit.compare import compare, open_scenes
+from twinmill.predict.floor import measure_floor
+from twinmill.predict.noise import ChannelNoise, Noise
+from twinmill.predict.problem import Scene
+from twinmill.predict.residual import StepGrid
+from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms
 
 SPEED_MPS = 0.3
 NOISE = Noise(ChannelNoise(3e-4, 3e-3, 0.15), ChannelNoise(1.75e-3, 0.03, 0.25))

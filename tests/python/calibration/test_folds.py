@@ -5,10 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from twinmill.calibration.folds import MARGIN_S, halves, step_mask, window_mask
-from twinmill.calibration.problem import Scene
-from twinmill.calibration.residual import StepGrid
-from twinmill.calibration.windows import Windows
+
+from twinmill.predict.folds import MARGIN_S, halves, step_mask, window_mask
+from twinmill.predict.problem import Scene
+from twinmill.predict.residual import StepGrid
+from twinmill.predict.windows import Windows
 
 OFFSET_S = 0.07
 DRIVE, REST = 120, 72  # control steps of 1/48 s: a drive every 4 s

@@ -7,11 +7,12 @@ may shift: its wheels, losses and noise are not written as ours are.
 
 import numpy as np
 import pytest
-from twinmill.calibration.add import add
-from twinmill.calibration.compare import GOOD, SUSPECT, compare
-from twinmill.calibration.fit import fit
-from twinmill.calibration.measurement import load_measurements
-from twinmill.calibration.model_file import ModelFile
+
+from twinmill.data.measurement import load_measurements
+from twinmill.fit.add import add
+from twinmill.fit.compare import GOOD, SUSPECT, compare
+from twinmill.fit.fit import fit
+from twinmill.model.model_file import ModelFile
 
 FORM = 0.1
 

@@ -7,9 +7,10 @@ import tomllib
 from dataclasses import replace
 
 import pytest
-from twinmill.calibration.model_file import Fitted, ModelError, ModelFile, write_child, write_whole
-from twinmill.calibration.noise import ChannelNoise, Noise
-from twinmill.calibration.solve import Estimate
+
+from twinmill.fit.solve import Estimate
+from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child, write_whole
+from twinmill.predict.noise import ChannelNoise, Noise
 
 NOISE = Noise(ChannelNoise(1e-4, 2e-3, 0.1), ChannelNoise(1e-3, 2e-2, 0.2))
 

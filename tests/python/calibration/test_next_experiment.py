@@ -9,23 +9,24 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from twinmill.calibration.diagnosis.diagnose import diagnose
-from twinmill.calibration.diagnosis.result import Diagnosis
-from twinmill.calibration.diagnosis.search import ALPHA
-from twinmill.calibration.fit import fit
-from twinmill.calibration.freedom import Free
-from twinmill.calibration.log import read_log
-from twinmill.calibration.measurement import Measurement
-from twinmill.calibration.model_file import ModelFile
-from twinmill.calibration.next_experiment.design import Limits, Plan, check, design
-from twinmill.calibration.next_experiment.foresight import Rows, rows_of
-from twinmill.calibration.next_experiment.information import CLOCKS, Ledger
-from twinmill.calibration.next_experiment.moves import AXES, family
-from twinmill.calibration.next_experiment.power import told_apart
-from twinmill.calibration.next_experiment.relevance import Relevance
-from twinmill.calibration.next_experiment.script_file import csv_text
-from twinmill.tools import cli
-from twinmill.tools import next as next_run
+
+from twinmill.data.log import read_log
+from twinmill.data.measurement import Measurement
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.result import Diagnosis
+from twinmill.diagnosis.search import ALPHA
+from twinmill.experiment.design import Limits, Plan, check, design
+from twinmill.experiment.foresight import Rows, rows_of
+from twinmill.experiment.information import CLOCKS, Ledger
+from twinmill.experiment.moves import AXES, family
+from twinmill.experiment.power import told_apart
+from twinmill.experiment.relevance import Relevance
+from twinmill.experiment.script_file import csv_text
+from twinmill.fit.fit import fit
+from twinmill.model.freedom import Free
+from twinmill.model.model_file import ModelFile
+from twinmill_cli import main as cli
+from twinmill_cli import next as next_run
 
 BIAS_RAD = 0.02
 HALVES = slice(0, None, 2), slice(1, None, 2)

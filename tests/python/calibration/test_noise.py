@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from scipy.signal import freqz, lfilter
 from scipy.stats import chi2
-from twinmill.calibration.compare import open_scenes
-from twinmill.calibration.flexible import unexplained
-from twinmill.calibration.noise import TRANSIENT, ChannelNoise, Noise, fit_noise
-from twinmill.calibration.problem import Scene
-from twinmill.calibration.residual import StepGrid
-from twinmill.calibration.track import command_at
+
+from twinmill.data.track import command_at
+from twinmill.fit.compare import open_scenes
+from twinmill.predict.flexible import unexplained
+from twinmill.predict.noise import TRANSIENT, ChannelNoise, Noise, fit_noise
+from twinmill.predict.problem import Scene
+from twinmill.predict.residual import StepGrid
 
 TRUTHS = [
     (ChannelNoise(3e-4, 3e-3, 0.15), ChannelNoise(1.75e-3, 0.03, 0.15), 1 / 120),

@@ -6,15 +6,16 @@ import gzip
 
 import numpy as np
 import pytest
-from twinmill.calibration import measurement
-from twinmill.calibration.add import add
-from twinmill.calibration.diagnosis.diagnose import diagnose
-from twinmill.calibration.diagnosis.encoders import geometry_notes
-from twinmill.calibration.log import RobotLog
-from twinmill.calibration.measurement import load_measurements
-from twinmill.calibration.model_file import ModelFile
-from twinmill.calibration.time_base import find_time_base, retimed
-from twinmill.tools.import_log import ImportOptions, import_log
+
+from twinmill.data import measurement
+from twinmill.data.importers.import_log import ImportOptions, import_log
+from twinmill.data.log import RobotLog
+from twinmill.data.measurement import load_measurements
+from twinmill.data.time_base import find_time_base, retimed
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.encoders import geometry_notes
+from twinmill.fit.add import add
+from twinmill.model.model_file import ModelFile
 
 OMNI4 = """
 name = "omni4"

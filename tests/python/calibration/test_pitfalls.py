@@ -6,16 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from twinmill.calibration.compare import compare, open_scenes
-from twinmill.calibration.diagnosis.diagnose import diagnose
-from twinmill.calibration.diagnosis.evidence import State, attempt, fall
-from twinmill.calibration.diagnosis.search import ALPHA
-from twinmill.calibration.fit import fit, refit
-from twinmill.calibration.folds import MARGIN_S, halves, step_mask
-from twinmill.calibration.freedom import base_quantities, catalogue, effect_quantities
-from twinmill.calibration.heldout import held_out
-from twinmill.calibration.model_file import ModelFile
-from twinmill.calibration.solve import huber, solve
+
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.evidence import State, attempt, fall
+from twinmill.diagnosis.search import ALPHA
+from twinmill.fit.compare import compare, open_scenes
+from twinmill.fit.fit import fit, refit
+from twinmill.fit.heldout import held_out
+from twinmill.fit.solve import huber, solve
+from twinmill.model.freedom import base_quantities, catalogue, effect_quantities
+from twinmill.model.model_file import ModelFile
+from twinmill.predict.folds import MARGIN_S, halves, step_mask
 
 MEMORY_S = 0.15
 

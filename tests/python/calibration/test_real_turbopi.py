@@ -3,12 +3,13 @@
 
 import numpy as np
 import pytest
-from twinmill.calibration.add import add
-from twinmill.calibration.fit import fit
-from twinmill.calibration.measurement import load_measurements
-from twinmill.calibration.model_file import ModelFile
-from twinmill.calibration.windows import HORIZONS_S
-from twinmill.tools.import_log import ImportOptions, import_log
+
+from twinmill.data.importers.import_log import ImportOptions, import_log
+from twinmill.data.measurement import load_measurements
+from twinmill.fit.add import add
+from twinmill.fit.fit import fit
+from twinmill.model.model_file import ModelFile
+from twinmill.predict.windows import HORIZONS_S
 
 # Coasting comes last: it sets the time constant at zero duty, to which lag_by_duty would add.
 EFFECTS = ("speed_curve", "lag_by_duty", "coasting")

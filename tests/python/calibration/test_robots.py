@@ -8,15 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from twinmill.calibration.compare import compare, open_scenes
-from twinmill.calibration.diagnosis.bumps import bumps, spared
-from twinmill.calibration.diagnosis.diagnose import diagnose
-from twinmill.calibration.diagnosis.explain import explain
-from twinmill.calibration.diagnosis.omnibus import unexplained
-from twinmill.calibration.log import LogError
-from twinmill.calibration.measurement import load_measurements
-from twinmill.calibration.model_file import ModelFile
-from twinmill.tools.challenge.script import write_rich_script
+
+from twinmill.challenge.script import write_rich_script
+from twinmill.data.log import LogError
+from twinmill.data.measurement import load_measurements
+from twinmill.diagnosis.bumps import bumps, spared
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.explain import explain
+from twinmill.diagnosis.omnibus import unexplained
+from twinmill.fit.compare import compare, open_scenes
+from twinmill.model.model_file import ModelFile
 
 ROOT = Path(__file__).resolve().parents[3]
 TWIN_RUN = os.environ.get("TWIN_RUN", str(ROOT / "build/bin/twin_run"))

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from twinmill.calibration.compare import open_scenes
-from twinmill.calibration.fit import refit
-from twinmill.calibration.freedom import base_quantities
-from twinmill.calibration.solve import excited, solve
+
+from twinmill.fit.compare import open_scenes
+from twinmill.fit.fit import refit
+from twinmill.fit.solve import excited, solve
+from twinmill.model.freedom import base_quantities
 
 LOGS = 12
 

@@ -4,11 +4,12 @@
 import numpy as np
 import pytest
 import twinmill_native as native
-from twinmill.calibration.compare import compare
-from twinmill.calibration.diagnosis.diagnose import diagnose
-from twinmill.calibration.log import LogError
-from twinmill.calibration.measurement import load_measurements
-from twinmill.calibration.model_file import ModelFile
+
+from twinmill.data.log import LogError
+from twinmill.data.measurement import load_measurements
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.fit.compare import compare
+from twinmill.model.model_file import ModelFile
 
 HEADER = "robot_id,speed_input,direction_deg,turn_input,run,speed_mps,turn_radps,note\n"
 LEVER_M = 0.126  # half wheelbase and half track of turbopi_nominal.toml

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import twinmill_native as native
 from scipy.stats import binom
-from twinmill.calibration.model_file import ModelFile
-from twinmill.calibration.swarm_compare import (
+
+from twinmill.model.model_file import ModelFile
+from twinmill.swarm.compare import (
     FALSE_ALARMS,
     blocks,
     compared,
@@ -20,7 +21,7 @@ from twinmill.calibration.swarm_compare import (
     plain,
     twin_values,
 )
-from twinmill.tools.cli import run
+from twinmill_cli.main import run
 
 SECONDS, SEEDS, PAIRS = 60, 39, 80
 SCALE = (1.1, 0.1)

@@ -7,8 +7,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from twinmill.calibration.model_file import ModelFile
-from twinmill.tools.diagnose import _judge_swarm
+
+from twinmill.model.model_file import ModelFile
+from twinmill_cli.diagnose import _judge_swarm
 
 pytestmark = pytest.mark.skipif(
     not os.environ.get("TWIN_RUN"), reason="TWIN_RUN does not name the program"

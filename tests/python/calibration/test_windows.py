@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import twinmill_native as native
-from twinmill.calibration.measurement import Measurement, _played
-from twinmill.calibration.problem import Scene
-from twinmill.calibration.residual import StepGrid
-from twinmill.calibration.track import make_track
-from twinmill.calibration.windows import HORIZONS_S, Windows, difference, rms, score
+
+from twinmill.data.measurement import Measurement, _played
+from twinmill.data.track import make_track
+from twinmill.predict.problem import Scene
+from twinmill.predict.residual import StepGrid
+from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms, score
 
 SPEED_MPS, TURN_RADPS, LEVER_M = 0.3, 0.5, 0.126  # of `driven`, and of the model's wheels
 

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Makes a log from motion capture exports and command tables of others."""
+
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import tomlkit
+
+from twinmill.data.importers.io_tsv import read_io_tsv
+from twinmill.data.importers.motive import read_motive
+from twinmill.data.importers.plain import read_commands, read_poses
+from twinmill.data.importers.series import CommandSeries, PoseSeries, multiply
+from twinmill.data.log import Log, LogError, read_log
+from twinmill.data.log_writer import write_log
+from twinmill.data.track import make_track
+from twinmill.files import replacing
+
+LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """How to read the files.
+
+    Attributes:
+        robot_id: whose the rows are, for files that do not say.
+        robots: robot_id by name of a Motive rigid body.
+        rename: column in a plain CSV file to column as we name it.
+        up: "y" or "z", the axis that a Motive export calls up.
+        pose_shift_s: added to the stamps of all poses.
+        heading_offset_rad: from the tracked body's x axis to the robot's front, left positive.
+        force: replace an output that exists.
+    """
+
+    robot_id: int | None = None
+    robots: dict[str, int] = field(default_factory=dict)
+    rename: dict[str, str] = field(default_factory=dict)
+    up: str = "y"
+    pose_shift_s: float = 0.0
+    heading_offset_rad: float = 0.0
+    force: bool = False
+
+
+def import_log(
+    poses: Path | None,
+    commands: Path | None,
+    out: Path,
+    *,
+    motive: Path | None = None,
+    io_tsv: tuple[Path, ...] = (),
+    options: ImportOptions | None = None,
+) -> dict:
+    """Makes a log from one source of poses and one of commands.
+
+    Args:
+        poses: plain CSV, or None with `motive`.
+        commands: plain CSV, or None with `io_tsv`.
+        out: the log to write; nothing is there until all went well.
+        motive: export of OptiTrack Motive.
+        io_tsv: one per robot.
+        options: how to read them.
+
+    Returns:
+        out, robots[] {robot_id, command_kind, commands, poses, poses_valid}, messages (commands and
+        poses), duration_s, warnings[].
+
+    Raises:
+        LogError: one sentence on what is wrong; nothing was written.
+    """
+    options = options or ImportOptions()
+    if (poses is None) == (motive is None) or (commands is None) == (not io_tsv):
+        raise LogError(
+            "a log needs one source of poses and one of commands: give --poses or "
+            "--motive, and --commands or --io-tsv."
+        )
+    if options.robot_id is not None and (not 0 <= options.robot_id <= 99 or len(io_tsv) > 1):
+        raise LogError(
+            f"--robot-id {options.robot_id}: must be in 0..99 and fits one robot; "
+            "number several by their folders' names."
+        )
+    pose_series = (
+        read_motive(motive, options.robots, options.up, absolute=bool(io_tsv))
+        if motive
+        else read_poses(poses, options.rename, options.robot_id)
+    )
+    pose_series = [_moved(series, options) for series in pose_series]
+    command_series = (
+        read_commands(commands, options.rename, options.robot_id)
+        if commands
+        else [read_io_tsv(path, options.robot_id) for path in io_tsv]
+    )
+    _check_times(pose_series, command_series)
+    sources = [path for path in (poses, motive, commands, *io_tsv) if path is not None]
+    with replacing(out, options.force) as temporary:
+        write_log(temporary, pose_series, command_series, _provenance(sources, options))
+        warnings = [text for series in command_series for text in series.warnings]
+        return _summary(read_log(temporary), out, warnings)
+
+
+def _moved(series: PoseSeries, options: ImportOptions) -> PoseSeries:
+    """Poses on the shifted clock, of the body whose x axis is the robot's front."""
+    half = options.heading_offset_rad / 2
+    turn = np.array([np.cos(half), 0, 0, np.sin(half)])
+    return PoseSeries(
+        series.robot_id,
+        series.utime_us + round(options.pose_shift_s * 1e6),
+        series.position_m,
+        multiply(series.orientation_wxyz, turn),
+        series.valid,
+    )
+
+
+def _check_times(poses: list[PoseSeries], commands: list[CommandSeries]) -> None:
+    """Raises LogError unless some robot has both, at the same time, without absurd holds."""
+    ids = [series.robot_id for series in commands]
+    if len(set(ids)) < len(ids):
+        raise LogError(
+            f"two sources of commands are for robot {max(ids, key=ids.count)}; name the "
+            "folders by the robots' numbers."
+        )
+    pairs = [(p, c) for p in poses for c in commands if p.robot_id == c.robot_id]
+    if not pairs:
+        raise LogError(
+            f"poses are of robots {[p.robot_id for p in poses]}, commands of {ids}: no "
+            "robot has both; number them alike (--robot NAME=ID, --robot-id)."
+        )
+    for p, c in pairs:
+        first_s, last_s = p.utime_us[[0, -1]] / 1e6
+        start_s, end_s = c.utime_us[[0, -1]] / 1e6
+        if last_s < start_s or (not c.repeat and first_s > end_s):
+            raise LogError(
+                f"robot {p.robot_id}: poses from {first_s:.3f} to {last_s:.3f} s and commands from "
+                f"{start_s:.3f} to {end_s:.3f} s do not overlap; shift the poses, for example so "
+                f"that both start together: --pose-shift-s {start_s - first_s:.3f}."
+            )
+        hold_s = np.diff(np.append(c.utime_us / 1e6, max(last_s, end_s))).max()
+        if c.repeat and hold_s > LONGEST_HOLD_S:
+            raise LogError(
+                f"robot {p.robot_id}: a command would be held for {hold_s:.0f} s; the "
+                "times of commands and poses are not of one run, or mixed up."
+            )
+
+
+def _provenance(sources: list[Path], options: ImportOptions) -> str:
+    """TOML for run_t: files with their hashes, and what was changed on the way."""
+    files = [
+        {"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+        for path in sources
+    ]
+    return tomlkit.dumps(
+        {
+            "import": {
+                "files": files,
+                "up": options.up,
+                "pose_shift_s": options.pose_shift_s,
+                "heading_offset_rad": options.heading_offset_rad,
+                "rename": options.rename,
+            }
+        }
+    )
+
+
+def _summary(log: Log, out: Path, warnings: list[str]) -> dict:
+    """What import_log returns, by reading the log as everybody else will."""
+    warnings = warnings + log.warnings
+    robots, end_s = [], 0.0
+    for robot in log.robots.values():
+        series = [t for t in (robot.command_t_s, robot.pose_t_s) if len(t)]
+        end_s = max(end_s, *(float(t[-1]) for t in series))
+        robots.append(
+            {
+                "robot_id": robot.robot_id,
+                "command_kind": robot.command_kind,
+                "commands": len(robot.command_t_s),
+                "poses": len(robot.pose_t_s),
+                "poses_valid": int(robot.valid.sum()),
+            }
+        )
+        if len(series) == 2 and robot.valid.sum() > 1:
+            warnings += [f"robot {robot.robot_id}: {note}" for note in make_track(robot).notes]
+    return {
+        "out": str(out),
+        "robots": robots,
+        "messages": sum(robot["commands"] + robot["poses"] for robot in robots),
+        "duration_s": end_s,
+        "warnings": warnings,
+    }

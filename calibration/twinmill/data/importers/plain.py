@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Poses and commands from plain CSV files, as described under `twinmill import --help`."""
+
+from pathlib import Path
+
+import numpy as np
+import turbopi
+
+from twinmill.data.importers.series import CommandSeries, PoseSeries, quaternion_from_heading
+from twinmill.data.log import CommandKind, LogError
+from twinmill.data.measurement_table import Table, read_table
+from twinmill.model.mixing import duties_from_inputs
+
+QUATERNION = ("qw", "qx", "qy", "qz")
+INPUTS = ("speed_input", "turn_input")
+VALUES: dict[CommandKind, tuple[str, ...]] = {
+    "duty": ("fl_pct", "fr_pct", "rl_pct", "rr_pct"),
+    "wheel_speed": ("w1_radps", "w2_radps", "w3_radps", "w4_radps"),
+    "twist": ("vx_mps", "vy_mps", "omega_radps"),
+}
+KNOWN = frozenset(
+    {
+        "t_s",
+        "robot_id",
+        "x_m",
+        "y_m",
+        "z_m",
+        "theta_rad",
+        "valid",
+        *QUATERNION,
+        *INPUTS,
+        *(name for names in VALUES.values() for name in names),
+    }
+)
+
+
+def read_poses(path: Path, rename: dict[str, str], robot_id: int | None) -> list[PoseSeries]:
+    """Poses by robot; empty or NaN cells are poses that were lost.
+
+    Args:
+        path: CSV with t_s, robot_id, x_m, y_m, theta_rad or QUATERNION, optional z_m, valid.
+        rename: columns, old name to new.
+        robot_id: of all rows, for files without that column.
+
+    Raises:
+        LogError: as read_table; a wrong value, with its row.
+    """
+    table = read_table(path, rename, KNOWN)
+    ids, utime_us = _robot_ids(table, robot_id), _utime_us(table)
+    height = table.numbers("z_m", True) if table.has("z_m") else np.zeros(len(ids))
+    position = np.column_stack([table.numbers("x_m", True), table.numbers("y_m", True), height])
+    orientation = _orientation(table)
+    valid = np.isfinite(position).all(axis=1) & np.isfinite(orientation).all(axis=1)
+    if table.has("valid"):
+        valid &= table.finite("valid") != 0
+    position[~valid] = orientation[~valid] = np.nan
+    _refuse_unsorted(table, ids, utime_us)
+    return [
+        PoseSeries(number, utime_us[rows], position[rows], orientation[rows], valid[rows])
+        for number in np.unique(ids).tolist()
+        for rows in [ids == number]
+    ]
+
+
+def read_commands(path: Path, rename: dict[str, str], robot_id: int | None) -> list[CommandSeries]:
+    """Commands by robot.
+
+    Args:
+        path: CSV with t_s, robot_id and one group of VALUES or INPUTS (inputs may stand beside
+            duties); each row is held until the next.
+        rename: columns, old name to new.
+        robot_id: of all rows, for files without that column.
+
+    Raises:
+        LogError: as read_table; a wrong value, with its row.
+    """
+    table = read_table(path, rename, KNOWN)
+    ids, utime_us = _robot_ids(table, robot_id), _utime_us(table)
+    kind = _kind(table)
+    inputs = (
+        np.column_stack([_input(table, name) for name in INPUTS])
+        if kind == "duty" and table.has(*INPUTS)
+        else np.full((len(ids), 2), np.nan)
+    )
+    for k, (name, limit) in enumerate(zip(INPUTS, (100, 2), strict=True)):
+        table.refuse(
+            np.abs(inputs[:, k]) > limit, name, inputs[:, k], f"must lie in -{limit}..{limit}"
+        )
+    value = _values(table, kind, inputs)
+    _refuse_unsorted(table, ids, utime_us)
+    return [
+        CommandSeries(
+            number,
+            utime_us[rows],
+            kind,
+            value[rows],
+            kind == "duty",
+            inputs[rows],
+            np.zeros((np.count_nonzero(rows), 2), int),
+            turbopi.telemetry_t.MODE_SCRIPT,
+        )
+        for number in np.unique(ids).tolist()
+        for rows in [ids == number]
+    ]
+
+
+def _input(table: Table, name: str) -> np.ndarray:
+    """(rows,) of one input; beside duties it need not be known."""
+    return table.numbers(name, True) if table.has(*VALUES["duty"]) else table.finite(name)
+
+
+def _kind(table: Table) -> CommandKind:
+    found = [kind for kind, columns in VALUES.items() if table.has(*columns)]
+    if len(found) > 1:
+        raise LogError(
+            f"{table.name}: has columns for {' and '.join(found)}, but a log keeps to "
+            "one kind of command; remove the others."
+        )
+    if found:
+        return found[0]
+    if table.has(*INPUTS):
+        return "duty"
+    # Name the column that is missing from the group that is most complete.
+    groups = [*VALUES.values(), INPUTS]
+    group = max(groups, key=lambda names: sum(table.has(name) for name in names) / len(names))
+    raise table.missing(next(name for name in group if not table.has(name)))
+
+
+def _values(table: Table, kind: CommandKind, inputs: np.ndarray) -> np.ndarray:
+    """(rows, 4) as in CommandSeries."""
+    columns = VALUES[kind]
+    if not table.has(*columns):
+        return np.array([duties_from_inputs(*row) for row in inputs], float)
+    value = np.zeros((len(table.rows), 4))
+    for k, name in enumerate(columns):
+        value[:, k] = table.finite(name)
+        if kind == "duty":
+            table.refuse(np.abs(value[:, k]) > 100, name, value[:, k], "must lie in -100..100")
+            table.refuse(
+                value[:, k] % 1 != 0, name, value[:, k], "the motor board takes whole percent"
+            )
+    return value
+
+
+def _orientation(table: Table) -> np.ndarray:
+    """(rows, 4) unit quaternions."""
+    if not table.has(*QUATERNION):
+        return quaternion_from_heading(table.numbers("theta_rad", True))
+    quaternion = np.column_stack([table.numbers(name, True) for name in QUATERNION])
+    norm = np.linalg.norm(quaternion, axis=1)
+    table.refuse(
+        (np.abs(norm - 1) > 0.05) & (norm > 0), "the length of qw, qx, qy, qz", norm, "must be 1"
+    )
+    return quaternion / np.where(norm > 0, norm, np.nan)[:, None]
+
+
+def _robot_ids(table: Table, robot_id: int | None) -> np.ndarray:
+    if robot_id is not None and not table.has("robot_id"):
+        return np.full(len(table.rows), robot_id)
+    if not table.has("robot_id"):
+        raise LogError(
+            f"{table.name}: column robot_id is missing; add it, or give --robot-id for "
+            "a file of one robot."
+        )
+    ids = table.finite("robot_id")
+    table.refuse(
+        (ids % 1 != 0) | (ids < 0) | (ids > 99), "robot_id", ids, "must be a whole number in 0..99"
+    )
+    return ids.astype(int)
+
+
+def _utime_us(table: Table) -> np.ndarray:
+    return np.round(table.finite("t_s") * 1e6).astype(np.int64)
+
+
+def _refuse_unsorted(table: Table, ids: np.ndarray, utime_us: np.ndarray) -> None:
+    late = np.zeros(len(ids), bool)
+    for number in np.unique(ids):
+        rows = np.flatnonzero(ids == number)
+        late[rows[1:]] = np.diff(utime_us[rows]) <= 0
+    table.refuse(late, "t_s", utime_us / 1e6, "the row before of this robot is not earlier")

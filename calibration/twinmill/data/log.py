@@ -1,0 +1,356 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads a log into plain arrays, one set per robot, as they were recorded. Truth is never read."""
+
+import hashlib
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import turbopi
+
+from twinmill.data.lcm_log import Events, LogError, decode, split_events
+
+__all__ = ["Log", "LogError", "RobotLog", "read_log"]
+
+CommandKind = Literal["duty", "wheel_speed", "twist", "none"]
+KINDS: tuple[CommandKind, ...] = ("duty", "wheel_speed", "twist")  # by drive_t.kind
+
+_READ = ("TELEMETRY", "POSE", "DRIVE", "RUN")
+_KNOWN_ELSEWHERE = re.compile(r".*(R\d\d_ACK|SWARM_COMMAND|TWIN_TRUTH_R\d\d)$")
+
+
+@dataclass(frozen=True)
+class RobotLog:
+    """Raw series of one robot: M commands, N poses. Times in seconds since Log.t0_utime_us.
+
+    Attributes:
+        robot_id: 0..99.
+        source: who speaks in the log, `robot` or `twin`; empty if it does not say.
+        behavior: name of the behaviour; empty if the log does not say.
+        command_kind: what `command` holds; `none` if there are no commands.
+        command_t_s: (M,) robot's clock, ascending.
+        command: (M, 4) duty: fraction -1..1 per wheel; wheel_speed: rad/s per wheel; wheels in
+            the order front-left, front-right, rear-left, rear-right; twist: vx_mps, vy_mps,
+            omega_radps, 0.
+        battery_V: (M,) NaN where not measured.
+        frame_t_s: (M,) time stamp of the camera frame, robot's clock; NaN where there was none;
+            (0,) without telemetry.
+        mode, detected_raw, detected: (M,) int8 as in telemetry_t; (0,) without telemetry.
+        speed_input, turn_input: (M,) as in telemetry_t; (0,) without telemetry.
+        pose_t_s: (N,) motion capture's clock, ascending.
+        pose: (N, 3) x_m, y_m, theta_rad (unwrapped); NaN where not valid.
+        z_m: (N,) height of the tracked body; NaN where not valid.
+        valid: (N,) bool.
+    """
+
+    robot_id: int
+    source: str
+    behavior: str
+    command_kind: CommandKind
+    command_t_s: np.ndarray
+    command: np.ndarray
+    battery_V: np.ndarray
+    frame_t_s: np.ndarray
+    mode: np.ndarray
+    detected_raw: np.ndarray
+    detected: np.ndarray
+    speed_input: np.ndarray
+    turn_input: np.ndarray
+    pose_t_s: np.ndarray
+    pose: np.ndarray
+    z_m: np.ndarray
+    valid: np.ndarray
+
+
+@dataclass(frozen=True)
+class Log:
+    """One log file.
+
+    Attributes:
+        path: of the file.
+        sha256: hex digest of its bytes.
+        t0_utime_us: earliest stamp of all messages read, us since the Unix epoch: time 0 of all
+            series.
+        robots: by robot_id, ascending.
+        warnings: sentences.
+    """
+
+    path: Path
+    sha256: str
+    t0_utime_us: int
+    robots: dict[int, RobotLog]
+    warnings: list[str]
+
+
+def read_log(path: str | Path, channel_prefix: str = "") -> Log:
+    """Reads a log file.
+
+    Args:
+        path: an LCM log; a truncated last event is a warning.
+        channel_prefix: before `R<nn>_...`; `TWIN_` is found by itself where no other is there.
+
+    Raises:
+        LogError: the file cannot be read, is no LCM log, has no robot in it, or has messages of
+            another type.
+    """
+    path = Path(path)
+    data = read_bytes(path)
+    events = split_events(data, path.name)
+    return decode_log(events, path, hashlib.sha256(data).hexdigest(), channel_prefix)
+
+
+def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = "") -> Log:
+    """What read_log does, of events that were cut out of a file or heard on a bus."""
+    warnings = list(events.warnings)
+    channels = _robot_channels(events.by_channel, channel_prefix, warnings)
+    if not channels:
+        names = ", ".join(sorted(events.by_channel)[:5])
+        raise LogError(
+            f"{path.name}: no channel {channel_prefix}R<nn>_TELEMETRY, _DRIVE or _POSE "
+            f"(the log has {names}); name the prefix that the log uses."
+        )
+    messages = {
+        robot_id: _decode_robot(robot_id, kinds, warnings)
+        for robot_id, kinds in sorted(channels.items())
+    }
+    t0_us = min(
+        int(m["utime_us"].min()) for pair in messages.values() for m in pair if m is not None
+    )
+    robots = {}
+    for robot_id, (commands, poses) in messages.items():
+        source, behavior = _last_run(channels[robot_id].get("RUN", []), robot_id)
+        robots[robot_id] = RobotLog(
+            robot_id=robot_id,
+            source=source,
+            behavior=behavior,
+            **_command_series(commands, t0_us, robot_id, warnings),
+            **_pose_series(poses, t0_us, robot_id, warnings),
+        )
+    return Log(path, sha256, t0_us, robots, warnings)
+
+
+def read_bytes(path: Path) -> bytes:
+    """The file's.
+
+    Raises:
+        LogError: it cannot be read.
+    """
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read ({error.strerror}); check the name.") from error
+
+
+def _robot_channels(
+    by_channel: dict[str, list[bytes]], prefix: str, warnings: list[str]
+) -> dict[int, dict[str, list[bytes]]]:
+    """Payloads by robot and kind of channel; robots with neither commands nor poses left out."""
+    found = _match_channels(by_channel, prefix)
+    if not found and not prefix:
+        prefix = "TWIN_"
+        found = _match_channels(by_channel, prefix)
+        if found:
+            warnings.append("Only channels with the prefix TWIN_ are in the log; these were read.")
+    unknown = [
+        name
+        for name in by_channel
+        if not _channel_pattern(prefix).fullmatch(name) and not _KNOWN_ELSEWHERE.match(name)
+    ]
+    if found and unknown:
+        count = sum(len(by_channel[name]) for name in unknown)
+        warnings.append(
+            f"{count} messages on {len(unknown)} other channels were ignored "
+            f"({', '.join(sorted(unknown)[:5])})."
+        )
+    return {robot_id: kinds for robot_id, kinds in found.items() if set(kinds) - {"RUN"}}
+
+
+def _channel_pattern(prefix: str) -> re.Pattern:
+    return re.compile(rf"{re.escape(prefix)}R(\d\d)_({'|'.join(_READ)})")
+
+
+def _match_channels(
+    by_channel: dict[str, list[bytes]], prefix: str
+) -> dict[int, dict[str, list[bytes]]]:
+    found: dict[int, dict[str, list[bytes]]] = {}
+    for name, payloads in by_channel.items():
+        if match := _channel_pattern(prefix).fullmatch(name):
+            found.setdefault(int(match[1]), {})[match[2]] = payloads
+    return found
+
+
+def _decode_robot(
+    robot_id: int,
+    kinds: dict[str, list[bytes]],
+    warnings: list[str],
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Commands and poses of a robot, in order of time; None where there are none."""
+    name = f"R{robot_id:02d}"
+    if "TELEMETRY" in kinds and "DRIVE" in kinds:
+        warnings.append(f"{name}: has telemetry and drive messages; telemetry was used.")
+    series: list[np.ndarray | None] = []
+    for sources in (("TELEMETRY", "DRIVE"), ("POSE",)):
+        source = next((s for s in sources if s in kinds), None)
+        if source is None:
+            warnings.append(
+                f"{name}: has no {'poses' if sources == ('POSE',) else 'commands'}; "
+                "it cannot be compared with a model."
+            )
+            series.append(None)
+            continue
+        message = getattr(turbopi, f"{source.lower()}_t")
+        series.append(
+            _in_order(
+                decode(kinds[source], message, f"{name}_{source}"),
+                f"{name}_{source}",
+                robot_id,
+                warnings,
+            )
+        )
+    return series[0], series[1]
+
+
+def _in_order(messages: np.ndarray, channel: str, robot_id: int, warnings: list[str]) -> np.ndarray:
+    """Sorted by stamp; of messages with the same stamp the last is kept."""
+    foreign = int(np.count_nonzero(messages["robot_id"] != robot_id))
+    if foreign:
+        warnings.append(
+            f"{channel}: {foreign} messages carry another robot_id; the channel's number was used."
+        )
+    stamps = messages["utime_us"].astype(np.int64)
+    late = int(np.count_nonzero(np.diff(stamps) < 0))
+    if late:
+        warnings.append(f"{channel}: {late} stamps lie before the one in front of them; sorted.")
+    order = np.argsort(stamps, kind="stable")
+    last = np.append(np.diff(stamps[order]) > 0, True)
+    if not last.all():
+        warnings.append(
+            f"{channel}: {np.count_nonzero(~last)} messages repeat a stamp; the last "
+            "one of each was kept."
+        )
+    return messages[order[last]]
+
+
+def _last_run(payloads: list[bytes], robot_id: int) -> tuple[str, str]:
+    """Source and behaviour by the last run_t; empty without one."""
+    if not payloads:
+        return "", ""
+    try:
+        run = turbopi.run_t.decode(payloads[-1])
+    except Exception as error:  # the generated decoder raises what its steps happen to raise
+        raise LogError(
+            f"R{robot_id:02d}_RUN: a message is not of type turbopi.run_t ({error}): "
+            "the log was made with other message types."
+        ) from error
+    return run.source, run.behavior
+
+
+def _command_series(
+    messages: np.ndarray | None, t0_us: int, robot_id: int, warnings: list[str]
+) -> dict:
+    """The command fields of RobotLog."""
+    count = 0 if messages is None else len(messages)
+    series = {
+        "command_kind": "none",
+        "command_t_s": np.empty(0),
+        "command": np.empty((0, 4)),
+        "battery_V": np.full(count, np.nan),
+        "frame_t_s": np.empty(0),
+        "mode": np.empty(0, np.int8),
+        "detected_raw": np.empty(0, np.int8),
+        "detected": np.empty(0, np.int8),
+        "speed_input": np.empty(0),
+        "turn_input": np.empty(0),
+    }
+    if messages is None:
+        return series
+    series["command_t_s"] = _seconds(messages, t0_us)
+    if "kind" in messages.dtype.names:
+        kind, command = _drive_kind(messages, robot_id), messages["value"].astype(float)
+    else:
+        kind, command = "duty", messages["wheel_duty_pct"].astype(float)
+        series["battery_V"] = messages["battery_V"].astype(float)
+        for name in ("mode", "detected_raw", "detected"):
+            series[name] = messages[name].copy()
+        stamp_us = messages["frame_utime_us"].astype(np.int64)
+        series["frame_t_s"] = np.where(stamp_us > 0, (stamp_us - t0_us) / 1e6, np.nan)
+        for name in ("speed_input", "turn_input"):
+            series[name] = messages[name].astype(float)
+    if not np.isfinite(command).all():
+        raise LogError(
+            f"R{robot_id:02d}: {np.count_nonzero(~np.isfinite(command).all(axis=1))} "
+            "commands are not finite numbers; repair the program that wrote the log."
+        )
+    if kind == "duty":
+        command = _duty_fraction(command, robot_id, warnings)
+    return series | {"command_kind": kind, "command": command}
+
+
+def _drive_kind(messages: np.ndarray, robot_id: int) -> CommandKind:
+    kinds = np.unique(messages["kind"])
+    if len(kinds) != 1 or not 0 <= kinds[0] < len(KINDS):
+        raise LogError(
+            f"R{robot_id:02d}_DRIVE: holds kinds {_listed(kinds)}, but a log must keep "
+            "to one of 0 (duty), 1 (wheel speed), 2 (twist); split the log."
+        )
+    return KINDS[kinds[0]]
+
+
+def _duty_fraction(duty_pct: np.ndarray, robot_id: int, warnings: list[str]) -> np.ndarray:
+    outside = int(np.count_nonzero((np.abs(duty_pct) > 100).any(axis=1)))
+    if outside:
+        warnings.append(
+            f"R{robot_id:02d}: {outside} commands have a duty outside -100..100 "
+            "percent; clamped, as the motor board does."
+        )
+    return np.clip(duty_pct, -100, 100) / 100
+
+
+def _pose_series(
+    messages: np.ndarray | None, t0_us: int, robot_id: int, warnings: list[str]
+) -> dict:
+    """The pose fields of RobotLog."""
+    if messages is None:
+        return {
+            "pose_t_s": np.empty(0),
+            "pose": np.empty((0, 3)),
+            "z_m": np.empty(0),
+            "valid": np.empty(0, bool),
+        }
+    position_m = messages["position_m"].astype(float)
+    quaternion = messages["orientation_wxyz"].astype(float)
+    stated = messages["valid"] != 0
+    norm = np.linalg.norm(quaternion, axis=1)
+    usable = np.isfinite(position_m).all(axis=1) & (np.abs(norm - 1) < 0.1)  # NaN compares false
+    if (stated & ~usable).any():
+        warnings.append(
+            f"R{robot_id:02d}_POSE: {np.count_nonzero(stated & ~usable)} poses are "
+            "marked valid but hold no position or no unit quaternion; taken as lost."
+        )
+    valid = stated & usable
+    pose = np.full((len(messages), 3), np.nan)
+    pose[valid, :2] = position_m[valid, :2]
+    pose[valid, 2] = np.unwrap(heading_rad(quaternion[valid]))
+    return {
+        "pose_t_s": _seconds(messages, t0_us),
+        "pose": pose,
+        "z_m": np.where(valid, position_m[:, 2], np.nan),
+        "valid": valid,
+    }
+
+
+def heading_rad(quaternion_wxyz: np.ndarray) -> np.ndarray:
+    """Direction of the body's x axis on the floor, (N, 4) unit quaternions to (N,) rad."""
+    w, x, y, z = quaternion_wxyz.T
+    return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def _seconds(messages: np.ndarray, t0_us: int) -> np.ndarray:
+    return (messages["utime_us"].astype(np.int64) - t0_us) / 1e6
+
+
+def _listed(values: Iterable) -> str:
+    return ", ".join(str(value) for value in values)

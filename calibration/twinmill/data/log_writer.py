@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes poses and commands of foreign measurements as a log that looks like a robot's own."""
+
+import heapq
+from collections.abc import Iterator
+from importlib.metadata import version
+from pathlib import Path
+
+import lcm
+import numpy as np
+import turbopi
+
+from twinmill.data.importers.series import CommandSeries, PoseSeries
+from twinmill.data.log import KINDS
+
+CONTROL_PERIOD_US = 22_000  # a TurboPi tells its duties once per control step, new or held
+
+Event = tuple[int, str, bytes]  # stamp, channel, encoded message
+
+
+def write_log(
+    path: Path, poses: list[PoseSeries], commands: list[CommandSeries], config_toml: str
+) -> None:
+    """Writes a log in order of stamps.
+
+    Args:
+        path: replaced if it exists.
+        poses: one per robot.
+        commands: one per robot; held duties are repeated every CONTROL_PERIOD_US to the last pose.
+        config_toml: where all this comes from, for run_t.
+    """
+    end_us = {series.robot_id: int(series.utime_us[-1]) for series in poses}
+    streams = [_pose_events(series) for series in poses]
+    for series in commands:
+        streams.append(_run_event(series, config_toml))
+        streams.append(
+            _telemetry_events(series, end_us.get(series.robot_id, 0))
+            if series.kind == "duty"
+            else _drive_events(series)
+        )
+    log = lcm.EventLog(str(path), "w", overwrite=True)
+    try:
+        for event in heapq.merge(*streams, key=lambda event: event[0]):
+            log.write_event(*event)
+    finally:
+        log.close()
+
+
+def _run_event(series: CommandSeries, config_toml: str) -> Iterator[Event]:
+    run = turbopi.run_t()
+    run.utime_us, run.robot_id = int(series.utime_us[0]), series.robot_id
+    run.source, run.version, run.config_toml = "robot", version("twinmill"), config_toml
+    yield run.utime_us, f"R{series.robot_id:02d}_RUN", run.encode()
+
+
+def _pose_events(series: PoseSeries) -> Iterator[Event]:
+    channel, message = f"R{series.robot_id:02d}_POSE", turbopi.pose_t()
+    message.robot_id = series.robot_id
+    rows = zip(
+        series.utime_us.tolist(),
+        series.valid.tolist(),
+        series.position_m.tolist(),
+        series.orientation_wxyz.tolist(),
+        strict=True,
+    )
+    for seq, (utime_us, valid, position, orientation) in enumerate(rows):
+        message.utime_us, message.seq, message.valid = utime_us, seq, int(valid)
+        message.position_m, message.orientation_wxyz = position, orientation
+        yield utime_us, channel, message.encode()
+
+
+def _drive_events(series: CommandSeries) -> Iterator[Event]:
+    channel, message = f"R{series.robot_id:02d}_DRIVE", turbopi.drive_t()
+    message.robot_id, message.kind = series.robot_id, KINDS.index(series.kind)
+    for utime_us, value in zip(series.utime_us.tolist(), series.value.tolist(), strict=True):
+        message.utime_us, message.value = utime_us, value
+        yield utime_us, channel, message.encode()
+
+
+def _telemetry_events(series: CommandSeries, end_us: int) -> Iterator[Event]:
+    channel, message = f"R{series.robot_id:02d}_TELEMETRY", turbopi.telemetry_t()
+    message.robot_id, message.mode, message.battery_V = series.robot_id, series.mode, np.nan
+    stamps = series.utime_us.tolist()
+    until = [*stamps[1:], max(end_us, stamps[-1]) + 1]
+    for k, (start_us, stop_us) in enumerate(zip(stamps, until, strict=True)):
+        message.wheel_duty_pct = [int(duty) for duty in series.value[k]]
+        message.speed_input, message.turn_input = series.inputs[k].tolist()
+        message.detected_raw, message.detected = series.detected[k].tolist()
+        held = range(start_us, stop_us, CONTROL_PERIOD_US) if series.repeat else [start_us]
+        for message.utime_us in held:
+            yield message.utime_us, channel, message.encode()
+            message.seq += 1

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is compared with a model: the cleaned runs of each robot in each log."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.camera_frames import Frames, frames_of
+from twinmill.data.log import LogError, RobotLog, read_log
+from twinmill.data.steady_table import Sheet, is_sheet, read_sheets
+from twinmill.data.time_base import TimeBase, find_time_base, retimed
+from twinmill.data.track import SILENCE_S, SMOOTH_S, Track, local_line, make_track
+
+MOST_POSES = 20_000  # of all robots in all logs, about: more make no fit better, and all slower
+SLOWEST = 4  # frames of which one is kept: the shortest horizon must hold some
+SHORTEST_LOG_S = 10.0  # below it no regime is seen twice
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One robot in one log.
+
+    Attributes:
+        log_name, log_sha256: where it comes from.
+        track: cleaned arrays.
+        played: the same for the native module; where telemetry falls silent the robot's watchdog
+            stops it, so a zero command is put in.
+        warnings: sentences of reading and cleaning.
+        recorded_utime_us: earliest stamp in the log, us since the Unix epoch.
+        time_base: of the log, where it was not what the stamps say; `track` has it put right.
+        frames: of the robot's camera; None if the log tells of none.
+    """
+
+    log_name: str
+    log_sha256: str
+    track: Track
+    played: native.Track
+    warnings: list[str]
+    recorded_utime_us: int
+    time_base: TimeBase | None = None
+    frames: Frames | None = None
+
+    @classmethod
+    def live(cls, track: Track) -> "Measurement":
+        """Of a robot that is heard now: from no file."""
+        return cls("live", "", track, _played(track), track.notes, 0)
+
+    @property
+    def label(self) -> str:
+        """Short name of log and robot."""
+        return f"{self.log_name} R{self.track.robot_id:02d}"
+
+    def with_pose(self, pose: np.ndarray) -> "Measurement":
+        """The same run with other poses (N, 3)."""
+        smooth_rad, _ = local_line(self.track.pose_t_s, pose[:, 2], self.track.segment, SMOOTH_S)
+        track = replace(self.track, pose=pose, heading_smooth=smooth_rad)
+        return replace(self, track=track, played=_played(track))
+
+    def without(self, stretches_s: list[tuple[float, float]], why: str) -> "Measurement":
+        """The same run cut: poses within stretches of capture's clock are not used."""
+        t_s, segment = self.track.pose_t_s, self.track.segment
+        inside = np.zeros(len(t_s), bool)
+        for begin_s, end_s in stretches_s:
+            inside |= (t_s >= begin_s) & (t_s <= end_s)
+        kept = np.where(inside, -1, segment)
+        begins = (kept >= 0) & (np.diff(kept, prepend=-1) != 0)
+        number = np.where(kept >= 0, np.cumsum(begins) - 1, -1)
+        smooth_rad = np.where(inside, np.nan, self.track.heading_smooth)
+        track = replace(self.track, segment=number, heading_smooth=smooth_rad)
+        return replace(self, track=track, played=_played(track), warnings=[*self.warnings, why])
+
+
+def load_measurements(paths: list[Path]) -> list[Measurement | Sheet]:
+    """Reads logs and cleans every robot in them; reads steady-state tables (.csv).
+
+    Raises:
+        LogError: a log cannot be read, or is too short to judge a model by.
+    """
+    measurements = []
+    for path in paths:
+        if is_sheet(path):
+            measurements += read_sheets(path)
+            continue
+        log = read_log(path)
+        runs = len(paths) * len(log.robots)
+        for robot in log.robots.values():
+            base = find_time_base(robot)
+            track = make_track(thinned(retimed(robot, base) if base else robot, runs))
+            _check_length(path, track)
+            measurements.append(
+                Measurement(
+                    Path(path).name,
+                    log.sha256,
+                    track,
+                    _played(track),
+                    [*log.warnings, *([f"{base}; put right."] if base else []), *track.notes],
+                    log.t0_utime_us,
+                    base,
+                    frames_of(robot),
+                )
+            )
+    return measurements
+
+
+def thinned(robot: RobotLog, runs: int) -> RobotLog:
+    """The robot with every k-th pose where there are more in so many runs than a fit needs."""
+    every = min(len(robot.pose_t_s) * runs // MOST_POSES, SLOWEST)
+    if runs < 2 or every < 2:
+        return robot
+    pose = {k: getattr(robot, k)[::every] for k in ("pose_t_s", "pose", "z_m", "valid")}
+    return replace(robot, **pose)
+
+
+def _check_length(path: Path, track: Track) -> None:
+    usable_s = np.count_nonzero(track.segment >= 0) * track.timing.pose_period_s
+    if usable_s < SHORTEST_LOG_S:
+        raise LogError(
+            f"{path}: robot {track.robot_id} has {usable_s:.1f} s of usable poses; a model "
+            f"cannot be judged on less than {SHORTEST_LOG_S:g} s, so record a longer run."
+        )
+
+
+def _played(track: Track) -> native.Track:
+    t_s, command, battery_V = track.command_t_s, track.command, track.battery_V
+    if track.command_kind == "duty":
+        silent = np.flatnonzero(np.diff(t_s) > SILENCE_S)
+        t_s = np.insert(t_s, silent + 1, t_s[silent] + SILENCE_S)
+        command = np.insert(command, silent + 1, 0.0, axis=0)
+        battery_V = np.insert(battery_V, silent + 1, battery_V[silent])
+    return native.Track(
+        *(
+            np.ascontiguousarray(a, float)
+            for a in (t_s, command, battery_V, track.pose_t_s, track.pose)
+        ),
+        np.ascontiguousarray(track.segment, np.int64),
+    )

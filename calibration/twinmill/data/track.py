@@ -1,0 +1,365 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cleans a robot's series for prediction: cuts the track where it breaks, marks where it rests."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinmill.data.log import CommandKind, LogError, RobotLog
+
+GAP_S = 0.05  # four frames at 100 Hz, in which a TurboPi moves at most 20 mm
+GAP_PERIODS = 4  # the same for slower cameras
+JUMP_NOISE_M, JUMP_NOISE_RAD = 0.005, 0.05  # ten times the noise of a motion capture
+MARGIN_S = 0.1  # frames beside a pick-up show the hand or half a marker body
+LIFT_M = 0.05  # height above the median that no driving robot has
+SHORTEST_S = 0.1  # shortest horizon that is predicted: a segment below it is of no use
+SILENCE_S = 0.25  # telemetry comes every 22 ms: after this the duties are not known any more
+CLOCK_S = 0.3  # more than any offset between the clocks
+FROZEN_S = 0.5  # a pose that keeps its very bits for longer while driven is no measurement
+REST_S = 1.5  # coasting ends within 0.5 s; the rest is for lag and clocks
+SMOOTH_S = 0.025  # half width of the heading's smoothing
+ASTRAY_RAD = 0.35  # more than any heading bias: the marker body's axes are turned
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How regular the time base is.
+
+    Attributes:
+        pose_period_s, command_period_s: medians.
+        pose_lost_share: part of the frames that segments span but that are missing or unusable.
+        command_held_share: part of the commands that equal the one before. Near 1 is an operator;
+            half or more in measured wheel speeds is a log that repeats rows of a slower loop.
+    """
+
+    pose_period_s: float
+    command_period_s: float
+    pose_lost_share: float
+    command_held_share: float
+
+
+@dataclass(frozen=True)
+class Track:
+    """One robot's measurement, ready for prediction: M commands, N poses, times as in RobotLog.
+
+    Attributes:
+        robot_id: 0..99.
+        command_kind, command_t_s, command: (M,), (M, 4) as in RobotLog; each held until the next.
+        battery_V: (M,) interpolated where not measured; all NaN if never measured.
+        pose_t_s: (N,).
+        pose: (N, 3) x_m, y_m, theta_rad; the heading is continuous within a segment.
+        segment: (N,) number of the unbroken stretch that a pose belongs to; -1 where unusable.
+        heading_smooth: (N,) rad, local straight line over 50 ms; NaN where segment is -1. Only to
+            turn vectors; errors of heading use `pose`.
+        rest: (K, 2) s, start and end of stretches in which the robot stands, on either clock:
+            all commands zero since 1.5 s before, and until 0.3 s after.
+        timing: of both series.
+        notes: sentences on each cut and on what looks wrong, with times.
+    """
+
+    robot_id: int
+    command_kind: CommandKind
+    command_t_s: np.ndarray
+    command: np.ndarray
+    battery_V: np.ndarray
+    pose_t_s: np.ndarray
+    pose: np.ndarray
+    segment: np.ndarray
+    heading_smooth: np.ndarray
+    rest: np.ndarray
+    timing: Timing
+    notes: list[str]
+
+
+def make_track(robot: RobotLog, max_speed_mps: float = 1.5, max_turn_radps: float = 12.0) -> Track:
+    """Cleans one robot's series.
+
+    Args:
+        robot: as read from the log.
+        max_speed_mps: what the robot cannot exceed; faster is a jump, as when it was picked up and
+            put elsewhere. The default is four times a TurboPi's speed.
+        max_turn_radps: the same for turning.
+
+    Raises:
+        LogError: without commands, or with fewer than two valid poses.
+    """
+    if not len(robot.command_t_s) or np.count_nonzero(robot.valid) < 2:
+        missing = "commands" if not len(robot.command_t_s) else "valid poses"
+        raise LogError(
+            f"robot {robot.robot_id}: the log has no {missing}, so nothing can be "
+            "predicted; record telemetry and motion capture together."
+        )
+    notes: list[str] = []
+    usable = _trackable(robot, notes)
+    usable &= ~_excursions(robot, usable, (max_speed_mps, max_turn_radps), notes)
+    index, cut = _cuts(robot, usable, (max_speed_mps, max_turn_radps), notes)
+    segment = _segments(robot, index, cut, notes)
+    pose = _continuous(robot.pose, segment)
+    rest = _rest(robot)
+    _note_frozen(robot, notes)
+    heading_smooth, _ = local_line(robot.pose_t_s, pose[:, 2], segment, SMOOTH_S)
+    _note_astray(robot, pose, segment, notes)
+    return Track(
+        robot.robot_id,
+        robot.command_kind,
+        robot.command_t_s,
+        robot.command,
+        _filled(robot.command_t_s, robot.battery_V),
+        robot.pose_t_s,
+        pose,
+        segment,
+        heading_smooth,
+        rest,
+        _timing(robot, segment),
+        notes,
+    )
+
+
+def command_at(t_s: np.ndarray, command_t_s: np.ndarray, command: np.ndarray) -> np.ndarray:
+    """Commands in force at times on the robot's clock: (N,), (M,), (M, 4) to (N, 4).
+
+    Zero before the first.
+    """
+    k = np.searchsorted(command_t_s, t_s, side="right") - 1
+    return np.where((k >= 0)[:, None], command[np.maximum(k, 0)], 0.0)
+
+
+def _gap_s(robot: RobotLog) -> float:
+    return max(GAP_S, GAP_PERIODS * float(np.median(np.diff(robot.pose_t_s))))
+
+
+def _trackable(robot: RobotLog, notes: list[str]) -> np.ndarray:
+    """(N,) bool: poses that are valid, on the floor, and taken while commands are known."""
+    lifted = np.abs(robot.z_m - np.nanmedian(robot.z_m)) > LIFT_M  # NaN compares false
+    if lifted.any():
+        notes.append(
+            f"{np.count_nonzero(lifted)} poses from {robot.pose_t_s[lifted][0]:.3f} s on "
+            "are off the floor; left out."
+        )
+    silent = _silent(robot)
+    if (silent & robot.valid).any():
+        first = robot.pose_t_s[silent & robot.valid][0]
+        notes.append(
+            f"{np.count_nonzero(silent & robot.valid)} poses from {first:.3f} s on were "
+            "taken while no commands are in the log; left out."
+        )
+    return robot.valid & ~lifted & ~silent
+
+
+def _silent(robot: RobotLog) -> np.ndarray:
+    """(N,) bool: poses at times whose commands are not in the log, whatever the clock offset."""
+    t, stamps = robot.pose_t_s, robot.command_t_s
+    outside = (t < stamps[0] - CLOCK_S) | (t > stamps[-1] + CLOCK_S)
+    if len(robot.mode) == 0:  # drive messages come when they change: held for as long as it takes
+        return t < stamps[0] - CLOCK_S
+    for k in np.flatnonzero(np.diff(stamps) > SILENCE_S):
+        outside |= (t > stamps[k] + CLOCK_S) & (t < stamps[k + 1] - CLOCK_S)
+    return outside
+
+
+def _jumps(robot: RobotLog, index: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
+    """(len(index) - 1,) bool: steps between these poses that the robot cannot make."""
+    dt_s = np.diff(robot.pose_t_s[index])
+    step = np.diff(robot.pose[index], axis=0)
+    turn_rad = np.abs(np.remainder(step[:, 2] + np.pi, 2 * np.pi) - np.pi)
+    return (np.hypot(step[:, 0], step[:, 1]) > limits[0] * dt_s + JUMP_NOISE_M) | (
+        turn_rad > np.minimum(limits[1] * dt_s + JUMP_NOISE_RAD, np.pi)
+    )
+
+
+def _excursions(
+    robot: RobotLog, usable: np.ndarray, limits: tuple[float, float], notes: list[str]
+) -> np.ndarray:
+    """(N,) bool: poses between a jump and the jump back, as when markers are mixed up."""
+    outlier = np.zeros(len(usable), bool)
+    index = np.flatnonzero(usable)
+    jumps = np.flatnonzero(_jumps(robot, index, limits))
+    position = 0
+    while position + 1 < len(jumps):
+        before, after = index[jumps[position]], index[jumps[position + 1] + 1]
+        ends = np.array([before, after])
+        back = (
+            robot.pose_t_s[after] - robot.pose_t_s[before] <= _gap_s(robot)
+            and not _jumps(robot, ends, limits)[0]
+        )
+        if back:
+            outlier[before + 1 : after] = True
+        position += 2 if back else 1
+    if outlier.any():
+        notes.append(
+            f"{np.count_nonzero(outlier)} poses from {robot.pose_t_s[outlier][0]:.3f} s "
+            "on jump away and back; left out."
+        )
+    return outlier
+
+
+def _cuts(
+    robot: RobotLog, usable: np.ndarray, limits: tuple[float, float], notes: list[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Usable poses without the margins, and which of them begin a segment: (K,) int, (K,) bool."""
+    index = np.flatnonzero(usable)
+    t = robot.pose_t_s[index]
+    jump = _jumps(robot, index, limits)
+    gap = np.diff(t) > _gap_s(robot)
+    lost = gap & (np.diff(index) > 1)
+    keep = np.ones(len(index), bool)
+    for k in np.flatnonzero(jump | gap):
+        moved_m = np.hypot(*(robot.pose[index[k + 1], :2] - robot.pose[index[k], :2]))
+        what = "not tracked" if lost[k] else "no poses" if gap[k] else "the robot jumps"
+        notes.append(
+            f"cut at {t[k]:.3f} s: {what} for {t[k + 1] - t[k]:.3f} s, then {moved_m:.3f} m away."
+        )
+        if jump[k] or lost[k]:
+            keep &= (t < t[k] - MARGIN_S) | (t > t[k + 1] + MARGIN_S)
+    begins = np.concatenate([[0], np.cumsum(jump | gap)])[: len(index)]
+    index, begins = index[keep], begins[keep]
+    return index, np.diff(begins, prepend=-1) > 0
+
+
+def _segments(
+    robot: RobotLog, index: np.ndarray, begins: np.ndarray, notes: list[str]
+) -> np.ndarray:
+    """(N,) numbers of segments, short ones dropped."""
+    segment, number = np.full(len(robot.pose_t_s), -1), 0
+    for part in np.split(index, np.flatnonzero(begins)):
+        if len(part) < 2 or np.ptp(robot.pose_t_s[part]) < SHORTEST_S:
+            continue
+        segment[part] = number
+        number += 1
+    if not number:
+        notes.append("no stretch of the track is long enough to predict anything.")
+    return segment
+
+
+def _continuous(pose: np.ndarray, segment: np.ndarray) -> np.ndarray:
+    """Poses with the heading unwrapped anew in each segment: outliers may have hidden a turn."""
+    pose = pose.copy()
+    for number in range(segment.max() + 1):
+        part = segment == number
+        pose[part, 2] = np.unwrap(pose[part, 2])
+    return pose
+
+
+def local_line(
+    t_s: np.ndarray, values: np.ndarray, segment: np.ndarray, half_width_s: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Straight line by least squares around each sample, within its segment.
+
+    Args:
+        t_s: (N,) ascending.
+        values: (N,) one per time.
+        segment: (N,) as in Track.
+        half_width_s: of the window.
+
+    Returns:
+        (N,) its value at the sample and (N,) its slope per second; NaN where segment is -1, slope
+        NaN too where the sample stands alone.
+    """
+    count, sample = len(t_s), np.arange(len(t_s))
+    reach = int(np.ceil(half_width_s / np.median(np.diff(t_s))))
+    s0, s1, s2, sy, sty = (np.zeros(count) for _ in range(5))
+    for lag in range(-reach, reach + 1):
+        other = np.clip(sample + lag, 0, count - 1)
+        near = (
+            (other == sample + lag)
+            & (segment[other] == segment)
+            & (segment >= 0)
+            & (np.abs(t_s[other] - t_s) <= half_width_s)
+        )
+        dt = np.where(near, t_s[other] - t_s, 0.0)
+        dy = np.where(near, values[other] - values, 0.0)
+        s0, s1, s2 = s0 + near, s1 + dt, s2 + dt * dt
+        sy, sty = sy + dy, sty + dt * dy
+    determinant = s0 * s2 - s1 * s1
+    alone = determinant <= 0
+    safe = np.where(alone, 1.0, determinant)
+    value = values + np.where(alone, 0.0, (s2 * sy - s1 * sty) / safe)
+    slope = np.where(alone, np.nan, (s0 * sty - s1 * sy) / safe)
+    return np.where(segment < 0, np.nan, value), np.where(segment < 0, np.nan, slope)
+
+
+def _rest(robot: RobotLog) -> np.ndarray:
+    """(K, 2) s as described in Track."""
+    t = robot.command_t_s
+    moving = (robot.command != 0).any(axis=1)
+    if len(robot.mode):  # a stretch without telemetry is no rest
+        moving[:-1] |= np.diff(t) > SILENCE_S
+    edge = np.flatnonzero(np.diff(np.concatenate([[1], moving, [1]])))
+    starts, ends = t[edge[::2]], np.append(t, t[-1] + CLOCK_S)[edge[1::2]]
+    rest = np.column_stack([starts + REST_S, ends - CLOCK_S])
+    return rest[rest[:, 0] < rest[:, 1]]
+
+
+def _filled(t_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+    known = np.isfinite(values)
+    return np.interp(t_s, t_s[known], values[known]) if known.any() else values
+
+
+def _timing(robot: RobotLog, segment: np.ndarray) -> Timing:
+    pose_period_s = float(np.median(np.diff(robot.pose_t_s)))
+    steps = np.diff(robot.command, axis=0)
+    spans_s = sum(
+        np.ptp(robot.pose_t_s[segment == number]) + pose_period_s
+        for number in range(segment.max() + 1)
+    )
+    lost = 1 - np.count_nonzero(segment >= 0) * pose_period_s / spans_s if spans_s else np.nan
+    return Timing(
+        pose_period_s=pose_period_s,
+        command_period_s=float(np.median(np.diff(robot.command_t_s))) if len(steps) else np.nan,
+        pose_lost_share=max(0.0, float(lost)),
+        command_held_share=float((steps == 0).all(axis=1).mean()) if len(steps) else np.nan,
+    )
+
+
+def _note_frozen(robot: RobotLog, notes: list[str]) -> None:
+    """Poses that keep their bits although the robot is driven all the while."""
+    index = np.flatnonzero(robot.valid)
+    t = robot.pose_t_s[index]
+    moves = np.flatnonzero((np.diff(robot.pose[index], axis=0) != 0).any(axis=1))
+    borders = np.concatenate([[-1], moves, [len(index) - 1]])
+    for first, last in zip(borders[:-1] + 1, borders[1:], strict=True):
+        within = (robot.command_t_s >= t[first]) & (robot.command_t_s <= t[last])
+        driven = within.any() and (robot.command[within] != 0).any(axis=1).all()
+        if t[last] - t[first] > FROZEN_S and driven:
+            notes.append(
+                f"the pose is frozen from {t[first]:.3f} to {t[last]:.3f} s while the "
+                "robot is driven; check the motion capture."
+            )
+
+
+def _note_astray(robot: RobotLog, pose: np.ndarray, segment: np.ndarray, notes: list[str]) -> None:
+    """Motion that points elsewhere than the heading although the robot is driven straight."""
+    half = max(1, round(0.25 / float(np.median(np.diff(robot.pose_t_s)))))
+    middle = np.arange(half, len(pose) - half)
+    whole = (segment[middle - half] >= 0) & (segment[middle - half] == segment[middle + half])
+    middle = middle[whole]
+    first, last = middle - half, middle + half
+    forward = np.column_stack(
+        [
+            _straight(
+                command_at(robot.pose_t_s[middle] + shift, robot.command_t_s, robot.command),
+                robot.command_kind,
+            )
+            for shift in (-0.5, -0.25, 0.0, 0.25, 0.5)
+        ]
+    )
+    steady = (forward != 0).all(axis=1) & (np.ptp(np.sign(forward), axis=1) == 0)
+    if np.count_nonzero(steady) < half:
+        return
+    step = (pose[last, :2] - pose[first, :2])[steady] * np.sign(forward[steady, :1])
+    angle = np.arctan2(step[:, 1], step[:, 0]) - pose[middle[steady], 2]
+    weight = np.hypot(step[:, 0], step[:, 1])
+    astray = float(np.angle(np.sum(weight * np.exp(1j * angle))))
+    if abs(astray) > ASTRAY_RAD:
+        notes.append(
+            f"driven straight, the robot moves {np.degrees(astray):.0f} degrees to the "
+            "left of its heading; turn the poses by that (`twinmill import "
+            f"--heading-offset-deg {np.degrees(astray):.0f}`)."
+        )
+
+
+def _straight(command: np.ndarray, kind: CommandKind) -> np.ndarray:
+    """(N,) forward command where it asks for straight motion, else 0."""
+    if kind == "twist":
+        return np.where((command[:, 1:3] == 0).all(axis=1), command[:, 0], 0.0)
+    return np.where(np.ptp(command, axis=1) == 0, command[:, 0], 0.0)

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cameras that differ from those of the other robots: which, in what, and how surely."""
+
+from collections.abc import Callable, Collection
+
+import numpy as np
+import twinmill_native as native
+from scipy.stats import t
+
+from twinmill.diagnosis.alike import ODD, middle_and_scale, odd_ones
+from twinmill.diagnosis.detections.search import search_bits
+from twinmill.diagnosis.robots import RobotOff
+from twinmill.fit.solve import Estimate
+from twinmill.predict.detection_errors import BitComparison, compare_bits
+from twinmill.predict.detections import BitScene
+
+# Scatter of the logarithm of errors among cameras that are alike: over all frames, and over those
+# in which another robot is in view, which are few and come in passages.
+SPREAD, SPREAD_IN_VIEW = 0.1, 0.2
+
+
+def odd_cameras(scenes: list[BitScene], model: native.Model) -> set[int]:
+    """Numbers of the robots whose bits fit the model much worse than the others'; never half."""
+    return odd_ones(camera_outliers(scenes, model))
+
+
+def camera_outliers(scenes: list[BitScene], model: native.Model) -> dict[int, float]:
+    """By robot: how many scales its bits' errors are above the median robot's.
+
+    Over all frames, or over those with a robot in view if they say more: a camera that sees nothing
+    is right in all the others.
+    """
+    found = compare_bits(scenes, model)
+    if found is None:
+        return {}
+    robots = np.array([s.robot_id for s in scenes])[found.robot]
+    over_all = _apart(found, robots, np.ones(len(robots), bool), SPREAD)
+    in_view = _apart(found, robots, found.in_view, SPREAD_IN_VIEW)
+    return {i: max(over_all[i], in_view[i]) for i in over_all}
+
+
+def _apart(
+    found: BitComparison, robots: np.ndarray, which: np.ndarray, spread: float
+) -> dict[int, float]:
+    """By robot: scales from the median, of the errors of its frames among (K,) bool `which`."""
+    squares = (found.measured - found.predicted) ** 2
+    variance = found.predicted * (1 - found.predicted)
+    size = {}
+    for i in np.unique(robots):
+        own = which & (robots == i)
+        # As if there were one more frame, that errs as it should: few frames prove little.
+        size[int(i)] = 0.5 * np.log((1 + squares[own].sum()) / (1 + variance[own].sum()))
+    middle, scale = middle_and_scale(list(size.values()))
+    return {i: float((s - middle) / max(scale, spread)) for i, s in size.items()}
+
+
+def judge_cameras(
+    alike: list[BitScene],
+    odd: list[BitScene],
+    model: native.Model,
+    say: Callable[[str], None],
+    barred: Collection[str] = (),
+) -> list[RobotOff]:
+    """Says of each odd camera what is different, with the model of the others held.
+
+    Args:
+        alike: frames of the others.
+        odd: frames of the odd ones.
+        model: with all effects that were found for the others.
+        say: told in words what is being done.
+        barred: effects that are not to be thought of.
+    """
+    away = camera_outliers([*alike, *odd], model)
+    others = float(np.sqrt(np.mean(np.square(_scores(alike, model)))))
+    off = []
+    for robot_id in sorted({s.robot_id for s in odd}):
+        if away[robot_id] < ODD:
+            continue
+        say(f"the camera of robot {robot_id} differs: looking for what it is")
+        own = [s for s in odd if s.robot_id == robot_id]
+        off.append(_judge_camera(own, model, barred, away, others))
+    return off
+
+
+def _judge_camera(
+    own: list[BitScene],
+    model: native.Model,
+    barred: Collection[str],
+    away: dict[int, float],
+    others: float,
+) -> RobotOff:
+    robot_id, count = own[0].robot_id, len(away)
+    done = search_bits(own, model.for_robot(robot_id), barred=barred)
+    before, after = done.rounds[0].before, done.rounds[-1].before
+    first = done.rounds[0].accepted
+    p_value = (
+        count * first.evidence.p_value(len(done.candidates))
+        if first
+        else count * t.sf(away[robot_id], count - 1)
+    )
+    parameters: list[Estimate] = [e for e in done.estimates if e.name.split(".")[0] in done.found]
+    told = f"the bits of its camera err {before.score:.2f} times as much as they should with the "
+    told += f"model of all, those of the others {others:.2f} times; "
+    told += (
+        f"{' and '.join(done.found)} of its own makes it {after.score:.2f}"
+        + "".join(f"; {trial.effect} would do as well" for trial in done.rounds[0].tied)
+        if done.found
+        else "no effect of the catalogue explains it"
+    )
+    return RobotOff(
+        robot_id,
+        " + ".join(done.found) or None,
+        parameters,
+        before.score,
+        after.score,
+        float(min(1.0, p_value)),
+        told,
+        [],
+        [],
+    )
+
+
+def _scores(scenes: list[BitScene], model: native.Model) -> list[float]:
+    """Of each scene."""
+    found = compare_bits(scenes, model)
+    return [score for *_, score in found.by_robot()] if found else []

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which effects the next run must part, and the model without them."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twinmill.diagnosis.candidates import Candidate, candidates
+from twinmill.diagnosis.evidence import State
+from twinmill.diagnosis.ranking import Ranked
+from twinmill.diagnosis.result import Diagnosis
+from twinmill.diagnosis.screen import screen
+from twinmill.experiment.information import Subject
+from twinmill.fit.fit import refit
+from twinmill.model.freedom import Free, catalogue
+from twinmill.predict.problem import Scene
+
+WEAKEST = 4  # effects that show least, where nothing else is in question
+
+
+@dataclass(frozen=True)
+class Contest:
+    """What is in question.
+
+    Attributes:
+        alike: effects that the diagnosis could not tell apart.
+        named: effects that it named; in question if another could imitate one of them after all.
+        hidden: effects that would not show.
+        closest: the two most probable, for want of other questions.
+        state: of the diagnosis, the effects alike or named taken out and the rest refitted; free
+            is all of the base that the next run may show.
+        fitted: parameters by effect, of those that the logs tell.
+    """
+
+    alike: list[str]
+    named: list[str]
+    hidden: list[str]
+    closest: list[str]
+    state: State
+    fitted: dict[str, dict[str, float]]
+
+
+def contest(diagnosis: Diagnosis, base: list[Free]) -> Contest:
+    """What a diagnosis leaves open; `base`: of the model, also what these logs do not tell."""
+    ranking = diagnosis.ranking
+    top = next((r.group for r in ranking if r.group is not None), None)
+    alike = [r.effect for r in ranking if r.group == top and top is not None]
+    named = [] if alike else diagnosis.found
+    hidden = [effect for effect, _ in diagnosis.not_identifiable]
+    closest = [r.effect for r in ranking[:2]]
+    state = replace(_without(diagnosis, [*alike, *named]), base=base)
+    told = [r for r in ranking if r.effect in (*alike, *named)]
+    return Contest(alike, named, hidden, closest, state, _values(told))
+
+
+def question(
+    asked: Contest, known: list[Subject], margins: np.ndarray, least_chi2: float
+) -> tuple[list[str], str]:
+    """Names of the effects in question, and a sentence.
+
+    Args:
+        asked: what the diagnosis leaves open.
+        known: all effects.
+        margins: (T, 1 + J) of the logs so far, over their scatter.
+        least_chi2: a smaller margin decides nothing.
+    """
+    names = [s.name for s in known]
+    if asked.alike:
+        return asked.alike, f"These logs cannot tell {' from '.join(asked.alike)}."
+    doubtful = []
+    for effect in (n for n in asked.named if n in names):
+        rivals = np.flatnonzero(margins[names.index(effect), 1:] < least_chi2)
+        doubtful += [effect, *(names[j] for j in rivals)] if len(rivals) else []
+    if doubtful:
+        doubtful = list(dict.fromkeys(doubtful))
+        return doubtful, f"These logs hardly tell {' from '.join(doubtful)}."
+    if asked.hidden:
+        return asked.hidden, f"These logs cannot show {', '.join(asked.hidden)}."
+    if len(asked.closest) > 1:
+        first, second = asked.closest
+        return (
+            asked.closest,
+            f"These logs tell all effects apart; closest were {first} and {second}.",
+        )
+    weakest = [names[i] for i in np.argsort(margins.min(axis=-1))[:WEAKEST]]
+    return weakest, f"These logs tell all effects apart; least {', '.join(weakest)}."
+
+
+def subjects(
+    scenes: list[Scene], planned: Scene, state: State, asked: Contest, usual: float
+) -> list[Subject]:
+    """Every effect that the logs or the planned run show, at its fitted or its usual strength.
+
+    Errors of the next run scatter no less over their noise than the score `usual` says.
+    """
+    shown, _ = candidates([*scenes, planned])
+    without = [s.white_errors() for s in scenes]
+    found = [(candidate, candidate.columns(scenes, without)) for candidate, _ in shown]
+    tested = screen(scenes, state.free, found).found
+    return [
+        Subject(t.candidate, _whole(t.candidate.effect, asked.fitted), max(t.excess, usual**2))
+        for t in tested
+    ]
+
+
+def _whole(effect: str, fitted: dict[str, dict[str, float]]) -> Candidate:
+    """The one step from neutral to the effect's strength."""
+    parameters = catalogue()[effect]["parameters"]
+    values = fitted.get(effect, {})
+    return Candidate(
+        effect,
+        tuple(p["name"] for p in parameters),
+        tuple(p["neutral"] for p in parameters),
+        (tuple(values.get(p["name"], p["default"]) for p in parameters),),
+        np.ones(1),
+        True,
+    )
+
+
+def _without(diagnosis: Diagnosis, names: list[str]) -> State:
+    """The diagnosis' state without these effects, the rest refitted."""
+    state = diagnosis.state
+    if not names:
+        return state
+    model = state.model.copy()
+    for index in reversed(range(len(model.effects))):
+        if model.effects[index] in names:
+            model.remove_effect(index)
+    reduced = State([s.with_model(model) for s in state.scenes], state.base, state.floors)
+    refit(reduced.scenes, reduced.free)
+    return reduced
+
+
+def _values(ranked: list[Ranked]) -> dict[str, dict[str, float]]:
+    """Fitted parameters by effect and short name."""
+    return {r.effect: {e.name.split(".", 1)[1]: e.value for e in r.parameters} for r in ranked}

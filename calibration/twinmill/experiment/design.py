@@ -1,0 +1,315 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Puts a script together, move by move, that parts most within the time and the floor given."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.measurement import SHORTEST_LOG_S
+from twinmill.diagnosis.result import Diagnosis
+from twinmill.experiment.contest import Contest, contest, question, subjects
+from twinmill.experiment.foresight import LEAD_S, Played, Rows, rows_of
+from twinmill.experiment.information import Ledger, Subject
+from twinmill.experiment.moves import Move, family
+from twinmill.experiment.power import power
+from twinmill.experiment.relevance import relevance
+from twinmill.model.freedom import base_quantities, catalogue
+from twinmill.model.model_file import ModelFile
+from twinmill.predict.problem import Scene
+from twinmill.predict.windows import Windows, score
+
+ENOUGH_CHI2 = 20.0  # a margin of this is about what an acceptance needs
+BESIDES = 0.05  # weight of effects that are not in question: once these are seen, they count
+WANDER_M = 0.08  # of a real robot from the predicted path within a minute, beside the candidates'
+SHORTEST_RUN_S = SHORTEST_LOG_S + 3  # as much may be left where no further move fits
+CENTRE = np.zeros(3)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the user has: s, m by m (along and across the robot at its start), share of duty."""
+
+    duration_s: float
+    floor_m: tuple[float, float]
+    max_duty: float
+
+
+@dataclass(frozen=True)
+class Chance:
+    """What the run does for one effect.
+
+    Attributes:
+        effect, rival: and the effect that could imitate it best after the run; None: the base.
+        margin_before, margin: chi2 that no rival can imitate, over the scatter of the log.
+        power_before, power: chance that the effect is named if it is the one.
+    """
+
+    effect: str
+    rival: str | None
+    margin_before: float
+    margin: float
+    power_before: float
+    power: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The script and what is foreseen of it.
+
+    Attributes:
+        why: what the logs leave open.
+        moves, rows: the script.
+        chances: one per effect in question, surest first.
+        pose_t_s, paths: (N,) s, and (V, N, 3) m, m, rad: the model's path, then with each effect.
+        limits: that it was made for.
+        radius_m: of the robot's body.
+        robot_id: of the log.
+    """
+
+    why: str
+    moves: list[Move]
+    rows: Rows
+    chances: list[Chance]
+    pose_t_s: np.ndarray
+    paths: np.ndarray
+    limits: Limits
+    radius_m: float
+    robot_id: int
+
+    @property
+    def predicted_power(self) -> float:
+        """Chance of the right name if each effect in question is as probable."""
+        return float(np.mean([c.power for c in self.chances]))
+
+    @property
+    def separates(self) -> list[str]:
+        """Effects that the run would more probably name than not."""
+        return [c.effect for c in self.chances if c.power > 0.5]
+
+    @property
+    def extent_m(self) -> np.ndarray:
+        """(2,) floor that the body sweeps on the predicted paths: along, across."""
+        at = self.paths[..., :2].reshape(-1, 2)
+        return np.ptp(at, axis=0) + 2 * self.radius_m
+
+    def to_json(self) -> dict:
+        """The interface's object, but for the path."""
+        return {
+            "separates": self.separates,
+            "predicted_power": self.predicted_power,
+            "why": self.why,
+            "duration_s": self.rows.end_s,
+            "floor_used_m": self.extent_m.tolist(),
+            "moves": [m.name for m in self.moves],
+            "effects": [vars(c) for c in self.chances],
+        }
+
+
+def design(
+    diagnosis: Diagnosis, model_file: ModelFile, limits: Limits, say: Callable[[str], None]
+) -> Plan:
+    """Designs the run that best names what the diagnosis leaves open.
+
+    Args:
+        diagnosis: of the logs so far.
+        model_file: that the diagnosis was given. Its score on other logs says what it lacks in
+            drives that these logs do not have; its base is refitted to all that the run shows.
+        limits: time, floor, duty; as `check` let them pass.
+        say: told in words what is being done.
+
+    Raises:
+        ValueError: there is no log, or no move shows what is in question.
+    """
+    hashes = [s.measurement.log_sha256 for s in diagnosis.state.scenes if s.noise]
+    usual = model_file.usual_score(hashes)
+    usual = usual if np.isfinite(usual) else 1.0
+    moves = family(limits.max_duty)
+    say("playing the moves in the twin")
+    asked = contest(diagnosis, base_quantities(model_file.model, model_file.told_by_others(hashes)))
+    scene = log_of(asked.state.scenes)
+    foreseen = Played.of([[m] for m in moves], scene).scene(scene, CENTRE)
+    known = subjects(asked.state.scenes, foreseen, asked.state, asked, usual)
+    ledger = Ledger(asked.state.free, known)
+    told = np.sum([ledger.told(s) for s in asked.state.scenes], axis=0)
+    names, why = question(asked, known, _tempered(ledger, told), ENOUGH_CHI2)
+    wanted = {i: with_effect(scene.model, s) for i, s in enumerate(known) if s.name in names}
+    if not wanted:
+        raise ValueError(f"{why} No move that the twin can play shows any of them.")
+    say("choosing moves")
+    floor = _Floor(limits, scene, list(wanted.values()))
+    chosen = _choose(moves, ledger, told, ledger.foreseen(foreseen), list(wanted), floor)
+    say("checking the whole script")
+    whole = Played.of([chosen], scene)
+    planned = whole.scene(scene, CENTRE)
+    after = told + ledger.foreseen(planned)[0]
+    outlook = _Outlook(asked, ledger, wanted, usual)
+    return Plan(
+        why,
+        chosen,
+        rows_of(chosen),
+        outlook.chances(told, after, planned),
+        whole.pose_t_s - whole.pose_t_s[0],
+        np.array([whole.path(m, CENTRE) for m in floor.models]),
+        limits,
+        scene.model.get("robot.body_radius_m"),
+        scene.measurement.track.robot_id,
+    )
+
+
+def log_of(scenes: list[Scene]) -> Scene:
+    """The first log: clock, noise and rate of poses are taken to be the same in the next.
+
+    Raises:
+        ValueError: there is none.
+    """
+    logs = [scene for scene in scenes if scene.noise]
+    if not logs:
+        raise ValueError(
+            "only steady-state tables were given; the next run is designed for the noise and the "
+            "clocks of a log, so give one of any drive besides."
+        )
+    return logs[0]
+
+
+def check(scenes: list[Scene], limits: Limits) -> None:
+    """Raises ValueError, before the long work, where no script can be."""
+    scene = log_of(scenes)
+    if scene.model.drive != "duty":
+        raise ValueError(
+            f"the model is driven by {scene.model.drive}; scripts are made of wheel duties, so "
+            "they can be designed for a robot driven by duty alone."
+        )
+    if limits.duration_s < SHORTEST_RUN_S:
+        raise ValueError(
+            f"a run of {limits.duration_s:g} s is too short: no model is judged on less than "
+            f"{SHORTEST_LOG_S:g} s, and moves come whole; allow {SHORTEST_RUN_S:g} s."
+        )
+    floor = _Floor(limits, scene, [])
+    if not any(floor.holds([m]) for m in family(limits.max_duty)):
+        size = "x".join(f"{side:g}" for side in limits.floor_m)
+        need_m = 2 * (scene.model.get("robot.body_radius_m") + WANDER_M)
+        raise ValueError(
+            f"no move fits on a floor of {size} m: the robot's body and what it may stray take "
+            f"{need_m:.2g} m each way; allow more."
+        )
+
+
+class _Floor:
+    """Keeps the robot on the floor, whichever of the effects it has."""
+
+    def __init__(self, limits: Limits, scene: Scene, richer: list[native.Model]) -> None:
+        self.scene, self.limits = scene, limits
+        self.models = [scene.model, *richer]
+        radius_m = scene.model.get("robot.body_radius_m")
+        self.room_m = np.array(limits.floor_m) / 2 - radius_m - WANDER_M
+
+    def holds(self, moves: list[Move]) -> bool:
+        """Whether these moves, one after the other, stay on it."""
+        played = Played.of([moves], self.scene)
+        return all(
+            np.all(np.abs(played.path(model, CENTRE)[:, :2]) <= self.room_m)
+            for model in self.models
+        )
+
+
+def with_effect(model: native.Model, effect: Subject) -> native.Model:
+    """The model with the effect at its strength."""
+    richer = model.copy()
+    richer.add_effect(effect.name)
+    for name, value in zip(effect.whole.names, effect.whole.target[0], strict=True):
+        richer.set(f"{effect.name}.{name}", value)
+    return richer
+
+
+def _choose(
+    moves: list[Move],
+    ledger: Ledger,
+    told: np.ndarray,
+    foreseen: np.ndarray,
+    wanted: list[int],
+    floor: _Floor,
+) -> list[Move]:
+    """Greedy: each time the move that adds most per second and still stays on the floor."""
+    left_s = floor.limits.duration_s - 2 * LEAD_S
+    duration_s = np.array([m.duration_s for m in moves])
+    chosen: list[Move] = []
+    while True:
+        worth = _worth(ledger, told + foreseen, wanted) - _worth(ledger, told, wanted)
+        worth = np.where(duration_s <= left_s, worth / duration_s, -np.inf)
+        order = [int(k) for k in np.argsort(worth)[::-1] if np.isfinite(worth[k])]
+        best = next((k for k in order if floor.holds([*chosen, moves[k]])), None)
+        if best is None:
+            break
+        chosen.append(moves[best])
+        told = told + foreseen[best]
+        left_s -= duration_s[best]
+    return chosen
+
+
+def _worth(ledger: Ledger, grams: np.ndarray, wanted: list[int]) -> np.ndarray:
+    """(...,) sum of what is reached of an ample margin: of the effects in question, then of all."""
+    margins = _tempered(ledger, grams).min(axis=-1)
+    reached = margins / (margins + ENOUGH_CHI2)
+    return reached[..., wanted].sum(axis=-1) + BESIDES * reached.sum(axis=-1)
+
+
+def _tempered(ledger: Ledger, grams: np.ndarray) -> np.ndarray:
+    """(..., T, 1 + J) margins over the scatter of the log."""
+    excess = np.array([s.excess for s in ledger.subjects])
+    return ledger.margins(grams) / excess[:, None]
+
+
+@dataclass(frozen=True)
+class _Outlook:
+    """What is foreseen of the effects in question.
+
+    Attributes:
+        asked, ledger: the question, and what runs tell of all effects.
+        wanted: by place in the ledger the model with the effect.
+        usual: score of the model on the logs that it was fitted to.
+    """
+
+    asked: Contest
+    ledger: Ledger
+    wanted: dict[int, native.Model]
+    usual: float
+
+    def chances(self, told: np.ndarray, after: np.ndarray, planned: Scene) -> list[Chance]:
+        """Of each effect before and after the planned run, surest first."""
+        before_chi2, before = self._power(told, [])
+        chi2, then = self._power(after, [planned])
+        chances = []
+        for row, place in enumerate(self.wanted):
+            nearest = int(chi2[row].argmin())
+            chances.append(
+                Chance(
+                    self.ledger.subjects[place].name,
+                    self.ledger.subjects[nearest - 1].name if nearest else None,
+                    float(before_chi2[row].min()),
+                    float(chi2[row].min()),
+                    float(before[row]),
+                    float(then[row]),
+                )
+            )
+        return sorted(chances, key=lambda c: -c.power)
+
+    def _power(self, grams: np.ndarray, planned: list[Scene]) -> tuple[np.ndarray, np.ndarray]:
+        """(T, 1 + J) margins of the wanted over the scatter, and (T,) chances to be named."""
+        state, subjects = self.asked.state, self.ledger.subjects
+        margins = _tempered(self.ledger, grams)[list(self.wanted)]
+        logs = [(s, f) for s, f in zip(state.scenes, state.floors, strict=True) if s.noise]
+        scores = [score(Windows.of(s.measurement.track).errors(s), f) for s, f in logs]
+        scenes = [*(s for s, _ in logs), *planned]
+        floors = [*(f for _, f in logs), *(logs[0][1] for _ in planned)]
+        scores += [max(1.0, self.usual, *scores) for _ in planned]
+        matter = relevance(scenes, floors, scores, self.ledger, grams, self.wanted)
+        entries = [catalogue()[subjects[i].name] for i in self.wanted]
+        return margins, power(
+            margins,
+            np.array([len(e["parameters"]) for e in entries]),
+            len(subjects),
+            matter,
+            np.array([e["name"] in self.asked.fitted for e in entries]),
+        )

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages as flat tables, one per type, with the column names that `twinmill import` reads."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+
+from twinmill.data.importers.plain import QUATERNION, VALUES
+from twinmill.data.log import KINDS, heading_rad
+from twinmill.export.recording import Channel, Recording
+
+WHEELS = ("fl", "fr", "rl", "rr")
+# Arrays in messages, one column each; those of drive_t are named by its kind.
+FLAT = {
+    "wheel_duty_pct": VALUES["duty"],
+    "position_m": ("x_m", "y_m", "z_m"),
+    "orientation_wxyz": QUATERNION,
+    "wheel_radps": tuple(f"{wheel}_radps" for wheel in WHEELS),
+}
+
+
+def tables_of(recording: Recording, provenance: dict) -> dict[str, pa.Table]:
+    """One table per type, in order of stamps; those with a channel prefix stand by themselves.
+
+    Columns: t_s since the earliest stamp of the log, channel, logged_utime_us by the recorder's
+    clock, then the fields of the .lcm file, arrays spread out. Poses have theta_rad besides.
+
+    Returns:
+        By name, as `pose` or `twin_pose`; `provenance` is in each table's metadata.
+    """
+    groups: dict[str, list[Channel]] = {}
+    for channel in recording.channels:
+        # Truth is the twin's alone: its prefix says nothing that the type does not.
+        prefix = "" if channel.type_name == "truth" else channel.prefix.lower()
+        groups.setdefault(prefix + channel.type_name, []).append(channel)
+    metadata = {"twinmill": json.dumps(provenance)}
+    return {
+        name: _table(channels, recording.t0_utime_us).replace_schema_metadata(metadata)
+        for name, channels in groups.items()
+    }
+
+
+def _table(channels: list[Channel], t0_us: int) -> pa.Table:
+    messages = [m for channel in channels for m in channel.messages]
+    utime_us = np.array([m.utime_us for m in messages])
+    columns = {
+        "t_s": (utime_us - t0_us) / 1e6,
+        "channel": [channel.name for channel in channels for _ in channel.messages],
+        "logged_utime_us": [stamp for channel in channels for stamp in channel.stamps_us],
+    }
+    for field in messages[0].__slots__:
+        columns.update(_columns(field, messages))
+    return pa.table(columns).take(pa.array(np.argsort(utime_us, kind="stable")))
+
+
+def _columns(field: str, messages: list) -> Iterator[tuple[str, np.ndarray]]:
+    values = [getattr(message, field) for message in messages]
+    if not isinstance(values[0], list | tuple):
+        yield field, values
+        return
+    array = np.array(values)
+    if field in FLAT:
+        yield from zip(FLAT[field], array.T, strict=True)
+    else:
+        yield from _by_kind(array, np.array([message.kind for message in messages]))
+    if field == "orientation_wxyz":
+        yield "theta_rad", heading_rad(array)
+
+
+def _by_kind(value: np.ndarray, kind: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """Columns of each kind of command that is there; NaN in rows of other kinds."""
+    for number, name in enumerate(KINDS):
+        if (kind == number).any():
+            for k, column in enumerate(VALUES[name]):
+                yield column, np.where(kind == number, value[:, k], np.nan)
+
+
+def write_csv(table: pa.Table, path: Path) -> None:
+    """With one header row; not-a-number as `nan`."""
+    options = pyarrow.csv.WriteOptions(quoting_style="needed")
+    pyarrow.csv.write_csv(table, path, options)
+
+
+def write_parquet(table: pa.Table, path: Path) -> None:
+    """With the provenance in the schema's metadata, under `twinmill`."""
+    pyarrow.parquet.write_table(table, path)

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Model files: read by the twin's own reader, written anew with what was fitted."""
+
+import hashlib
+import math
+import os
+from collections.abc import Collection
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tomlkit
+import twinmill_native as native
+
+from twinmill.fit.solve import Estimate
+from twinmill.model.freedom import catalogue, effect_names
+from twinmill.predict.noise import Noise
+
+DEFAULT_MODEL = "turbopi.toml"
+
+
+class ModelError(ValueError):
+    """A model file that cannot be read or written; the message is one sentence."""
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """A model and the text it was read from."""
+
+    path: Path
+    text: str
+    model: native.Model
+
+    @classmethod
+    def load(cls, name: str) -> "ModelFile":
+        """Looks in the working directory, then among the installed models.
+
+        Raises:
+            ModelError: no such file, or it is no valid model.
+        """
+        try:
+            path = Path(native.find_model_file(str(name)))
+            text = path.read_text()
+            return cls(path, text, native.Model.from_toml(text, str(name)))
+        except (ValueError, OSError, UnicodeDecodeError) as error:
+            raise ModelError(str(error)) from error
+
+    @property
+    def clock_logs(self) -> list[str]:
+        """Hashes (sha256) of the logs that told the clock offset."""
+        return list(tomlkit.parse(self.text).get("clock", {}).get("fitted_on", []))
+
+    def told_by_others(self, log_sha256: Collection[str]) -> set[str]:
+        """Names of the base quantities that were fitted, and on none of these logs."""
+        base = tomlkit.parse(self.text).get("base", {})
+        if not base.get("fitted_on") or set(base["fitted_on"]) & set(log_sha256):
+            return set()
+        told = set()
+        for key, std in base.get("std", {}).items():
+            told |= (
+                {f"base.{key}.{i}" for i, s in enumerate(std) if not math.isnan(s)}
+                if isinstance(std, list)
+                else {f"base.{key}"}
+            )
+        return told
+
+    def usual_score(self, log_sha256: Collection[str]) -> float:
+        """Score that the model reached on the other logs it was fitted to; infinite without any.
+
+        No less than 1: on its own log a fit can look better than it is.
+        """
+        score = tomlkit.parse(self.text).get("fit", {}).get("score_after")
+        if score is None or not self.told_by_others(log_sha256):
+            return math.inf
+        return max(1.0, float(score))
+
+    def left_over(self, log_sha256: Collection[str]) -> dict[str, float]:
+        """What the model left in other logs: fall of chi2 per step by what it depends on."""
+        table = tomlkit.parse(self.text).get("fit", {}).get("left_over", {})
+        if set(table.get("fitted_on", [])) & set(log_sha256):
+            return {}
+        return {str(g): float(v) for g, v in table.items() if g != "fitted_on"}
+
+    @property
+    def hash(self) -> str:
+        """Of the text, as a child names its parent."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a fit found out and a new model file records.
+
+    Attributes:
+        model: with the fitted values and effects.
+        estimates: with their uncertainties.
+        logs: sha256 of the logs fitted on, by name.
+        score_before, score_after: on those logs.
+        noise: of the first log, or None to leave the old.
+        clock: offset and rate that the logs share, by name; empty if they do not agree.
+        base_told: the base was held near what other logs told; they keep the credit.
+        left_over: what a diagnosis found that no effect explains; None if there was none.
+        robots: what is a robot's own, by its number.
+    """
+
+    model: native.Model
+    estimates: list[Estimate]
+    logs: dict[str, str]
+    score_before: float
+    score_after: float
+    noise: Noise | None = None
+    clock: dict[str, Estimate] = field(default_factory=dict)
+    base_told: bool = False
+    left_over: dict[str, float] | None = None
+    robots: dict[int, list[Estimate]] = field(default_factory=dict)
+
+
+def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> None:
+    """Writes the fitted model to a new file: whole or not at all.
+
+    Raises:
+        ModelError: the file cannot be written.
+    """
+    document = tomlkit.parse(parent.text)
+    document["parent"] = parent.hash
+    document["created_by"] = command
+    _write_base(document, fitted)
+    _write_effects(document, fitted)
+    _write_robots(document, fitted)
+    if fitted.noise:
+        section = document.setdefault("noise", tomlkit.table())
+        section.update({k: _short(v) for k, v in fitted.noise.to_json().items()})
+    if fitted.clock:
+        section = document.setdefault("clock", tomlkit.table())
+        clock = {name.removeprefix("clock."): e for name, e in fitted.clock.items()}
+        section.update({key: _short(e.value) for key, e in clock.items()})
+        section["std"] = {key: _short(e.std) for key, e in clock.items()}
+        section["fitted_on"] = list(fitted.logs.values())
+    old = document.get("fit", {}).get("left_over", {})
+    document["fit"] = {
+        "logs": list(fitted.logs),
+        "score_before": _short(fitted.score_before),
+        "score_after": _short(fitted.score_after),
+    }
+    if fitted.left_over is not None:
+        left = {group: _short(value) for group, value in fitted.left_over.items()}
+        old = {**left, "fitted_on": list(fitted.logs.values())} if left else {}
+    if old:
+        document["fit"]["left_over"] = old
+    write_whole(Path(path), tomlkit.dumps(document))
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Writes a file through a temporary one beside it.
+
+    Raises:
+        ModelError: the folder does not exist or cannot be written.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_text(text)
+        os.replace(temporary, path)
+    except OSError as error:
+        with suppress(OSError):
+            temporary.unlink()
+        raise ModelError(
+            f"{path}: cannot be written ({error.strerror}); choose another place."
+        ) from error
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+def _write_base(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
+    base = document.setdefault("base", tomlkit.table())
+    stds: dict = {}
+    for estimate in fitted.estimates:
+        section, *key = estimate.name.split(".")
+        if section != "base":
+            continue
+        values, errors, place = base, stds, key[0]
+        if len(key) == 2:  # an entry of a table: those that were not fitted have no error
+            values, place = base[key[0]], int(key[1])
+            errors = stds.setdefault(key[0], [math.nan] * len(values))
+        values[place], errors[place] = _short(estimate.value), _short(estimate.std)
+    if stds and not fitted.base_told:
+        base["std"] = stds
+        base["fitted_on"] = list(fitted.logs.values())
+
+
+def _write_robots(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
+    """What is one robot's own, as [robots.R03]."""
+    for robot_id, estimates in sorted(fitted.robots.items()):
+        robots = document.setdefault("robots", tomlkit.table(is_super_table=True))
+        own = robots.setdefault(f"R{robot_id:02d}", tomlkit.table())
+        for estimate in estimates:
+            *effect, key = estimate.name.split(".")
+            place = own.setdefault(effect[0], tomlkit.inline_table()) if effect else own
+            place[key] = _short(estimate.value)
+
+
+def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
+    entries, stds = catalogue(), {e.name: e.std for e in fitted.estimates}
+    old = list(document.get("effect", []))
+    tables = tomlkit.aot()
+    instances = zip(effect_names(fitted.model), fitted.model.texts, strict=True)
+    for i, (instance, texts) in enumerate(instances):
+        table = tomlkit.table() if i >= len(old) else old[i]
+        name = instance.split("#")[0]
+        table["name"] = name
+        table.update(texts)
+        keys = [p["name"] for p in entries[name]["parameters"]]
+        for key in keys:
+            table[key] = _short(fitted.model.get(f"{instance}.{key}"))
+        known = {
+            key: _short(stds[f"{instance}.{key}"]) for key in keys if f"{instance}.{key}" in stds
+        }
+        if known:
+            table["std"] = known
+            table["fitted_on"] = ", ".join(fitted.logs)
+        if i >= len(old):
+            table["error_before"] = _short(fitted.score_before)
+            table["error_after"] = _short(fitted.score_after)
+        tables.append(table)
+    if len(tables):
+        document["effect"] = tables

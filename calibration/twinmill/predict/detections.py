@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of one robot with the poses of all robots around it, and how likely a model finds them."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.camera_frames import Frames
+from twinmill.data.track import Track
+from twinmill.predict.folds import BLOCK_S, thue_morse
+from twinmill.predict.problem import CLOCK, CLOCK_RATE, Scene
+
+# Poses are never better known than this: markers sit off the wheels' centre, cameras off theirs.
+LEAST_M, LEAST_RAD = 0.003, 0.005
+SURE = 1e-3  # no frame is ever surer: one strange bit must not decide
+VOTE_ERROR = 0.01  # of voted bits that no count of frames explains
+UNSEEN_FRAMES = 64  # at the start: the vote may remember frames from before the log
+
+
+@dataclass
+class BitScene:
+    """One robot in one log.
+
+    Attributes:
+        label, robot_id, log_sha256: which.
+        own: place of the robot among `tracks`.
+        tracks: of all robots in the log.
+        frames: of this robot.
+        usable: (K,) bool, every robot is tracked.
+        offset_s, rate: capture's clock against the robot's.
+        clock_free: the offset was found from this log itself.
+        blur: standard deviations of a pose, m and rad.
+        block: (K,) number of the 4 s block of each frame; half: (K,) which half it belongs to.
+    """
+
+    label: str
+    robot_id: int
+    log_sha256: str
+    own: int
+    tracks: list[Track]
+    frames: Frames
+    usable: np.ndarray
+    offset_s: float
+    rate: float
+    clock_free: bool
+    blur: tuple[float, float]
+    block: np.ndarray
+    half: np.ndarray
+    _seen: tuple = field(default=(None, None), repr=False)
+    _placed: tuple = field(default=(None, None), repr=False)
+
+    def poses(self, age_s: float, pick: slice = slice(None)) -> np.ndarray:
+        """(K, N, 3) poses of all robots when the pictures were taken; NaN where untracked."""
+        key = (pick.step, age_s)
+        if self._placed[0] != key:
+            t_s = self._capture_s(age_s)[pick]
+            placed = np.stack([pose_at(track, t_s) for track in self.tracks], axis=1)
+            self._placed = (key, placed)
+        return self._placed[1]
+
+    def view(self, model: native.Model, pick: slice = slice(None)) -> np.ndarray:
+        """(K,) probability that the robot of `model` (its own) has another in view."""
+        sight = model.sight()
+        age_s = sight["age_s"] + (0.0 if self.frames.stamped else sight["delay_s"])
+        geometry = ("range_m", "softness_m", "cone_rad", "pan_rad", "hide_radius_m")
+        key = (pick.step, age_s, *(sight[g] for g in geometry))
+        if self._seen[0] != key:
+            poses = self.poses(age_s, pick)
+            self._seen = (key, native.in_view(model, self.own, poses, *self.blur))
+        return self._seen[1]
+
+    def chance(self, model: native.Model, pick: slice = slice(None)) -> np.ndarray:
+        """(K,) probability that the frame shows a target."""
+        sight = model.sight()
+        view = self.view(model, pick)
+        chance = view * (1 - sight["miss_rate"]) + (1 - view) * sight["false_rate"]
+        return np.clip(chance, SURE, 1 - SURE)
+
+    def reported(self, model: native.Model, raw: bool) -> np.ndarray:
+        """(K,) chance of the raw bit, or of the voted one."""
+        chance = self.chance(model)
+        return chance if raw else majority(chance, int(model.sight()["vote_frames"]))
+
+    def likelihood(self, model: native.Model, pick: slice = slice(None)) -> np.ndarray:
+        """(K,) log likelihood of what the robot reported; NaN where nothing can be said.
+
+        Raw bits are independent draws, and voted ones follow from them. Without raw bits only
+        every so many frames counts, since neighbouring votes share their frames.
+        """
+        model = model.for_robot(self.robot_id)
+        frames = int(model.sight()["vote_frames"])
+        if not self.frames.has_raw:
+            return self._voted_alone(model, frames)[pick]
+        chance = self.chance(model, pick)
+        raw = self.frames.raw[pick]
+        right = self.voted(frames)[pick] == self.frames.voted[pick]
+        vote = np.where(right, np.log(1 - VOTE_ERROR), np.log(VOTE_ERROR))
+        vote[np.arange(len(self.frames.raw))[pick] < UNSEEN_FRAMES] = 0
+        told = np.log(np.where(raw, chance, 1 - chance)) + vote
+        return np.where(self.usable[pick], told, np.nan)
+
+    def voted(self, frames: int) -> np.ndarray:
+        """(K,) bool: strict majority of the newest `frames` raw bits, as the firmware votes."""
+        count = np.concatenate([[0], np.cumsum(self.frames.raw)])
+        end = np.arange(1, len(count))
+        begin = np.maximum(end - frames, 0)
+        return 2 * (count[end] - count[begin]) > end - begin
+
+    def _voted_alone(self, model: native.Model, frames: int) -> np.ndarray:
+        chance = np.clip(self.reported(model, False), SURE, 1 - SURE)
+        told = np.log(np.where(self.frames.voted, chance, 1 - chance))
+        told[(np.arange(len(told)) % frames != frames - 1) | ~self.usable] = np.nan
+        return told
+
+    def _capture_s(self, age_s: float) -> np.ndarray:
+        robot_s = self.frames.t_s - age_s
+        return robot_s * (1 + self.rate) + self.offset_s
+
+
+def majority(chance: np.ndarray, frames: int) -> np.ndarray:
+    """(K,) probability that more than half of the newest `frames` independent bits are 1.
+
+    Poisson-binomial distribution by convolution (Wang 1993, Statistica Sinica 3, 295); at the start
+    bits before the first count as it.
+    """
+    padded = np.concatenate([np.full(frames - 1, chance[0]), chance])
+    counts = np.zeros((len(chance), frames + 1))
+    counts[:, 0] = 1
+    for k in range(frames):
+        p = padded[k : k + len(chance), None]
+        moved = np.pad(counts[:, :-1], ((0, 0), (1, 0)))
+        counts = counts * (1 - p) + moved * p
+    return counts[:, frames // 2 + 1 :].sum(axis=1)
+
+
+def pose_at(track: Track, t_s: np.ndarray) -> np.ndarray:
+    """(K, 3) poses between the measured ones; NaN where the robot is not tracked."""
+    after = np.clip(np.searchsorted(track.pose_t_s, t_s), 1, len(track.pose_t_s) - 1)
+    before = after - 1
+    whole = (track.segment[after] >= 0) & (track.segment[after] == track.segment[before])
+    whole &= (t_s >= track.pose_t_s[0]) & (t_s <= track.pose_t_s[-1])
+    span_s = track.pose_t_s[after] - track.pose_t_s[before]
+    part = ((t_s - track.pose_t_s[before]) / span_s)[:, None]
+    pose = track.pose[before] * (1 - part) + track.pose[after] * part
+    return np.where(whole[:, None], pose, np.nan)
+
+
+def bit_scenes(scenes: list) -> list[BitScene]:
+    """Robots that reported bits while at least one other was tracked.
+
+    Args:
+        scenes: measurements with their clocks; those without a track or frames are passed over.
+    """
+    found = []
+    logs: dict[str, list[Scene]] = {}
+    for scene in scenes:
+        if isinstance(scene, Scene):
+            logs.setdefault(scene.measurement.log_sha256, []).append(scene)
+    for together in logs.values():
+        for own, scene in enumerate(together):
+            if len(together) > 1 and scene.measurement.frames is not None:
+                made = _bit_scene(together, own)
+                if made.usable.any():
+                    found.append(made)
+    return found
+
+
+def _bit_scene(together: list[Scene], own: int) -> BitScene:
+    scene = together[own]
+    noise, frames = scene.noise.to_json(), scene.measurement.frames
+    block = ((frames.t_s - frames.t_s[0]) // BLOCK_S).astype(int)
+    made = BitScene(
+        scene.measurement.label,
+        scene.measurement.track.robot_id,
+        scene.measurement.log_sha256,
+        own,
+        [s.measurement.track for s in together],
+        frames,
+        np.ones(len(frames.t_s), bool),
+        scene.model.get(CLOCK),
+        scene.model.get(CLOCK_RATE) * 1e-6,
+        scene.clock_free,
+        (max(noise["sensor_m"], LEAST_M), max(noise["sensor_rad"], LEAST_RAD)),
+        block,
+        thue_morse(block),
+    )
+    made.usable = np.isfinite(made.poses(0.0)).all(axis=(1, 2))
+    return made

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Noise of a log: white sensor noise and coloured drive noise, and the filter that whitens both.
+
+One-step errors of a right model are e_k = dt n_k + s_k - s_(k-1): s is the sensor's noise, white; n
+is a disturbance of the velocity, first order: n_(k+1) = phi n_k + sqrt(1 - phi^2) sigma_d w_k with
+phi = exp(-dt / tau). Whitened, they have unit variance and no memory.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.signal import lfilter
+from scipy.signal.windows import hann
+
+from twinmill.predict.residual import StepGrid
+
+CHUNK = 256  # steps of one periodogram: 2 s at 120 Hz, a few times the disturbance's memory
+FEWEST_CHUNKS = 6
+FINER = 2  # frequencies per bin at which the spectrum is taken: exact up to memories of a stretch
+TRANSIENT = 20  # steps after a break in which the filter settles
+# Sensor and drive of position and heading that no capture and no floor are below: what a log made
+# without any noise leaves is the arithmetic of its maker, of which nothing can be learned.
+LEAST = ((1e-5, 1e-4), (1e-4, 1e-3))
+LEAST_MEMORY_S = 0.15
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """Noise of one channel: sensor (m or rad), drive (m/s or rad/s), its memory."""
+
+    sensor: float
+    drive: float
+    memory_s: float
+
+    def spectrum(self, frequency_Hz: np.ndarray, period_s: float) -> np.ndarray:
+        """Power of one-step errors per sample at these frequencies."""
+        phase = np.exp(-2j * np.pi * frequency_Hz * period_s)
+        phi = np.exp(-period_s / self.memory_s)
+        drive = (period_s * self.drive) ** 2 * (1 - phi**2) / np.abs(1 - phi * phase) ** 2
+        return self.sensor**2 * np.abs(1 - phase) ** 2 + drive
+
+    def whitening(self, period_s: float) -> tuple[np.ndarray, np.ndarray, float]:
+        """Filter (numerator, denominator) and standard deviation of what comes out of it."""
+        phi = np.exp(-period_s / self.memory_s)
+        fresh = (period_s * self.drive) ** 2 * (1 - phi**2)
+        variance = self.sensor**2
+        # Autocovariance of (1 - phi B) e, factored into the minimum-phase moving average.
+        lags = [
+            variance * phi,
+            -variance * (1 + phi) ** 2,
+            fresh + variance * (1 + (1 + phi) ** 2 + phi**2),
+        ]
+        roots = np.roots([*lags, lags[1], lags[0]])
+        inside = roots[np.argsort(np.abs(roots))][:2]
+        average = np.real(np.poly(inside))
+        scale = np.sqrt(lags[0] / average[2])
+        return np.array([1.0, -phi]), average, float(scale)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of a log: position and heading."""
+
+    position: ChannelNoise
+    heading: ChannelNoise
+
+    def to_json(self) -> dict:
+        """The interface's field names."""
+        return {
+            "sensor_m": self.position.sensor,
+            "sensor_rad": self.heading.sensor,
+            "drive_mps": self.position.drive,
+            "drive_radps": self.heading.drive,
+            "drive_s": self.position.memory_s,
+            "drive_turn_s": self.heading.memory_s,
+        }
+
+    def loudness(self, period_s: float) -> float:
+        """Log of the one-step variance that remains when all memory is used, over channels."""
+        scales = [noise.whitening(period_s)[2] for noise in (self.position, self.heading)]
+        return float(4 * np.log(scales[0]) + 2 * np.log(scales[1]))
+
+    def whiten(self, errors: np.ndarray, grid: StepGrid) -> np.ndarray:
+        """(..., S, 3) one-step errors to whitened ones; zero where the filter still settles."""
+        white = np.zeros_like(errors)
+        for channels, noise in ((slice(0, 2), self.position), (slice(2, 3), self.heading)):
+            numerator, denominator, scale = noise.whitening(grid.period_s)
+            for part in grid.slices:
+                white[..., part, channels] = (
+                    lfilter(numerator, denominator, errors[..., part, channels], axis=-2) / scale
+                )
+        for start in grid.starts:
+            white[..., start : start + TRANSIENT, :] = 0
+        return white
+
+
+def fit_noise(errors: list[np.ndarray], moving: np.ndarray, grid: StepGrid) -> Noise:
+    """Estimates the noise from what a flexible model leaves.
+
+    Args:
+        errors: (S, 3) one-step errors; their mean power is taken.
+        moving: (S,) bool: the disturbance acts only then.
+        grid: of the steps.
+
+    The median over stretches of 2 s keeps passing physics (a start, a stop) out of the noise.
+    """
+    chunk = CHUNK
+    while (pieces := _pieces(grid, moving, chunk)) is None:
+        chunk //= 2
+    bins = _bins(chunk)
+    power = np.mean([_median_power(e, pieces, bins) for e in errors], axis=0)
+    return Noise(
+        _fit_channel(power[:, :2].mean(1), bins, grid.period_s, LEAST[0]),
+        _fit_channel(power[:, 2], bins, grid.period_s, LEAST[1]),
+    )
+
+
+def _pieces(grid: StepGrid, moving: np.ndarray, chunk: int) -> np.ndarray | None:
+    """(C,) starts of overlapping stretches in which the robot moves; None if there are too few.
+
+    Of the shortest stretches all are taken where it never moves for so long.
+    """
+    everywhere = [
+        at
+        for part in grid.slices
+        for at in range(part.start + TRANSIENT, part.stop - chunk, chunk // 2)
+    ]
+    starts = [at for at in everywhere if moving[at : at + chunk].mean() > 0.9]
+    if len(starts) < FEWEST_CHUNKS and chunk > CHUNK // 8:
+        return None
+    return np.array(starts or everywhere)
+
+
+def _bins(chunk: int) -> np.ndarray:
+    """(F, chunk) weights whose sums over a stretch are its spectrum: taper, wave, mean left out."""
+    taper = hann(chunk, sym=False)
+    wave = np.exp(-2j * np.pi * np.outer(np.arange(1, chunk // 2), np.arange(chunk)) / chunk)
+    weights = taper * wave / np.sqrt(np.sum(taper**2))
+    return weights - weights.mean(axis=1, keepdims=True)
+
+
+def _median_power(errors: np.ndarray, pieces: np.ndarray, bins: np.ndarray) -> np.ndarray:
+    """(F, 3) power per sample: the median over stretches, over that of exponential variates."""
+    stretches = errors[pieces[:, None] + np.arange(bins.shape[1])]
+    power = np.abs(np.einsum("fk,ckx->cfx", bins, stretches, optimize=True)) ** 2
+    return np.median(power, axis=0) / _median_of_exponentials(len(pieces))
+
+
+def _median_of_exponentials(count: int) -> float:
+    """Expected median of so many of mean 1: their k-th has mean 1/count + ... of k terms."""
+    waits = np.cumsum(1 / np.arange(count, 0, -1))
+    return float(waits[[(count - 1) // 2, count // 2]].mean())
+
+
+def _fit_channel(
+    power: np.ndarray, bins: np.ndarray, period_s: float, least: tuple[float, float]
+) -> ChannelNoise:
+    """Whittle's likelihood over sensor, drive and memory, with what each bin takes in from others.
+
+    Debiased as by Sykulski et al. 2019, Biometrika 106(2): a short stretch blurs the spectrum, and
+    leaving out its mean takes part of the slow drive noise away.
+    """
+    count = FINER * bins.shape[1]
+    taken = np.abs(np.fft.fft(bins, count, axis=1)) ** 2 / count
+    frequency_Hz = np.fft.fftfreq(count, period_s)
+    quiet = ChannelNoise(*least, LEAST_MEMORY_S)
+    power = np.maximum(power, taken @ quiet.spectrum(frequency_Hz, period_s))
+    sensor = np.sqrt(power[-len(power) // 4 :].mean() / 4)
+    drive = np.sqrt(power[: len(power) // 8].mean()) / period_s / 5
+
+    def unpack(logs: np.ndarray) -> ChannelNoise:
+        return ChannelNoise(*np.exp(np.clip(logs, -25, 5)))
+
+    def cost(logs: np.ndarray) -> float:
+        model = taken @ unpack(logs).spectrum(frequency_Hz, period_s)
+        outside = np.clip(np.log(0.01) - logs[2], 0, None) + np.clip(logs[2] - np.log(2.0), 0, None)
+        return float(np.sum(np.log(model) + power / model) + 1e3 * outside**2)
+
+    starts = [np.log([sensor, drive, memory_s]) for memory_s in (0.03, 0.15, 0.6)]
+    best = min(
+        (
+            minimize(cost, s, method="Nelder-Mead", options={"maxiter": 600, "xatol": 1e-4})
+            for s in starts
+        ),
+        key=lambda found: found.fun,
+    )
+    return unpack(best.x)

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A diagnosis as tables, for the terminal and as a section of a report."""
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from twinmill.diagnosis.explain import Explanation, steps
+from twinmill.diagnosis.result import Diagnosis
+from twinmill.fit.solve import Estimate
+from twinmill.report import Figure, Section, show, tables, views
+from twinmill.report.detection_figures import field_of_view
+from twinmill.report.detection_tables import bit_steps, bit_tables
+from twinmill.report.error_figures import waterfall
+from twinmill.report.sections import robot_pictures
+from twinmill.report.tables import Cell, Table, Tone, number, tone
+
+TONES: dict[str, Tone] = {
+    "model_adequate": "good",
+    "refit_enough": "warn",
+    "effect_missing": "bad",
+    "ambiguous": "warn",
+    "outside_catalogue": "bad",
+}
+
+
+def ranking(diagnosis: Diagnosis) -> Table:
+    """Effects, best first."""
+    rows = []
+    for r in diagnosis.ranking:
+        found = r.effect in diagnosis.found
+        rows.append(
+            [
+                Cell(r.effect, "good" if found else "dim"),
+                Cell(number(r.score_heldout), tone(r.score_heldout)),
+                Cell(f"{100 * r.share_explained:.0f} %"),
+                Cell(f"{r.p_value:.3f}"),
+                Cell("" if r.group is None else str(r.group)),
+                Cell(", ".join(_estimate(e) for e in r.parameters)),
+            ]
+        )
+    return Table(
+        "What could be missing",
+        ["effect", "held-out\nscore", "explains", "p", "group", "estimates"],
+        rows,
+        "Found effects are coloured. The score is of drives that were not fitted to; explains: "
+        "share of what anything could explain; p: chance of such a fit if nothing were missing, "
+        "for all effects together; effects of one group look alike in this log.",
+        words=(0, 5),
+    )
+
+
+def unseen(diagnosis: Diagnosis) -> Table:
+    """Effects that could be there and not be seen."""
+    rows = [[Cell(effect), Cell(why)] for effect, why in diagnosis.not_identifiable]
+    return Table("What this log cannot show", ["effect", "why"], rows, words=(0, 1))
+
+
+def robots_off(diagnosis: Diagnosis) -> Table:
+    """Robots that differ from the others."""
+    rows = [
+        [
+            Cell(off.label, "bad"),
+            Cell(off.effect or "not in the catalogue"),
+            Cell(number(off.score_before), tone(off.score_before)),
+            Cell(number(off.score_after), tone(off.score_after)),
+            Cell(f"{off.p_value:.1g}"),
+            Cell(", ".join(_estimate(e) for e in off.parameters)),
+        ]
+        for off in diagnosis.robots_off
+    ]
+    return Table(
+        "Robots that differ from the others",
+        ["robot", "in", "score\nas all", "score\nown", "p", "estimates"],
+        rows,
+        "Scores are of drives that were not fitted to: with the model of all, and with the robot's "
+        "own. What the others lack was looked for without these robots.",
+        words=(1, 5),
+    )
+
+
+def lines(diagnosis: Diagnosis) -> list[str]:
+    """What the tables do not say."""
+    told = list(diagnosis.notes)
+    term = diagnosis.omnibus.term
+    if term:
+        told.append(
+            f"{100 * diagnosis.share_unexplained:.0f} % of what could be explained depends on "
+            f"{' and '.join(g.group for g in diagnosis.omnibus.groups)}; best formula: "
+            f"{term.adds_to} += {diagnosis.omnibus.coefficient:.3g} * {term.formula}."
+        )
+    if equation := diagnosis.omnibus.equation:
+        told.append(
+            f"To add it: twinmill add equation LOG --adds-to {equation['adds_to']} --formula "
+            f"'{equation['formula']}', with the same logs and model."
+        )
+    if diagnosis.next_experiment:
+        told.append(
+            f"Next run: {diagnosis.next_experiment['why']}; `twinmill next`, given the same logs "
+            "and model, writes the script."
+        )
+    return told
+
+
+def terminal(diagnosis: Diagnosis) -> RenderableType:
+    """What a person reads of a diagnosis."""
+    parts: list[RenderableType] = [
+        Text(f"{diagnosis.sentence}", show.STYLES[TONES[diagnosis.verdict]]),
+        Text(
+            f"score {number(diagnosis.before.score)} as given, "
+            f"{number(diagnosis.score_refit)} after a refit of the base"
+        ),
+        Text(),
+    ]
+    parts += [show.table(t) for t in (*_tables(diagnosis), *_bit_steps(diagnosis))]
+    parts += [Text(line) for line in lines(diagnosis)]
+    return Group(*parts)
+
+
+def terminal_explanation(result: Explanation) -> RenderableType:
+    """What a person reads of the whole loop."""
+    return Group(
+        terminal(result.diagnosis),
+        Text(),
+        show.table(tables.steps(_labelled(result.diagnosis))),
+        show.table(tables.parameters(result.parameters)),
+        Text(f"Written: {result.path}"),
+    )
+
+
+def section(diagnosis: Diagnosis) -> Section:
+    """Of a report."""
+    before = diagnosis.before
+    scores = [("as given", before.score), ("base refitted", diagnosis.score_refit)]
+    if len(diagnosis.bit_steps) > 1:
+        scores += [("bits", diagnosis.bit_steps[0][1]), ("bits, found", diagnosis.bit_steps[-1][1])]
+    return Section(
+        f"What {before.model_name} lacks",
+        [(label, number(value), tone(value)) for label, value in scores],
+        diagnosis.sentence,
+        views.facts(before),
+        [*_bit_figures(diagnosis), waterfall(_labelled(diagnosis)), *robot_pictures(before)],
+        [*_tables(diagnosis), *_bit_steps(diagnosis), *_bit_tables(diagnosis)],
+        " ".join(lines(diagnosis)),
+        before.warnings,
+    )
+
+
+def _tables(diagnosis: Diagnosis) -> list[Table]:
+    return [t for t in (robots_off(diagnosis), ranking(diagnosis), unseen(diagnosis)) if t.rows]
+
+
+def _bit_steps(diagnosis: Diagnosis) -> list[Table]:
+    return [bit_steps(diagnosis.bit_steps)] if len(diagnosis.bit_steps) > 1 else []
+
+
+def _bit_tables(diagnosis: Diagnosis) -> list[Table]:
+    """Predicted and measured bits, with the effects that were found if there are any."""
+    bits = diagnosis.bits_after or diagnosis.bits
+    return bit_tables(bits) if bits else []
+
+
+def _bit_figures(diagnosis: Diagnosis) -> list[Figure]:
+    """What the camera sees, with the model as given and with what was found."""
+    if not diagnosis.bits:
+        return []
+    after = diagnosis.bits_after
+    found = [field_of_view(after, "What the camera sees, effects added")] if after else []
+    return [field_of_view(diagnosis.bits), *found]
+
+
+def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
+    """Steps of the waterfall."""
+    names = {None: "as given", "refit": "base refitted"}
+    return [
+        (names.get(s["effect"], f"+ {s['effect']}"), s["score_heldout"]) for s in steps(diagnosis)
+    ]
+
+
+def _estimate(estimate: Estimate) -> str:
+    name = estimate.name.split(".", 1)[-1]
+    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
+    spread = f" ± {estimate.std:.1g}" if np.isfinite(estimate.std) else ""
+    return f"{name} {estimate.value:.3g}{spread}{unit}"

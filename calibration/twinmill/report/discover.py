@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of what was found: the archive's map, and pictures of the best of each kind."""
+
+import numpy as np
+import twinmill_native as native
+from matplotlib.axes import Axes
+
+from twinmill.report import Figure, Section
+from twinmill.report.canvas import draw
+from twinmill.report.phase_figures import TRACE_EVERY_S, TRACE_S, paint_paths
+from twinmill.report.tables import Cell, Table, number
+from twinmill.swarm.classes import WORDS
+from twinmill.swarm.discover.entries import Entry
+from twinmill.swarm.discover.genes import table_text
+from twinmill.swarm.discover.kinds import KIND_COLORS, KIND_WORDS, MEASURES
+from twinmill.swarm.discover.search import Hunt
+
+ACROSS = 3
+
+
+def section(hunt: Hunt, found: list[Entry], shown: list[Entry], tried: int, cells: int) -> Section:
+    """The whole page."""
+    present = [kind for kind in KIND_COLORS if any(entry.kind == kind for entry in found)]
+    count = {kind: sum(entry.kind == kind for entry in found) for kind in present}
+    listed = ", ".join(f"{kind} {count[kind]}" for kind in present)
+    return Section(
+        title="Behaviours that were found",
+        score=[
+            ("behaviours kept", str(len(found)), ""),
+            ("of cells", str(cells), ""),
+            ("swarms tried", str(tried), ""),
+        ],
+        verdict=f"Of {tried} swarms, {len(found)} that differ: {listed}.",
+        facts=[
+            ("model", hunt.request.model_name),
+            ("robots", str(hunt.n)),
+            ("runs", f"{hunt.request.seeds} of {hunt.request.duration_s:g} s each"),
+            ("run one", f"in this folder: {shown[0].command}"),
+            ("put one on a robot", f"twinmill flash robot03.local --behavior {shown[0].name}"),
+        ],
+        figures=[
+            _map(found, present),
+            *[_gallery(hunt, k, [e for e in shown if e.kind == k]) for k in present],
+        ],
+        tables=[_table(shown)],
+    )
+
+
+def _map(found: list[Entry], present: list[str]) -> Figure:
+    names = list(MEASURES)
+    x, y = names.index("circliness"), names.index("scatter")
+
+    def paint(axes: Axes) -> None:
+        for kind in reversed(present):
+            at = np.array([entry.measures for entry in found if entry.kind == kind])
+            axes.plot(at[:, x], at[:, y], "o", ms=3.5, color=KIND_COLORS[kind], label=kind)
+        axes.set(xlabel="circliness (power of 10)", ylabel="scatter (power of 10, m²)")
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=4, columnspacing=1)
+
+    return Figure(
+        draw(4.4, paint),
+        "All that was kept",
+        "Each dot is the most repeatable swarm of its cell; cells also differ in rotation, groups "
+        "and where odd robots are.",
+    )
+
+
+def _gallery(hunt: Hunt, kind: str, best: list[Entry]) -> Figure:
+    rows = -(-len(best) // ACROSS)
+
+    def paint(panels) -> None:
+        for axes in panels.flat:
+            axes.set_axis_off()
+        for axes, entry in zip(panels.flat, best, strict=False):
+            axes.set_axis_on()
+            odd = entry.mix.odd_count
+            trace = native.trace_world(
+                hunt.cell(entry.mix),
+                hunt.request.first_seed,
+                hunt.request.duration_s,
+                TRACE_EVERY_S,
+            )[-int(TRACE_S / TRACE_EVERY_S) :]
+            paint_paths(axes, trace, KIND_COLORS[kind], odd)
+            title = f"{entry.name}\n{table_text(entry.mix.ring)}"
+            title += f"\n{odd} odd: {table_text(entry.mix.odd)}" if odd else ""
+            axes.set_title(title, fontsize=7)
+
+    words = KIND_WORDS.get(kind) or WORDS[kind]
+    return Figure(
+        draw(2.1 * rows + 0.2, paint, nrows=rows, ncols=ACROSS, squeeze=False),
+        f"{kind.capitalize()}: {words}",
+        f"The last {TRACE_S:.0f} s of one run each; dots are the robots at the end, odd ones "
+        "hollow; the bar is 1 m. Below the name: speed and turn for nothing seen, then for seen.",
+    )
+
+
+def _table(shown: list[Entry]) -> Table:
+    rows = [
+        [
+            Cell(entry.name),
+            Cell(entry.kind),
+            Cell(f"{100 * entry.share:.0f}"),
+            Cell(number(entry.alike, 2)),
+            *(Cell(number(value, 2)) for value in entry.measures),
+            Cell(entry.mix.behavior(entry.name)),
+        ]
+        for entry in shown
+    ]
+    runs = shown[0].confirmed
+    return Table(
+        "The most repeatable of each kind",
+        ["name", "kind", "% of its kind", "alike", *MEASURES, "behaviour"],
+        rows,
+        f"The share is of {runs} runs with fresh seeds. Alike: 1 is the same whatever the seed. "
+        "Circliness and scatter are powers of 10. The last column goes after --behavior.",
+        words=(0, 1, 4 + len(MEASURES)),
+    )

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of errors: how they grow, when they come, and what each step took away."""
+
+import numpy as np
+
+from twinmill.fit.compare import GOOD, MISSING, RobotComparison
+from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
+from twinmill.report.canvas import BEFORE, FLOOR, PREDICTED, draw, legend_above, plain_ticks
+from twinmill.report.html import Figure
+from twinmill.report.tables import SHOWN, WORST, number
+from twinmill.steady.compare import SteadyComparison
+
+TONES = {"good": "#009e73", "warn": "#e69f00", "bad": "#d55e00"}
+
+
+def error_growth(models: list[tuple[str, RobotComparison]]) -> Figure:
+    """Error against horizon in each channel, over the floor's band."""
+    colours = [PREDICTED] if len(models) == 1 else [BEFORE, PREDICTED]
+
+    def paint(panels) -> None:
+        for c, ((channel, unit), axes) in enumerate(zip(CHANNELS, panels, strict=True)):
+            factor, shown = SHOWN[unit]
+            floor = models[-1][1].floor.rms[:, c] * factor
+            found = [rms(robot.errors)[:, c] * factor for _, robot in models]
+            low = 0.6 * np.nanmin([floor, *found])
+            axes.fill_between(
+                HORIZONS_S, low, floor, color=FLOOR, alpha=0.25, lw=0, label="noise floor"
+            )
+            for (label, _), colour, marker, error in zip(
+                models, colours, "so", found, strict=False
+            ):
+                axes.plot(HORIZONS_S, error, marker=marker, ms=4, color=colour, label=label)
+            axes.set(
+                xscale="log", yscale="log", ylabel=f"{channel} error ({shown})", ylim=(low, None)
+            )
+            plain_ticks(axes.xaxis)
+            plain_ticks(axes.yaxis)
+        legend_above(panels[0], 3)
+        panels[-1].set_xlabel("predicted this many seconds ahead")
+
+    return Figure(
+        draw(6.0, paint, nrows=3, sharex=True),
+        "How errors grow with time",
+        "The further ahead, the larger the error. Inside the green band an error cannot be told "
+        "from noise: a line that runs along its edge is as good as this log can show. Each "
+        "gridline up is a factor.",
+    )
+
+
+def regimes(
+    robot: RobotComparison | SteadyComparison, of: str = "Predictions half a second ahead"
+) -> Figure:
+    """Error over floor by what the robot was doing."""
+    shown, labels, groups = [], [], {}
+    for regime in robot.where:
+        groups.setdefault(regime.group, []).append(regime)
+    for group, members in groups.items():
+        shown += members[:WORST]
+        labels += [f"{group}: {r.regime}" for r in members[:WORST]]
+
+    def paint(axes) -> None:
+        at = np.arange(len(shown))
+        ratios = np.array([r.ratio for r in shown])
+        colours = [
+            TONES["good"] if x <= GOOD else TONES["warn"] if x <= MISSING else TONES["bad"]
+            for x in ratios
+        ]
+        low = min(0.5, 0.8 * ratios.min())
+        axes.barh(at, ratios - low, left=low, color=colours, height=0.7)
+        for y, regime in zip(at, shown, strict=True):
+            axes.annotate(
+                f"{number(regime.ratio)}  ({100 * regime.share:.0f} %)",
+                (regime.ratio, y),
+                xytext=(3, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=8,
+            )
+        axes.axvline(1, color="#3c3c3c", lw=1, ls="--")
+        axes.set(
+            xscale="log",
+            xlim=(low, 2.2 * max(ratios.max(), 1)),
+            ylim=(len(shown) - 0.4, -0.6),
+            xlabel="error over noise floor (share of all error)",
+        )
+        axes.set_yticks(at, labels)
+        axes.grid(False, axis="y")
+        plain_ticks(axes.xaxis)
+
+    return Figure(
+        draw(0.9 + 0.24 * max(len(shown), 3), paint),
+        "When it fails",
+        f"{of}, sorted by what the robot was doing. A bar that ends "
+        "at the dashed line (1) is as good as the noise allows; a long bar is a place to look.",
+    )
+
+
+def waterfall(scores: list[tuple[str, float]]) -> Figure:
+    """What each step took from the score, on a scale of factors."""
+    values = np.array([score for _, score in scores])
+
+    def paint(axes) -> None:
+        at = np.arange(len(scores))
+        low = min(0.9, 0.9 * values.min())
+        axes.barh(at, values - low, left=low, color="#d9d9d9", height=0.62)
+        fell, rose = np.minimum(values[1:], values[:-1]), np.maximum(values[1:], values[:-1])
+        colours = [FLOOR if better else PREDICTED for better in values[1:] < values[:-1]]
+        axes.barh(at[1:], rose - fell, left=fell, color=colours, height=0.62)
+        edge = [values[0], *rose]
+        for y, (_, score) in enumerate(scores):
+            axes.annotate(
+                number(score),
+                (edge[y], y),
+                xytext=(4, 0),
+                textcoords="offset points",
+                va="center",
+                fontweight="bold",
+            )
+        axes.axvline(1, color="#3c3c3c", lw=1, ls="--")
+        axes.set(
+            xscale="log",
+            xlim=(low, 1.6 * values.max()),
+            ylim=(len(scores) - 0.4, -0.6),
+            xlabel="score: error over noise floor",
+        )
+        axes.set_yticks(at, [label for label, _ in scores])
+        axes.grid(False, axis="y")
+        plain_ticks(axes.xaxis)
+
+    return Figure(
+        draw(0.9 + 0.36 * max(len(scores), 3), paint),
+        "What each step gained",
+        "The score after each step. Green is what the step took away (red: added); the dashed "
+        "line at 1 is as good as this log can tell.",
+    )

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sections of text, tables and figures to one HTML file."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from twinmill.model.model_file import write_whole
+from twinmill.report.tables import Table, Tone
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What every output carries; the model's hash is empty where none was used."""
+
+    command: str
+    version: str
+    model_sha256: str
+
+    def to_json(self) -> dict:
+        """Fields of JSON output."""
+        return vars(self)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture as SVG text, and what is to be seen in it, in plain words."""
+
+    svg: str
+    title: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """One step of the work.
+
+    Attributes:
+        title: of the step.
+        score: label, number and colour of each score shown large.
+        verdict: what the score means.
+        facts: label and text.
+        figures, tables: in their order.
+        next_step: a sentence.
+        commands: where or when, and the command line to type there; below next_step.
+        warnings: sentences.
+    """
+
+    title: str
+    score: list[tuple[str, str, Tone]]
+    verdict: str
+    facts: list[tuple[str, str]] = field(default_factory=list)
+    figures: list[Figure] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
+    next_step: str = ""
+    commands: list[tuple[str, str]] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+
+SCORE_NOTE = (
+    "The score is prediction error over what noise alone would cause: 1.0 is as good as this log "
+    "can tell, above about 1.3 something is missing in the model, below 0.9 the noise was judged "
+    "wrongly."
+)
+
+
+def write_report(
+    folder: Path,
+    title: str,
+    source: Provenance,
+    sections: list[Section],
+    note: str = SCORE_NOTE,
+) -> Path:
+    """Writes index.html into a folder, which is made if need be.
+
+    The same input gives the same bytes: no date but the log's is in it.
+
+    Returns:
+        Path of the file.
+
+    Raises:
+        ModelError: it cannot be written.
+    """
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    path = Path(folder) / "index.html"
+    write_whole(path, render_page(title, source, sections, note))
+    return path
+
+
+def render_page(title: str, source: Provenance, sections: list[Section], note: str) -> str:
+    """The HTML text; the same input gives the same."""
+    environment = Environment(
+        loader=PackageLoader("twinmill.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("report.html.j2").render(
+        title=title, source=source, sections=sections, note=note
+    )

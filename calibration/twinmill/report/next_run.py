@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A planned run for people: terminal and report."""
+
+from dataclasses import dataclass
+from itertools import groupby
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from twinmill.experiment.design import Chance, Plan
+from twinmill.experiment.power import percent
+from twinmill.model.freedom import catalogue
+from twinmill.report import Section, show
+from twinmill.report import next_run_figures as figures
+from twinmill.report.tables import Cell, Table, Tone, number
+
+
+@dataclass(frozen=True)
+class How:
+    """How to play a script.
+
+    Attributes:
+        first: sentences on what to do before.
+        commands: where or when, and the command line.
+    """
+
+    first: str
+    commands: list[tuple[str, str]]
+
+
+def terminal(plan: Plan, how: How) -> RenderableType:
+    """What a person reads; command lines stay whole, to be copied."""
+    steps = [part for where, command in how.commands for part in (Text(where), _whole(command))]
+    return Group(
+        Text(plan.why),
+        Text(_outlook(plan), show.STYLES[_tone(plan.predicted_power)]),
+        Text(f"It takes {_length(plan)}"),
+        Text(),
+        show.table(_moves(plan)),
+        show.table(_chances(plan)),
+        *(Text(line) for line in (*_hidden(plan), how.first)),
+        *steps,
+    )
+
+
+def _whole(command: str) -> Text:
+    return Text(f"  {command}", no_wrap=True, overflow="ignore")
+
+
+def section(plan: Plan, how: How) -> Section:
+    """Of a report."""
+    power = plan.predicted_power
+    return Section(
+        "The next run",
+        [("predicted power", percent(power), _tone(power))],
+        f"{plan.why} {_outlook(plan)}",
+        [("run", _length(plan))],
+        [figures.duties(plan), figures.floor(plan), figures.margins(plan)],
+        [_chances(plan), _moves(plan)],
+        how.first,
+        how.commands,
+        _hidden(plan),
+    )
+
+
+def _length(plan: Plan) -> str:
+    along_m, across_m = plan.extent_m
+    return (
+        f"{plan.rows.end_s:.1f} s on {along_m:.1f} m along by {across_m:.1f} m across, the robot's "
+        "body included."
+    )
+
+
+def _outlook(plan: Plan) -> str:
+    told, asked = len(plan.separates), len(plan.chances)
+    return (
+        f"The run tells {told} of these {asked}; the right name comes with a chance of "
+        f"{percent(plan.predicted_power)}, if it is one of these that is missing."
+    )
+
+
+def _hidden(plan: Plan) -> list[str]:
+    """What even this run does not tell, and what would."""
+    entries = catalogue()
+    return [
+        f"{c.effect} stays open ({_rival(c)}); measured by hand: {entries[c.effect]['measure']}"
+        for c in plan.chances
+        if c.effect not in plan.separates
+    ]
+
+
+def _rival(chance: Chance) -> str:
+    return f"like {chance.rival}" if chance.rival else "too weak here"
+
+
+def _moves(plan: Plan) -> Table:
+    rows, at_s = [], float(plan.rows.t_s[1])
+    for name, same in groupby(plan.moves, key=lambda move: move.name):
+        moves = list(same)
+        times = f"{len(moves)} x " if len(moves) > 1 else ""
+        rows.append([Cell(f"{at_s:.1f}"), Cell(f"{times}{name}")])
+        at_s += sum(move.duration_s for move in moves)
+    return Table("The script", ["from (s)", "move"], rows, words=(1,))
+
+
+def _chances(plan: Plan) -> Table:
+    rows = [
+        [
+            Cell(c.effect),
+            Cell(c.rival or "none"),
+            Cell(number(c.margin_before)),
+            Cell(number(c.margin)),
+            Cell(percent(c.power_before)),
+            Cell(percent(c.power), _tone(c.power)),
+        ]
+        for c in plan.chances
+    ]
+    return Table(
+        "What it tells apart",
+        ["effect", "best\nimitation", "margin\nso far", "with\nthis run", "named\nso far", "then"],
+        rows,
+        "Margin: chi2 of the effect's trace that no rival and no change of the base could leave, "
+        "at its fitted strength or else its usual one. Named: chance that it is, if it is the one: "
+        "it must stand out, be told from its rivals and lower the score by 2 %. Where no log tells "
+        "its strength, that is the mean over weak, usual and strong (0.4, 1, 2.5 times).",
+        words=(0, 1),
+    )
+
+
+def _tone(power: float) -> Tone:
+    return "good" if power > 0.8 else "warn" if power > 0.5 else "bad"

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Results of calibration to sections of a report."""
+
+from twinmill.fit.add import AddResult
+from twinmill.fit.compare import Comparison
+from twinmill.fit.fit import FitResult
+from twinmill.report import tables, views
+from twinmill.report.advice import advice
+from twinmill.report.detection_figures import field_of_view
+from twinmill.report.error_figures import error_growth, regimes, waterfall
+from twinmill.report.html import Figure, Section
+from twinmill.report.motion_figures import floor_map, path, speeds
+from twinmill.report.steady_figures import steady_values
+from twinmill.report.tables import number, tone
+
+
+def comparison_section(result: Comparison) -> Section:
+    """Of one comparison."""
+    robot = tables.main_robot(result)
+    title = f"{result.model_name} against {robot.scene.measurement.log_name}"
+    return Section(
+        title,
+        [_score("score", result.score)],
+        result.verdict,
+        views.facts(result),
+        [
+            *_pictures(result, [("this model", robot)]),
+            *([field_of_view(result.bits)] if result.bits else []),
+        ],
+        views.robot_tables(result),
+        advice(result),
+        result.warnings,
+    )
+
+
+def fit_section(result: FitResult) -> Section:
+    """Of one fit: the same pictures of the fitted model, beside the old one's errors."""
+    before, after = tables.main_robot(result.before), tables.main_robot(result.after)
+    title = f"{result.before.model_name} fitted to {after.scene.measurement.log_name}"
+    return Section(
+        title,
+        [_score("before", result.before.score), _score("after", result.after.score)],
+        result.after.verdict,
+        views.facts(result.after),
+        _pictures(result.after, [("before", before), ("after", after)]),
+        [tables.parameters(result.parameters), *views.robot_tables(result.after)],
+        advice(result.after),
+        result.after.warnings,
+    )
+
+
+def added_section(result: AddResult) -> Section:
+    """Of one added effect."""
+    before, after = tables.main_robot(result.before), tables.main_robot(result.after)
+    scores = [
+        _score("before", result.before.score),
+        _score("after", result.after.score),
+        _score("held out, without", result.heldout_refit.score),
+        _score("held out, with it", result.heldout_after.score),
+    ]
+    title = f"{result.effect} added to {result.before.model_name}"
+    return Section(
+        title,
+        scores,
+        result.after.verdict,
+        views.facts(result.after),
+        _pictures(result.after, [("before", before), ("after", after)]),
+        [tables.parameters(result.parameters), *tables.held_out(result)],
+        advice(result.after),
+        result.after.warnings,
+    )
+
+
+def steps_section(title: str, scores: list[tuple[str, float]], verdict: str) -> Section:
+    """Of a chain of steps."""
+    ends = [_score("start", scores[0][1]), _score("end", scores[-1][1])]
+    return Section(title, ends, verdict, figures=[waterfall(scores)], tables=[tables.steps(scores)])
+
+
+def robot_pictures(result: Comparison) -> list[Figure]:
+    """Where and how fast the robot went, and when the model fails."""
+    robot, steady = result.main, views.sheets(result)
+    own = [] if robot in steady else [path(robot), speeds(robot), regimes(robot), floor_map(robot)]
+    if steady:
+        number = steady[0].scene.measurement.robot_id
+        own += [steady_values(steady), regimes(steady[0], f"Steady inputs of robot {number}")]
+    return own
+
+
+def _pictures(result: Comparison, models: list[tuple]) -> list[Figure]:
+    """The same, with errors over time if there is a log."""
+    growth = [] if result.main in views.sheets(result) else [error_growth(models)]
+    return robot_pictures(result) + growth
+
+
+def _score(label: str, value: float) -> tuple[str, str, tables.Tone]:
+    return label, number(value), tone(value)

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a person reads in the terminal."""
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from twinmill.fit.add import AddResult
+from twinmill.fit.compare import Comparison
+from twinmill.fit.fit import FitResult
+from twinmill.report import tables, views
+from twinmill.report.advice import advice
+from twinmill.report.tables import Cell, Table, number, tone
+
+STYLES = {"": "", "good": "bold green", "warn": "yellow", "bad": "bold red", "dim": "dim"}
+BAR = 20  # characters
+WARNINGS = 3  # in the terminal; --json has all
+
+
+def comparison(result: Comparison) -> RenderableType:
+    """A comparison."""
+    return Group(
+        _facts(views.facts(result)),
+        Text(),
+        score_line("score", result),
+        *_robots(result),
+        Text(),
+        *(table(t) for t in views.robot_tables(result)),
+        *_warnings(result.warnings),
+        _next(result),
+    )
+
+
+def fit(result: FitResult) -> RenderableType:
+    """A fit."""
+    return Group(
+        _facts(views.facts(result.before)),
+        Text(),
+        _change("score", result.before.score, result.after.score),
+        score_line("", result.after, number_too=False),
+        Text(),
+        table(tables.parameters(result.parameters)),
+        *_warnings(result.after.warnings),
+        _written(result.path),
+        _next(result.after),
+    )
+
+
+def added(result: AddResult) -> RenderableType:
+    """An added effect."""
+    own = [e for e in result.parameters if e.name.startswith(f"{result.effect}.")]
+    rest = len(result.parameters) - len(own)
+    return Group(
+        _facts(views.facts(result.before)),
+        Text(),
+        _change("score", result.before.score, result.after.score),
+        _change(
+            "held out",
+            result.heldout_refit.score,
+            result.heldout_after.score,
+            "without and with the effect, all refitted",
+        ),
+        score_line("", result.after, number_too=False),
+        Text(),
+        table(tables.parameters(own)),
+        Text(f"  and {rest} more refitted (--json has all).", "dim"),
+        *(table(t) for t in tables.held_out(result)),
+        *_warnings(result.after.warnings),
+        _written(result.path),
+        _next(result.after),
+    )
+
+
+def effect(entry: dict) -> RenderableType:
+    """One card of the catalogue."""
+    lines = _facts(
+        [
+            (label, entry[key])
+            for label, key in (
+                ("equation", "equation"),
+                ("stage", "stage"),
+                ("leaves out", "leaves_out"),
+                ("measure by", "measure"),
+                ("reference", "reference"),
+            )
+        ]
+    )
+    return Group(
+        Text.assemble((entry["name"], "bold"), f": {entry['summary']}"),
+        Text(),
+        lines,
+        Text(),
+        table(tables.effect_parameters(entry)),
+    )
+
+
+def table(data: Table) -> RenderableType:
+    """Any table."""
+    made = RichTable(
+        title=data.title,
+        title_justify="left",
+        title_style="bold",
+        caption=data.note or None,
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        padding=(0, 1, 0, 0),
+    )
+    for i, column in enumerate(data.columns):
+        words = i in data.words
+        made.add_column(column, justify="left" if words else "right", no_wrap=not words or i == 0)
+    for row in data.rows:
+        made.add_row(*(_cell(cell) for cell in row))
+    return made
+
+
+def score_line(label: str, result: Comparison, number_too: bool = True) -> Text:
+    """Score in colour, and what it means."""
+    line = Text(f"{label:<10}" if label else "")
+    if number_too:
+        line.append(number(result.score), STYLES[tone(result.score)]).append("  ")
+    return line.append(result.verdict)
+
+
+def _cell(cell: Cell) -> Text:
+    text = Text(cell.text, STYLES[cell.tone])
+    if cell.bar is None:
+        return text
+    filled = max(0, min(BAR, round(BAR * cell.bar)))
+    return Text.assemble(
+        ("█" * filled, STYLES[cell.tone]),
+        ("·" * (BAR - filled), "dim"),
+        " ",
+        (f"{cell.text:>6}", STYLES[cell.tone]),
+    )
+
+
+def _facts(pairs: list[tuple[str, str]]) -> RenderableType:
+    grid = RichTable.grid(padding=(0, 1))
+    grid.add_column(style="dim", min_width=10)
+    grid.add_column()
+    for label, text in pairs:
+        grid.add_row(label, Text(text))
+    return grid
+
+
+def _robots(result: Comparison) -> list[Text]:
+    if len(result.robots) == 1:
+        return []
+    return [
+        Text.assemble(f"  {r.scene.measurement.label}  ", (number(r.score), STYLES[tone(r.score)]))
+        for r in result.robots
+    ]
+
+
+def _change(label: str, before: float, after: float, note: str = "") -> Text:
+    return Text.assemble(
+        f"{label:<10}",
+        (number(before), STYLES[tone(before)]),
+        " → ",
+        (number(after), STYLES[tone(after)]),
+        (f"  {note}", "dim"),
+    )
+
+
+def _warnings(warnings: list[str]) -> list[RenderableType]:
+    lines: list[RenderableType] = [Text(f"! {text}", "yellow") for text in warnings[:WARNINGS]]
+    if len(warnings) > WARNINGS:
+        lines.append(Text(f"! and {len(warnings) - WARNINGS} more (--json has all).", "yellow"))
+    return lines
+
+
+def _written(path: object) -> Text:
+    return Text(f"Written: {path}")
+
+
+def _next(result: Comparison) -> RenderableType:
+    return Padding(Text(f"Next: {advice(result)}"), (1, 0, 0, 0))

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A comparison with a steady-state table as tables for people, all robots of it together."""
+
+from collections import defaultdict
+
+import numpy as np
+
+from twinmill.report.tables import Cell, Table, number, tone
+from twinmill.steady.compare import SteadyComparison
+from twinmill.steady.scene import CHANNELS
+
+WORST = 15  # inputs shown
+
+
+def facts(robots: list[SteadyComparison], model_name: str) -> list[tuple[str, str]]:
+    """What was compared with what: label and text."""
+    sheet = robots[0].scene.measurement
+    numbers = ", ".join(str(r.scene.measurement.robot_id) for r in robots)
+    runs = sum(int(r.scene.measurement.runs.sum()) for r in robots)
+    kind = robots[0].floor.kind
+    return [
+        ("table", f"{sheet.log_name}, robot{'s' * (len(robots) > 1)} {numbers}"),
+        ("holds", f"{runs} runs at {sum(len(r.errors) for r in robots)} steady inputs"),
+        ("model", model_name),
+        ("scatter", "; ".join(_scatter(robots[0], c) for c in (0, 1))),
+        (
+            "floor",
+            "scatter of repeated runs"
+            + (", with that of robots of one kind" if kind == "spread" else ""),
+        ),
+    ]
+
+
+def _scatter(robot: SteadyComparison, channel: int) -> str:
+    spread = robot.scene.measurement.spread[channel]
+    between = f", between robots {100 * spread.robots:.1f} %" if np.isfinite(spread.robots) else ""
+    return f"{CHANNELS[channel][0]}: runs of one robot {100 * spread.runs:.1f} %{between}"
+
+
+def errors(robots: list[SteadyComparison]) -> Table:
+    """Errors by channel, over all robots."""
+    rows = []
+    for c, (channel, unit) in enumerate(CHANNELS):
+        found = np.concatenate([r.errors[:, c] for r in robots])
+        floor = np.concatenate([r.scene.floor()[:, c] for r in robots])
+        known = np.isfinite(found)
+        if not known.any():
+            continue
+        ratio = float(np.sqrt(np.mean((found[known] / floor[known]) ** 2)))
+        rows.append(
+            [
+                Cell(channel),
+                Cell(unit),
+                Cell(str(int(known.sum()))),
+                Cell(number(float(np.sqrt(np.mean(found[known] ** 2))))),
+                Cell(number(float(np.sqrt(np.mean(floor[known] ** 2)))), "dim"),
+                Cell(number(ratio), tone(max(ratio, 1.0))),
+            ]
+        )
+    return Table(
+        "How far predictions miss",
+        ["channel", "unit", "values", "error", "floor", "ratio"],
+        rows,
+        "RMS of medians of runs less prediction; the ratio is that of each value's own. Standing "
+        "side: rim speed predicted where a side was seen to stand still.",
+        (0, 1),
+    )
+
+
+def cells(robots: list[SteadyComparison]) -> Table:
+    """Measured and predicted by input, mean over robots, the worst first."""
+    entries = sorted(_by_input(robots), key=lambda e: -e[-1])
+    rows = []
+    for inputs, measured, predicted, spread, still, ratio in entries[:WORST]:
+        row = [Cell(f"{v:g}") for v in inputs]
+        for c in (0, 1):
+            row += [
+                Cell(number(measured[c])),
+                Cell(number(predicted[c]), "" if np.isfinite(measured[c]) else "dim"),
+                Cell("-" if np.isnan(spread[c]) else f"{100 * spread[c]:.0f} %", "dim"),
+            ]
+        rows.append(
+            [
+                *row,
+                Cell("a side stood still" if still else ""),
+                Cell(number(ratio), tone(max(ratio, 1.0))),
+            ]
+        )
+    rest = len(entries) - len(rows)
+    return Table(
+        "By input",
+        [
+            "speed",
+            "direction\n°",
+            "turn",
+            "m/s",
+            "model",
+            "robots",
+            "rad/s",
+            "model",
+            "robots",
+            "seen",
+            "ratio",
+        ],
+        rows,
+        "Inputs as the vendor writes them (90° is forward, turn positive clockwise); rates are "
+        "positive counter-clockwise. Robots: how much they differ. Worst first"
+        + (f"; {rest} more in --json." if rest else "."),
+        (9,),
+    )
+
+
+def _by_input(robots: list[SteadyComparison]) -> list[tuple]:
+    """Input, measured, predicted and spread (2,), whether a side stood still, RMS ratio."""
+    groups: dict[tuple, list[tuple[SteadyComparison, int]]] = defaultdict(list)
+    for robot in robots:
+        for u, inputs in enumerate(robot.scene.measurement.inputs):
+            groups[tuple(inputs)].append((robot, u))
+    entries = []
+    for inputs, members in groups.items():
+        ratios = np.array([r.ratios[u] for r, u in members])
+        if not np.isfinite(ratios).any():
+            continue
+        sheets = [(r.scene.measurement, u) for r, u in members]
+        entries.append(
+            (
+                inputs,
+                _mean(np.array([s.value[u] for s, u in sheets])),
+                np.mean([r.predicted[u, :2] for r, u in members], axis=0),
+                _mean(np.array([s.cell_spread[u] for s, u in sheets])),
+                any(s.still[u] for s, u in sheets),
+                float(np.sqrt(np.nanmean(ratios**2))),
+            )
+        )
+    return entries
+
+
+def _mean(values: np.ndarray) -> np.ndarray:
+    """Over rows, NaN left out; NaN where there is nothing else."""
+    count = np.isfinite(values).sum(axis=0)
+    return np.nansum(values, axis=0) / np.where(count, count, np.nan)

@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tables that a person reads, as plain data: the terminal and the HTML report show the same."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Literal
+
+import numpy as np
+
+from twinmill.fit.add import AddResult
+from twinmill.fit.compare import GOOD, MISSING, SUSPECT, Comparison, RobotComparison
+from twinmill.fit.solve import Estimate
+from twinmill.predict.noise import Noise
+from twinmill.predict.regimes import HORIZON, Regime
+from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
+
+Tone = Literal["", "good", "warn", "bad", "dim"]
+
+FLOOR_KINDS = {
+    "repeat": "runs that the log repeats",
+    "bootstrap": "the model's own noisy replica",
+    "sensor": "sensor noise alone (too low)",
+}
+SHOWN = {
+    "m": (1000.0, "mm"),
+    "rad": (float(np.degrees(1)), "°"),
+}  # unit: factor, as a person reads it
+WORST = 3  # regimes of a group
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell: text, what colour it deserves, and a bar of this share of the column (or None)."""
+
+    text: str
+    tone: Tone = ""
+    bar: float | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table. Columns whose places are in `words` stand left and may wrap; a note goes below."""
+
+    title: str
+    columns: list[str]
+    rows: list[list[Cell]]
+    note: str = ""
+    words: tuple[int, ...] = (0,)
+
+
+def number(value: float | None, significant: int = 3) -> str:
+    """That many significant digits, without an exponent where a person would write none."""
+    if value is None or not np.isfinite(value):
+        return "-"
+    if value == 0 or 1e-4 <= abs(value) < 1e6:
+        power = int(f"{value:.{significant - 1}e}".partition("e")[2])
+        return f"{value:.{max(0, significant - 1 - power)}f}"
+    return f"{value:.{significant - 1}e}"
+
+
+def tone(score: float) -> Tone:
+    """Colour of a score or of a ratio."""
+    if not np.isfinite(score):
+        return "dim"
+    if score < SUSPECT:
+        return "warn"
+    return "good" if score <= GOOD else "warn" if score <= MISSING else "bad"
+
+
+def main_robot(comparison: Comparison) -> RobotComparison:
+    """The robot with most windows speaks for the errors, as in the JSON."""
+    return comparison.main
+
+
+def facts(comparison: Comparison) -> list[tuple[str, str]]:
+    """What was compared with what: label and text."""
+    robot = main_robot(comparison)
+    measurement, noise = robot.scene.measurement, robot.scene.noise
+    track = measurement.track
+    recorded = datetime.fromtimestamp(measurement.recorded_utime_us / 1e6, UTC)
+    date = f"{recorded:%Y-%m-%d %H:%M} UTC" if recorded.year > 2000 else "date unknown"
+    others = len(comparison.robots) - 1
+    return [
+        (
+            "log",
+            f"{measurement.log_name}, robot {track.robot_id}"
+            + (f" (and {others} more)" if others else ""),
+        ),
+        (
+            "recorded",
+            f"{date}, {track.pose_t_s[-1] - track.pose_t_s[0]:.0f} s, "
+            f"{len(track.pose)} poses, driven by {track.command_kind.replace('_', ' ')}",
+        ),
+        ("model", comparison.model_name),
+        ("noise", _noise(noise)),
+        ("floor", f"from {FLOOR_KINDS.get(robot.floor.kind, robot.floor.kind)}"),
+        (
+            "clock",
+            f"motion capture {number(1000 * abs(robot.time_offset_s))} ms "
+            f"{'ahead of' if robot.time_offset_s >= 0 else 'behind'} the robot",
+        ),
+    ]
+
+
+def _noise(noise: Noise) -> str:
+    """In words: what the sensor adds to a pose, and how the robot itself wavers."""
+    at, heading = noise.position, noise.heading
+    mm, degrees = number(1000 * at.sensor, 2), number(np.degrees(heading.sensor), 2)
+    mm_s, degrees_s = number(1000 * at.drive, 2), number(np.degrees(heading.drive), 2)
+    return (
+        f"each measured pose is off by {mm} mm and {degrees}°; "
+        f"the robot's speed wavers by {mm_s} mm/s for {number(at.memory_s, 2)} s at a time, "
+        f"its turning by {degrees_s}°/s for {number(heading.memory_s, 2)} s"
+    )
+
+
+def errors(robot: RobotComparison) -> Table:
+    """Errors by horizon and channel, each beside its floor."""
+    found, floor = rms(robot.errors), robot.floor.rms
+    columns = ["ahead\ns"]
+    for channel, unit in CHANNELS:
+        columns += [f"{channel}\n{SHOWN[unit][1]}", "floor", "ratio"]
+    rows = []
+    for h, horizon_s in enumerate(HORIZONS_S):
+        row = [Cell(f"{horizon_s:g}")]
+        for c, (_, unit) in enumerate(CHANNELS):
+            ratio = found[h, c] / floor[h, c]
+            row += [
+                Cell(number(found[h, c] * SHOWN[unit][0])),
+                Cell(number(floor[h, c] * SHOWN[unit][0]), "dim"),
+                Cell(number(ratio), tone(max(ratio, 1.0))),
+            ]
+        rows.append(row)
+    return Table(
+        "How far predictions miss",
+        columns,
+        rows,
+        "RMS error of predictions that start from measured poses; ratio is error over floor.",
+    )
+
+
+def where(robot: RobotComparison) -> Table:
+    """The worst regimes of each group."""
+    groups: dict[str, list[Regime]] = {}
+    for regime in robot.where:
+        groups.setdefault(regime.group, []).append(regime)
+    worst = max((r.ratio for r in robot.where), default=1.0)
+    rows = []
+    for group, regimes in groups.items():
+        for i, r in enumerate(regimes[:WORST]):
+            rows.append(
+                [
+                    Cell("" if i else group, "dim"),
+                    Cell(r.regime),
+                    Cell(number(r.ratio), tone(max(r.ratio, 1.0)), r.ratio / worst),
+                    Cell(f"{100 * r.share:.0f} %"),
+                ]
+            )
+    return Table(
+        "Where it fails",
+        ["by", "while", "error over floor", "share of error"],
+        rows,
+        f"Predictions {HORIZONS_S[HORIZON]:g} s ahead; the {WORST} worst of each kind.",
+        (0, 1),
+    )
+
+
+def parameters(estimates: list[Estimate]) -> Table:
+    """Fitted quantities with their uncertainty."""
+    rows = []
+    for e in estimates:
+        remark = ("at its bound" if e.at_bound else "") if e.seen else "not told by this log"
+        value, std = (
+            (_rounded(e.value, e.std), f"± {number(e.std)}") if e.seen else (number(e.value), "-")
+        )
+        rows.append(
+            [
+                Cell(e.name, "" if e.seen else "dim"),
+                Cell(value, "" if e.seen else "dim"),
+                Cell(std),
+                Cell("" if e.unit == "1" else e.unit),
+                Cell(remark, "warn" if remark else ""),
+            ]
+        )
+    return Table(
+        "Fitted quantities", ["quantity", "value", "std", "unit", ""], rows, words=(0, 3, 4)
+    )
+
+
+def _rounded(value: float, std: float) -> str:
+    """To the digits that the uncertainty leaves meaning."""
+    if not np.isfinite(std) or std <= 0:
+        return number(value)
+    return f"{value:.{int(np.clip(1 - np.floor(np.log10(std)), 0, 6))}f}"
+
+
+def held_out(added: AddResult) -> list[Table]:
+    """Errors on the half that was not fitted, before and after; none without a log."""
+    if not added.heldout_after.rows():
+        return []
+    columns = ["ahead\ns"]
+    for channel, unit in CHANNELS:
+        columns += [f"{channel}\n{SHOWN[unit][1]}", "after"]
+    rows = []
+    for h, horizon_s in enumerate(HORIZONS_S):
+        row = [Cell(f"{horizon_s:g}")]
+        for c, (_, unit) in enumerate(CHANNELS):
+            before, after = added.heldout_before.rms[h, c], added.heldout_after.rms[h, c]
+            row += [
+                Cell(number(before * SHOWN[unit][0])),
+                Cell(
+                    number(after * SHOWN[unit][0]),
+                    "good" if after < 0.95 * before else "bad" if after > 1.05 * before else "",
+                ),
+            ]
+        rows.append(row)
+    note = "Fitted on one half of the log, judged on the other, both ways."
+    return [Table("Errors on data that was not fitted", columns, rows, note)]
+
+
+def steps(scores: list[tuple[str, float]]) -> Table:
+    """Score after each step of a chain, with a bar on a scale of factors."""
+    widest = max(np.log(max(score, 1.0)) for _, score in scores) or 1.0
+    rows = [
+        [Cell(label), Cell(number(score), tone(score), float(np.log(max(score, 1.0)) / widest))]
+        for label, score in scores
+    ]
+    return Table(
+        "Score after each step",
+        ["step", "score"],
+        rows,
+        "1.0 is as good as the log can tell; bars show factors.",
+    )
+
+
+def catalogue(entries: list[dict]) -> Table:
+    """The effects in the order of the signal path."""
+    order = ("duty", "wheel", "ground", "world", "observe", "view", "decide")
+    ranked = sorted(entries, key=lambda e: order.index(e["stage"]))
+    rows = [[Cell(e["name"]), Cell(e["stage"]), Cell(e["summary"])] for e in ranked]
+    return Table(
+        "Effects",
+        ["effect", "stage", "what it is"],
+        rows,
+        "twinmill effects NAME shows one with its equation and parameters.",
+        (0, 1, 2),
+    )
+
+
+def effect_parameters(entry: dict) -> Table:
+    """Parameters of one effect."""
+    rows = [
+        [
+            Cell(p["name"]),
+            *(Cell(f"{p[key]:g}") for key in ("default", "min", "max", "neutral")),
+            Cell("" if p["unit"] == "1" else p["unit"]),
+            Cell(p["doc"]),
+        ]
+        for p in entry["parameters"]
+    ]
+    return Table(
+        "Parameters",
+        ["parameter", "default", "min", "max", "neutral", "unit", "meaning"],
+        rows,
+        words=(0, 5, 6),
+    )

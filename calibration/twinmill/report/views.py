@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Facts and tables of a comparison, whatever was measured: logs, steady-state tables, or both."""
+
+from twinmill.fit.compare import Comparison
+from twinmill.report import steady as present
+from twinmill.report import tables
+from twinmill.report.detection_tables import bit_tables
+from twinmill.report.tables import Table
+from twinmill.steady.compare import SteadyComparison
+
+
+def sheets(comparison: Comparison) -> list[SteadyComparison]:
+    """The robots known from tables."""
+    return [r for r in comparison.robots if isinstance(r, SteadyComparison)]
+
+
+def facts(comparison: Comparison) -> list[tuple[str, str]]:
+    """What was compared with what: label and text."""
+    if isinstance(comparison.main, SteadyComparison):
+        return present.facts(sheets(comparison), comparison.model_name)
+    return tables.facts(comparison)
+
+
+def robot_tables(comparison: Comparison) -> list[Table]:
+    """Errors and where they come: of the log that speaks for all, then of all tables."""
+    made = []
+    if not isinstance(comparison.main, SteadyComparison):
+        made += [tables.errors(comparison.main), tables.where(comparison.main)]
+    if steady := sheets(comparison):
+        made += [present.errors(steady), present.cells(steady)]
+    if comparison.bits:
+        made += bit_tables(comparison.bits)
+    return made

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One robot gets the program: checked, copied, installed, configured, restarted, heard."""
+
+import re
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from twinmill.robots.fleet import Fleet
+from twinmill.robots.package import Package
+from twinmill.robots.remote import Remote, RemoteError
+
+INSTALL_S = 300
+CAMERA_S = 5.0  # from the first telemetry until a camera must have opened
+
+
+@dataclass(frozen=True)
+class Target:
+    """A host and the number of the robot that it is."""
+
+    host: str
+    robot_id: int
+
+
+def parse_target(text: str) -> Target:
+    """Reads HOST or HOST=ID; without ID, the last number in the host's first name.
+
+    Raises:
+        ValueError: there is no number in 0..99.
+    """
+    host, _, number = text.partition("=")
+    if not number:
+        name = host.rpartition("@")[2].partition(".")[0]
+        found = re.findall(r"\d+", "" if name.isdigit() else name)
+        number = found[-1] if found else ""
+    if not number.isdigit() or int(number) > 99 or host.startswith("-") or not host:
+        raise ValueError(f"{text}: which robot is it? Write HOST=ID with an ID in 0..99.")
+    return Target(host, int(number))
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What is to be done.
+
+    Attributes:
+        package: to install; None: go back to the one before.
+        settings: of the configuration, KEY to value, besides the robot's number.
+        behaviors: file of tables of the user's own to put there; None: leave what is there.
+        dry_run: only look.
+        wait_s: for telemetry.
+    """
+
+    package: Package | None
+    settings: dict[str, str]
+    behaviors: Path | None
+    dry_run: bool
+    wait_s: float
+    ssh_config: Path | None
+
+
+@dataclass
+class Outcome:
+    """What became of one robot: ok, or the kind of failure and a sentence."""
+
+    target: Target
+    ok: bool = False
+    kind: str = ""
+    sentence: str = ""
+    before: str = ""
+    version: str = ""
+    battery_V: float = float("nan")
+    camera: str = ""
+    would: list[str] = field(default_factory=list)
+
+    def to_json(self) -> dict:
+        """As printed."""
+        return {"host": self.target.host, "robot_id": self.target.robot_id} | {
+            key: value for key, value in vars(self).items() if key != "target"
+        }
+
+
+def update(target: Target, wish: Wish, fleet: Fleet, say: Callable[[str], None]) -> Outcome:
+    """Does what is wished.
+
+    Args:
+        target: the robot.
+        wish: what to do.
+        fleet: somebody else listens to it meanwhile.
+        say: told the step that begins.
+    """
+    outcome = Outcome(target)
+    try:
+        _update(target, wish, fleet, say, outcome)
+        outcome.ok = True
+    except RemoteError as error:
+        outcome.kind, outcome.sentence = error.kind, str(error)
+    say("done" if outcome.ok else outcome.kind)
+    return outcome
+
+
+def _update(
+    target: Target, wish: Wish, fleet: Fleet, say: Callable[[str], None], outcome: Outcome
+) -> None:
+    remote, package = Remote(target.host, wish.ssh_config), wish.package
+    say("looking")
+    architecture, needed_kb = (package.architecture, package.needed_kb) if package else ("", 1)
+    settings = {"robot_id": str(target.robot_id), **wish.settings}
+    found = remote.run("probe", architecture, str(needed_kb))
+    outcome.before = found.get("installed", "")
+    if package is None and "previous" not in found:
+        raise RemoteError("no previous", "no package before is kept on it: give --package FILE.")
+    if wish.dry_run:
+        outcome.would = _plan(wish, found, settings)
+        return
+    if package is None:
+        say("going back")
+        remote.run("rollback", timeout_s=INSTALL_S)
+    else:
+        say("copying")
+        upload = _upload(remote, package.path)
+        say("installing")
+        remote.run("install", upload, timeout_s=INSTALL_S)
+        say("configuring")
+        if wish.behaviors:
+            remote.run("behaviors", _upload(remote, wish.behaviors))
+        remote.run("configure", *(f"{key}={value}" for key, value in settings.items()))
+    say("restarting")
+    restarted_s = time.monotonic()
+    remote.run("restart")
+    say("waiting for telemetry")
+    version = package.version if package else found["previous"]
+    _hear(target, version, restarted_s, wish.wait_s, fleet, outcome)
+
+
+def _upload(remote: Remote, path: Path) -> str:
+    upload = remote.run("upload")["upload"]
+    remote.copy(path, upload)
+    return upload
+
+
+def _plan(wish: Wish, found: dict[str, str], settings: dict[str, str]) -> list[str]:
+    package = wish.package
+    before = found.get("installed") or "nothing"
+    if package is None:
+        return [f"go back from {before} to {found['previous']}", "restart turbopi.service"]
+    changed = ", ".join(f"{key} = {value}" for key, value in settings.items())
+    return [
+        f"copy {package.path.name}, {package.path.stat().st_size // 1024} KB",
+        f"install {package.version} over {before}",
+        *([f"put {wish.behaviors} there"] if wish.behaviors else []),
+        f"set {changed}",
+        "restart turbopi.service and wait for telemetry",
+    ]
+
+
+def _hear(
+    target: Target,
+    version: str,
+    since_s: float,
+    wait_s: float,
+    fleet: Fleet,
+    outcome: Outcome,
+) -> None:
+    def heard() -> bool:
+        robot = fleet.robots.get(target.robot_id)
+        return bool(robot and robot.telemetry and robot.run_heard_s > since_s)
+
+    if not _wait(heard, wait_s):
+        raise RemoteError(
+            "no telemetry",
+            f"runs, but R{target.robot_id:02d} was not heard in {wait_s:g} s: is lcm_url in its "
+            "configuration this network's, with ttl=1?",
+        )
+    robot = fleet.robots[target.robot_id]
+    _wait(lambda: robot.camera not in ("lost", "no frames"), CAMERA_S)
+    outcome.version, outcome.camera = robot.run.version, robot.camera
+    outcome.battery_V = robot.telemetry.battery_V
+    if not version.startswith(outcome.version):
+        raise RemoteError(
+            "other version",
+            f"installed {version}, but R{target.robot_id:02d} says {outcome.version}: has another "
+            "robot the same number?",
+        )
+    if robot.camera in ("lost", "no frames"):
+        raise RemoteError("no camera", "runs, but its camera gives no pictures: is it plugged in?")
+
+
+def _wait(condition: Callable[[], bool], timeout_s: float) -> bool:
+    end_s = time.monotonic() + timeout_s
+    while not (met := condition()) and time.monotonic() < end_s:
+        time.sleep(0.05)
+    return met

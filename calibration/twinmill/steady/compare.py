@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compares a model with a steady-state table."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinmill.predict.floor import Floor, floor_of
+from twinmill.predict.regimes import Regime
+from twinmill.predict.windows import score
+from twinmill.steady.scene import CHANNELS, SteadyScene
+
+SLOW, FAST = 0.45, 0.75  # duty below and above which an input counts as slow and fast
+SPOT_MPS = 0.05
+
+
+@dataclass(frozen=True)
+class SteadyComparison:
+    """One robot of one table.
+
+    Attributes:
+        scene: table and model.
+        predicted, errors: (U, 3); m/s, rad/s, m/s.
+        floor: kind of the floor.
+        where: regimes.
+    """
+
+    scene: SteadyScene
+    predicted: np.ndarray
+    errors: np.ndarray
+    floor: Floor
+    where: list[Regime]
+
+    @property
+    def ratios(self) -> np.ndarray:
+        """(U, 3) errors over floor."""
+        return self.scene.ratios()
+
+    @property
+    def score(self) -> float:
+        """Of this robot alone."""
+        return score(self.ratios[:, None], np.ones((1, len(CHANNELS))))
+
+    @property
+    def size(self) -> int:
+        """How many values were predicted."""
+        return int(np.isfinite(self.errors).sum())
+
+    def error_rows(self) -> list[dict]:
+        """errors[] of the interface; a ratio is the RMS of each input's own."""
+        rows = []
+        for c, (channel, unit) in enumerate(CHANNELS):
+            known = np.isfinite(self.errors[:, c])
+            if known.any():
+                parts = (self.errors, self.scene.floor(), self.ratios)
+                values = [float(np.sqrt(np.mean(part[known, c] ** 2))) for part in parts]
+                rows.append(
+                    {
+                        "channel": channel,
+                        "unit": unit,
+                        "horizon_s": None,
+                        **dict(zip(("rms", "floor", "ratio"), values, strict=True)),
+                    }
+                )
+        return rows
+
+    def cells(self) -> list[dict]:
+        """One entry per input, in the vendor's convention; a spread is relative, over robots."""
+        sheet = self.scene.measurement
+        names = ("speed_input", "direction_deg", "turn_input")
+        keys = ("measured", "predicted", "floor", "ratio")
+        entries = []
+        for u, inputs in enumerate(sheet.inputs):
+            entry = {
+                **dict(zip(names, inputs.tolist(), strict=True)),
+                "runs": int(sheet.runs[u]),
+                "side_stands_still": bool(sheet.still[u]),
+                "standing_side_predicted_mps": float(self.predicted[u, 2]),
+            }
+            for c, channel in enumerate(("speed_mps", "turn_radps")):
+                values = (
+                    sheet.value[u, c],
+                    self.predicted[u, c],
+                    sheet.floor[u, c],
+                    self.ratios[u, c],
+                )
+                entry[channel] = {
+                    **{k: float(v) for k, v in zip(keys, values, strict=True)},
+                    "spread": float(sheet.cell_spread[u, c]),
+                }
+            entries.append(entry)
+        return entries
+
+    def to_json(self) -> dict:
+        """One entry of robots[]."""
+        sheet = self.scene.measurement
+        return {
+            "robot_id": sheet.robot_id,
+            "log": sheet.log_name,
+            "score": self.score,
+            "floor_kind": self.floor.kind,
+            "noise": None,
+            "errors": self.error_rows(),
+            "where": [r.to_json() for r in self.where],
+            "time_offset_s": None,
+            "spread": {
+                name: {"within_robot": s.runs, "between_robots": s.robots}
+                for name, s in zip(("speed", "turn"), sheet.spread, strict=True)
+            },
+            "cells": self.cells(),
+        }
+
+
+def compare_steady(scene: SteadyScene) -> SteadyComparison:
+    """Compares one robot of a table."""
+    return SteadyComparison(
+        scene, scene.predicted(), scene.errors(), floor_of(scene), _where(scene, scene.ratios())
+    )
+
+
+def _where(scene: SteadyScene, ratios: np.ndarray) -> list[Regime]:
+    """By path and by the smallest duty, the worst first."""
+    count = np.isfinite(ratios).sum(axis=1)
+    squares = np.nansum(ratios**2, axis=1)
+    regimes = [
+        Regime(
+            group,
+            name,
+            float(squares[mask].sum() / max(squares.sum(), 1e-12)),
+            float(np.sqrt(squares[mask].sum() / count[mask].sum())),
+            int(count[mask].sum()),
+        )
+        for group, name, mask in _masks(scene)
+        if count[mask].sum()
+    ]
+    return sorted(regimes, key=lambda r: (r.group != "path", -r.ratio))
+
+
+def _masks(scene: SteadyScene) -> Iterator[tuple[str, str, np.ndarray]]:
+    sheet = scene.measurement
+    turns = sheet.inputs[:, 2] != 0
+    along = np.isin(sheet.inputs[:, 1] % 180, (90,))
+    spot = turns & (np.nan_to_num(sheet.value[:, 0], nan=1.0) < SPOT_MPS)
+    yield "path", "straight, forward or back", ~turns & along
+    yield "path", "straight, sideways or diagonal", ~turns & ~along
+    yield "path", "on the spot", spot
+    yield "path", "in a circle", turns & ~spot
+    slowest = np.abs(scene.commands).min(axis=1)
+    yield "slowest wheel", f"duty below {SLOW:.0%}", slowest < SLOW
+    yield "slowest wheel", f"duty {SLOW:.0%} to {FAST:.0%}", (slowest >= SLOW) & (slowest <= FAST)
+    yield "slowest wheel", f"duty above {FAST:.0%}", slowest > FAST

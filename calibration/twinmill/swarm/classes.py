@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What becomes of a swarm: the classes, their colours, and what a behaviour is meant to do."""
+
+import difflib
+
+import numpy as np
+import pyarrow as pa
+from scipy.stats import binomtest
+
+from twinmill.swarm.request import Request
+
+# Colours of Okabe and Ito (2008), told apart by colour-blind readers.
+COLORS = {
+    "milling": "#009e73",
+    "ellipsoidal": "#f0e442",
+    "cluster": "#d55e00",
+    "separated": "#56b4e9",
+    "jammed": "#a0a0a0",
+    "undefined": "#e8e8e8",
+}
+WORDS = {
+    "milling": "one steady ring",
+    "ellipsoidal": "an uneven ring",
+    "cluster": "one colliding group",
+    "separated": "groups out of sight of each other",
+    "jammed": "a ring that touches or stands",
+    "undefined": "too few robots",
+}
+# Aims beyond a class: nobody can reach another's view for all of the last 10 s.
+DIFFUSED = "diffused"
+GOALS = [*COLORS, DIFFUSED]
+
+
+def check_goal(name: str) -> str:
+    """The name itself.
+
+    Raises:
+        ValueError: there is no such class; names the nearest.
+    """
+    if name in GOALS:
+        return name
+    near = difflib.get_close_matches(name, GOALS, n=1, cutoff=0.3)
+    hint = f"; the nearest is '{near[0]}'" if near else ""
+    raise ValueError(f"there is no class '{name}'{hint}. Classes: {', '.join(GOALS)}.")
+
+
+def goal_of(request: Request) -> str:
+    """What the first species is for, as far as its name tells."""
+    return DIFFUSED if request.behavior.startswith(("diffusing", "disperse")) else "milling"
+
+
+def reached(table: pa.Table, goal: str) -> np.ndarray:
+    """(rows,) whether a run got there."""
+    if goal == DIFFUSED:
+        return table["least_diffusion"].to_numpy() > 1
+    return np.array(table["class"].to_pylist()) == goal
+
+
+def interval(count: int, of: int, exact: bool = False) -> tuple[float, float]:
+    """95 % interval of a fraction: Wilson's, or that of Clopper and Pearson."""
+    low, high = binomtest(int(count), int(of)).proportion_ci(method="exact" if exact else "wilson")
+    return float(low), float(high)

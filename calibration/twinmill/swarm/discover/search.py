@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Quality-diversity search: the most repeatable swarm of each sort, by CMA-ME and MAP-Elites.
+
+Fontaine et al. 2020 (arXiv 1912.02400) and Mouret and Clune 2015 (arXiv 1504.04909), by pyribs.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import twinmill_native as native
+from ribs.archives import GridArchive
+from ribs.emitters import EvolutionStrategyEmitter, GaussianEmitter
+from ribs.schedulers import Scheduler
+
+from twinmill.model.model_file import write_whole
+from twinmill.swarm.discover.genes import GENES, Mix, decode
+from twinmill.swarm.discover.kinds import COLUMNS, MEASURES, measures
+from twinmill.swarm.request import Request
+
+BATCH = 36  # candidates of each emitter in a generation
+EMITTERS = 3
+STEP = 0.2  # first standard deviation of genes
+PER_GENERATION = BATCH * EMITTERS
+
+
+@dataclass(frozen=True)
+class Hunt:
+    """All that the archive depends on but the number of generations.
+
+    Attributes:
+        request: model, start, seeds and duration of each candidate's runs; without axes.
+        seed: of the search.
+    """
+
+    request: Request
+    n: int
+    seed: int
+
+    @property
+    def sha256(self) -> str:
+        """Of all in it."""
+        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
+
+    def cell(self, mix: Mix) -> native.Cell:
+        """The swarm of a mix."""
+        tables = mix.tables("mix")
+        named = replace(self.request, behavior=mix.behavior("mix"), n=self.n, tables=tables)
+        return named.cell(())
+
+    def run(self, mixes: list[Mix], seeds: range) -> np.ndarray:
+        """(mixes, seeds, COLUMNS) metrics of the last 10 s."""
+        count = len(os.sched_getaffinity(0))
+        chunks = [mixes[k::count] for k in range(min(count, len(mixes)))]
+        rows = np.empty((len(mixes), len(seeds), len(COLUMNS)))
+        with ThreadPoolExecutor(count) as pool:
+            for k, part in enumerate(pool.map(lambda chunk: self._run(chunk, seeds), chunks)):
+                rows[k::count] = part
+        return rows
+
+    def _run(self, mixes: list[Mix], seeds: range) -> np.ndarray:
+        cells = [self.cell(mix) for mix in mixes]
+        flat = native.run_worlds(
+            cells,
+            np.repeat(np.arange(len(cells)), len(seeds)),
+            np.tile(np.array(seeds, dtype=np.uint64), len(cells)),
+            self.request.duration_s,
+            self.request.full,
+        )
+        return flat.reshape(len(mixes), len(seeds), len(COLUMNS))
+
+
+@dataclass(frozen=True)
+class Elites:
+    """The archive, best first within each cell's place. (E, ...) arrays."""
+
+    genes: np.ndarray
+    alike: np.ndarray
+    measures: np.ndarray
+    rows: np.ndarray
+    cells: int
+
+
+def _scheduler(seed: int) -> Scheduler:
+    bounds = list(MEASURES.values())
+    archive = GridArchive(
+        solution_dim=GENES,
+        dims=[cells for _, _, cells in bounds],
+        ranges=[(low, high) for low, high, _ in bounds],
+        extra_fields={"place": ((), np.int64)},
+        seed=seed,
+    )
+    common = {"bounds": [(0.0, 1.0)] * GENES, "batch_size": BATCH, "x0": np.full(GENES, 0.5)}
+    emitters = [
+        EvolutionStrategyEmitter(archive, sigma0=STEP, seed=seed + 1, **common),
+        EvolutionStrategyEmitter(archive, sigma0=STEP, seed=seed + 2, **common),
+        GaussianEmitter(archive, sigma=STEP, seed=seed + 3, **common),
+    ]
+    return Scheduler(archive, emitters)
+
+
+class Ledger:
+    """What every generation gave, one file each: who goes on replays them."""
+
+    def __init__(self, folder: Path, hunt: Hunt) -> None:
+        """Makes the folder, or opens one of the same hunt.
+
+        Raises:
+            ValueError: it holds something else.
+        """
+        self._parts, manifest = folder / "generations", folder / "manifest.json"
+        if manifest.exists():
+            if json.loads(manifest.read_text())["sha256"] != hunt.sha256:
+                raise ValueError(
+                    f"{folder}: holds a search with other parameters, another model or version; "
+                    "choose another --out, or remove it."
+                )
+        elif folder.exists() and any(folder.iterdir()):
+            raise ValueError(f"{folder}: is not empty and holds no search; choose another --out.")
+        self._parts.mkdir(parents=True, exist_ok=True)
+        text = json.dumps({"sha256": hunt.sha256, "hunt": asdict(hunt)}, indent=1, sort_keys=True)
+        write_whole(manifest, text)
+
+    def rows(self, generation: int, genes: np.ndarray, run: Callable[[], np.ndarray]) -> np.ndarray:
+        """What was kept of these candidates, else what they do now, which is then kept."""
+        path = self._parts / f"{generation:06d}.parquet"
+        digest = hashlib.sha256(genes.tobytes()).hexdigest().encode()
+        if path.exists():
+            table = pq.read_table(path)
+            if table.schema.metadata.get(b"genes") == digest:
+                return np.stack([table[name].to_numpy() for name in COLUMNS], axis=-1).reshape(
+                    len(genes), -1, len(COLUMNS)
+                )
+        rows = run()
+        columns = {name: rows[..., k].ravel() for k, name in enumerate(COLUMNS)}
+        fresh = path.with_suffix(".tmp")
+        pq.write_table(pa.table(columns).replace_schema_metadata({"genes": digest}), fresh)
+        os.replace(fresh, path)
+        return rows
+
+
+def search(hunt: Hunt, folder: Path, generations: int, tell: Callable[[int, int], None]) -> Elites:
+    """Searches, or goes on where it was stopped.
+
+    Args:
+        hunt: what is searched.
+        folder: of the ledger.
+        generations: in all, those that are kept included.
+        tell: is given candidates tried and cells found after each.
+    """
+    ledger, scheduler, kept = Ledger(folder, hunt), _scheduler(hunt.seed), []
+    seeds = range(hunt.request.first_seed, hunt.request.first_seed + hunt.request.seeds)
+    for generation in range(generations):
+        genes = scheduler.ask()
+        mixes = [decode(one, hunt.n) for one in genes]
+        rows = ledger.rows(generation, genes, lambda mixes=mixes: hunt.run(mixes, seeds))
+        found, alike = measures(rows)
+        scheduler.tell(alike, found, place=len(kept) * PER_GENERATION + np.arange(len(genes)))
+        kept.append(rows)
+        tell((generation + 1) * PER_GENERATION, len(scheduler.archive))
+    data = scheduler.archive.data()
+    order = np.lexsort((data["index"], -data["objective"]))
+    return Elites(
+        data["solution"][order],
+        data["objective"][order],
+        data["measures"][order],
+        np.concatenate(kept)[data["place"][order]],
+        scheduler.archive.cells,
+    )

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What determines a sweep's result, to the byte, and the cells that follow from it."""
+
+import hashlib
+import itertools
+import json
+import math
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.swarm.axes import QUANTITIES, Axis, set_speeds
+
+MAX_ROBOTS = 1000
+# Agent-steps in one part: about a second's work. The lean kernel is a hundred times faster.
+PART_LEAN, PART_FULL = 50_000_000, 1_000_000
+
+
+@dataclass(frozen=True)
+class Request:
+    """All that a sweep's bytes depend on.
+
+    Attributes:
+        tables: own behaviours beside the firmware's: name, inputs (unseen speed, unseen turn,
+            seen speed, seen turn; turns in thousandths).
+        n: robots; None: what the behaviour says, or 6.
+        first_seed, seeds: seeds of every cell.
+        full: every robot its firmware and plant, also where the lean kernel would serve.
+    """
+
+    behavior: str
+    model_name: str
+    model_text: str
+    version: str
+    axes: list[Axis]
+    n: int | None = None
+    seeds: int = 50
+    first_seed: int = 1
+    duration_s: float = 120.0
+    start: str = "square"
+    spread_m: float = 1.2
+    target_radius_m: float | None = None
+    tables: list[tuple[str, list[int]]] = field(default_factory=list)
+    full: bool = False
+
+    def to_json(self) -> str:
+        """One line, the same for the same request."""
+        return json.dumps(asdict(self), sort_keys=True, allow_nan=False)
+
+    @classmethod
+    def from_json(cls, text: str) -> "Request":
+        """The inverse of to_json."""
+        data = json.loads(text)
+        data["axes"] = [Axis(axis["name"], tuple(axis["values"])) for axis in data["axes"]]
+        data["tables"] = [(name, row) for name, row in data["tables"]]
+        return cls(**data)
+
+    @property
+    def sha256(self) -> str:
+        """Of everything in it, the model's text included."""
+        return hashlib.sha256(self.to_json().encode()).hexdigest()
+
+    @property
+    def model(self) -> native.Model:
+        """Read anew."""
+        return native.Model.from_toml(self.model_text, self.model_name)
+
+    @property
+    def points(self) -> list[tuple[float, ...]]:
+        """Axis values of each cell, the first axis fastest."""
+        grids = [axis.values for axis in reversed(self.axes)]
+        return [tuple(reversed(point)) for point in itertools.product(*grids)]
+
+    @property
+    def world_count(self) -> int:
+        """Cells times seeds."""
+        return math.prod(len(axis.values) for axis in self.axes) * self.seeds
+
+    def species(self, n: int | None) -> tuple[list[list[int]], int]:
+        """Tables of all robots, and how many of the first species make the ring.
+
+        Where a mix is given and `n` differs from its sum, the first species takes up the rest.
+        """
+        mixed = ":" in self.behavior
+        robots = native.species(self.behavior, None if mixed else n, self.tables)
+        ring = sum(name == robots[0][0] for name, _ in robots)
+        wanted = len(robots) if n is None else n
+        if not 1 <= wanted <= MAX_ROBOTS or wanted <= len(robots) - ring:
+            raise ValueError(
+                f"{wanted} robots: from {len(robots) - ring + 1} to {MAX_ROBOTS} can run "
+                f"'{self.behavior}'."
+            )
+        ring += wanted - len(robots)
+        return [robots[0][1]] * ring + [row for name, row in robots if name != robots[0][0]], ring
+
+    def cell(self, point: tuple[float, ...]) -> native.Cell:
+        """The swarm at these axis values.
+
+        Raises:
+            ValueError: a value is out of bounds.
+        """
+        model, at = self.model, dict(zip((a.name for a in self.axes), point, strict=True))
+        if self.target_radius_m is not None:
+            model.set("sensor.target_radius_m", self.target_radius_m)
+        tables, ring = self.species(int(at["n"]) if "n" in at else self.n)
+        omega_degps = at.get("omega_degps")
+        omega = None if omega_degps is None else math.radians(omega_degps)
+        set_speeds(model, tables[0], at.get("v_mps"), omega)
+        for name, value in at.items():
+            if name not in QUANTITIES:
+                model.set(name, value)
+            elif setter := QUANTITIES[name].set:
+                setter(model, value)
+        return native.Cell(model, tables, ring, self.start, at.get("spread_m", self.spread_m))
+
+    def robots(self, point: tuple[float, ...]) -> int:
+        """How many there are in a cell."""
+        at = dict(zip((a.name for a in self.axes), point, strict=True))
+        return len(self.species(int(at["n"]) if "n" in at else self.n)[0])
+
+    def steps(self, model: native.Model) -> float:
+        """Control periods of one world."""
+        return self.duration_s / model.get("base.control_period_s")
+
+    def parts(self) -> list[range]:
+        """Worlds in pieces that depend on the request alone."""
+        cells = [self.cell(point) for point in (self.points[0], self.points[-1])]
+        lean = not self.full and not any(cell.why_not_lean for cell in cells)
+        robots = max(self.robots(point) for point in (self.points[0], self.points[-1]))
+        agent_steps = robots * self.steps(self.model)
+        size = max(1, int((PART_LEAN if lean else PART_FULL) / agent_steps))
+        return [
+            range(first, min(first + size, self.world_count))
+            for first in range(0, self.world_count, size)
+        ]
+
+
+def run_part(request: Request, worlds: range) -> dict[str, list]:
+    """Simulates some worlds, numbered seed by seed within cell by cell.
+
+    Returns:
+        The columns of the sweep's table.
+    """
+    numbers = np.array(worlds, dtype=np.int64)
+    cell_of, seeds = numbers // request.seeds, numbers % request.seeds + request.first_seed
+    points = request.points
+    used = list(range(cell_of[0], cell_of[-1] + 1))
+    cells = [request.cell(points[c]) for c in used]
+    rows = native.run_worlds(
+        cells, cell_of - used[0], seeds.astype(np.uint64), request.duration_s, request.full
+    )
+    columns: dict[str, list] = {"cell": cell_of.tolist(), "seed": seeds.tolist()}
+    for a, axis in enumerate(request.axes):
+        kind = int if axis.whole else float
+        columns[axis.name] = [kind(points[c][a]) for c in cell_of]
+    columns["n"] = [request.robots(points[c]) for c in cell_of]
+    for k, name in enumerate([*native.METRICS, "least_diffusion"]):
+        columns[name] = rows[:, k].tolist()
+    columns["class"] = native.classify(rows)
+    lean = [not request.full and not cell.why_not_lean for cell in cells]
+    columns["kernel"] = ["lean" if lean[c - used[0]] else "full" for c in cell_of]
+    return columns

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A sweep's folder: parts while it runs, one Parquet file when it is done."""
+
+import json
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from twinmill.swarm.request import Request
+
+
+@dataclass(frozen=True)
+class Store:
+    """Everything is written beside and renamed, so that a kill leaves whole files only."""
+
+    folder: Path
+
+    @property
+    def result(self) -> Path:
+        """The finished table."""
+        return self.folder / "sweep.parquet"
+
+    @property
+    def _manifest(self) -> Path:
+        return self.folder / "manifest.json"
+
+    def _part(self, number: int) -> Path:
+        return self.folder / "parts" / f"{number:06d}.parquet"
+
+    def open(self, request: Request) -> None:
+        """Makes the folder, or goes on in one that holds parts of the same request.
+
+        Raises:
+            ValueError: it holds something else.
+        """
+        if self._manifest.exists():
+            if self.read_manifest()["sha256"] != request.sha256:
+                raise ValueError(
+                    f"{self.folder}: holds a sweep with other parameters, another model or "
+                    "version; choose another --out, or remove it."
+                )
+        elif self.folder.exists() and any(self.folder.iterdir()):
+            raise ValueError(f"{self.folder}: is not empty and holds no sweep; choose another.")
+        self._part(0).parent.mkdir(parents=True, exist_ok=True)
+        manifest = {"sha256": request.sha256, "request": json.loads(request.to_json())}
+        self._replace(self._manifest, json.dumps(manifest, indent=1, sort_keys=True).encode())
+
+    def read_manifest(self) -> dict:
+        """`sha256` and `request`."""
+        return json.loads(self._manifest.read_text())
+
+    def missing(self, count: int) -> list[int]:
+        """Numbers of the parts not yet kept."""
+        return [number for number in range(count) if not self._part(number).exists()]
+
+    def keep(self, number: int, columns: dict[str, list]) -> None:
+        """Keeps one part."""
+        self._write(self._part(number), pa.table(columns))
+
+    def finish(self, request: Request, count: int) -> None:
+        """Joins all parts and removes them."""
+        table = pa.concat_tables([pq.read_table(self._part(number)) for number in range(count)])
+        about = {"twinmill_request": request.to_json(), "twinmill_sha256": request.sha256}
+        self._write(self.result, table.replace_schema_metadata(about))
+        shutil.rmtree(self._part(0).parent)
+
+    @staticmethod
+    def _write(path: Path, table: pa.Table) -> None:
+        fresh = path.with_suffix(".tmp")
+        pq.write_table(table, fresh, compression="zstd")
+        os.replace(fresh, path)
+
+    @staticmethod
+    def _replace(path: Path, data: bytes) -> None:
+        fresh = path.with_suffix(".tmp")
+        fresh.write_bytes(data)
+        os.replace(fresh, path)
+
+
+def read_sweep(folder: Path) -> tuple[Request, pa.Table]:
+    """A finished sweep.
+
+    Raises:
+        ValueError: there is none.
+    """
+    store = Store(folder)
+    if not store.result.exists():
+        state = "a sweep that is not finished" if store._manifest.exists() else "no sweep"
+        raise ValueError(f"{folder}: holds {state}; run twin_sweep --out {folder} to its end.")
+    table = pq.read_table(store.result)
+    return Request.from_json(table.schema.metadata[b"twinmill_request"].decode()), table

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Many swarms over a grid of parameters: asked for, run, joined and summed up."""
+
+import time
+from collections import Counter
+from importlib.metadata import version
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from twinmill.files import check_new_folder
+from twinmill.model.model_file import ModelFile
+from twinmill.swarm.axes import parse_axis
+from twinmill.swarm.request import Request
+from twinmill.swarm.store import Store, read_sweep
+from twinmill.swarm.workers import run_here, run_on_dask
+
+
+def make_request(
+    behavior: str, model: str, axes: list[str], tables: list[str] | None = None, **rest
+) -> Request:
+    """Checks everything before the long work.
+
+    Raises:
+        ValueError: in one sentence.
+    """
+    model_file = ModelFile.load(model)
+    parsed = [parse_axis(text, model_file.model) for text in axes]
+    names = [axis.name for axis in parsed]
+    if len(set(names)) < len(names):
+        raise ValueError(f"the axes {', '.join(names)}: each must be another quantity.")
+    request = Request(
+        behavior=behavior,
+        model_name=model_file.path.name,
+        model_text=model_file.text,
+        version=version("twinmill"),
+        axes=parsed,
+        tables=[parse_table(text) for text in tables or []],
+        **rest,
+    )
+    for point in request.points:
+        request.cell(point)
+    return request
+
+
+def parse_table(text: str) -> tuple[str, list[int]]:
+    """`name=unseen_speed,unseen_turn,seen_speed,seen_turn` in the robot's inputs.
+
+    Raises:
+        ValueError: in one sentence.
+    """
+    name, _, rest = text.partition("=")
+    try:
+        unseen_speed, unseen_turn, seen_speed, seen_turn = map(float, rest.split(","))
+    except ValueError:
+        raise ValueError(
+            f"--table '{text}': write name=speed,turn,speed,turn, for nothing seen and for seen, "
+            "as in spin=0,-1.5,100,0.5 (speed -100 to 100, turn -2 to 2)."
+        ) from None
+    milli = [round(unseen_turn * 1000), round(seen_turn * 1000)]
+    return name, [round(unseen_speed), milli[0], round(seen_speed), milli[1]]
+
+
+def sweep(
+    request: Request, folder: Path, workers: int | None = None, dask: str | None = None
+) -> dict:
+    """Runs what is missing of a sweep and joins it.
+
+    Returns:
+        What the JSON says.
+    """
+    store = Store(folder)
+    check_new_folder(folder)
+    store.open(request)
+    begin_s, parts = time.monotonic(), request.parts()
+    todo = {} if store.result.exists() else {k: parts[k] for k in store.missing(len(parts))}
+    done = len(parts) - len(todo)
+    run = run_on_dask(request, todo, dask) if dask else run_here(request, todo, workers)
+    with _progress() as progress:
+        task = progress.add_task("worlds", total=request.world_count)
+        progress.advance(task, request.world_count - sum(map(len, todo.values())))
+        for number, columns in run:
+            store.keep(number, columns)
+            progress.advance(task, len(parts[number]))
+    if not store.result.exists():
+        store.finish(request, len(parts))
+    return {**_summary(request, folder, begin_s), "parts": len(parts), "parts_kept_before": done}
+
+
+def _summary(request: Request, folder: Path, begin_s: float) -> dict:
+    _, table = read_sweep(folder)
+    wall_s = time.monotonic() - begin_s
+    kernels = Counter(table["kernel"].to_pylist())
+    reasons = {request.cell(point).why_not_lean for point in request.points} - {""}
+    return {
+        "out": str(folder),
+        "file": str(Store(folder).result),
+        "sha256": request.sha256,
+        "version": f"twinmill {request.version}",
+        "axes": {axis.name: list(axis.values) for axis in request.axes},
+        "cells": len(request.points),
+        "worlds": table.num_rows,
+        "classes": dict(sorted(Counter(table["class"].to_pylist()).items())),
+        "kernels": dict(sorted(kernels.items())),
+        "why_full": "asked for" if request.full else "; ".join(sorted(reasons)),
+        "wall_s": wall_s,
+    }
+
+
+def _progress() -> Progress:
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    return Progress(
+        *columns,
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the robot sees with the old limits and with the new ones, as a picture."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from twinmill.threshold.box import SURE_OUTSIDE, Ball, Look
+from twinmill.threshold.pictures import Picture
+
+SHOWN = 4
+HIT, MISS, FALSE = (60, 190, 75), (0, 110, 220), (230, 30, 30)
+
+
+def draw(
+    path: Path, pictures: list[Picture], balls: list[Ball], before: list[Look], after: list[Look]
+) -> None:
+    """Writes one row a picture: itself with the ball marked, and what both limits make of it."""
+    rows = range(min(SHOWN, len(pictures)))
+    figure = Figure(figsize=(12, 3.3 * len(rows)), layout="constrained")
+    for row in rows:
+        axes = [figure.add_subplot(len(rows), 3, 3 * row + k + 1) for k in range(3)]
+        picture, ball = pictures[row], balls[row]
+        axes[0].imshow(picture.rgb)
+        axes[0].add_patch(Circle((ball.x_px, ball.y_px), ball.radius_px, fill=False, color="w"))
+        axes[0].set_title(picture.name)
+        for axis, seen, words in ((axes[1], before[row], "before"), (axes[2], after[row], "after")):
+            axis.imshow(_coloured(picture, ball, seen))
+            axis.set_title(
+                f"{words}: {100 * seen.hit_frac:.0f} % of the ball, {seen.false_px} false px",
+            )
+        for axis in axes:
+            axis.set_axis_off()
+    figure.suptitle("green: ball, found   blue: ball, missed   red: found, but not the ball")
+    figure.savefig(path, dpi=90)
+
+
+def _coloured(picture: Picture, ball: Ball, seen: Look) -> np.ndarray:
+    shown = np.repeat(picture.yuv[..., :1] // 2 + 80, 3, axis=2)
+    distance = ball.distance(seen.mask.shape)
+    shown[(distance < 1) & ~seen.mask] = MISS
+    shown[(distance <= SURE_OUTSIDE) & seen.mask] = HIT
+    shown[(distance > SURE_OUTSIDE) & seen.mask] = FALSE
+    return shown

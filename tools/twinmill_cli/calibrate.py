@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill compare`, `fit` and `add`: from logs and a model to errors and a better model."""
+
+import shlex
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import RenderableType
+
+from twinmill.data.measurement import load_measurements
+from twinmill.diagnosis.detections.add import BitAddition, add_to_camera, is_of_camera
+from twinmill.files import check_new_file, check_new_folder
+from twinmill.fit.add import AddResult, add
+from twinmill.fit.compare import Comparison, compare
+from twinmill.fit.fit import FitResult, fit
+from twinmill.model.model_file import DEFAULT_MODEL, ModelFile
+from twinmill.report import (
+    Provenance,
+    Section,
+    added_section,
+    comparison_section,
+    fit_section,
+    show,
+    write_report,
+)
+from twinmill.report import detections as bits
+from twinmill_cli.effects import find_effect
+from twinmill_cli.options import Force, Logs, Model, NewModel, Out
+from twinmill_cli.output import AsJson, busy, deliver
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the commands to the application."""
+    app.command("compare")(_compare)
+    app.command("fit")(_fit)
+    app.command("add")(_add)
+
+
+def provenance(command: str, model: ModelFile) -> Provenance:
+    """What every output carries."""
+    return Provenance(command, f"twinmill {version('twinmill')}", model.hash)
+
+
+def _compare(
+    logs: Logs, model: Model = DEFAULT_MODEL, as_json: AsJson = False, out: Out = None
+) -> Comparison:
+    """Tell how well a model predicts logs, against the log's own noise, and where it fails.
+
+    Predictions start from measured poses and are judged 0.1, 0.2, 0.5, 1 and
+    2 s later. A score of 1.0 is as good as the log can tell; above 1.3
+    something is missing.
+
+    Example: twinmill compare run.lcmlog --model turbopi.toml --out report
+    """
+    source = provenance(command_line("compare", logs, model), model_file := open_model(model, out))
+    with busy(f"comparing with {model}"):
+        result = compare(load_measurements(logs), model_file)
+    section = comparison_section(result)
+    finish(result.to_json(), show.comparison(result), source, section, as_json, out)
+    return result
+
+
+def _fit(
+    logs: Logs,
+    output: NewModel,
+    model: Model = DEFAULT_MODEL,
+    force: Force = False,
+    as_json: AsJson = False,
+    out: Out = None,
+) -> FitResult:
+    """Fit all quantities of a model to logs; writes a new model file and leaves the old one.
+
+    Example: twinmill fit run.lcmlog --model turbopi.toml -o fitted.toml
+    """
+    source = provenance(
+        command_line("fit", logs, model, output), model_file := open_model(model, out)
+    )
+    check_output(output, model_file, force)
+    with busy(f"fitting {model}"):
+        result = fit(load_measurements(logs), model_file, output, source.command)
+    section = fit_section(result)
+    finish(result.to_json(), show.fit(result), source, section, as_json, out)
+    return result
+
+
+def _add(
+    effect: Annotated[
+        str,
+        typer.Argument(
+            metavar="EFFECT", show_default=False, help="Its name; `twinmill effects` lists them."
+        ),
+    ],
+    logs: Logs,
+    output: NewModel,
+    model: Model = DEFAULT_MODEL,
+    force: Force = False,
+    adds_to: Annotated[
+        str | None, typer.Option("--adds-to", help="Of an equation: vx_mps, rim_mps and others.")
+    ] = None,
+    formula: Annotated[
+        str | None, typer.Option("--formula", help="Of an equation: what is added, of p0 to p3.")
+    ] = None,
+    as_json: AsJson = False,
+    out: Out = None,
+) -> AddResult | BitAddition:
+    """Add an effect to a model, fit it with all the rest, and judge it on data not fitted to.
+
+    Example: twinmill add coasting run.lcmlog --model fitted.toml -o better.toml
+    """
+    known = [text["name"] for text in find_effect(effect)["texts"]]
+    texts = {"adds_to": adds_to, "formula": formula}
+    texts = {name: text for name, text in texts.items() if text is not None}
+    if extra := [name for name in texts if name not in known]:
+        option = f"--{extra[0].replace('_', '-')}"
+        raise ValueError(f"{option}: {effect} has none; it is for `twinmill add equation`.")
+    verb = f"add {effect}" + "".join(
+        f" --{name.replace('_', '-')} {shlex.quote(text)}" for name, text in texts.items()
+    )
+    source = provenance(
+        command_line(verb, logs, model, output), model_file := open_model(model, out)
+    )
+    check_output(output, model_file, force)
+    if is_of_camera(effect):
+        with busy(f"adding {effect} to {model}"):
+            seen = add_to_camera(
+                effect, load_measurements(logs), model_file, output, source.command
+            )
+        section = bits.addition_section(seen, model_file.path.name)
+        finish(seen.to_json(), bits.addition(seen), source, section, as_json, out)
+        return seen
+    with busy(f"adding {effect} to {model}"):
+        result = add(effect, load_measurements(logs), model_file, output, source.command, texts)
+    section = added_section(result)
+    finish(result.to_json(), show.added(result), source, section, as_json, out)
+    return result
+
+
+def command_line(verb: str, logs: list[Path], model: str, output: Path | None = None) -> str:
+    """The command line that does this again, without what only changes where and how it is told."""
+    words = ["twinmill", *shlex.split(verb), *map(str, logs), "--model", model]
+    return shlex.join(words + (["-o", str(output)] if output else []))
+
+
+def open_model(model: str, out: Path | None) -> ModelFile:
+    """Reads the model, once it is clear that the report's folder can be written."""
+    if out:
+        check_new_folder(out)
+    return ModelFile.load(model)
+
+
+def check_output(output: Path, model_file: ModelFile, force: bool) -> None:
+    """Raises ValueError if the new model could not be written, before the long work."""
+    if output.resolve() == model_file.path.resolve():
+        raise ValueError(
+            f"{output}: is the model that is read, and models are never changed in place; "
+            "choose another name."
+        )
+    check_new_file(output, force)
+
+
+def finish(
+    data: dict,
+    text: RenderableType,
+    source: Provenance,
+    section: Section,
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Report, then JSON or text."""
+    report = write_report(out, section.title, source, [section]) if out else None
+    deliver({**data, **source.to_json(), "report": str(report) if report else None}, text, as_json)
+    if report and not as_json:
+        typer.echo(f"Report: {report}")

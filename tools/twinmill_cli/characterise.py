@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill characterise`: drives one robot by a script, open loop, and logs all that is heard."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import turbopi
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from twinmill.data.log import LogError
+from twinmill.data.measurement_table import read_table
+from twinmill.data.recorder import Recorder
+from twinmill.files import check_new_file
+from twinmill.model.mixing import duties_from_inputs
+from twinmill.robots import tell
+from twinmill.robots.fleet import RUN_PERIOD_S, URL, Fleet
+from twinmill.robots.remote import Remote
+from twinmill_cli.keyboard import any_key
+from twinmill_cli.options import LcmUrl, Prefix, SshConfig
+from twinmill_cli.output import AsJson, deliver
+from twinmill_cli.swarm import warn_of_clocks
+
+LOST_S = 0.5  # without telemetry, or without a valid pose: stop
+AFTER_S = 1.0  # logged after the end: the robot still rolls
+INPUTS = ("speed_input", "turn_input")
+DUTIES = ("fl_pct", "fr_pct", "rl_pct", "rr_pct")
+
+
+class Abort(Exception):
+    """Why the robot must stop now, as the end of a sentence."""
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the application."""
+    app.command("characterise")(_characterise)
+
+
+def _characterise(
+    robot: Annotated[int, typer.Option("--robot", min=0, max=99, help="Its number.")],
+    script: Annotated[
+        str,
+        typer.Option("--script", metavar="CSV", help="Input script, or its name there."),
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="LOG", help="The log to write.")],
+    host: Annotated[
+        str, typer.Option("--host", help="Copy the script there first, by ssh: pi@robot03.local.")
+    ] = "",
+    cap_pct: Annotated[
+        int, typer.Option("--cap-pct", min=1, max=100, help="Refuse scripts with larger duties.")
+    ] = 60,
+    countdown_s: Annotated[float, typer.Option("--countdown-s", min=1, max=60)] = 3.0,
+    ssh_config: SshConfig = None,
+    lcm_url: LcmUrl = URL,
+    channel_prefix: Prefix = "",
+    force: Annotated[bool, typer.Option("--force", help="Replace LOG if it exists.")] = False,
+    as_json: AsJson = False,
+) -> int:
+    """Play an input script on one robot's wheels, and log its telemetry and poses.
+
+    Any key, Ctrl-C, lost telemetry or lost poses stop the robot; what was
+    logged until then is kept. Without --host, the script must lie on the robot
+    (/etc/turbopi/scripts) or in twin_run's --script-dir under the same name.
+
+    Example: twinmill characterise --robot 3 --script steps.csv --out run.lcmlog
+    """
+    check_new_file(out, force)
+    end_s = check_script(Path(script), cap_pct)
+    name = Path(script).name
+    if host:
+        copy_script(Remote(host, ssh_config), Path(script), name)
+    run = Run(Fleet(lcm_url, channel_prefix), robot, channel_prefix)
+    with Recorder(out) as recorder, any_key() as pressed:
+        why = run.drive(recorder, name, end_s, countdown_s, pressed)
+    ended = why or "played to its end"
+    data = {"log": str(out), "events": recorder.events, "ok": not why, "ended": ended}
+    deliver(data, f"{ended}\n{out}: {recorder.events} messages", as_json)
+    return 1 if why else 0
+
+
+def check_script(path: Path, cap_pct: int) -> float | None:
+    """How long a script takes, or None if it is not here but on the robot.
+
+    Raises:
+        ValueError: it is no script, or drives faster than the cap.
+    """
+    if not path.exists():
+        if path.name != str(path):
+            raise ValueError(f"{path}: no such script; a name without folder is one on the robot.")
+        return None
+    try:
+        table = read_table(path, {}, frozenset({"t_s", *INPUTS, *DUTIES}))
+        columns = INPUTS if table.has(INPUTS[0]) else DUTIES
+        t_s, values = table.finite("t_s"), [table.finite(name) for name in columns]
+    except LogError as error:
+        raise ValueError(str(error)) from error
+    rows = list(zip(*values, strict=True))
+    duties = [duties_from_inputs(*row) for row in rows] if columns == INPUTS else rows
+    for at_s, row in zip(t_s, duties, strict=True):
+        if max(map(abs, row)) > cap_pct:
+            raise ValueError(
+                f"{path}: a wheel's duty is {max(map(abs, row)):g} % at {at_s:g} s, above the cap "
+                f"of {cap_pct} %; if there is room for it, raise --cap-pct."
+            )
+    return float(t_s[-1])
+
+
+def copy_script(remote: Remote, path: Path, name: str) -> None:
+    """Puts a script where the robot's program looks for it."""
+    if not path.exists():
+        raise ValueError(f"{path}: no such script to copy.")
+    upload = remote.run("upload")["upload"]
+    remote.copy(path, upload)
+    remote.run("script", name, upload)
+
+
+@dataclass
+class Run:
+    """One robot that plays a script while all it says is logged."""
+
+    fleet: Fleet
+    robot_id: int
+    channel_prefix: str
+    pose_s: float = -1e9  # when a valid one came last, by time.monotonic()
+
+    def drive(
+        self,
+        recorder: Recorder,
+        script: str,
+        end_s: float | None,
+        countdown_s: float,
+        pressed: Callable[[], bool],
+    ) -> str:
+        """Plays the script and stops the robot, whatever happens.
+
+        Returns:
+            Why it was cut short; empty if it was not.
+
+        Raises:
+            ValueError: the robot is not there, or refuses.
+        """
+        self._listen_to(recorder)
+        tell.find(self.fleet, {self.robot_id})
+        self._check_ready()
+        warn_of_clocks(self.fleet, {self.robot_id})
+        try:
+            with self._watched("starts; any key stops", countdown_s, pressed):
+                self._start(script, countdown_s)
+            with self._watched("plays; any key stops", end_s, pressed):
+                self._play(end_s)
+            why = ""
+        except Abort as abort:
+            why = f"stopped: {abort}"
+        except KeyboardInterrupt:
+            why = "stopped: Ctrl-C"
+        finally:
+            (answer,) = tell.stop(self.fleet, {self.robot_id})
+            self.fleet.listen(AFTER_S)
+        if not answer.accepted:
+            why += "; NO ANSWER TO STOP: switch the robot off by hand"
+        return why
+
+    def _listen_to(self, recorder: Recorder) -> None:
+        prefix = f"{self.channel_prefix}R{self.robot_id:02d}_"
+
+        def on_message(channel: str, data: bytes) -> None:
+            recorder.add(channel, data)
+            if channel == f"{prefix}POSE" and turbopi.pose_t.decode(data).valid:
+                self.pose_s = time.monotonic()
+
+        subscription = self.fleet.bus.subscribe(prefix + ".*", on_message)
+        subscription.set_queue_capacity(1000)
+
+    def _check_ready(self) -> None:
+        if self.robot_id not in self.fleet.here():
+            raise ValueError(
+                f"robot {self.robot_id} is not heard; `twinmill swarm status` shows who is."
+            )
+        self.fleet.listen(1.0, lambda: self.pose_s > 0)
+        if self.pose_s < 0:
+            raise ValueError(
+                f"no pose of robot {self.robot_id} is heard; does motion capture publish "
+                f"R{self.robot_id:02d}_POSE, and does it see the robot?"
+            )
+        # So that the log says whose it is.
+        self.fleet.listen(RUN_PERIOD_S, lambda: self.fleet.robots[self.robot_id].run is not None)
+
+    def _start(self, script: str, countdown_s: float) -> None:
+        begun = tell.start(
+            self.fleet, {self.robot_id}, script, countdown_s, False, tell.VERBS.VERB_SCRIPT
+        )
+        (answer,) = begun.answers
+        if begun.called_off:
+            raise ValueError(f"robot {self.robot_id} does not play {script}: {answer.reason}.")
+
+    def _play(self, end_s: float | None) -> None:
+        robot, begin_s = self.fleet.robots[self.robot_id], time.monotonic()
+        while robot.mode == "script":
+            self.fleet.listen(0.1)
+        passed_s = time.monotonic() - begin_s
+        if robot.mode == "fault":
+            raise Abort("the robot reports a fault (camera, board or battery)")
+        if robot.mode == "running" or (end_s is not None and passed_s < end_s - 1):
+            raise Abort(f"the robot left the script after {passed_s:.1f} s")
+
+    @contextmanager
+    def _watched(
+        self, what: str, duration_s: float | None, pressed: Callable[[], bool]
+    ) -> Iterator[None]:
+        """Shows how long something takes on stderr, and ends it by Abort if it must not go on."""
+        console = Console(stderr=True)
+        columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+        with Progress(
+            *columns, console=console, transient=True, disable=not console.is_terminal
+        ) as progress:
+            task, begin_s = progress.add_task(what, total=duration_s), time.monotonic()
+
+            def watch() -> None:
+                progress.update(task, completed=time.monotonic() - begin_s)
+                if why := self._why_stop(pressed):
+                    self.fleet.watch = lambda: None  # the stop that follows is heard out
+                    raise Abort(why)
+
+            self.fleet.watch = watch
+            try:
+                yield
+            finally:
+                self.fleet.watch = lambda: None
+
+    def _why_stop(self, pressed: Callable[[], bool]) -> str:
+        if pressed():
+            return "a key was pressed"
+        now_s = time.monotonic()
+        heard_s = {"telemetry": self.fleet.robots[self.robot_id].heard_s, "pose": self.pose_s}
+        if now_s - min(heard_s.values()) <= LOST_S:
+            return ""
+        # Where both stop at once, which one came last says nothing.
+        lost = [what for what, at_s in heard_s.items() if now_s - at_s > LOST_S / 2]
+        why = ": motion capture has lost the robot" if lost == ["pose"] else ""
+        return f"no {' and no '.join(lost)} for {LOST_S:g} s{why}"

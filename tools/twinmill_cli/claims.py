@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill claims`: does this program do what was published?"""
+
+import hashlib
+import json
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Group
+from rich.text import Text
+
+from twinmill.files import check_new_folder, plain
+from twinmill.model.model_file import ModelFile, write_whole
+from twinmill.report import Provenance, Section, show, write_report
+from twinmill.report.tables import Cell, Table, number
+from twinmill.swarm.claims.claims import CLAIMS, ODD_TURNS
+from twinmill.swarm.claims.rows import Claim, Row
+from twinmill_cli.options import Out
+from twinmill_cli.output import AsJson, deliver, telling
+
+NOTE = (
+    "Claims of Vega et al. 2024 (arXiv 2410.16444). The reference is an independent C program of "
+    "their equations. Kinds of robot: point sees another's centre and has no body; disc sees any "
+    "part of 0.1 m and bodies push apart; robot sees centres, misses 4 %, imagines 10 %, and votes "
+    "over 10 frames. Shares and means agree within 3.5 standard deviations of both samples, radii "
+    "within 5 %, as the reference's own change by 9 % with its time step."
+)
+
+MOST_TURN = 4  # the ring's turn input is 0.5, and 2 is the most
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the application."""
+    app.command("claims")(_claims)
+
+
+def _claims(
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="NAME", help=f"Of {', '.join(CLAIMS)}.")
+    ] = None,
+    seeds: Annotated[int, typer.Option("--seeds", min=20, help="Runs of each cell.")] = 200,
+    odd_turn: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--odd-turn", help="Of the bull's-eye's odd robot, over the ring's turn rate."
+        ),
+    ] = None,
+    as_json: AsJson = False,
+    out: Out = None,
+) -> int:
+    """Check what was published of these swarms, with a figure of each claim.
+
+    Exit code 1 if a number differs and it is not known why. DIR also gets claims.json and every
+    figure as SVG.
+
+    Example: twinmill claims --out claims
+    """
+    names = only or list(CLAIMS)
+    if unknown := [name for name in names if name not in CLAIMS]:
+        raise ValueError(f"--only {unknown[0]}: must be one of {', '.join(CLAIMS)}.")
+    if strange := [turn for turn in odd_turn or [] if not abs(turn) <= MOST_TURN]:
+        raise ValueError(f"--odd-turn {strange[0]:g}: must be from -{MOST_TURN} to {MOST_TURN}.")
+    if out:
+        check_new_folder(out)
+    found = []
+    with telling("checking claims") as say:
+        for name in names:
+            say(name)
+            more = {"turns": tuple(odd_turn or ODD_TURNS)} if name == "bullseye" else {}
+            found.append(CLAIMS[name](seeds, **more))
+    source = Provenance(
+        _command_line(only, seeds, odd_turn),
+        f"twinmill {version('twinmill')}",
+        hashlib.sha256(ModelFile.load("paper.toml").text.encode()).hexdigest(),
+    )
+    hold = all(claim.holds for claim in found)
+    data = {
+        "hold": hold,
+        "seeds": seeds,
+        "claims": [claim.to_json() for claim in found],
+        **source.to_json(),
+    }
+    lines = [_line(claim) for claim in found]
+    lines += [show.table(_table(claim, off)) for claim in found if (off := _differing(claim))]
+    if out:
+        lines.append(f"Report: {_write(out, source, found, data)}")
+    deliver(data, Group(*lines), as_json)
+    return 0 if hold else 1
+
+
+def _command_line(only: list[str] | None, seeds: int, odd_turn: list[float] | None) -> str:
+    words = ["twinmill claims", *(f"--only {name}" for name in only or [])]
+    words += [f"--seeds {seeds}", *(f"--odd-turn {turn:g}" for turn in odd_turn or [])]
+    return " ".join(words)
+
+
+def _differing(claim: Claim) -> list[Row]:
+    return [row for row in claim.rows if row.agrees is False]
+
+
+def _line(claim: Claim) -> Text:
+    good, of = claim.count
+    mark = ("holds  ", "green") if claim.holds else ("DIFFERS", "red")
+    return Text.assemble(mark, f" {claim.title} ({good} of {of} numbers). {claim.finding}")
+
+
+def _write(out: Path, source: Provenance, found: list[Claim], data: dict) -> Path:
+    good = sum(claim.holds for claim in found)
+    report = write_report(
+        out, f"Published claims: {good} of {len(found)} hold", source, _sections(found), NOTE
+    )
+    write_whole(out / "claims.json", json.dumps(plain(data), indent=1, allow_nan=False) + "\n")
+    for claim in found:
+        for k, figure in enumerate(claim.figures, 1):
+            write_whole(out / f"{claim.name}_{k}.svg", figure.svg)
+    return report
+
+
+def _sections(found: list[Claim]) -> list[Section]:
+    return [
+        Section(
+            title=claim.title,
+            score=[
+                (
+                    "{} of {} numbers agree".format(*claim.count),
+                    "holds" if claim.holds else "differs",
+                    "good" if claim.holds else "bad",
+                )
+            ],
+            verdict=claim.finding,
+            facts=[("claim", claim.sentence)],
+            figures=claim.figures,
+            tables=[_table(claim, claim.rows)],
+        )
+        for claim in found
+    ]
+
+
+def _table(claim: Claim, shown: list[Row]) -> Table:
+    rows = [
+        [
+            Cell(row.what),
+            Cell(_number(row, row.value)),
+            Cell(f"{_number(row, row.low)} to {_number(row, row.high)}", "dim"),
+            Cell(_reference(row)),
+            _verdict(row),
+            Cell("; ".join(filter(None, (row.rule, row.known))), "dim"),
+        ]
+        for row in shown
+    ]
+    columns = ["number", "ours", "95 % interval", "reference", "", "by"]
+    return Table(
+        "Numbers" if len(shown) == len(claim.rows) else f"{claim.title}: what differs",
+        columns,
+        rows,
+        words=(0, 4, 5),
+    )
+
+
+def _verdict(row: Row) -> Cell:
+    if row.agrees is None:
+        return Cell("no reference", "dim")
+    if row.agrees:
+        return Cell("agrees", "good")
+    return Cell("differs", "warn" if row.known else "bad")
+
+
+def _number(row: Row, value: float) -> str:
+    if row.unit == "%":
+        return f"{100 * value:.1f} %"
+    return f"{number(value)}{' ' + row.unit if row.unit else ''}"
+
+
+def _reference(row: Row) -> str:
+    if row.reference is None:
+        return "-"
+    low, high = row.reference
+    if low == high:
+        return _number(row, low)
+    return f"{_number(row, low)} to {_number(row, high)}"

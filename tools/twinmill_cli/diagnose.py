@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill diagnose` and `explain`: which physical effect a model lacks."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import typer
+
+from twinmill.data.log import read_log
+from twinmill.data.measurement import load_measurements
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.explain import Explanation, explain
+from twinmill.diagnosis.result import Diagnosis
+from twinmill.model.model_file import DEFAULT_MODEL
+from twinmill.report import diagnosis as present
+from twinmill.swarm.metrics import swarm_metrics
+from twinmill_cli.calibrate import check_output, command_line, finish, open_model, provenance
+from twinmill_cli.compare_swarm import LOOK, compare_swarm
+from twinmill_cli.options import Force, Logs, Model, NewModel, Out
+from twinmill_cli.output import AsJson, telling
+
+TWIN_RUNS = 50
+TABLE = 1  # telemetry_t.mode
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the commands to the application."""
+    app.command("diagnose")(_diagnose)
+    app.command("explain")(_explain)
+
+
+def _diagnose(
+    logs: Logs, model: Model = DEFAULT_MODEL, as_json: AsJson = False, out: Out = None
+) -> Diagnosis:
+    """Name the physical effect that a model lacks, or say that none is or that the log cannot tell.
+
+    Best on a model whose base was fitted to another log of the same robot and clocks: then a lag
+    that is new and a delay can be told from what was there before.
+
+    Example: twinmill diagnose run.lcmlog --model fitted.toml
+    """
+    source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
+    with telling(f"diagnosing with {model}") as say:
+        measurements = load_measurements(logs)
+        result = diagnose(measurements, model_file, say)
+        swarm = None
+        if len({m.label for m in measurements if m.log_name == logs[0].name}) > 1:
+            say("the swarm as a whole")
+            note, swarm = _judge_swarm(logs[0], result)
+            result = replace(result, notes=[*result.notes, note])
+    data = {**result.to_json(), "swarm": swarm}
+    if data["next_experiment"]:  # the script comes from a command of its own
+        data["next_experiment"]["command"] = command_line("next", logs, model)
+    finish(data, present.terminal(result), source, present.section(result), as_json, out)
+    return result
+
+
+def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
+    """What no single robot shows: the whole log against swarms of the model that was found.
+
+    Returns:
+        A sentence, and the comparison where there is one.
+    """
+    if result.verdict in ("ambiguous", "outside_catalogue"):
+        return (
+            "Each robot was judged by itself; the swarm as a whole can be once the model predicts "
+            "each robot: `twinmill compare-swarm`."
+        ), None
+    log, model = read_log(path), result.state.model
+    if not all((robot.mode == TABLE).any() for robot in log.robots.values()):
+        return "Each robot was judged by itself: not all play a table, as a swarm does.", None
+    scale = model.get("sensor.range_m"), model.get("robot.body_radius_m")
+    try:
+        series = swarm_metrics(log, *scale)
+        found = compare_swarm(log, series, model, scale, range(1, TWIN_RUNS + 1))
+    except ValueError as error:
+        return f"Each robot was judged by itself; the swarm as a whole cannot be: {error}", None
+    done = "with what was found" if result.found else "with this model, its base refitted"
+    if not found.judgement.differs:
+        return f"The swarm as a whole, {done}: {found.verdict}", found.to_json()
+    return f"The swarm as a whole, {done}: {found.verdict} {LOOK.capitalize()}", found.to_json()
+
+
+def _explain(
+    logs: Logs,
+    output: NewModel,
+    model: Model = DEFAULT_MODEL,
+    force: Force = False,
+    as_json: AsJson = False,
+    out: Out = None,
+) -> Explanation:
+    """Diagnose, add what is found, and write the model that has it; every step on held-out data.
+
+    Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
+    """
+    source = provenance(
+        command_line("explain", logs, model, output), model_file := open_model(model, out)
+    )
+    check_output(output, model_file, force)
+    with telling(f"explaining with {model}") as say:
+        result = explain(load_measurements(logs), model_file, output, source.command, say)
+    section = present.section(result.diagnosis)
+    finish(result.to_json(), present.terminal_explanation(result), source, section, as_json, out)
+    return result

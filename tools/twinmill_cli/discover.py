@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill discover`: looks for behaviours that nobody thought of."""
+
+import hashlib
+import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from twinmill.files import check_new_folder
+from twinmill.report import Provenance, write_report
+from twinmill.report.discover import section
+from twinmill.swarm.discover.changes import with_changes
+from twinmill.swarm.discover.entries import Entry, confirm, entries, write_entries
+from twinmill.swarm.discover.kinds import KIND_COLORS
+from twinmill.swarm.discover.search import PER_GENERATION, Hunt, search
+from twinmill.swarm.sweep import make_request
+from twinmill_cli.output import AsJson, busy, deliver
+
+NOTE = (
+    "A search by quality and diversity: of each sort of swarm it keeps the one that does the same "
+    "whatever the start. Names are given after the search, which knows none of them."
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the application."""
+    app.command("discover")(_discover)
+
+
+def _discover(
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", show_default=False, help="Of the archive.")
+    ],
+    model: Annotated[str, typer.Option("--model", "-m", metavar="M")] = "paper.toml",
+    change: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Of the model, as an axis of twin_sweep."),
+    ] = None,
+    n: Annotated[int, typer.Option("--n", min=2, max=100, help="Robots.")] = 6,
+    generations: Annotated[
+        int, typer.Option("--generations", min=1, help=f"Of {PER_GENERATION} swarms each.")
+    ] = 100,
+    seeds: Annotated[int, typer.Option("--seeds", min=2, help="Runs of each swarm.")] = 8,
+    duration_s: Annotated[float, typer.Option("--duration-s", min=1)] = 120,
+    start: Annotated[str, typer.Option("--start")] = "square",
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the search.")] = 1,
+    show: Annotated[int, typer.Option("--show", min=1, help="Pictures of each kind.")] = 6,
+    confirm_runs: Annotated[
+        int, typer.Option("--confirm", min=1, help="Fresh runs of those that are shown.")
+    ] = 50,
+    as_json: AsJson = False,
+) -> list[Entry]:
+    """Search tables and mixes of two tables for behaviours that differ, and name what is known.
+
+    Stopped half way, or with more generations, the same command goes on where it
+    was. DIR/behaviors.toml makes each runnable by name in twin_run.
+
+    Example: twinmill discover --set robot.body_radius_m=0.1 --set target_radius_m=0.1 --out found
+    """
+    request = make_request(
+        "milling", model, change or [], n=n, seeds=seeds, duration_s=duration_s, start=start
+    )
+    check_new_folder(out)
+    hunt = Hunt(with_changes(request), n, seed)
+    with _progress(generations) as tell:
+        elites = search(hunt, out, generations, tell)
+    with busy("running the best again and drawing"):
+        found, start_m2 = entries(hunt, elites)
+        shown = _best(found, show)
+        confirm(hunt, shown, start_m2, confirm_runs)
+        write_entries(out, hunt, found)
+        tried = generations * PER_GENERATION
+        page = section(hunt, found, shown, tried, elites.cells)
+        source = _source(hunt, model, change or [], generations, out)
+        report = write_report(out, page.title, source, [page], NOTE)
+    data = {
+        "tried": tried,
+        "kept": len(found),
+        "cells": elites.cells,
+        "sha256": hunt.sha256,
+        "entries": [entry.to_json() for entry in found],
+        **source.to_json(),
+        "archive": str(out / "archive.parquet"),
+        "behaviors": str(out / "behaviors.toml"),
+        "report": str(report),
+    }
+    words = f"{page.verdict}\nReport: {report}\nRun one: cd {out} && {shown[0].command}"
+    deliver(data, words, as_json)
+    return found
+
+
+def _best(found: list[Entry], show: int) -> list[Entry]:
+    return [
+        entry
+        for kind in KIND_COLORS
+        for entry in [entry for entry in found if entry.kind == kind][:show]
+    ]
+
+
+def _source(hunt: Hunt, model: str, change: list[str], generations: int, out: Path) -> Provenance:
+    request = hunt.request
+    words = ["twinmill", "discover", "--model", model]
+    words += [word for text in change for word in ("--set", text)]
+    words += ["--n", str(hunt.n), "--generations", str(generations), "--seeds", str(request.seeds)]
+    words += ["--duration-s", f"{request.duration_s:g}", "--start", request.start]
+    words += ["--seed", str(hunt.seed), "--out", str(out)]
+    return Provenance(
+        shlex.join(words),
+        f"twinmill {request.version}",
+        hashlib.sha256(request.model_text.encode()).hexdigest(),
+    )
+
+
+@contextmanager
+def _progress(generations: int) -> Iterator:
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    ) as progress:
+        task = progress.add_task("swarms", total=generations * PER_GENERATION)
+        yield lambda tried, kept: progress.update(
+            task, completed=tried, description=f"swarms tried, {kept} kept"
+        )

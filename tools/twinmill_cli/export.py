@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill export`: a log for other programs."""
+
+import os
+import shlex
+import tempfile
+from collections.abc import Callable
+from enum import StrEnum
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+import pyarrow as pa
+import typer
+
+from twinmill.export.mcap_file import write_mcap
+from twinmill.export.recording import Recording, read_recording
+from twinmill.export.tables import tables_of, write_csv, write_parquet
+from twinmill.files import check_new_folder, replacing
+from twinmill.model.model_file import DEFAULT_MODEL
+from twinmill.model.outlines import Body
+from twinmill_cli.calibrate import open_model
+from twinmill_cli.options import Model
+from twinmill_cli.output import AsJson, busy, deliver
+
+
+class Format(StrEnum):
+    """What can be written."""
+
+    MCAP = "mcap"
+    CSV = "csv"
+    PARQUET = "parquet"
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the application."""
+    app.command("export")(_export)
+
+
+def _export(
+    log: Annotated[Path, typer.Argument(metavar="LOG", show_default=False)],
+    to: Annotated[Format, typer.Option("--to", show_default=False, help="What to write.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            show_default=False,
+            help="File (mcap) or folder (csv, parquet); default: LOG's name, here.",
+        ),
+    ] = None,
+    model: Model = DEFAULT_MODEL,
+    force: Annotated[bool, typer.Option("--force", help="Replace what exists.")] = False,
+    as_json: AsJson = False,
+) -> dict:
+    """Write a log as MCAP for Foxglove, or as tables, CSV or Parquet.
+
+    MCAP holds all channels with all fields, and robots, views and paths to look
+    at in Foxglove's 3D panel; the model says how large they are and how far they
+    see. Tables are one file per message type; `twinmill import` reads pose.csv,
+    telemetry.csv and drive.csv. A log that breaks off is read up to there.
+
+    Example: twinmill export run.lcmlog --to mcap
+    """
+    command = shlex.join(["twinmill", "export", str(log), "--to", to, "--model", model])
+    body = Body.of(open_model(model, None).model)
+    out = out or Path(f"{log.stem}.mcap" if to is Format.MCAP else f"{log.stem}_{to}")
+    with busy(f"exporting {log}"):
+        recording = read_recording(log)
+        provenance = {
+            "command": command,
+            "version": f"twinmill {version('twinmill')}",
+            "log_sha256": recording.sha256,
+            "t0_utime_us": recording.t0_utime_us,
+        }
+        if to is Format.MCAP:
+            with replacing(out, force) as temporary:
+                write_mcap(recording, temporary, provenance, body)
+            files = [out]
+        else:
+            writer = write_csv if to is Format.CSV else write_parquet
+            files = _write_tables(tables_of(recording, provenance), out, to, writer, force)
+    counts = {channel.name: len(channel.messages) for channel in recording.channels}
+    data = {
+        "out": str(out),
+        "files": [str(file) for file in files],
+        "messages": sum(counts.values()),
+        "channels": counts,
+        "warnings": recording.warnings,
+        **provenance,
+    }
+    deliver(data, _text(recording, files), as_json)
+    return data
+
+
+def _write_tables(
+    tables: dict[str, pa.Table],
+    folder: Path,
+    suffix: str,
+    write: Callable[[pa.Table, Path], None],
+    force: bool,
+) -> list[Path]:
+    """One file per table: all are there in the end, or none is new."""
+    check_new_folder(folder)
+    if folder.exists() and not force:
+        raise ValueError(f"{folder}: exists; choose another name, or replace it with --force.")
+    files = [folder / f"{name}.{suffix}" for name in tables]
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as temporary:
+        for table, file in zip(tables.values(), files, strict=True):
+            write(table, Path(temporary) / file.name)
+        folder.mkdir(exist_ok=True)
+        for file in files:
+            os.replace(Path(temporary) / file.name, file)
+    return files
+
+
+def _text(recording: Recording, files: list[Path]) -> str:
+    count = sum(len(channel.messages) for channel in recording.channels)
+    return "\n".join(
+        [
+            f"{count} messages of {len(recording.channels)} channels: {', '.join(map(str, files))}",
+            *(f"! {warning}" for warning in recording.warnings),
+        ]
+    )

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill flash`: puts the robot's program on many robots at once."""
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.console import Console, Group
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
+
+from twinmill.robots.fleet import URL, Fleet
+from twinmill.robots.package import Package, build_package, read_package
+from twinmill.robots.robot_update import Outcome, Target, Wish, parse_target, update
+from twinmill.swarm.behaviors import find_file, read_tables
+from twinmill_cli.options import LcmUrl, SshConfig
+from twinmill_cli.output import AsJson, deliver, telling
+
+AT_ONCE = 16
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the application."""
+    app.command("flash")(_flash)
+
+
+def _flash(
+    hosts: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="HOST[=ID]",
+            show_default=False,
+            help="Robots by ssh name; ID: the number in the name, if not given.",
+        ),
+    ],
+    behavior: Annotated[
+        str, typer.Option("--behavior", "-b", help="Play it: milling, or one of behaviors.toml.")
+    ] = "",
+    behaviors: Annotated[
+        Path | None,
+        typer.Option(
+            "--behaviors",
+            metavar="FILE",
+            help="Tables of your own, for `twinmill swarm` to name; default: behaviors.toml, if "
+            "--behavior is in it.",
+        ),
+    ] = None,
+    package: Annotated[
+        Path | None, typer.Option("--package", metavar="DEB", help="This one; default: build it.")
+    ] = None,
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="A key of its configuration; repeatable."),
+    ] = None,
+    rollback: Annotated[
+        bool, typer.Option("--rollback", help="Go back to the package before, kept on the robot.")
+    ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Look at the robots, say what would be done.")
+    ] = False,
+    wait_s: Annotated[float, typer.Option("--wait-s", min=1, help="For telemetry.")] = 20.0,
+    ssh_config: SshConfig = None,
+    lcm_url: LcmUrl = URL,
+    as_json: AsJson = False,
+) -> int:
+    """Install the robot's program on robots, all at once, and see that each runs.
+
+    Needs ssh with a key, and sudo without password, on Raspberry Pi OS (64 bit).
+    Robots stop while they are updated, and stand after it. Exit code 1 if any
+    failed; each says why.
+
+    Example: twinmill flash robot03.local robot04.local --behavior milling
+    """
+    targets = [parse_target(host) for host in hosts]
+    _refuse_twins(targets)
+    settings = _parse_settings(setting or [])
+    file = behaviors or find_file()
+    tables = read_tables(file) if file and (behaviors or behavior) else {}
+    if behavior:
+        settings |= {"behavior": behavior, "table": tables.get(behavior, "")}
+    if rollback and (settings or package or behaviors):
+        raise ValueError(
+            "--rollback changes nothing else: give no --behavior, --behaviors, --set, --package."
+        )
+    fleet = Fleet(lcm_url)
+    wish = Wish(
+        None if rollback else _package(package),
+        settings,
+        file if behaviors or behavior in tables else None,
+        dry_run,
+        wait_s,
+        ssh_config,
+    )
+    outcomes = _update_all(targets, wish, fleet)
+    data = {
+        "ok": all(outcome.ok for outcome in outcomes),
+        "dry_run": dry_run,
+        "package": wish.package.path.name if wish.package else None,
+        "robots": [outcome.to_json() for outcome in outcomes],
+    }
+    deliver(data, _plans(outcomes) if dry_run else _table(outcomes), as_json)
+    return 0 if data["ok"] else 1
+
+
+def _package(path: Path | None) -> Package:
+    if path:
+        return read_package(path)
+    with telling("package") as say:
+        return build_package(say)
+
+
+def _refuse_twins(targets: list[Target]) -> None:
+    """Two robots of one number would speak on the same channels."""
+    for k, target in enumerate(targets):
+        for other in targets[:k]:
+            if target.robot_id == other.robot_id:
+                raise ValueError(
+                    f"{other.host} and {target.host} would both be robot {target.robot_id}; "
+                    "write HOST=ID."
+                )
+
+
+def _parse_settings(pairs: list[str]) -> dict[str, str]:
+    for pair in pairs:
+        if "=" not in pair or not pair.partition("=")[0].isidentifier():
+            raise ValueError(f"--set {pair}: must be KEY=VALUE; turbopi --print-config lists keys.")
+    return dict(pair.split("=", 1) for pair in pairs)
+
+
+def _update_all(targets: list[Target], wish: Wish, fleet: Fleet) -> list[Outcome]:
+    """All at once, one line of progress each on stderr, while this thread hears the bus."""
+    console = Console(stderr=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with (
+        Progress(*columns, console=console, disable=not console.is_terminal) as progress,
+        ThreadPoolExecutor(AT_ONCE) as pool,
+    ):
+        futures: list[Future[Outcome]] = []
+        for target in targets:
+            line = progress.add_task(f"{target.host}: waits", total=1)
+
+            def say(step: str, line=line, target=target) -> None:
+                progress.update(line, description=f"{target.host}: {step}")
+
+            futures.append(pool.submit(update, target, wish, fleet, say))
+        while not all(future.done() for future in futures):
+            fleet.listen(0.1)
+        return [future.result() for future in futures]
+
+
+def _plans(outcomes: list[Outcome]) -> Group:
+    lines = []
+    for outcome in outcomes:
+        head = f"{outcome.target.host} (robot {outcome.target.robot_id})"
+        words = [f"  would {step}" for step in outcome.would] or [f"  {outcome.sentence}"]
+        lines.append(Text("\n".join([head, *words]), "" if outcome.ok else "red"))
+    return Group(*lines)
+
+
+def _table(outcomes: list[Outcome]) -> Group:
+    table = Table(box=box.SIMPLE_HEAD)
+    for column in ("host", "robot", "result", "before", "version", "battery", "camera"):
+        table.add_column(column)
+    for outcome in outcomes:
+        volts = outcome.battery_V
+        table.add_row(
+            outcome.target.host,
+            f"R{outcome.target.robot_id:02d}",
+            Text("ok", "green") if outcome.ok else Text(outcome.kind, "red"),
+            outcome.before or "-",
+            outcome.version or "-",
+            f"{volts:.2f} V" if volts == volts else "-",
+            outcome.camera or "-",
+        )
+    failed = [
+        Text(f"{outcome.target.host}: {outcome.sentence}", "red")
+        for outcome in outcomes
+        if not outcome.ok
+    ]
+    return Group(table, *failed)

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill import`: makes a log from motion capture exports and command tables of others."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from twinmill.data.importers.import_log import ImportOptions, import_log
+from twinmill.data.log import LogError
+from twinmill.report import show
+from twinmill.report.tables import Cell, Table
+
+SHOWN = 10  # warnings in the terminal; --json has all
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command `import` to the application."""
+    app.command("import", no_args_is_help=True)(_command)
+
+
+def _command(
+    out: Annotated[Path, typer.Option("--out", "-o", help="The log to write (.lcmlog).")],
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            help=("CSV: t_s, robot_id, x_m, y_m, theta_rad or qw, qx, qy, qz; optional z_m, valid.")
+        ),
+    ] = None,
+    motive: Annotated[
+        Path | None,
+        typer.Option(
+            help=(
+                "CSV export of OptiTrack Motive with rigid bodies, quaternions, global coordinates."
+            )
+        ),
+    ] = None,
+    commands: Annotated[
+        Path | None,
+        typer.Option(
+            help=(
+                "CSV: t_s, robot_id and fl_pct, fr_pct, rl_pct, rr_pct | speed_input, turn_input | "
+                "w1_radps..w4_radps | vx_mps, vy_mps, omega_radps; held until the next row."
+            )
+        ),
+    ] = None,
+    io_tsv: Annotated[
+        list[Path] | None, typer.Option(help=("io.tsv of a robot; repeat for several."))
+    ] = None,
+    robot: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=ID", help="Number of a Motive rigid body; else digits in its name."
+        ),
+    ] = None,
+    robot_id: Annotated[int | None, typer.Option(help="For files of one robot.")] = None,
+    rename: Annotated[
+        list[str] | None,
+        typer.Option(metavar="OLD=NEW", help="Read column OLD of the CSV files as NEW."),
+    ] = None,
+    up: Annotated[str, typer.Option(help="Axis that is up in the Motive export: y or z.")] = "y",
+    pose_shift_s: Annotated[float, typer.Option(help="Added to the times of poses.")] = 0.0,
+    heading_offset_deg: Annotated[
+        float,
+        typer.Option(help=("From the tracked body's x axis to the robot's front, left positive.")),
+    ] = 0.0,
+    force: Annotated[bool, typer.Option("--force", help="Replace the output.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
+) -> None:
+    """Make a log from motion capture exports and command tables.
+
+    Files may end in .gz. A Motive export that goes with io.tsv is placed in time
+    by its capture start, read as UTC; use --pose-shift-s for another time zone.
+
+    Example: twinmill import --poses poses.csv --commands commands.csv -o run.lcmlog
+    """
+    try:
+        if up not in ("y", "z"):
+            raise LogError(f"--up {up}: must be y or z.")
+        options = ImportOptions(
+            robot_id=robot_id,
+            rename=dict(_pair(text, "--rename OLD=NEW") for text in rename or []),
+            robots={
+                name: _number(number)
+                for name, number in (_pair(text, "--robot NAME=ID") for text in robot or [])
+            },
+            up=up,
+            pose_shift_s=pose_shift_s,
+            force=force,
+            heading_offset_rad=float(np.radians(heading_offset_deg)),
+        )
+        summary = import_log(
+            poses, commands, out, motive=motive, io_tsv=tuple(io_tsv or ()), options=options
+        )
+    except ValueError as error:
+        typer.echo(f"twinmill: {error}", err=True)
+        raise typer.Exit(1) from error
+    if as_json:
+        typer.echo(json.dumps(summary))
+    else:
+        _print(summary)
+
+
+def _pair(text: str, form: str) -> tuple[str, str]:
+    left, equals, right = text.rpartition("=")
+    if not (left and equals and right):
+        raise LogError(f"{form.split()[0]} {text}: must have the form {form.split()[1]}.")
+    return left, right
+
+
+def _number(text: str) -> int:
+    if not text.isdecimal():
+        raise LogError(f"--robot: '{text}' is no robot number in 0..99.")
+    return int(text)
+
+
+def _print(summary: dict) -> None:
+    table = Table(
+        f"{summary['out']}: {summary['messages']} messages, {summary['duration_s']:.1f} s",
+        ["robot", "driven by", "commands", "poses", "of them valid"],
+        [
+            [Cell("-" if value is None else str(value)) for value in robot.values()]
+            for robot in summary["robots"]
+        ],
+        words=(1,),
+    )
+    console = Console()
+    console.print(show.table(table))
+    for text in summary["warnings"][:SHOWN]:
+        console.print(f"! {text}", style="yellow", markup=False)
+    if len(summary["warnings"]) > SHOWN:
+        console.print(f"and {len(summary['warnings']) - SHOWN} more (--json has all).")

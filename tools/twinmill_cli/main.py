@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command `twinmill`: all subcommands, and one sentence on what went wrong."""
+
+import sys
+from importlib.metadata import version
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from twinmill_cli.lazy import Later
+
+# Name, module and what it does, in the order of the help. The modules are imported when called.
+COMMANDS = (
+    ("import", "import_log", "Make a log from motion capture exports and command tables."),
+    ("export", "export", "Write a log as MCAP for Foxglove, or as tables, CSV or Parquet."),
+    ("plot", "plot", "Draw paths, speeds, bits and wheel commands of all robots in a log."),
+    (
+        "watch",
+        "watch",
+        "Show robots and their twins (channels TWIN_...) side by side in the viewer Rerun.",
+    ),
+    (
+        "compare",
+        "calibrate",
+        "Tell how well a model predicts logs, against the log's own noise, and where it fails.",
+    ),
+    (
+        "fit",
+        "calibrate",
+        "Fit all quantities of a model to logs; writes a new model file and leaves the old one.",
+    ),
+    (
+        "add",
+        "calibrate",
+        "Add an effect to a model, fit it with all the rest, and judge it on data not fitted to.",
+    ),
+    (
+        "diagnose",
+        "diagnose",
+        "Name the physical effect that a model lacks, or say that none is or "
+        "that the log cannot tell.",
+    ),
+    (
+        "explain",
+        "diagnose",
+        "Diagnose, add what is found, and write the model that has it; every "
+        "step on held-out data.",
+    ),
+    (
+        "next",
+        "next",
+        "Design the run that best tells apart what these logs cannot, and write its script.",
+    ),
+    (
+        "challenge",
+        "challenge",
+        "Draw effects at random, seal the answers, let the twin make logs, "
+        "diagnose, unseal, score.",
+    ),
+    (
+        "effects",
+        "effects",
+        "List the physical effects that a model can have, or show one with its equation.",
+    ),
+    (
+        "flash",
+        "flash",
+        "Install the robot's program on robots, all at once, and see that each runs.",
+    ),
+    (
+        "characterise",
+        "characterise",
+        "Play an input script on one robot's wheels, and log its telemetry and poses.",
+    ),
+    (
+        "metrics",
+        "metrics",
+        "Tell what the swarm in a log or on the bus does: metrics over time, and its class.",
+    ),
+    (
+        "compare-swarm",
+        "compare_swarm",
+        "Tell whether a recorded swarm behaves as the twin's swarms do, and since when not.",
+    ),
+    (
+        "phase",
+        "phase",
+        "Draw what becomes of the swarm over a sweep's grid, and where to experiment next.",
+    ),
+    ("ask", "ask", "Answer one of the four design questions with a curve and a sentence."),
+    (
+        "claims",
+        "claims",
+        "Check what was published of these swarms, with a figure of each claim.",
+    ),
+    (
+        "discover",
+        "discover",
+        "Search tables and mixes of two tables for behaviours that differ, and name what is known.",
+    ),
+    (
+        "threshold",
+        "threshold",
+        "Find the limits of colour that hold the green ball, and nothing else.",
+    ),
+    (
+        "swarm",
+        "swarm",
+        "Start, stop and watch the robots on the network, or those of twin_run.",
+    ),
+)
+
+
+class Commands(TyperGroup):
+    """All of them."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        for name, module, summary in COMMANDS:
+            self.add_command(Later(name, f"twinmill_cli.{module}", summary))
+
+
+app = typer.Typer(
+    cls=Commands,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"twinmill {version('twinmill')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    show_version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """Compare a robot's log with its model, and make the model as good as the log can tell.
+
+    Lengths in m, angles in rad, times in s; what is printed for people says mm and degrees.
+
+    Exit codes: 0 done, 1 failed (one sentence on stderr), 2 wrong command line.
+    """
+
+
+def run(arguments: list[str]) -> Any:
+    """Runs one command line without the leading `twinmill`.
+
+    Returns:
+        What the subcommand found, or an exit code where it asked for one.
+
+    Raises:
+        ValueError, OSError: it failed, in one sentence.
+    """
+    return app(arguments, prog_name="twinmill", standalone_mode=False)
+
+
+def main() -> None:
+    """Entry point: leaves with the exit code."""
+    try:
+        result = run(sys.argv[1:] or ["--help"])
+        code = result if isinstance(result, int) else 0
+    except typer.TyperException as error:
+        code = error.exit_code
+        sentence = error.format_message()  # empty where help was printed instead
+        if sentence:
+            _complain(f"{sentence} (--help lists what can be given)" if code == 2 else sentence)
+    except (ValueError, OSError) as error:
+        code = 1
+        _complain(str(error))
+    sys.exit(code)
+
+
+def _complain(sentence: str) -> None:
+    print(f"twinmill: {' '.join(sentence.split())}", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

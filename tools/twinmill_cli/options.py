@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options that several subcommands share."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Logs = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG", show_default=False, help="LCM logs with commands and poses of a robot."
+    ),
+]
+Model = Annotated[
+    str,
+    typer.Option(
+        "--model", "-m", metavar="M", help="Model file, here or among the installed models."
+    ),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        help="Write an HTML report, DIR/index.html, with its pictures in it.",
+    ),
+]
+NewModel = Annotated[
+    Path,
+    typer.Option(
+        "--output", "-o", metavar="M2", show_default=False, help="The new model file (.toml)."
+    ),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace M2 if it exists.")]
+LcmUrl = Annotated[str, typer.Option("--lcm-url", help="The bus that the robots are on.")]
+Prefix = Annotated[
+    str, typer.Option("--channel-prefix", help="As given to twin_run, to speak to a twin alone.")
+]
+SshConfig = Annotated[
+    Path | None,
+    typer.Option("--ssh-config", metavar="FILE", help="Instead of ~/.ssh/config: ssh -F."),
+]
+DurationS = Annotated[
+    float, typer.Option("--duration-s", min=0.1, help="Of the bus; else until Ctrl-C.")
+]

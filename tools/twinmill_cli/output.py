@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What all subcommands share: JSON or text, and the spinner."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Annotated
+
+import typer
+from rich.console import Console, RenderableType
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from twinmill.files import plain
+
+AsJson = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object on stdout, nothing else.")
+]
+
+
+def deliver(data: dict, text: RenderableType, as_json: bool) -> None:
+    """Prints the one or the other on stdout; text that must not wrap is not cut either."""
+    if as_json:
+        print(json.dumps(plain(data), allow_nan=False))
+    else:
+        Console().print(text, crop=False)
+
+
+@contextmanager
+def busy(what: str) -> Iterator[None]:
+    """Shows on stderr, if that is a terminal, what is being done and for how long."""
+    with telling(what):
+        yield
+
+
+@contextmanager
+def telling(what: str) -> Iterator[Callable[[str], None]]:
+    """The same, with a function that tells in words where the work has got to."""
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    console = Console(stderr=True)
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as progress:
+        task = progress.add_task(what, total=None)
+        yield lambda words: progress.update(task, description=f"{what}: {words}")

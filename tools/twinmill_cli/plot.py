@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill plot`: a log at one glance."""
+
+import shlex
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+import matplotlib
+import typer
+from matplotlib.figure import Figure as Canvas
+
+from twinmill.data.log import LogError
+from twinmill.data.multi_log import Cast, read_everyone
+from twinmill.files import replacing
+from twinmill.report import Figure, Provenance, Section, render_page
+from twinmill.report.canvas import STYLE, draw
+from twinmill.report.log_figures import Drawing
+from twinmill_cli.output import AsJson, busy, deliver
+
+SUFFIXES = (".png", ".svg", ".html")
+WIDTH_IN, DPI = 8.0, 150
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the application."""
+    app.command("plot")(_plot)
+
+
+def _plot(
+    log: Annotated[Path, typer.Argument(metavar="LOG", show_default=False)],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", show_default=False, help="A .png, .svg or .html; default: LOG.png."
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace what exists.")] = False,
+    as_json: AsJson = False,
+) -> dict:
+    """Draw paths, speeds, bits and wheel commands of all robots in a log.
+
+    Speeds come from the poses. Twins on channels TWIN_... are dashed.
+
+    Example: twinmill plot run.lcmlog -o run.html
+    """
+    out = out or Path(f"{log.stem}.png")
+    if out.suffix not in SUFFIXES:
+        raise ValueError(f"{out}: must end in {', '.join(SUFFIXES)}: the end says what is drawn.")
+    with busy(f"drawing {log}"), replacing(out, force) as temporary:
+        cast = read_everyone(log)
+        panels = _panels(cast, log)
+        command = shlex.join(["twinmill", "plot", str(log), "-o", str(out)])
+        source = Provenance(command, f"twinmill {version('twinmill')}", "")
+        if out.suffix == ".html":
+            temporary.write_text(_page(log, cast, panels, source))
+        else:
+            _sheet(log, panels, temporary, out.suffix[1:])
+    data = {
+        "out": str(out),
+        "robots": [actor.name for actor in cast.actors],
+        "warnings": cast.warnings,
+        "log_sha256": cast.sha256,
+        **source.to_json(),
+    }
+    deliver(data, "\n".join([str(out), *(f"! {w}" for w in cast.warnings)]), as_json)
+    return data
+
+
+def _panels(cast: Cast, log: Path) -> list[tuple]:
+    """(painter, height_in, title, caption) of all that the log can show."""
+    drawing = Drawing(cast.actors)
+    rows = len(drawing.driven)
+    panels = []
+    if drawing.tracked:
+        panels += [
+            (drawing.paths, 4.6, "Paths", "Seen from above; dots are the ends, lines the front."),
+            (drawing.speed, 1.6, "Speed", "Forward, from the poses."),
+            (drawing.turn, 1.4, "Turn", "Counter-clockwise is positive, from the poses."),
+        ]
+    if drawing.telling:
+        height_in = 0.5 + 0.18 * len(drawing.telling)
+        panels.append((drawing.bits, height_in, "Bits", "Green: the robot sees a neighbour."))
+    if drawing.driven:
+        words = "A row per wheel: front-left, front-right, rear-left, rear-right."
+        panels.append((drawing.commands, 0.8 + 0.36 * rows, "Commands", words))
+    if not panels:
+        raise LogError(f"{log.name}: has neither poses nor commands; there is nothing to draw.")
+    return panels
+
+
+def _sheet(log: Path, panels: list[tuple], path: Path, kind: str) -> None:
+    """All panels below each other in one picture."""
+    heights = [height_in for _, height_in, _, _ in panels]
+    with matplotlib.rc_context(STYLE):
+        canvas = Canvas(figsize=(WIDTH_IN, sum(heights)), layout="constrained", dpi=DPI)
+        canvas.suptitle(log.name, x=0.01, ha="left", fontsize=10, fontweight="bold")
+        rows = canvas.subplots(nrows=len(panels), height_ratios=heights, squeeze=False)[:, 0]
+        for axes, (paint, *_) in zip(rows, panels, strict=True):
+            paint(axes)
+        metadata = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}
+        canvas.savefig(path, format=kind, metadata=metadata[kind])
+
+
+def _page(log: Path, cast: Cast, panels: list[tuple], source: Provenance) -> str:
+    figures = [
+        Figure(draw(height_in + 0.2, paint), title, caption)
+        for paint, height_in, title, caption in panels
+    ]
+    section = Section(
+        title=log.name,
+        score=[],
+        verdict=f"{', '.join(actor.name for actor in cast.actors)}.",
+        figures=figures,
+        warnings=cast.warnings,
+    )
+    return render_page(log.name, source, [section], "")

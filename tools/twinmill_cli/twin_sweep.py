@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The program twin_sweep. Python drives it, for tables, clusters and progress; C++ simulates."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from twinmill.swarm.axes import ALIASES, QUANTITIES
+from twinmill.swarm.sweep import make_request, sweep
+from twinmill_cli.output import AsJson, deliver
+
+INTERRUPTED = 130  # what typer makes of Ctrl-C
+AXIS_HELP = "name=from:to:count or name=value,value,..."
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _text(data: dict) -> str:
+    classes = ", ".join(f"{name} {count}" for name, count in data["classes"].items())
+    lines = [f"{data['worlds']} worlds in {data['cells']} cells, {data['wall_s']:.1f} s: {classes}"]
+    if data["why_full"]:
+        lines.append(f"Every robot ran its firmware and plant, slowly: {data['why_full']}.")
+    lines.append(f"{data['file']}\nPicture: twinmill phase {data['out']}")
+    return "\n".join(lines)
+
+
+@app.command(
+    epilog=f"Axes: {', '.join(QUANTITIES)}, {', '.join(f'{a} = {b}' for a, b in ALIASES.items())}; "
+    "or any quantity of the model file by its full name."
+)
+def _command(
+    x: Annotated[str, typer.Option("--x", show_default=False, help=AXIS_HELP)],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", show_default=False, help="Folder of the sweep.")
+    ],
+    y: Annotated[str | None, typer.Option("--y", help=AXIS_HELP)] = None,
+    z: Annotated[list[str] | None, typer.Option("--z", help="More axes.")] = None,
+    behavior: Annotated[
+        str, typer.Option("--behavior", help="One for all, or milling:5,self_centering:1.")
+    ] = "milling",
+    table: Annotated[
+        list[str] | None,
+        typer.Option("--table", help="Own behaviour: name=speed,turn,speed,turn, unseen first."),
+    ] = None,
+    n: Annotated[int | None, typer.Option("--n", help="Robots; default 6 or the mix's.")] = None,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Runs of each cell.")] = 50,
+    first_seed: Annotated[int, typer.Option("--first-seed", min=0)] = 1,
+    duration_s: Annotated[float, typer.Option("--duration-s", min=0.1, help="Of each run.")] = 120,
+    start: Annotated[str, typer.Option("--start", help="square, disc or facing-out.")] = "square",
+    spread_m: Annotated[
+        float, typer.Option("--spread-m", min=0.01, help="Side of the square, diameter of the disc")
+    ] = 1.2,
+    target_radius_m: Annotated[
+        float | None,
+        typer.Option("--target-radius-m", help="Of the disc that is seen; default: the model's."),
+    ] = None,
+    model: Annotated[str, typer.Option("--model", "-m", metavar="M")] = "paper.toml",
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="Threads; default: all cores.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option("--dask", help="Address of a Dask scheduler, tcp://host:port.")
+    ] = None,
+    full: Annotated[
+        bool, typer.Option("--full", help="Each robot its firmware and plant, always.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Run swarms over a grid of parameters, with metrics and a class for each.
+
+    Stopped half way, the same command goes on where it was.
+
+    Example: twin_sweep --x v_mps=0.1:0.35:6 --y omega_degps=20:90:8 --out sweep
+    """
+    request = make_request(
+        behavior,
+        model,
+        [axis for axis in (x, y, *(z or [])) if axis],
+        table,
+        n=n,
+        seeds=seeds,
+        first_seed=first_seed,
+        duration_s=duration_s,
+        start=start,
+        spread_m=spread_m,
+        target_radius_m=target_radius_m,
+        full=full,
+    )
+    data = sweep(request, out, workers, dask)
+    deliver(data, _text(data), as_json)
+
+
+def main() -> None:
+    """Entry point: leaves with the exit code."""
+    code = 0
+    try:
+        result = app(sys.argv[1:] or ["--help"], prog_name="twin_sweep", standalone_mode=False)
+        code = result if isinstance(result, int) else 0
+    except typer.TyperException as error:
+        code = error.exit_code
+        print(f"twin_sweep: {' '.join(error.format_message().split())}", file=sys.stderr)
+    except (ValueError, OSError) as error:
+        code = 1
+        print(f"twin_sweep: {' '.join(str(error).split())}", file=sys.stderr)
+    if code == INTERRUPTED:
+        print("twin_sweep: stopped; the same command goes on from here.", file=sys.stderr)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

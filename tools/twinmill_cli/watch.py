@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill watch`: robots and their twins side by side, while they drive or from a log."""
+
+import shlex
+import sys
+from contextlib import nullcontext
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import track
+
+from twinmill.data.multi_log import PREFIXES
+from twinmill.data.stream import FOREVER_S, from_bus, from_log
+from twinmill.files import check_new_file, replacing
+from twinmill.model.model_file import DEFAULT_MODEL, ModelFile
+from twinmill.robots.fleet import URL
+from twinmill_cli.calibrate import open_model
+from twinmill_cli.options import DurationS, LcmUrl, Model
+from twinmill_cli.output import AsJson, deliver
+
+RERUN = "rerun-sdk==0.41.0"
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the application."""
+    app.command("watch")(_watch)
+
+
+def _watch(
+    log: Annotated[
+        Path | None,
+        typer.Argument(metavar="[LOG]", show_default=False, help="A log instead of the bus."),
+    ] = None,
+    model: Model = DEFAULT_MODEL,
+    lcm_url: LcmUrl = URL,
+    save: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a recording for the viewer (.rrd); no display."),
+    ] = None,
+    connect: Annotated[
+        str, typer.Option(metavar="URL", help="A viewer that runs, rerun+http://HOST:9876/proxy.")
+    ] = "",
+    spawn: Annotated[
+        bool, typer.Option("--spawn", help="Start the viewer here; so it is without the others.")
+    ] = False,
+    duration_s: DurationS = FOREVER_S,
+    force: Annotated[bool, typer.Option("--force", help="Replace FILE if it exists.")] = False,
+    as_json: AsJson = False,
+) -> dict:
+    """Show robots and their twins (channels TWIN_...) side by side in the viewer Rerun.
+
+    From above: paths, headings, what each camera looks over, green while it
+    sees a neighbour; orange, where the model would have the robot go from two
+    seconds ago. Over time: bits, and the model's score over the last 12 s.
+
+    Example: twinmill watch run.lcmlog --save run.rrd
+    """
+    if sum([save is not None, bool(connect), spawn]) > 1:
+        raise ValueError("--save, --connect and --spawn: give one of them.")
+    _need_rerun()
+    model_file, warnings = open_model(model, None), []
+    if save:
+        check_new_file(save, force)
+    batches = from_log(log, warnings) if log else from_bus(lcm_url, duration_s)
+    with replacing(save, force) if save else nullcontext() as file:
+        show = _show(batches, model_file, log.name if log else None, file, connect)
+    command = shlex.join(["twinmill", "watch", *([str(log)] if log else []), "--model", model])
+    source = {"command": command, "version": f"twinmill {version('twinmill')}"}
+    data = {
+        "saved": str(save) if save else None,
+        "messages": show.messages,
+        "robots": sorted(show.shown),
+        "scores": show.scores,
+        "model_sha256": model_file.hash,
+        "warnings": warnings,
+        **source,
+    }
+    deliver(data, _text(show, save, warnings), as_json)
+    return data
+
+
+def _need_rerun() -> None:
+    if find_spec("rerun") is None:
+        raise ValueError(
+            "the viewer is not installed, since it takes 500 MB; install it with: "
+            f"{sys.executable} -m pip install {RERUN}"
+        )
+
+
+def _show(batches, model_file: ModelFile, log_name: str | None, file: Path | None, url: str):
+    """Shows all batches, with progress for a log, until they end or Ctrl-C."""
+    from twinmill.watch.show import Show, open_stream
+
+    prefixes = PREFIXES
+    if log_name:
+        names = {name for _, batch in batches for name in batch.by_channel}
+        prefixes = [p for p in PREFIXES if any(name.startswith(f"{p}R") for name in names)]
+        console = Console(stderr=True)
+        quiet = not console.is_terminal
+        batches = track(batches, "showing", console=console, transient=True, disable=quiet)
+    stream = open_stream(log_name, prefixes, file, url)
+    show = Show(stream, model_file)
+    try:
+        show.run(batches)
+    except KeyboardInterrupt:
+        pass  # the way to end a bus
+    finally:
+        stream.flush()
+        stream.disconnect()
+    return show
+
+
+def _text(show, save: Path | None, warnings: list[str]) -> str:
+    scores = ", ".join(f"{name} {score:.2f}" for name, score in sorted(show.scores.items()))
+    return "\n".join(
+        [
+            f"{show.messages} messages of {len(show.shown)} robots"
+            + (f": {save}; look at it with: rerun {save}" if save else ""),
+            f"score of the last 12 s: {scores}" if scores else "no score: too little was heard",
+            *(f"! {warning}" for warning in warnings),
+        ]
+    )
