@@ -29,7 +29,6 @@ FOLDERS = (
     "cmake",
 )
 CODE_SUFFIXES = {".c", ".h", ".cpp", ".py"}
-MAX_LINES = 400
 # What the core may ask of its surroundings: no heap, clock or I/O is among it.
 CORE_HEADERS = {"limits.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
 # Built with the kernel's headers, and for the kernel alone.
@@ -138,14 +137,6 @@ def lcm_comments(args: argparse.Namespace) -> Iterator[str]:
             previous = line.strip()
 
 
-def file_length(args: argparse.Namespace) -> Iterator[str]:
-    """No source file is longer than a person reads in one go."""
-    for path in filter(is_code, ours(args.root)):
-        lines = len(path.read_text(encoding="utf-8").splitlines())
-        if lines > MAX_LINES:
-            yield f"{path}: {lines} lines, at most {MAX_LINES}: split it"
-
-
 def licence_line(args: argparse.Namespace) -> Iterator[str]:
     """Every source file names its licence in its first line, or in its second after #!."""
     for path in filter(is_code, ours(args.root)):
@@ -177,7 +168,6 @@ RULES: dict[str, Callable[[argparse.Namespace], Iterator[str]]] = {
         core_symbols,
         headers_alone,
         lcm_comments,
-        file_length,
         licence_line,
         machine_paths,
     )

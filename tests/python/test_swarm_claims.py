@@ -6,9 +6,9 @@ import json
 import numpy as np
 import pytest
 
-from twinmill.swarm.claims import claims, rows
-from twinmill.swarm.claims.claims import CLAIMS
-from twinmill.swarm.claims.swarms import KINDS, run
+from twinmill.claims import claims, rows
+from twinmill.claims.claims import CLAIMS
+from twinmill.claims.swarms import KINDS, run
 from twinmill_cli import main as cli
 
 SEEDS = 100

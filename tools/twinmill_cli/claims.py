@@ -11,12 +11,12 @@ import typer
 from rich.console import Group
 from rich.text import Text
 
+from twinmill.claims.claims import CLAIMS, ODD_TURNS
+from twinmill.claims.rows import Claim, Row
 from twinmill.files import check_new_folder, plain
 from twinmill.model.model_file import ModelFile, write_whole
 from twinmill.report import Provenance, Section, show, write_report
 from twinmill.report.tables import Cell, Table, number
-from twinmill.swarm.claims.claims import CLAIMS, ODD_TURNS
-from twinmill.swarm.claims.rows import Claim, Row
 from twinmill_cli.options import Out
 from twinmill_cli.output import AsJson, deliver, telling
 

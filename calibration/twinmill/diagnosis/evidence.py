@@ -11,8 +11,8 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.fit.heldout import HeldOut, held_out
-from twinmill.fit.solve import Estimate, huber, solve
-from twinmill.model.freedom import Free, effect_names, effect_quantities
+from twinmill.fit.solve import huber, solve
+from twinmill.model.freedom import Estimate, Free, effect_names, effect_quantities
 from twinmill.predict.problem import Scene
 
 ROUNDS, PRECISION = 8, 1e-6  # of a trial's fit

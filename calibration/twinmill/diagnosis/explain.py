@@ -11,7 +11,7 @@ from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.robots import own_effects, own_values
 from twinmill.fit.compare import Comparison, comparison
 from twinmill.fit.fit import common_clock, refit
-from twinmill.fit.solve import Estimate
+from twinmill.model.freedom import Estimate
 from twinmill.model.model_file import Fitted, ModelFile, write_child
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from twinmill.diagnosis.screen import Screening
 from twinmill.diagnosis.search import CLOCK_OFF, DELAY, TIE_CHI2, Judged, Round, Search
-from twinmill.fit.solve import Estimate
+from twinmill.model.freedom import Estimate
 
 ALIKE = 0.9  # share of a signature that another effect imitates (0.95 as a correlation)
 FAINT_CHI2 = 2 * TIE_CHI2  # of what is not imitated: the difference is often no more than that

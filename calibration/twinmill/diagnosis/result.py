@@ -10,7 +10,7 @@ from twinmill.diagnosis.ranking import Ranked
 from twinmill.diagnosis.robots import RobotOff
 from twinmill.diagnosis.settled import Sum
 from twinmill.fit.compare import Comparison
-from twinmill.fit.solve import Estimate
+from twinmill.model.freedom import Estimate
 from twinmill.predict.detection_errors import BitComparison
 
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from twinmill.diagnosis.evidence import State
 from twinmill.diagnosis.ranking import Ranked
-from twinmill.fit.solve import Estimate, System
-from twinmill.model.freedom import catalogue
+from twinmill.fit.solve import System
+from twinmill.model.freedom import Estimate, catalogue
 
 # A delay, a clock and a lag all hold a response back: a log tells their sum before their parts.
 LATE = ("input_delay.delay_s", "clock_offset.offset_s", "motor_lag.extra_s")

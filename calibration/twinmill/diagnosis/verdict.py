@@ -7,7 +7,7 @@ from twinmill.diagnosis.omnibus import CHANGE, Omnibus
 from twinmill.diagnosis.ranking import Ranked, groups_of
 from twinmill.diagnosis.search import SILENT
 from twinmill.fit.compare import GOOD
-from twinmill.fit.solve import Estimate
+from twinmill.model.freedom import Estimate
 
 HELPED = 0.95  # a refit that lowers the score below this share of it was worth it
 OUTSIDE = 0.1  # share of what could be explained that no effect does

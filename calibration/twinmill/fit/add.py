@@ -8,8 +8,8 @@ from twinmill.data.measurement import Measurement
 from twinmill.fit.compare import Comparison, comparison, open_scenes
 from twinmill.fit.fit import common_clock, refit, share_noise
 from twinmill.fit.heldout import HeldOut, held_out
-from twinmill.fit.solve import Estimate, excited, solve
-from twinmill.model.freedom import base_quantities, effect_names, effect_quantities
+from twinmill.fit.solve import excited, solve
+from twinmill.model.freedom import Estimate, base_quantities, effect_names, effect_quantities
 from twinmill.model.model_file import Fitted, ModelFile, write_child
 
 

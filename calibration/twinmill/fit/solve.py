@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from twinmill.model.freedom import Free
+from twinmill.model.freedom import Estimate, Free
 from twinmill.predict.problem import CLOCK, CLOCK_RATE, GAINS, Scene
 
 HUBER_SIGMA = 3.5
@@ -16,22 +16,6 @@ RATE_PRIOR_PPM = 30.0  # of ordinary crystals against each other
 ALIKE = 0.03  # standard deviation of gains among robots of a kind where the model tells none
 AT_BOUND = 0.01  # share of the range that counts as at the bound
 CHORDS = 3  # steps with the same slopes
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A fitted quantity. `seen` is false where the log does not tell it and the prior holds it."""
-
-    name: str
-    value: float
-    std: float
-    unit: str
-    at_bound: bool
-    seen: bool
-
-    def to_json(self) -> dict:
-        """Fields of the interface."""
-        return vars(self)
 
 
 @dataclass(frozen=True)

@@ -116,3 +116,19 @@ def effect_quantities(model: native.Model, fresh: str | None = None) -> list[Fre
 def words(formula: str) -> set[str]:
     """Names in a formula."""
     return set(re.findall(r"[A-Za-z_]\w*", formula))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted quantity. `seen` is false where the log does not tell it and the prior holds it."""
+
+    name: str
+    value: float
+    std: float
+    unit: str
+    at_bound: bool
+    seen: bool
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return vars(self)

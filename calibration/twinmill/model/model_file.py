@@ -8,13 +8,12 @@ from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import tomlkit
 import twinmill_native as native
 
-from twinmill.fit.solve import Estimate
-from twinmill.model.freedom import catalogue, effect_names
-from twinmill.predict.noise import Noise
+from twinmill.model.freedom import Estimate, catalogue, effect_names
 
 DEFAULT_MODEL = "turbopi.toml"
 
@@ -87,6 +86,13 @@ class ModelFile:
         return hashlib.sha256(self.text.encode()).hexdigest()
 
 
+class NoiseTable(Protocol):
+    """Noise of a log, as far as a model file records it."""
+
+    def to_json(self) -> dict[str, float]:
+        """Keys and values of the table `[noise]`."""
+
+
 @dataclass(frozen=True)
 class Fitted:
     """What a fit found out and a new model file records.
@@ -108,7 +114,7 @@ class Fitted:
     logs: dict[str, str]
     score_before: float
     score_after: float
-    noise: Noise | None = None
+    noise: NoiseTable | None = None
     clock: dict[str, Estimate] = field(default_factory=dict)
     base_told: bool = False
     left_over: dict[str, float] | None = None

@@ -7,7 +7,7 @@ from rich.text import Text
 
 from twinmill.diagnosis.explain import Explanation, steps
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.fit.solve import Estimate
+from twinmill.model.freedom import Estimate
 from twinmill.report import Figure, Section, show, tables, views
 from twinmill.report.detection_figures import field_of_view
 from twinmill.report.detection_tables import bit_steps, bit_tables

@@ -9,7 +9,7 @@ import numpy as np
 
 from twinmill.fit.add import AddResult
 from twinmill.fit.compare import GOOD, MISSING, SUSPECT, Comparison, RobotComparison
-from twinmill.fit.solve import Estimate
+from twinmill.model.freedom import Estimate
 from twinmill.predict.noise import Noise
 from twinmill.predict.regimes import HORIZON, Regime
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms

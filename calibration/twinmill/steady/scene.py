@@ -8,10 +8,9 @@ import twinmill_native as native
 
 from twinmill.data.log import LogError
 from twinmill.data.steady_table import STILL_MPS, Sheet
-from twinmill.fit.solve import BLOCK_S
 from twinmill.model.mixing import duties_from_vendor_move
 from twinmill.predict.floor import Floor, floor_of
-from twinmill.predict.folds import halves, held_errors, step_mask
+from twinmill.predict.folds import BLOCK_S, halves, held_errors, step_mask
 from twinmill.predict.problem import stated_names
 
 CHANNELS = (("speed", "m/s"), ("turn", "rad/s"), ("standing side", "m/s"))

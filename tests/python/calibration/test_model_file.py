@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from twinmill.fit.solve import Estimate
+from twinmill.model.freedom import Estimate
 from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child, write_whole
 from twinmill.predict.noise import ChannelNoise, Noise
 

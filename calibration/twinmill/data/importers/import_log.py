@@ -9,11 +9,11 @@ import numpy as np
 import tomlkit
 
 from twinmill.data.importers.io_tsv import read_io_tsv
+from twinmill.data.importers.log_writer import write_log
 from twinmill.data.importers.motive import read_motive
 from twinmill.data.importers.plain import read_commands, read_poses
 from twinmill.data.importers.series import CommandSeries, PoseSeries, multiply
 from twinmill.data.log import Log, LogError, read_log
-from twinmill.data.log_writer import write_log
 from twinmill.data.track import make_track
 from twinmill.files import replacing
 

@@ -8,8 +8,7 @@ import numpy as np
 import twinmill_native as native
 from scipy.optimize import minimize
 
-from twinmill.fit.solve import Estimate
-from twinmill.model.freedom import catalogue, effect_names
+from twinmill.model.freedom import Estimate, catalogue, effect_names
 from twinmill.predict.detections import BitScene
 
 STAGES = ("view", "decide")

@@ -10,7 +10,7 @@ from scipy.stats import t
 from twinmill.diagnosis.alike import ODD, middle_and_scale, odd_ones
 from twinmill.diagnosis.detections.search import search_bits
 from twinmill.diagnosis.robots import RobotOff
-from twinmill.fit.solve import Estimate
+from twinmill.model.freedom import Estimate
 from twinmill.predict.detection_errors import BitComparison, compare_bits
 from twinmill.predict.detections import BitScene
 

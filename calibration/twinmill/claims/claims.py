@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import mannwhitneyu
 
-from twinmill.report import claims as figures
-from twinmill.swarm.claims.rows import Claim, Row, length, mean, median, share
-from twinmill.swarm.claims.swarms import KINDS, Runs, run
+from twinmill.claims import figures
+from twinmill.claims.rows import Claim, Row, length, mean, median, share
+from twinmill.claims.swarms import KINDS, Runs, run
 
 V_MPS = (0.10, 0.15, 0.20, 0.25, 0.30, 0.35)
 RING_RANGE = 2.534  # mean range of six standard normal numbers (Tippett 1925)
