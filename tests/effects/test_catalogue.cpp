@@ -2,6 +2,7 @@
 // The catalogue as a whole, and what every effect in it must keep.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <set>
@@ -91,6 +92,28 @@ TEST_P(EveryEffect, HasACompleteCard)
     EXPECT_EQ(std::string(card.summary).back(), '.');
     EXPECT_NE(card.drives & kAnyDrive, 0u);
     EXPECT_EQ(card.drives & ~kAnyDrive, 0u);
+    for (const char *text : {card.phrase, FamilyName(card.family), NeedsName(card.needs)})
+        EXPECT_FALSE(std::string(text).empty());
+    if (card.family != Family::kFormula)  // its drive is the formula's own
+        EXPECT_FALSE(ManeuverNames(card.identify).empty());
+}
+
+// What a camera sees shows in frames alone; what only frames show is of the camera.
+TEST_P(EveryEffect, NeedsFramesIfItIsOfTheCamera)
+{
+    const Card &card = GetParam()->card;
+    const bool of_camera = card.stage == Stage::kView || card.stage == Stage::kDecide;
+    EXPECT_EQ(card.family == Family::kCamera, of_camera);
+    EXPECT_EQ(card.needs == Needs::kFrames, of_camera);
+}
+
+// Where only steady speeds are known, an effect on what follows a change must not be looked for.
+TEST_P(EveryEffect, NeedsChangesOrClocksIfItIsOnlyLate)
+{
+    const EffectSpec &spec = *GetParam();
+    const auto late = [](const Parameter &p) { return p.role == Role::kLateness; };
+    if (std::any_of(spec.parameters.begin(), spec.parameters.end(), late))
+        EXPECT_TRUE(spec.card.needs == Needs::kChanges || spec.card.needs == Needs::kClocks);
 }
 
 TEST_P(EveryEffect, HasParametersWithinBounds)
@@ -105,6 +128,8 @@ TEST_P(EveryEffect, HasParametersWithinBounds)
         EXPECT_TRUE(p.min <= p.neutral && p.neutral <= p.max) << p.name;
         EXPECT_TRUE(p.min <= p.default_value && p.default_value <= p.max) << p.name;
         EXPECT_NE(p.default_value, p.neutral) << p.name << ": a fit would start at nothing";
+        EXPECT_GT(UsualSize(p), 0) << p.name;
+        EXPECT_EQ(std::string(p.above).empty(), std::string(p.below).empty()) << p.name;
     }
     EXPECT_FALSE(names.empty());
 }

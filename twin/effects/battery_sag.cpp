@@ -15,10 +15,15 @@ constexpr Card kCard = {
     .leaves_out = "voltage drop inside the driver; needs the pack voltage in the log",
     .measure = "the same drives with a full and with an empty battery",
     .reference = "back-EMF of a DC motor: no-load speed is proportional to voltage (strength 1)",
+    .family = Family::kPower,
+    .needs = Needs::kBattery,
+    .phrase = "wheels slow down as the battery empties",
+    .identify = kStraight | kLong,
 };
 
 constexpr Parameter kParameters[] = {
-    {"strength", "1", 0, 1, -1, 3, "relative loss of speed over relative loss of voltage"},
+    {"strength", "1", 0, 1, -1, 3, "relative loss of speed over relative loss of voltage",
+     "slower as the battery empties", "faster as the battery empties"},
 };
 
 class BatterySag final : public Effect

@@ -21,11 +21,17 @@ constexpr Card kCard = {
     .reference =
         "lowest harmonic of anisotropic friction; Zmitrowicz 1989, Mathematical descriptions "
         "of anisotropic friction",
+    .family = Family::kPlace,
+    .needs = Needs::kRoom,
+    .phrase = "faster along one line of the room",
+    .identify = kStraight | kHeadings,
 };
 
 constexpr Parameter kParameters[] = {
-    {"c2", "1", 0, 0.03, -0.5, 0.5, "rise of speed along x of W, and loss along y"},
-    {"s2", "1", 0, 0.03, -0.5, 0.5, "rise of speed halfway between x and y of W, and loss across"},
+    {"c2", "1", 0, 0.03, -0.5, 0.5, "rise of speed along x of W, and loss along y",
+     "faster along x of the room", "faster along y of the room"},
+    {"s2", "1", 0, 0.03, -0.5, 0.5, "rise of speed halfway between x and y of W, and loss across",
+     "faster between x and y of the room", "faster across the line between x and y of the room"},
 };
 
 class CarpetGrain final : public Effect

@@ -16,11 +16,16 @@ constexpr Card kCard = {
     .measure =
         "a second mark on both clocks: a flash or a tap; delay and offset look alike without",
     .reference = "clock model of order zero; Mills 2016, Computer Network Time Synchronization",
+    .family = Family::kClock,
+    .needs = Needs::kClocks,
+    .phrase = "the clocks of robot and motion capture differ",
+    .identify = kSteps,
 };
 
 constexpr Parameter kParameters[] = {
     {"offset_s", "s", 0, 0.01, -0.5, 0.5,
-     "capture's time stamp less the robot's at the same moment"},
+     "capture's time stamp less the robot's at the same moment", "motion capture's clock is ahead",
+     "motion capture's clock is behind", 0.2, Role::kLateness},
 };
 
 class ClockOffset final : public Effect

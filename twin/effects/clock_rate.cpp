@@ -17,10 +17,15 @@ constexpr Card kCard = {
         "a log of ten minutes or more with steps at both ends; on short ones clock_offset "
         "looks alike",
     .reference = "clock model of order one; Mills 2016, Computer Network Time Synchronization",
+    .family = Family::kClock,
+    .needs = Needs::kClocks,
+    .phrase = "one clock runs faster than the other",
+    .identify = kSteps | kLong,
 };
 
 constexpr Parameter kParameters[] = {
-    {"rate_ppm", "ppm", 0, 20, -500, 500, "seconds gained on the robot's clock in a million"},
+    {"rate_ppm", "ppm", 0, 20, -500, 500, "seconds gained on the robot's clock in a million",
+     "motion capture's clock runs fast", "motion capture's clock runs slow"},
 };
 
 class ClockRate final : public Effect

@@ -19,12 +19,19 @@ constexpr Card kCard = {
     .measure = "stops to zero duty from several speeds",
     .reference =
         "Coulomb friction of an open motor; Olsson et al. 1998, Friction models and friction compensation",
+    .family = Family::kTransient,
+    .needs = Needs::kChanges,
+    .phrase = "rolls on when it is told to stop",
+    .identify = kStops,
+    .suspect_when = kStopping,
 };
 
 constexpr Parameter kParameters[] = {
     {"deceleration_mps2", "m/s^2", 20, 0.7, 0.05, 20,
-     "deceleration of a wheel's rim while its duty is zero"},
-    {"viscous_per_s", "1/s", 0, 0.5, 0, 20, "what speed adds to the deceleration"},
+     "deceleration of a wheel's rim while its duty is zero", "stops at once",
+     "rolls on after a stop"},
+    {"viscous_per_s", "1/s", 0, 0.5, 0, 20, "what speed adds to the deceleration",
+     "rolls on less from high speeds", "rolls on more from high speeds"},
 };
 
 class Coasting final : public Effect

@@ -19,12 +19,18 @@ constexpr Card kCard = {
     .measure = "two robots that drive into each other, head on and past each other",
     .reference =
         "Coulomb friction in position-based dynamics: Macklin et al. 2014, ACM Transactions on Graphics 33(4) 153",
+    .family = Family::kContact,
+    .needs = Needs::kContacts,
+    .phrase = "robots touch at another distance",
+    .identify = kTwoRobots,
 };
 
 constexpr Parameter kParameters[] = {
-    {"radius_m", "m", 0, 0.01, -0.2, 0.2, "added to the body's radius"},
+    {"radius_m", "m", 0, 0.01, -0.2, 0.2, "added to the body's radius", "touches earlier",
+     "touches later"},
     {"friction", "1", 0, 0.3, 0, 2,
-     "added to the coefficient between two bodies, of which the larger counts"},
+     "added to the coefficient between two bodies, of which the larger counts", "bodies rub",
+     "bodies slide past"},
 };
 
 class Collision final : public Effect

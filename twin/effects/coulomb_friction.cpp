@@ -21,10 +21,15 @@ constexpr Card kCard = {
         "straight drives at five or more speeds, forward and sideways, and turns; on straight"
         " drives dead_zone looks alike where speed is proportional to duty",
     .reference = "Olsson et al. 1998, Friction models and friction compensation",
+    .family = Family::kFriction,
+    .needs = Needs::kSteadySpeed,
+    .phrase = "friction takes a fixed speed away",
+    .identify = kStraight | kStrafe | kSpin | kLevels,
 };
 
 constexpr Parameter kParameters[] = {
-    {"loss_mps", "m/s", 0, 0.012, 0, 0.3, "speed lost when travelling much faster than that"},
+    {"loss_mps", "m/s", 0, 0.012, 0, 0.3, "speed lost when travelling much faster than that",
+     "too slow by the same at all speeds", "too fast by the same at all speeds"},
 };
 
 // Below it friction fades, so that it never turns the motion round and fits see no kink.

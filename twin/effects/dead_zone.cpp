@@ -19,11 +19,17 @@ constexpr Card kCard = {
     .measure = "steps to several duties below 40 %, each from rest",
     .reference =
         "Tao and Kokotovic 1996, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, ch. 2",
+    .family = Family::kFriction,
+    .needs = Needs::kSteadySpeed,
+    .phrase = "small commands do not move the wheels",
+    .identify = kSteps | kLevels,
+    .suspect_when = kStanding,
 };
 
 constexpr Parameter kParameters[] = {
     {"width", "1", 0, 0.05, 0, 0.6,
-     "duty below which a wheel stands still, as a fraction of full duty"},
+     "duty below which a wheel stands still, as a fraction of full duty",
+     "does not move at small duties", "moves at smaller duties"},
 };
 
 class DeadZone final : public Effect

@@ -30,6 +30,9 @@ constexpr Card kCard = {
     .leaves_out = "memory; where the formula has no finite value, nothing is added",
     .measure = "whatever drive varies the quantities in the formula; what it resembles is its own",
     .reference = "muParser (the parser); the formula is the user's",
+    .family = Family::kFormula,
+    .needs = Needs::kSteadySpeed,
+    .phrase = "a formula of its own",
 };
 
 constexpr Parameter kParameters[] = {

@@ -18,11 +18,16 @@ constexpr Card kCard = {
     .measure = "one robot alone in the room, many frames",
     .reference =
         "binary asymmetric channel; Cover and Thomas 2006, Elements of Information Theory, ch. 7",
+    .family = Family::kCamera,
+    .needs = Needs::kFrames,
+    .phrase = "the camera sees targets that are not there",
+    .identify = kWatch,
 };
 
 constexpr Parameter kParameters[] = {
     {"rate", "1", 0, 0.1, -1, 1,
-     "share of frames beyond those of the model; below 0: share of the model's that are right"},
+     "share of frames beyond those of the model; below 0: share of the model's that are right",
+     "sees what is not there more often", "sees what is not there less often"},
 };
 
 class FalseDetection final : public Effect

@@ -21,12 +21,19 @@ constexpr Card kCard = {
         "drives across the whole floor, the same paths shifted by half a metre; a patch "
         "larger than the paths is a gain of the base or gain_slope",
     .reference = "a step of the gain with a smooth edge, so that its place can be fitted",
+    .family = Family::kPlace,
+    .needs = Needs::kRoom,
+    .phrase = "slower on one patch of the floor",
+    .identify = kStraight | kPlaces,
 };
 
 constexpr Parameter kParameters[] = {
-    {"strength", "1", 0, 0.2, -1, 0.95, "relative loss of speed on the patch"},
-    {"x_m", "m", 0, 0.3, -5, 5, "centre in W; means nothing at strength 0"},
-    {"y_m", "m", 0, 0.2, -5, 5, "centre in W; means nothing at strength 0"},
+    {"strength", "1", 0, 0.2, -1, 0.95, "relative loss of speed on the patch",
+     "slower on a patch of the floor", "faster on a patch of the floor"},
+    {"x_m", "m", 0, 0.3, -5, 5, "centre in W; means nothing at strength 0", "", "", 0,
+     Role::kPlace},
+    {"y_m", "m", 0, 0.2, -5, 5, "centre in W; means nothing at strength 0", "", "", 0,
+     Role::kPlace},
     {"radius_m", "m", 0.5, 0.3, 0.02, 3, "of the patch; means nothing at strength 0"},
 };
 

@@ -18,11 +18,17 @@ constexpr Card kCard = {
     .measure = "the same drives along four headings",
     .reference =
         "Scheding et al. 1999, An experiment in autonomous navigation of an underground mining vehicle (slip on slopes)",
+    .family = Family::kPlace,
+    .needs = Needs::kRoom,
+    .phrase = "creeps in one direction of the room",
+    .identify = kStraight | kHeadings,
 };
 
 constexpr Parameter kParameters[] = {
-    {"drift_x_mps", "m/s", 0, 0.005, -0.2, 0.2, "creep along x of W"},
-    {"drift_y_mps", "m/s", 0, 0.005, -0.2, 0.2, "creep along y of W"},
+    {"drift_x_mps", "m/s", 0, 0.005, -0.2, 0.2, "creep along x of W",
+     "creeps towards x of the room", "creeps against x of the room"},
+    {"drift_y_mps", "m/s", 0, 0.005, -0.2, 0.2, "creep along y of W",
+     "creeps towards y of the room", "creeps against y of the room"},
 };
 
 class FloorTilt final : public Effect

@@ -20,11 +20,17 @@ constexpr Card kCard = {
         "base.forward_gain and base.sideways_gain look alike, over time battery_sag and "
         "heat_gain",
     .reference = "first-order expansion of a gain that depends on place",
+    .family = Family::kPlace,
+    .needs = Needs::kRoom,
+    .phrase = "faster at one end of the room",
+    .identify = kStraight | kPlaces | kHeadings,
 };
 
 constexpr Parameter kParameters[] = {
-    {"x_per_m", "1/m", 0, 0.02, -0.3, 0.3, "gx: relative rise of speed per metre along x of W"},
-    {"y_per_m", "1/m", 0, 0.02, -0.3, 0.3, "gy: the same along y"},
+    {"x_per_m", "1/m", 0, 0.02, -0.3, 0.3, "gx: relative rise of speed per metre along x of W",
+     "faster at large x", "faster at small x"},
+    {"y_per_m", "1/m", 0, 0.02, -0.3, 0.3, "gy: the same along y", "faster at large y",
+     "faster at small y"},
 };
 
 class GainSlope final : public Effect

@@ -15,10 +15,15 @@ constexpr Card kCard = {
     .leaves_out = "roll and pitch of the marker body",
     .measure = "straight drives forward and sideways: without the latter it looks like wheel_gain",
     .reference = "rigid-body transform",
+    .family = Family::kFrame,
+    .needs = Needs::kPoses,
+    .phrase = "the tracked heading is turned against the robot",
+    .identify = kStraight | kStrafe,
 };
 
 constexpr Parameter kParameters[] = {
-    {"bias_rad", "rad", 0, 0.02, -0.6, 0.6, "heading seen less the robot's own"},
+    {"bias_rad", "rad", 0, 0.02, -0.6, 0.6, "heading seen less the robot's own",
+     "tracked heading turned left", "tracked heading turned right", 0.1},
 };
 
 class HeadingBias final : public Effect

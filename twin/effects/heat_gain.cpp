@@ -20,11 +20,16 @@ constexpr Card kCard = {
         "one continuous drive of two minutes at full duty after a rest; battery_sag looks "
         "alike where the battery empties meanwhile",
     .reference = "first-order thermal model; Hughes and Drury 2019, Electric Motors and Drives",
+    .family = Family::kPower,
+    .needs = Needs::kHistory,
+    .phrase = "wheels slow down as the motors warm up",
+    .identify = kStraight | kLong,
 };
 
 constexpr Parameter kParameters[] = {
     {"loss", "1", 0, 0.06, -0.5, 0.5,
-     "relative loss of speed of a wheel that has long been at full duty"},
+     "relative loss of speed of a wheel that has long been at full duty",
+     "slower as the motors warm up", "faster as the motors warm up"},
 };
 
 constexpr double kMemory_s = 60;

@@ -19,11 +19,17 @@ constexpr Card kCard = {
     .reference =
         "pure transport delay; Franklin et al. 2010, Feedback Control of Dynamic "
         "Systems, sec. 5.6",
+    .family = Family::kTransient,
+    .needs = Needs::kChanges,
+    .phrase = "commands act late",
+    .identify = kSteps,
+    .suspect_when = kStarting | kChanging,
 };
 
 constexpr Parameter kParameters[] = {
     {"delay_s", "s", 0, 0.02, 0, 0.3,
-     "from the time stamp of a command to its effect on the motors"},
+     "from the time stamp of a command to its effect on the motors", "commands act late",
+     "commands act early", 0.2, Role::kLateness},
 };
 
 // A ring of the last commands, each with the time at which it was given. Longer than the longest

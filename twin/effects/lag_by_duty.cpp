@@ -18,10 +18,16 @@ constexpr Card kCard = {
     .leaves_out = "curvature of the dependence",
     .measure = "steps from rest to five or more duties",
     .reference = "linear in duty; seen on a TurboPi: 0.04 s at full and 0.11 s at half duty",
+    .family = Family::kTransient,
+    .needs = Needs::kChanges,
+    .phrase = "slow commands take longer to act",
+    .identify = kSteps | kLevels,
+    .suspect_when = kStarting | kChanging,
 };
 
 constexpr Parameter kParameters[] = {
-    {"extra_s", "s", 0, 0.1, -0.5, 1, "time constant at zero duty less that at full duty"},
+    {"extra_s", "s", 0, 0.1, -0.5, 1, "time constant at zero duty less that at full duty",
+     "slow commands take longer to act", "fast commands take longer to act", 0.3},
 };
 
 class LagByDuty final : public Effect

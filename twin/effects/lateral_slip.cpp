@@ -19,10 +19,15 @@ constexpr Card kCard = {
     .reference =
         "side slip proportional to the centripetal acceleration; Pacejka 2012, Tire and "
         "Vehicle Dynamics",
+    .family = Family::kFriction,
+    .needs = Needs::kSteadySpeed,
+    .phrase = "slips outwards in curves",
+    .identify = kArcs | kLevels,
 };
 
 constexpr Parameter kParameters[] = {
-    {"slip_s", "s", 0, 0.03, -0.5, 0.5, "outward speed per centripetal acceleration"},
+    {"slip_s", "s", 0, 0.03, -0.5, 0.5, "outward speed per centripetal acceleration",
+     "slips outwards in curves", "pulls inwards in curves"},
 };
 
 class LateralSlip final : public Effect

@@ -17,11 +17,17 @@ constexpr Card kCard = {
     .leaves_out = "height and tilt of the marker body",
     .measure = "turns on the spot, both ways",
     .reference = "rigid-body transform",
+    .family = Family::kFrame,
+    .needs = Needs::kPoses,
+    .phrase = "the tracked point is off the centre of turning",
+    .identify = kSpin,
 };
 
 constexpr Parameter kParameters[] = {
-    {"x_m", "m", 0, 0.01, -0.5, 0.5, "marker ahead of the robot's centre"},
-    {"y_m", "m", 0, 0.01, -0.5, 0.5, "marker left of the robot's centre"},
+    {"x_m", "m", 0, 0.01, -0.5, 0.5, "marker ahead of the robot's centre",
+     "tracked point ahead of the centre", "tracked point behind the centre", 0.03},
+    {"y_m", "m", 0, 0.01, -0.5, 0.5, "marker left of the robot's centre",
+     "tracked point left of the centre", "tracked point right of the centre", 0.03},
 };
 
 class MarkerOffset final : public Effect

@@ -24,13 +24,19 @@ constexpr Card kCard = {
     .reference =
         "viscous creep of the wheels against drag at the centre of mass, to first order in "
         "slip; creep law as in Pacejka 2012, Tire and Vehicle Dynamics",
+    .family = Family::kGeometry,
+    .needs = Needs::kSteadySpeed,
+    .phrase = "the weight is off the centre of the wheels",
+    .identify = kStraight | kStrafe | kSpin,
 };
 
 constexpr Parameter kParameters[] = {
     {"x_m", "m", 0, 0.002, -0.05, 0.05,
-     "centre of mass ahead of the wheels' centre, times the share of speed lost to slip"},
+     "centre of mass ahead of the wheels' centre, times the share of speed lost to slip",
+     "weight ahead of the centre", "weight behind the centre"},
     {"y_m", "m", 0, 0.002, -0.05, 0.05,
-     "centre of mass left of the wheels' centre, times the same share"},
+     "centre of mass left of the wheels' centre, times the same share", "weight left of the centre",
+     "weight right of the centre"},
 };
 
 // With which the wheels' creep resists turning.

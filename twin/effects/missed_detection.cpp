@@ -18,11 +18,16 @@ constexpr Card kCard = {
     .measure = "two robots at rest, well in view, many frames",
     .reference =
         "binary asymmetric channel; Cover and Thomas 2006, Elements of Information Theory, ch. 7",
+    .family = Family::kCamera,
+    .needs = Needs::kFrames,
+    .phrase = "the camera misses targets",
+    .identify = kWatch,
 };
 
 constexpr Parameter kParameters[] = {
     {"rate", "1", 0, 0.1, -1, 1,
-     "share of frames missed beyond those of the model; below 0: share of the model's that are not"},
+     "share of frames missed beyond those of the model; below 0: share of the model's that are not",
+     "misses targets more often", "misses targets less often"},
 };
 
 class MissedDetection final : public Effect

@@ -17,10 +17,16 @@ constexpr Card kCard = {
     .leaves_out = "dependence on duty (lag_by_duty) and on the direction of change (coasting)",
     .measure = "steps from rest to several duties and back",
     .reference = "first-order motor model; Siciliano et al. 2009, Robotics, sec. 5.2",
+    .family = Family::kTransient,
+    .needs = Needs::kChanges,
+    .phrase = "wheels take their time to follow",
+    .identify = kSteps,
+    .suspect_when = kStarting | kStopping | kChanging,
 };
 
 constexpr Parameter kParameters[] = {
-    {"extra_s", "s", 0, 0.03, -0.5, 0.5, "added to the time constant of every wheel"},
+    {"extra_s", "s", 0, 0.03, -0.5, 0.5, "added to the time constant of every wheel",
+     "wheels follow more slowly", "wheels follow faster", 0.3, Role::kLateness},
 };
 
 class MotorLag final : public Effect

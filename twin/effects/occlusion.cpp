@@ -18,10 +18,15 @@ constexpr Card kCard = {
         "three robots in a row, the middle one half out of the picture: alone it is not seen, yet it hides the third",
     .reference =
         "line of sight against discs; Ericson 2005, Real-Time Collision Detection, ch. 5.3",
+    .family = Family::kCamera,
+    .needs = Needs::kFrames,
+    .phrase = "other robots hide targets",
+    .identify = kWatch,
 };
 
 constexpr Parameter kParameters[] = {
-    {"radius_m", "m", 0, 0.08, 0, 1, "of the bodies that hide"},
+    {"radius_m", "m", 0, 0.08, 0, 1, "of the bodies that hide", "robots hide what is behind them",
+     "robots hide less"},
 };
 
 class Occlusion final : public Effect

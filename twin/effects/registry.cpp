@@ -36,19 +36,4 @@ const EffectSpec *FindEffect(std::string_view name)
     return nullptr;
 }
 
-const char *StageName(Stage stage)
-{
-    switch (stage)
-    {
-        case Stage::kDuty: return "duty";
-        case Stage::kWheel: return "wheel";
-        case Stage::kGround: return "ground";
-        case Stage::kWorld: return "world";
-        case Stage::kObserve: return "observe";
-        case Stage::kView: return "view";
-        case Stage::kDecide: return "decide";
-    }
-    return "";
-}
-
 }  // namespace twin

@@ -21,10 +21,15 @@ constexpr Card kCard = {
     .reference =
         "lock-out of motor drivers; for play in gears see Nordin and Gutman 2002, Controlling"
         " mechanical systems with backlash",
+    .family = Family::kTransient,
+    .needs = Needs::kChanges,
+    .phrase = "wheels pause before they turn the other way",
+    .identify = kReversals,
 };
 
 constexpr Parameter kParameters[] = {
-    {"dead_time_s", "s", 0, 0.05, 0, 0.3, "from leaving one direction to the start in the other"},
+    {"dead_time_s", "s", 0, 0.05, 0, 0.3, "from leaving one direction to the start in the other",
+     "pauses before it reverses", "reverses without a pause"},
 };
 
 // Sums of steps and times that differ by rounding alone are the same time.

@@ -17,11 +17,18 @@ constexpr Card kCard = {
     .measure = "straight drives forward and back at the same duties",
     .reference =
         "brush motors with advanced timing; seen on a TurboPi as a yaw drift that changes in reverse",
+    .family = Family::kGain,
+    .needs = Needs::kSteadySpeed,
+    .phrase = "wheels differ in reverse",
+    .identify = kStraight | kReversals,
+    .suspect_when = kSteady,
 };
 
 constexpr Parameter kParameters[] = {
-    {"left", "1", 0, 0.03, -0.5, 0.5, "relative change of the left wheels' speed in reverse"},
-    {"right", "1", 0, 0.03, -0.5, 0.5, "relative change of the right wheels' speed in reverse"},
+    {"left", "1", 0, 0.03, -0.5, 0.5, "relative change of the left wheels' speed in reverse",
+     "left wheels strong in reverse", "left wheels weak in reverse"},
+    {"right", "1", 0, 0.03, -0.5, 0.5, "relative change of the right wheels' speed in reverse",
+     "right wheels strong in reverse", "right wheels weak in reverse"},
 };
 
 class ReverseAsymmetry final : public Effect

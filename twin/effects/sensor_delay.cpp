@@ -16,10 +16,15 @@ constexpr Card kCard = {
     .measure =
         "a robot that turns on the spot beside another one at rest, at two speeds, both ways",
     .reference = "time offset of a camera: Furgale, Rehder and Siegwart 2013, IROS",
+    .family = Family::kCamera,
+    .needs = Needs::kFrames,
+    .phrase = "the camera is late",
+    .identify = kWatch | kSpin,
 };
 
 constexpr Parameter kParameters[] = {
-    {"delay_s", "s", 0, 0.05, 0, 1, "exposure to time stamp"},
+    {"delay_s", "s", 0, 0.05, 0, 1, "exposure to time stamp", "the camera is late",
+     "the camera is early"},
 };
 
 class SensorDelay final : public Effect

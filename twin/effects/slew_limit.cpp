@@ -22,10 +22,15 @@ constexpr Card kCard = {
     .reference =
         "rate limiter as in motor drivers' acceleration ramps; Franklin et al. 2010, Feedback"
         " Control of Dynamic Systems",
+    .family = Family::kTransient,
+    .needs = Needs::kChanges,
+    .phrase = "commands are ramped",
+    .identify = kSteps | kLevels,
 };
 
 constexpr Parameter kParameters[] = {
-    {"ramp_s", "s", 0, 0.1, 0, 2, "time from rest to full duty; 0: no limit"},
+    {"ramp_s", "s", 0, 0.1, 0, 2, "time from rest to full duty; 0: no limit", "commands are ramped",
+     "commands are not ramped"},
 };
 
 // What the driver put out at time state[0], and what it was told then. A later effect may cut the

@@ -18,12 +18,19 @@ constexpr Card kCard = {
     .measure = "steady straight drives at five or more duties",
     .reference =
         "cubic through 0 and full duty; compare the duty table of Hiwonder TurboPi measurements",
+    .family = Family::kGain,
+    .needs = Needs::kSteadySpeed,
+    .phrase = "speed is not proportional to the command",
+    .identify = kStraight | kLevels,
+    .suspect_when = kSteady,
 };
 
 constexpr Parameter kParameters[] = {
     {"bend", "1", 0, 0.5, -0.9, 2,
-     "rise over the straight line: half duty gives bend/4 of full speed more"},
-    {"skew", "1", 0, 0.1, -2, 2, "moves the rise towards low duties"},
+     "rise over the straight line: half duty gives bend/4 of full speed more",
+     "too fast at middle duties", "too slow at middle duties"},
+    {"skew", "1", 0, 0.1, -2, 2, "moves the rise towards low duties", "the rise is at low duties",
+     "the rise is at high duties"},
 };
 
 class SpeedCurve final : public Effect

@@ -22,10 +22,15 @@ constexpr Card kCard = {
         "straight drives at five or more speeds, forward and sideways; on drives in one "
         "direction speed_curve looks alike, and at one speed base.forward_gain",
     .reference = "slip linear in speed; Wong 2008, Theory of Ground Vehicles",
+    .family = Family::kFriction,
+    .needs = Needs::kSteadySpeed,
+    .phrase = "loses more of its speed the faster it goes",
+    .identify = kStraight | kStrafe | kLevels,
 };
 
 constexpr Parameter kParameters[] = {
-    {"loss_s_per_m", "s/m", 0, 0.2, -1, 2, "relative loss of speed per speed"},
+    {"loss_s_per_m", "s/m", 0, 0.2, -1, 2, "relative loss of speed per speed",
+     "loses speed when fast", "gains speed when fast"},
 };
 
 class SpeedSlip final : public Effect

@@ -21,10 +21,15 @@ constexpr Card kCard = {
     .reference =
         "on a diagonal two mecanum wheels stand and drag their rollers; Tlale and de Villiers"
         " 2008, Kinematics and dynamics modelling of a mecanum wheeled mobile platform",
+    .family = Family::kFriction,
+    .needs = Needs::kSteadySpeed,
+    .phrase = "loses sideways speed on diagonals",
+    .identify = kDiagonal,
 };
 
 constexpr Parameter kParameters[] = {
-    {"loss", "1", 0, 0.1, -1, 1, "relative loss of sideways speed at 45 degrees"},
+    {"loss", "1", 0, 0.1, -1, 1, "relative loss of sideways speed at 45 degrees",
+     "loses sideways speed on diagonals", "gains sideways speed on diagonals"},
 };
 
 class StrafeLoss final : public Effect

@@ -21,10 +21,15 @@ constexpr Card kCard = {
     .reference =
         "Borenstein and Feng 1996, Measurement and correction of systematic odometry errors "
         "in mobile robots",
+    .family = Family::kGain,
+    .needs = Needs::kSteadySpeed,
+    .phrase = "turns one way faster than the other",
+    .identify = kSpin,
 };
 
 constexpr Parameter kParameters[] = {
-    {"asymmetry", "1", 0, 0.03, -0.5, 0.5, "relative rise of left turns, and loss of right ones"},
+    {"asymmetry", "1", 0, 0.03, -0.5, 0.5, "relative rise of left turns, and loss of right ones",
+     "turns faster to the left", "turns faster to the right"},
 };
 
 class TurnAsymmetry final : public Effect

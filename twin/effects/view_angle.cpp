@@ -19,10 +19,15 @@ constexpr Card kCard = {
     .measure = "a robot turned on the spot beside another one at rest, slowly, both ways",
     .reference =
         "field of view of a pinhole camera; Hartley and Zisserman 2004, Multiple View Geometry, ch. 6",
+    .family = Family::kCamera,
+    .needs = Needs::kFrames,
+    .phrase = "the camera sees another angle",
+    .identify = kWatch | kSpin,
 };
 
 constexpr Parameter kParameters[] = {
-    {"factor", "1", 1, 0.8, 0.05, 8, "opening angle over that of the model"},
+    {"factor", "1", 1, 0.8, 0.05, 8, "opening angle over that of the model", "sees a wider angle",
+     "sees a narrower angle"},
 };
 
 class ViewAngle final : public Effect

@@ -17,10 +17,15 @@ constexpr Card kCard = {
         "a robot turned on the spot beside another one at rest: the bit must come and go symmetrically",
     .reference =
         "yaw of the camera's extrinsic calibration; Hartley and Zisserman 2004, Multiple View Geometry, ch. 6",
+    .family = Family::kCamera,
+    .needs = Needs::kFrames,
+    .phrase = "the camera does not look straight ahead",
+    .identify = kWatch | kSpin,
 };
 
 constexpr Parameter kParameters[] = {
-    {"pan_rad", "rad", 0, 0.1, -3.15, 3.15, "axis of the camera left of the heading"},
+    {"pan_rad", "rad", 0, 0.1, -3.15, 3.15, "axis of the camera left of the heading",
+     "camera looks to the left", "camera looks to the right"},
 };
 
 class ViewPan final : public Effect

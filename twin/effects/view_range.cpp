@@ -16,12 +16,18 @@ constexpr Card kCard = {
     .leaves_out = "light, and the size of the target in the picture",
     .measure = "robots at rest at several distances around the range, many frames each",
     .reference = "logistic psychometric function: Treutwein 1995, Vision Research 35(17) 2503",
+    .family = Family::kCamera,
+    .needs = Needs::kFrames,
+    .phrase = "the camera sees another distance",
+    .identify = kWatch,
 };
 
 constexpr Parameter kParameters[] = {
-    {"factor", "1", 1, 0.8, 0.05, 5, "range over that of the model"},
+    {"factor", "1", 1, 0.8, 0.05, 5, "range over that of the model", "sees farther",
+     "sees less far"},
     {"softness_m", "m", 0, 0.02, 0, 2,
-     "scale of the edge: seen in 73 % of the frames so far before it, in 27 % so far behind"},
+     "scale of the edge: seen in 73 % of the frames so far before it, in 27 % so far behind",
+     "the edge of sight is soft", "the edge of sight is sharp"},
 };
 
 class ViewRange final : public Effect

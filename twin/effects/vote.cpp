@@ -19,11 +19,16 @@ constexpr Card kCard = {
     .leaves_out = "votes with weights or another share",
     .measure = "any run with raw and voted bits in its telemetry",
     .reference = "majority decoding of a repetition code; MacKay 2003, Information Theory, ch. 1.2",
+    .family = Family::kCamera,
+    .needs = Needs::kFrames,
+    .phrase = "another number of frames votes",
+    .identify = kWatch,
 };
 
 constexpr Parameter kParameters[] = {
     {"extra_frames", "1", 0, 5, -63, 63,
-     "frames beyond those of the model, rounded to a whole number"},
+     "frames beyond those of the model, rounded to a whole number", "more frames vote",
+     "fewer frames vote"},
 };
 
 class Vote final : public Effect

@@ -16,13 +16,22 @@ constexpr Card kCard = {
     .measure = "straight drives forward and sideways, turns on the spot",
     .reference =
         "Borenstein and Feng 1996, Measurement and correction of systematic odometry errors in mobile robots",
+    .family = Family::kGain,
+    .needs = Needs::kSteadySpeed,
+    .phrase = "wheels differ in strength",
+    .identify = kStraight | kStrafe | kSpin,
+    .suspect_when = kSteady,
 };
 
 constexpr Parameter kParameters[] = {
-    {"fl", "1", 0, 0.03, -0.5, 0.5, "relative change of the front left wheel's speed"},
-    {"fr", "1", 0, 0.03, -0.5, 0.5, "relative change of the front right wheel's speed"},
-    {"rl", "1", 0, 0.03, -0.5, 0.5, "relative change of the rear left wheel's speed"},
-    {"rr", "1", 0, 0.03, -0.5, 0.5, "relative change of the rear right wheel's speed"},
+    {"fl", "1", 0, 0.03, -0.5, 0.5, "relative change of the front left wheel's speed",
+     "front left wheel strong", "front left wheel weak", 0.05},
+    {"fr", "1", 0, 0.03, -0.5, 0.5, "relative change of the front right wheel's speed",
+     "front right wheel strong", "front right wheel weak", 0.05},
+    {"rl", "1", 0, 0.03, -0.5, 0.5, "relative change of the rear left wheel's speed",
+     "rear left wheel strong", "rear left wheel weak", 0.05},
+    {"rr", "1", 0, 0.03, -0.5, 0.5, "relative change of the rear right wheel's speed",
+     "rear right wheel strong", "rear right wheel weak", 0.05},
 };
 
 class WheelGain final : public Effect

@@ -19,10 +19,15 @@ constexpr Card kCard = {
     .reference =
         "effective lever of wheels that slip; Mandow et al. 2007, Experimental kinematics for"
         " wheeled skid-steer mobile robots",
+    .family = Family::kGeometry,
+    .needs = Needs::kSteadySpeed,
+    .phrase = "turns at another rate while it travels",
+    .identify = kSpin | kArcs | kLevels,
 };
 
 constexpr Parameter kParameters[] = {
-    {"rise_s_per_m", "s/m", 0, 0.3, -2, 2, "relative rise of the turn rate per speed of travel"},
+    {"rise_s_per_m", "s/m", 0, 0.3, -2, 2, "relative rise of the turn rate per speed of travel",
+     "turns faster while it travels", "turns slower while it travels"},
 };
 
 class YawLever final : public Effect

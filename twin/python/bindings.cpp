@@ -46,47 +46,76 @@ struct PyTrack
     Indices segment;
 };
 
+nb::list Words(const std::vector<const char *> &words)
+{
+    nb::list list;
+    for (const char *word : words)
+        list.append(word);
+    return list;
+}
+
+nb::dict ParameterEntry(const Parameter &p)
+{
+    nb::dict row;
+    row["name"] = p.name;
+    row["unit"] = p.unit;
+    row["neutral"] = p.neutral;
+    row["default"] = p.default_value;
+    row["min"] = p.min;
+    row["max"] = p.max;
+    row["usual_size"] = UsualSize(p);
+    row["role"] = RoleName(p.role);
+    row["place_like"] = p.role == Role::kPlace;
+    row["above"] = p.above;
+    row["below"] = p.below;
+    row["doc"] = p.doc;
+    return row;
+}
+
+nb::dict CardEntry(const EffectSpec &spec)
+{
+    const Card &card = spec.card;
+    nb::dict entry;
+    entry["name"] = card.name;
+    entry["stage"] = StageName(card.stage);
+    entry["family"] = FamilyName(card.family);
+    entry["phrase"] = card.phrase;
+    entry["summary"] = card.summary;
+    entry["equation"] = card.equation;
+    entry["leaves_out"] = card.leaves_out;
+    entry["measure"] = card.measure;
+    entry["identify"] = Words(ManeuverNames(card.identify));
+    entry["needs"] = NeedsName(card.needs);
+    entry["suspect_when"] = Words(PhaseNames(card.suspect_when));
+    entry["reference"] = card.reference;
+    entry["duty_only"] = card.drives == kDutyOnly;
+    bool place_like = false;
+    nb::list parameters;
+    for (const Parameter &p : spec.parameters)
+    {
+        place_like |= p.role == Role::kPlace;
+        parameters.append(ParameterEntry(p));
+    }
+    entry["place_like"] = place_like;
+    entry["parameters"] = parameters;
+    nb::list texts;
+    for (const TextParameter &t : spec.texts)
+    {
+        nb::dict row;
+        row["name"] = t.name;
+        row["default"] = t.default_value;
+        row["doc"] = t.doc;
+        texts.append(row);
+    }
+    entry["texts"] = texts;
+    return entry;
+}
+
 nb::list CatalogueList()
 {
     nb::list effects;
     for (const EffectSpec *spec : Catalogue())
-    {
-        const Card &card = spec->card;
-        nb::dict entry;
-        entry["name"] = card.name;
-        entry["stage"] = StageName(card.stage);
-        entry["summary"] = card.summary;
-        entry["equation"] = card.equation;
-        entry["leaves_out"] = card.leaves_out;
-        entry["measure"] = card.measure;
-        entry["reference"] = card.reference;
-        entry["duty_only"] = card.drives == kDutyOnly;
-        nb::list parameters;
-        for (const Parameter &p : spec->parameters)
-        {
-            nb::dict row;
-            row["name"] = p.name;
-            row["unit"] = p.unit;
-            row["neutral"] = p.neutral;
-            row["default"] = p.default_value;
-            row["min"] = p.min;
-            row["max"] = p.max;
-            row["doc"] = p.doc;
-            parameters.append(row);
-        }
-        entry["parameters"] = parameters;
-        nb::list texts;
-        for (const TextParameter &t : spec->texts)
-        {
-            nb::dict row;
-            row["name"] = t.name;
-            row["default"] = t.default_value;
-            row["doc"] = t.doc;
-            texts.append(row);
-        }
-        entry["texts"] = texts;
-        effects.append(entry);
-    }
+        effects.append(CardEntry(*spec));
     return effects;
 }
 

@@ -14,6 +14,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace twin
 {
@@ -94,6 +95,14 @@ struct Body
     double friction = 0;  // kWorld: Coulomb's coefficient against another body
 };
 
+// What a parameter says, for those who search for its value.
+enum class Role
+{
+    kSize,      // how strong the effect is
+    kPlace,     // where in the room it acts: a search starts from several places
+    kLateness,  // how late a response comes: only the sum with other such parameters is firm
+};
+
 // One number of an effect. This table is the only place of its name, unit and bounds.
 struct Parameter
 {
@@ -103,7 +112,14 @@ struct Parameter
     double default_value;  // plausible value: where a fit starts
     double min, max;
     const char *doc;
+    // Of a robot whose value is above or below neutral, in plain words; empty: none fit.
+    const char *above = "", *below = "";
+    double usual_size = 0;  // standard deviation over robots; 0: twice from neutral to default
+    Role role = Role::kSize;
 };
+
+// `usual_size`, or what its 0 stands for.
+double UsualSize(const Parameter &parameter);
 
 // A choice or formula of an effect: what no number can say.
 struct TextParameter
@@ -113,7 +129,67 @@ struct TextParameter
     const char *doc;
 };
 
-// What a person should know of an effect.
+// Effects of one family are told apart with difficulty: one may stand for another.
+enum class Family
+{
+    kTransient,  // what follows a change of the command
+    kClock,      // time stamps
+    kGain,       // speed over command
+    kFriction,   // speed lost to the floor or in the gears
+    kGeometry,   // places and shapes of wheels and masses
+    kFrame,      // what motion capture tracks, against the robot
+    kPlace,      // where in the room, or in which direction
+    kPower,      // battery and heat
+    kContact,    // other bodies
+    kCamera,     // what the camera sees, and when
+    kFormula,    // the user's own
+};
+
+// What a measurement must hold for an effect to show in it.
+enum class Needs
+{
+    kSteadySpeed,  // mean speeds and turn rates at constant commands are enough
+    kChanges,      // starts, stops and other changes of the command
+    kClocks,       // time stamps of commands and of poses
+    kPoses,        // the pose of the tracked body
+    kRoom,         // where in the room the robot was, and its heading
+    kBattery,      // the pack voltage
+    kHistory,      // how long the robot had been driving
+    kWheelAngle,   // motion within a turn of the wheels
+    kContacts,     // bodies that touch
+    kFrames,       // the camera's bits
+};
+
+// Kinds of drives, for Card::identify.
+enum Maneuver : unsigned
+{
+    kStraight = 1 << 0,
+    kStrafe = 1 << 1,
+    kDiagonal = 1 << 2,  // forward and sideways at once
+    kSpin = 1 << 3,      // on the spot
+    kArcs = 1 << 4,
+    kSteps = 1 << 5,  // from rest
+    kStops = 1 << 6,
+    kReversals = 1 << 7,
+    kLevels = 1 << 8,    // the same at several commands
+    kHeadings = 1 << 9,  // the same along several headings
+    kPlaces = 1 << 10,   // the same at several places
+    kLong = 1 << 11,     // minutes
+    kTwoRobots = 1 << 12,
+    kWatch = 1 << 13,  // robots in view of a camera
+};
+
+// Phases of a drive, for Card::suspect_when.
+enum Phase : unsigned
+{
+    kStanding = 1 << 0,
+    kSteady = 1 << 1,
+    kStarting = 1 << 2,
+    kStopping = 1 << 3,
+    kChanging = 1 << 4,
+};
+
+// What a person should know of an effect, and what a search for it should.
 struct Card
 {
     const char *name;
@@ -124,6 +200,11 @@ struct Card
     const char *leaves_out;
     const char *measure;    // which drive makes it visible
     const char *reference;  // where the equation comes from
+    Family family;
+    Needs needs;
+    const char *phrase;         // of a robot that has it, in plain words
+    unsigned identify = 0;      // mask of Maneuver: the drives of `measure`
+    unsigned suspect_when = 0;  // mask of Phase: where it is the first to think of
 };
 
 class Effect
@@ -164,6 +245,11 @@ std::span<const EffectSpec *const> Catalogue();
 // The effect of that name, or nullptr.
 const EffectSpec *FindEffect(std::string_view name);
 const char *StageName(Stage stage);
+const char *FamilyName(Family family);
+const char *NeedsName(Needs needs);
+const char *RoleName(Role role);
+std::vector<const char *> ManeuverNames(unsigned maneuvers);
+std::vector<const char *> PhaseNames(unsigned phases);
 
 }  // namespace twin
 
