@@ -17,7 +17,7 @@ from twinmill.challenge.script import write_rich_script
 from twinmill.data.measurement import Measurement, load_measurements
 from twinmill.data.track import command_at
 from twinmill.diagnosis.diagnose import diagnose
-from twinmill.fit.fit import fit
+from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 
 DURATION_S, GOAL_S = 150.0, 10.0

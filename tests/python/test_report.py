@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 import pytest
 
 from twinmill.data.measurement import load_measurements
-from twinmill.fit.compare import compare
+from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
 from twinmill.report import Provenance, Section, comparison_section, steps_section, write_report
 

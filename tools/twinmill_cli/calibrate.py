@@ -12,9 +12,9 @@ from rich.console import RenderableType
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.detections.add import BitAddition, add_to_camera, is_of_camera
 from twinmill.files import check_new_file, check_new_folder
-from twinmill.fit.add import AddResult, add
-from twinmill.fit.compare import Comparison, compare
-from twinmill.fit.fit import FitResult, fit
+from twinmill.fitting.add import AddResult, add
+from twinmill.fitting.compare import Comparison, compare
+from twinmill.fitting.fit import FitResult, fit
 from twinmill.model.model_file import DEFAULT_MODEL, ModelFile
 from twinmill.report import (
     Provenance,

@@ -26,7 +26,7 @@ from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
 from twinmill.files import check_new_folder
-from twinmill.fit.fit import fit
+from twinmill.fitting.fit import fit
 from twinmill.model.freedom import effect_names
 from twinmill.model.model_file import ModelFile, write_whole
 from twinmill.report import challenge as page

@@ -14,7 +14,7 @@ from twinmill.diagnosis.diagnose import diagnose
 from twinmill.experiment.design import Limits, Plan, check, design
 from twinmill.experiment.script_file import csv_text
 from twinmill.files import check_new_file
-from twinmill.fit.compare import open_scenes
+from twinmill.fitting.compare import open_scenes
 from twinmill.model.model_file import DEFAULT_MODEL, write_whole
 from twinmill.report import next_run as present
 from twinmill_cli.calibrate import command_line, finish, open_model, provenance

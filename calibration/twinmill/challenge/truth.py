@@ -8,8 +8,8 @@ import numpy as np
 
 from twinmill.challenge.cases import Hidden
 from twinmill.diagnosis.evidence import State
-from twinmill.fit.heldout import HeldOut, held_out
-from twinmill.fit.solve import solve
+from twinmill.fitting.heldout import HeldOut, held_out
+from twinmill.fitting.solve import solve
 from twinmill.model.freedom import effect_quantities
 from twinmill.model.model_file import ModelFile
 from twinmill.predict.windows import HORIZONS_S

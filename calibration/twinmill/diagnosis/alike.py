@@ -13,8 +13,8 @@ import numpy as np
 from twinmill.diagnosis.bumps import spared
 from twinmill.diagnosis.evidence import State
 from twinmill.diagnosis.search import Search, search
-from twinmill.fit.fit import refit
-from twinmill.fit.solve import gain_spread
+from twinmill.fitting.fit import refit
+from twinmill.fitting.solve import gain_spread
 from twinmill.model.freedom import Free
 from twinmill.predict.problem import GAINS, Scene
 from twinmill.predict.windows import Windows, rms, score_of

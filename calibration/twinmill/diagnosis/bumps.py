@@ -4,7 +4,7 @@
 import numpy as np
 
 from twinmill.data.measurement import Measurement
-from twinmill.fit.solve import solve
+from twinmill.fitting.solve import solve
 from twinmill.predict.problem import Scene
 from twinmill.predict.residual import StepGrid
 from twinmill.predict.windows import HORIZONS_S, Windows

@@ -19,9 +19,9 @@ from twinmill.diagnosis.robots import judge, sentence
 from twinmill.diagnosis.search import Search
 from twinmill.diagnosis.settled import Settled
 from twinmill.diagnosis.verdict import Weighed
-from twinmill.fit.compare import Comparison, comparison, open_scenes
-from twinmill.fit.fit import refit, share_noise
-from twinmill.fit.solve import excited
+from twinmill.fitting.compare import Comparison, comparison, open_scenes
+from twinmill.fitting.fit import refit, share_noise
+from twinmill.fitting.solve import excited
 from twinmill.model.freedom import Free, base_quantities, effect_names, effect_quantities
 from twinmill.model.model_file import ModelFile
 from twinmill.predict.floor import floor_of

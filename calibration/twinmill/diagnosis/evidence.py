@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import twinmill_native as native
 
-from twinmill.fit.heldout import HeldOut, held_out
-from twinmill.fit.solve import huber, solve
+from twinmill.fitting.heldout import HeldOut, held_out
+from twinmill.fitting.solve import huber, solve
 from twinmill.model.freedom import Estimate, Free, effect_names, effect_quantities
 from twinmill.predict.problem import Scene
 

@@ -9,8 +9,8 @@ from twinmill.data.measurement import Measurement
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.robots import own_effects, own_values
-from twinmill.fit.compare import Comparison, comparison
-from twinmill.fit.fit import common_clock, refit
+from twinmill.fitting.compare import Comparison, comparison
+from twinmill.fitting.fit import common_clock, refit
 from twinmill.model.freedom import Estimate
 from twinmill.model.model_file import Fitted, ModelFile, write_child
 

@@ -14,7 +14,7 @@ import numpy as np
 from twinmill.data.track import command_at
 from twinmill.diagnosis.changes import change_columns
 from twinmill.diagnosis.screen import project_out
-from twinmill.fit.solve import System
+from twinmill.fitting.solve import System
 from twinmill.model.freedom import Free, words
 from twinmill.predict.problem import CLOCK, Scene
 from twinmill.predict.residual import body_velocity, rotate

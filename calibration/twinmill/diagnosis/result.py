@@ -9,7 +9,7 @@ from twinmill.diagnosis.omnibus import Omnibus
 from twinmill.diagnosis.ranking import Ranked
 from twinmill.diagnosis.robots import RobotOff
 from twinmill.diagnosis.settled import Sum
-from twinmill.fit.compare import Comparison
+from twinmill.fitting.compare import Comparison
 from twinmill.model.freedom import Estimate
 from twinmill.predict.detection_errors import BitComparison
 

@@ -15,7 +15,7 @@ from scipy.stats import norm, t
 from twinmill.diagnosis.alike import ODD, gains_apart, middle_and_scale, outlying, rms_of, robot_of
 from twinmill.diagnosis.evidence import PRECISION, ROUNDS, State, Trial, attempt, grown
 from twinmill.diagnosis.search import search
-from twinmill.fit.solve import Solution, solve
+from twinmill.fitting.solve import Solution, solve
 from twinmill.model.freedom import Estimate, effect_names
 from twinmill.predict.problem import GAINS, Scene
 from twinmill.predict.windows import score_of

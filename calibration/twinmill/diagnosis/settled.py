@@ -7,7 +7,7 @@ import numpy as np
 
 from twinmill.diagnosis.evidence import State
 from twinmill.diagnosis.ranking import Ranked
-from twinmill.fit.solve import System
+from twinmill.fitting.solve import System
 from twinmill.model.freedom import Estimate, catalogue
 
 # A delay, a clock and a lag all hold a response back: a log tells their sum before their parts.

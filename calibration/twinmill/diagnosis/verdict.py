@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from twinmill.diagnosis.omnibus import CHANGE, Omnibus
 from twinmill.diagnosis.ranking import Ranked, groups_of
 from twinmill.diagnosis.search import SILENT
-from twinmill.fit.compare import GOOD
+from twinmill.fitting.compare import GOOD
 from twinmill.model.freedom import Estimate
 
 HELPED = 0.95  # a refit that lowers the score below this share of it was worth it

@@ -11,7 +11,7 @@ from twinmill.diagnosis.ranking import Ranked
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.screen import screen
 from twinmill.experiment.information import Subject
-from twinmill.fit.fit import refit
+from twinmill.fitting.fit import refit
 from twinmill.model.freedom import Free, catalogue
 from twinmill.predict.problem import Scene
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinmill.diagnosis.candidates import Candidate
-from twinmill.fit.solve import System
+from twinmill.fitting.solve import System
 from twinmill.model.freedom import EFFECT_PRIOR, Free
 from twinmill.predict.problem import Scene
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What to do after a comparison, in a sentence."""
 
-from twinmill.fit.compare import GOOD, SUSPECT, Comparison
+from twinmill.fitting.compare import GOOD, SUSPECT, Comparison
 from twinmill.report.tables import main_robot, number
 from twinmill.steady.compare import SteadyComparison
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from twinmill.fit.compare import GOOD, MISSING, RobotComparison
+from twinmill.fitting.compare import GOOD, MISSING, RobotComparison
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
 from twinmill.report.canvas import BEFORE, FLOOR, PREDICTED, draw, legend_above, plain_ticks
 from twinmill.report.html import Figure

@@ -6,7 +6,7 @@ import twinmill_native as native
 from matplotlib.ticker import MaxNLocator
 
 from twinmill.data.track import Track
-from twinmill.fit.compare import RobotComparison
+from twinmill.fitting.compare import RobotComparison
 from twinmill.predict.regimes import HORIZON
 from twinmill.predict.residual import body_velocity, rotate
 from twinmill.predict.windows import HORIZONS_S

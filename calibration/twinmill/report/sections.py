@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results of calibration to sections of a report."""
 
-from twinmill.fit.add import AddResult
-from twinmill.fit.compare import Comparison
-from twinmill.fit.fit import FitResult
+from twinmill.fitting.add import AddResult
+from twinmill.fitting.compare import Comparison
+from twinmill.fitting.fit import FitResult
 from twinmill.report import tables, views
 from twinmill.report.advice import advice
 from twinmill.report.detection_figures import field_of_view

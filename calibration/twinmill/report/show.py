@@ -7,9 +7,9 @@ from rich.padding import Padding
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from twinmill.fit.add import AddResult
-from twinmill.fit.compare import Comparison
-from twinmill.fit.fit import FitResult
+from twinmill.fitting.add import AddResult
+from twinmill.fitting.compare import Comparison
+from twinmill.fitting.fit import FitResult
 from twinmill.report import tables, views
 from twinmill.report.advice import advice
 from twinmill.report.tables import Cell, Table, number, tone

@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from twinmill.fit.add import AddResult
-from twinmill.fit.compare import GOOD, MISSING, SUSPECT, Comparison, RobotComparison
+from twinmill.fitting.add import AddResult
+from twinmill.fitting.compare import GOOD, MISSING, SUSPECT, Comparison, RobotComparison
 from twinmill.model.freedom import Estimate
 from twinmill.predict.noise import Noise
 from twinmill.predict.regimes import HORIZON, Regime

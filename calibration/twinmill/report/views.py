@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Facts and tables of a comparison, whatever was measured: logs, steady-state tables, or both."""
 
-from twinmill.fit.compare import Comparison
+from twinmill.fitting.compare import Comparison
 from twinmill.report import steady as present
 from twinmill.report import tables
 from twinmill.report.detection_tables import bit_tables

@@ -11,7 +11,7 @@ from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.ranking import rank
 from twinmill.diagnosis.screen import Screened, Screening
-from twinmill.fit.fit import fit
+from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 
 TABLE = """

@@ -6,9 +6,9 @@ import pytest
 
 from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
-from twinmill.fit.add import add
-from twinmill.fit.compare import compare
-from twinmill.fit.fit import fit
+from twinmill.fitting.add import add
+from twinmill.fitting.compare import compare
+from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 
 EULER_S = 1 / 480  # the robot's step: times are known to half of it, and lags to as much again

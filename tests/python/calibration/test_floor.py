@@ -6,7 +6,7 @@ import pytest
 
 from twinmill.data.measurement import Measurement, _played
 from twinmill.data.track import make_track
-from twinmill.fit.compare import compare, open_scenes
+from twinmill.fitting.compare import compare, open_scenes
 from twinmill.predict.floor import measure_floor
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.problem import Scene

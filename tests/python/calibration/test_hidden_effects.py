@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from twinmill.data.measurement import load_measurements
-from twinmill.fit.add import add
-from twinmill.fit.compare import GOOD, SUSPECT, compare
-from twinmill.fit.fit import fit
+from twinmill.fitting.add import add
+from twinmill.fitting.compare import GOOD, SUSPECT, compare
+from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 
 FORM = 0.1

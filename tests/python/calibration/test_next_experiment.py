@@ -22,7 +22,7 @@ from twinmill.experiment.moves import AXES, family
 from twinmill.experiment.power import told_apart
 from twinmill.experiment.relevance import Relevance
 from twinmill.experiment.script_file import csv_text
-from twinmill.fit.fit import fit
+from twinmill.fitting.fit import fit
 from twinmill.model.freedom import Free
 from twinmill.model.model_file import ModelFile
 from twinmill_cli import main as cli

@@ -9,7 +9,7 @@ from scipy.signal import freqz, lfilter
 from scipy.stats import chi2
 
 from twinmill.data.track import command_at
-from twinmill.fit.compare import open_scenes
+from twinmill.fitting.compare import open_scenes
 from twinmill.predict.flexible import unexplained
 from twinmill.predict.noise import TRANSIENT, ChannelNoise, Noise, fit_noise
 from twinmill.predict.problem import Scene

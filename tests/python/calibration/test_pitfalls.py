@@ -10,10 +10,10 @@ import pytest
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.evidence import State, attempt, fall
 from twinmill.diagnosis.search import ALPHA
-from twinmill.fit.compare import compare, open_scenes
-from twinmill.fit.fit import fit, refit
-from twinmill.fit.heldout import held_out
-from twinmill.fit.solve import huber, solve
+from twinmill.fitting.compare import compare, open_scenes
+from twinmill.fitting.fit import fit, refit
+from twinmill.fitting.heldout import held_out
+from twinmill.fitting.solve import huber, solve
 from twinmill.model.freedom import base_quantities, catalogue, effect_quantities
 from twinmill.model.model_file import ModelFile
 from twinmill.predict.folds import MARGIN_S, halves, step_mask

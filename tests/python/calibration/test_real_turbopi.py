@@ -6,8 +6,8 @@ import pytest
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.measurement import load_measurements
-from twinmill.fit.add import add
-from twinmill.fit.fit import fit
+from twinmill.fitting.add import add
+from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 from twinmill.predict.windows import HORIZONS_S
 

@@ -16,7 +16,7 @@ from twinmill.diagnosis.bumps import bumps, spared
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.omnibus import unexplained
-from twinmill.fit.compare import compare, open_scenes
+from twinmill.fitting.compare import compare, open_scenes
 from twinmill.model.model_file import ModelFile
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from twinmill.fit.compare import open_scenes
-from twinmill.fit.fit import refit
-from twinmill.fit.solve import excited, solve
+from twinmill.fitting.compare import open_scenes
+from twinmill.fitting.fit import refit
+from twinmill.fitting.solve import excited, solve
 from twinmill.model.freedom import base_quantities
 
 LOGS = 12

@@ -8,7 +8,7 @@ import twinmill_native as native
 from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
-from twinmill.fit.compare import compare
+from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
 
 HEADER = "robot_id,speed_input,direction_deg,turn_input,run,speed_mps,turn_radps,note\n"

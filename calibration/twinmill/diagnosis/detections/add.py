@@ -7,7 +7,7 @@ from pathlib import Path
 from twinmill.data.measurement import Measurement
 from twinmill.diagnosis.detections.fit import STAGES
 from twinmill.diagnosis.detections.search import attempt
-from twinmill.fit.compare import open_scenes
+from twinmill.fitting.compare import open_scenes
 from twinmill.model.freedom import Estimate, catalogue
 from twinmill.model.model_file import Fitted, ModelFile, write_child
 from twinmill.predict.detection_errors import BitComparison, compare_bits

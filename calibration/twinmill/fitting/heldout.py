@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twinmill.fit.solve import System, huber
+from twinmill.fitting.solve import System, huber
 from twinmill.model.freedom import Free
 from twinmill.predict.folds import halves, held_errors, step_mask
 from twinmill.predict.problem import Scene

@@ -8,7 +8,7 @@ import numpy as np
 from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import Sheet
-from twinmill.fit.solve import solve
+from twinmill.fitting.solve import solve
 from twinmill.model.model_file import ModelFile
 from twinmill.predict.detection_errors import BitComparison, compare_bits
 from twinmill.predict.detections import bit_scenes

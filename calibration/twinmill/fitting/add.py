@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from twinmill.data.measurement import Measurement
-from twinmill.fit.compare import Comparison, comparison, open_scenes
-from twinmill.fit.fit import common_clock, refit, share_noise
-from twinmill.fit.heldout import HeldOut, held_out
-from twinmill.fit.solve import excited, solve
+from twinmill.fitting.compare import Comparison, comparison, open_scenes
+from twinmill.fitting.fit import common_clock, refit, share_noise
+from twinmill.fitting.heldout import HeldOut, held_out
+from twinmill.fitting.solve import excited, solve
 from twinmill.model.freedom import Estimate, base_quantities, effect_names, effect_quantities
 from twinmill.model.model_file import Fitted, ModelFile, write_child
 

@@ -8,8 +8,8 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
-from twinmill.fit.compare import Comparison, comparison, open_scenes
-from twinmill.fit.solve import Solution, excited, solve
+from twinmill.fitting.compare import Comparison, comparison, open_scenes
+from twinmill.fitting.solve import Solution, excited, solve
 from twinmill.model.freedom import Estimate, Free, base_quantities, effect_quantities
 from twinmill.model.model_file import Fitted, ModelFile, write_child
 from twinmill.predict.problem import CLOCK, CLOCK_RATE, Scene
