@@ -230,6 +230,18 @@ TEST(ModelFile, ReadsWhatIsThereAndLeavesTheRestAtItsDefaults)
     EXPECT_EQ(model.effects[1].values[0], model.effects[1].spec->parameters[0].default_value);
 }
 
+TEST(ModelFile, OneClockIsDeclaredAndNotContradicted)
+{
+    const Model model = Parse("[clock]\nsame = true");
+    EXPECT_TRUE(model.clock.known);
+    EXPECT_TRUE(model.clock.same);
+    EXPECT_FALSE(Parse("[clock]\noffset_s = 0.1").clock.same);
+    EXPECT_FALSE(Parse("[clock]\nsame = false\noffset_s = 0.1").clock.same);
+    EXPECT_THROW(Parse("[clock]\nsame = true\noffset_s = 0.1"), std::invalid_argument);
+    EXPECT_THROW(Parse("[clock]\nsame = 1"), std::invalid_argument);
+    EXPECT_THROW(Parse("[clock]\nsane = true"), std::invalid_argument);
+}
+
 TEST(ModelFile, ReadsFormulasAndNarrowerBounds)
 {
     Model model = Parse(

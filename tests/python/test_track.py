@@ -156,3 +156,32 @@ def test_commands_of_another_time_leave_nothing_usable(driven):
     track = make_track(replace(robot, command_t_s=robot.command_t_s + 100))
     assert (track.segment == -1).all()
     assert any("no stretch" in note for note in track.notes)
+
+
+@pytest.mark.parametrize("period_s", [0.01, 0.25])
+def test_a_fast_car_does_not_jump_and_is_cut_where_it_is_put_elsewhere(driven, period_s):
+    pose_t_s = np.arange(0, 40, period_s)
+    speed_mps = 6 * (1 - np.cos(2 * np.pi * pose_t_s / 20))  # to 12 m/s and back, twice
+    x_m = np.cumsum(speed_mps * period_s)
+    pose = np.column_stack([x_m, 0 * x_m, 0 * x_m])
+    count = len(pose_t_s)
+    robot = driven(40.0, pose_t_s=pose_t_s, pose=pose, z_m=np.zeros(count), valid=np.ones(count, bool))
+    assert (make_track(robot).segment == 0).all()
+    pose[count // 2 :, 1] += 8.0  # at rest, 20 s
+    assert make_track(robot).segment.max() == 1
+
+
+def test_losing_every_third_frame_at_random_does_not_cut_the_track(driven):
+    robot = driven(60.0)
+    lost = np.random.default_rng(1).random(len(robot.pose_t_s)) < 1 / 3
+    robot.valid[lost] = False
+    robot.pose[lost] = np.nan
+    track = make_track(robot)
+    assert track.segment.max() == 0
+    assert track.timing.pose_lost_share == pytest.approx(1 / 3, abs=0.03)
+
+
+def test_noise_of_five_degrees_is_no_jump(driven):
+    robot = driven(30.0)
+    robot.pose[:, 2] += np.radians(5) * np.random.default_rng(1).normal(size=len(robot.pose))
+    assert make_track(robot).segment.tolist() == [0] * len(robot.pose_t_s)

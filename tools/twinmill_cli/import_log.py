@@ -27,7 +27,10 @@ def _command(
     poses: Annotated[
         Path | None,
         typer.Option(
-            help=("CSV: t_s, robot_id, x_m, y_m, theta_rad or qw, qx, qy, qz; optional z_m, valid.")
+            help=(
+                "CSV: t_s, robot_id, x_m, y_m, theta_rad or qw, qx, qy, qz; optional z_m, valid. "
+                "Without a heading only the position is judged."
+            )
         ),
     ] = None,
     motive: Annotated[
@@ -43,7 +46,8 @@ def _command(
         typer.Option(
             help=(
                 "CSV: t_s, robot_id and fl_pct, fr_pct, rl_pct, rr_pct | speed_input, turn_input | "
-                "w1_radps..w4_radps | vx_mps, vy_mps, omega_radps; held until the next row."
+                "w1_radps..w4_radps | vx_mps, vy_mps, omega_radps | vx_world_mps, vy_world_mps; "
+                "held until the next row."
             )
         ),
     ] = None,
@@ -67,6 +71,12 @@ def _command(
         float,
         typer.Option(help=("From the tracked body's x axis to the robot's front, left positive.")),
     ] = 0.0,
+    same_clock: Annotated[
+        bool,
+        typer.Option(
+            "--same-clock", help="One clock stamped poses and commands: no offset is estimated."
+        ),
+    ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the output.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> None:
@@ -89,6 +99,7 @@ def _command(
             },
             up=up,
             pose_shift_s=pose_shift_s,
+            same_clock=same_clock,
             force=force,
             heading_offset_rad=float(np.radians(heading_offset_deg)),
         )

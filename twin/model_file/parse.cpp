@@ -63,7 +63,7 @@ public:
         ReadFields();
         ReadEffects();
         ReadRobots();
-        model_.clock.known = root_.contains("clock");
+        ReadClock();
         return model_;
     }
 
@@ -95,7 +95,7 @@ private:
     void ReadFields()
     {
         static const std::set<std::string> kSpecial{"base.drive", "base.wheels", "base.duty_pct",
-                                                    "base.wheel_speed_mps"};
+                                                    "base.wheel_speed_mps", "clock.same"};
         for (const auto &[section, node] : root_)
         {
             const std::string name(section.str());
@@ -103,6 +103,8 @@ private:
             if (!table || name == "robots" || name == "fit")
                 continue;
             std::set<std::string> known{"std", "fitted_on"};
+            if (name == "clock")
+                known.insert("same");
             for (const Field &field : Fields())
                 if (name == field.section)
                     known.insert(field.key);
@@ -119,6 +121,21 @@ private:
                             Number(origin_, path, value, field.min, field.max, field.unit);
             }
         }
+    }
+
+    // `same = true`: poses and commands were stamped by one clock, so nothing is to be estimated.
+    void ReadClock()
+    {
+        Clock &clock = model_.clock;
+        clock.known = root_.contains("clock");
+        const toml::node_view same = root_["clock"]["same"];
+        if (same && !same.is_boolean())
+            Fail(origin_, "clock.same must be true or false");
+        clock.same = same.value_or(false);
+        if (clock.same && (clock.offset_s != 0 || clock.rate_ppm != 0))
+            Fail(origin_,
+                 "clock.same = true says that one clock stamped poses and commands, but "
+                 "clock.offset_s or clock.rate_ppm is not 0; remove the one or the other");
     }
 
     template <class Kind>

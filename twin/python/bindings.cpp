@@ -278,6 +278,7 @@ NB_MODULE(twinmill_native, m)
         .def("copy", [](const Model &model) { return Model(model); })
         .def_prop_ro("drive", &DriveName)
         .def_prop_ro("clock_known", [](const Model &model) { return model.clock.known; })
+        .def_prop_ro("clock_same", [](const Model &model) { return model.clock.same; })
         .def_prop_ro("texts", &TextsList, "By effect in their order: its texts by name.")
         .def_prop_ro("effects", [](const Model &model) {
             nb::list names;

@@ -167,7 +167,7 @@ def _body_velocity(track: Track) -> tuple[np.ndarray, np.ndarray]:
         [
             cos * slope[:, 0] + sin * slope[:, 1],
             cos * slope[:, 1] - sin * slope[:, 0],
-            LEVER_M * slope[:, 2],
+            LEVER_M * slope[:, 2] if track.has_heading else 0 * slope[:, 0],
         ]
     )
     every = max(1, round(THIN_S / track.timing.pose_period_s))

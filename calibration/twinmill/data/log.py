@@ -3,6 +3,7 @@
 
 import hashlib
 import re
+import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,9 +42,11 @@ class RobotLog:
         mode, detected_raw, detected: (M,) int8 as in telemetry_t; (0,) without telemetry.
         speed_input, turn_input: (M,) as in telemetry_t; (0,) without telemetry.
         pose_t_s: (N,) motion capture's clock, ascending.
-        pose: (N, 3) x_m, y_m, theta_rad (unwrapped); NaN where not valid.
+        pose: (N, 3) x_m, y_m, theta_rad (unwrapped); NaN where not valid. Where the heading was
+            not recorded it is NaN throughout.
         z_m: (N,) height of the tracked body; NaN where not valid.
         valid: (N,) bool.
+        same_clock: the log says that one clock stamped commands and poses.
     """
 
     robot_id: int
@@ -63,6 +66,12 @@ class RobotLog:
     pose: np.ndarray
     z_m: np.ndarray
     valid: np.ndarray
+    same_clock: bool = False
+
+    @property
+    def has_heading(self) -> bool:
+        """Whether the heading was recorded; of a robot that was never seen nothing is missing."""
+        return not self.valid.any() or bool(np.isfinite(self.pose[self.valid, 2]).any())
 
 
 @dataclass(frozen=True)
@@ -121,11 +130,12 @@ def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = ""
     )
     robots = {}
     for robot_id, (commands, poses) in messages.items():
-        source, behavior = _last_run(channels[robot_id].get("RUN", []), robot_id)
+        run = _last_run(channels[robot_id].get("RUN", []), robot_id)
         robots[robot_id] = RobotLog(
             robot_id=robot_id,
-            source=source,
-            behavior=behavior,
+            source=run.source,
+            behavior=run.behavior,
+            same_clock=_says_same_clock(run.config_toml),
             **_command_series(commands, t0_us, robot_id, warnings),
             **_pose_series(poses, t0_us, robot_id, warnings),
         )
@@ -234,18 +244,26 @@ def _in_order(messages: np.ndarray, channel: str, robot_id: int, warnings: list[
     return messages[order[last]]
 
 
-def _last_run(payloads: list[bytes], robot_id: int) -> tuple[str, str]:
-    """Source and behaviour by the last run_t; empty without one."""
+def _last_run(payloads: list[bytes], robot_id: int) -> turbopi.run_t:
+    """What the robot said of itself last; empty if it said nothing."""
     if not payloads:
-        return "", ""
+        return turbopi.run_t()
     try:
-        run = turbopi.run_t.decode(payloads[-1])
+        return turbopi.run_t.decode(payloads[-1])
     except Exception as error:  # the generated decoder raises what its steps happen to raise
         raise LogError(
             f"R{robot_id:02d}_RUN: a message is not of type turbopi.run_t ({error}): "
             "the log was made with other message types."
         ) from error
-    return run.source, run.behavior
+
+
+def _says_same_clock(config_toml: str) -> bool:
+    """What `twinmill import --same-clock` noted; robots write other things, or no TOML at all."""
+    try:
+        table = tomllib.loads(config_toml).get("import")
+    except tomllib.TOMLDecodeError:
+        return False
+    return isinstance(table, dict) and table.get("same_clock") is True
 
 
 def _command_series(
@@ -323,17 +341,20 @@ def _pose_series(
     position_m = messages["position_m"].astype(float)
     quaternion = messages["orientation_wxyz"].astype(float)
     stated = messages["valid"] != 0
-    norm = np.linalg.norm(quaternion, axis=1)
-    usable = np.isfinite(position_m).all(axis=1) & (np.abs(norm - 1) < 0.1)  # NaN compares false
-    if (stated & ~usable).any():
+    placed = np.isfinite(position_m).all(axis=1)
+    turned = np.abs(np.linalg.norm(quaternion, axis=1) - 1) < 0.1  # NaN compares false
+    seen = stated & placed
+    has_heading = not seen.any() or not np.isnan(quaternion[seen]).all()
+    valid = seen & turned if has_heading else seen
+    if (stated & ~valid).any():
         warnings.append(
-            f"R{robot_id:02d}_POSE: {np.count_nonzero(stated & ~usable)} poses are "
+            f"R{robot_id:02d}_POSE: {np.count_nonzero(stated & ~valid)} poses are "
             "marked valid but hold no position or no unit quaternion; taken as lost."
         )
-    valid = stated & usable
     pose = np.full((len(messages), 3), np.nan)
     pose[valid, :2] = position_m[valid, :2]
-    pose[valid, 2] = np.unwrap(heading_rad(quaternion[valid]))
+    if has_heading:
+        pose[valid, 2] = np.unwrap(heading_rad(quaternion[valid]))
     return {
         "pose_t_s": _seconds(messages, t0_us),
         "pose": pose,

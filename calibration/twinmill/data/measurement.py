@@ -8,7 +8,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.camera_frames import Frames, frames_of
-from twinmill.data.log import LogError, RobotLog, read_log
+from twinmill.data.log import Log, LogError, RobotLog, read_log
 from twinmill.data.steady_table import Sheet, is_sheet, read_sheets
 from twinmill.data.time_base import TimeBase, find_time_base, retimed
 from twinmill.data.track import SILENCE_S, SMOOTH_S, Track, local_line, make_track
@@ -52,9 +52,17 @@ class Measurement:
         """Short name of log and robot."""
         return f"{self.log_name} R{self.track.robot_id:02d}"
 
+    @property
+    def same_clock(self) -> bool:
+        """The log says that one clock stamped commands and poses."""
+        return self.track.same_clock
+
     def with_pose(self, pose: np.ndarray) -> "Measurement":
         """The same run with other poses (N, 3)."""
-        smooth_rad, _ = local_line(self.track.pose_t_s, pose[:, 2], self.track.segment, SMOOTH_S)
+        smooth_rad = self.track.heading_smooth
+        if self.track.has_heading:
+            t_s, segment = self.track.pose_t_s, self.track.segment
+            smooth_rad, _ = local_line(t_s, pose[:, 2], segment, SMOOTH_S)
         track = replace(self.track, pose=pose, heading_smooth=smooth_rad)
         return replace(self, track=track, played=_played(track))
 
@@ -72,36 +80,71 @@ class Measurement:
         return replace(self, track=track, played=_played(track), warnings=[*self.warnings, why])
 
 
-def load_measurements(paths: list[Path]) -> list[Measurement | Sheet]:
+class Measurements(list[Measurement | Sheet]):
+    """What can be judged, and what was left out.
+
+    Attributes:
+        excluded: one sentence on each robot, log or table that cannot be judged.
+    """
+
+    def __init__(self, judged: list[Measurement | Sheet], excluded: list[str]) -> None:
+        super().__init__(judged)
+        self.excluded = excluded
+
+
+def load_measurements(paths: list[Path]) -> Measurements:
     """Reads logs and cleans every robot in them; reads steady-state tables (.csv).
 
+    A robot or a log that cannot be judged is left out, with the reason, if another can.
+
     Raises:
-        LogError: a log cannot be read, or is too short to judge a model by.
+        LogError: nothing that could be judged is left; why not the first.
     """
-    measurements = []
+    judged: list[Measurement | Sheet] = []
+    excluded: list[LogError] = []
     for path in paths:
-        if is_sheet(path):
-            measurements += read_sheets(path)
+        try:
+            if is_sheet(path):
+                judged += read_sheets(path)
+                continue
+            log = read_log(path)
+        except LogError as error:
+            excluded.append(error)
             continue
-        log = read_log(path)
         runs = len(paths) * len(log.robots)
         for robot in log.robots.values():
-            base = find_time_base(robot)
-            track = make_track(thinned(retimed(robot, base) if base else robot, runs))
-            _check_length(path, track)
-            measurements.append(
-                Measurement(
-                    Path(path).name,
-                    log.sha256,
-                    track,
-                    _played(track),
-                    [*log.warnings, *([f"{base}; put right."] if base else []), *track.notes],
-                    log.t0_utime_us,
-                    base,
-                    frames_of(robot),
-                )
-            )
-    return measurements
+            try:
+                judged.append(_measured(log, robot, runs))
+            except LogError as error:
+                excluded.append(error)
+    if not judged:
+        raise excluded[0]
+    return Measurements(judged, [f"Left out: {error}" for error in excluded])
+
+
+def _measured(log: Log, robot: RobotLog, runs: int) -> Measurement:
+    """One robot of a log, cleaned; of so many robots and logs in all.
+
+    Raises:
+        LogError: too little of it can be used.
+    """
+    name = log.path.name
+    base = find_time_base(robot)
+    try:
+        track = make_track(thinned(retimed(robot, base) if base else robot, runs))
+    except LogError as error:
+        raise LogError(f"{name}: {error}") from error
+    _check_length(name, track)
+    return Measurement(
+        name,
+        log.sha256,
+        track,
+        _played(track),
+        [*log.warnings, *([f"{base}; put right."] if base else []), *track.notes],
+        log.t0_utime_us,
+        base,
+        frames_of(robot) if robot.has_heading else None,
+    )
 
 
 def thinned(robot: RobotLog, runs: int) -> RobotLog:
@@ -113,11 +156,11 @@ def thinned(robot: RobotLog, runs: int) -> RobotLog:
     return replace(robot, **pose)
 
 
-def _check_length(path: Path, track: Track) -> None:
+def _check_length(name: str, track: Track) -> None:
     usable_s = np.count_nonzero(track.segment >= 0) * track.timing.pose_period_s
     if usable_s < SHORTEST_LOG_S:
         raise LogError(
-            f"{path}: robot {track.robot_id} has {usable_s:.1f} s of usable poses; a model "
+            f"{name}: robot {track.robot_id} has {usable_s:.1f} s of usable poses; a model "
             f"cannot be judged on less than {SHORTEST_LOG_S:g} s, so record a longer run."
         )
 
@@ -129,10 +172,13 @@ def _played(track: Track) -> native.Track:
         t_s = np.insert(t_s, silent + 1, t_s[silent] + SILENCE_S)
         command = np.insert(command, silent + 1, 0.0, axis=0)
         battery_V = np.insert(battery_V, silent + 1, battery_V[silent])
+    pose = track.pose.copy()
+    if not track.has_heading:  # taken to be held: body and world are one frame
+        pose[:, 2] = 0.0
     return native.Track(
         *(
             np.ascontiguousarray(a, float)
-            for a in (t_s, command, battery_V, track.pose_t_s, track.pose)
+            for a in (t_s, command, battery_V, track.pose_t_s, pose)
         ),
         np.ascontiguousarray(track.segment, np.int64),
     )

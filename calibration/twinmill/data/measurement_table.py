@@ -58,6 +58,11 @@ class Table:
         """Whether all these columns are there."""
         return set(columns) <= set(self.header)
 
+    @property
+    def strange(self) -> list[str]:
+        """Columns without a meaning."""
+        return [name for name in self.header if name not in self.known]
+
     def numbers(self, column: str, empty_is_nan: bool = False) -> np.ndarray:
         """(rows,) floats of a column.
 
@@ -100,8 +105,7 @@ class Table:
 
     def missing(self, column: str) -> LogError:
         """The error to raise where this column is needed and not there."""
-        strange = [name for name in self.header if name not in self.known]
-        near = difflib.get_close_matches(column, strange, n=1, cutoff=0.0)
+        near = difflib.get_close_matches(column, self.strange, n=1, cutoff=0.0)
         if not near:
             return LogError(f"{self.name}: column {column} is missing; add it.")
         return LogError(

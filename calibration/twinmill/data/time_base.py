@@ -52,9 +52,11 @@ class TimeBase:
 
 def find_time_base(robot: RobotLog) -> TimeBase | None:
     """The time base of measured wheel speeds; None if the log's own will do, or nothing tells."""
+    if robot.same_clock:
+        return None
     if robot.command_kind != "wheel_speed" or len(robot.command_t_s) < 100:
         return None
-    if np.count_nonzero(robot.valid) < 100:
+    if np.count_nonzero(robot.valid) < 100 or not robot.has_heading:
         return None
     problem, coarse = _Regression(robot, GRID_S), _Regression(robot, COARSE_S)
     if not problem.moves:

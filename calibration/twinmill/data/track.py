@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cleans a robot's series for prediction: cuts the track where it breaks, marks where it rests."""
+"""Cleans a robot's series for prediction: what is usable, where it rests, how regular it is."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from twinmill.data.cuts import find_segments
 from twinmill.data.log import CommandKind, LogError, RobotLog
 
-GAP_S = 0.05  # four frames at 100 Hz, in which a TurboPi moves at most 20 mm
-GAP_PERIODS = 4  # the same for slower cameras
-JUMP_NOISE_M, JUMP_NOISE_RAD = 0.005, 0.05  # ten times the noise of a motion capture
-MARGIN_S = 0.1  # frames beside a pick-up show the hand or half a marker body
 LIFT_M = 0.05  # height above the median that no driving robot has
-SHORTEST_S = 0.1  # shortest horizon that is predicted: a segment below it is of no use
 SILENCE_S = 0.25  # telemetry comes every 22 ms: after this the duties are not known any more
 CLOCK_S = 0.3  # more than any offset between the clocks
 FROZEN_S = 0.5  # a pose that keeps its very bits for longer while driven is no measurement
@@ -50,11 +46,15 @@ class Track:
         pose: (N, 3) x_m, y_m, theta_rad; the heading is continuous within a segment.
         segment: (N,) number of the unbroken stretch that a pose belongs to; -1 where unusable.
         heading_smooth: (N,) rad, local straight line over 50 ms; NaN where segment is -1. Only to
-            turn vectors; errors of heading use `pose`.
+            turn vectors; errors of heading use `pose`. Zero where the heading was not recorded:
+            the robot is then taken to hold it, and body and world are one frame.
         rest: (K, 2) s, start and end of stretches in which the robot stands, on either clock:
             all commands zero since 1.5 s before, and until 0.3 s after.
         timing: of both series.
         notes: sentences on each cut and on what looks wrong, with times.
+        has_heading: false where the heading was not recorded: it is NaN in `pose`, and nothing
+            about it can be judged.
+        same_clock: the log says that one clock stamped commands and poses.
     """
 
     robot_id: int
@@ -69,16 +69,19 @@ class Track:
     rest: np.ndarray
     timing: Timing
     notes: list[str]
+    has_heading: bool = True
+    same_clock: bool = False
 
 
-def make_track(robot: RobotLog, max_speed_mps: float = 1.5, max_turn_radps: float = 12.0) -> Track:
+def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.0) -> Track:
     """Cleans one robot's series.
 
     Args:
         robot: as read from the log.
-        max_speed_mps: what the robot cannot exceed; faster is a jump, as when it was picked up and
-            put elsewhere. The default is four times a TurboPi's speed.
-        max_turn_radps: the same for turning.
+        usual_mps: no step is a jump below this speed, four times a TurboPi's. Above it a step is
+            one where it is far faster than the steps before and after it, as when the robot was
+            picked up and put elsewhere: a car that drives at 4 m/s does not jump.
+        usual_radps: the same for turning.
 
     Raises:
         LogError: without commands, or with fewer than two valid poses.
@@ -91,14 +94,16 @@ def make_track(robot: RobotLog, max_speed_mps: float = 1.5, max_turn_radps: floa
         )
     notes: list[str] = []
     usable = _trackable(robot, notes)
-    usable &= ~_excursions(robot, usable, (max_speed_mps, max_turn_radps), notes)
-    index, cut = _cuts(robot, usable, (max_speed_mps, max_turn_radps), notes)
-    segment = _segments(robot, index, cut, notes)
+    segment = find_segments(robot, usable, (usual_mps, usual_radps), notes)
     pose = _continuous(robot.pose, segment)
     rest = _rest(robot)
     _note_frozen(robot, notes)
-    heading_smooth, _ = local_line(robot.pose_t_s, pose[:, 2], segment, SMOOTH_S)
-    _note_astray(robot, pose, segment, notes)
+    if robot.has_heading:
+        heading_smooth, _ = local_line(robot.pose_t_s, pose[:, 2], segment, SMOOTH_S)
+        _note_astray(robot, pose, segment, notes)
+    else:
+        heading_smooth = np.where(segment < 0, np.nan, 0.0)
+        notes.append("the heading is not recorded: only the position is judged.")
     return Track(
         robot.robot_id,
         robot.command_kind,
@@ -112,6 +117,8 @@ def make_track(robot: RobotLog, max_speed_mps: float = 1.5, max_turn_radps: floa
         rest,
         _timing(robot, segment),
         notes,
+        robot.has_heading,
+        robot.same_clock,
     )
 
 
@@ -122,10 +129,6 @@ def command_at(t_s: np.ndarray, command_t_s: np.ndarray, command: np.ndarray) ->
     """
     k = np.searchsorted(command_t_s, t_s, side="right") - 1
     return np.where((k >= 0)[:, None], command[np.maximum(k, 0)], 0.0)
-
-
-def _gap_s(robot: RobotLog) -> float:
-    return max(GAP_S, GAP_PERIODS * float(np.median(np.diff(robot.pose_t_s))))
 
 
 def _trackable(robot: RobotLog, notes: list[str]) -> np.ndarray:
@@ -155,80 +158,6 @@ def _silent(robot: RobotLog) -> np.ndarray:
     for k in np.flatnonzero(np.diff(stamps) > SILENCE_S):
         outside |= (t > stamps[k] + CLOCK_S) & (t < stamps[k + 1] - CLOCK_S)
     return outside
-
-
-def _jumps(robot: RobotLog, index: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
-    """(len(index) - 1,) bool: steps between these poses that the robot cannot make."""
-    dt_s = np.diff(robot.pose_t_s[index])
-    step = np.diff(robot.pose[index], axis=0)
-    turn_rad = np.abs(np.remainder(step[:, 2] + np.pi, 2 * np.pi) - np.pi)
-    return (np.hypot(step[:, 0], step[:, 1]) > limits[0] * dt_s + JUMP_NOISE_M) | (
-        turn_rad > np.minimum(limits[1] * dt_s + JUMP_NOISE_RAD, np.pi)
-    )
-
-
-def _excursions(
-    robot: RobotLog, usable: np.ndarray, limits: tuple[float, float], notes: list[str]
-) -> np.ndarray:
-    """(N,) bool: poses between a jump and the jump back, as when markers are mixed up."""
-    outlier = np.zeros(len(usable), bool)
-    index = np.flatnonzero(usable)
-    jumps = np.flatnonzero(_jumps(robot, index, limits))
-    position = 0
-    while position + 1 < len(jumps):
-        before, after = index[jumps[position]], index[jumps[position + 1] + 1]
-        ends = np.array([before, after])
-        back = (
-            robot.pose_t_s[after] - robot.pose_t_s[before] <= _gap_s(robot)
-            and not _jumps(robot, ends, limits)[0]
-        )
-        if back:
-            outlier[before + 1 : after] = True
-        position += 2 if back else 1
-    if outlier.any():
-        notes.append(
-            f"{np.count_nonzero(outlier)} poses from {robot.pose_t_s[outlier][0]:.3f} s "
-            "on jump away and back; left out."
-        )
-    return outlier
-
-
-def _cuts(
-    robot: RobotLog, usable: np.ndarray, limits: tuple[float, float], notes: list[str]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Usable poses without the margins, and which of them begin a segment: (K,) int, (K,) bool."""
-    index = np.flatnonzero(usable)
-    t = robot.pose_t_s[index]
-    jump = _jumps(robot, index, limits)
-    gap = np.diff(t) > _gap_s(robot)
-    lost = gap & (np.diff(index) > 1)
-    keep = np.ones(len(index), bool)
-    for k in np.flatnonzero(jump | gap):
-        moved_m = np.hypot(*(robot.pose[index[k + 1], :2] - robot.pose[index[k], :2]))
-        what = "not tracked" if lost[k] else "no poses" if gap[k] else "the robot jumps"
-        notes.append(
-            f"cut at {t[k]:.3f} s: {what} for {t[k + 1] - t[k]:.3f} s, then {moved_m:.3f} m away."
-        )
-        if jump[k] or lost[k]:
-            keep &= (t < t[k] - MARGIN_S) | (t > t[k + 1] + MARGIN_S)
-    begins = np.concatenate([[0], np.cumsum(jump | gap)])[: len(index)]
-    index, begins = index[keep], begins[keep]
-    return index, np.diff(begins, prepend=-1) > 0
-
-
-def _segments(
-    robot: RobotLog, index: np.ndarray, begins: np.ndarray, notes: list[str]
-) -> np.ndarray:
-    """(N,) numbers of segments, short ones dropped."""
-    segment, number = np.full(len(robot.pose_t_s), -1), 0
-    for part in np.split(index, np.flatnonzero(begins)):
-        if len(part) < 2 or np.ptp(robot.pose_t_s[part]) < SHORTEST_S:
-            continue
-        segment[part] = number
-        number += 1
-    if not number:
-        notes.append("no stretch of the track is long enough to predict anything.")
-    return segment
 
 
 def _continuous(pose: np.ndarray, segment: np.ndarray) -> np.ndarray:
@@ -315,7 +244,7 @@ def _note_frozen(robot: RobotLog, notes: list[str]) -> None:
     """Poses that keep their bits although the robot is driven all the while."""
     index = np.flatnonzero(robot.valid)
     t = robot.pose_t_s[index]
-    moves = np.flatnonzero((np.diff(robot.pose[index], axis=0) != 0).any(axis=1))
+    moves = np.flatnonzero((np.diff(np.nan_to_num(robot.pose[index]), axis=0) != 0).any(axis=1))
     borders = np.concatenate([[-1], moves, [len(index) - 1]])
     for first, last in zip(borders[:-1] + 1, borders[1:], strict=True):
         within = (robot.command_t_s >= t[first]) & (robot.command_t_s <= t[last])

@@ -79,7 +79,7 @@ def make_scenes(driven):
         t_s, poses = paths(seed)
         late = round(delay_s * POSE_HZ)
         tracks = [
-            make_track(replace(driven(DURATION_S), robot_id=i, pose=p), max_turn_radps=20)
+            make_track(replace(driven(DURATION_S), robot_id=i, pose=p), usual_radps=20)
             for i, p in enumerate(poses)
         ]
         scenes = []

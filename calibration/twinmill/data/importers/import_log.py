@@ -12,7 +12,7 @@ from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
 from twinmill.data.importers.motive import read_motive
 from twinmill.data.importers.plain import read_commands, read_poses
-from twinmill.data.importers.series import CommandSeries, PoseSeries, multiply
+from twinmill.data.importers.series import CommandSeries, PoseSeries, in_body_frame, multiply
 from twinmill.data.log import Log, LogError, read_log
 from twinmill.data.track import make_track
 from twinmill.files import replacing
@@ -31,6 +31,7 @@ class ImportOptions:
         up: "y" or "z", the axis that a Motive export calls up.
         pose_shift_s: added to the stamps of all poses.
         heading_offset_rad: from the tracked body's x axis to the robot's front, left positive.
+        same_clock: one clock stamped poses and commands: no offset is estimated.
         force: replace an output that exists.
     """
 
@@ -40,6 +41,7 @@ class ImportOptions:
     up: str = "y"
     pose_shift_s: float = 0.0
     heading_offset_rad: float = 0.0
+    same_clock: bool = False
     force: bool = False
 
 
@@ -92,6 +94,11 @@ def import_log(
         else [read_io_tsv(path, options.robot_id) for path in io_tsv]
     )
     _check_times(pose_series, command_series)
+    by_robot = {series.robot_id: series for series in pose_series}
+    command_series = [
+        in_body_frame(series, by_robot.get(series.robot_id)) if series.world else series
+        for series in command_series
+    ]
     sources = [path for path in (poses, motive, commands, *io_tsv) if path is not None]
     with replacing(out, options.force) as temporary:
         write_log(temporary, pose_series, command_series, _provenance(sources, options))
@@ -154,6 +161,7 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
             "import": {
                 "files": files,
                 "up": options.up,
+                "same_clock": options.same_clock,
                 "pose_shift_s": options.pose_shift_s,
                 "heading_offset_rad": options.heading_offset_rad,
                 "rename": options.rename,

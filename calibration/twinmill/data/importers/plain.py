@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Poses and commands from plain CSV files, as described under `twinmill import --help`."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,9 @@ from twinmill.data.log import CommandKind, LogError
 from twinmill.data.measurement_table import Table, read_table
 from twinmill.model.mixing import duties_from_inputs
 
+HEADING_LIKE = re.compile(r"theta|yaw|heading|psi|orient|angle|rot|^q_?[wxyz0-3]$", re.IGNORECASE)
 QUATERNION = ("qw", "qx", "qy", "qz")
+WORLD = ("vx_world_mps", "vy_world_mps")
 INPUTS = ("speed_input", "turn_input")
 VALUES: dict[CommandKind, tuple[str, ...]] = {
     "duty": ("fl_pct", "fr_pct", "rl_pct", "rr_pct"),
@@ -29,6 +32,7 @@ KNOWN = frozenset(
         "valid",
         *QUATERNION,
         *INPUTS,
+        *WORLD,
         *(name for names in VALUES.values() for name in names),
     }
 )
@@ -38,7 +42,8 @@ def read_poses(path: Path, rename: dict[str, str], robot_id: int | None) -> list
     """Poses by robot; empty or NaN cells are poses that were lost.
 
     Args:
-        path: CSV with t_s, robot_id, x_m, y_m, theta_rad or QUATERNION, optional z_m, valid.
+        path: CSV with t_s, robot_id, x_m, y_m, and theta_rad or QUATERNION where the heading was
+            recorded; optional z_m, valid.
         rename: columns, old name to new.
         robot_id: of all rows, for files without that column.
 
@@ -50,7 +55,9 @@ def read_poses(path: Path, rename: dict[str, str], robot_id: int | None) -> list
     height = table.numbers("z_m", True) if table.has("z_m") else np.zeros(len(ids))
     position = np.column_stack([table.numbers("x_m", True), table.numbers("y_m", True), height])
     orientation = _orientation(table)
-    valid = np.isfinite(position).all(axis=1) & np.isfinite(orientation).all(axis=1)
+    valid = np.isfinite(position).all(axis=1)
+    if np.isfinite(orientation).any():
+        valid &= np.isfinite(orientation).all(axis=1)
     if table.has("valid"):
         valid &= table.finite("valid") != 0
     position[~valid] = orientation[~valid] = np.nan
@@ -66,8 +73,8 @@ def read_commands(path: Path, rename: dict[str, str], robot_id: int | None) -> l
     """Commands by robot.
 
     Args:
-        path: CSV with t_s, robot_id and one group of VALUES or INPUTS (inputs may stand beside
-            duties); each row is held until the next.
+        path: CSV with t_s, robot_id and one group of VALUES, INPUTS or WORLD (inputs may stand
+            beside duties, omega_radps beside WORLD); each row is held until the next.
         rename: columns, old name to new.
         robot_id: of all rows, for files without that column.
 
@@ -76,7 +83,7 @@ def read_commands(path: Path, rename: dict[str, str], robot_id: int | None) -> l
     """
     table = read_table(path, rename, KNOWN)
     ids, utime_us = _robot_ids(table, robot_id), _utime_us(table)
-    kind = _kind(table)
+    kind, world = _kind(table), table.has(*WORLD)
     inputs = (
         np.column_stack([_input(table, name) for name in INPUTS])
         if kind == "duty" and table.has(*INPUTS)
@@ -98,6 +105,7 @@ def read_commands(path: Path, rename: dict[str, str], robot_id: int | None) -> l
             inputs[rows],
             np.zeros((np.count_nonzero(rows), 2), int),
             turbopi.telemetry_t.MODE_SCRIPT,
+            world=world,
         )
         for number in np.unique(ids).tolist()
         for rows in [ids == number]
@@ -110,7 +118,8 @@ def _input(table: Table, name: str) -> np.ndarray:
 
 
 def _kind(table: Table) -> CommandKind:
-    found = [kind for kind, columns in VALUES.items() if table.has(*columns)]
+    groups = [(kind, columns) for kind, columns in VALUES.items()] + [("twist", WORLD)]
+    found = [kind for kind, columns in groups if table.has(*columns)]
     if len(found) > 1:
         raise LogError(
             f"{table.name}: has columns for {' and '.join(found)}, but a log keeps to "
@@ -121,7 +130,7 @@ def _kind(table: Table) -> CommandKind:
     if table.has(*INPUTS):
         return "duty"
     # Name the column that is missing from the group that is most complete.
-    groups = [*VALUES.values(), INPUTS]
+    groups = [*VALUES.values(), INPUTS, WORLD]
     group = max(groups, key=lambda names: sum(table.has(name) for name in names) / len(names))
     raise table.missing(next(name for name in group if not table.has(name)))
 
@@ -129,7 +138,9 @@ def _kind(table: Table) -> CommandKind:
 def _values(table: Table, kind: CommandKind, inputs: np.ndarray) -> np.ndarray:
     """(rows, 4) as in CommandSeries."""
     columns = VALUES[kind]
-    if not table.has(*columns):
+    if table.has(*WORLD):
+        columns = (*WORLD, *(["omega_radps"] if table.has("omega_radps") else []))
+    elif not table.has(*columns):
         return np.array([duties_from_inputs(*row) for row in inputs], float)
     value = np.zeros((len(table.rows), 4))
     for k, name in enumerate(columns):
@@ -143,8 +154,10 @@ def _values(table: Table, kind: CommandKind, inputs: np.ndarray) -> np.ndarray:
 
 
 def _orientation(table: Table) -> np.ndarray:
-    """(rows, 4) unit quaternions."""
+    """(rows, 4) unit quaternions; NaN if the table has no heading, by any name."""
     if not table.has(*QUATERNION):
+        if not table.has("theta_rad") and not any(map(HEADING_LIKE.search, table.strange)):
+            return np.full((len(table.rows), 4), np.nan)
         return quaternion_from_heading(table.numbers("theta_rad", True))
     quaternion = np.column_stack([table.numbers(name, True) for name in QUATERNION])
     norm = np.linalg.norm(quaternion, axis=1)

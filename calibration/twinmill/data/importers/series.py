@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every reader of foreign measurements hands over: poses and commands of one robot."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from twinmill.data.log import CommandKind
+from twinmill.data.log import CommandKind, heading_rad
+
+TURNED_RAD = 0.02  # turns a velocity by 2 % of itself
 
 
 @dataclass(frozen=True)
@@ -16,7 +18,7 @@ class PoseSeries:
         robot_id: 0..99.
         utime_us: (N,) int, ascending.
         position_m: (N, 3) in W, z up.
-        orientation_wxyz: (N, 4) unit quaternions.
+        orientation_wxyz: (N, 4) unit quaternions; all NaN where the heading was not recorded.
         valid: (N,) bool; elsewhere position and orientation are NaN.
     """
 
@@ -41,6 +43,7 @@ class CommandSeries:
         detected: (M, 2) int, this frame alone, and the vote.
         mode: of the telemetry.
         warnings: sentences.
+        world: whether velocities are along the axes of W, not of the body.
     """
 
     robot_id: int
@@ -52,6 +55,44 @@ class CommandSeries:
     detected: np.ndarray
     mode: int
     warnings: list[str] = field(default_factory=list)
+    world: bool = False
+
+
+def in_body_frame(commands: CommandSeries, poses: PoseSeries | None) -> CommandSeries:
+    """World-frame velocities turned into the body's, by the heading at the time.
+
+    Held for long, such a velocity turns in the body's frame as the robot turns, so a row is added
+    wherever the heading has changed by TURNED_RAD. Without headings the robot is taken to hold
+    heading 0, and the velocities stay as they are.
+    """
+    known = poses is not None and poses.valid & np.isfinite(poses.orientation_wxyz[:, 0])
+    if not np.any(known):
+        return replace(commands, world=False)
+    pose_us, heading = poses.utime_us[known], heading_rad(poses.orientation_wxyz[known])
+    heading = np.unwrap(heading)
+    utime_us = np.unique(np.concatenate([commands.utime_us, pose_us]))
+    utime_us = utime_us[utime_us >= commands.utime_us[0]]
+    row = np.searchsorted(commands.utime_us, utime_us, side="right") - 1
+    at_rad = np.interp(utime_us, pose_us, heading)
+    fresh = np.isin(utime_us, commands.utime_us)
+    kept, told_rad = [], np.inf
+    for k, angle_rad in enumerate(at_rad):
+        if fresh[k] or abs(angle_rad - told_rad) > TURNED_RAD:
+            kept.append(k)
+            told_rad = angle_rad
+    utime_us, row, at_rad = utime_us[kept], row[kept], at_rad[kept]
+    value = commands.value[row].copy()
+    c, s = np.cos(at_rad), np.sin(at_rad)
+    x, y = commands.value[row, 0], commands.value[row, 1]
+    value[:, 0], value[:, 1] = c * x + s * y, c * y - s * x
+    return replace(
+        commands,
+        utime_us=utime_us,
+        value=value,
+        inputs=commands.inputs[row],
+        detected=commands.detected[row],
+        world=False,
+    )
 
 
 def quaternion_from_heading(heading_rad: np.ndarray) -> np.ndarray:

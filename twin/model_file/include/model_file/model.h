@@ -73,6 +73,7 @@ struct Idiosyncrasy
 struct Clock
 {
     bool known = false;
+    bool same = false;  // declared to be one clock: offset and rate are zero, not to be estimated
     double offset_s = 0, rate_ppm = 0;
 };
 

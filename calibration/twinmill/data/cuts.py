@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cuts a track where it breaks: at gaps, and at jumps that no wheels make."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinmill.data.log import RobotLog
+
+GAP_S = 0.05  # four frames at 100 Hz, in which a TurboPi moves at most 20 mm
+GAP_PERIODS = 4  # the same for slower cameras
+LOSSY_GAP_S = 0.25  # and for captures that lose frames all the time; a pick-up takes longer
+JUMP_NOISE_M, JUMP_NOISE_RAD = 0.005, 0.05  # ten times the noise of a motion capture
+JUMP_SIGMA = 8  # times the noise of a camera that is worse than that
+JUMP_FACTOR = 3  # times as fast as just before or after: no wheels do that between two frames
+BESIDE = 3  # steps that tell how fast the robot is just before, or just after
+MARGIN_S = 0.1  # frames beside a pick-up show the hand or half a marker body
+SHORTEST_S = 0.1  # shortest horizon that is predicted: a segment below it is of no use
+
+
+def find_segments(
+    robot: RobotLog, usable: np.ndarray, usual: tuple[float, float], notes: list[str]
+) -> np.ndarray:
+    """Numbers the unbroken stretches of a track.
+
+    Args:
+        robot: its log.
+        usable: (N,) bool: poses that are measurements of a robot on the floor.
+        usual: m/s and rad/s below which no step is a jump.
+        notes: sentences on each cut are added.
+
+    Returns:
+        (N,) number of the stretch; -1 where unusable.
+    """
+    limits = _Limits.of(robot, usable, *usual)
+    usable = usable & ~_excursions(robot, usable, limits, notes)
+    index, begins = _cuts(robot, usable, limits, notes)
+    return _segments(robot, index, begins, notes)
+
+
+def _gap_s(robot: RobotLog) -> float:
+    """Longest time between usable poses over which the track goes on."""
+    spacing_s = np.diff(robot.pose_t_s[robot.valid])
+    usual_s = max(GAP_S, GAP_PERIODS * float(np.median(np.diff(robot.pose_t_s))))
+    return max(usual_s, min(LOSSY_GAP_S, 2 * float(np.quantile(spacing_s, 0.99))))
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """What a step of one robot's poses can be by noise alone, and by speeds it may have.
+
+    Attributes:
+        usual: m/s, rad/s.
+        noise: m, rad.
+    """
+
+    usual: tuple[float, float]
+    noise: tuple[float, float]
+
+    @classmethod
+    def of(cls, robot: RobotLog, usable: np.ndarray, *usual: float) -> "_Limits":
+        """With the noise that second differences of the poses show: motion is smooth beside it."""
+        pose = robot.pose[usable]
+        pose[:, 2] = np.unwrap(pose[:, 2])
+        bend = np.abs(np.diff(np.nan_to_num(pose), n=2, axis=0))
+        sigma = np.median(bend, axis=0) / 0.6745 / np.sqrt(6) if len(bend) else np.zeros(3)
+        return cls(
+            usual,
+            (
+                max(JUMP_NOISE_M, JUMP_SIGMA * float(sigma[:2].max())),
+                max(JUMP_NOISE_RAD, JUMP_SIGMA * float(sigma[2])),
+            ),
+        )
+
+    def possible(self, channel: int, speed: np.ndarray, dt_s: np.ndarray) -> np.ndarray:
+        """(K,) longest step of one channel, by the speeds before and after it."""
+        fastest = np.maximum(self.usual[channel], JUMP_FACTOR * _beside(speed))
+        return fastest * dt_s + self.noise[channel]
+
+
+def _beside(speed: np.ndarray) -> np.ndarray:
+    """(K,) median of the BESIDE steps before each, or of those after it if that is more."""
+    around = np.pad(speed, BESIDE)
+    windows = np.lib.stride_tricks.sliding_window_view(around, BESIDE)
+    medians = np.median(windows, axis=1)
+    return np.maximum(medians[: len(speed)], medians[BESIDE + 1 :])
+
+
+def _jumps(robot: RobotLog, index: np.ndarray, limits: _Limits) -> np.ndarray:
+    """(len(index) - 1,) bool: steps between these poses that the robot cannot make."""
+    dt_s = np.diff(robot.pose_t_s[index])
+    step = np.diff(robot.pose[index], axis=0)
+    moved_m = np.hypot(step[:, 0], step[:, 1])
+    turn_rad = np.nan_to_num(np.abs(np.remainder(step[:, 2] + np.pi, 2 * np.pi) - np.pi))
+    return (moved_m > limits.possible(0, moved_m / dt_s, dt_s)) | (
+        turn_rad > np.minimum(limits.possible(1, turn_rad / dt_s, dt_s), np.pi)
+    )
+
+
+def _excursions(
+    robot: RobotLog, usable: np.ndarray, limits: _Limits, notes: list[str]
+) -> np.ndarray:
+    """(N,) bool: poses between a jump and the jump back, as when markers are mixed up."""
+    outlier = np.zeros(len(usable), bool)
+    index = np.flatnonzero(usable)
+    jumps = np.flatnonzero(_jumps(robot, index, limits))
+    position = 0
+    while position + 1 < len(jumps):
+        before, after = index[jumps[position]], index[jumps[position + 1] + 1]
+        ends = np.array([before, after])
+        back = (
+            robot.pose_t_s[after] - robot.pose_t_s[before] <= _gap_s(robot)
+            and not _jumps(robot, ends, limits)[0]
+        )
+        if back:
+            outlier[before + 1 : after] = True
+        position += 2 if back else 1
+    if outlier.any():
+        notes.append(
+            f"{np.count_nonzero(outlier)} poses from {robot.pose_t_s[outlier][0]:.3f} s "
+            "on jump away and back; left out."
+        )
+    return outlier
+
+
+def _cuts(
+    robot: RobotLog, usable: np.ndarray, limits: _Limits, notes: list[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Usable poses without the margins, and which of them begin a segment: (K,) int, (K,) bool."""
+    index = np.flatnonzero(usable)
+    t = robot.pose_t_s[index]
+    jump = _jumps(robot, index, limits)
+    gap = np.diff(t) > _gap_s(robot)
+    lost = gap & (np.diff(index) > 1)
+    keep = np.ones(len(index), bool)
+    for k in np.flatnonzero(jump | gap):
+        moved_m = np.hypot(*(robot.pose[index[k + 1], :2] - robot.pose[index[k], :2]))
+        what = "not tracked" if lost[k] else "no poses" if gap[k] else "the robot jumps"
+        notes.append(
+            f"cut at {t[k]:.3f} s: {what} for {t[k + 1] - t[k]:.3f} s, then {moved_m:.3f} m away."
+        )
+        if jump[k] or lost[k]:
+            keep &= (t < t[k] - MARGIN_S) | (t > t[k + 1] + MARGIN_S)
+    begins = np.concatenate([[0], np.cumsum(jump | gap)])[: len(index)]
+    index, begins = index[keep], begins[keep]
+    return index, np.diff(begins, prepend=-1) > 0
+
+
+def _segments(
+    robot: RobotLog, index: np.ndarray, begins: np.ndarray, notes: list[str]
+) -> np.ndarray:
+    """(N,) numbers of segments, short ones dropped."""
+    segment, number = np.full(len(robot.pose_t_s), -1), 0
+    for part in np.split(index, np.flatnonzero(begins)):
+        if len(part) < 2 or np.ptp(robot.pose_t_s[part]) < SHORTEST_S:
+            continue
+        segment[part] = number
+        number += 1
+    if not number:
+        notes.append("no stretch of the track is long enough to predict anything.")
+    return segment
