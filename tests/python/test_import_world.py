@@ -3,11 +3,12 @@
 
 import numpy as np
 import pytest
+
 from twinmill.data.clock import estimate_offset
+from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import LogError, read_log
 from twinmill.data.measurement import load_measurements
 from twinmill.data.track import make_track
-from twinmill.data.importers.import_log import ImportOptions, import_log
 
 WORLD = "t_s,robot_id,vx_world_mps,vy_world_mps\n"
 
@@ -70,7 +71,7 @@ def test_without_a_heading_the_body_is_the_world_at_heading_zero(imported):
 
 def test_a_heading_under_another_name_is_not_taken_for_a_missing_one(imported):
     poses = _poses(np.arange(0, 1, 0.1), np.zeros(10)).replace("theta_rad", "yaw")
-    with pytest.raises(LogError, match="theta_rad is missing.*'yaw'"):
+    with pytest.raises(LogError, match=r"theta_rad is missing.*'yaw'"):
         imported(poses, WORLD + "0,4,0.2,0\n")
 
 

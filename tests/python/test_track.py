@@ -165,7 +165,9 @@ def test_a_fast_car_does_not_jump_and_is_cut_where_it_is_put_elsewhere(driven, p
     x_m = np.cumsum(speed_mps * period_s)
     pose = np.column_stack([x_m, 0 * x_m, 0 * x_m])
     count = len(pose_t_s)
-    robot = driven(40.0, pose_t_s=pose_t_s, pose=pose, z_m=np.zeros(count), valid=np.ones(count, bool))
+    robot = driven(
+        40.0, pose_t_s=pose_t_s, pose=pose, z_m=np.zeros(count), valid=np.ones(count, bool)
+    )
     assert (make_track(robot).segment == 0).all()
     pose[count // 2 :, 1] += 8.0  # at rest, 20 s
     assert make_track(robot).segment.max() == 1

@@ -176,9 +176,6 @@ def _played(track: Track) -> native.Track:
     if not track.has_heading:  # taken to be held: body and world are one frame
         pose[:, 2] = 0.0
     return native.Track(
-        *(
-            np.ascontiguousarray(a, float)
-            for a in (t_s, command, battery_V, track.pose_t_s, pose)
-        ),
+        *(np.ascontiguousarray(a, float) for a in (t_s, command, battery_V, track.pose_t_s, pose)),
         np.ascontiguousarray(track.segment, np.int64),
     )
