@@ -29,6 +29,7 @@ from twinmill.files import check_new_folder
 from twinmill.fitting.fit import fit
 from twinmill.model.freedom import effect_names
 from twinmill.model.model_file import ModelFile, write_whole
+from twinmill.programs import find_program
 from twinmill.report import challenge as page
 from twinmill_cli.output import AsJson, deliver
 
@@ -74,7 +75,7 @@ def _challenge(
     Example: twinmill challenge --n 20 --out challenge
     """
     check_new_folder(out)
-    twin_run = program or _find_program()
+    twin_run = program or find_program("twin_run")
     (out / DONE).mkdir(parents=True, exist_ok=True)
     console = Console(stderr=True)
     script = out / "script.csv"
@@ -97,13 +98,6 @@ def _challenge(
     shutil.rmtree(out / DONE)
     deliver(found, page.shown(found, list(times_s.values())), as_json)
     return found
-
-
-def _find_program() -> Path:
-    found = shutil.which("twin_run") or Path(__file__).resolve().parents[2] / "build/bin/twin_run"
-    if not Path(found).exists():
-        raise ValueError("twin_run: not found; build it, or name it with --twin-run.")
-    return Path(found)
 
 
 def _base(program: Path, folder: Path, plant: str, script: Path, seed: int) -> Path:

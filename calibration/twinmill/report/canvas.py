@@ -32,13 +32,37 @@ STYLE = {
 }
 
 
-def draw(height_in: float, paint: Callable[..., None], **grid) -> str:
+class Picture(Canvas):
+    """A figure that a notebook shows without pyplot."""
+
+    def _repr_svg_(self) -> str:
+        return _svg_of(self)
+
+
+class Svg(str):
+    """An SVG element, with the figure that it was made from.
+
+    Attributes:
+        picture: to be shown, changed or saved otherwise.
+    """
+
+    picture: Picture
+
+
+def draw(height_in: float, paint: Callable[..., None], **grid) -> Svg:
     """Paints axes laid out by `grid` (as for subplots) and gives the SVG element."""
     with matplotlib.rc_context(STYLE):
-        canvas = Canvas(figsize=(WIDTH_IN, height_in), layout="constrained")
-        paint(canvas.subplots(**grid))
+        picture = Picture(figsize=(WIDTH_IN, height_in), layout="constrained")
+        paint(picture.subplots(**grid))
+        svg = Svg(_svg_of(picture))
+    svg.picture = picture
+    return svg
+
+
+def _svg_of(picture: Picture) -> str:
+    with matplotlib.rc_context(STYLE):
         text = io.StringIO()
-        canvas.savefig(
+        picture.savefig(
             text,
             format="svg",
             metadata={"Date": None, "Creator": None, "Format": None, "Type": None},

@@ -1,0 +1,721 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `import twinmill as tm` gives: logs, models, and what one tells of the other.
+
+Lengths in m, angles in rad, times in s; frames, signs and clocks as in the page Conventions. All
+functions leave their arguments and the disk as they are: a fit returns a new `Model`, which
+`Model.save` writes.
+"""
+
+import html
+import subprocess
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from functools import cached_property
+from importlib.metadata import version
+from io import StringIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, TypeVar
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from rich.console import Console, RenderableType
+
+from twinmill import report
+from twinmill.data.log import read_log
+from twinmill.data.measurement import Measurement, load_measurements
+from twinmill.data.multi_log import read_everyone
+from twinmill.data.steady_table import Sheet, is_sheet
+from twinmill.diagnosis import diagnose as _diagnose
+from twinmill.diagnosis.detections.add import BitAddition, add_to_camera, is_of_camera
+from twinmill.diagnosis.ranking import Ranked
+from twinmill.files import plain, replacing
+from twinmill.fitting import add as _add
+from twinmill.fitting import compare as _compare
+from twinmill.fitting import fit as _fit
+from twinmill.model.freedom import catalogue
+from twinmill.model.model_file import DEFAULT_MODEL, ModelFile
+from twinmill.programs import find_program
+from twinmill.report import detections, error_figures, show, steady_figures, views
+from twinmill.report import diagnosis as diagnosis_report
+from twinmill.report.canvas import draw
+from twinmill.report.log_figures import Drawing
+from twinmill.swarm.metrics import swarm_metrics
+
+TERMINAL_COLUMNS = 100
+Result = TypeVar("Result")
+
+
+class _Shown:
+    """What all results share: one line, a table for notebooks, text for terminals, JSON."""
+
+    _result: Any
+
+    def to_json(self) -> dict:
+        """The same object as `--json` of the command, without how the command was called."""
+        return plain(self._result.to_json())
+
+    def table(self) -> pd.DataFrame:
+        """The numbers; each class says which."""
+        raise NotImplementedError
+
+    def _text(self) -> RenderableType:
+        return repr(self)
+
+    def __str__(self) -> str:
+        out = StringIO()
+        Console(file=out, width=TERMINAL_COLUMNS, color_system=None).print(self._text())
+        return out.getvalue().rstrip()
+
+    def _repr_html_(self) -> str:
+        return f"<p><b>{html.escape(repr(self))}</b></p>{self.table()._repr_html_()}"
+
+
+class Log(_Shown):
+    """One recorded run, or several: what robots were told, and where they were.
+
+    Attributes:
+        paths: of the files.
+
+    Examples:
+        >>> log = tm.load("run.lcmlog")
+        >>> log
+        Log(run.lcmlog: robot 0, 60 s)
+        >>> list(log.table().columns)
+        ['log', 'robot_id', 't_s', 'x_m', 'y_m', 'theta_rad', 'valid']
+    """
+
+    def __init__(self, paths: Iterable[str | Path], folder: TemporaryDirectory | None = None):
+        self.paths = [Path(path) for path in paths]
+        self._folder = folder  # removed with the last reference to a simulated run
+        self._logs = [read_log(path) for path in self.paths if not is_sheet(path)]
+
+    @cached_property
+    def measurements(self) -> list[Measurement | Sheet]:
+        """Cleaned runs, one for each robot in each log.
+
+        Raises:
+            LogError: a run is shorter than 10 s.
+        """
+        return load_measurements(self.paths)
+
+    @property
+    def robots(self) -> list[int]:
+        """Numbers of all robots in the logs."""
+        return sorted({number for log in self._logs for number in log.robots})
+
+    @property
+    def duration_s(self) -> float:
+        """Of the longest log."""
+        ends = [
+            r.pose_t_s[-1] for log in self._logs for r in log.robots.values() if r.pose_t_s.size
+        ]
+        return float(max(ends, default=0.0))
+
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences on what is odd in the files."""
+        return [text for log in self._logs for text in log.warnings]
+
+    def table(self) -> pd.DataFrame:
+        """All measured poses, as they were recorded.
+
+        Returns:
+            log, robot_id, t_s (motion capture's clock), x_m, y_m, theta_rad (unwrapped), valid; NaN
+            where a pose is not valid.
+        """
+        return pd.concat([_poses(log) for log in self._logs], ignore_index=True)
+
+    def commands(self) -> pd.DataFrame:
+        """All commands, as they were recorded.
+
+        Returns:
+            log, robot_id, t_s (robot's clock), kind, c0 to c3: duty as a fraction or speed in rad/s
+            of the wheels front-left, front-right, rear-left, rear-right; or vx_mps, vy_mps,
+            omega_radps, 0.
+        """
+        return pd.concat([_commands(log) for log in self._logs], ignore_index=True)
+
+    def metrics(self, model: "Model | str | None" = None) -> pd.DataFrame:
+        """What the swarm does over time.
+
+        Args:
+            model: whose range of sight and radius of the body scale the metrics.
+
+        Returns:
+            t_s, the metrics, and class: what the last 10 s look like.
+
+        Raises:
+            LogError: the log has not two robots with poses at the same time.
+        """
+        native_model = _model(model).file.model
+        scale = native_model.get("sensor.range_m"), native_model.get("robot.body_radius_m")
+        series = swarm_metrics(self._logs[0], *scale)
+        table = pd.DataFrame(series.values, columns=list(series.to_json()["metrics"]))
+        table.insert(0, "t_s", series.t_s)
+        table["class"] = series.classes
+        return table
+
+    def plot(self) -> Figure:
+        """Paths of all robots, seen from above."""
+        actors = [actor for log in self._logs for actor in read_everyone(log.path).actors]
+        return draw(4.6, Drawing(actors).paths).picture
+
+    def save(self, path: str | Path, force: bool = False) -> None:
+        """Copies the log to a file, which must not be there unless `force`.
+
+        Raises:
+            ValueError: it is there, cannot be written, or these are several logs.
+        """
+        if len(self.paths) > 1:
+            raise ValueError(f"{path}: one file cannot hold {len(self.paths)} logs; save each.")
+        with replacing(Path(path), force) as temporary:
+            temporary.write_bytes(self.paths[0].read_bytes())
+
+    def to_json(self) -> dict:
+        """paths, robots, duration_s, warnings."""
+        return {
+            "paths": [str(path) for path in self.paths],
+            "robots": self.robots,
+            "duration_s": self.duration_s,
+            "warnings": self.warnings,
+        }
+
+    def __repr__(self) -> str:
+        names = ", ".join(path.name for path in self.paths)
+        if not self._logs:
+            return f"Log({names}: steady-state table)"
+        plural = "s" if len(self.robots) > 1 else ""
+        numbers = ", ".join(map(str, self.robots))
+        return f"Log({names}: robot{plural} {numbers}, {self.duration_s:.0f} s)"
+
+
+class Model(_Shown):
+    """A robot's model: base, camera and effects, as a model file holds them. It never changes.
+
+    Attributes:
+        file: text, hash and the twin's own object.
+
+    Examples:
+        >>> model = tm.Model.load("turbopi.toml")
+        >>> model
+        Model(turbopi.toml: duty, no effects)
+        >>> model["robot.wheel_radius_m"]
+        0.0325
+    """
+
+    def __init__(self, file: ModelFile):
+        self.file = file
+
+    @classmethod
+    def load(cls, name: str | Path = DEFAULT_MODEL) -> "Model":
+        """Reads a model file, here or among the installed models.
+
+        Args:
+            name: path, or name of an installed model.
+
+        Raises:
+            ModelError: there is no such file, or it is no valid model; one sentence.
+        """
+        return cls(ModelFile.load(str(name)))
+
+    @property
+    def name(self) -> str:
+        """Of its file; of a model that was not saved, what it was made from."""
+        return self.file.path.name
+
+    @property
+    def effects(self) -> list[str]:
+        """Names of its effects in their order."""
+        return list(self.file.model.effects)
+
+    def __getitem__(self, quantity: str) -> float:
+        """A quantity by its full name, such as `base.motor_lag_s` or `coasting.decel_mps2`."""
+        return self.file.model.get(quantity)
+
+    def table(self) -> pd.DataFrame:
+        """All quantities: name, unit, value, min, max."""
+        return pd.DataFrame(self.file.model.values())
+
+    def to_json(self) -> dict:
+        """name, sha256, effects, values by full name."""
+        values = {v["name"]: v["value"] for v in self.file.model.values()}
+        return plain(
+            {
+                "name": self.name,
+                "sha256": self.file.hash,
+                "effects": self.effects,
+                "values": values,
+            }
+        )
+
+    def save(self, path: str | Path, force: bool = False) -> None:
+        """Writes the model file, whole or not at all.
+
+        Args:
+            path: new file (.toml).
+            force: replace it if it is there.
+
+        Raises:
+            ValueError: it is there, or cannot be written.
+        """
+        with replacing(Path(path), force) as temporary:
+            temporary.write_text(self.file.text)
+
+    def compare(self, log: "Log | str | Path") -> "Comparison":
+        """As `compare`."""
+        return compare(log, self)
+
+    def fit(self, log: "Log | str | Path") -> "Fit":
+        """As `fit`."""
+        return fit(log, self)
+
+    def add(self, effect: str, log: "Log | str | Path", **texts: str) -> "Addition":
+        """Adds an effect, fits it with all the rest, and judges it on data it was not fitted to.
+
+        Args:
+            effect: name from the catalogue.
+            log: what it is fitted to.
+            texts: of the effect `equation`: adds_to and formula.
+
+        Returns:
+            Scores without and with the effect, and the new model.
+
+        Raises:
+            ValueError: there is no such effect, or a text makes no sense.
+
+        Examples:
+            >>> added = tm.Model.load("turbopi.toml").add("coasting", "run.lcmlog")
+            >>> added.model.effects
+            ['coasting']
+            >>> added.heldout_after < added.heldout_before
+            True
+        """
+        if effect not in catalogue():
+            raise ValueError(f"{effect}: no such effect; `twinmill effects` lists them.")
+        log = _log(log)
+        name = f"{self.file.path.stem}+{effect}.toml"
+        if is_of_camera(effect):
+            result, file = _made(
+                name,
+                lambda out: add_to_camera(
+                    effect, log.measurements, self.file, out, f"twinmill.add {effect}"
+                ),
+            )
+        else:
+            result, file = _made(
+                name,
+                lambda out: _add.add(
+                    effect, log.measurements, self.file, out, f"twinmill.add {effect}", texts
+                ),
+            )
+        return Addition(result, Model(file))
+
+    def diagnose(self, log: "Log | str | Path", **options: Any) -> "Diagnosis":
+        """As `diagnose`."""
+        return diagnose(log, self, **options)
+
+    def __repr__(self) -> str:
+        effects = ", ".join(self.effects) or "no effects"
+        return f"Model({self.name}: {self.file.model.drive}, {effects})"
+
+
+class Comparison(_Shown):
+    """How well a model predicts a log, against the log's own noise.
+
+    Attributes:
+        score: root mean square of prediction errors over what noise alone would cause: 1.0 is as
+            good as the log can tell; above 1.3 something is missing.
+        verdict: what that means, in a sentence.
+    """
+
+    def __init__(self, result: _compare.Comparison):
+        self._result = result
+        self.score, self.verdict = result.score, result.verdict
+
+    def table(self) -> pd.DataFrame:
+        """Errors of the robot with most data.
+
+        Returns:
+            channel, unit, horizon_s, rms, floor (both in the unit), ratio.
+        """
+        return pd.DataFrame(self._result.main.to_json()["errors"])
+
+    def plot(self) -> Figure:
+        """Errors over the time predicted ahead, with the noise floor; of a table, its values."""
+        return _errors_drawn([("this model", self._result)])
+
+    def report(self, folder: str | Path) -> Path:
+        """Writes folder/index.html with all tables and figures, as `--out` does."""
+        section = report.comparison_section(self._result)
+        return _report(folder, section, "twinmill.compare")
+
+    def _text(self) -> RenderableType:
+        return show.comparison(self._result)
+
+    def __repr__(self) -> str:
+        log = self._result.main.scene.measurement.log_name
+        return f"Comparison({self._result.model_name}, {log}: score {self.score:.3g})"
+
+
+class Fit(_Shown):
+    """A model fitted to a log.
+
+    Attributes:
+        model: the new one.
+        before, after: comparisons of both models on the same noise.
+        score: of the new model on the log it was fitted to.
+    """
+
+    def __init__(self, result: _fit.FitResult, model: Model):
+        self._result, self.model = result, model
+        self.before, self.after = Comparison(result.before), Comparison(result.after)
+        self.score = self.after.score
+
+    def table(self) -> pd.DataFrame:
+        """Fitted quantities: name, value, std, unit, at_bound, seen (the log tells it)."""
+        return pd.DataFrame([e.to_json() for e in self._result.parameters])
+
+    def plot(self) -> Figure:
+        """Errors before and after, over the time predicted ahead."""
+        return _errors_drawn([("before", self._result.before), ("after", self._result.after)])
+
+    def compare(self, log: "Log | str | Path") -> Comparison:
+        """The fitted model against a log, best another than it was fitted to."""
+        return self.model.compare(log)
+
+    def report(self, folder: str | Path) -> Path:
+        """Writes folder/index.html with all tables and figures, as `--out` does."""
+        return _report(folder, report.fit_section(self._result), "twinmill.fit")
+
+    def _text(self) -> RenderableType:
+        return show.fit(self._result)
+
+    def __repr__(self) -> str:
+        name, before = self._result.before.model_name, self.before.score
+        return f"Fit({name}: score {before:.3g} -> {self.score:.3g})"
+
+
+class Addition(_Shown):
+    """An effect added to a model.
+
+    Attributes:
+        effect: its name, with a number if the model had one already: `dead_zone#2`.
+        model: the new model.
+        heldout_before, heldout_after: scores on data that was not fitted to, without and with the
+            effect, all else refitted.
+    """
+
+    def __init__(self, result: _add.AddResult | BitAddition, model: Model):
+        self._result, self.model = result, model
+        self.effect = result.effect
+        told = result.to_json()
+        self.heldout_before = told.get("heldout_refit", told["heldout_before"])
+        self.heldout_after = told["heldout_after"]
+
+    def table(self) -> pd.DataFrame:
+        """Fitted quantities: name, value, std, unit, at_bound, seen (the log tells it)."""
+        return pd.DataFrame([e.to_json() for e in self._result.parameters])
+
+    def plot(self) -> Figure:
+        """Errors before and after; of an effect of the camera, what it sees."""
+        if isinstance(self._result, BitAddition):
+            return detections.field_of_view(self._result.after).svg.picture
+        return _errors_drawn([("before", self._result.before), ("after", self._result.after)])
+
+    def _text(self) -> RenderableType:
+        camera = isinstance(self._result, BitAddition)
+        return detections.addition(self._result) if camera else show.added(self._result)
+
+    def __repr__(self) -> str:
+        return (
+            f"Addition({self.effect}: held out {self.heldout_before:.3g} -> "
+            f"{self.heldout_after:.3g})"
+        )
+
+
+class Finding(_Shown):
+    """An effect that a model lacks, as a diagnosis found it.
+
+    Attributes:
+        effect: its name.
+        parameters: estimates by name.
+        score_heldout: of the model with it, on data that was not fitted to.
+    """
+
+    def __init__(self, ranked: Ranked, log: Log):
+        self._result, self._log = ranked, log
+        self.effect, self.score_heldout = ranked.effect, ranked.score_heldout
+        self.parameters = {e.name.split(".", 1)[-1]: e.value for e in ranked.parameters}
+
+    def add_to(self, model: Model) -> Model:
+        """The model with this effect, all fitted to the log of the diagnosis."""
+        return model.add(self.effect.split("#")[0], self._log).model
+
+    def table(self) -> pd.DataFrame:
+        """Its parameters: name, value, std, unit, at_bound, seen."""
+        return pd.DataFrame([e.to_json() for e in self._result.parameters])
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={value:.3g}" for name, value in self.parameters.items())
+        return f"Finding({self.effect}: {values})"
+
+
+class Diagnosis(_Shown):
+    """What a model lacks.
+
+    Attributes:
+        verdict: model_adequate, refit_enough, effect_missing, ambiguous or outside_catalogue.
+        sentence: the same for people.
+        found: the missing effects, most important first.
+        best: the first of them; None if none is named.
+    """
+
+    def __init__(self, result: _diagnose.Diagnosis, log: Log):
+        self._result = result
+        self.verdict, self.sentence = result.verdict, result.sentence
+        ranked = {r.effect: r for r in result.ranking}
+        self.found = [Finding(ranked[name], log) for name in result.found if name in ranked]
+        self.best = self.found[0] if self.found else None
+
+    def table(self) -> pd.DataFrame:
+        """All effects that were tried, best first.
+
+        Returns:
+            effect, found, score_heldout, share_explained, p_value, group (effects of one number
+            look alike in this log).
+        """
+        keys = ("effect", "score_heldout", "share_explained", "p_value", "group")
+        table = pd.DataFrame([{k: getattr(r, k) for k in keys} for r in self._result.ranking])
+        if len(table):
+            table.insert(1, "found", table["effect"].isin(self._result.found))
+        return table
+
+    def plot(self) -> Figure:
+        """Score after each step: as given, refitted, with each effect found."""
+        return diagnosis_report.section(self._result).figures[0].svg.picture
+
+    def report(self, folder: str | Path) -> Path:
+        """Writes folder/index.html with all tables and figures, as `--out` does."""
+        return _report(folder, diagnosis_report.section(self._result), "twinmill.diagnose")
+
+    def _text(self) -> RenderableType:
+        return diagnosis_report.terminal(self._result)
+
+    def __repr__(self) -> str:
+        return f"Diagnosis({self.verdict}: {self.sentence})"
+
+
+def load(*paths: str | Path) -> Log:
+    """Reads logs of the same kind of robot, or steady-state tables (.csv).
+
+    Args:
+        paths: LCM logs, as `twinmill import` and twin_run write them.
+
+    Returns:
+        All of them together; fits and comparisons take them all.
+
+    Raises:
+        LogError: a file cannot be read or is no log; one sentence.
+
+    Examples:
+        >>> tm.load("run.lcmlog").robots
+        [0]
+    """
+    return Log(paths)
+
+
+def compare(log: Log | str | Path, model: Model | str | None = None) -> Comparison:
+    """Tells how well a model predicts a log.
+
+    Predictions start from measured poses and are judged 0.1, 0.2, 0.5, 1 and 2 s later.
+
+    Args:
+        log: a log, or the path of one.
+        model: a model, or the name of one; None is TurboPi's.
+
+    Raises:
+        LogError: the log cannot be judged; one sentence.
+
+    Examples:
+        >>> found = tm.compare("run.lcmlog", "turbopi.toml")
+        >>> found.verdict
+        'Something is missing in the model, or its parameters are stale.'
+        >>> list(found.table().columns)
+        ['channel', 'unit', 'horizon_s', 'rms', 'floor', 'ratio']
+    """
+    return Comparison(_compare.compare(_log(log).measurements, _model(model).file))
+
+
+def fit(log: Log | str | Path, model: Model | str | None = None) -> Fit:
+    """Fits all free quantities of a model, and the parameters of its effects, to a log.
+
+    Args:
+        log: a log, or the path of one.
+        model: where the fit begins; a model, or the name of one; None is TurboPi's.
+
+    Returns:
+        The new model, its parameters with uncertainties, and both comparisons.
+
+    Raises:
+        LogError: the log cannot be used; one sentence.
+
+    Examples:
+        >>> fitted = tm.fit("run.lcmlog", "turbopi.toml")
+        >>> fitted.score <= fitted.before.score
+        True
+        >>> list(fitted.table().columns)
+        ['name', 'value', 'std', 'unit', 'at_bound', 'seen']
+    """
+    start = _model(model)
+    measurements = _log(log).measurements
+    result, file = _made(
+        f"{start.file.path.stem}_fitted.toml",
+        lambda out: _fit.fit(measurements, start.file, out, "twinmill.fit"),
+    )
+    return Fit(result, Model(file))
+
+
+def diagnose(
+    log: Log | str | Path,
+    model: Model | str | None = None,
+    *,
+    without: Iterable[str] = (),
+    progress: Callable[[str], None] | None = None,
+) -> Diagnosis:
+    """Names the physical effect that a model lacks, or says that none is, or that none can be told.
+
+    Args:
+        log: a log, or the path of one.
+        model: best one that was fitted to another log; None is TurboPi's.
+        without: names of effects that are not considered.
+        progress: is told in words what is being done.
+
+    Raises:
+        LogError: the log cannot be used; one sentence.
+
+    Examples:
+        >>> d = tm.diagnose("run.lcmlog", "fitted.toml")
+        >>> d.best
+        Finding(coasting: ...)
+        >>> d.best.add_to(tm.Model.load("fitted.toml")).effects
+        ['coasting']
+    """
+    log = _log(log)
+    result = _diagnose.diagnose(
+        log.measurements, _model(model).file, progress or (lambda _: None), tuple(without)
+    )
+    return Diagnosis(result, log)
+
+
+def simulate(
+    model: Model | str | None = None,
+    n: int = 8,
+    *,
+    behavior: str = "milling_cmaes",
+    duration_s: float = 60.0,
+    plant: str = "planar",
+    seed: int = 1,
+    script: str | Path | None = None,
+) -> Log:
+    """Lets robots drive in the twin.
+
+    Args:
+        model: a model, or the name of one; None is TurboPi's.
+        n: number of robots.
+        behavior: of all of them, or as `milling:5,self_centering:1`.
+        duration_s: simulated time.
+        plant: `planar`, or `mujoco` with contacts and rollers.
+        seed: the same seed gives the same log.
+        script: CSV of inputs or duties that all play in place of a behaviour.
+
+    Returns:
+        A log like a robot's own; its file goes with the object unless it is saved.
+
+    Raises:
+        ValueError: the twin refuses; its own sentence.
+
+    Examples:
+        >>> swarm = tm.simulate(n=3, duration_s=20)
+        >>> swarm.robots
+        [0, 1, 2]
+        >>> swarm.metrics().shape[0] > 0
+        True
+    """
+    folder = TemporaryDirectory(prefix="twinmill.")
+    place, file = Path(folder.name), _model(model).file
+    (place / "model.toml").write_text(file.text)
+    command = [
+        find_program("twin_run"), "--plant", plant, "--model", "model.toml", "--n", n,
+        "--seed", seed, "--duration-s", duration_s, "--log", "simulated.lcmlog",
+        *(["--script", Path(script).resolve()] if script else ["--behavior", behavior]),
+    ]  # fmt: skip
+    done = subprocess.run(
+        [str(word) for word in command], cwd=place, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise ValueError(done.stderr.strip().removeprefix("twin_run: ") or "twin_run failed.")
+    return Log([place / "simulated.lcmlog"], folder)
+
+
+def _log(log: Log | str | Path) -> Log:
+    return log if isinstance(log, Log) else load(log)
+
+
+def _model(model: Model | str | None) -> Model:
+    return model if isinstance(model, Model) else Model.load(model or DEFAULT_MODEL)
+
+
+def _made(name: str, make: Callable[[Path], Result]) -> tuple[Result, ModelFile]:
+    """A result whose model is written to a file that is read back and gone at once."""
+    with TemporaryDirectory(prefix="twinmill.") as folder:
+        path = Path(folder) / name
+        result = make(path)
+        file = ModelFile.load(str(path))
+    return replace(result, path=Path(name)), replace(file, path=Path(name))
+
+
+def _poses(log: Any) -> pd.DataFrame:
+    parts = [
+        pd.DataFrame(
+            {
+                "log": log.path.name,
+                "robot_id": number,
+                "t_s": robot.pose_t_s,
+                **dict(zip(("x_m", "y_m", "theta_rad"), robot.pose.T, strict=True)),
+                "valid": robot.valid,
+            }
+        )
+        for number, robot in log.robots.items()
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def _commands(log: Any) -> pd.DataFrame:
+    parts = [
+        pd.DataFrame(
+            {
+                "log": log.path.name,
+                "robot_id": number,
+                "t_s": robot.command_t_s,
+                "kind": robot.command_kind,
+                **{f"c{i}": column for i, column in enumerate(np.atleast_2d(robot.command.T))},
+            }
+        )
+        for number, robot in log.robots.items()
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def _errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
+    last = results[-1][1]
+    if last.main in (tables := views.sheets(last)):
+        return steady_figures.steady_values(tables).svg.picture
+    mains = [(label, result.main) for label, result in results]
+    return error_figures.error_growth(mains).svg.picture
+
+
+def _report(folder: str | Path, section: report.Section, call: str) -> Path:
+    source = report.Provenance(call, f"twinmill {version('twinmill')}", "")
+    return report.write_report(Path(folder), section.title, source, [section])

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`import twinmill as tm`: the examples run, results are those of the commands, nothing is left."""
+
+import doctest
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import twinmill as tm
+from twinmill import api
+from twinmill.challenge.script import write_rich_script
+from twinmill.data.log import read_log
+from twinmill.model.freedom import catalogue
+from twinmill_cli.main import run
+
+pytestmark = pytest.mark.skipif(
+    not os.environ.get("TWIN_RUN"), reason="TWIN_RUN does not name the program"
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A minute of a robot that coasts, and the model that lacks it."""
+    folder = tmp_path_factory.mktemp("api")
+    base = Path(tm.Model.load("turbopi.toml").file.path).read_text()
+    parameters = catalogue()["coasting"]["parameters"]
+    effect = "".join(f"{p['name']} = {p['default']}\n" for p in parameters)
+    (folder / "hidden.toml").write_text(f'{base}\n[[effect]]\nname = "coasting"\n{effect}')
+    (folder / "fitted.toml").write_text(base)
+    write_rich_script(folder / "script.csv", 60, 1)
+    subprocess.run(
+        [
+            *(os.environ["TWIN_RUN"], "--plant", "planar", "--model", "hidden.toml", "--n", "1"),
+            *("--script", "script.csv", "--duration-s", "60", "--log", "run.lcmlog"),
+        ],
+        cwd=folder,
+        check=True,
+        capture_output=True,
+    )
+    return folder
+
+
+@pytest.fixture
+def here(folder, monkeypatch) -> Path:
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("PATH", str(Path(os.environ["TWIN_RUN"]).parent), prepend=os.pathsep)
+    return folder
+
+
+def test_the_examples_of_the_documentation_run(here):
+    options = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    done = doctest.testmod(api, extraglobs={"tm": tm}, optionflags=options)
+    assert done.attempted > 20 and done.failed == 0
+    assert sorted(p.name for p in here.iterdir()) == [
+        *("fitted.toml", "hidden.toml", "run.lcmlog", "script.csv")
+    ]
+
+
+def test_a_comparison_is_that_of_the_command(here, capsys):
+    run(["compare", "run.lcmlog", "--model", "fitted.toml", "--json"])
+    told = json.loads(capsys.readouterr().out)
+    found = tm.compare("run.lcmlog", "fitted.toml")
+    assert found.to_json().items() <= told.items()
+    assert set(told) - set(found.to_json()) == {"command", "version", "model_sha256", "report"}
+    assert f"{found.score:.3g}" in repr(found)
+    assert found.verdict in " ".join(str(found).split())
+    assert "<table" in found._repr_html_()
+    assert len(found.plot().axes) == 3
+
+
+def test_a_fit_gives_the_model_of_the_command(here, tmp_path, capsys):
+    run(["fit", "run.lcmlog", "--model", "fitted.toml", "-o", str(tmp_path / "new.toml"), "--json"])
+    told = json.loads(capsys.readouterr().out)
+    fitted = tm.Model.load("fitted.toml").fit(tm.load("run.lcmlog"))
+    assert fitted.to_json()["score_after"] == told["score_after"] == fitted.score
+    model = fitted.model
+    assert model.to_json()["values"] == tm.Model.load(tmp_path / "new.toml").to_json()["values"]
+    model.save(tmp_path / "saved.toml")
+    assert tm.Model.load(tmp_path / "saved.toml").to_json()["sha256"] == model.file.hash
+    with pytest.raises(ValueError, match="exists"):
+        model.save(tmp_path / "saved.toml")
+
+
+def test_tables_hold_what_the_log_holds(here):
+    log, raw = tm.load("run.lcmlog"), read_log("run.lcmlog").robots[0]
+    poses, commands = log.table(), log.commands()
+    assert poses[["x_m", "y_m", "theta_rad"]].to_numpy().shape == raw.pose.shape
+    assert (poses.t_s.to_numpy() == raw.pose_t_s).all()
+    assert (commands[["c0", "c1", "c2", "c3"]].to_numpy() == raw.command).all()
+
+
+def test_a_simulated_log_goes_with_its_object_unless_it_is_saved(here, tmp_path):
+    log = tm.simulate("turbopi.toml", n=2, duration_s=5)
+    place = log.paths[0]
+    log.save(tmp_path / "kept.lcmlog")
+    assert (tmp_path / "kept.lcmlog").read_bytes() == place.read_bytes()
+    del log
+    assert not place.exists()
+
+
+def test_what_is_wrong_is_said_in_a_sentence(here):
+    with pytest.raises(tm.ModelError, match="no such file"):
+        tm.Model.load("turbopy.toml")
+    with pytest.raises(tm.LogError):
+        tm.load("absent.lcmlog")
+    with pytest.raises(ValueError, match="no such effect"):
+        tm.Model.load().add("coastin", "run.lcmlog")
+    with pytest.raises(ValueError, match="nobody"):
+        tm.simulate(behavior="nobody", duration_s=1)
+
+
+def test_importing_needs_no_numbers():
+    code = "import sys, twinmill; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not set(done.stdout.split()) & {"numpy", "pandas", "matplotlib", "twinmill_native"}
+    assert set(tm.__all__) <= set(dir(tm))
