@@ -34,6 +34,7 @@ struct app_config
     char board[CONFIG_TEXT_MAX];
     char i2c_device[CONFIG_TEXT_MAX], uart_device[CONFIG_TEXT_MAX];
     bool i2c_burst;
+    bool board_confirms;
     int32_t board_retry_ms;
     int32_t sign[FW_WHEEL_COUNT];
     int32_t battery_low_mV;
@@ -60,6 +61,10 @@ bool config_parse(struct app_config *config, const char *name, const char *text,
 
 // The same from a file.
 bool config_load(struct app_config *config, const char *path, char error[CONFIG_ERROR_MAX]);
+
+// Sets what can be understood of a file, and leaves the rest as it is.
+// @return false if anything but an absent default file was left out.
+bool config_load_what_can_be(struct app_config *config, const char *path);
 
 // Writes all keys as lines that config_parse() reads back, valid TOML as well.
 // @param with_docs a comment above each key. @return bytes written, without the final 0; the text

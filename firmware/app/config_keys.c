@@ -56,6 +56,10 @@ const struct config_key config_keys[] = {
     TEXT(i2c_device, "bus of the Pi 4 kit's board"),
     TEXT(uart_device, "serial line of the Pi 5 kit's board"),
     YES_NO(i2c_burst, "true: four duties in one transfer; false: one by one"),
+    YES_NO(
+        board_confirms,
+        "true: a stop counts once the board confirms it, by its registers (Pi 4 kit) or by being "
+        "heard (Pi 5 kit); false: once it was taken"),
     INTEGER(board_retry_ms, 0, 100, "a refused transfer is tried again for this long"),
     SIGN("sign_fl", FW_FRONT_LEFT, "1 or -1: which way a positive duty turns the wheel; 0: never"),
     SIGN("sign_fr", FW_FRONT_RIGHT, "as above"),

@@ -41,44 +41,48 @@ static void use_uart(struct motors_uart *board, const struct hal_motors *motors,
 }
 
 // `where`: a file that records, "camera" to answer through the camera's socket, or NULL.
-static void use_stub(const char *where, struct loop_devices *devices)
+static void use_stub(const char *where, struct stub_board *board, struct loop_devices *devices)
 {
-    static struct stub_board board;
     const bool answers = where != NULL && strcmp(where, "camera") == 0;
-    board = (struct stub_board){.record_path = answers ? NULL : where,
-                                .clock = devices->clock,
-                                .answers_to = answers ? &stub_camera : NULL,
-                                .pack_mV = STUB_PACK_MV};
-    devices->motors = stub_board_motors(&board);
-    devices->battery = stub_board_battery(&board);
+    *board = (struct stub_board){.record_path = answers ? NULL : where,
+                                 .clock = devices->clock,
+                                 .answers_to = answers ? &stub_camera : NULL,
+                                 .pack_mV = STUB_PACK_MV};
+    devices->motors = stub_board_motors(board);
+    devices->battery = stub_board_battery(board);
 }
 
-static bool use_board(const struct app_config *config, struct loop_devices *devices, char *error)
+static bool use_board(const struct app_config *config, struct board_drivers *drivers,
+                      struct loop_devices *devices, char *error)
 {
-    static struct motors_i2c i2c;
-    static struct motors_uart uart;
+    struct motors_i2c *i2c = &drivers->i2c;
+    struct motors_uart *uart = &drivers->uart;
     struct motors_i2c_config i2c_config = {.path = config->i2c_device,
                                            .burst = config->i2c_burst,
+                                           .reads_back = config->board_confirms,
                                            .retry_us = config->board_retry_ms * 1000};
     struct motors_uart_config uart_config = {.path = config->uart_device,
+                                             .must_be_heard = config->board_confirms,
                                              .retry_us = config->board_retry_ms * 1000};
     for (int wheel = 0; wheel < FW_WHEEL_COUNT; ++wheel)
     {
         i2c_config.sign[wheel] = uart_config.sign[wheel] = (int8_t)config->sign[wheel];
     }
     const struct hal_motors i2c_motors =
-        motors_i2c_make(&i2c, &i2c_config, &devices->clock, &hal_sys_kernel);
-    const struct hal_motors uart_motors = motors_uart_make(&uart, &uart_config, &devices->clock);
+        motors_i2c_make(i2c, &i2c_config, &devices->clock, &hal_sys_kernel);
+    const struct hal_motors uart_motors = motors_uart_make(uart, &uart_config, &devices->clock);
     enum board_kind kind = strcmp(config->board, "uart") == 0 ? BOARD_UART : BOARD_I2C;
     if (strcmp(config->board, "auto") == 0)
     {
-        const enum fw_err err = board_probe(&i2c, &uart, &kind);
+        const enum fw_err err = board_probe(i2c, uart, &kind);
         if (err != FW_OK)
         {
             (void)snprintf(error, CONFIG_ERROR_MAX,
-                           "motor board: none at %.80s, nor a serial line %.80s: is the robot "
-                           "switched on, and I2C enabled?",
+                           "motor board: none answers at %.80s, and none is heard at %.80s: is the "
+                           "robot switched on, and I2C enabled? If you know which it is, set board",
                            config->i2c_device, config->uart_device);
+            hal_motors_close(&i2c_motors);
+            hal_motors_close(&uart_motors);
             return false;
         }
     }
@@ -91,41 +95,56 @@ static bool use_board(const struct app_config *config, struct loop_devices *devi
     }
     if (kind == BOARD_I2C)
     {
-        use_i2c(&i2c, &i2c_motors, devices);
+        use_i2c(i2c, &i2c_motors, devices);
     }
     else
     {
-        use_uart(&uart, &uart_motors, devices);
+        use_uart(uart, &uart_motors, devices);
     }
     return true;
 }
 
-bool devices_make_board(const struct app_config *config, bool dry_run, struct loop_devices *devices,
+bool devices_make_board(const struct app_config *config, bool dry_run,
+                        struct board_drivers *drivers, struct loop_devices *devices,
                         char error[CONFIG_ERROR_MAX])
 {
     devices->clock = clock_linux();
     const char *where = after(config->board, "stub:");
     if (dry_run || where != NULL || strcmp(config->board, "stub") == 0)
     {
-        use_stub(dry_run ? NULL : where, devices);
+        use_stub(dry_run ? NULL : where, &drivers->stub, devices);
         return true;
     }
-    return use_board(config, devices, error);
+    return use_board(config, drivers, devices, error);
 }
 
-void devices_settle_board(struct app_config *config, bool dry_run)
+const char *devices_board_path(const struct app_config *config, bool dry_run)
 {
-    struct loop_devices devices = {0};
-    char error[CONFIG_ERROR_MAX];
-    if (strcmp(config->board, "auto") != 0 || !devices_make_board(config, dry_run, &devices, error))
+    const char *file = after(config->board, "stub:");
+    if (dry_run || (file != NULL && strcmp(file, "camera") == 0))
     {
-        return;
+        return NULL;
     }
-    if (devices.board != NULL)
+    return file != NULL                         ? file
+           : strcmp(config->board, "i2c") == 0  ? config->i2c_device
+           : strcmp(config->board, "uart") == 0 ? config->uart_device
+                                                : NULL;
+}
+
+bool devices_settle_board(struct app_config *config, bool dry_run, char error[CONFIG_ERROR_MAX])
+{
+    struct board_drivers drivers;
+    struct loop_devices devices = {0};
+    if (!devices_make_board(config, dry_run, &drivers, &devices, error))
+    {
+        return false;
+    }
+    if (strcmp(config->board, "auto") == 0 && devices.board != NULL)
     {
         (void)snprintf(config->board, sizeof config->board, "%s", devices.board);
     }
     hal_motors_close(&devices.motors);
+    return true;
 }
 
 static void use_camera(const struct app_config *config, struct loop_devices *devices)
@@ -216,7 +235,8 @@ static bool use_panel(const struct app_config *config, bool dry_run, struct loop
 bool devices_make(const struct app_config *config, bool dry_run, struct loop_devices *devices,
                   char error[CONFIG_ERROR_MAX])
 {
-    if (!devices_make_board(config, dry_run, devices, error) ||
+    static struct board_drivers drivers;
+    if (!devices_make_board(config, dry_run, &drivers, devices, error) ||
         !use_panel(config, dry_run, devices, error))
     {
         return false;

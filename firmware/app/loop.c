@@ -8,7 +8,8 @@
 #include "loop_tend.h"
 
 #define LONGEST_WAIT_US 100000
-#define STOP_TRIES 3
+#define STOP_TRIES 10
+#define STOP_PAUSE_US 10000
 
 enum fw_err loop_init(struct loop *loop, const struct app_config *config,
                       const struct own_tables *own, const struct loop_devices *devices,
@@ -36,6 +37,8 @@ enum fw_err loop_init(struct loop *loop, const struct app_config *config,
     loop->script.rows = loop->script_rows;
     loop->script.capacity = LOOP_SCRIPT_MAX_ROWS;
     loop->battery_low_mV = config->battery_low_mV;
+    loop->watchdog_ms = config->watchdog_ms;
+    loop->may_move = true;
     // Not open yet: lost until the first step opens it.
     loop->lost[LOOP_CAMERA] = FW_ERR_TIMEOUT;
     return FW_OK;
@@ -88,9 +91,19 @@ static enum fw_err adopt_format(struct loop *loop, const struct hal_camera_forma
     return fw_init(&loop->core, &config);
 }
 
+// It may block for seconds: not while wheels may turn.
+static void close_camera(struct loop *loop)
+{
+    if (!loop->may_move)
+    {
+        hal_camera_close(&loop->devices.camera);
+    }
+}
+
 static void open_camera(struct loop *loop)
 {
     struct hal_camera_format format;
+    close_camera(loop);
     enum fw_err err = hal_camera_open(&loop->devices.camera, &format);
     if (err == FW_OK)
     {
@@ -110,7 +123,7 @@ static bool take_frame(struct loop *loop, struct fw_frame *frame)
 {
     if (loop->lost[LOOP_CAMERA] != FW_OK)
     {
-        if (loop_now_us(loop) >= loop->retry_us[LOOP_CAMERA])
+        if (!loop->may_move && loop_now_us(loop) >= loop->retry_us[LOOP_CAMERA])
         {
             open_camera(loop);
         }
@@ -121,15 +134,23 @@ static bool take_frame(struct loop *loop, struct fw_frame *frame)
     {
         return err == FW_OK;
     }
-    hal_camera_close(&loop->devices.camera);
-    loop->camera_over = err == FW_ERR_END;
     loop_lose(loop, LOOP_CAMERA, err);
+    loop->camera_over = err == FW_ERR_END;
+    close_camera(loop);
     return false;
+}
+
+// Whoever could stop this program if it hangs does live.
+static bool is_guarded(const struct loop *loop)
+{
+    return loop->watch == NULL ||
+           (watch_silent_ms(loop->watch, WATCH_SUPERVISOR) <= loop->watchdog_ms &&
+            watch_silent_ms(loop->watch, WATCH_GUARD) <= loop->watchdog_ms);
 }
 
 static bool must_stand_still(const struct loop *loop)
 {
-    bool still = loop->battery_low;
+    bool still = loop->battery_low || !is_guarded(loop);
     for (int part = 0; part < LOOP_PART_COUNT; ++part)
     {
         still = still || loop->lost[part] != FW_OK;
@@ -179,24 +200,25 @@ static void decide(struct loop *loop, const struct fw_frame *frame, struct fw_ou
 // A board that was lost stands still in decide(), so that it is stopped once before it moves again.
 static void drive(struct loop *loop, struct fw_output *out)
 {
-    static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
-    const bool moves = out->mode == FW_MODE_TABLE || out->mode == FW_MODE_SCRIPT;
-    const bool turns = moves && memcmp(out->wheel_duty_pct, zero_pct, sizeof zero_pct) != 0;
-    if (turns && !loop->moving && loop->before_moving != NULL)
-    {
-        loop->before_moving(loop->before_moving_context);
-    }
-    const enum fw_err err = moves ? hal_motors_write(&loop->devices.motors, out->wheel_duty_pct)
-                                  : hal_motors_stop(&loop->devices.motors);
+    const enum fw_err err = loop_drive(loop, out->wheel_duty_pct);
     if (err == FW_OK)
     {
-        loop->moving = turns;
         loop_regain(loop, LOOP_BOARD);
         return;
     }
     loop_lose(loop, LOOP_BOARD, err);
-    out->mode = loop->running ? FW_MODE_FAULT : FW_MODE_STOPPED;
-    memset(out->wheel_duty_pct, 0, sizeof out->wheel_duty_pct);
+    out->mode = loop->running || loop->may_move ? FW_MODE_FAULT : FW_MODE_STOPPED;
+    memcpy(out->wheel_duty_pct, loop->wheel_duty_pct, sizeof out->wheel_duty_pct);
+}
+
+static int32_t status_flags(const struct loop *loop, const struct fw_output *out)
+{
+    const bool drives = out->mode == FW_MODE_TABLE || out->mode == FW_MODE_SCRIPT;
+    return out->status_flags | (loop->battery_low ? LINK_STATUS_BATTERY_LOW : 0) |
+           (loop->lost[LOOP_BOARD] != FW_OK ? LINK_STATUS_BOARD_LOST : 0) |
+           (loop->lost[LOOP_CAMERA] != FW_OK ? LINK_STATUS_CAMERA_LOST : 0) |
+           (loop->may_move && !drives ? LINK_STATUS_STOP_UNCONFIRMED : 0) |
+           (is_guarded(loop) ? 0 : LINK_STATUS_UNGUARDED);
 }
 
 static void report(struct loop *loop, const struct fw_output *out, int64_t begin_us)
@@ -211,9 +233,7 @@ static void report(struct loop *loop, const struct fw_output *out, int64_t begin
         .pack_mV = loop->battery_count > 0
                        ? loop->battery_mV[(loop->battery_count - 1) % LOOP_BATTERY_READINGS]
                        : 0,
-        .status_flags = out->status_flags | (loop->battery_low ? LINK_STATUS_BATTERY_LOW : 0) |
-                        (loop->lost[LOOP_BOARD] != FW_OK ? LINK_STATUS_BOARD_LOST : 0) |
-                        (loop->lost[LOOP_CAMERA] != FW_OK ? LINK_STATUS_CAMERA_LOST : 0),
+        .status_flags = status_flags(loop, out),
         .panel_lost = loop->lost[LOOP_PANEL] != FW_OK,
         .lost_report_count = loop->lost_report_count,
     };
@@ -223,11 +243,31 @@ static void report(struct loop *loop, const struct fw_output *out, int64_t begin
     loop->lost_report_count += !loop->link.send_report(loop->link.context, &report);
 }
 
+static void beat(const struct loop *loop)
+{
+    if (loop->watch != NULL)
+    {
+        watch_beat(loop->watch, WATCH_DRIVER);
+    }
+}
+
+// Before anything that may take its time, such as opening a camera.
+static void stand_first(struct loop *loop)
+{
+    const enum fw_err err = loop->may_move && must_stand_still(loop) ? loop_halt(loop) : FW_OK;
+    if (err != FW_OK && loop->lost[LOOP_BOARD] == FW_OK)
+    {
+        loop->lost[LOOP_BOARD] = err;
+    }
+}
+
 void loop_step(struct loop *loop)
 {
     wait_for_work(loop);
+    beat(loop);
     const int64_t begin_us = loop_now_us(loop);
     loop_obey_commands(loop);
+    stand_first(loop);
     struct fw_frame frame;
     struct fw_output out;
     const bool has_frame = take_frame(loop, &frame);
@@ -238,14 +278,18 @@ void loop_step(struct loop *loop)
     loop_tend_battery(loop);
 }
 
-void loop_close(struct loop *loop)
+bool loop_close(struct loop *loop)
 {
     loop_stop(loop);
-    for (int tries = 0; tries < STOP_TRIES && hal_motors_stop(&loop->devices.motors) != FW_OK;
-         ++tries)
+    for (int tries = 0; tries < STOP_TRIES && loop_halt(loop) != FW_OK; ++tries)
     {
+        hal_clock_wait(&loop->devices.clock, NULL, 0, STOP_PAUSE_US);
     }
-    hal_camera_close(&loop->devices.camera);
-    hal_panel_close(&loop->devices.panel);
-    hal_motors_close(&loop->devices.motors);
+    if (!loop->may_move)
+    {
+        hal_camera_close(&loop->devices.camera);
+        hal_panel_close(&loop->devices.panel);
+        hal_motors_close(&loop->devices.motors);
+    }
+    return !loop->may_move;
 }

@@ -15,7 +15,8 @@ enum fw_err FW_MUST_CHECK loop_init(struct loop *loop, const struct app_config *
 // Waits for a frame, a command or the next thing due, then does one control step.
 void loop_step(struct loop *loop);
 
-// Stops the motors and gives all devices back.
-void loop_close(struct loop *loop);
+// Stops the motors, then gives all devices back, which may block. @return false if no stop was
+// confirmed: then the devices stay as they are.
+bool loop_close(struct loop *loop);
 
 #endif

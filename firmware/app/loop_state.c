@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "loop_state.h"
 
-#include <stdio.h>
+#include <string.h>
+
+#include "say.h"
 
 #define RETRY_US 500000
+// A robot that stands looks now and then whether another program moves it.
+#define CONFIRM_PERIOD_US 500000
 
 int64_t loop_now_us(const struct loop *loop)
 {
@@ -13,20 +17,62 @@ int64_t loop_now_us(const struct loop *loop)
 static const char *const part_names[LOOP_PART_COUNT] = {"camera", "motor board", "battery",
                                                         "panel"};
 
+// The watchers know it before the board does.
+static void set_may_move(struct loop *loop, bool may_move)
+{
+    loop->may_move = may_move;
+    if (loop->watch != NULL)
+    {
+        loop->watch->may_move = may_move;
+    }
+}
+
+enum fw_err loop_halt(struct loop *loop)
+{
+    enum fw_err err = hal_motors_stop(&loop->devices.motors);
+    if (err == FW_OK && (loop->may_move || loop_now_us(loop) >= loop->confirm_us))
+    {
+        err = hal_motors_confirm(&loop->devices.motors);
+        loop->confirm_us = loop_now_us(loop) + CONFIRM_PERIOD_US;
+    }
+    if (err == FW_OK)
+    {
+        memset(loop->wheel_duty_pct, 0, sizeof loop->wheel_duty_pct);
+    }
+    set_may_move(loop, err != FW_OK);
+    return err;
+}
+
+enum fw_err loop_drive(struct loop *loop, const int8_t wheel_duty_pct[FW_WHEEL_COUNT])
+{
+    static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
+    if (memcmp(wheel_duty_pct, zero_pct, sizeof zero_pct) == 0)
+    {
+        return loop_halt(loop);
+    }
+    set_may_move(loop, true);
+    const enum fw_err err = hal_motors_write(&loop->devices.motors, wheel_duty_pct);
+    if (err == FW_OK)
+    {
+        memcpy(loop->wheel_duty_pct, wheel_duty_pct, sizeof loop->wheel_duty_pct);
+    }
+    return err;
+}
+
 void loop_lose(struct loop *loop, enum loop_part part, enum fw_err err)
 {
-    if (loop->lost[part] != err && err != FW_ERR_END)
-    {
-        (void)fprintf(stderr, "turbopi: %s: %s: the robot stands still until it is back\n",
-                      part_names[part], fw_err_str(err));
-    }
+    const enum fw_err stop_err = loop_halt(loop);
+    const bool is_new = loop->lost[part] != err && err != FW_ERR_END;
     loop->lost[part] = err;
     loop->retry_us[part] = loop_now_us(loop) + RETRY_US;
-    const enum fw_err stop_err = hal_motors_stop(&loop->devices.motors);
-    loop->moving = loop->moving && stop_err != FW_OK;
+    if (is_new)
+    {
+        say("%s: %s: the robot stands still until it is back", part_names[part], fw_err_str(err));
+    }
     if (stop_err != FW_OK && loop->lost[LOOP_BOARD] == FW_OK)
     {
         loop->lost[LOOP_BOARD] = stop_err;
+        say("%s: %s: THE WHEELS MAY TURN", part_names[LOOP_BOARD], fw_err_str(stop_err));
     }
 }
 
@@ -34,7 +80,7 @@ void loop_regain(struct loop *loop, enum loop_part part)
 {
     if (loop->lost[part] != FW_OK)
     {
-        (void)fprintf(stderr, "turbopi: %s: works\n", part_names[part]);
+        say("%s: works", part_names[part]);
         loop->lost[part] = FW_OK;
     }
 }

@@ -13,6 +13,7 @@
 #include "hal/panel.h"
 #include "link.h"
 #include "own_tables.h"
+#include "watch.h"
 
 #define LOOP_SCRIPT_MAX_ROWS 4096
 #define LOOP_BATTERY_READINGS 5
@@ -85,11 +86,15 @@ struct loop
     // Button, as seen in the last step and as debounced.
     bool button_seen, button_down;
 
-    // Duties that the board was told last are not all zero.
-    bool moving;
-    // Called before the board is told to move from standstill, unless NULL.
-    void (*before_moving)(const void *context);
-    const void *before_moving_context;
+    // Shared with the processes that watch this one; NULL: nobody does.
+    struct watch *watch;
+    int32_t watchdog_ms;
+    // Wheels may turn: from before the first byte that moves one until a stop is confirmed. At
+    // first nobody knows.
+    bool may_move;
+    // What the board took last, and when a stop is to be confirmed again (monotonic).
+    int8_t wheel_duty_pct[FW_WHEEL_COUNT];
+    int64_t confirm_us;
     // The camera's recording or the script is over.
     bool camera_over, script_over;
     uint32_t lost_report_count;
@@ -104,7 +109,14 @@ int64_t loop_now_us(const struct loop *loop);
 void loop_start(struct loop *loop);
 void loop_stop(struct loop *loop);
 
-// Notes a failure and stops the motors; the part is tried again later.
+// Four duties to the board, which is a stop if all are zero.
+enum fw_err FW_MUST_CHECK loop_drive(struct loop *loop,
+                                     const int8_t wheel_duty_pct[FW_WHEEL_COUNT]);
+
+// Zero to all wheels. @return FW_OK once the board has confirmed that they stand.
+enum fw_err FW_MUST_CHECK loop_halt(struct loop *loop);
+
+// Stops the motors, then notes and tells the failure; the part is tried again later.
 void loop_lose(struct loop *loop, enum loop_part part, enum fw_err err);
 void loop_regain(struct loop *loop, enum loop_part part);
 

@@ -196,13 +196,52 @@ static bool check(const struct app_config *config, char *error)
     return err == FW_OK;
 }
 
+static bool wants_stop(int argc, char **argv)
+{
+    bool stop = false;
+    opterr = 0;
+    for (int code; (code = getopt_long(argc, argv, short_options, long_options, NULL)) != -1;)
+    {
+        stop = stop || code == OPTION_STOP;
+    }
+    opterr = !stop;
+    optind = 1;
+    return stop;
+}
+
+// All that can be understood.
+static void read_for_stop(int argc, char **argv, struct options *options)
+{
+    enum options_action action;
+    char error[CONFIG_ERROR_MAX];
+    const char *path = DEFAULT_FILE;
+    bool is_whole = true;
+    for (int code; (code = getopt_long(argc, argv, short_options, long_options, NULL)) != -1;)
+    {
+        path = code == 'c' ? optarg : path;
+    }
+    is_whole = config_load_what_can_be(&options->config, path);
+    optind = 1;
+    for (int code; (code = getopt_long(argc, argv, short_options, long_options, NULL)) != -1;)
+    {
+        is_whole = code != '?' && apply(code, options, &action, error) && is_whole;
+    }
+    options->is_whole = is_whole;
+}
+
 enum options_action parse_options(int argc, char **argv, struct options *options)
 {
     char error[CONFIG_ERROR_MAX] = "";
     enum options_action action = OPTIONS_RUN;
     options->dry_run = false;
     options->own.count = 0;
+    options->is_whole = true;
     config_default(&options->config);
+    if (wants_stop(argc, argv))
+    {
+        read_for_stop(argc, argv, options);
+        return OPTIONS_STOP;
+    }
     bool ok = load_file(argc, argv, &options->config, error);
     while (ok && action != OPTIONS_DONE)
     {

@@ -24,10 +24,15 @@ struct options
     // Of the file that the configuration names, and its own table under its behaviour's name.
     struct own_tables own;
     bool dry_run;
+    // Nothing was left out because it could not be understood, as --stop does.
+    bool is_whole;
+    // The command line's own memory, for a process that goes by another name.
+    char *command_line;
+    size_t command_line_bytes;
 };
 
 // Reads the command line over the configuration file over the defaults. A mistake is told on
-// stderr.
+// stderr; with --stop there is none: what cannot be understood is left out.
 enum options_action parse_options(int argc, char **argv, struct options *options);
 
 #endif

@@ -2,7 +2,6 @@
 #include "supervisor.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -11,247 +10,382 @@
 #include <sys/prctl.h>
 #include <sys/signalfd.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "devices.h"
+#include "guard.h"
+#include "instance.h"
 #include "notify.h"
+#include "say.h"
+#include "stopper.h"
 
-// A worker that stands still may take its time: cameras are slow to open.
+#define TICK_MS 20
+// A driver whose wheels stand may take its time: cameras are slow to open.
 #define STILL_PATIENCE_MS 15000
-// From being asked to end to being killed.
+// From being asked to end to being killed, once the wheels stand.
 #define END_PATIENCE_MS 1000
-#define STOP_TRIES 50
-#define STOP_PAUSE_MS 20
+// For a board that does not confirm a stop. A driver is then started again all the same: it goes
+// on telling the board, and the operator.
+#define STOP_PATIENCE_MS 1000
+// For a program that is ending to give the board back.
+#define HELD_PATIENCE_MS 2000
+#define NOTIFY_PERIOD_US 500000
 
-struct worker
+struct crew
 {
-    pid_t pid;
-    int heartbeat_fd;
-    bool moving;
+    struct options *options;
+    driver_fn *drive;
+    struct watch *watch;
+    struct stopper stopper;
+    int signal_fd;
+    // 0: none.
+    pid_t driver, guard;
+    int driver_status;
+    // The signal that asked to end, and when; 0: none did.
+    int asked_by;
+    int64_t asked_us, notified_us, guard_tried_us;
 };
 
-void heartbeat_send(const struct heartbeat *heartbeat, bool moving)
-{
-    const char beat = moving ? 'm' : 's';
-    (void)!write(heartbeat->fd, &beat, 1);
-}
-
-static void pause_ms(int32_t duration_ms)
-{
-    (void)poll(NULL, 0, duration_ms);
-}
-
-static bool stop_once(struct app_config *config, const char *board, bool dry_run)
-{
-    struct loop_devices devices;
-    char error[CONFIG_ERROR_MAX];
-    if (board != NULL)
-    {
-        (void)snprintf(config->board, sizeof config->board, "%s", board);
-    }
-    if (!devices_make_board(config, dry_run, &devices, error))
-    {
-        return false;
-    }
-    const enum fw_err err = hal_motors_stop(&devices.motors);
-    hal_motors_close(&devices.motors);
-    return err == FW_OK;
-}
-
-bool stop_board(const struct options *options)
-{
-    struct app_config config = options->config;
-    const bool is_known = strcmp(config.board, "auto") != 0;
-    bool line_took_it = false;
-    for (int tries = 0; tries < STOP_TRIES; ++tries)
-    {
-        // A board on I2C that refuses for a while must not be taken for the other one: a serial
-        // line takes anything, so it is told as well, and believed only if I2C never answers.
-        if (stop_once(&config, is_known ? NULL : "i2c", options->dry_run))
-        {
-            return true;
-        }
-        line_took_it = !is_known && stop_once(&config, "uart", options->dry_run);
-        pause_ms(STOP_PAUSE_MS);
-    }
-    if (!line_took_it)
-    {
-        (void)fprintf(stderr,
-                      "turbopi: motor board: does not take a stop: the wheels may turn: "
-                      "switch the robot off\n");
-    }
-    return line_took_it;
-}
-
-// SIGTERM, SIGINT and SIGHUP as something to wait for. @return -1 and errno on failure.
+// Signals that end or suspend a program, as something to wait for: a suspended one could not stop
+// the wheels. @return -1 and errno on failure.
 static int block_signals(void)
 {
+    const int numbers[] = {SIGTERM, SIGINT,  SIGHUP,  SIGQUIT, SIGTSTP,
+                           SIGTTIN, SIGTTOU, SIGUSR1, SIGUSR2, SIGCHLD};
     sigset_t signals;
     sigemptyset(&signals);
-    sigaddset(&signals, SIGTERM);
-    sigaddset(&signals, SIGINT);
-    sigaddset(&signals, SIGHUP);
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i)
+    {
+        sigaddset(&signals, numbers[i]);
+    }
     return sigprocmask(SIG_BLOCK, &signals, NULL) == 0
                ? signalfd(-1, &signals, SFD_NONBLOCK | SFD_CLOEXEC)
                : -1;
 }
 
+static bool asks_to_end(uint32_t number)
+{
+    return number == SIGTERM || number == SIGINT || number == SIGHUP || number == SIGQUIT ||
+           number == SIGTSTP;
+}
+
+int supervisor_asked_to_end(int stop_fd)
+{
+    struct signalfd_siginfo info;
+    int number = 0;
+    while (read(stop_fd, &info, sizeof info) == sizeof info)
+    {
+        number = asks_to_end(info.ssi_signo) ? (int)info.ssi_signo : number;
+    }
+    return number;
+}
+
 // In the child: dies with its parent, after having stopped the wheels.
-static _Noreturn void become_worker(const struct options *options, worker_fn *worker, int beat_fd,
-                                    pid_t parent, int stop_fd)
+static _Noreturn void become_driver(struct crew *crew, pid_t parent)
 {
     (void)prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (getppid() != parent)
     {
         _exit(1);
     }
-    (void)signal(SIGPIPE, SIG_IGN);
-    const struct heartbeat heartbeat = {beat_fd};
-    exit(worker(options, &heartbeat, stop_fd));
+    crew->watch->driver_pid = getpid();
+    exit(crew->drive(crew->options, crew->watch, crew->signal_fd));
 }
 
-static bool start_worker(const struct options *options, worker_fn *run, int stop_fd,
-                         struct worker *worker)
+static bool start_driver(struct crew *crew)
 {
-    int fds[2];
-    // Nobody waits for a reader that is late.
-    if (pipe2(fds, O_CLOEXEC) != 0 || fcntl(fds[1], F_SETFL, O_NONBLOCK) != 0)
-    {
-        return false;
-    }
     const pid_t parent = getpid();
-    (void)fflush(NULL);
-    worker->pid = fork();
-    if (worker->pid == 0)
+    watch_beat(crew->watch, WATCH_DRIVER);
+    crew->driver = fork();
+    if (crew->driver == 0)
     {
-        (void)close(fds[0]);
-        become_worker(options, run, fds[1], parent, stop_fd);
+        become_driver(crew, parent);
     }
-    (void)close(fds[1]);
-    worker->heartbeat_fd = fds[0];
-    worker->moving = false;
-    if (worker->pid < 0)
-    {
-        (void)close(fds[0]);
-        return false;
-    }
-    return true;
+    return crew->driver > 0;
 }
 
-// @return false when the worker's end is closed: it is dead or dying.
-static bool read_beats(struct worker *worker)
+static void keep_guard(struct crew *crew)
 {
-    char beats[64];
-    const ssize_t got = read(worker->heartbeat_fd, beats, sizeof beats);
-    if (got <= 0)
+    const int64_t now_us = watch_now_us();
+    if (crew->guard > 0 && waitpid(crew->guard, NULL, WNOHANG) == crew->guard)
     {
-        return false;
+        crew->guard = 0;
     }
-    worker->moving = beats[got - 1] == 'm';
-    notify("WATCHDOG=1");
-    return true;
+    if (crew->guard > 0 || now_us - crew->guard_tried_us < STOP_PATIENCE_MS * 1000)
+    {
+        return;
+    }
+    if (crew->guard_tried_us != 0)
+    {
+        say("the guard is gone: another is started");
+    }
+    crew->guard_tried_us = now_us;
+    const pid_t parent = getpid();
+    crew->guard = fork();
+    if (crew->guard == 0)
+    {
+        guard_run(crew->options, crew->watch, parent);
+    }
 }
 
-// Watches until the worker is dead, hangs, or a signal asks to end. @return true if asked to end.
-static bool watch(struct worker *worker, int stop_fd, int32_t watchdog_ms)
+static void reap_driver(struct crew *crew)
 {
-    for (;;)
+    if (crew->driver > 0 && waitpid(crew->driver, &crew->driver_status, WNOHANG) == crew->driver)
     {
-        struct pollfd fds[] = {{.fd = worker->heartbeat_fd, .events = POLLIN},
-                               {.fd = stop_fd, .events = POLLIN}};
-        const int ready = poll(fds, 2, worker->moving ? watchdog_ms : STILL_PATIENCE_MS);
-        if (ready < 0 && errno == EINTR)
+        crew->driver = 0;
+        crew->watch->driver_pid = 0;
+    }
+}
+
+static void note_signals(struct crew *crew)
+{
+    const int number = supervisor_asked_to_end(crew->signal_fd);
+    if (number != 0 && crew->asked_by == 0)
+    {
+        crew->asked_by = number;
+        crew->asked_us = watch_now_us();
+    }
+}
+
+// What is done at all times, whatever else goes on; then a short wait, or none if a signal comes.
+static void tick(struct crew *crew)
+{
+    watch_beat(crew->watch, WATCH_SUPERVISOR);
+    keep_guard(crew);
+    if (watch_now_us() - crew->notified_us > NOTIFY_PERIOD_US)
+    {
+        notify("WATCHDOG=1");
+        crew->notified_us = watch_now_us();
+    }
+    struct pollfd signals = {.fd = crew->signal_fd, .events = POLLIN};
+    (void)poll(&signals, 1, TICK_MS);
+    note_signals(crew);
+    reap_driver(crew);
+}
+
+static int64_t asked_ms(const struct crew *crew)
+{
+    return crew->asked_by != 0 ? (watch_now_us() - crew->asked_us) / 1000 : -1;
+}
+
+// @return why the driver has to be killed, or NULL.
+static const char *must_end(const struct crew *crew)
+{
+    const bool may_move = crew->watch->may_move;
+    const int32_t watchdog_ms = crew->options->config.watchdog_ms;
+    const int64_t silent_ms = watch_silent_ms(crew->watch, WATCH_DRIVER);
+    return silent_ms > (may_move ? watchdog_ms : STILL_PATIENCE_MS)      ? "hangs"
+           : asked_ms(crew) > (may_move ? watchdog_ms : END_PATIENCE_MS) ? "does not end"
+                                                                         : NULL;
+}
+
+// Until the driver has ended or has to be made to. @return why it has to, or NULL.
+static const char *watch_driver(struct crew *crew)
+{
+    bool told = false;
+    const char *why = NULL;
+    while (crew->driver > 0 && why == NULL)
+    {
+        tick(crew);
+        if (crew->asked_by != 0 && !told)
         {
-            continue;
+            (void)kill(crew->driver, SIGTERM);
+            told = true;
         }
-        if (fds[1].revents != 0)
-        {
-            return true;
-        }
-        if (ready <= 0)
-        {
-            (void)fprintf(stderr, "turbopi: the program hangs: killed\n");
-            (void)kill(worker->pid, SIGKILL);
-            return false;
-        }
-        if (!read_beats(worker))
-        {
-            return false;
-        }
+        why = must_end(crew);
     }
+    return why;
 }
 
-static int64_t monotonic_ms(void)
+// Until nobody is left who could write to the board, and it has confirmed a stop; for the second
+// no longer than the patience. @return true if it has.
+static bool put_to_rest(struct crew *crew)
 {
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
-
-// Asks the worker to end, and makes it. Its end of the pipe closes when it is dead.
-static void end_worker(const struct worker *worker)
-{
-    (void)kill(worker->pid, SIGTERM);
-    char beats[64];
-    struct pollfd alive = {.fd = worker->heartbeat_fd, .events = POLLIN};
-    const int64_t end_ms = monotonic_ms() + END_PATIENCE_MS;
-    for (int64_t left_ms = END_PATIENCE_MS; left_ms > 0; left_ms = end_ms - monotonic_ms())
+    const int64_t begin_us = watch_now_us();
+    bool stopped = false, complained = false;
+    do
     {
-        if (poll(&alive, 1, (int)left_ms) > 0 &&
-            read(worker->heartbeat_fd, beats, sizeof beats) <= 0)
+        if (crew->driver > 0)
         {
-            return;
+            crew->watch->driver_pid = crew->driver;
         }
-    }
-    (void)kill(worker->pid, SIGKILL);
-}
-
-static int wait_for_end(const struct worker *worker)
-{
-    int status = 0;
-    while (waitpid(worker->pid, &status, 0) < 0 && errno == EINTR)
-    {
-    }
-    (void)close(worker->heartbeat_fd);
-    if (WIFSIGNALED(status))
-    {
-        (void)fprintf(stderr, "turbopi: the program was killed by signal %d\n", WTERMSIG(status));
-        return 1;
-    }
-    return WEXITSTATUS(status);
-}
-
-int supervise(struct options *options, worker_fn *run)
-{
-    // Both processes speak to the same board, whatever it answers later.
-    devices_settle_board(&options->config, options->dry_run);
-    const int stop_fd = block_signals();
-    int code = 1;
-    for (bool again = stop_fd >= 0; again;)
-    {
-        struct worker worker;
-        if (!start_worker(options, run, stop_fd, &worker))
+        stopped = stopper_end_driver(&crew->stopper, crew->watch);
+        reap_driver(crew);
+        if (!stopped || crew->driver > 0)
+        {
+            tick(crew);
+        }
+        const bool is_late = (watch_now_us() - begin_us) / 1000 > STOP_PATIENCE_MS;
+        if (is_late && !stopped && !complained)
+        {
+            say("motor board: does not confirm a stop: THE WHEELS MAY TURN: switch the robot off");
+            complained = true;
+        }
+        if (is_late && crew->driver == 0)
         {
             break;
         }
-        notify("READY=1");
+    } while (!stopped || crew->driver > 0);
+    stopper_close(&crew->stopper);
+    return stopped;
+}
+
+// Tells what has happened, now that the wheels stand. @return the exit code of the driver.
+static int tell_end(const struct crew *crew, const char *why)
+{
+    if (why != NULL)
+    {
+        say("the driving process %s: killed", why);
+        return 1;
+    }
+    if (WIFSIGNALED(crew->driver_status))
+    {
+        say("the driving process was killed by signal %d", WTERMSIG(crew->driver_status));
+        return 1;
+    }
+    return WEXITSTATUS(crew->driver_status);
+}
+
+static void pause_for(struct crew *crew, int32_t duration_ms)
+{
+    const int64_t end_us = watch_now_us() + (int64_t)duration_ms * 1000;
+    while (crew->asked_by == 0 && watch_now_us() < end_us)
+    {
+        tick(crew);
+    }
+}
+
+// Waits for a program that is ending to let go of the board. @return false if another keeps it.
+static bool take_board(struct crew *crew)
+{
+    const char *path = devices_board_path(&crew->options->config, crew->options->dry_run);
+    const int64_t end_us = watch_now_us() + HELD_PATIENCE_MS * 1000;
+    pid_t holder = 0;
+    bool taken = path == NULL || instance_take(path, &holder);
+    while (!taken && crew->asked_by == 0 && watch_now_us() < end_us)
+    {
+        (void)poll(NULL, 0, TICK_MS);
+        note_signals(crew);
+        taken = instance_take(path, &holder);
+    }
+    if (!taken)
+    {
+        char who[INSTANCE_WHO_MAX] = "another program";
+        if (holder > 0)
+        {
+            instance_describe(holder, who);
+        }
+        say("motor board %s: %s has it: end that first; nothing was moved", path, who);
+    }
+    return taken;
+}
+
+static void warn_of_vendor(const struct options *options)
+{
+    char who[INSTANCE_WHO_MAX];
+    if (devices_board_path(&options->config, options->dry_run) != NULL && instance_vendor(who))
+    {
+        say("%s runs, too, and may move the wheels or hold camera and lines: stop and disable it",
+            who);
+    }
+}
+
+// Finds the board and makes it this program's own. @return false to end, with the exit code.
+static bool settle(struct crew *crew, int *code)
+{
+    char error[CONFIG_ERROR_MAX], told[CONFIG_ERROR_MAX] = "";
+    bool found = false;
+    *code = 1;
+    while (crew->asked_by == 0 &&
+           !(found = devices_settle_board(&crew->options->config, crew->options->dry_run, error)))
+    {
+        if (strcmp(told, error) != 0)
+        {
+            say("%s", error);
+            memcpy(told, error, sizeof told);
+        }
+        if (crew->options->config.restart_ms < 0)
+        {
+            return false;
+        }
         notify("WATCHDOG=1");
-        const bool asked = watch(&worker, stop_fd, options->config.watchdog_ms);
-        if (asked)
+        struct pollfd signals = {.fd = crew->signal_fd, .events = POLLIN};
+        (void)poll(&signals, 1, crew->options->config.restart_ms);
+        note_signals(crew);
+    }
+    if (found && !take_board(crew))
+    {
+        *code = SUPERVISOR_EXIT_HELD;
+        return false;
+    }
+    *code = found ? 1 : 0;
+    return found;
+}
+
+// One life of the driver. @return true if another follows.
+static bool drive_once(struct crew *crew, int *code)
+{
+    if (!start_driver(crew))
+    {
+        say("no process can be started: %s", strerror(errno));
+        return false;
+    }
+    const char *why = watch_driver(crew);
+    // Nothing comes before this: a dead driver's last duties are still on the wheels.
+    const bool stopped = put_to_rest(crew);
+    *code = tell_end(crew, why);
+    if (crew->asked_by != 0)
+    {
+        *code = stopped ? 0 : 1;
+        return false;
+    }
+    if (*code != 1 || crew->options->config.restart_ms < 0)
+    {
+        return false;
+    }
+    pause_for(crew, crew->options->config.restart_ms);
+    *code = stopped ? 0 : 1;
+    return crew->asked_by == 0;
+}
+
+static void tell_signal(const struct crew *crew)
+{
+    if (crew->asked_by == SIGTSTP || crew->asked_by == SIGQUIT)
+    {
+        say("ended, not suspended: who is suspended cannot stop the wheels");
+    }
+}
+
+int supervise(struct options *options, driver_fn *drive)
+{
+    struct crew crew = {
+        .options = options,
+        .drive = drive,
+        .stopper = {.config = &options->config, .dry_run = options->dry_run},
+    };
+    crew.signal_fd = block_signals();
+    crew.watch = watch_make();
+    int code = 1;
+    if (crew.signal_fd < 0 || crew.watch == NULL || !say_never_wait())
+    {
+        say("cannot start: %s", strerror(errno));
+        return code;
+    }
+    notify("READY=1");
+    notify("WATCHDOG=1");
+    if (settle(&crew, &code))
+    {
+        (void)put_to_rest(&crew);
+        warn_of_vendor(options);
+        while (crew.asked_by == 0 && drive_once(&crew, &code))
         {
-            end_worker(&worker);
         }
-        code = wait_for_end(&worker);
-        // Nothing comes before this: a dead worker's last duties are still on the wheels.
-        const bool stopped = stop_board(options);
-        code = asked && stopped ? 0 : code;
-        again = !asked && code == 1 && options->config.restart_ms >= 0;
-        if (again)
-        {
-            struct pollfd stop = {.fd = stop_fd, .events = POLLIN};
-            again = poll(&stop, 1, options->config.restart_ms) == 0;
-        }
+        tell_signal(&crew);
+    }
+    // While wheels may turn the guard goes on; else nobody needs it, hanging or not.
+    if (crew.guard > 0 && !crew.watch->may_move)
+    {
+        (void)kill(crew.guard, SIGKILL);
     }
     notify("STOPPING=1");
     return code;

@@ -1,32 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-// A parent that outlives the program it started, and stops the wheels when that dies or hangs.
+// A parent that outlives the process it started to drive, and stops the wheels when that dies or
+// hangs. A second one, the guard, does so when the parent cannot.
 #ifndef APP_SUPERVISOR_H
 #define APP_SUPERVISOR_H
 
-#include <stdbool.h>
-
 #include "options.h"
+#include "watch.h"
 
-// How the worker says that it lives.
-struct heartbeat
-{
-    int fd;
-};
+// The program itself: beats in watch. @param stop_fd readable when a signal asks to end.
+// @return its exit code.
+typedef int driver_fn(const struct options *options, struct watch *watch, int stop_fd);
 
-// Called after every control step. @param moving some wheel may turn.
-void heartbeat_send(const struct heartbeat *heartbeat, bool moving);
+// Takes the signals that have come. @return one that asks to end, or 0.
+int supervisor_asked_to_end(int stop_fd);
 
-// The program itself. @param stop_fd readable when a signal asks to end. @return its exit code.
-typedef int worker_fn(const struct options *options, const struct heartbeat *heartbeat,
-                      int stop_fd);
+// Exit code if another program has the motor board.
+#define SUPERVISOR_EXIT_HELD 3
 
-// Starts the worker in a child process and again whenever it dies, until a signal asks to end or
-// the worker ends by itself with code 0 or 2. Whatever ended the worker, the board is told zero.
-// A board that was to be found is written into the options. SIGTERM, SIGINT and SIGHUP stay blocked
-// for the rest of the process. @return the exit code.
-int supervise(struct options *options, worker_fn *worker);
-
-// Tells the board zero until it takes it, for at most a second.
-bool stop_board(const struct options *options);
+// Starts the driver in a child process and again whenever it dies, until a signal asks to end or
+// the driver ends by itself with code 0 or 2. Whatever ended it, the board is told zero, before
+// anything else is done or said. A board that was to be found is written into the options.
+// Signals that end or suspend programs stay blocked for the rest of the process.
+// @return the exit code.
+int supervise(struct options *options, driver_fn *drive);
 
 #endif

@@ -123,33 +123,65 @@ static enum fw_err stop(void *device)
     return first_err;
 }
 
-struct hal_motors motors_i2c_make(struct motors_i2c *board, const struct motors_i2c_config *config,
-                                  const struct hal_clock *clock, const struct hal_sys *sys)
-{
-    static const struct hal_motors_ops ops = {write_duties, stop, close_bus};
-    *board = (struct motors_i2c){.config = *config, .clock = *clock, .sys = sys, .fd = -1};
-    return (struct hal_motors){.device = board, .ops = &ops};
-}
-
 // The board knows no repeated start: the register is chosen in one transfer and read in the next.
-static enum fw_err read_battery(void *device, int32_t *pack_mV)
+static enum fw_err read_register(struct motors_i2c *board, uint8_t chosen, uint8_t *bytes,
+                                 size_t count)
 {
-    struct motors_i2c *board = device;
-    const uint8_t chosen = REGISTER_BATTERY;
     enum fw_err err = send_until(board, &chosen, sizeof chosen, deadline_us(board));
     if (err != FW_OK)
     {
         return err;
     }
-    uint8_t bytes[2];
-    err = result_of(board->sys->read(board->fd, bytes, sizeof bytes), sizeof bytes);
+    err = result_of(board->sys->read(board->fd, bytes, count), count);
     if (err != FW_OK)
     {
         close_bus(board);
-        return err;
     }
-    *pack_mV = bytes[0] + 256 * bytes[1];
-    return FW_OK;
+    return err;
+}
+
+// Another program may choose its own register between the two transfers: what is not zero is read
+// once more.
+static enum fw_err confirm_wheel(struct motors_i2c *board, int wheel)
+{
+    const uint8_t chosen = (uint8_t)(REGISTER_MOTOR + wheel);
+    uint8_t duty = 0;
+    enum fw_err err = read_register(board, chosen, &duty, sizeof duty);
+    if (err == FW_OK && duty != 0)
+    {
+        err = read_register(board, chosen, &duty, sizeof duty);
+    }
+    return err == FW_OK && duty != 0 ? FW_ERR_NOT_ZERO : err;
+}
+
+static enum fw_err confirm(void *device)
+{
+    struct motors_i2c *board = device;
+    enum fw_err err = FW_OK;
+    for (int wheel = 0; err == FW_OK && board->config.reads_back && wheel < FW_WHEEL_COUNT; ++wheel)
+    {
+        err = confirm_wheel(board, wheel);
+    }
+    return err;
+}
+
+struct hal_motors motors_i2c_make(struct motors_i2c *board, const struct motors_i2c_config *config,
+                                  const struct hal_clock *clock, const struct hal_sys *sys)
+{
+    static const struct hal_motors_ops ops = {write_duties, stop, confirm, close_bus};
+    *board = (struct motors_i2c){.config = *config, .clock = *clock, .sys = sys, .fd = -1};
+    return (struct hal_motors){.device = board, .ops = &ops};
+}
+
+static enum fw_err read_battery(void *device, int32_t *pack_mV)
+{
+    uint8_t bytes[2];
+    const enum fw_err err = read_register(device, REGISTER_BATTERY, bytes, sizeof bytes);
+    if (err == FW_OK)
+    {
+        *pack_mV = bytes[0] + 256 * bytes[1];
+    }
+    return err;
 }
 
 struct hal_battery motors_i2c_battery(struct motors_i2c *board)
@@ -160,6 +192,6 @@ struct hal_battery motors_i2c_battery(struct motors_i2c *board)
 
 enum fw_err motors_i2c_probe(struct motors_i2c *board)
 {
-    const uint8_t chosen = REGISTER_BATTERY;
-    return send_until(board, &chosen, sizeof chosen, deadline_us(board));
+    int32_t pack_mV;
+    return read_battery(board, &pack_mV);
 }

@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -14,6 +15,10 @@
 #define FUNCTION_MOTOR 3
 #define SYSTEM_BATTERY 4
 #define MOTOR_DUTY 5
+// The board reports many times a second; after this long without, it is gone.
+#define HEARD_US 2000000
+#define PROBE_US 1500000
+#define RECEIVE_TURNS 64
 
 static void close_line(void *device)
 {
@@ -24,6 +29,7 @@ static void close_line(void *device)
         board->fd = -1;
         board->received_count = 0;
         board->has_battery = false;
+        board->was_heard = false;
     }
 }
 
@@ -114,15 +120,6 @@ static enum fw_err stop(void *device)
     return write_duties(device, zero_pct);
 }
 
-struct hal_motors motors_uart_make(struct motors_uart *board,
-                                   const struct motors_uart_config *config,
-                                   const struct hal_clock *clock)
-{
-    static const struct hal_motors_ops ops = {write_duties, stop, close_line};
-    *board = (struct motors_uart){.config = *config, .clock = *clock, .fd = -1};
-    return (struct hal_motors){.device = board, .ops = &ops};
-}
-
 static void drop_received(struct motors_uart *board, size_t count)
 {
     board->received_count -= count;
@@ -146,6 +143,12 @@ static void parse_received(struct motors_uart *board)
             drop_received(board, 1);
             continue;
         }
+        // A line may give back what it was sent.
+        if (bytes[2] != FUNCTION_MOTOR)
+        {
+            board->was_heard = true;
+            board->heard_us = hal_clock_monotonic_us(&board->clock);
+        }
         if (bytes[2] == FUNCTION_SYSTEM && bytes[3] == 3 && bytes[4] == SYSTEM_BATTERY)
         {
             board->pack_mV = bytes[5] + 256 * bytes[6];
@@ -155,24 +158,18 @@ static void parse_received(struct motors_uart *board)
     }
 }
 
-static enum fw_err read_battery(void *device, int32_t *pack_mV)
+// Takes in what has come. Bounded: the board may send without end.
+static enum fw_err receive(struct motors_uart *board)
 {
-    struct motors_uart *board = device;
-    const enum fw_err err = open_line(board);
-    if (err != FW_OK)
-    {
-        return err;
-    }
-    // Bounded: the board may send without end.
-    for (int turns = 0; turns < 16; ++turns)
+    enum fw_err err = open_line(board);
+    for (int turns = 0; err == FW_OK && turns < RECEIVE_TURNS; ++turns)
     {
         const ssize_t done = read(board->fd, board->received + board->received_count,
                                   sizeof board->received - board->received_count);
         if (done < 0 && errno != EAGAIN && errno != EINTR)
         {
-            const enum fw_err read_err = hal_sys_err(errno);
+            err = hal_sys_err(errno);
             close_line(board);
-            return read_err;
         }
         if (done <= 0)
         {
@@ -181,12 +178,47 @@ static enum fw_err read_battery(void *device, int32_t *pack_mV)
         board->received_count += (size_t)done;
         parse_received(board);
     }
-    if (!board->has_battery)
+    return err;
+}
+
+static enum fw_err read_battery(void *device, int32_t *pack_mV)
+{
+    struct motors_uart *board = device;
+    const enum fw_err err = receive(board);
+    if (err != FW_OK || !board->has_battery)
     {
-        return FW_ERR_TIMEOUT;
+        return err != FW_OK ? err : FW_ERR_TIMEOUT;
     }
     *pack_mV = board->pack_mV;
     return FW_OK;
+}
+
+static bool is_heard(const struct motors_uart *board)
+{
+    return board->was_heard && hal_clock_monotonic_us(&board->clock) - board->heard_us < HEARD_US;
+}
+
+// The board does not answer: it is enough that the frame has left and that the board is heard.
+static enum fw_err confirm(void *device)
+{
+    struct motors_uart *board = device;
+    int unsent_bytes = 0;
+    const enum fw_err err = receive(board);
+    if (err != FW_OK)
+    {
+        return err;
+    }
+    const bool sent = ioctl(board->fd, TIOCOUTQ, &unsent_bytes) != 0 || unsent_bytes == 0;
+    return !board->config.must_be_heard || (sent && is_heard(board)) ? FW_OK : FW_ERR_TIMEOUT;
+}
+
+struct hal_motors motors_uart_make(struct motors_uart *board,
+                                   const struct motors_uart_config *config,
+                                   const struct hal_clock *clock)
+{
+    static const struct hal_motors_ops ops = {write_duties, stop, confirm, close_line};
+    *board = (struct motors_uart){.config = *config, .clock = *clock, .fd = -1};
+    return (struct hal_motors){.device = board, .ops = &ops};
 }
 
 struct hal_battery motors_uart_battery(struct motors_uart *board)
@@ -197,5 +229,13 @@ struct hal_battery motors_uart_battery(struct motors_uart *board)
 
 enum fw_err motors_uart_probe(struct motors_uart *board)
 {
-    return open_line(board);
+    const int64_t end_us = hal_clock_monotonic_us(&board->clock) + PROBE_US;
+    enum fw_err err = receive(board);
+    while (err == FW_OK && !is_heard(board) && hal_clock_monotonic_us(&board->clock) < end_us)
+    {
+        hal_clock_wait(&board->clock, &board->fd, 1,
+                       end_us - hal_clock_monotonic_us(&board->clock));
+        err = receive(board);
+    }
+    return err == FW_OK && !is_heard(board) ? FW_ERR_TIMEOUT : err;
 }

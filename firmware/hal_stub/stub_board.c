@@ -79,6 +79,18 @@ static enum fw_err stop(void *device)
     return err;
 }
 
+static enum fw_err confirm(void *device)
+{
+    static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
+    const struct stub_board *board = device;
+    const enum fw_err err = stub_faults_next(board->faults);
+    if (err != FW_OK)
+    {
+        return err;
+    }
+    return memcmp(board->wheel_duty_pct, zero_pct, sizeof zero_pct) == 0 ? FW_OK : FW_ERR_NOT_ZERO;
+}
+
 static void close_board(void *device)
 {
     (void)device;
@@ -97,7 +109,7 @@ static enum fw_err read_battery(void *device, int32_t *pack_mV)
 
 struct hal_motors stub_board_motors(struct stub_board *board)
 {
-    static const struct hal_motors_ops ops = {write_duties, stop, close_board};
+    static const struct hal_motors_ops ops = {write_duties, stop, confirm, close_board};
     return (struct hal_motors){.device = board, .ops = &ops};
 }
 

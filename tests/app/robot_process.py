@@ -13,6 +13,8 @@ WIDTH_PX, HEIGHT_PX = 64, 48
 # sRGB (0, 128, 0) and mid grey in BT.601 studio range.
 GREEN = bytes([81, 91, 81, 81]) * (WIDTH_PX * HEIGHT_PX // 2)
 GREY = bytes([126, 128, 126, 128]) * (WIDTH_PX * HEIGHT_PX // 2)
+# What two of its processes go by.
+GUARD, RELAY = "wheelguard", "stderr-relay"
 LEFT, RIGHT, ZERO = (37, 100, 37, 100), (100, 37, 100, 37), (0, 0, 0, 0)
 
 
@@ -68,7 +70,14 @@ class Camera:
 class Robot:
     """The running program. As a context it is killed at the end, if it still lives."""
 
-    def __init__(self, program: list[str], folder: Path, *arguments: str, env: dict | None = None):
+    def __init__(
+        self,
+        program: list[str],
+        folder: Path,
+        *arguments: str,
+        env: dict | None = None,
+        stderr: int = subprocess.PIPE,
+    ):
         self.record = folder / "board.csv"
         self.camera = Camera(folder / "camera")
         command = [
@@ -79,23 +88,34 @@ class Robot:
             *arguments,
         ]
         self.process = subprocess.Popen(
-            command, stderr=subprocess.PIPE, text=True, env={**os.environ, **(env or {})}
+            command, stderr=stderr, text=True, env={**os.environ, **(env or {})}
         )
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
-        for pid in (*self.children(), self.process.pid):
-            if self.process.poll() is None:
+        if self.process.poll() is None:
+            for pid in (self.process.pid, *self.children(), *self.guards()):
                 os.kill(pid, signal.SIGKILL)
         self.process.wait()
         self.camera.unplug()
 
     def children(self) -> list[int]:
-        """The program's own child: the one that drives."""
+        """The child that drives."""
+        return self._children(lambda name: name not in (GUARD, RELAY))
+
+    def guards(self) -> list[int]:
+        """The child that watches with its parent."""
+        return self._children(lambda name: name == GUARD)
+
+    def _children(self, is_it) -> list[int]:
         path = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
-        return [int(pid) for pid in path.read_text().split()] if path.exists() else []
+        try:
+            pids = path.read_text().split()
+            return [int(p) for p in pids if is_it(Path(f"/proc/{p}/comm").read_text().strip())]
+        except OSError:  # one of them is gone
+            return []
 
     def rows(self) -> list[tuple[float, tuple[int, ...]]]:
         """What the board was told: monotonic time in s and four duties."""

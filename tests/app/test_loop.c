@@ -27,28 +27,6 @@ static void test_green_turns_left_and_grey_turns_right(void)
     ASSERT_DUTIES(right_pct);
 }
 
-static void count_while_it_stands(const void *count)
-{
-    TEST_ASSERT_TRUE(robot_stands());
-    ++*(int *)(intptr_t)count;
-}
-
-// Once for each time that it starts to move, before the board is told.
-static void test_whoever_watches_is_told_before_the_wheels_start(void)
-{
-    int count = 0;
-    robot_boot();
-    robot.loop.before_moving = count_while_it_stands;
-    robot.loop.before_moving_context = &count;
-    robot.view = VIEW_GREEN;
-    robot_steps(30);
-    TEST_ASSERT_EQUAL(0, count);
-    loop_start(&robot.loop);
-    robot_steps(30);
-    TEST_ASSERT_FALSE(robot_stands());
-    TEST_ASSERT_EQUAL(1, count);
-}
-
 static void test_robot_waits_for_a_start(void)
 {
     robot.view = VIEW_GREEN;
@@ -262,7 +240,6 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_green_turns_left_and_grey_turns_right);
-    RUN_TEST(test_whoever_watches_is_told_before_the_wheels_start);
     RUN_TEST(test_robot_waits_for_a_start);
     RUN_TEST(test_duties_are_those_of_the_core);
     RUN_TEST(test_motors_stop_200_ms_after_the_last_frame);

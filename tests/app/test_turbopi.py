@@ -91,11 +91,11 @@ def test_kill_9_of_the_parent_stops_the_wheels(driving):
     assert_stopped_since(driving, killed_s, WATCHDOG_S)
 
 
-def test_stop_option_stops_what_a_double_kill_left(driving):
-    for pid in (driving.process.pid, *driving.children()):
-        os.kill(pid, signal.SIGSTOP)
-    for pid in (*driving.children(), driving.process.pid):
-        os.kill(pid, signal.SIGKILL)
+def test_stop_option_stops_what_a_threefold_kill_left(driving):
+    all_of_them = (*driving.guards(), driving.process.pid, *driving.children())
+    for number in (signal.SIGSTOP, signal.SIGKILL):
+        for pid in all_of_them:
+            os.kill(pid, number)
     driving.process.wait()
     assert driving.duties() == LEFT
     assert (
@@ -104,7 +104,7 @@ def test_stop_option_stops_what_a_double_kill_left(driving):
     assert driving.duties() == ZERO
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT])
 def test_signal_stops_the_wheels_and_ends_well(driving, number):
     killed_s = time.monotonic()
     driving.process.send_signal(number)

@@ -103,7 +103,7 @@ static const struct hal_sys bus_sys = {
 static struct motors_i2c_config config(void)
 {
     return (struct motors_i2c_config){
-        .path = "/dev/i2c-1", .retry_us = 10000, .sign = {-1, 1, -1, 1}};
+        .path = "/dev/i2c-1", .retry_us = 10000, .reads_back = true, .sign = {-1, 1, -1, 1}};
 }
 
 static void make(struct motors_i2c_config wanted)
@@ -221,6 +221,33 @@ static void test_battery_is_two_bytes_after_a_transfer_that_chooses_it(void)
     TEST_ASSERT_EQUAL(7708, pack_mV);
 }
 
+// The registers are read back, each by itself; another program may choose its own in between.
+static void test_stop_is_confirmed_by_the_registers(void)
+{
+    memset(bus.registers + 31, 50, 4);
+    TEST_ASSERT_EQUAL(FW_ERR_NOT_ZERO, hal_motors_confirm(&motors));
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_stop(&motors));
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_confirm(&motors));
+    for (int wheel = 0; wheel < FW_WHEEL_COUNT; ++wheel)
+    {
+        bus.registers[31 + wheel] = 1;
+        TEST_ASSERT_EQUAL(FW_ERR_NOT_ZERO, hal_motors_confirm(&motors));
+        bus.registers[31 + wheel] = 0;
+    }
+    bus.refused_count = 1000000;
+    TEST_ASSERT_EQUAL(FW_ERR_NO_DEVICE, hal_motors_confirm(&motors));
+}
+
+static void test_board_whose_registers_cannot_be_read_confirms_by_taking(void)
+{
+    struct motors_i2c_config trusting = config();
+    trusting.reads_back = false;
+    make(trusting);
+    memset(bus.registers + 31, 50, 4);
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_confirm(&motors));
+    TEST_ASSERT_EQUAL(0, bus.transfer_count);
+}
+
 static void test_probe_tells_the_boards_apart_and_moves_nothing(void)
 {
     struct motors_uart uart;
@@ -234,10 +261,12 @@ static void test_probe_tells_the_boards_apart_and_moves_nothing(void)
     TEST_ASSERT_EQUAL(BOARD_I2C, kind);
     TEST_ASSERT_EACH_EQUAL_HEX8(50, bus.registers, 256);
 
+    // A line that opens and says nothing is no board: test_motors_uart.c has one that speaks.
     bus.refused_count = 1000000;
+    hand.wait_us = 10000;
     const struct hal_motors uart_motors = motors_uart_make(&uart, &uart_config, &clock);
-    TEST_ASSERT_EQUAL(FW_OK, board_probe(&driver, &uart, &kind));
-    TEST_ASSERT_EQUAL(BOARD_UART, kind);
+    TEST_ASSERT_EQUAL(FW_ERR_NO_DEVICE, board_probe(&driver, &uart, &kind));
+    TEST_ASSERT_EQUAL(BOARD_I2C, kind);
     hal_motors_close(&uart_motors);
 
     uart_config.path = "/nowhere";
@@ -256,6 +285,8 @@ int main(void)
     RUN_TEST(test_stop_reaches_the_wheels_after_a_refusing_one);
     RUN_TEST(test_bus_that_vanished_is_opened_again);
     RUN_TEST(test_battery_is_two_bytes_after_a_transfer_that_chooses_it);
+    RUN_TEST(test_stop_is_confirmed_by_the_registers);
+    RUN_TEST(test_board_whose_registers_cannot_be_read_confirms_by_taking);
     RUN_TEST(test_probe_tells_the_boards_apart_and_moves_nothing);
     return UNITY_END();
 }

@@ -26,7 +26,7 @@ void setUp(void)
     static char path[64];
     strcpy(path, ptsname(board_fd));
     const struct motors_uart_config config = {
-        .path = path, .retry_us = 10000, .sign = {-1, 1, -1, 1}};
+        .path = path, .retry_us = 10000, .sign = {-1, 1, -1, 1}, .must_be_heard = true};
     const struct hal_clock clock = clock_linux();
     motors = motors_uart_make(&driver, &config, &clock);
     battery = motors_uart_battery(&driver);
@@ -128,6 +128,45 @@ static void test_endless_noise_neither_blocks_nor_fools(void)
     }
 }
 
+// The line's two ends are joined by the kernel, in its own time.
+static enum fw_err confirm_soon(void)
+{
+    enum fw_err err = FW_ERR_TIMEOUT;
+    for (int tries = 0; tries < 100 && err == FW_ERR_TIMEOUT; ++tries)
+    {
+        usleep(1000);
+        err = hal_motors_confirm(&motors);
+    }
+    return err;
+}
+
+// The board answers nothing: a stop counts while the board is heard. An echo is no board.
+static void test_stop_is_confirmed_while_the_board_is_heard(void)
+{
+    uint8_t frame[64];
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_stop(&motors));
+    TEST_ASSERT_EQUAL(FW_ERR_TIMEOUT, hal_motors_confirm(&motors));
+    const ssize_t echo = read(board_fd, frame, sizeof frame);
+    TEST_ASSERT_GREATER_THAN(0, echo);
+    board_sends(frame, (size_t)echo);
+    TEST_ASSERT_EQUAL(FW_ERR_TIMEOUT, confirm_soon());
+    board_sends(frame, uart_frame_make(7, (const uint8_t *)"\x01\x02", 2, frame));
+    TEST_ASSERT_EQUAL(FW_OK, confirm_soon());
+    driver.heard_us -= 3000000;
+    TEST_ASSERT_EQUAL(FW_ERR_TIMEOUT, hal_motors_confirm(&motors));
+    driver.config.must_be_heard = false;
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_confirm(&motors));
+}
+
+static void test_probe_believes_a_frame_and_nothing_else(void)
+{
+    uint8_t frame[16];
+    board_sends((const uint8_t *)"\xAA\x55 hello", 8);
+    TEST_ASSERT_EQUAL(FW_ERR_TIMEOUT, motors_uart_probe(&driver));
+    board_sends(frame, uart_frame_make(0, (const uint8_t *)"\x04\x1C\x1E", 3, frame));
+    TEST_ASSERT_EQUAL(FW_OK, motors_uart_probe(&driver));
+}
+
 static void test_line_that_vanishes_is_an_error(void)
 {
     TEST_ASSERT_EQUAL(FW_OK, hal_motors_stop(&motors));
@@ -145,6 +184,8 @@ int main(void)
     RUN_TEST(test_line_is_raw_and_fast);
     RUN_TEST(test_battery_is_unknown_until_the_board_reports_it);
     RUN_TEST(test_endless_noise_neither_blocks_nor_fools);
+    RUN_TEST(test_stop_is_confirmed_while_the_board_is_heard);
+    RUN_TEST(test_probe_believes_a_frame_and_nothing_else);
     RUN_TEST(test_line_that_vanishes_is_an_error);
     return UNITY_END();
 }

@@ -25,6 +25,7 @@ enum fw_err
     FW_ERR_FORMAT,
     FW_ERR_IO,
     FW_ERR_TIMEOUT,
+    FW_ERR_NOT_ZERO,
     FW_ERR_END,
 };
 

@@ -16,6 +16,7 @@ struct hal_motors_ops
 {
     enum fw_err (*write)(void *device, const int8_t wheel_duty_pct[FW_WHEEL_COUNT]);
     enum fw_err (*stop)(void *device);
+    enum fw_err (*confirm)(void *device);
     void (*close)(void *device);
 };
 
@@ -39,6 +40,14 @@ hal_motors_write(const struct hal_motors *motors, const int8_t wheel_duty_pct[FW
 static inline enum fw_err FW_MUST_CHECK hal_motors_stop(const struct hal_motors *motors)
 {
     return motors->ops->stop(motors->device);
+}
+
+// Asks the board whether the wheels have been told to stand; what it answers by is the driver's.
+// @return FW_OK if it says so, FW_ERR_NOT_ZERO if it says otherwise, FW_ERR_TIMEOUT if it says
+// nothing, or as hal_motors_write().
+static inline enum fw_err FW_MUST_CHECK hal_motors_confirm(const struct hal_motors *motors)
+{
+    return motors->ops->confirm(motors->device);
 }
 
 // Gives the bus back; the duties stay as they are.

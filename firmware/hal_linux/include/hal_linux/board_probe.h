@@ -12,7 +12,8 @@ enum board_kind
     BOARD_UART,
 };
 
-// An answer at the I2C board's address decides for it, else a serial line that opens for the other.
+// An answer at the I2C board's address decides for it, else a report of the other on its serial
+// line: a line that opens is no answer.
 // @param kind untouched on failure. @return FW_OK, or what the I2C board said if there is neither.
 enum fw_err FW_MUST_CHECK board_probe(struct motors_i2c *i2c, struct motors_uart *uart,
                                       enum board_kind *kind);

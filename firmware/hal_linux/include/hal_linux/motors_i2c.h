@@ -19,6 +19,9 @@ struct motors_i2c_config
     bool burst;
     // A refused transfer is tried again until this long after it was first tried.
     int64_t retry_us;
+    // The motor registers can be read: a stop is confirmed when they are zero. Without, it is when
+    // the board has acknowledged every byte of it.
+    bool reads_back;
     // +1 or -1: the left wheels of the kit are mounted mirrored, so -1, 1, -1, 1.
     int8_t sign[FW_WHEEL_COUNT];
 };
@@ -40,7 +43,7 @@ struct hal_motors motors_i2c_make(struct motors_i2c *board, const struct motors_
 // The battery of the same board.
 struct hal_battery motors_i2c_battery(struct motors_i2c *board);
 
-// Tells whether a board answers at its address. Writes no duty.
+// Tells whether a board answers at its address with a voltage. Writes no duty.
 // @return FW_OK, FW_ERR_NO_DEVICE, FW_ERR_TIMEOUT or FW_ERR_IO.
 enum fw_err FW_MUST_CHECK motors_i2c_probe(struct motors_i2c *board);
 

@@ -17,6 +17,8 @@ struct motors_uart_config
     // As motors_i2c_config.
     int64_t retry_us;
     int8_t sign[FW_WHEEL_COUNT];
+    // A stop is confirmed only while the board is heard. Without, when the line has taken it.
+    bool must_be_heard;
 };
 
 // Only motors_uart.c looks inside.
@@ -28,6 +30,9 @@ struct motors_uart
     // Frame that is arriving.
     uint8_t received[MOTORS_UART_FRAME_MAX];
     size_t received_count;
+    // When the last whole frame of the board was read (monotonic), if there was any.
+    bool was_heard;
+    int64_t heard_us;
     bool has_battery;
     int32_t pack_mV;
 };
@@ -41,8 +46,10 @@ struct hal_motors motors_uart_make(struct motors_uart *board,
 // What the board reported last of its own accord: FW_ERR_TIMEOUT until it has.
 struct hal_battery motors_uart_battery(struct motors_uart *board);
 
-// Opens the line. @return FW_OK, FW_ERR_NO_DEVICE or FW_ERR_IO; a board that hears nothing cannot
-// be told from one that does.
+// Tells whether a board is heard on the line: one whole frame of its reports, which it sends of its
+// own accord. Writes nothing. Takes up to a second and a half.
+// @return FW_OK, FW_ERR_TIMEOUT if the line is silent or speaks otherwise, FW_ERR_NO_DEVICE or
+// FW_ERR_IO.
 enum fw_err FW_MUST_CHECK motors_uart_probe(struct motors_uart *board);
 
 #endif

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: Apache-2.0
+"""firmware/app: the wheels stand, whatever happens to the program, its configuration or its reader.
+
+Each fault has a limit from the moment it happens to the zero that the board keeps.
+"""
+
+import fcntl
+import itertools
+import os
+import pty
+import shlex
+import signal
+import socket
+import subprocess
+import time
+
+import pytest
+from robot_process import LEFT, ZERO, Robot, wait_until
+
+TURBOPI = shlex.split(os.environ.get("TURBOPI", ""))
+pytestmark = pytest.mark.skipif(not TURBOPI, reason="TURBOPI does not name the program")
+
+# The program's promise, and what a machine that is busy with other tests may add.
+LIMIT_S, SLACK_S = 0.5, 1.0
+
+
+def stop(*arguments, **options):
+    """`turbopi --stop`."""
+    command = [*TURBOPI, "--stop", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, **options)
+
+
+def stands_for_good(robot, since_s):
+    """Waits for zero, and that it stays. Returns how long after since_s the last move came."""
+    assert robot.wait_for(ZERO), robot.rows()[-3:]
+    time.sleep(0.3)
+    moves_s = [t for t, duties in robot.rows() if duties != ZERO]
+    zeros_s = [t for t, duties in robot.rows() if t > moves_s[-1]]
+    assert robot.duties() == ZERO
+    return zeros_s[0] - since_s
+
+
+@pytest.fixture
+def driving(tmp_path):
+    """A robot that turns left, whose camera would let it drive on for ten seconds without a frame."""
+    patience = ("--set", "frame_timeout_ms=10000", "--set", "restart_ms=-1")
+    with Robot(TURBOPI, tmp_path, "--start", *patience) as robot:
+        assert robot.wait_for(LEFT)
+        # Whoever watches is up, too.
+        assert wait_until(robot.guards)
+        yield robot
+
+
+def processes(robot):
+    """The three that can stop the wheels."""
+    return {"driver": robot.children()[0], "parent": robot.process.pid, "guard": robot.guards()[0]}
+
+
+ROLES = ("driver", "parent", "guard")
+SOME = [*itertools.combinations(ROLES, 1), *itertools.combinations(ROLES, 2)]
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
+@pytest.mark.parametrize("roles", SOME, ids="+".join)
+def test_whoever_is_left_stops_the_wheels(driving, roles, number):
+    pids = processes(driving)
+    begin_s = time.monotonic()
+    for role in roles:
+        os.kill(pids[role], number)
+    if roles == ("guard",) and number == signal.SIGKILL:
+        # The parent starts another: nothing is lost for long.
+        assert wait_until(lambda: driving.guards() not in ([], [pids["guard"]]))
+        return
+    assert stands_for_good(driving, begin_s) < LIMIT_S + SLACK_S
+
+
+def test_killall_leaves_the_guard(driving):
+    names = {role: open(f"/proc/{pid}/comm").read().strip() for role, pid in processes(driving).items()}
+    assert names["driver"] == names["parent"] != names["guard"]
+    command = open(f"/proc/{driving.guards()[0]}/cmdline").read()
+    assert "turbopi" not in command
+
+
+@pytest.mark.parametrize("number", [signal.SIGTSTP, signal.SIGQUIT, signal.SIGHUP, signal.SIGUSR1])
+def test_keys_of_a_terminal_leave_no_wheel_turning(driving, number):
+    begin_s = time.monotonic()
+    for pid in (driving.process.pid, *driving.children()):
+        os.kill(pid, number)
+    if number == signal.SIGUSR1:  # nothing that asks it to end
+        time.sleep(0.3)
+        assert driving.duties() == LEFT
+        return
+    code, said = driving.end()
+    assert code == 0
+    assert stands_for_good(driving, begin_s) < LIMIT_S + SLACK_S
+    assert ("not suspended" in said) == (number in (signal.SIGTSTP, signal.SIGQUIT))
+
+
+def full_pipe():
+    """A pipe that takes no byte more."""
+    read_end, write_end = os.pipe()
+    fcntl.fcntl(write_end, fcntl.F_SETFL, os.O_NONBLOCK)
+    try:
+        while True:
+            os.write(write_end, b"x" * 4096)
+    except BlockingIOError:
+        fcntl.fcntl(write_end, fcntl.F_SETFL, 0)
+    return read_end, write_end
+
+
+@pytest.fixture
+def unheard(tmp_path):
+    """A robot that drives, and whose stderr nobody reads."""
+    read_end, write_end = full_pipe()
+    patience = ("--set", "restart_ms=100")
+    robot = Robot(TURBOPI, tmp_path, "--start", *patience, stderr=write_end)
+    with robot:
+        assert robot.wait_for(LEFT)
+        yield robot
+    os.close(write_end)
+    os.close(read_end)
+
+
+def test_unread_messages_do_not_keep_a_lost_camera_from_stopping(unheard):
+    begin_s = time.monotonic()
+    unheard.camera.unplug()
+    assert stands_for_good(unheard, begin_s) < LIMIT_S + SLACK_S
+    unheard.camera.plug()
+
+
+@pytest.mark.parametrize("number", [signal.SIGSTOP, signal.SIGKILL])
+def test_unread_messages_do_not_keep_a_dead_driver_from_being_stopped(unheard, number):
+    begin_s = time.monotonic()
+    driver = unheard.children()[0]
+    os.kill(driver, number)
+    assert wait_until(lambda: any(t > begin_s and d == ZERO for t, d in unheard.rows()))
+    zero_s = next(t for t, d in unheard.rows() if t > begin_s and d == ZERO)
+    assert zero_s - begin_s < LIMIT_S + SLACK_S
+    assert wait_until(lambda: unheard.children() not in ([], [driver]))
+
+
+def test_unread_messages_do_not_keep_it_from_ending(unheard):
+    unheard.process.terminate()
+    assert unheard.process.wait(timeout=10) == 0
+    assert unheard.duties() == ZERO
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"\x00\xff garbage \n" * 50,
+        b"behaviour = milling\n",
+        b"behavior = dance\n",
+        b"behaviors = /nowhere.toml\n",
+        b"watchdog_ms = never\n",
+    ],
+    ids=["garbage", "typo", "unknown behaviour", "no table file", "bad value"],
+)
+def test_stop_needs_no_configuration(tmp_path, text):
+    record, config = tmp_path / "board.csv", tmp_path / "robot.conf"
+    config.write_bytes(f"board = stub:{record}\n".encode() + text)
+    done = stop("--config", str(config))
+    assert done.returncode == 0, done.stderr
+    assert record.read_text().endswith(",0,0,0,0\n")
+    assert f"{record}: zero to all wheels, confirmed" in done.stderr
+
+
+def test_stop_waits_for_no_pipe(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    record = tmp_path / "board.csv"
+    assert stop("--config", str(tmp_path / "pipe"), "--board", f"stub:{record}").returncode == 0
+    assert record.read_text().endswith(",0,0,0,0\n")
+
+
+def test_stop_ends_the_program_that_drives(driving):
+    assert stop("--config", "/dev/null", "--board", f"stub:{driving.record}").returncode == 0
+    code, _ = driving.end()
+    assert code == 0 and driving.duties() == ZERO
+
+
+@pytest.mark.parametrize("options", [[], ["--board", "uart"]], ids=["auto", "uart"])
+def test_a_line_that_opens_is_no_board(options):
+    """A pseudo terminal takes every byte, and answers none."""
+    board, line = pty.openpty()
+    named = ("--set", f"uart_device={os.ttyname(line)}", "--set", "i2c_device=/nowhere")
+    done = stop("--config", "/dev/null", *named, *options)
+    assert done.returncode == 1
+    assert "NOT CONFIRMED" in done.stderr and "SWITCH" in done.stderr.upper()
+    os.close(board)
+    os.close(line)
+
+
+def test_a_board_is_found_by_its_answer(tmp_path):
+    board, line = pty.openpty()
+    command = [*TURBOPI, "--config", "/dev/null", "--lcm-url", "", "--set", "panel=none"]
+    named = ("--set", f"uart_device={os.ttyname(line)}", "--set", "i2c_device=/nowhere")
+    silent = subprocess.run(
+        [*command, *named, "--set", "restart_ms=-1"], capture_output=True, text=True, timeout=30
+    )
+    assert silent.returncode == 1 and "none is heard" in silent.stderr
+    os.close(board)
+    os.close(line)
+
+
+def test_one_program_has_the_board(driving, tmp_path):
+    """The second says who has it, and moves nothing; --stop for it leaves the first alone."""
+    before = len(driving.rows())
+    second = [*TURBOPI, "--config", "/dev/null", "--start", "--board", f"stub:{driving.record}"]
+    done = subprocess.run(
+        [*second, "--lcm-url", "", "--set", "panel=none", "--camera", "stub:unix:/nowhere"],
+        capture_output=True,
+        text=True,
+        timeout=30,
+    )
+    assert done.returncode == 3
+    assert f"turbopi (pid {driving.process.pid}" in done.stderr and "has it" in done.stderr
+    refused = {"SERVICE_RESULT": "exit-code", "EXIT_CODE": "exited", "EXIT_STATUS": "3"}
+    board = ("--config", "/dev/null", "--board", f"stub:{driving.record}")
+    assert stop(*board, env={**os.environ, **refused}).returncode == 0
+    assert {duties for _, duties in driving.rows()[before:]} == {LEFT}
+    assert driving.process.poll() is None
+
+
+def test_parent_that_waits_for_a_board_can_be_ended(tmp_path):
+    inbox = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    inbox.bind(str(tmp_path / "notify"))
+    inbox.settimeout(10)
+    nowhere = ("--set", "i2c_device=/nowhere", "--set", "uart_device=/nowhere")
+    process = subprocess.Popen(
+        [*TURBOPI, "--config", "/dev/null", *nowhere, "--lcm-url", ""],
+        env={**os.environ, "NOTIFY_SOCKET": str(tmp_path / "notify")},
+        stderr=subprocess.PIPE,
+    )
+    assert inbox.recv(100) == b"READY=1"
+    process.terminate()
+    _, said = process.communicate(timeout=10)
+    assert process.returncode == 0 and b"none answers at /nowhere" in said
