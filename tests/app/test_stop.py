@@ -75,7 +75,9 @@ def test_whoever_is_left_stops_the_wheels(driving, roles, number):
 
 
 def test_killall_leaves_the_guard(driving):
-    names = {role: open(f"/proc/{pid}/comm").read().strip() for role, pid in processes(driving).items()}
+    names = {
+        role: open(f"/proc/{pid}/comm").read().strip() for role, pid in processes(driving).items()
+    }
     assert names["driver"] == names["parent"] != names["guard"]
     command = open(f"/proc/{driving.guards()[0]}/cmdline").read()
     assert "turbopi" not in command

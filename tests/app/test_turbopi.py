@@ -148,7 +148,9 @@ def test_script_is_played_once(tmp_path):
         code, _ = robot.end()
         rows = [duties for _, duties in robot.rows()]
     assert code == 0
+    # Before anything else the board is told to stand.
     assert [d for i, d in enumerate(rows) if i == 0 or rows[i - 1] != d] == [
+        ZERO,
         (10, 20, 30, 40),
         (-5, 5, -5, 5),
         ZERO,
