@@ -41,7 +41,7 @@ void config_default(struct app_config *config)
         // 3.45 V a cell, where the authors' robots switch themselves off.
         .battery_low_mV = 6900,
         .panel = "gpio",
-        .gpio_chip = "/dev/gpiochip0",
+        .gpio_chip = "auto",
         .button_line = 13,
         .detected_line = 16,
         .running_line = 26,

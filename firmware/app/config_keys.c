@@ -67,7 +67,10 @@ const struct config_key config_keys[] = {
     SIGN("sign_rr", FW_REAR_RIGHT, "as above"),
     INTEGER(battery_low_mV, 0, 8500, "motors stop for good when the pack stays below"),
     TEXT(panel, "gpio or none"),
-    TEXT(gpio_chip, "chip of the lines below"),
+    TEXT(
+        gpio_chip,
+        "chip of the lines below: auto (a Raspberry Pi's header), a label as gpiodetect prints it, or a "
+        "path"),
     INTEGER(button_line, 0, 1023, "start/stop button, low while pressed"),
     INTEGER(detected_line, 0, 1023, "LED: target detected"),
     INTEGER(running_line, 0, 1023, "LED: running"),

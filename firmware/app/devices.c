@@ -228,7 +228,7 @@ static bool use_panel(const struct app_config *config, bool dry_run, struct loop
                    [PANEL_GPIO_RUNNING] = (unsigned)config->running_line,
                    [PANEL_GPIO_BUZZER] = (unsigned)config->buzzer_line},
     };
-    devices->panel = panel_gpio_make(&gpio, &gpio_config);
+    devices->panel = panel_gpio_make(&gpio, &gpio_config, &hal_sys_kernel);
     return true;
 }
 

@@ -20,13 +20,26 @@ static char *trim(char *text)
     return text;
 }
 
+// Cuts the comment off, in place: # at the beginning or after white space begins one.
+static void cut_comment(char *text)
+{
+    for (char *hash = strchr(text, '#'); hash != NULL; hash = strchr(hash + 1, '#'))
+    {
+        if (hash == text || hash[-1] == ' ' || hash[-1] == '\t')
+        {
+            *hash = '\0';
+            return;
+        }
+    }
+}
+
 // Takes a value out of its quotes, or cuts the comment after a bare one. @return NULL if neither.
 static char *value_of(char *text)
 {
     text = trim(text);
     if (*text != '"')
     {
-        text[strcspn(text, "#")] = '\0';
+        cut_comment(text);
         return trim(text);
     }
     char *end = strchr(text + 1, '"');

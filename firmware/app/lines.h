@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Texts of lines `key = value`: # begins a comment, a value may stand in quotes. TOML without
-// tables.
+// Texts of lines `key = value`: # at the beginning or after white space begins a comment, a value
+// may stand in quotes, and then holds any #. TOML without tables.
 #ifndef APP_LINES_H
 #define APP_LINES_H
 

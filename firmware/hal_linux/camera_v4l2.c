@@ -4,8 +4,11 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/videodev2.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+
+#include "hal_linux/mjpg.h"
 
 static int call(struct camera_v4l2 *camera, unsigned long request, void *argument)
 {
@@ -98,12 +101,29 @@ static void close_camera(void *device)
         (void)request_buffers(camera, 0);
     }
     (void)camera->sys->close(camera->fd);
+    free(camera->decoded);
+    camera->decoded = NULL;
     memset(camera->buffers, 0, sizeof camera->buffers);
     camera->buffer_count = 0;
     camera->streaming = false;
     camera->fd = -1;
     camera->held = -1;
     camera->has_sequence = false;
+}
+
+static size_t yuyv_bytes(const struct camera_v4l2 *camera)
+{
+    return 2 * (size_t)camera->width_px * (size_t)camera->height_px;
+}
+
+// Where pictures are decoded to, if the camera sends none that can be read as they are.
+static enum fw_err make_room(struct camera_v4l2 *camera)
+{
+    if (camera->is_mjpg)
+    {
+        camera->decoded = malloc(yuyv_bytes(camera));
+    }
+    return camera->is_mjpg && camera->decoded == NULL ? FW_ERR_IO : FW_OK;
 }
 
 static enum fw_err open_camera(void *device, struct hal_camera_format *format)
@@ -115,6 +135,10 @@ static enum fw_err open_camera(void *device, struct hal_camera_format *format)
         return hal_sys_err(errno);
     }
     enum fw_err err = camera_v4l2_setup(camera);
+    if (err == FW_OK)
+    {
+        err = make_room(camera);
+    }
     if (err == FW_OK)
     {
         err = request_buffers(camera, CAMERA_V4L2_MAX_BUFFERS);
@@ -205,6 +229,21 @@ static enum fw_err take_newest(struct camera_v4l2 *camera, struct v4l2_buffer *n
     return err != FW_OK ? err : camera->held >= 0 ? FW_OK : FW_ERR_TIMEOUT;
 }
 
+// A picture that cannot be decoded is as good as none.
+static enum fw_err decode(struct camera_v4l2 *camera, struct fw_frame *frame)
+{
+    const enum fw_err err = mjpg_to_yuyv(frame->yuyv, frame->length_bytes, camera->width_px,
+                                         camera->height_px, camera->decoded);
+    if (err != FW_OK)
+    {
+        ++camera->stats.damaged_count;
+        return FW_ERR_TIMEOUT;
+    }
+    frame->yuyv = camera->decoded;
+    frame->length_bytes = yuyv_bytes(camera);
+    return FW_OK;
+}
+
 static enum fw_err take(void *device, struct fw_frame *frame)
 {
     struct camera_v4l2 *camera = device;
@@ -214,7 +253,6 @@ static enum fw_err take(void *device, struct fw_frame *frame)
     {
         return err;
     }
-    ++camera->stats.taken_count;
     const struct camera_v4l2_buffer *mapped = &camera->buffers[buffer.index];
     *frame = (struct fw_frame){
         .yuyv = mapped->bytes,
@@ -226,7 +264,9 @@ static enum fw_err take(void *device, struct fw_frame *frame)
         .length_bytes =
             buffer.bytesused < mapped->length_bytes ? buffer.bytesused : mapped->length_bytes,
     };
-    return FW_OK;
+    const enum fw_err decoded = camera->is_mjpg ? decode(camera, frame) : FW_OK;
+    camera->stats.taken_count += decoded == FW_OK;
+    return decoded;
 }
 
 static int fd_of(const void *device)

@@ -25,18 +25,31 @@ static enum fw_err check_capability(struct camera_v4l2 *camera)
     return (has & needed) == needed ? FW_OK : FW_ERR_FORMAT;
 }
 
-static enum fw_err check_yuyv(struct camera_v4l2 *camera)
+// YUYV if the camera has it, which costs nothing to read; else Motion-JPEG.
+static enum fw_err choose_format(struct camera_v4l2 *camera)
 {
     struct v4l2_fmtdesc format = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
-    while (call(camera, VIDIOC_ENUM_FMT, &format) == 0)
+    bool has_mjpg = false;
+    for (; call(camera, VIDIOC_ENUM_FMT, &format) == 0; ++format.index)
     {
         if (format.pixelformat == V4L2_PIX_FMT_YUYV)
         {
+            camera->is_mjpg = false;
             return FW_OK;
         }
-        ++format.index;
+        has_mjpg |= format.pixelformat == V4L2_PIX_FMT_MJPEG;
     }
-    return errno == EINVAL ? FW_ERR_FORMAT : hal_sys_err(errno);
+    if (errno != EINVAL)
+    {
+        return hal_sys_err(errno);
+    }
+    camera->is_mjpg = has_mjpg;
+    return has_mjpg ? FW_OK : FW_ERR_FORMAT;
+}
+
+static uint32_t pixel_format(const struct camera_v4l2 *camera)
+{
+    return camera->is_mjpg ? V4L2_PIX_FMT_MJPEG : V4L2_PIX_FMT_YUYV;
 }
 
 // Nearest of the camera's own sizes that the core can read; the size asked for if the camera lists
@@ -48,7 +61,7 @@ static void choose_size(struct camera_v4l2 *camera, uint32_t *width_px, uint32_t
     *width_px = (uint32_t)wanted_width_px;
     *height_px = (uint32_t)wanted_height_px;
     int best_distance_px = -1;
-    struct v4l2_frmsizeenum size = {.pixel_format = V4L2_PIX_FMT_YUYV};
+    struct v4l2_frmsizeenum size = {.pixel_format = pixel_format(camera)};
     for (; call(camera, VIDIOC_ENUM_FRAMESIZES, &size) == 0; ++size.index)
     {
         if (size.type != V4L2_FRMSIZE_TYPE_DISCRETE)
@@ -75,17 +88,18 @@ static enum fw_err set_format(struct camera_v4l2 *camera)
     struct v4l2_format format = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
     struct v4l2_pix_format *pix = &format.fmt.pix;
     choose_size(camera, &pix->width, &pix->height);
-    pix->pixelformat = V4L2_PIX_FMT_YUYV;
+    pix->pixelformat = pixel_format(camera);
     pix->field = V4L2_FIELD_NONE;
     if (call(camera, VIDIOC_S_FMT, &format) != 0)
     {
         return hal_sys_err(errno);
     }
     const uint32_t row_bytes = 2 * pix->width;
-    const uint32_t stride_bytes = pix->bytesperline == 0 ? row_bytes : pix->bytesperline;
-    if (pix->pixelformat != V4L2_PIX_FMT_YUYV || pix->width < 2 || pix->width > FW_MAX_WIDTH_PX ||
-        pix->width % 2 != 0 || pix->height < 1 || pix->height > FW_MAX_HEIGHT_PX ||
-        stride_bytes < row_bytes || stride_bytes > INT32_MAX)
+    const bool has_stride = !camera->is_mjpg && pix->bytesperline != 0;
+    const uint32_t stride_bytes = has_stride ? pix->bytesperline : row_bytes;
+    if (pix->pixelformat != pixel_format(camera) || pix->width < 2 ||
+        pix->width > FW_MAX_WIDTH_PX || pix->width % 2 != 0 || pix->height < 1 ||
+        pix->height > FW_MAX_HEIGHT_PX || stride_bytes < row_bytes || stride_bytes > INT32_MAX)
     {
         return FW_ERR_FORMAT;
     }
@@ -137,7 +151,7 @@ enum fw_err camera_v4l2_setup(struct camera_v4l2 *camera)
     enum fw_err err = check_capability(camera);
     if (err == FW_OK)
     {
-        err = check_yuyv(camera);
+        err = choose_format(camera);
     }
     if (err == FW_OK)
     {

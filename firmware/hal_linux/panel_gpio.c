@@ -4,6 +4,7 @@
 #include <stddef.h>
 
 #include "gpio_line.h"
+#include "hal_linux/gpio_chip.h"
 
 static void release_lines(struct panel_gpio *panel)
 {
@@ -15,18 +16,22 @@ static void release_lines(struct panel_gpio *panel)
     panel->shown = (struct hal_lights){0};
 }
 
+// The chip is looked for each time: what is plugged in later has another number.
 static enum fw_err reserve_lines(struct panel_gpio *panel)
 {
-    enum fw_err err = FW_OK;
+    if (panel->lines[PANEL_GPIO_BUTTON] != NULL)
+    {
+        return FW_OK;
+    }
+    char found[GPIO_CHIP_PATH_MAX];
+    const bool is_path = panel->config.chip[0] == '/';
+    const char *chip = is_path ? panel->config.chip : found;
+    enum fw_err err = is_path ? FW_OK : gpio_chip_find(panel->sys, panel->config.chip, found);
     for (int i = 0; i < PANEL_GPIO_COUNT && err == FW_OK; ++i)
     {
-        if (panel->lines[i] == NULL)
-        {
-            const unsigned offset = panel->config.offset[i];
-            err = i == PANEL_GPIO_BUTTON
-                      ? gpio_line_open_input(panel->config.chip, offset, &panel->lines[i])
-                      : gpio_line_open_output(panel->config.chip, offset, &panel->lines[i]);
-        }
+        const unsigned offset = panel->config.offset[i];
+        err = i == PANEL_GPIO_BUTTON ? gpio_line_open_input(chip, offset, &panel->lines[i])
+                                     : gpio_line_open_output(chip, offset, &panel->lines[i]);
     }
     if (err != FW_OK)
     {
@@ -107,9 +112,10 @@ static void close_panel(void *device)
     release_lines(panel);
 }
 
-struct hal_panel panel_gpio_make(struct panel_gpio *panel, const struct panel_gpio_config *config)
+struct hal_panel panel_gpio_make(struct panel_gpio *panel, const struct panel_gpio_config *config,
+                                 const struct hal_sys *sys)
 {
     static const struct hal_panel_ops ops = {read_button, show, close_panel};
-    *panel = (struct panel_gpio){.config = *config};
+    *panel = (struct panel_gpio){.config = *config, .sys = sys};
     return (struct hal_panel){.device = panel, .ops = &ops};
 }

@@ -61,12 +61,12 @@ static void test_every_default_is_in_its_own_range(void)
 static void test_values_comments_and_quotes(void)
 {
     TEST_ASSERT_TRUE_MESSAGE(parse("# a robot\n\n robot_id=7 # seven\r\nbehavior = \"orbit\"\n"
-                                   "camera = /dev/video2\ni2c_burst = true\nsign_fl = 1\n"
+                                   "camera = /dev/camera#2 # front\ni2c_burst = true\nsign_fl = 1\n"
                                    "lcm_url = \"\"  # silent\nio_tsv = \"a # b\""),
                              error);
     TEST_ASSERT_EQUAL(7, config.robot_id);
     TEST_ASSERT_EQUAL_STRING("orbit", config.behavior);
-    TEST_ASSERT_EQUAL_STRING("/dev/video2", config.camera);
+    TEST_ASSERT_EQUAL_STRING("/dev/camera#2", config.camera);
     TEST_ASSERT_TRUE(config.i2c_burst);
     TEST_ASSERT_EQUAL(1, config.sign[FW_FRONT_LEFT]);
     TEST_ASSERT_EQUAL_STRING("", config.lcm_url);

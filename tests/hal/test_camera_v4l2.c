@@ -4,6 +4,7 @@
 
 #include "fake_v4l2.h"
 #include "hal_stub/stub_clock.h"
+#include "jpeg_picture.h"
 #include "unity.h"
 
 // Fixture
@@ -100,6 +101,7 @@ static void test_padding_of_rows_reaches_the_frame(void)
 
 static void test_camera_without_yuyv_is_refused(void)
 {
+    fake.formats[0] = V4L2_PIX_FMT_H264;
     fake.format_count = 1;
     TEST_ASSERT_EQUAL(FW_ERR_FORMAT, hal_camera_open(&camera, &format));
 }
@@ -243,6 +245,46 @@ static void test_open_that_fails_anywhere_leaves_nothing_behind(void)
     }
 }
 
+// A camera that has Motion-JPEG alone; buffer 0 holds a green picture. @return its length in bytes.
+static uint32_t have_mjpg_alone(void)
+{
+    const struct jpeg_picture green = {
+        .width_px = 640, .height_px = 480, .rgb = {0, 128, 0}, .horizontal = 2, .vertical = 1};
+    uint8_t *file;
+    const size_t length = jpeg_picture_make(&green, &file);
+    memcpy(fake.memory[0], file, length);
+    free(file);
+    fake.format_count = 1;
+    return (uint32_t)length;
+}
+
+static void test_camera_that_has_motion_jpeg_alone_is_decoded(void)
+{
+    const uint32_t length = have_mjpg_alone();
+    open_camera();
+    fake_arrive(1, MONOTONIC, length, 4000000);
+    struct fw_frame frame;
+    TEST_ASSERT_EQUAL(FW_OK, hal_camera_take(&camera, &frame));
+    TEST_ASSERT_EQUAL(FW_REJECT_NONE, fw_frame_check(&frame, 640, 480));
+    TEST_ASSERT_EQUAL(FRAME_BYTES, frame.length_bytes);
+    TEST_ASSERT_EQUAL(4000000, frame.utime_us);
+    // sRGB (0, 128, 0) in BT.601.
+    TEST_ASSERT_INT_WITHIN(2, 81, frame.yuyv[0]);
+    TEST_ASSERT_INT_WITHIN(2, 91, frame.yuyv[1]);
+    TEST_ASSERT_INT_WITHIN(2, 81, frame.yuyv[FRAME_BYTES - 1]);
+}
+
+static void test_damaged_motion_jpeg_is_counted_and_is_no_frame(void)
+{
+    const uint32_t length = have_mjpg_alone();
+    open_camera();
+    fake_arrive(1, MONOTONIC, length / 2, 4000000);
+    struct fw_frame frame;
+    TEST_ASSERT_EQUAL(FW_ERR_TIMEOUT, hal_camera_take(&camera, &frame));
+    TEST_ASSERT_EQUAL(1, stats().damaged_count);
+    TEST_ASSERT_EQUAL(0, stats().taken_count);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -262,5 +304,7 @@ int main(void)
     RUN_TEST(test_damaged_frame_is_given_back_and_counted);
     RUN_TEST(test_unplugged_camera_comes_back_after_closing);
     RUN_TEST(test_open_that_fails_anywhere_leaves_nothing_behind);
+    RUN_TEST(test_camera_that_has_motion_jpeg_alone_is_decoded);
+    RUN_TEST(test_damaged_motion_jpeg_is_counted_and_is_no_frame);
     return UNITY_END();
 }

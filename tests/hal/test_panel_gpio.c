@@ -13,7 +13,7 @@ static struct hal_panel panel;
 static void make(const char *chip)
 {
     const struct panel_gpio_config config = {.chip = chip, .offset = {13, 16, 26, 6}};
-    panel = panel_gpio_make(&driver, &config);
+    panel = panel_gpio_make(&driver, &config, &hal_sys_kernel);
 }
 
 void setUp(void)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera behind V4L2, streamed through buffers that driver and program share.
+// A camera behind V4L2, streamed through buffers that driver and program share. Pictures in
+// Motion-JPEG are decoded, which takes heap.
 #ifndef HAL_LINUX_CAMERA_V4L2_H
 #define HAL_LINUX_CAMERA_V4L2_H
 
@@ -35,6 +36,9 @@ struct camera_v4l2
     const struct hal_sys *sys;
     int fd;
     int width_px, height_px, stride_bytes;
+    // The camera sends Motion-JPEG alone: each picture is decoded here.
+    bool is_mjpg;
+    uint8_t *decoded;
     bool streaming;
     struct camera_v4l2_buffer buffers[CAMERA_V4L2_MAX_BUFFERS];
     unsigned buffer_count;
@@ -51,8 +55,8 @@ struct hal_camera camera_v4l2_make(struct camera_v4l2 *camera,
                                    const struct camera_v4l2_config *config,
                                    const struct hal_clock *clock, const struct hal_sys *sys);
 
-// Negotiates YUYV, size and rate, and locks the controls that exist, on an open device. Fills
-// width_px, height_px and stride_bytes with what the camera will send.
+// Negotiates YUYV, or else Motion-JPEG, size and rate, and locks the controls that exist, on an
+// open device. Fills width_px, height_px, stride_bytes and is_mjpg with what the camera will send.
 // @return FW_OK, FW_ERR_NO_DEVICE, FW_ERR_FORMAT or FW_ERR_IO.
 enum fw_err FW_MUST_CHECK camera_v4l2_setup(struct camera_v4l2 *camera);
 
