@@ -1,5 +1,5 @@
 # Tool chain for the robot's arm64 Debian, from any machine with gcc-aarch64-linux-gnu:
-#   scripts/make_sysroot SYSROOT
+#   scripts/make_sysroot SYSROOT trixie       # or bookworm: the Debian of the robot
 #   cmake -S . -B build-arm64 -G Ninja -DCMAKE_TOOLCHAIN_FILE=cmake/aarch64.cmake \
 #       -DTWINMILL_SYSROOT=SYSROOT -DTWINMILL_BUILD_TWIN=OFF
 # With qemu-aarch64-static installed, tests run, too.

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from rig import KERNEL, CannotRun, Rig, prepare, prepare_system
+from rig import KERNEL, SUITE, CannotRun, Rig, prepare, prepare_system
 
 
 def boot(image: Callable[[], Path], name: str, **options) -> Iterator[Rig]:
@@ -22,9 +22,9 @@ def boot(image: Callable[[], Path], name: str, **options) -> Iterator[Rig]:
 
 @pytest.fixture(scope="session")
 def rig():
-    yield from boot(prepare, f"drive.{KERNEL}")
+    yield from boot(prepare, f"drive.{KERNEL}.{SUITE}")
 
 
 @pytest.fixture(scope="session")
 def system():
-    yield from boot(prepare_system, "system", memory_mb=1024)
+    yield from boot(prepare_system, f"system.{SUITE}", memory_mb=1024)

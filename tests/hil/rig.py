@@ -19,6 +19,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 BUILD = ROOT / "build/hil"
 KERNEL = os.environ.get("HIL_KERNEL", "linux-image-arm64")
+SUITE = os.environ.get("HIL_SUITE", "bookworm")
 SETUP_LIMIT_S, BOOT_LIMIT_S, CALL_LIMIT_S = 600, 180, 60
 CANNOT = 77  # exit code of a script that says why it cannot
 
@@ -69,7 +70,7 @@ class End:
 def _script(name: str, limit_s: float = SETUP_LIMIT_S) -> str:
     """Runs a script of this folder. Returns what it says on stdout."""
     done = subprocess.run(
-        [HERE / name, KERNEL], capture_output=True, text=True, timeout=limit_s, check=False
+        [HERE / name, KERNEL, SUITE], capture_output=True, text=True, timeout=limit_s, check=False
     )
     if done.returncode == CANNOT:
         raise CannotRun(done.stderr.strip().splitlines()[-1].removeprefix("hil: "))

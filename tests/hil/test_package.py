@@ -8,13 +8,17 @@ from robot import HEIGHT_PX, LEFT, WIDTH_PX, Watched
 # systemd is slow in an emulator; without it nothing would stop the motors at all.
 STOP_LIMIT_S = 10.0
 SETTINGS = {
-    "gpio_chip": "/dev/gpiochip1",
+    # The module's own label.
+    "gpio_chip": "hilboard",
     "width_px": WIDTH_PX,
     "height_px": HEIGHT_PX,
     # So that it is no missing frame that stops the motors.
     "frame_timeout_ms": 10000,
 }
 COMMAND_LIMIT_S = 120
+UNIT = "twinmill-robot.service"
+# In tenths, of systemd's own examination: 0 is safest, 100 is no sandbox at all.
+EXPOSURE_LIMIT = 20
 
 
 def run(system, *command):
@@ -31,8 +35,7 @@ def systemctl(system, *words):
 @pytest.fixture(scope="module")
 def installed(system):
     systemctl(system, "is-system-running", "--wait")
-    # What it depends on is unpacked, but dpkg has not been told.
-    run(system, "/usr/bin/dpkg", "--force-depends", "-i", "/turbopi.deb")
+    run(system, "/usr/bin/dpkg", "-i", "/turbopi.deb")
     lines = "".join(f"{key} = {value}\\n" for key, value in SETTINGS.items())
     run(system, "/bin/sh", "-c", f"printf '{lines}' >> /etc/turbopi/turbopi.conf")
     return system
@@ -42,7 +45,7 @@ def installed(system):
 def driving(installed):
     """The service, driving since somebody pressed the button."""
     robot = Watched(installed)
-    systemctl(installed, "restart", "turbopi")
+    systemctl(installed, "restart", UNIT)
     robot.show_until(lambda: any(t.frame_utime_us for t in robot.telemetry()))
     robot.press()
     robot.drive_until(LEFT)
@@ -55,30 +58,54 @@ def wait_for_zero(robot, since_s):
 
 
 def test_service_drives_as_its_own_user(driving):
-    users = "test $(stat -c %U /proc/$(systemctl show -P MainPID turbopi)) = turbopi"
+    users = "test $(stat -c %U /proc/$(systemctl show -P MainPID twinmill-robot)) = turbopi"
     run(driving.rig, "/bin/sh", "-c", users)
 
 
 def test_stopping_the_service_stops_the_motors(driving):
     begin_s = driving.since(0)[-1].t_s
-    systemctl(driving.rig, "stop", "turbopi")
+    systemctl(driving.rig, "stop", UNIT)
     assert wait_for_zero(driving, begin_s) < STOP_LIMIT_S
 
 
 def test_killing_all_of_the_service_stops_the_motors_and_starts_it_again(driving):
     before_s = driving.since(0)[-1].t_s
-    systemctl(driving.rig, "kill", "-s", "KILL", "turbopi")
+    systemctl(driving.rig, "kill", "-s", "KILL", UNIT)
     assert wait_for_zero(driving, before_s) < STOP_LIMIT_S
     driving.rig.wait(
-        lambda: driving.rig.run("/bin/systemctl", "is-active", "turbopi").code == 0,
+        lambda: driving.rig.run("/bin/systemctl", "is-active", UNIT).code == 0,
         COMMAND_LIMIT_S,
         "the service",
     )
     assert driving.wire() == ZERO
 
 
+def test_service_runs_in_a_sandbox_that_systemd_calls_safe(installed):
+    run(installed, "/usr/bin/systemd-analyze", "security", f"--threshold={EXPOSURE_LIMIT}", UNIT)
+
+
+def test_wrong_configuration_is_told_once_not_tried_for_ever(installed):
+    config = "/etc/turbopi/turbopi.conf"
+    run(installed, "/bin/sh", "-c", f"cp {config} /kept; echo nonsense >> {config}")
+    installed.run("/bin/systemctl", "restart", UNIT, limit_s=COMMAND_LIMIT_S)
+    run(installed, "/bin/sh", "-c", f"sleep 3; systemctl is-failed {UNIT}")
+    run(installed, "/bin/sh", "-c", f"test $(systemctl show -P NRestarts {UNIT}) = 0")
+    run(installed, "/bin/sh", "-c", f"cp /kept {config}; systemctl reset-failed {UNIT}")
+
+
 def test_removing_the_package_stops_the_motors(driving):
     begin_s = driving.since(0)[-1].t_s
     run(driving.rig, "/usr/bin/dpkg", "-r", "turbopi")
     assert wait_for_zero(driving, begin_s) < STOP_LIMIT_S
-    assert driving.rig.run("/bin/systemctl", "is-active", "turbopi").code != 0
+    assert driving.rig.run("/bin/systemctl", "is-active", UNIT).code != 0
+
+
+def test_purging_leaves_nothing(installed):
+    run(installed, "/usr/bin/dpkg", "--purge", "turbopi")
+    wants = "/etc/systemd/system/multi-user.target.wants"
+    run(
+        installed,
+        "/bin/sh",
+        "-c",
+        f"! ls {wants}/{UNIT} /etc/turbopi /usr/lib/sysusers.d/twinmill*",
+    )
