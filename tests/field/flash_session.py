@@ -72,7 +72,9 @@ def failures(flash: Flasher, robot: SshRobot, package: Path) -> dict:
     attempt("wrong architecture", {"architecture": "arm64"}, {"architecture": "amd64"})
     attempt("no permission", {"uid": "1000"}, {"uid": "0"})
     attempt("no space", {"free_kb": "100"}, {"free_kb": "500000"})
-    attempt("not installed", {"dpkg_fails": ""}, {})
+    attempt("not installable", {"apt_fails": ""}, {})
+    attempt("no package", {"system/etc/os-release": 'VERSION_ID="11"\n'},
+            {"system/etc/os-release": 'VERSION_ID="12"\n'})  # fmt: skip
     attempt("service dies", {"dies": ""}, {})
     before = robot.config.read_text()
     run["bad configuration"] = flash.run(host, "--package", package, "--behavior", "dance")
@@ -102,6 +104,24 @@ def threshold(robot: SshRobot, config: Path) -> dict:
     return {"code": code, **json.loads(said.getvalue()), "config": robot.config.read_text()}
 
 
+def vendor(flash: Flasher, robot: SshRobot, package: Path) -> dict:
+    """A robot on which the vendor's program runs, and what must not be stopped."""
+    robot.add_service("turbopi.service", "/usr/bin/python3 /home/pi/TurboPi/TurboPi.py")
+    robot.add_service("hw_wifi.service", "/usr/bin/python3 /home/pi/hiwonder-toolbox/hw_wifi.py")
+    before = robot.services()
+    refused = flash.run(robot.name, "--package", package)
+    untouched = robot.services() == before
+    taken = flash.run(robot.name, "--package", package, "--take-over")
+    during = robot.services()
+    back = flash.run(robot.name, "--hand-back")
+    after = robot.services()
+    for state in ("active", "enabled"):
+        (robot.folder / "units" / f"turbopi.service.{state}").unlink()
+    return {"refused": refused, "untouched": untouched, "taken": taken, "during": during,
+            "back": back, "before": before, "after": after,
+            "again": flash.run(robot.name, "--hand-back")}  # fmt: skip
+
+
 def own_tables(flash: Flasher, robot: SshRobot, folder: Path, package: Path) -> dict:
     """A table of the user's own is put on a robot; then a file that holds none."""
     good, bad = folder / "own.toml", folder / "bad.toml"
@@ -121,8 +141,8 @@ def main(folder: Path) -> dict:
     version = subprocess.run(
         [program, "--version"], capture_output=True, text=True, check=True
     ).stdout.split()[1]
-    old = make_package(folder, program, f"{version}-1", "amd64")
-    new = make_package(folder, program, f"{version}-2", "amd64")
+    old = make_package(folder, program, f"{version}-1~deb12", "amd64")
+    new = make_package(folder, program, f"{version}-2~deb12", "amd64")
     robots = [SshRobot(folder, f"robot0{i}", 2200 + i, key) for i in (3, 4, 5)]
     config = folder / "ssh_config"
     other_key = folder / "other"
@@ -140,6 +160,7 @@ def main(folder: Path) -> dict:
         result["configs"] = [robot.config.read_text() for robot in robots[:2]]
         result["no_previous"] = flash.run("robot03", "--rollback")
         result["second"] = flash.run(*both, "--package", new)
+        result["vendor"] = vendor(flash, robots[1], new)
         result["own"] = own_tables(flash, robots[1], folder, new)
         result["installed"] = [(robot.folder / "installed").read_text().strip() for robot in robots]
         result["rollback"] = flash.run("robot03", "--rollback")

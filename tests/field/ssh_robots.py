@@ -19,22 +19,36 @@ STUBS = {
     "dpkg": """
 case $1 in
     --print-architecture) cat "$ROBOT/architecture" ;;
+    --audit) ;;
+    --purge | --remove) : >"$ROBOT/installed" ;;
     *)  for package; do :; done
-        if [ -e "$ROBOT/dpkg_fails" ]; then
-            echo "dpkg: dependency problems: turbopi depends on liblcm1" >&2
-            exit 1
-        fi
         conf=$ROBOT/system/etc/turbopi/turbopi.conf
         cp -a "$conf" "$ROBOT/kept.conf"
         dpkg-deb --extract "$package" "$ROBOT/system"
         mv "$ROBOT/kept.conf" "$conf"
         dpkg-deb --field "$package" Version >"$ROBOT/installed" ;;
 esac""",
-    "apt-get": "exit 100",
-    "dpkg-query": 'cat "$ROBOT/installed"',
+    "apt-get": """
+for last; do :; done
+[ "$last" != update ] || exit 0
+if [ -e "$ROBOT/apt_fails" ]; then
+    echo " turbopi : Depends: liblcm1 but it is not installable"
+    echo "E: Unable to correct problems, you have held broken packages."
+    exit 100
+fi
+case "$*" in *--simulate*) ;; *) dpkg --install "$last" ;; esac""",
+    "dpkg-query": """
+case "$*" in *Architecture*) exit 0 ;; esac
+[ ! -s "$ROBOT/installed" ] || echo "installed $(cat "$ROBOT/installed")" """,
     "df": 'echo "header"; echo "disk 1000000 1 $(cat "$ROBOT/free_kb") 1% /"',
     "systemctl": """
+units=$ROBOT/units
+for name; do :; done
 case $1 in
+    --quiet) [ -e "$units/$name.${2#is-}" ] ;;
+    enable) : >"$units/$name.enabled" ;;
+    start) : >"$units/$name.active" ;;
+    disable) rm -f "$units/$name.enabled" "$units/$name.active" ;;
     restart)
         [ ! -e "$ROBOT/pid" ] || kill "$(cat "$ROBOT/pid")" 2>/dev/null || true
         [ -e "$ROBOT/dies" ] && exit 0
@@ -79,8 +93,10 @@ class SshRobot:
 
     def __init__(self, folder: Path, name: str, port: int, key: Path):
         self.folder, self.name, self.port = folder / name, name, port
-        for path in ("bin", "system/var/lib", "system/usr/bin", "system/etc/turbopi"):
+        system = ("var/lib", "usr/bin", "etc/turbopi", "etc/systemd/system")
+        for path in ("bin", "units", *(f"system/{path}" for path in system)):
             (self.folder / path).mkdir(parents=True)
+        (self.folder / "system/etc/os-release").write_text('VERSION_ID="12"\n')
         for stub, text in STUBS.items():
             path = self.folder / "bin" / stub
             path.write_text(f"#!/bin/sh\n{text}\n")
@@ -116,6 +132,17 @@ class SshRobot:
         """Sets what the stand-ins answer."""
         for name, text in files.items():
             (self.folder / name).write_text(text)
+
+    def add_service(self, name: str, command: str) -> None:
+        """A service that runs and starts with the robot."""
+        unit = self.folder / "system/etc/systemd/system" / name
+        unit.write_text(f"[Service]\nExecStart={command}\n")
+        for state in ("active", "enabled"):
+            (self.folder / "units" / f"{name}.{state}").touch()
+
+    def services(self) -> list[str]:
+        """Which services run, and which start with the robot."""
+        return sorted(path.name for path in (self.folder / "units").iterdir())
 
     def end(self) -> None:
         """Ends the server and the program."""

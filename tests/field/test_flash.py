@@ -15,7 +15,8 @@ FAILURES = (
     "wrong architecture",
     "no permission",
     "no space",
-    "not installed",
+    "not installable",
+    "no package",
     "service dies",
     "bad configuration",
     "no camera",
@@ -41,7 +42,7 @@ def only(run: dict) -> dict:
 
 def test_dry_run_says_what_would_be_done_and_does_nothing(session):
     for robot in session["dry_run"]["robots"]:
-        assert any("-1 over nothing" in step for step in robot["would"])
+        assert any("-1~deb12 over nothing" in step for step in robot["would"])
         assert any("behavior = diffusing" in step for step in robot["would"])
     assert session["dry_run"]["code"] == 0 and not session["touched_by_dry_run"]
 
@@ -57,7 +58,7 @@ def test_two_robots_run_what_was_installed(session):
 def test_number_and_behaviour_are_set_and_the_rest_is_kept(session):
     for robot_id, text in zip((3, 4), session["configs"], strict=True):
         lines = text.splitlines()
-        assert f"robot_id = {robot_id}" in lines and "behavior = diffusing" in lines
+        assert f"robot_id = {robot_id}" in lines and 'behavior = "diffusing"' in lines
         assert text.count("robot_id") == 1 and text.count("behavior") == 1
         assert "board = stub" in lines and "width_px = 64" in lines
 
@@ -65,7 +66,7 @@ def test_number_and_behaviour_are_set_and_the_rest_is_kept(session):
 def test_tables_of_ones_own_are_put_on_the_robot(session):
     own = session["own"]
     assert own["put"]["code"] == 0 and own["same"]
-    assert "behavior = spin" in own["config"] and "table = 0,2,0,2" in own["config"]
+    assert 'behavior = "spin"' in own["config"] and 'table = "0,2,0,2"' in own["config"]
     robot = only(own["bad"])
     assert own["bad"]["code"] == 1 and robot["kind"] == "bad behaviours"
     assert "line 1: table 'ahead' must be" in robot["sentence"]
@@ -74,8 +75,8 @@ def test_tables_of_ones_own_are_put_on_the_robot(session):
 def test_rollback_goes_to_the_package_before(session):
     assert only(session["no_previous"])["kind"] == "no previous"
     assert session["second"]["code"] == 0
-    assert [version[-2:] for version in session["installed"][:2]] == ["-2", "-2"]
-    assert session["rollback"]["code"] == 0 and session["back_to"].endswith("-1")
+    assert [version[-8:] for version in session["installed"][:2]] == ["-2~deb12"] * 2
+    assert session["rollback"]["code"] == 0 and session["back_to"].endswith("-1~deb12")
 
 
 def test_one_robot_that_fails_does_not_hold_up_another(session):
@@ -98,6 +99,38 @@ def test_every_failure_has_its_name_and_its_exit_code(session, kind):
 def test_bad_configuration_leaves_the_old_one(session):
     assert session["failures"]["config kept"]
     assert "milling" in only(session["failures"]["bad configuration"])["sentence"]
+
+
+def test_reason_for_a_package_that_cannot_be_installed_is_apts_own(session):
+    sentence = only(session["failures"]["not installable"])["sentence"]
+    assert "needs liblcm1 but it is not installable" in sentence
+    assert "Nothing was changed" in sentence
+
+
+def test_robot_with_another_debian_is_refused_by_its_name(session):
+    sentence = only(session["failures"]["no package"])["sentence"]
+    assert "runs Debian 11" in sentence and "12" in sentence
+
+
+def test_vendors_services_are_stopped_with_consent_alone(session):
+    vendor = session["vendor"]
+    refused = only(vendor["refused"])
+    assert refused["kind"] == "in use" and "turbopi.service" in refused["sentence"]
+    assert "hw_wifi" not in refused["sentence"] and vendor["untouched"]
+    assert vendor["taken"]["code"] == 0
+    assert vendor["during"] == [
+        "hw_wifi.service.active",
+        "hw_wifi.service.enabled",
+        "twinmill-robot.service.enabled",
+    ]
+
+
+def test_vendors_services_come_back_and_ours_goes(session):
+    vendor = session["vendor"]
+    assert vendor["back"]["code"] == 0
+    assert set(vendor["before"]) - set(vendor["after"]) == {"twinmill-robot.service.enabled"}
+    assert not set(vendor["after"]) - set(vendor["before"])
+    assert only(vendor["again"])["kind"] == "nothing taken"
 
 
 def test_limits_of_colour_come_from_the_robots_camera_into_its_configuration(session):

@@ -13,11 +13,18 @@ from rich.table import Table
 from rich.text import Text
 
 from twinmill.robots.fleet import URL, Fleet
-from twinmill.robots.package import Package, build_package, read_package
-from twinmill.robots.robot_update import Outcome, Target, Wish, parse_target, update
+from twinmill.robots.package import Packages, read_package
+from twinmill.robots.robot_update import (
+    Outcome,
+    Target,
+    Wish,
+    hand_back,
+    parse_target,
+    update,
+)
 from twinmill.swarm.behaviors import find_file, read_tables
 from twinmill_cli.options import LcmUrl, SshConfig
-from twinmill_cli.output import AsJson, deliver, telling
+from twinmill_cli.output import AsJson, deliver
 
 AT_ONCE = 16
 
@@ -58,6 +65,17 @@ def _flash(
     rollback: Annotated[
         bool, typer.Option("--rollback", help="Go back to the package before, kept on the robot.")
     ] = False,
+    take_over: Annotated[
+        bool,
+        typer.Option(
+            "--take-over",
+            help="Stop and disable other services that drive the robot, the vendor's.",
+        ),
+    ] = False,
+    give_back: Annotated[
+        bool,
+        typer.Option("--hand-back", help="Undo --take-over: their services run again, ours not."),
+    ] = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Look at the robots, say what would be done.")
     ] = False,
@@ -81,35 +99,35 @@ def _flash(
     tables = read_tables(file) if file and (behaviors or behavior) else {}
     if behavior:
         settings |= {"behavior": behavior, "table": tables.get(behavior, "")}
-    if rollback and (settings or package or behaviors):
+    if (rollback or give_back) and (settings or package or behaviors):
         raise ValueError(
-            "--rollback changes nothing else: give no --behavior, --behaviors, --set, --package."
+            "--rollback and --hand-back change nothing else: give no --behavior, --behaviors, "
+            "--set, --package."
         )
-    fleet = Fleet(lcm_url)
+    if give_back and (rollback or take_over or dry_run):
+        raise ValueError("--hand-back stands alone: give no --rollback, --take-over, --dry-run.")
+    given = read_package(package) if package else None
     wish = Wish(
-        None if rollback else _package(package),
+        None if rollback else Packages(given),
         settings,
         file if behaviors or behavior in tables else None,
+        take_over,
         dry_run,
         wait_s,
         ssh_config,
     )
-    outcomes = _update_all(targets, wish, fleet)
+    if give_back:
+        outcomes = [hand_back(target, ssh_config) for target in targets]
+    else:
+        outcomes = _update_all(targets, wish, Fleet(lcm_url))
     data = {
         "ok": all(outcome.ok for outcome in outcomes),
         "dry_run": dry_run,
-        "package": wish.package.path.name if wish.package else None,
+        "package": given.path.name if given else None,
         "robots": [outcome.to_json() for outcome in outcomes],
     }
     deliver(data, _plans(outcomes) if dry_run else _table(outcomes), as_json)
     return 0 if data["ok"] else 1
-
-
-def _package(path: Path | None) -> Package:
-    if path:
-        return read_package(path)
-    with telling("package") as say:
-        return build_package(say)
 
 
 def _refuse_twins(targets: list[Target]) -> None:

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Debian package of the robot's program: built for arm64 here, or one that is there."""
 
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 
 ROOT = Path(__file__).resolve().parents[3]
-SYSROOT, BUILD = ROOT / ".deps" / "sysroot-arm64", ROOT / "build" / "arm64"
+# Debian's releases, and so Raspberry Pi OS's, that a package is built for.
+RELEASES = {"12": "bookworm", "13": "trixie"}
 # Programs, and the Debian packages that have them.
 NEEDED = {
     "aarch64-linux-gnu-gcc": "gcc-aarch64-linux-gnu",
@@ -21,11 +24,16 @@ NEEDED = {
 
 @dataclass(frozen=True)
 class Package:
-    """A package file and what it says of itself."""
+    """A package file and what it says of itself.
+
+    Attributes:
+        release: of Debian, as "12"; empty if it does not say.
+    """
 
     path: Path
     architecture: str
     version: str
+    release: str
     installed_kb: int
 
     @property
@@ -53,13 +61,49 @@ def read_package(path: Path) -> Package:
     if fields["Package"] != "turbopi":
         raise ValueError(f"--package {path}: is '{fields['Package']}', not turbopi.")
     size_kb = int(fields["Installed-Size"] or 0)
-    return Package(path, fields["Architecture"], fields["Version"], size_kb)
+    release = re.search(r"~deb(\d+)$", fields["Version"])
+    version = fields["Version"]
+    return Package(path, fields["Architecture"], version, release[1] if release else "", size_kb)
 
 
-def build_package(say: Callable[[str], None]) -> Package:
+class Packages:
+    """The package for each robot: one that the user named, or one built for the robot's release."""
+
+    def __init__(self, given: Package | None):
+        self.given = given
+        self._built: dict[str, Package] = {}
+        self._lock = Lock()
+
+    def for_release(self, release: str, say: Callable[[str], None]) -> Package:
+        """Returns the package; builds it if nobody did so far.
+
+        Args:
+            release: of the robot's Debian, as "12".
+            say: told what is being done.
+
+        Raises:
+            ValueError: there is none for this release, or it cannot be built.
+        """
+        if self.given and self.given.release in ("", release):
+            return self.given
+        if self.given or release not in RELEASES:
+            known = {self.given.release: ""} if self.given else RELEASES
+            raise ValueError(
+                f"it runs Debian {release or 'of no number'}, the package is for "
+                f"{' or '.join(f'{key} {name}'.strip() for key, name in known.items())}: "
+                "put Raspberry Pi OS (64 bit) of that release on its card."
+            )
+        with self._lock:
+            if release not in self._built:
+                self._built[release] = build_package(RELEASES[release], say)
+            return self._built[release]
+
+
+def build_package(suite: str, say: Callable[[str], None]) -> Package:
     """Builds for arm64; only what changed since the last time.
 
     Args:
+        suite: Debian's name of the release.
         say: told what is being done.
 
     Raises:
@@ -70,28 +114,28 @@ def build_package(say: Callable[[str], None]) -> Package:
         raise ValueError(
             f"the package cannot be built: install {' '.join(missing)}, or give --package FILE."
         )
-    if not SYSROOT.is_dir():
+    sysroot, build = ROOT / ".deps" / f"sysroot-{suite}", ROOT / "build" / f"arm64-{suite}"
+    if not sysroot.is_dir():
         say("fetching the robot's headers and libraries, once")
-        _run([str(ROOT / "scripts/make_sysroot"), str(SYSROOT)])
-    say("building for arm64")
+        _run([str(ROOT / "scripts/make_sysroot"), str(sysroot), suite])
+    say(f"building for arm64, {suite}")
     options = [
         f"-DCMAKE_TOOLCHAIN_FILE={ROOT / 'cmake' / 'aarch64.cmake'}",
-        f"-DTWINMILL_SYSROOT={SYSROOT}",
+        f"-DTWINMILL_SYSROOT={sysroot}",
         "-DTWINMILL_BUILD_TWIN=OFF",
         "-DTWINMILL_BUILD_TESTS=OFF",
         "-DCMAKE_BUILD_TYPE=Release",
     ]
-    _run(["cmake", "-S", str(ROOT), "-B", str(BUILD), "-G", "Ninja", *options])
-    _run(["cmake", "--build", str(BUILD)])
-    for old in BUILD.glob("turbopi_*.deb"):
+    _run(["cmake", "-S", str(ROOT), "-B", str(build), "-G", "Ninja", *options])
+    _run(["cmake", "--build", str(build)])
+    for old in build.glob("turbopi_*.deb"):
         old.unlink()
-    _run(["cpack", "--config", "CPackConfig.cmake"])
-    return read_package(next(BUILD.glob("turbopi_*_arm64.deb")))
+    _run(["cpack", "--config", str(build / "CPackConfig.cmake"), "-B", str(build)])
+    return read_package(next(build.glob("turbopi_*_arm64.deb")))
 
 
 def _run(command: list[str]) -> None:
-    folder = BUILD if command[0] == "cpack" else ROOT
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     if done.returncode != 0:
         last = " ".join((done.stderr or done.stdout).strip().splitlines()[-3:])
         raise ValueError(f"the package cannot be built: {Path(command[0]).name} failed: {last}")

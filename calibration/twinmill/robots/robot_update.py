@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from twinmill.robots.fleet import Fleet
-from twinmill.robots.package import Package
+from twinmill.robots.package import Package, Packages
 from twinmill.robots.remote import Remote, RemoteError
 
 INSTALL_S = 300
@@ -44,16 +44,18 @@ class Wish:
     """What is to be done.
 
     Attributes:
-        package: to install; None: go back to the one before.
+        packages: to install from; None: go back to the package before.
         settings: of the configuration, KEY to value, besides the robot's number.
         behaviors: file of tables of the user's own to put there; None: leave what is there.
+        take_over: stop and disable other services that drive the robot.
         dry_run: only look.
         wait_s: for telemetry.
     """
 
-    package: Package | None
+    packages: Packages | None
     settings: dict[str, str]
     behaviors: Path | None
+    take_over: bool
     dry_run: bool
     wait_s: float
     ssh_config: Path | None
@@ -99,20 +101,32 @@ def update(target: Target, wish: Wish, fleet: Fleet, say: Callable[[str], None])
     return outcome
 
 
+def hand_back(target: Target, ssh_config: Path | None) -> Outcome:
+    """Gives the robot back to the services that had it before `take_over`."""
+    outcome = Outcome(target)
+    try:
+        Remote(target.host, ssh_config).run("hand_back")
+        outcome.ok = True
+    except RemoteError as error:
+        outcome.kind, outcome.sentence = error.kind, str(error)
+    return outcome
+
+
 def _update(
     target: Target, wish: Wish, fleet: Fleet, say: Callable[[str], None], outcome: Outcome
 ) -> None:
-    remote, package = Remote(target.host, wish.ssh_config), wish.package
+    remote = Remote(target.host, wish.ssh_config)
     say("looking")
-    architecture, needed_kb = (package.architecture, package.needed_kb) if package else ("", 1)
-    settings = {"robot_id": str(target.robot_id), **wish.settings}
-    found = remote.run("probe", architecture, str(needed_kb))
+    found = remote.run("probe")
     outcome.before = found.get("installed", "")
-    if package is None and "previous" not in found:
-        raise RemoteError("no previous", "no package before is kept on it: give --package FILE.")
+    package = _choose(wish, found, say)
+    settings = {"robot_id": str(target.robot_id), **wish.settings}
     if wish.dry_run:
-        outcome.would = _plan(wish, found, settings)
+        outcome.would = _plan(wish, package, found, settings)
         return
+    if found.get("others"):
+        say("taking over")
+        remote.run("take_over")
     if package is None:
         say("going back")
         remote.run("rollback", timeout_s=INSTALL_S)
@@ -133,24 +147,64 @@ def _update(
     _hear(target, version, restarted_s, wish.wait_s, fleet, outcome)
 
 
+def _choose(wish: Wish, found: dict[str, str], say: Callable[[str], None]) -> Package | None:
+    """The package for a robot; None: the one before. All that can be refused is refused here."""
+    if found.get("others") and not wish.take_over:
+        raise RemoteError(
+            "in use",
+            f"these services of it drive the robot: {found['others']}. Give --take-over to stop "
+            "and disable them; --hand-back undoes that.",
+        )
+    if wish.packages is None:
+        if "previous" not in found:
+            raise RemoteError(
+                "no previous", "no package before is kept on it: give --package FILE."
+            )
+        return None
+    try:
+        package = wish.packages.for_release(found["release"], say)
+    except ValueError as error:
+        raise RemoteError("no package", str(error)) from error
+    if package.architecture != found["architecture"]:
+        raise RemoteError(
+            "wrong architecture",
+            f"its system is {found['architecture']}, the package is for {package.architecture}: "
+            "does its card have the 64-bit Raspberry Pi OS?",
+        )
+    if int(found["free_kb"]) < package.needed_kb:
+        raise RemoteError(
+            "no space",
+            f"{found['free_kb']} KB are free on it, {package.needed_kb} KB are needed: remove "
+            "something.",
+        )
+    return package
+
+
 def _upload(remote: Remote, path: Path) -> str:
     upload = remote.run("upload")["upload"]
     remote.copy(path, upload)
     return upload
 
 
-def _plan(wish: Wish, found: dict[str, str], settings: dict[str, str]) -> list[str]:
-    package = wish.package
+def _plan(
+    wish: Wish, package: Package | None, found: dict[str, str], settings: dict[str, str]
+) -> list[str]:
     before = found.get("installed") or "nothing"
+    others = [f"stop and disable {name}" for name in found.get("others", "").split()]
     if package is None:
-        return [f"go back from {before} to {found['previous']}", "restart turbopi.service"]
+        return [
+            *others,
+            f"go back from {before} to {found['previous']}",
+            "restart twinmill-robot.service",
+        ]
     changed = ", ".join(f"{key} = {value}" for key, value in settings.items())
     return [
+        *others,
         f"copy {package.path.name}, {package.path.stat().st_size // 1024} KB",
         f"install {package.version} over {before}",
         *([f"put {wish.behaviors} there"] if wish.behaviors else []),
         f"set {changed}",
-        "restart turbopi.service and wait for telemetry",
+        "restart twinmill-robot.service and wait for telemetry",
     ]
 
 
