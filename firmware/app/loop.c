@@ -110,6 +110,8 @@ static void open_camera(struct loop *loop)
         err = adopt_format(loop, &format);
         if (err == FW_OK)
         {
+            // Whatever the time-out, no picture of before decides.
+            fw_forget_frames(&loop->core);
             loop_regain(loop, LOOP_CAMERA);
             return;
         }

@@ -18,12 +18,13 @@ static const char *const part_names[LOOP_PART_COUNT] = {"camera", "motor board",
                                                         "panel"};
 
 // The watchers know it before the board does.
-static void set_may_move(struct loop *loop, bool may_move)
+static void set_may_move(struct loop *loop, bool may_move, bool needs_help)
 {
     loop->may_move = may_move;
     if (loop->watch != NULL)
     {
         loop->watch->may_move = may_move;
+        loop->watch->needs_help = needs_help;
     }
 }
 
@@ -39,7 +40,7 @@ enum fw_err loop_halt(struct loop *loop)
     {
         memset(loop->wheel_duty_pct, 0, sizeof loop->wheel_duty_pct);
     }
-    set_may_move(loop, err != FW_OK);
+    set_may_move(loop, err != FW_OK, err != FW_OK);
     return err;
 }
 
@@ -50,7 +51,7 @@ enum fw_err loop_drive(struct loop *loop, const int8_t wheel_duty_pct[FW_WHEEL_C
     {
         return loop_halt(loop);
     }
-    set_may_move(loop, true);
+    set_may_move(loop, true, false);
     const enum fw_err err = hal_motors_write(&loop->devices.motors, wheel_duty_pct);
     if (err == FW_OK)
     {

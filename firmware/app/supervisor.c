@@ -179,6 +179,19 @@ static const char *must_end(const struct crew *crew)
                                                                          : NULL;
 }
 
+// A driver that cannot reach the board may be the only one that cannot.
+static void help_driver(struct crew *crew)
+{
+    if (crew->watch->needs_help)
+    {
+        (void)stopper_stop(&crew->stopper);
+    }
+    else
+    {
+        stopper_close(&crew->stopper);
+    }
+}
+
 // Until the driver has ended or has to be made to. @return why it has to, or NULL.
 static const char *watch_driver(struct crew *crew)
 {
@@ -192,6 +205,7 @@ static const char *watch_driver(struct crew *crew)
             (void)kill(crew->driver, SIGTERM);
             told = true;
         }
+        help_driver(crew);
         why = must_end(crew);
     }
     return why;

@@ -25,6 +25,8 @@ struct watch
     // Set before the first byte that moves a wheel is written, cleared after a stop that the board
     // has confirmed.
     _Atomic bool may_move;
+    // The driver wants the wheels to stand and cannot make them: whoever can helps.
+    _Atomic bool needs_help;
 };
 
 // @return memory that children share, or NULL.

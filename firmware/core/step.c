@@ -34,6 +34,16 @@ void fw_set_running(struct fw_ctx *ctx, bool running)
     ctx->running = running;
 }
 
+void fw_forget_frames(struct fw_ctx *ctx)
+{
+    fw_vote_clear(&ctx->vote);
+    ctx->has_frame = false;
+    ctx->detected_raw = false;
+    ctx->blob_px = 0;
+    ctx->frame_seq = 0;
+    ctx->frame_utime_us = 0;
+}
+
 // The watchdog: after a gap longer than the time-out, or when the clock stepped back, nothing that
 // was seen before counts any more.
 static void forget_old_frames(struct fw_ctx *ctx, int64_t now_us)
@@ -41,12 +51,7 @@ static void forget_old_frames(struct fw_ctx *ctx, int64_t now_us)
     if (ctx->has_frame &&
         fw_watchdog_expired(ctx->frame_utime_us, now_us, ctx->config.frame_timeout_us))
     {
-        fw_vote_clear(&ctx->vote);
-        ctx->has_frame = false;
-        ctx->detected_raw = false;
-        ctx->blob_px = 0;
-        ctx->frame_seq = 0;
-        ctx->frame_utime_us = 0;
+        fw_forget_frames(ctx);
     }
 }
 

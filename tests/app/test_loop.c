@@ -100,6 +100,22 @@ static void test_unplugged_camera_stops_at_once_and_comes_back(void)
     TEST_ASSERT_EQUAL(0, robot.report.status_flags);
 }
 
+// However long a frame may decide, none from before the loss does.
+static void test_frames_from_before_a_loss_decide_nothing(void)
+{
+    robot.config.frame_timeout_ms = 10000;
+    robot_drive(VIEW_GREEN);
+    robot.view = VIEW_UNPLUGGED;
+    robot_steps(1);
+    robot.view = VIEW_NOTHING;
+    for (int i = 0; i < 60; ++i)
+    {
+        robot_steps(1);
+        TEST_ASSERT_TRUE(robot_stands());
+    }
+    TEST_ASSERT_TRUE(robot.camera_is_open);
+}
+
 static void test_lost_board_is_stopped_before_it_moves_again(void)
 {
     robot_drive(VIEW_GREEN);
@@ -244,6 +260,7 @@ int main(void)
     RUN_TEST(test_duties_are_those_of_the_core);
     RUN_TEST(test_motors_stop_200_ms_after_the_last_frame);
     RUN_TEST(test_unplugged_camera_stops_at_once_and_comes_back);
+    RUN_TEST(test_frames_from_before_a_loss_decide_nothing);
     RUN_TEST(test_lost_board_is_stopped_before_it_moves_again);
     RUN_TEST(test_end_of_a_recording_stops_and_is_told);
     RUN_TEST(test_button_starts_and_stops_once_per_press);

@@ -13,6 +13,7 @@ import signal
 import socket
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 from robot_process import LEFT, ZERO, Robot, wait_until
@@ -42,7 +43,7 @@ def stands_for_good(robot, since_s):
 
 @pytest.fixture
 def driving(tmp_path):
-    """A robot that turns left, whose camera would let it drive on for ten seconds without a frame."""
+    """A robot that turns left, and would drive on for ten seconds without a frame."""
     patience = ("--set", "frame_timeout_ms=10000", "--set", "restart_ms=-1")
     with Robot(TURBOPI, tmp_path, "--start", *patience) as robot:
         assert robot.wait_for(LEFT)
@@ -75,11 +76,10 @@ def test_whoever_is_left_stops_the_wheels(driving, roles, number):
 
 
 def test_killall_leaves_the_guard(driving):
-    names = {
-        role: open(f"/proc/{pid}/comm").read().strip() for role, pid in processes(driving).items()
-    }
+    pids = processes(driving)
+    names = {role: Path(f"/proc/{pid}/comm").read_text() for role, pid in pids.items()}
     assert names["driver"] == names["parent"] != names["guard"]
-    command = open(f"/proc/{driving.guards()[0]}/cmdline").read()
+    command = Path(f"/proc/{driving.guards()[0]}/cmdline").read_text()
     assert "turbopi" not in command
 
 

@@ -36,6 +36,7 @@ ZERO = (0, 0, 0, 0)
 # The start button, low while pressed.
 BUTTON_LINE = 13
 PRESSED, RELEASED = 0, 1
+NONE_REFUSED = 255
 
 
 class CannotRun(Exception):
@@ -252,12 +253,16 @@ class Rig:
     def mend(self):
         """Makes the board answer, its pack full and its button released."""
         self.board(b"N", 0)
+        self.board(b"B", NONE_REFUSED)
         self.board(b"R", BATTERY_REGISTER, *PACK_MV.to_bytes(2, "little"))
         self.board(b"P", BUTTON_LINE, RELEASED)
 
-    def start(self, *command: object) -> int:
-        """Starts a program. Returns its pid."""
-        pid, _ = self.words("x", *command)
+    def start(self, *command: object, heard: bool = True) -> int:
+        """Starts a program, words NAME=VALUE of its environment first. Returns its pid.
+
+        Without being heard it writes its messages into a pipe that is full.
+        """
+        pid, _ = self.words("x" if heard else "y", *command)
         assert pid > 0
         return pid
 

@@ -99,9 +99,18 @@ class Watched:
 class Robot(Watched):
     """The running program; as a context it is ended at the end, and the motors are at zero."""
 
-    def __init__(self, rig: Rig, *arguments: str, camera: str = LOOPBACK, **watching):
+    def __init__(
+        self,
+        rig: Rig,
+        *arguments: str,
+        camera: str = LOOPBACK,
+        environment: tuple[str, ...] = (),
+        heard: bool = True,
+        **watching,
+    ):
         super().__init__(rig, camera, **watching)
-        self.pid = rig.start(PROGRAM, *SETTINGS, "--camera", camera, *arguments)
+        command = (*environment, PROGRAM, *SETTINGS, "--camera", camera, *arguments)
+        self.pid = rig.start(*command, heard=heard)
 
     def __enter__(self):
         return self
@@ -119,6 +128,13 @@ class Robot(Watched):
 
     def driver(self) -> int:
         """Returns the pid of the process that drives: the program's child."""
-        pid, _ = self.rig.words("d", self.pid)
-        assert pid > 0
+        return self._child("turbopi")
+
+    def guard(self) -> int:
+        """Returns the pid of the child that watches with the program."""
+        return self._child("wheelguard")
+
+    def _child(self, name: str) -> int:
+        pid, _ = self.rig.words("d", self.pid, name)
+        assert pid > 0, name
         return pid

@@ -61,10 +61,10 @@ def test_hanging_process_is_killed_and_the_motors_stop(blind):
     assert wait_for_zero(blind, stopped_s) < WATCHDOG_S + SLACK_S
 
 
-def test_stop_option_stops_what_a_double_kill_left(blind):
-    driver = blind.driver()
+def test_stop_option_stops_what_a_threefold_kill_left(blind):
+    pids = (blind.guard(), blind.pid, blind.driver())
     for number in (signal.SIGSTOP, signal.SIGKILL):
-        for pid in (blind.pid, driver):
+        for pid in pids:
             blind.rig.kill(pid, number)
     blind.wait_for_end()
     assert blind.wire() == LEFT

@@ -78,11 +78,27 @@ static void send_message(uint8_t type, const void *payload, size_t length)
     }
 }
 
-static int spawn(char **arguments)
+// Words with = before the program's path go into its environment.
+static char **take_environment(char **arguments)
+{
+    while (strchr(*arguments, '=') != NULL)
+    {
+        (void)putenv(*arguments++);
+    }
+    return arguments;
+}
+
+// @param error what the program has as stderr; -1: the console.
+static int spawn(char **arguments, int error)
 {
     const pid_t pid = fork();
     if (pid == 0)
     {
+        arguments = take_environment(arguments);
+        if (error >= 0)
+        {
+            (void)dup2(error, STDERR_FILENO);
+        }
         sigset_t none;
         sigemptyset(&none);
         (void)sigprocmask(SIG_SETMASK, &none, NULL);
@@ -93,22 +109,74 @@ static int spawn(char **arguments)
     return pid;
 }
 
-// @return the first child of a process: the one that drives, if it is the robot's program.
-static long child_of(const char *pid)
+// @return the number that a file holds. The file goes.
+static long take_number(const char *path)
+{
+    long number = -1;
+    FILE *file = fopen(path, "r");
+    if (file != NULL)
+    {
+        (void)!fscanf(file, "%ld", &number);
+        (void)fclose(file);
+        (void)unlink(path);
+    }
+    return number;
+}
+
+static bool has_name(long pid, const char *name)
+{
+    char path[64], got[32] = "";
+    (void)snprintf(path, sizeof path, "/proc/%ld/comm", pid);
+    FILE *file = fopen(path, "r");
+    const bool has = file != NULL && fscanf(file, "%31s", got) == 1 && strcmp(got, name) == 0;
+    if (file != NULL)
+    {
+        (void)fclose(file);
+    }
+    return has;
+}
+
+// @return the newest child of a process that goes by a name.
+static long child_of(const char *pid, const char *name)
 {
     char path[64];
-    long child = -1;
+    long child = -1, next;
     (void)snprintf(path, sizeof path, "/proc/%s/task/%s/children", pid, pid);
     FILE *children = fopen(path, "r");
-    if (children == NULL || fscanf(children, "%ld", &child) != 1)
+    while (children != NULL && fscanf(children, "%ld", &next) == 1)
     {
-        errno = ESRCH;
+        child = has_name(next, name) ? next : child;
     }
     if (children != NULL)
     {
         (void)fclose(children);
     }
+    errno = ESRCH;
     return child;
+}
+
+// A pipe that takes no byte more, and that nobody reads.
+static int full_pipe(void)
+{
+    int fds[2];
+    const char bytes[4096] = {0};
+    if (pipe(fds) != 0)
+    {
+        return -1;
+    }
+    (void)fcntl(fds[1], F_SETFL, O_NONBLOCK);
+    while (write(fds[1], bytes, sizeof bytes) > 0)
+    {
+    }
+    (void)fcntl(fds[1], F_SETFL, 0);
+    return fds[1];
+}
+
+static int write_text(const char *path, const char *text)
+{
+    FILE *file = fopen(path, "w");
+    const int result = file != NULL && fputs(text, file) >= 0 ? 0 : -1;
+    return file != NULL && fclose(file) != 0 ? -1 : result;
 }
 
 // Commands of words: their number follows from what they are.
@@ -116,9 +184,12 @@ static long obey_words(uint8_t type, char **word, int count)
 {
     switch (type)
     {
-        case 'x': return count > 0 ? spawn(word) : -1;
+        case 'x': return count > 0 ? spawn(word, -1) : -1;
+        case 'y': return count > 0 ? spawn(word, full_pipe()) : -1;
+        case 'n': return count == 1 ? take_number(word[0]) : -1;
+        case 'w': return count == 2 ? write_text(word[0], word[1]) : -1;
         case 'k': return count == 2 ? kill(atoi(word[0]), atoi(word[1])) : -1;
-        case 'd': return count == 1 ? child_of(word[0]) : -1;
+        case 'd': return count == 2 ? child_of(word[0], word[1]) : -1;
         case 'o': return count == 3 ? camera_open(word[0], atoi(word[1]), atoi(word[2])) : -1;
         case 'c': return count == 3 ? camera_control(word[0], word[1], word[2]) : -1;
         case 'l': return count == 2 ? load_module(word[0], word[1]) : -1;

@@ -14,6 +14,10 @@
 //   'R' register bytes...  sets registers, as a sensor would
 //   'P' line level         drives a line from outside; level 2 lets go: the bias decides
 //   'N' count              leaves the next transfers unanswered; 255: all, until told otherwise
+//   'B' register           leaves writes to this register unanswered; 255: none
+//   'H' tenths             makes the next reading of a line take so many tenths of a second, in
+//                          which nothing can end who reads
+#include <linux/delay.h>
 #include <linux/gpio/driver.h>
 #include <linux/i2c.h>
 #include <linux/kfifo.h>
@@ -58,7 +62,7 @@ static void add_event(__u8 kind, __u8 reg, const __u8 *data, size_t length)
 
 // I2C
 
-static __u8 registers[256], pointer, nacks_left;
+static __u8 registers[256], pointer, nacks_left, refused_register = 255;
 
 static void take_write(const __u8 *bytes, size_t length)
 {
@@ -85,7 +89,12 @@ static int transfer(struct i2c_adapter *bus, struct i2c_msg *message, int count)
         return -EOPNOTSUPP;
     }
     mutex_lock(&lock);
-    if (message->addr != BOARD_ADDRESS || nacks_left > 0)
+    if (message->addr == BOARD_ADDRESS && !(message->flags & I2C_M_RD) && message->len > 1 &&
+        message->buf[0] == refused_register)
+    {
+        result = -ENXIO;
+    }
+    else if (message->addr != BOARD_ADDRESS || nacks_left > 0)
     {
         nacks_left -= message->addr == BOARD_ADDRESS && nacks_left != NACK_ALL;
         result = -ENXIO;
@@ -123,8 +132,16 @@ static struct
     __u8 output, outside, bias;
 } line_of[LINES];
 
+static __u8 hang_tenths;
+
 static int get_level(struct gpio_chip *chip, unsigned int n)
 {
+    const unsigned int hang_ms = xchg(&hang_tenths, 0) * 100;
+
+    if (hang_ms > 0)
+    {
+        msleep(hang_ms);
+    }
     return line_of[n].is_output           ? line_of[n].output
            : line_of[n].outside == LET_GO ? line_of[n].bias
                                           : line_of[n].outside;
@@ -224,6 +241,14 @@ static ssize_t take_command(struct file *file, const char __user *from, size_t s
     else if (command[0] == 'P' && size == 3 && command[1] < LINES)
     {
         line_of[command[1]].outside = command[2];
+    }
+    else if (command[0] == 'B')
+    {
+        refused_register = command[1];
+    }
+    else if (command[0] == 'H')
+    {
+        hang_tenths = command[1];
     }
     else if (command[0] == 'N')
     {

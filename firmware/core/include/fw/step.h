@@ -88,6 +88,9 @@ enum fw_err FW_MUST_CHECK fw_set_table(struct fw_ctx *ctx, const struct fw_table
 // false: duties are zero and the mode is stopped, while frames are still looked at; true: resumes.
 void fw_set_running(struct fw_ctx *ctx, bool running);
 
+// Nothing that was seen so far counts any more, as after a camera was lost.
+void fw_forget_frames(struct fw_ctx *ctx);
+
 // One control step. Detects, votes, looks up, mixes, caps; zero duties without a fresh frame.
 // @param frame the newest frame, or NULL if none came since the last step; not kept.
 // @param now_us by the clock of the frames. If it steps back, old frames are forgotten.

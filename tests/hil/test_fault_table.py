@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table of faults in firmware/README.md: how long after each the wheels stand.
+
+The program is that of the Debian package, started by hand. Times are the guest kernel's, from the
+fault to the zero that stays. The camera's frames go on, or would not be missed for ten seconds, so
+that it is nothing but the row's fault that stops the wheels.
+"""
+
+import itertools
+import signal
+import time
+
+import pytest
+import turbopi
+from rig import BUILD, ZERO
+from robot import LEFT, PROGRAM, SETTINGS, Robot
+
+# What the program promises while it or its guard lives. The emulator may be slow: SLACK_S.
+LIMIT_S, SLACK_S = 0.5, 1.0
+PRELOAD = ("LD_PRELOAD=/lib/failcalls.so",)
+CONTROL, FIRST = "/tmp/failcalls", "/tmp/failcalls.first"
+UNCONFIRMED = turbopi.telemetry_t.STATUS_STOP_UNCONFIRMED
+ENODEV, EIO, EREMOTEIO = 19, 5, 121
+ALL, BOARD_ANSWERS, SECOND_WHEEL = 255, 0, 0x20
+ROLES = ("driver", "parent", "guard")
+PARTS = [*itertools.combinations(ROLES, 1), *itertools.combinations(ROLES, 2)]
+
+# (function, ioctl, path): calls that a driving robot makes again and again.
+VIDEO, I2C, GPIO = "/dev/video", "/dev/i2c", "anon_inode:gpio"
+CALLS = {
+    "camera: VIDIOC_DQBUF": ("ioctl", 0xC0585611, VIDEO, ENODEV),
+    "camera: VIDIOC_QBUF": ("ioctl", 0xC058560F, VIDEO, EIO),
+    "motor board: read": ("read", 0, I2C, EREMOTEIO),
+    "button and lights: ioctl": ("ioctl", 0, GPIO, EIO),
+}
+# Calls that open the camera again, after the first of those above: the robot stands meanwhile.
+OPENING = {
+    "open": ("open", 0, VIDEO, EIO),
+    "VIDIOC_QUERYCAP": ("ioctl", 0x80685600, VIDEO, EIO),
+    "VIDIOC_ENUM_FMT": ("ioctl", 0xC0405602, VIDEO, EIO),
+    "VIDIOC_S_FMT": ("ioctl", 0xC0D05605, VIDEO, EIO),
+    "VIDIOC_REQBUFS": ("ioctl", 0xC0145608, VIDEO, EIO),
+    "VIDIOC_QUERYBUF": ("ioctl", 0xC0585609, VIDEO, EIO),
+    "mmap": ("mmap", 0, VIDEO, EIO),
+    "VIDIOC_STREAMON": ("ioctl", 0x40045612, VIDEO, EIO),
+}
+
+
+@pytest.fixture(scope="module")
+def table():
+    """Rows of the table, by the order of the tests; written at the end."""
+    rows: list[tuple[str, str]] = []
+    yield rows
+    text = "| fault | wheels stand after |\n|---|---|\n"
+    text += "".join(f"| {fault} | {after} |\n" for fault, after in rows)
+    (BUILD / "faults_by_hand.md").write_text(text)
+    print("\n" + text)
+
+
+@pytest.fixture
+def drive(rig):
+    """Makes a robot that turns left and does not miss a frame for ten seconds."""
+    robots = []
+
+    def make(*arguments, **options):
+        settings = ("--start", "--set", "frame_timeout_ms=10000", *arguments)
+        robot = Robot(rig, *settings, **options)
+        robots.append(robot)
+        robot.drive_until(LEFT)
+        # Whoever watches is up.
+        rig.wait(lambda: rig.words("d", robot.pid, "wheelguard")[0] > 0, what="the guard")
+        return robot
+
+    yield make
+    rig.words("w", CONTROL, "")
+    rig.mend()
+    for robot in robots:
+        end_all(rig, robot)
+    assert rig.duties[-1].wire == ZERO
+
+
+def end_all(rig, robot):
+    """Ends what is left of a robot, and its wheels."""
+    if robot.pid not in rig.ends:
+        rig.words("k", robot.pid, int(signal.SIGCONT))
+        rig.words("k", robot.pid, int(signal.SIGTERM))
+        robot.wait_for_end()
+    rig.run(PROGRAM, *SETTINGS, "--stop")
+
+
+def stands_after(robot, fault_s, *, frames=False):
+    """Waits for four zeros that stay a second. Returns how long after the fault they came."""
+    rig = robot.rig
+    pump = robot.show_until if frames else rig.wait
+    pump(lambda: robot.wire() == ZERO)
+    end_s = time.monotonic() + 1.0
+    pump(lambda: time.monotonic() > end_s)
+    assert robot.wire() == ZERO
+    return robot.stopped_s(fault_s) - fault_s
+
+
+def fail(rig, function, request, path, error, pid=0):
+    """Makes calls fail from now on."""
+    rig.words("n", FIRST)
+    rig.words("w", CONTROL, f"{function} {request} {path} {error} {pid}")
+
+
+def failed_s(rig):
+    """When the first of them did (guest, s)."""
+    t_ns = -1
+    end_s = time.monotonic() + 30
+    while t_ns < 0 and time.monotonic() < end_s:
+        rig.pump(0.05)
+        t_ns, _ = rig.words("n", FIRST)
+    assert t_ns > 0
+    return t_ns / 1e9
+
+
+def note(table, fault, after_s):
+    table.append((fault, f"{after_s:.2f} s"))
+    assert after_s < LIMIT_S + SLACK_S
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize("roles", PARTS, ids="+".join)
+def test_processes(drive, table, roles, number):
+    robot = drive("--set", "restart_ms=-1")
+    pids = {"driver": robot.driver(), "parent": robot.pid, "guard": robot.guard()}
+    fault_s = min(robot.rig.kill(pids[role], number) for role in roles)
+    what = "killed" if number == signal.SIGKILL else "stopped (SIGSTOP)"
+    if roles == ("guard",) and number == signal.SIGKILL:
+        robot.rig.wait(lambda: robot.rig.words("d", robot.pid, "wheelguard")[0] > 0)
+        table.append((f"guard {what}", "drives on: another guard is started"))
+        return
+    note(table, f"{' and '.join(roles)} {what}", stands_after(robot, fault_s))
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGTSTP])
+def test_signals(drive, table, number):
+    robot = drive()
+    fault_s = robot.rig.kill(robot.pid, number)
+    names = {"SIGINT": "SIGINT (Ctrl-C)", "SIGTSTP": "SIGTSTP (Ctrl-Z)"}
+    after_s = stands_after(robot, fault_s)
+    note(table, f"{names.get(number.name, number.name)} to the program", after_s)
+
+
+def test_call_that_nothing_ends(rig, drive, table):
+    """The driver hangs for five seconds in the kernel, where SIGKILL does not reach it."""
+    robot = drive("--set", "restart_ms=-1")
+    _, fault_s = rig.call("b", b"H" + bytes([50]))
+    note(table, "driver hangs in a call that cannot be killed", stands_after(robot, fault_s))
+    robot.wait_for_end()
+
+
+@pytest.mark.parametrize("fault", ["driver killed", "driver stopped (SIGSTOP)", "camera frozen"])
+def test_messages_that_nobody_reads(rig, drive, table, fault):
+    timeout = ("--set", "frame_timeout_ms=200") if fault == "camera frozen" else ()
+    robot = drive("--set", "restart_ms=60000", *timeout, heard=False)
+    if fault == "camera frozen":
+        fault_s = robot.show(robot.view)
+    else:
+        number = signal.SIGKILL if "killed" in fault else signal.SIGSTOP
+        fault_s = rig.kill(robot.driver(), number)
+    note(table, f"{fault}, stderr full and unread", stands_after(robot, fault_s))
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_call_fails(rig, drive, table, call):
+    robot = drive(environment=PRELOAD)
+    fail(rig, *CALLS[call])
+    robot.show_until(lambda: robot.wire() == ZERO)
+    note(table, f"{call} fails", stands_after(robot, failed_s(rig), frames=True))
+    rig.words("w", CONTROL, "")
+    robot.drive_until(LEFT)
+
+
+def test_only_the_driver_cannot_reach_the_board(rig, drive, table):
+    robot = drive(environment=PRELOAD)
+    fail(rig, "write", 0, I2C, EREMOTEIO, robot.driver())
+    robot.show_until(lambda: robot.wire() == ZERO)
+    fault_s = failed_s(rig)
+    note(
+        table, "motor board: write fails, in the driver", stands_after(robot, fault_s, frames=True)
+    )
+
+
+@pytest.mark.parametrize("call", OPENING)
+def test_camera_cannot_be_opened_again(rig, drive, table, call):
+    robot = drive(environment=PRELOAD)
+    fail(rig, *CALLS["camera: VIDIOC_DQBUF"])
+    robot.show_until(lambda: robot.wire() == ZERO)
+    fault_s = failed_s(rig)
+    fail(rig, *OPENING[call])
+    note(table, f"camera lost, then {call} fails", stands_after(robot, fault_s, frames=True))
+    rig.words("w", CONTROL, "")
+    robot.drive_until(LEFT)
+
+
+def test_write_that_is_torn(rig, drive, table):
+    """The second wheel's register refuses: the first has its duty already."""
+    robot = drive("--set", "restart_ms=-1")
+    rig.kill(robot.pid, signal.SIGTERM)
+    robot.wait_for_end()
+    torn = Robot(rig, "--start", "--set", "frame_timeout_ms=10000")
+    _, fault_s = rig.call("b", b"B" + bytes([SECOND_WHEEL]))
+    torn.show_until(lambda: torn.has(UNCONFIRMED))
+    assert torn.telemetry()[-1].mode == torn.telemetry()[-1].MODE_FAULT
+    rig.mend()
+    end_all(rig, torn)
+    table.append(("one wheel's register refuses", "never starts, and says so"))
+    assert {d.wire for d in torn.since(fault_s)} <= {ZERO}
+
+
+def test_board_refuses_everything(rig, drive, table):
+    """What no program can mend; it says so, and the first that the board hears is a stop."""
+    robot = drive()
+    rig.board(b"N", ALL)
+    robot.show_until(lambda: robot.has(UNCONFIRMED))
+    said = robot.telemetry()[-1]
+    assert said.mode == said.MODE_FAULT and tuple(map(abs, said.wheel_duty_pct)) != ZERO
+    robot.rig.kill(robot.pid, signal.SIGSTOP)  # it shall not drive on
+    _, answers_s = rig.call("b", b"N" + bytes([BOARD_ANSWERS]))
+    after_s = stands_after(robot, answers_s)
+    table.append(("motor board refuses all", f"{after_s:.2f} s after it answers again"))
+    assert after_s < LIMIT_S + SLACK_S
+
+
+def test_all_three_are_killed(rig, drive, table):
+    robot = drive()
+    for pid in (robot.guard(), robot.pid, robot.driver()):
+        rig.kill(pid, signal.SIGSTOP)
+    for pid in (robot.guard(), robot.driver(), robot.pid):
+        rig.kill(pid, signal.SIGKILL)
+    robot.wait_for_end()
+    assert robot.wire() == LEFT
+    rig.words("w", "/tmp/garbage.conf", "speed = much\n= =\n[\n")
+    pid = rig.start(PROGRAM, "--config", "/tmp/garbage.conf", "--stop")
+    begin_s = rig.duties[-1].t_s
+    rig.wait(lambda: robot.wire() == ZERO)
+    rig.wait(lambda: pid in rig.ends)
+    stop_s = min(d.t_s for d in robot.since(begin_s) if d.wire == ZERO)
+    took_s = rig.ends[pid].t_s - stop_s
+    assert rig.ends[pid].code == 0, took_s
+    table.append(("all three killed", "only `turbopi --stop` or systemd, see below"))
