@@ -25,6 +25,8 @@ static void set_may_move(struct loop *loop, bool may_move, bool needs_help)
     {
         loop->watch->may_move = may_move;
         loop->watch->needs_help = needs_help;
+        // A board that makes this process try again and again keeps it busy, not dead.
+        watch_beat(loop->watch, WATCH_DRIVER);
     }
 }
 

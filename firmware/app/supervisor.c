@@ -30,6 +30,8 @@
 // For a program that is ending to give the board back.
 #define HELD_PATIENCE_MS 2000
 #define NOTIFY_PERIOD_US 500000
+#define START_PATIENCE_US 2000000
+#define HELP_PERIOD_US 100000
 
 struct crew
 {
@@ -43,7 +45,7 @@ struct crew
     int driver_status;
     // The signal that asked to end, and when; 0: none did.
     int asked_by;
-    int64_t asked_us, notified_us, guard_tried_us;
+    int64_t asked_us, notified_us, guard_tried_us, help_us;
 };
 
 // Signals that end or suspend a program, as something to wait for: a suspended one could not stop
@@ -95,7 +97,8 @@ static _Noreturn void become_driver(struct crew *crew, pid_t parent)
 static bool start_driver(struct crew *crew)
 {
     const pid_t parent = getpid();
-    watch_beat(crew->watch, WATCH_DRIVER);
+    // It has this long for its first own beat: what it found moving, it did not set in motion.
+    crew->watch->beat_us[WATCH_DRIVER] = watch_now_us() + START_PATIENCE_US;
     crew->driver = fork();
     if (crew->driver == 0)
     {
@@ -182,13 +185,15 @@ static const char *must_end(const struct crew *crew)
 // A driver that cannot reach the board may be the only one that cannot.
 static void help_driver(struct crew *crew)
 {
-    if (crew->watch->needs_help)
-    {
-        (void)stopper_stop(&crew->stopper);
-    }
-    else
+    const int64_t now_us = watch_now_us();
+    if (!crew->watch->needs_help)
     {
         stopper_close(&crew->stopper);
+    }
+    else if (now_us >= crew->help_us)
+    {
+        (void)stopper_stop(&crew->stopper);
+        crew->help_us = now_us + HELP_PERIOD_US;
     }
 }
 

@@ -21,6 +21,8 @@ LOOPBACK, VIVID = "/dev/video0", "/dev/video1"
 # Chip 0 is the machine's own.
 SETTINGS = (
     *("--set", "gpio_chip=/dev/gpiochip1", "--set", f"width_px={WIDTH_PX}"),
+    # The emulator may be slow: only tests of it have the watchdog's own time.
+    *("--set", "watchdog_ms=1000"),
     *("--set", f"height_px={HEIGHT_PX}", "--lcm-url", "udpm://239.255.76.67:7667?ttl=0"),
 )
 

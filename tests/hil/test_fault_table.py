@@ -17,6 +17,7 @@ from robot import LEFT, PROGRAM, SETTINGS, Robot
 
 # What the program promises while it or its guard lives. The emulator may be slow: SLACK_S.
 LIMIT_S, SLACK_S = 0.5, 1.0
+WATCHDOG, PATIENT = ("--set", "watchdog_ms=300"), ("--set", "watchdog_ms=3000")
 PRELOAD = ("LD_PRELOAD=/lib/failcalls.so",)
 CONTROL, FIRST = "/tmp/failcalls", "/tmp/failcalls.first"
 UNCONFIRMED = turbopi.telemetry_t.STATUS_STOP_UNCONFIRMED
@@ -63,7 +64,7 @@ def drive(rig):
     robots = []
 
     def make(*arguments, **options):
-        settings = ("--start", "--set", "frame_timeout_ms=10000", *arguments)
+        settings = ("--start", "--set", "frame_timeout_ms=10000", *WATCHDOG, *arguments)
         robot = Robot(rig, *settings, **options)
         robots.append(robot)
         robot.drive_until(LEFT)
@@ -175,7 +176,7 @@ def test_call_fails(rig, drive, table, call):
 
 
 def test_only_the_driver_cannot_reach_the_board(rig, drive, table):
-    robot = drive(environment=PRELOAD)
+    robot = drive(*PATIENT, environment=PRELOAD)
     fail(rig, "write", 0, I2C, EREMOTEIO, robot.driver())
     robot.show_until(lambda: robot.wire() == ZERO)
     fault_s = failed_s(rig)
@@ -201,7 +202,7 @@ def test_write_that_is_torn(rig, drive, table):
     robot = drive("--set", "restart_ms=-1")
     rig.kill(robot.pid, signal.SIGTERM)
     robot.wait_for_end()
-    torn = Robot(rig, "--start", "--set", "frame_timeout_ms=10000")
+    torn = Robot(rig, "--start", "--set", "frame_timeout_ms=10000", *PATIENT)
     _, fault_s = rig.call("b", b"B" + bytes([SECOND_WHEEL]))
     torn.show_until(lambda: torn.has(UNCONFIRMED))
     assert torn.telemetry()[-1].mode == torn.telemetry()[-1].MODE_FAULT
@@ -213,7 +214,7 @@ def test_write_that_is_torn(rig, drive, table):
 
 def test_board_refuses_everything(rig, drive, table):
     """What no program can mend; it says so, and the first that the board hears is a stop."""
-    robot = drive()
+    robot = drive(*PATIENT)
     rig.board(b"N", ALL)
     robot.show_until(lambda: robot.has(UNCONFIRMED))
     said = robot.telemetry()[-1]
@@ -226,7 +227,7 @@ def test_board_refuses_everything(rig, drive, table):
 
 
 def test_all_three_are_killed(rig, drive, table):
-    robot = drive()
+    robot = drive(*PATIENT)
     for pid in (robot.guard(), robot.pid, robot.driver()):
         rig.kill(pid, signal.SIGSTOP)
     for pid in (robot.guard(), robot.driver(), robot.pid):
