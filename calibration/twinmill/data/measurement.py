@@ -8,6 +8,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.camera_frames import Frames, frames_of
+from twinmill.data.checks import InputFinding, check_poses, check_tracks
 from twinmill.data.log import Log, LogError, RobotLog, read_log
 from twinmill.data.steady_table import Sheet, is_sheet, read_sheets
 from twinmill.data.time_base import TimeBase, find_time_base, retimed
@@ -81,27 +82,47 @@ class Measurement:
 
 
 class Measurements(list[Measurement | Sheet]):
-    """What can be judged, and what was left out.
+    """What can be judged, and what is to be said of the input.
 
     Attributes:
         excluded: one sentence on each robot, log or table that cannot be judged.
+        findings: mistakes of the input; robots with a fatal one are left out.
     """
 
-    def __init__(self, judged: list[Measurement | Sheet], excluded: list[str]) -> None:
+    def __init__(
+        self,
+        judged: list[Measurement | Sheet],
+        excluded: list[str],
+        findings: list[InputFinding],
+    ) -> None:
         super().__init__(judged)
-        self.excluded = excluded
+        self.excluded, self.findings = excluded, findings
 
 
-def load_measurements(paths: list[Path]) -> Measurements:
+class BadInputError(LogError):
+    """Nothing is left to judge, because the input is wrong; `findings` say how."""
+
+    def __init__(self, findings: list[InputFinding]) -> None:
+        super().__init__(" ".join(map(str, findings)))
+        self.findings = findings
+
+
+def load_measurements(paths: list[Path], model: native.Model | None = None) -> Measurements:
     """Reads logs and cleans every robot in them; reads steady-state tables (.csv).
 
     A robot or a log that cannot be judged is left out, with the reason, if another can.
 
+    Args:
+        paths: logs and tables.
+        model: tells what the wheels do, so that commands can be checked against the motion.
+
     Raises:
-        LogError: nothing that could be judged is left; why not the first.
+        BadInputError: by their findings, nothing is left that could be judged.
+        LogError: nothing could be read that could be judged; why not the first.
     """
     judged: list[Measurement | Sheet] = []
     excluded: list[LogError] = []
+    findings: list[InputFinding] = []
     for path in paths:
         try:
             if is_sheet(path):
@@ -113,13 +134,26 @@ def load_measurements(paths: list[Path]) -> Measurements:
             continue
         runs = len(paths) * len(log.robots)
         for robot in log.robots.values():
+            wrong = check_poses(robot, log.path.name)
+            findings += wrong
+            if any(f.fatal for f in wrong):
+                continue
             try:
                 judged.append(_measured(log, robot, runs))
             except LogError as error:
                 excluded.append(error)
+    runs = [m for m in judged if isinstance(m, Measurement)]
+    findings += check_tracks([(m.log_name, m.track) for m in runs], model)
+    bad = {(f.log_name, f.robot_id) for f in findings if f.fatal}
+    judged = [
+        m for m in judged if isinstance(m, Sheet) or (m.log_name, m.track.robot_id) not in bad
+    ]
+    if not judged and bad:
+        raise BadInputError([f for f in findings if f.fatal])
     if not judged:
         raise excluded[0]
-    return Measurements(judged, [f"Left out: {error}" for error in excluded])
+    reasons = [*map(str, excluded), *(str(f) for f in findings if f.fatal)]
+    return Measurements(judged, [f"Left out: {reason}" for reason in reasons], findings)
 
 
 def _measured(log: Log, robot: RobotLog, runs: int) -> Measurement:

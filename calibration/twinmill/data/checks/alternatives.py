@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The few simple mistakes of signs, columns and axes, and how well each would explain a log.
+
+Commands through the wheels' geometry give the direction in which a robot should move; how fast is
+left to one factor per channel. Each mistake gives another direction. All are fitted to every second
+stretch of the log and judged on the others.
+"""
+
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+
+from twinmill.data.checks.motion import (
+    EARLY_S,
+    LAGS_S,
+    LATE_S,
+    STEP_S,
+    Felt,
+    Motion,
+)
+
+LEVERS_M = (0.05, 0.3)  # turning (rad/s) is weighed against moving (m/s) by the wheels' lever
+TWIST_LEVER_M = 0.2  # where there are no wheels
+ONE_FLIP = ((-1, -1, -1, -1), (-1, 1, -1, 1), (1, -1, 1, -1))  # all, the left, the right wheels
+TRIED = 4  # lags and shifts
+LATES_S = np.arange(EARLY_S, LATE_S + STEP_S / 2, STEP_S)
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """One mistake, and what it makes of the columns.
+
+    Attributes:
+        place, sign: (4,) wheel k was really driven by sign[k] times column place[k].
+        heading_sign, mirrored: as in Motion.body_mps.
+        turned: the heading may be off by any constant.
+    """
+
+    place: tuple[int, ...] = (0, 1, 2, 3)
+    sign: tuple[int, ...] = (1, 1, 1, 1)
+    heading_sign: int = 1
+    mirrored: bool = False
+    turned: bool = False
+
+    @property
+    def of_poses(self) -> bool:
+        """Whether the mistake lies in the poses."""
+        return self.turned or self.mirrored or self.heading_sign < 0
+
+    @property
+    def steps(self) -> float:
+        """How many simple mistakes it takes: of two that explain as much, the simpler is true."""
+        moved = sum(k != p for k, p in enumerate(self.place))
+        sides = self.place in ((1, 0, 3, 2), (2, 3, 0, 1))
+        flips = 1 if self.sign in ONE_FLIP else self.sign.count(-1)
+        of_poses = 1.5 * self.of_poses + (self.turned and (self.mirrored or self.heading_sign < 0))
+        return (1 if sides else moved // 2 + moved % 2) + flips + of_poses
+
+
+OWN = Alternative()
+
+
+def wheel_alternatives(used: int) -> list[Alternative]:
+    """All orders and signs of the columns in use (3 or 4); the right one is left out."""
+    rest, same = tuple(range(used, 4)), (1,) * (4 - used)
+    found = [
+        Alternative((*place, *rest), (*sign, *same))
+        for place in permutations(range(used))
+        for sign in product((1, -1), repeat=used)
+    ]
+    return [a for a in found if a != OWN]
+
+
+def pose_alternatives() -> list[Alternative]:
+    """Mirrored or turned positions, headings that turn the wrong way."""
+    return [
+        Alternative(heading_sign=sign, mirrored=mirrored, turned=turned)
+        for sign, mirrored in ((1, False), (-1, True), (-1, False), (1, True))
+        for turned in (False, True)
+        if turned or sign < 0 or mirrored
+    ]
+
+
+@dataclass(frozen=True)
+class Explained:
+    """How well one alternative explains the motion.
+
+    Attributes:
+        left: share of the squared motion that it leaves, on stretches not fitted to.
+        by_block: (B,) the same summed by stretch, over the whole motion.
+        turned_rad: heading offset that went with it.
+        gain: (3,) measured over predicted speed, by channel.
+        lag_s, late_s: at which it was found.
+    """
+
+    alternative: Alternative
+    left: float
+    by_block: np.ndarray
+    turned_rad: float
+    gain: np.ndarray
+    lag_s: float
+    late_s: float
+
+
+class Search:
+    """Sums from which each alternative is judged, at every lag and shift in time."""
+
+    def __init__(
+        self,
+        motion: Motion,
+        wheels: np.ndarray,
+        felt: dict[float, Felt] | None = None,
+        lates_s: np.ndarray = LATES_S,
+    ) -> None:
+        """Args: wheels (3, 4): velocity of the body by command. felt: of another robot."""
+        self.motion, self.wheels = motion, wheels
+        self.lates_s = lates_s
+        forward, turn = np.abs(wheels[0]).max(), np.abs(wheels[2]).max()
+        is_twist = np.array_equal(wheels[:2], np.eye(2, 4))
+        self.lever_m = TWIST_LEVER_M if is_twist or not turn else forward / turn
+        self.lever_m = float(np.clip(self.lever_m, *LEVERS_M))
+        blocks = int(motion.block.max()) + 1
+        self.fold = np.arange(blocks) % 2
+        self.felt = felt or {lag_s: motion.felt(lag_s) for lag_s in LAGS_S}
+        self.starts = np.searchsorted(motion.block, np.arange(blocks))
+        self._keys: dict[tuple, list[tuple[float, float]]] = {}
+
+    def _by_block(self, rows: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """(B, SHAPES, 4, n) sums over stretches of products of (K, SHAPES, 4) with (K, ..., n)."""
+        product = rows[..., None] * other.reshape(len(other), -1, 1, other.shape[-1])
+        return self._sums(product)
+
+    def _sums(self, values: np.ndarray) -> np.ndarray:
+        """(B, ...) sums over stretches; a stretch without poses is zero."""
+        ends = np.append(self.starts[1:], len(values))
+        sums = np.zeros((len(self.starts), *values.shape[1:]))
+        filled = ends > self.starts
+        sums[filled] = np.add.reduceat(values, self.starts[filled])
+        return sums
+
+    def _likely(self, body: np.ndarray, sign: int, mirrored: bool) -> list[tuple[float, float]]:
+        """Lags and shifts at which any mixture of the commands explains most.
+
+        They do not depend on the order or the signs of the columns, nor on a constant angle.
+        """
+        if (sign, mirrored) not in self._keys:
+            speeds = self._speeds(body, sign)
+            explained = {}
+            for lag_s, (begin_s, shapes) in self.felt.items():
+                linear = begin_s, shapes[:, 1]
+                for late_s in self.lates_s:
+                    rows = self.motion.at(linear, late_s)
+                    gram, moment = rows.T @ rows, rows.T @ speeds
+                    ridge = 1e-6 * (np.trace(gram) + 1e-12) * np.eye(4)
+                    explained[lag_s, late_s] = np.sum(
+                        moment * np.linalg.solve(gram + ridge, moment)
+                    )
+            ranked = sorted(explained, key=explained.get, reverse=True)
+            self._keys[sign, mirrored] = ranked[:TRIED]
+        return self._keys[sign, mirrored]
+
+    def best(self, alternatives: list[Alternative]) -> list[Explained]:
+        """Each at the lag and the shift where it explains most."""
+        found: list[Explained] = []
+        by_pose: dict[tuple, list[Alternative]] = {}
+        for a in alternatives:
+            by_pose.setdefault((a.heading_sign, a.mirrored, a.turned), []).append(a)
+        for (sign, mirrored, turned), group in by_pose.items():
+            found += self._best_of(group, sign, mirrored, turned)
+        return found
+
+    def at_rate(self, own: Explained, rate: float) -> Explained:
+        """The columns as they are, with clocks that run apart by `rate` (seconds per second)."""
+        body = self.motion.body_mps()
+        speeds = self._speeds(body, 1)
+        total = self._sums(np.sum(speeds**2, axis=1))
+        best: Explained | None = None
+        middle_s = rate * float(np.ptp(self.motion.t_s)) / 2
+        for late_s in own.late_s - middle_s + np.arange(-0.06, 0.061, 0.03):
+            rows = self.motion.at(self.felt[own.lag_s], late_s, rate)
+            left, gain = self._left(
+                self.wheels[None], self._by_block(rows, rows), self._by_block(rows, speeds), total
+            )
+            if best is None or left.sum() < best.left:
+                best = Explained(
+                    OWN, float(left.sum()), left[0], 0.0, gain[0], own.lag_s, float(late_s)
+                )
+        return best
+
+    def _best_of(
+        self, group: list[Alternative], sign: int, mirrored: bool, turned: bool
+    ) -> list[Explained]:
+        body = self.motion.body_mps(sign, mirrored)
+        # (A, 3, 4): velocity by column under each alternative.
+        mixing = np.stack(
+            [self.wheels[:, _inverse(a.place)] * np.array(a.sign)[_inverse(a.place)] for a in group]
+        )
+        least = np.full(len(group), np.inf)
+        places: list = [None] * len(group)
+        for key in self._likely(body, sign, mirrored):
+            rows = self.motion.at(self.felt[key[0]], key[1])
+            gram = self._by_block(rows, rows)
+            angle = self._angle(rows, body) if turned else 0.0
+            speeds = self._speeds(body * np.exp(-1j * angle), sign)
+            moment = self._by_block(rows, speeds)
+            total = self._sums(np.sum(speeds**2, axis=1))
+            left, gain = self._left(mixing, gram, moment, total)
+            better = left.sum(axis=1) < least
+            for i in np.flatnonzero(better):
+                least[i] = left[i].sum()
+                places[i] = (left[i], angle, gain[i], *key)
+        return [Explained(a, float(least[i]), *places[i]) for i, a in enumerate(group) if places[i]]
+
+    def _speeds(self, body: np.ndarray, sign: int) -> np.ndarray:
+        """(K, 3) forward, left, lever_m * turn."""
+        return np.column_stack([body.real, body.imag, self.lever_m * sign * self.motion.turn_radps])
+
+    def _angle(self, rows: np.ndarray, body: np.ndarray) -> float:
+        """Heading offset at which the body moves where its commands say, on the whole."""
+        told = rows[:, 1] @ self.wheels[:2].T
+        return float(np.angle(np.sum(body * np.conj(told[:, 0] + 1j * told[:, 1]))))
+
+    def _left(
+        self, mixing: np.ndarray, gram: np.ndarray, moment: np.ndarray, total: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(A, B) share left by stretch, judged by fits to the other half; (A, 3) gains."""
+        weighted = mixing * np.array([1, 1, self.lever_m])[:, None]
+        power = np.einsum("aci,bsij,acj->absc", weighted, gram, weighted, optimize=True)
+        along = np.einsum("aci,bsic->absc", weighted, moment, optimize=True)
+        left = np.zeros(power.shape[:2])
+        for half in (0, 1):
+            fit, judge = self.fold != half, self.fold == half
+            p, m = power[:, fit].sum(axis=1), along[:, fit].sum(axis=1)
+            gain = np.maximum(m, 0) / np.maximum(p, 1e-12)  # (A, SHAPES, C)
+            shape = np.argmax(gain * m, axis=1)[:, None]  # that which explains most
+            best = np.take_along_axis(gain, shape, axis=1)
+            here_p = np.take_along_axis(power[:, judge], shape[:, None], axis=2)[:, :, 0]
+            here_m = np.take_along_axis(along[:, judge], shape[:, None], axis=2)[:, :, 0]
+            left[:, judge] = (best**2 * here_p - 2 * best * here_m).sum(axis=2)
+        left = (left + total) / max(total.sum(), 1e-12)
+        linear_p, linear_m = power[:, :, 1].sum(axis=1), along[:, :, 1].sum(axis=1)
+        return left, linear_m / np.maximum(linear_p, 1e-12)
+
+
+def _inverse(place: tuple[int, ...]) -> list[int]:
+    """Column to wheel from wheel to column."""
+    inverse = [0] * len(place)
+    for wheel, column in enumerate(place):
+        inverse[column] = wheel
+    return inverse

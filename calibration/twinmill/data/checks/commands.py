@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commands against poses of one robot: signs, columns, axes, units, drift of the clocks."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinmill.data.checks.alternatives import (
+    OWN,
+    Explained,
+    Search,
+    pose_alternatives,
+    wheel_alternatives,
+)
+from twinmill.data.checks.finding import InputFinding
+from twinmill.data.checks.geometry import columns_in_use
+from twinmill.data.checks.motion import Motion
+from twinmill.data.checks.words import described
+from twinmill.data.track import Track
+
+GOOD = 0.03  # share of the motion left unexplained at which no mistake is looked for
+FAR_BETTER = 0.5  # times what is left: physics explains that much more, a mistake more still
+SURE = 4.0  # standard errors over stretches of the log
+TURNED_RAD = 0.35  # more than any heading bias
+ALIKE, ALIKE_LEFT = 1.3, 0.003  # times and beside what the best leaves: as good as the best
+UNRELATED = 0.85  # share left at which commands and poses have nothing to do with each other
+LEAST_MPS = 0.01  # RMS speed below which nothing is said of a robot that hardly moves
+FEWEST_BLOCKS = 6
+UNITS = (  # measured over commanded speed, and what it says
+    ((300.0, 3000.0), "the positions are in millimetres", "name the columns x_mm and y_mm"),
+    ((30.0, 300.0), "the positions are in centimetres", "name the columns x_cm and y_cm"),
+    (
+        (1 / 3000, 1 / 300),
+        "the commanded speeds are in millimetres per second",
+        "name the columns vx_mmps and vy_mmps",
+    ),
+)
+TURN_UNITS = (
+    ((25.0, 130.0), "the headings are in degrees", "name the column theta_deg"),
+    ((1 / 130, 1 / 25), "the commanded turns are in degrees per second", "name it omega_degps"),
+)
+WHEEL_UNITS = (
+    ((0.08, 0.13), "the wheel speeds are in rounds per minute", "name the columns w1_rpm ..."),
+    ((0.012, 0.025), "the wheel speeds are in degrees per second", "name the columns w1_degps ..."),
+)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One robot's track and what its commands do by the model's wheels, (3, 4)."""
+
+    label: str
+    track: Track
+    body: np.ndarray
+
+    def finding(self, what: str, evidence: str, remedy: str, fatal: bool = True) -> InputFinding:
+        """Of this robot."""
+        return InputFinding(what, evidence, remedy, fatal, self.label, self.track.robot_id)
+
+
+def check_commands(subject: Subject) -> tuple[list[InputFinding], Search | None, Explained | None]:
+    """Findings of one robot, and how well its commands explain its motion; None if too short."""
+    track = subject.track
+    if not track.has_heading and (turns := _turning_share(subject)) > 0.05:
+        return [_no_heading(subject, turns)], None, None
+    motion = Motion.of(track)
+    if len(motion.t_s) < 20 or motion.block.max() + 1 < FEWEST_BLOCKS:
+        return [], None, None
+    body = subject.body if track.has_heading else subject.body * np.array([[1], [1], [0]])
+    search = Search(motion, body)
+    own = search.best([OWN])[0]
+    speed_mps = float(np.sqrt(np.mean(np.abs(motion.world_mps) ** 2)))
+    if speed_mps < LEAST_MPS and np.abs(motion.turn_radps).max() < 0.2:
+        return [], search, own
+    if own.left < GOOD:
+        return _units(subject, own), search, own
+    return _mistakes(subject, search, own), search, own
+
+
+def _mistakes(subject: Subject, search: Search, own: Explained) -> list[InputFinding]:
+    track = subject.track
+    poses = pose_alternatives()
+    if not track.has_heading:
+        poses = [a for a in poses if a.turned and not a.mirrored and a.heading_sign > 0]
+    found = search.best(wheel_alternatives(columns_in_use(subject.body)) + poses)
+    found = [e for e in found if not _is_bias(e)]
+    best = min(found, key=lambda e: e.left)
+    if not far_better(best, own):
+        if own.left > UNRELATED:
+            return [_unrelated(subject, min(own.left, best.left))]
+        return _units(subject, own) if own.left < 0.5 else []
+    alike = [e for e in found if e.left < ALIKE * best.left + ALIKE_LEFT]
+    alike.sort(key=lambda e: (e.alternative.steps, e.left))
+    simplest = [e for e in alike if e.alternative.steps < alike[0].alternative.steps + 0.6][:3]
+    words = [described(e.alternative, track.command_kind, e.turned_rad) for e in simplest]
+    return [
+        subject.finding(
+            ", or ".join(dict.fromkeys(what for what, _ in words)),
+            f"the commands explain {1 - own.left:.0%} of the motion as it is, and "
+            f"{1 - simplest[0].left:.0%} without that mistake",
+            "correct it where the log is made, or import anew with "
+            + ", or ".join(dict.fromkeys(options for _, options in words)),
+        ),
+        *_units(subject, simplest[0]),
+    ]
+
+
+def far_better(best: Explained, own: Explained) -> bool:
+    """Whether an alternative explains so much more that it is no matter of physics."""
+    if best.left > FAR_BETTER * own.left or own.left - best.left < GOOD:
+        return False
+    gained = own.by_block - best.by_block
+    return gained.sum() > SURE * gained.std() * np.sqrt(len(gained))
+
+
+def _is_bias(e: Explained) -> bool:
+    """A heading that is off by no more than an effect of physics makes it."""
+    a = e.alternative
+    plain = a.turned and a.heading_sign > 0 and not a.mirrored
+    return plain and abs(e.turned_rad) < TURNED_RAD
+
+
+def _unrelated(subject: Subject, left: float) -> InputFinding:
+    return subject.finding(
+        "the commands do not explain the motion",
+        f"under no order and sign of the columns and no turn of the axes more than {1 - left:.0%}",
+        "check that commands and poses are of the same robot and run, and shifted by less than a "
+        "second against each other (--pose-shift-s)",
+    )
+
+
+def _turning_share(subject: Subject) -> float:
+    """Share of the time in which the commands turn the robot."""
+    t_s, command = subject.track.command_t_s, subject.track.command
+    if len(t_s) < 2:
+        return 0.0
+    moving = np.abs(command @ subject.body.T)
+    turning = (moving[:, 2] > 0.05)[:-1]
+    return float(np.sum(np.diff(t_s)[turning]) / (t_s[-1] - t_s[0]))
+
+
+def _no_heading(subject: Subject, share: float) -> InputFinding:
+    return subject.finding(
+        "the heading is not recorded, and the commands turn the robot",
+        f"in {share:.0%} of the time",
+        "record the heading; positions alone tell of a robot that holds its heading",
+    )
+
+
+def _units(subject: Subject, e: Explained) -> list[InputFinding]:
+    """Speeds that are off by what a unit makes, where the commands explain the motion well."""
+    if e.left > 0.5:
+        return []
+    speed = float(e.gain[:2].max())
+    turn = float(e.gain[2]) if subject.track.has_heading else 0.0
+    kind = subject.track.command_kind
+    tried = [(speed, unit) for unit in UNITS[: 3 if kind == "twist" else 2]]
+    tried += [(turn, unit) for unit in TURN_UNITS[: 2 if kind == "twist" else 1]]
+    if kind == "wheel_speed":
+        tried += [(speed, unit) for unit in WHEEL_UNITS]
+    return [
+        subject.finding(
+            what,
+            f"the robot is {ratio:.3g} times as fast as its commands and its model say",
+            f"{remedy} and import anew",
+        )
+        for ratio, ((low, high), what, remedy) in tried
+        if low < ratio < high
+    ]
+
+
+RATES_PPM = (-3000, -2000, -1000, -500, 0, 500, 1000, 2000, 3000)
+LEAST_PPM = 300.0  # less is what crystals and fits of the clock are for
+ROWS_PPM = 2000.0  # rows of encoder logs are often counted, not timed: time_base.py sees to more
+DRIFT_SURE = 5.0
+
+
+def check_drift(subject: Subject, search: Search, own: Explained) -> list[InputFinding]:
+    """Clocks that run apart, by the rate at which the commands explain the motion best."""
+    span_s = float(np.ptp(search.motion.t_s))
+    if own.left > 0.3 or span_s < 30:
+        return []
+    by_block = np.array([search.at_rate(own, 1e-6 * rate).by_block for rate in RATES_PPM])
+    left = by_block.sum(axis=1)
+    k = int(np.clip(left.argmin(), 1, len(left) - 2))
+    near = slice(k - 1, k + 2)
+    rate = _vertex(RATES_PPM[near], left[near])
+    without = [_vertex(RATES_PPM[near], left[near] - block[near]) for block in by_block.T]
+    std = float(np.sqrt((len(without) - 1) * np.var(without)))  # jackknife, Efron and Stein 1981
+    least = ROWS_PPM if subject.track.command_kind == "wheel_speed" else LEAST_PPM
+    if not abs(rate) > max(least, DRIFT_SURE * std):
+        return []
+    return [
+        subject.finding(
+            "the two clocks run apart",
+            f"by {rate:.0f} +- {std:.0f} ppm, {abs(rate) * span_s / 1000:.0f} ms over the log",
+            "stamp both with one clock or keep them in step (chrony, NTP), or import anew with "
+            f"--pose-clock-ppm={rate:.0f}",
+            fatal=False,
+        )
+    ]
+
+
+def _vertex(x: tuple, y: np.ndarray) -> float:
+    """Place of the least value by the parabola through three points; NaN if it has none."""
+    square, slope, _ = np.polyfit(x, y, 2)
+    return float(-slope / (2 * square)) if square > 0 else np.nan

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is wrong with an input, in three sentences."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class InputFinding:
+    """A mistake in what was recorded or imported, not in the robot's physics.
+
+    Attributes:
+        what: the mistake, a clause without a full stop.
+        evidence: the numbers that show it.
+        remedy: what to do.
+        fatal: the log cannot be judged as it is; false where only something about it is lost.
+        log_name, robot_id: whose; -1 where it is about all robots.
+    """
+
+    what: str
+    evidence: str
+    remedy: str
+    fatal: bool
+    log_name: str = ""
+    robot_id: int = -1
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return vars(self)
+
+    def __str__(self) -> str:
+        robot = f" R{self.robot_id:02d}" if self.robot_id >= 0 else ""
+        where = f"{self.log_name}{robot}: " if self.log_name or robot else ""
+        return f"{where}{self.what}: {self.evidence}; {self.remedy}."

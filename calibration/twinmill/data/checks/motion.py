@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measured velocities beside lagged commands, without any model of the robot.
+
+Both are averaged over the same window, so that neither noise nor slow cameras matter: the slope of
+a least-squares line over [-h, h] is the mean velocity under the weight 3 (h^2 - s^2) / (4 h^3).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.ndimage import convolve1d
+from scipy.signal import lfilter
+
+from twinmill.data.track import Track, local_line
+
+GRID_S = 0.02
+HALF_S = 0.15  # of the window; three poses at least
+THIN_S = 0.06
+MOST = 3000  # times: more tell no mistake better
+LAGS_S = (0.02, 0.06, 0.15, 0.35)
+EARLY_S, LATE_S, STEP_S = -0.6, 1.2, 0.06  # poses against commands: clock, delay
+BLOCK_S = 3.0
+SHAPES = 3  # of a command: its root, itself, its square, all with its sign
+
+Felt = tuple[float, np.ndarray]  # begin of the grid, s; (G, SHAPES, 4)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Velocities of one robot at K times, and its commands as they were felt then.
+
+    Attributes:
+        t_s: (K,) capture's clock.
+        world_mps: (K,) complex, x + i y.
+        turn_radps: (K,) zero where the heading was not recorded.
+        heading_rad: (K,) zero where the heading was not recorded.
+        has_heading: whether it was.
+        grid_s, shapes: (G,) and (G, SHAPES, 4) commands on an even grid, robot's clock.
+        half_s: of the window.
+    """
+
+    t_s: np.ndarray
+    world_mps: np.ndarray
+    turn_radps: np.ndarray
+    heading_rad: np.ndarray
+    has_heading: bool
+    grid_s: np.ndarray
+    shapes: np.ndarray
+    half_s: float
+
+    @classmethod
+    def of(cls, track: Track) -> "Motion":
+        """Measures a track."""
+        half_s = max(HALF_S, 1.5 * track.timing.pose_period_s)
+        line = [
+            local_line(track.pose_t_s, track.pose[:, k], track.segment, half_s) for k in range(3)
+        ]
+        slope = np.column_stack([s for _, s in line])
+        heading_rad = line[2][0]
+        if not track.has_heading:
+            slope[:, 2], heading_rad = 0, 0 * slope[:, 0]
+        known = np.flatnonzero(np.isfinite(slope).all(axis=1))
+        every = max(1, round(THIN_S / track.timing.pose_period_s), len(known) // MOST)
+        known = known[::every]
+        first = min(track.command_t_s[0], track.pose_t_s[0]) - LATE_S - 1
+        last = max(track.command_t_s[-1], track.pose_t_s[-1]) + 1
+        grid_s = np.arange(first, last, GRID_S)
+        return cls(
+            track.pose_t_s[known],
+            slope[known, 0] + 1j * slope[known, 1],
+            slope[known, 2],
+            heading_rad[known],
+            track.has_heading,
+            grid_s,
+            _shapes(track, grid_s),
+            half_s,
+        )
+
+    @cached_property
+    def block(self) -> np.ndarray:
+        """(K,) number of the stretch of BLOCK_S that a time lies in."""
+        return ((self.t_s - self.t_s[0]) // BLOCK_S).astype(int)
+
+    def body_mps(self, heading_sign: int = 1, mirrored: bool = False) -> np.ndarray:
+        """(K,) complex, forward + i left, as the poses say or as they would say if mended.
+
+        Args:
+            heading_sign: -1 if headings are to be taken clockwise.
+            mirrored: positions are to be mirrored (y negative).
+        """
+        world = np.conj(self.world_mps) if mirrored else self.world_mps
+        return world * np.exp(-1j * heading_sign * self.heading_rad)
+
+    def felt(self, lag_s: float) -> Felt:
+        """Commands through a first-order lag, averaged over the window."""
+        keep = np.exp(-GRID_S / lag_s)
+        lagged = lfilter([1 - keep], [1, -keep], self.shapes, axis=0)
+        s = np.arange(-self.half_s, self.half_s + GRID_S / 2, GRID_S)
+        weight = np.maximum(self.half_s**2 - s**2, 0)
+        weight /= weight.sum()
+        return float(self.grid_s[0]), convolve1d(lagged, weight, axis=0, mode="nearest")
+
+    def at(self, felt: Felt, late_s: float, rate: float = 0.0) -> np.ndarray:
+        """(K, ...) of what was felt `late_s` before each pose; `rate` of the clocks."""
+        begin_s, felt = felt
+        place = (self.t_s - late_s - rate * (self.t_s - self.t_s[0]) - begin_s) / GRID_S
+        place = np.clip(place, 0, len(felt) - 1.001)
+        k = place.astype(int)
+        part = (place - k).reshape(-1, *[1] * (felt.ndim - 1))
+        return felt[k] * (1 - part) + felt[k + 1] * part
+
+
+def _shapes(track: Track, grid_s: np.ndarray) -> np.ndarray:
+    """(G, SHAPES, 4) the command in force in each grid step, averaged over the step."""
+    top = np.abs(track.command).max(axis=0)
+    unit = track.command / np.where(top > 0, top.max(), 1)
+    size, sign = np.abs(unit), np.sign(unit)
+    shapes = np.stack([sign * np.sqrt(size), unit, sign * size**2], axis=1) * top.max()
+    knots_s = np.append(track.command_t_s, max(grid_s[-1], track.command_t_s[-1]) + 1)
+    area = np.concatenate(
+        [np.zeros((1, SHAPES, 4)), np.cumsum(shapes * np.diff(knots_s)[:, None, None], axis=0)]
+    )
+    place = np.clip(np.searchsorted(knots_s, grid_s, side="right") - 1, 0, len(knots_s) - 2)
+    within = np.clip(grid_s - knots_s[place], 0, None)
+    before = grid_s < knots_s[0]
+    at_grid = area[place] + shapes[place] * within[:, None, None]
+    at_grid[before] = 0
+    return np.diff(at_grid, axis=0, prepend=0.0) / GRID_S

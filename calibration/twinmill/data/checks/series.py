@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the poses alone show: axes, units, headings that are none, how much there is."""
+
+import numpy as np
+
+from twinmill.data.checks.finding import InputFinding
+from twinmill.data.log import RobotLog
+from twinmill.data.track import Track
+
+FASTEST_MPS = 25.0  # half a second of it at least: no robot in a laboratory
+MM_MPS = 100.0  # faster still, even centimetres would make it 1 m/s
+FLAT_M = 0.05  # what a height varies by on a floor
+NOISE_RAD, NONSENSE_RAD = np.radians(3), np.radians(20)
+LOST_SHARE = 0.2
+SLOW_S = 0.15
+SHORT_S = 14.0
+STILL_RAD = 1e-6
+
+
+def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
+    """Findings of a robot's poses as they were recorded."""
+    t_s, pose, z_m = (a[robot.valid] for a in (robot.pose_t_s, robot.pose, robot.z_m))
+    if len(t_s) < 20:
+        return []
+
+    def finding(what: str, evidence: str, remedy: str) -> InputFinding:
+        return InputFinding(what, evidence, remedy, True, label, robot.robot_id)
+
+    span_m = np.ptp(np.column_stack([pose[:, :2], z_m]), axis=0)
+    x_m, y_m, height_m = (float(v) for v in span_m)
+    fast_mps = _usual_top_speed(t_s, pose)
+    if min(x_m, y_m) < FLAT_M < 0.2 * max(x_m, y_m) and height_m > max(0.3, 5 * min(x_m, y_m)):
+        axis = "y" if y_m < x_m else "x"
+        return [
+            finding(
+                f"{axis} is up in these poses, not z",
+                f"z goes over {height_m:.2f} m and {axis} over {min(x_m, y_m) * 1000:.0f} mm",
+                f"import with --up {axis}",
+            )
+        ]
+    if fast_mps > FASTEST_MPS:
+        unit = "mm" if fast_mps > MM_MPS else "mm or cm"
+        return [
+            finding(
+                f"the positions are in {unit}, not in m",
+                f"the robot drives at {fast_mps:.0f} m/s by them, over {max(x_m, y_m):.0f} m",
+                "name the columns x_mm and y_mm (x_cm and y_cm) and import anew",
+            )
+        ]
+    if robot.has_heading and _heading_is_constant(robot, pose):
+        return [
+            finding(
+                "the heading was not measured",
+                f"it is {np.degrees(pose[0, 2]):.1f} degrees in all {len(pose)} poses, to the bit",
+                "record it, or import without that column if the robot holds its heading",
+            )
+        ]
+    return []
+
+
+def check_track(track: Track, label: str) -> list[InputFinding]:
+    """What about a log can be used, and yet is worth a sentence."""
+    found = []
+
+    def add(what: str, evidence: str, remedy: str, fatal: bool = False) -> None:
+        found.append(InputFinding(what, evidence, remedy, fatal, label, track.robot_id))
+
+    timing = track.timing
+    if timing.pose_lost_share > LOST_SHARE:
+        add(
+            "many poses are lost",
+            f"{timing.pose_lost_share:.0%} of the frames while the robot is tracked",
+            "look for hidden markers or a full network; what changes quickly is judged on fewer "
+            "poses",
+        )
+    closed_loop = abs(timing.command_period_s / timing.pose_period_s - 1) < 0.2
+    if timing.pose_period_s > SLOW_S and not closed_loop:
+        add(
+            "the poses come slowly",
+            f"{1 / timing.pose_period_s:.1f} in a second",
+            "record at 10 Hz or more; lags, delays and starts cannot be judged from so few",
+        )
+    noise_rad = _heading_noise_rad(track) if track.has_heading else 0.0
+    if noise_rad > NONSENSE_RAD:
+        add(
+            "the headings make no sense",
+            f"they jump by {np.degrees(noise_rad):.0f} degrees from pose to pose",
+            "check the column and its unit: degrees belong into theta_deg",
+            fatal=True,
+        )
+    elif noise_rad > NOISE_RAD:
+        add(
+            "the headings are noisy",
+            f"{np.degrees(noise_rad):.1f} degrees, which makes "
+            f"{1000 * np.sin(noise_rad):.0f} mm of each metre",
+            "set the markers further apart, or print larger tags",
+        )
+    return found
+
+
+def check_length(tracks: list[tuple[str, Track]]) -> list[InputFinding]:
+    """Too little to see each kind of motion twice, in all logs of a robot together."""
+    total_s: dict[int, float] = {}
+    for _, track in tracks:
+        usable_s = np.count_nonzero(track.segment >= 0) * track.timing.pose_period_s
+        total_s[track.robot_id] = total_s.get(track.robot_id, 0) + usable_s
+    return [
+        InputFinding(
+            "the log is short",
+            f"{seconds:.0f} s of usable poses",
+            "drive for a minute or more: what is driven once is fitted, and nothing is left to "
+            "judge it by",
+            False,
+            next(label for label, track in tracks if track.robot_id == robot_id),
+            robot_id,
+        )
+        for robot_id, seconds in total_s.items()
+        if seconds < SHORT_S
+    ]
+
+
+def _usual_top_speed(t_s: np.ndarray, pose: np.ndarray) -> float:
+    """Speed over half a second that is passed in a twentieth of the time."""
+    after = np.searchsorted(t_s, t_s + 0.5)
+    start = np.flatnonzero(after < len(t_s))
+    after = after[start]
+    near = t_s[after] - t_s[start] < 1
+    if not near.any():
+        return 0.0
+    step = pose[after[near], :2] - pose[start[near], :2]
+    speed = np.hypot(step[:, 0], step[:, 1]) / (t_s[after[near]] - t_s[start[near]])
+    return float(np.quantile(speed, 0.95))
+
+
+def _heading_is_constant(robot: RobotLog, pose: np.ndarray) -> bool:
+    """The heading never changes, though positions have noise: so it is no measurement."""
+    bend = np.median(np.abs(np.diff(pose[:, :2], n=2, axis=0)))
+    return bool(np.ptp(pose[:, 2]) < STILL_RAD and bend > STILL_RAD)
+
+
+def _heading_noise_rad(track: Track) -> float:
+    """Standard deviation from second differences; zero where motion alone would make them."""
+    if track.timing.pose_period_s > SLOW_S:
+        return 0.0
+    index = np.flatnonzero(track.segment >= 0)
+    if len(index) < 20:
+        return 0.0
+    bend = np.diff(track.pose[index, 2], n=2)
+    same = np.diff(track.segment[index])
+    bend = bend[(same[1:] == 0) & (same[:-1] == 0)]
+    return float(np.median(np.abs(bend)) / 0.6745 / np.sqrt(6)) if len(bend) else 0.0

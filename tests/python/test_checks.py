@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Mistakes of the input are named, and nothing else is. The robot here is simulated by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import twinmill_native as native
+
+from twinmill.data.checks import check_poses, check_tracks
+from twinmill.data.log import RobotLog
+from twinmill.data.track import make_track
+
+LEVER_M, TOP_MPS, LAG_S = 0.126, 0.36, 0.07
+MECANUM = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # Muir and Neuman 1987
+MODEL = """
+[robot]
+half_wheelbase_m = 0.059
+half_track_m = 0.067
+[base]
+drive = "{drive}"
+wheels = "mecanum"
+duty_pct = [0, 100]
+wheel_speed_mps = [0, 0.36]
+"""
+
+
+def _robot(robot_id=3, duration_s=60.0, seed=1, pose_hz=50) -> RobotLog:
+    """A mecanum robot that saturates, lags, slips and wavers, driven at random on all axes."""
+    rng = np.random.default_rng(seed)
+    t_s = np.arange(0, duration_s, 0.005)
+    axes = rng.choice([-0.8, -0.4, 0, 0.4, 0.8], (int(duration_s / 0.7) + 1, 3))
+    forward, left, turn = axes[(t_s / 0.7).astype(int)].T
+    wheels = [forward - left - turn, forward + left + turn, forward + left - turn]
+    duty = np.clip(np.column_stack([*wheels, forward - left + turn]), -1, 1).round(2)
+    rim = TOP_MPS * np.sign(duty) * np.abs(duty) ** 0.7
+    felt = np.zeros(4)
+    pose = np.zeros((len(t_s), 3))
+    for k in range(1, len(t_s)):
+        felt += 0.005 / LAG_S * (rim[k - 1] - felt)
+        vx, vy, w = MECANUM @ felt * [1, 0.88, 0.93 / LEVER_M] + rng.normal(size=3) * 0.02
+        c, s = np.cos(pose[k - 1, 2]), np.sin(pose[k - 1, 2])
+        pose[k] = pose[k - 1] + 0.005 * np.array([c * vx - s * vy, s * vx + c * vy, w])
+    seen = slice(None, None, round(200 / pose_hz))
+    told = slice(None, None, 5)
+    noisy = pose[seen] + rng.normal(size=pose[seen].shape) * [0.0005, 0.0005, 0.003]
+    count = len(t_s[told])
+    flags, nan = np.zeros(count, np.int8), np.full(count, np.nan)
+    return RobotLog(
+        robot_id=robot_id,
+        source="robot",
+        behavior="",
+        command_kind="duty",
+        command_t_s=t_s[told],
+        command=duty[told],
+        battery_V=nan,
+        frame_t_s=nan,
+        mode=flags,
+        detected_raw=flags,
+        detected=flags,
+        speed_input=nan,
+        turn_input=nan,
+        pose_t_s=t_s[seen] + 0.04,  # the clocks differ
+        pose=noisy,
+        z_m=np.zeros(len(noisy)),
+        valid=np.ones(len(noisy), bool),
+    )
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return _robot()
+
+
+def _findings(robots, drive="duty"):
+    model = native.Model.from_toml(MODEL.format(drive=drive), "test")
+    found = [f for r in robots for f in check_poses(r, "log")]
+    if not any(f.fatal for f in found):
+        found += check_tracks([("log", make_track(r)) for r in robots], model)
+    return found
+
+
+def _one(robots, *words, fatal=True):
+    """The one finding that there must be holds these words."""
+    found = _findings(robots)
+    assert len(found) == 1, found
+    for word in words:
+        assert word in f"{found[0].what}; {found[0].remedy}", found[0]
+    assert found[0].fatal is fatal
+    assert str(found[0]).count(";") == 1 and str(found[0]).endswith(".")
+
+
+def _with_pose(robot, x=None, y=None, theta=None):
+    pose = robot.pose.copy()
+    for k, values in enumerate((x, y, theta)):
+        if values is not None:
+            pose[:, k] = values
+    return replace(robot, pose=pose)
+
+
+def test_a_right_log_has_no_findings(robot):
+    assert _findings([robot]) == []
+
+
+@pytest.mark.parametrize(
+    ("order", "signs", "words"),
+    [
+        ((1, 0, 3, 2), (1, 1, 1, 1), ("left and the right wheels are swapped",)),
+        ((2, 3, 0, 1), (1, 1, 1, 1), ("front and the rear wheels are swapped",)),
+        ((1, 0, 2, 3), (1, 1, 1, 1), ("fl_pct and fr_pct are swapped", "--rename fl_pct=fr_pct")),
+        ((0, 1, 2, 3), (-1, 1, 1, 1), ("fl_pct has the wrong sign", "--flip fl_pct")),
+        ((0, 1, 2, 3), (-1, 1, -1, 1), ("left wheels have the wrong sign",)),
+        ((0, 1, 2, 3), (-1, -1, -1, -1), ("all wheels have the wrong sign",)),
+    ],
+)
+def test_wheels_that_are_swapped_or_turned_round_are_named(robot, order, signs, words):
+    wrong = replace(robot, command=robot.command[:, order] * signs)
+    _one([wrong], *words)
+
+
+def test_axes_that_are_swapped_or_mirrored_are_named(robot):
+    x, y, theta = robot.pose.T
+    _one([_with_pose(robot, x=y, y=x)], "x and y are swapped", "--rename x_m=y_m")
+    _one([_with_pose(robot, y=-y)], "y has the wrong sign", "--flip y_m")
+    _one([_with_pose(robot, y=-y, theta=-theta)], "mirrored", "--flip y_m --flip theta_rad")
+    _one([_with_pose(robot, theta=-theta)], "counted clockwise", "--flip theta_rad")
+
+
+@pytest.mark.parametrize("off_deg", [-90, 40, 180])
+def test_a_heading_that_is_off_by_a_constant_is_named_with_the_angle(robot, off_deg):
+    wrong = _with_pose(robot, theta=robot.pose[:, 2] - np.radians(off_deg))
+    found = _findings([wrong])
+    assert len(found) == 1
+    told_deg = float(found[0].remedy.split("--heading-offset-deg=")[1].split()[0].rstrip("."))
+    assert abs((told_deg - off_deg + 180) % 360 - 180) < 4
+
+
+def test_an_effect_of_physics_is_no_mistake(robot):
+    # Ten degrees of heading bias, a wheel at three quarters, a tracked point off the middle.
+    theta = robot.pose[:, 2]
+    x = robot.pose[:, 0] + 0.04 * np.cos(theta)
+    y = robot.pose[:, 1] + 0.04 * np.sin(theta)
+    assert _findings([_with_pose(robot, x=x, y=y, theta=theta + np.radians(10))]) == []
+    weak = robot.command * [0.75, 1, 1, 1]
+    assert _findings([replace(robot, command=weak)]) == []
+
+
+def test_units_are_told_from_speeds(robot):
+    _one([_with_pose(robot, *(1000 * robot.pose[:, :2]).T)], "in mm", "x_mm")
+    _one([_with_pose(robot, theta=np.degrees(robot.pose[:, 2]))], "degrees", "theta_deg")
+
+
+def test_a_height_in_the_place_of_y_is_named(robot):
+    flat = 0.05 + 1e-4 * np.random.default_rng(1).normal(size=len(robot.pose))
+    _one([replace(_with_pose(robot, y=flat), z_m=robot.pose[:, 1])], "y is up", "--up y")
+
+
+def test_headings_that_are_none_are_named(robot):
+    _one([_with_pose(robot, theta=0.5 + 0 * robot.pose[:, 2])], "heading was not measured")
+    _one([_with_pose(robot, theta=np.nan * robot.pose[:, 2])], "heading is not recorded")
+    noise = np.random.default_rng(1).normal(size=len(robot.pose))
+    noisy = _with_pose(robot, theta=robot.pose[:, 2] + np.radians(5) * noise)
+    _one([noisy], "headings are noisy", fatal=False)
+
+
+def test_names_that_are_exchanged_are_told_for_both(robot):
+    other = _robot(robot_id=5, seed=2)
+    assert _findings([robot, other]) == []
+    found = _findings([replace(robot, robot_id=5), replace(other, robot_id=3)])
+    assert found == []  # whole robots under another number are right
+    pose = {k: getattr(robot, k) for k in ("pose_t_s", "pose", "z_m", "valid")}
+    theirs = {k: getattr(other, k) for k in pose}
+    found = _findings([replace(robot, **theirs), replace(other, **pose)])
+    assert [f.robot_id for f in found] == [3, 5]
+    assert "exchanged with that of robot 5" in found[0].what
+
+
+@pytest.mark.parametrize("ppm", [-1000, 1000])
+def test_drift_of_the_clocks_is_measured(robot, ppm):
+    found = _findings([replace(robot, pose_t_s=robot.pose_t_s * (1 + 1e-6 * ppm))])
+    assert [f.what for f in found] == ["the two clocks run apart"]
+    assert not found[0].fatal
+    told, std = (float(w) for w in found[0].evidence.split(" ppm")[0][3:].split(" +- "))
+    assert abs(told - ppm) < 4 * std + 20
+
+
+def test_too_few_poses_are_told(robot):
+    lost = np.random.default_rng(1).random(len(robot.pose)) < 1 / 3
+    pose = np.where(lost[:, None], np.nan, robot.pose)
+    _one([replace(robot, pose=pose, valid=~lost)], "many poses are lost", fatal=False)
+    _one([_robot(duration_s=12)], "the log is short", fatal=False)
+    _one([_robot(pose_hz=4)], "poses come slowly", fatal=False)
+
+
+def test_commands_of_another_run_are_told(robot):
+    _one([replace(robot, command=_robot(seed=7).command)], "do not explain the motion")
