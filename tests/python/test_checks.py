@@ -9,7 +9,9 @@ import twinmill_native as native
 
 from twinmill.data.checks import check_poses, check_tracks
 from twinmill.data.log import RobotLog
+from twinmill.data.measurement import load_measurements
 from twinmill.data.track import make_track
+from twinmill_cli.diagnose import robots_recorded
 
 LEVER_M, TOP_MPS, LAG_S = 0.126, 0.36, 0.07
 MECANUM = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # Muir and Neuman 1987
@@ -194,3 +196,10 @@ def test_too_few_poses_are_told(robot):
 
 def test_commands_of_another_run_are_told(robot):
     _one([replace(robot, command=_robot(seed=7).command)], "do not explain the motion")
+
+
+def test_a_table_of_several_robots_is_no_swarm(data_dir):
+    sheet = data_dir / "turbopi_actuation" / "steady_state.csv"
+    measurements = load_measurements([sheet])
+    assert len(measurements) == 4  # by the table's description
+    assert robots_recorded(sheet, measurements) == 0

@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 from rich.console import RenderableType
 
-from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.detections.add import BitAddition, add_to_camera, is_of_camera
 from twinmill.files import check_new_file, check_new_folder
 from twinmill.fitting.add import AddResult, add
@@ -26,6 +25,7 @@ from twinmill.report import (
     write_report,
 )
 from twinmill.report import detections as bits
+from twinmill_cli import inputs
 from twinmill_cli.effects import find_effect
 from twinmill_cli.options import Force, Logs, Model, NewModel, Out
 from twinmill_cli.output import AsJson, busy, deliver
@@ -56,9 +56,11 @@ def _compare(
     """
     source = provenance(command_line("compare", logs, model), model_file := open_model(model, out))
     with busy(f"comparing with {model}"):
-        result = compare(load_measurements(logs), model_file)
+        measurements = inputs.load(logs, model_file, as_json)
+        result = compare(measurements, model_file)
     section = comparison_section(result)
-    finish(result.to_json(), show.comparison(result), source, section, as_json, out)
+    data = {**result.to_json(), **inputs.told(measurements)}
+    finish(data, show.comparison(result), source, section, as_json, out)
     return result
 
 
@@ -79,9 +81,11 @@ def _fit(
     )
     check_output(output, model_file, force)
     with busy(f"fitting {model}"):
-        result = fit(load_measurements(logs), model_file, output, source.command)
+        measurements = inputs.load(logs, model_file, as_json)
+        result = fit(measurements, model_file, output, source.command)
     section = fit_section(result)
-    finish(result.to_json(), show.fit(result), source, section, as_json, out)
+    data = {**result.to_json(), **inputs.told(measurements)}
+    finish(data, show.fit(result), source, section, as_json, out)
     return result
 
 
@@ -122,18 +126,19 @@ def _add(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
     check_output(output, model_file, force)
+    measurements = inputs.load(logs, model_file, as_json)
     if is_of_camera(effect):
         with busy(f"adding {effect} to {model}"):
-            seen = add_to_camera(
-                effect, load_measurements(logs), model_file, output, source.command
-            )
+            seen = add_to_camera(effect, measurements, model_file, output, source.command)
         section = bits.addition_section(seen, model_file.path.name)
-        finish(seen.to_json(), bits.addition(seen), source, section, as_json, out)
+        data = {**seen.to_json(), **inputs.told(measurements)}
+        finish(data, bits.addition(seen), source, section, as_json, out)
         return seen
     with busy(f"adding {effect} to {model}"):
-        result = add(effect, load_measurements(logs), model_file, output, source.command, texts)
+        result = add(effect, measurements, model_file, output, source.command, texts)
     section = added_section(result)
-    finish(result.to_json(), show.added(result), source, section, as_json, out)
+    data = {**result.to_json(), **inputs.told(measurements)}
+    finish(data, show.added(result), source, section, as_json, out)
     return result
 
 

@@ -7,13 +7,15 @@ from pathlib import Path
 import typer
 
 from twinmill.data.log import read_log
-from twinmill.data.measurement import load_measurements
+from twinmill.data.measurement import Measurements
+from twinmill.data.steady_table import is_sheet
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import Explanation, explain
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.model.model_file import DEFAULT_MODEL
 from twinmill.report import diagnosis as present
 from twinmill.swarm.metrics import swarm_metrics
+from twinmill_cli import inputs
 from twinmill_cli.calibrate import check_output, command_line, finish, open_model, provenance
 from twinmill_cli.compare_swarm import LOOK, compare_swarm
 from twinmill_cli.options import Force, Logs, Model, NewModel, Out
@@ -41,18 +43,25 @@ def _diagnose(
     """
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with telling(f"diagnosing with {model}") as say:
-        measurements = load_measurements(logs)
+        measurements = inputs.load(logs, model_file, as_json)
         result = diagnose(measurements, model_file, say)
         swarm = None
-        if len({m.label for m in measurements if m.log_name == logs[0].name}) > 1:
+        if robots_recorded(logs[0], measurements) > 1:
             say("the swarm as a whole")
             note, swarm = _judge_swarm(logs[0], result)
             result = replace(result, notes=[*result.notes, note])
-    data = {**result.to_json(), "swarm": swarm}
+    data = {**result.to_json(), **inputs.told(measurements), "swarm": swarm}
     if data["next_experiment"]:  # the script comes from a command of its own
         data["next_experiment"]["command"] = command_line("next", logs, model)
     finish(data, present.terminal(result), source, present.section(result), as_json, out)
     return result
+
+
+def robots_recorded(path: Path, measurements: Measurements) -> int:
+    """How many robots drove together in this log; none in a table of separate drives."""
+    if is_sheet(path):
+        return 0
+    return len({m.label for m in measurements if m.log_name == path.name})
 
 
 def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
@@ -98,7 +107,9 @@ def _explain(
     )
     check_output(output, model_file, force)
     with telling(f"explaining with {model}") as say:
-        result = explain(load_measurements(logs), model_file, output, source.command, say)
+        measurements = inputs.load(logs, model_file, as_json)
+        result = explain(measurements, model_file, output, source.command, say)
     section = present.section(result.diagnosis)
-    finish(result.to_json(), present.terminal_explanation(result), source, section, as_json, out)
+    data = {**result.to_json(), **inputs.told(measurements)}
+    finish(data, present.terminal_explanation(result), source, section, as_json, out)
     return result

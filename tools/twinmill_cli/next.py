@@ -9,7 +9,6 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.experiment.design import Limits, Plan, check, design
 from twinmill.experiment.script_file import csv_text
@@ -17,6 +16,7 @@ from twinmill.files import check_new_file
 from twinmill.fitting.compare import open_scenes
 from twinmill.model.model_file import DEFAULT_MODEL, write_whole
 from twinmill.report import next_run as present
+from twinmill_cli import inputs
 from twinmill_cli.calibrate import command_line, finish, open_model, provenance
 from twinmill_cli.options import Logs, Model, Out
 from twinmill_cli.output import AsJson, telling
@@ -59,7 +59,7 @@ def _next(
     )
     check_new_file(output, force)
     with telling(f"designing a run with {model}") as say:
-        measurements = load_measurements(logs)
+        measurements = inputs.load(logs, model_file, as_json)
         check(open_scenes(measurements, model_file), limits)
         plan = design(diagnose(measurements, model_file, say), model_file, limits, say)
     write_whole(output, csv_text(plan.rows))

@@ -143,7 +143,7 @@ def _no_heading(subject: Subject, share: float) -> InputFinding:
     return subject.finding(
         "the heading is not recorded, and the commands turn the robot",
         f"in {share:.0%} of the time",
-        "record the heading; positions alone tell of a robot that holds its heading",
+        "record the heading, since positions alone tell only of a robot that holds it",
     )
 
 

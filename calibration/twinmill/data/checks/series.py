@@ -70,15 +70,14 @@ def check_track(track: Track, label: str) -> list[InputFinding]:
         add(
             "many poses are lost",
             f"{timing.pose_lost_share:.0%} of the frames while the robot is tracked",
-            "look for hidden markers or a full network; what changes quickly is judged on fewer "
-            "poses",
+            "look for hidden markers or a full network, since fewer poses show quick changes worse",
         )
     closed_loop = abs(timing.command_period_s / timing.pose_period_s - 1) < 0.2
     if timing.pose_period_s > SLOW_S and not closed_loop:
         add(
             "the poses come slowly",
             f"{1 / timing.pose_period_s:.1f} in a second",
-            "record at 10 Hz or more; lags, delays and starts cannot be judged from so few",
+            "record at 10 Hz or more, since lags, delays and starts cannot be judged from so few",
         )
     noise_rad = _heading_noise_rad(track) if track.has_heading else 0.0
     if noise_rad > NONSENSE_RAD:
