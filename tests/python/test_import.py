@@ -111,18 +111,17 @@ def test_heading_offset_and_shift_move_the_poses_alone(imported):
 @pytest.mark.parametrize(
     ("poses", "commands", "sentence"),
     [
-        (POSES.replace("theta_rad", "theta"), COMMANDS, r"theta_rad is missing.*--rename theta="),
+        (POSES.replace("theta_rad", "theta"), COMMANDS, r"'theta' has no unit.*--rename theta="),
         (POSES.replace("0.3", "x"), COMMANDS, r"p\.csv: row 4: x_m is 'x', not a number"),
-        (POSES.replace("1.0,4", "0.2,4"), COMMANDS, r"row 4: t_s is 0\.2, .*not earlier"),
         (POSES.replace("1.0,4", "1.0,123"), COMMANDS, r"row 4: robot_id is 123, .*0\.\.99"),
         (POSES + "1,4,0\n", COMMANDS, r"row 5: has 3 cells"),
         ("", COMMANDS, r"p\.csv: has no rows"),
-        (POSES.replace("robot_id", "robot"), COMMANDS, r"robot_id is missing.*--robot-id"),
+        (POSES.replace("robot_id", "number"), COMMANDS, r"robot_id is missing.*--robot-id"),
         (POSES, COMMANDS.replace("-100", "-101"), r"row 3: rr_pct is -101, .*-100\.\.100"),
         (POSES, COMMANDS.replace("-100", "12.5"), r"row 3: rr_pct is 12\.5, .*whole"),
         (POSES, COMMANDS.replace("-100", ""), r"row 3: rr_pct is '', not a number"),
         (POSES, COMMANDS.replace("-100", "inf"), r"row 3: rr_pct is inf, .*finite"),
-        (POSES, COMMANDS.replace("rr_pct", "rr"), r"rr_pct is missing \(nearest is 'rr'\)"),
+        (POSES, COMMANDS.replace("rr_pct", "rr"), r"'rr' has no unit .*percent"),
         (
             POSES.replace("x_m,", "")
             .replace(",0.1,", ",")

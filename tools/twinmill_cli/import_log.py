@@ -9,8 +9,10 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from twinmill.data.importers.import_log import ImportOptions, import_log
+from twinmill.data.importers.columns import Guess, to_toml
+from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
 from twinmill.data.log import LogError
+from twinmill.files import replacing
 from twinmill.report import show
 from twinmill.report.tables import Cell, Table
 
@@ -23,7 +25,9 @@ def register(app: typer.Typer) -> None:
 
 
 def _command(
-    out: Annotated[Path, typer.Option("--out", "-o", help="The log to write (.lcmlog).")],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="The log to write (.lcmlog).")
+    ] = None,
     poses: Annotated[
         Path | None,
         typer.Option(
@@ -63,10 +67,30 @@ def _command(
     robot_id: Annotated[int | None, typer.Option(help="For files of one robot.")] = None,
     rename: Annotated[
         list[str] | None,
-        typer.Option(metavar="OLD=NEW", help="Read column OLD of the CSV files as NEW."),
+        typer.Option(
+            metavar="OLD=NEW", help="Read column OLD of the CSV files as NEW, as in yaw=theta_deg."
+        ),
+    ] = None,
+    mapping: Annotated[
+        Path | None, typer.Option(help="TOML file that says which column is what.")
+    ] = None,
+    explain_columns_to: Annotated[
+        Path | None,
+        typer.Option(
+            "--explain-columns",
+            metavar="FILE",
+            help="Say what each column looks like, and write that as a mapping to FILE.",
+        ),
+    ] = None,
+    flip: Annotated[
+        list[str] | None,
+        typer.Option(metavar="COLUMN", help="Change the sign of one of our columns, as in y_m."),
     ] = None,
     up: Annotated[str, typer.Option(help="Axis that is up in the Motive export: y or z.")] = "y",
     pose_shift_s: Annotated[float, typer.Option(help="Added to the times of poses.")] = 0.0,
+    pose_clock_ppm: Annotated[
+        float, typer.Option(help="By which the poses' clock gains on the commands', taken out.")
+    ] = 0.0,
     heading_offset_deg: Annotated[
         float,
         typer.Option(help=("From the tracked body's x axis to the robot's front, left positive.")),
@@ -90,7 +114,15 @@ def _command(
     try:
         if up not in ("y", "z"):
             raise LogError(f"--up {up}: must be y or z.")
+        if explain_columns_to:
+            _explain(explain_columns(poses, commands), explain_columns_to, force)
+            return
+        if out is None:
+            raise LogError("--out is missing: name the log to write.")
         options = ImportOptions(
+            mapping=mapping,
+            flips=frozenset(flip or []),
+            pose_clock_ppm=pose_clock_ppm,
             robot_id=robot_id,
             rename=dict(_pair(text, "--rename OLD=NEW") for text in rename or []),
             robots={
@@ -113,6 +145,24 @@ def _command(
         typer.echo(json.dumps(summary))
     else:
         _print(summary)
+
+
+def _explain(guesses: dict[str, list[Guess]], out: Path, force: bool) -> None:
+    """What each column was taken for, on the terminal and as a mapping file."""
+    if not guesses:
+        raise LogError("--explain-columns: give the tables with --poses and --commands.")
+    with replacing(out, force) as temporary:
+        temporary.write_text(to_toml(guesses), encoding="utf-8")
+    for kind, columns in guesses.items():
+        rows = [[g.column, ", ".join(g.targets) or "-", g.why] for g in columns]
+        table = Table(
+            kind,
+            ["column", "is", "because"],
+            [[Cell(text) for text in row] for row in rows],
+            words=(0, 1, 2),
+        )
+        Console().print(show.table(table))
+    typer.echo(f"Check {out}, then import with --mapping {out}")
 
 
 def _pair(text: str, form: str) -> tuple[str, str]:

@@ -8,7 +8,7 @@ import io
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TextIO
 
@@ -53,6 +53,27 @@ class Table:
     rows: list[list[str]]
     line: list[int]
     known: frozenset[str]  # columns that have a meaning: never proposed for renaming
+    factor: dict[str, float] = field(default_factory=dict)  # of columns in another unit
+
+    def under(self, sources: dict, flips: frozenset[str]) -> "Table":
+        """The same cells under other names and in other units; columns that nobody names stay."""
+        place = {name: k for k, name in enumerate(self.header)}
+        taken = {source.column for source in sources.values()}
+        rest = [name for name in self.header if name not in taken and name not in sources]
+        rows = [
+            [
+                *(
+                    row[place[s.column]] if s.column else repr(float(s.value))
+                    for s in sources.values()
+                ),
+                *(row[place[name]] for name in rest),
+            ]
+            for row in self.rows
+        ]
+        factor = {
+            name: source.factor * (-1 if name in flips else 1) for name, source in sources.items()
+        }
+        return replace(self, header=[*sources, *rest], rows=rows, factor=factor)
 
     def has(self, *columns: str) -> bool:
         """Whether all these columns are there."""
@@ -80,7 +101,7 @@ class Table:
         if empty_is_nan:
             cells = [cell or "nan" for cell in cells]
         try:
-            return np.array([float(cell) for cell in cells])
+            return np.array([float(cell) for cell in cells]) * self.factor.get(column, 1.0)
         except ValueError:
             bad = next(k for k, cell in enumerate(cells) if not _is_number(cell))
             raise LogError(

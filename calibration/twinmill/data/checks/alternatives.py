@@ -124,6 +124,7 @@ class Search:
         self.fold = np.arange(blocks) % 2
         self.felt = felt or {lag_s: motion.felt(lag_s) for lag_s in LAGS_S}
         self.starts = np.searchsorted(motion.block, np.arange(blocks))
+        self._own_key: list[tuple[float, float]] = []
         self._keys: dict[tuple, list[tuple[float, float]]] = {}
 
     def _by_block(self, rows: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -160,14 +161,22 @@ class Search:
             self._keys[sign, mirrored] = ranked[:TRIED]
         return self._keys[sign, mirrored]
 
+    def own(self) -> Explained:
+        """The columns as they are, at the lag and the shift where they explain most of all."""
+        keys = [(lag_s, late_s) for lag_s in self.felt for late_s in self.lates_s]
+        own = self._best_of([OWN], 1, False, False, keys)[0]
+        self._own_key = [(own.lag_s, own.late_s)]
+        return own
+
     def best(self, alternatives: list[Alternative]) -> list[Explained]:
-        """Each at the lag and the shift where it explains most."""
+        """Each at the lag and the shift where it explains most, of those that are likely."""
         found: list[Explained] = []
         by_pose: dict[tuple, list[Alternative]] = {}
         for a in alternatives:
             by_pose.setdefault((a.heading_sign, a.mirrored, a.turned), []).append(a)
         for (sign, mirrored, turned), group in by_pose.items():
-            found += self._best_of(group, sign, mirrored, turned)
+            keys = self._likely(self.motion.body_mps(sign, mirrored), sign, mirrored)
+            found += self._best_of(group, sign, mirrored, turned, [*keys, *self._own_key])
         return found
 
     def at_rate(self, own: Explained, rate: float) -> Explained:
@@ -189,7 +198,12 @@ class Search:
         return best
 
     def _best_of(
-        self, group: list[Alternative], sign: int, mirrored: bool, turned: bool
+        self,
+        group: list[Alternative],
+        sign: int,
+        mirrored: bool,
+        turned: bool,
+        keys: list[tuple[float, float]],
     ) -> list[Explained]:
         body = self.motion.body_mps(sign, mirrored)
         # (A, 3, 4): velocity by column under each alternative.
@@ -198,7 +212,7 @@ class Search:
         )
         least = np.full(len(group), np.inf)
         places: list = [None] * len(group)
-        for key in self._likely(body, sign, mirrored):
+        for key in keys:
             rows = self.motion.at(self.felt[key[0]], key[1])
             gram = self._by_block(rows, rows)
             angle = self._angle(rows, body) if turned else 0.0

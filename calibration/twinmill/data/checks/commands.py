@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinmill.data.checks.alternatives import (
-    OWN,
     Explained,
     Search,
     pose_alternatives,
@@ -25,7 +24,7 @@ TURNED_RAD = 0.35  # more than any heading bias
 ALIKE, ALIKE_LEFT = 1.3, 0.003  # times and beside what the best leaves: as good as the best
 UNRELATED = 0.85  # share left at which commands and poses have nothing to do with each other
 LEAST_MPS = 0.01  # RMS speed below which nothing is said of a robot that hardly moves
-FEWEST_BLOCKS = 6
+FEWEST_BLOCKS = 8
 UNITS = (  # measured over commanded speed, and what it says
     ((300.0, 3000.0), "the positions are in millimetres", "name the columns x_mm and y_mm"),
     ((30.0, 300.0), "the positions are in centimetres", "name the columns x_cm and y_cm"),
@@ -68,7 +67,7 @@ def check_commands(subject: Subject) -> tuple[list[InputFinding], Search | None,
         return [], None, None
     body = subject.body if track.has_heading else subject.body * np.array([[1], [1], [0]])
     search = Search(motion, body)
-    own = search.best([OWN])[0]
+    own = search.own()
     speed_mps = float(np.sqrt(np.mean(np.abs(motion.world_mps) ** 2)))
     if speed_mps < LEAST_MPS and np.abs(motion.turn_radps).max() < 0.2:
         return [], search, own
@@ -86,7 +85,7 @@ def _mistakes(subject: Subject, search: Search, own: Explained) -> list[InputFin
     found = [e for e in found if not _is_bias(e)]
     best = min(found, key=lambda e: e.left)
     if not far_better(best, own):
-        if own.left > UNRELATED:
+        if min(own.left, best.left) > UNRELATED:
             return [_unrelated(subject, min(own.left, best.left))]
         return _units(subject, own) if own.left < 0.5 else []
     alike = [e for e in found if e.left < ALIKE * best.left + ALIKE_LEFT]

@@ -4,7 +4,7 @@
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from twinmill.data.checks.alternatives import OWN, Explained, Search
+from twinmill.data.checks.alternatives import Explained, Search
 from twinmill.data.checks.commands import Subject, far_better
 from twinmill.data.checks.finding import InputFinding
 
@@ -48,4 +48,4 @@ def _explained(
 ) -> Explained:
     """How well the commands of one explain the poses of another."""
     commands, motion = of_commands[1], of_poses[1].motion
-    return Search(motion, commands.wheels, commands.felt, np.array(lates_s)).best([OWN])[0]
+    return Search(motion, commands.wheels, commands.felt, np.array(lates_s)).own()

@@ -13,7 +13,7 @@ FLAT_M = 0.05  # what a height varies by on a floor
 NOISE_RAD, NONSENSE_RAD = np.radians(3), np.radians(20)
 LOST_SHARE = 0.2
 SLOW_S = 0.15
-SHORT_S = 14.0
+SHORT_S = 13.0
 STILL_RAD = 1e-6
 
 

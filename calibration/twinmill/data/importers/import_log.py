@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import tomlkit
 
+from twinmill.data.importers.columns import Guess, explain, read_mapping
 from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
 from twinmill.data.importers.motive import read_motive
-from twinmill.data.importers.plain import read_commands, read_poses
+from twinmill.data.importers.plain import KNOWN, Columns, read_commands, read_poses
 from twinmill.data.importers.series import CommandSeries, PoseSeries, in_body_frame, multiply
 from twinmill.data.log import Log, LogError, read_log
+from twinmill.data.measurement_table import read_table
 from twinmill.data.track import make_track
 from twinmill.files import replacing
 
@@ -27,9 +29,12 @@ class ImportOptions:
     Attributes:
         robot_id: whose the rows are, for files that do not say.
         robots: robot_id by name of a Motive rigid body.
-        rename: column in a plain CSV file to column as we name it.
+        rename: column in a plain CSV file to column as we name it, or with another unit.
+        mapping: file that says which column is what, in place of `rename`.
+        flips: our columns that are to change their sign.
         up: "y" or "z", the axis that a Motive export calls up.
         pose_shift_s: added to the stamps of all poses.
+        pose_clock_ppm: by which the poses' clock gains on the commands', taken out.
         heading_offset_rad: from the tracked body's x axis to the robot's front, left positive.
         same_clock: one clock stamped poses and commands: no offset is estimated.
         force: replace an output that exists.
@@ -38,8 +43,11 @@ class ImportOptions:
     robot_id: int | None = None
     robots: dict[str, int] = field(default_factory=dict)
     rename: dict[str, str] = field(default_factory=dict)
+    mapping: Path | None = None
+    flips: frozenset[str] = frozenset()
     up: str = "y"
     pose_shift_s: float = 0.0
+    pose_clock_ppm: float = 0.0
     heading_offset_rad: float = 0.0
     same_clock: bool = False
     force: bool = False
@@ -85,11 +93,11 @@ def import_log(
     pose_series = (
         read_motive(motive, options.robots, options.up, absolute=bool(io_tsv))
         if motive
-        else read_poses(poses, options.rename, options.robot_id)
+        else read_poses(poses, _columns(options, "poses"))
     )
     pose_series = [_moved(series, options) for series in pose_series]
     command_series = (
-        read_commands(commands, options.rename, options.robot_id)
+        read_commands(commands, _columns(options, "commands"))
         if commands
         else [read_io_tsv(path, options.robot_id) for path in io_tsv]
     )
@@ -102,8 +110,26 @@ def import_log(
     sources = [path for path in (poses, motive, commands, *io_tsv) if path is not None]
     with replacing(out, options.force) as temporary:
         write_log(temporary, pose_series, command_series, _provenance(sources, options))
-        warnings = [text for series in command_series for text in series.warnings]
+        warnings = [w for series in (*pose_series, *command_series) for w in series.warnings]
         return _summary(read_log(temporary), out, warnings)
+
+
+def _columns(options: ImportOptions, kind: str) -> Columns:
+    """How to read the table of poses, or that of commands."""
+    if unknown := options.flips - KNOWN:
+        raise LogError(
+            f"--flip {min(unknown)}: is none of our columns; they are {', '.join(sorted(KNOWN))}."
+        )
+    mapping = read_mapping(options.mapping, kind, KNOWN) if options.mapping else None
+    return Columns(options.rename, mapping, options.flips, options.robot_id)
+
+
+def explain_columns(poses: Path | None, commands: Path | None) -> dict[str, list[Guess]]:
+    """What the columns of both tables look like, by `poses` and `commands`."""
+    tables = {"poses": poses, "commands": commands}
+    return {
+        kind: explain(read_table(path, {}, KNOWN), KNOWN) for kind, path in tables.items() if path
+    }
 
 
 def _moved(series: PoseSeries, options: ImportOptions) -> PoseSeries:
@@ -112,11 +138,18 @@ def _moved(series: PoseSeries, options: ImportOptions) -> PoseSeries:
     turn = np.array([np.cos(half), 0, 0, np.sin(half)])
     return PoseSeries(
         series.robot_id,
-        series.utime_us + round(options.pose_shift_s * 1e6),
+        _on_our_clock(series.utime_us, options),
         series.position_m,
         multiply(series.orientation_wxyz, turn),
         series.valid,
+        series.warnings,
     )
+
+
+def _on_our_clock(utime_us: np.ndarray, options: ImportOptions) -> np.ndarray:
+    """Stamps without the drift, counted from the first, and shifted."""
+    since_us = (utime_us - utime_us[0]) / (1 + 1e-6 * options.pose_clock_ppm)
+    return utime_us[0] + np.round(since_us).astype(np.int64) + round(options.pose_shift_s * 1e6)
 
 
 def _check_times(poses: list[PoseSeries], commands: list[CommandSeries]) -> None:
@@ -163,6 +196,9 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
                 "up": options.up,
                 "same_clock": options.same_clock,
                 "pose_shift_s": options.pose_shift_s,
+                "pose_clock_ppm": options.pose_clock_ppm,
+                "mapping": options.mapping.read_text() if options.mapping else "",
+                "flips": sorted(options.flips),
                 "heading_offset_rad": options.heading_offset_rad,
                 "rename": options.rename,
             }

@@ -35,7 +35,7 @@ def write_log(
         streams.append(_run_event(series, config_toml))
         streams.append(
             _telemetry_events(series, end_us.get(series.robot_id, 0))
-            if series.kind == "duty"
+            if series.kind == "duty" and not np.any(series.value % 1)  # a board's own, in percent
             else _drive_events(series)
         )
     log = lcm.EventLog(str(path), "w", overwrite=True)

@@ -2,14 +2,17 @@
 """Poses and commands from plain CSV files, as described under `twinmill import --help`."""
 
 import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import turbopi
 
+from twinmill.data.importers.columns import Mapping, read_mapped
 from twinmill.data.importers.series import CommandSeries, PoseSeries, quaternion_from_heading
 from twinmill.data.log import CommandKind, LogError
-from twinmill.data.measurement_table import Table, read_table
+from twinmill.data.measurement_table import Table
 from twinmill.model.mixing import duties_from_inputs
 
 HEADING_LIKE = re.compile(r"theta|yaw|heading|psi|orient|angle|rot|^q_?[wxyz0-3]$", re.IGNORECASE)
@@ -38,20 +41,38 @@ KNOWN = frozenset(
 )
 
 
-def read_poses(path: Path, rename: dict[str, str], robot_id: int | None) -> list[PoseSeries]:
+@dataclass(frozen=True)
+class Columns:
+    """How to read a table: as `columns.read_mapped`, and whose rows they are.
+
+    Attributes:
+        rename, mapping, flips: as there.
+        robot_id: of all rows, for files without that column.
+    """
+
+    rename: dict[str, str] = field(default_factory=dict)
+    mapping: Mapping | None = None
+    flips: frozenset[str] = frozenset()
+    robot_id: int | None = None
+
+    def read(self, path: Path) -> Table:
+        """The table under our names."""
+        return read_mapped(path, KNOWN, self.mapping, self.rename, self.flips)
+
+
+def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:
     """Poses by robot; empty or NaN cells are poses that were lost.
 
     Args:
         path: CSV with t_s, robot_id, x_m, y_m, and theta_rad or QUATERNION where the heading was
             recorded; optional z_m, valid.
-        rename: columns, old name to new.
-        robot_id: of all rows, for files without that column.
+        columns: how to read it.
 
     Raises:
         LogError: as read_table; a wrong value, with its row.
     """
-    table = read_table(path, rename, KNOWN)
-    ids, utime_us = _robot_ids(table, robot_id), _utime_us(table)
+    table = columns.read(path)
+    ids, utime_us = _robot_ids(table, columns.robot_id), _utime_us(table)
     height = table.numbers("z_m", True) if table.has("z_m") else np.zeros(len(ids))
     position = np.column_stack([table.numbers("x_m", True), table.numbers("y_m", True), height])
     orientation = _orientation(table)
@@ -61,28 +82,25 @@ def read_poses(path: Path, rename: dict[str, str], robot_id: int | None) -> list
     if table.has("valid"):
         valid &= table.finite("valid") != 0
     position[~valid] = orientation[~valid] = np.nan
-    _refuse_unsorted(table, ids, utime_us)
     return [
-        PoseSeries(number, utime_us[rows], position[rows], orientation[rows], valid[rows])
-        for number in np.unique(ids).tolist()
-        for rows in [ids == number]
+        PoseSeries(number, utime_us[rows], position[rows], orientation[rows], valid[rows], notes)
+        for number, rows, notes in _by_robot(table, ids, utime_us)
     ]
 
 
-def read_commands(path: Path, rename: dict[str, str], robot_id: int | None) -> list[CommandSeries]:
+def read_commands(path: Path, columns: Columns) -> list[CommandSeries]:
     """Commands by robot.
 
     Args:
         path: CSV with t_s, robot_id and one group of VALUES, INPUTS or WORLD (inputs may stand
             beside duties, omega_radps beside WORLD); each row is held until the next.
-        rename: columns, old name to new.
-        robot_id: of all rows, for files without that column.
+        columns: how to read it.
 
     Raises:
         LogError: as read_table; a wrong value, with its row.
     """
-    table = read_table(path, rename, KNOWN)
-    ids, utime_us = _robot_ids(table, robot_id), _utime_us(table)
+    table = columns.read(path)
+    ids, utime_us = _robot_ids(table, columns.robot_id), _utime_us(table)
     kind, world = _kind(table), table.has(*WORLD)
     inputs = (
         np.column_stack([_input(table, name) for name in INPUTS])
@@ -94,7 +112,6 @@ def read_commands(path: Path, rename: dict[str, str], robot_id: int | None) -> l
             np.abs(inputs[:, k]) > limit, name, inputs[:, k], f"must lie in -{limit}..{limit}"
         )
     value = _values(table, kind, inputs)
-    _refuse_unsorted(table, ids, utime_us)
     return [
         CommandSeries(
             number,
@@ -103,12 +120,12 @@ def read_commands(path: Path, rename: dict[str, str], robot_id: int | None) -> l
             value[rows],
             kind == "duty",
             inputs[rows],
-            np.zeros((np.count_nonzero(rows), 2), int),
+            np.zeros((len(rows), 2), int),
             turbopi.telemetry_t.MODE_SCRIPT,
+            warnings=notes,
             world=world,
         )
-        for number in np.unique(ids).tolist()
-        for rows in [ids == number]
+        for number, rows, notes in _by_robot(table, ids, utime_us)
     ]
 
 
@@ -147,9 +164,10 @@ def _values(table: Table, kind: CommandKind, inputs: np.ndarray) -> np.ndarray:
         value[:, k] = table.finite(name)
         if kind == "duty":
             table.refuse(np.abs(value[:, k]) > 100, name, value[:, k], "must lie in -100..100")
-            table.refuse(
-                value[:, k] % 1 != 0, name, value[:, k], "the motor board takes whole percent"
-            )
+            if table.factor.get(name, 1.0) in (1.0, -1.0):
+                table.refuse(
+                    value[:, k] % 1 != 0, name, value[:, k], "the motor board takes whole percent"
+                )
     return value
 
 
@@ -186,9 +204,19 @@ def _utime_us(table: Table) -> np.ndarray:
     return np.round(table.finite("t_s") * 1e6).astype(np.int64)
 
 
-def _refuse_unsorted(table: Table, ids: np.ndarray, utime_us: np.ndarray) -> None:
-    late = np.zeros(len(ids), bool)
-    for number in np.unique(ids):
+def _by_robot(
+    table: Table, ids: np.ndarray, utime_us: np.ndarray
+) -> Iterator[tuple[int, np.ndarray, list[str]]]:
+    """Each robot, its rows in order of time, each stamp once (the last row), and what was done."""
+    for number in np.unique(ids).tolist():
         rows = np.flatnonzero(ids == number)
-        late[rows[1:]] = np.diff(utime_us[rows]) <= 0
-    table.refuse(late, "t_s", utime_us / 1e6, "the row before of this robot is not earlier")
+        stamps = utime_us[rows]
+        late = int(np.count_nonzero(np.diff(stamps) < 0))
+        rows = rows[np.argsort(stamps, kind="stable")]
+        last = np.append(np.diff(utime_us[rows]) > 0, True)
+        where = f"{table.name}: robot {number}: "
+        notes = [f"{where}{late} rows are earlier than the row before; sorted."] if late else []
+        if not last.all():
+            double = np.count_nonzero(~last)
+            notes.append(f"{where}{double} rows repeat a stamp; the last of each was kept.")
+        yield number, rows[last], notes

@@ -20,6 +20,7 @@ class PoseSeries:
         position_m: (N, 3) in W, z up.
         orientation_wxyz: (N, 4) unit quaternions; all NaN where the heading was not recorded.
         valid: (N,) bool; elsewhere position and orientation are NaN.
+        warnings: sentences.
     """
 
     robot_id: int
@@ -27,6 +28,7 @@ class PoseSeries:
     position_m: np.ndarray
     orientation_wxyz: np.ndarray
     valid: np.ndarray
+    warnings: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables as people have them: units, usual names, order of rows, and the mapping file."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from twinmill.data.importers.import_log import ImportOptions, import_log
+from twinmill.data.log import LogError, read_log
+from twinmill_cli.main import app
+
+POSES = "t_s,robot_id,x_m,y_m,theta_rad\n0,4,0,0,0\n1,4,0.5,0.25,0.5\n2,4,1,0.5,1\n"
+COMMANDS = "t_s,robot_id,fl_pct,fr_pct,rl_pct,rr_pct\n0,4,10,20,30,40\n"
+
+
+@pytest.fixture
+def imported(tmp_path):
+    """The robot 4 of a log made from two texts; its warnings."""
+
+    def make(poses=POSES, commands=COMMANDS, **options):
+        (tmp_path / "p.csv").write_text(poses)
+        (tmp_path / "c.csv").write_text(commands)
+        summary = import_log(
+            tmp_path / "p.csv",
+            tmp_path / "c.csv",
+            tmp_path / "o.lcmlog",
+            options=ImportOptions(force=True, **options),
+        )
+        return read_log(tmp_path / "o.lcmlog").robots[4], summary["warnings"]
+
+    return make
+
+
+def test_a_unit_in_a_name_is_converted(imported):
+    robot, _ = imported(
+        "t_ms,robot_id,x_mm,y_cm,theta_deg\n0,4,0,0,0\n1000,4,500,25,90\n2000,4,1000,50,180\n"
+    )
+    np.testing.assert_allclose(robot.pose_t_s, [0, 1, 2])
+    np.testing.assert_allclose(robot.pose[:, :2], [[0, 0], [0.5, 0.25], [1, 0.5]])
+    np.testing.assert_allclose(robot.pose[:, 2], [0, np.pi / 2, np.pi])
+
+
+def test_a_new_name_may_have_another_unit(imported):
+    robot, _ = imported(POSES.replace("theta_rad", "yaw"), rename={"yaw": "theta_deg"})
+    np.testing.assert_allclose(robot.pose[:, 2], np.radians([0, 0.5, 1]))
+
+
+@pytest.mark.parametrize(
+    ("column", "usual", "looks"), [("theta_rad", "yaw", "radians"), ("x_m", "x", "m")]
+)
+def test_a_name_without_a_unit_is_asked_about(imported, column, usual, looks):
+    with pytest.raises(LogError, match=f"'{usual}' has no unit .*looks like {looks}"):
+        imported(POSES.replace(column, usual))
+
+
+def test_rows_out_of_order_and_repeated_stamps_are_put_right_and_said(imported):
+    robot, warnings = imported(
+        "t_s,robot_id,x_m,y_m,theta_rad\n1,4,1,0,0\n0,4,0,0,0\n1,4,9,0,0\n-0.5,4,-1,0,0\n"
+    )
+    np.testing.assert_allclose(robot.pose[:, 0], [-1, 0, 9])
+    assert any("2 rows are earlier" in w for w in warnings)
+    assert any("1 rows repeat a stamp" in w for w in warnings)
+
+
+def test_signs_drift_and_shift_are_taken_out(imported):
+    robot, _ = imported(flips=frozenset({"y_m", "fl_pct"}))
+    np.testing.assert_allclose(robot.pose[:, 1], [0, -0.25, -0.5])
+    np.testing.assert_allclose(robot.command[0] * 100, [-10, 20, 30, 40])
+    robot, _ = imported(pose_clock_ppm=1000)
+    np.testing.assert_allclose(np.diff(robot.pose_t_s), 1 / 1.001, atol=1e-6)
+
+
+def test_columns_are_explained_and_the_mapping_kept(tmp_path):
+    poses, commands = tmp_path / "p.csv", tmp_path / "c.csv"
+    rows = [f"{k * 50},{k * 20},{k},{k * 2}" for k in range(60)]
+    poses.write_text("time,X,Y,yaw\n" + "\n".join(rows) + "\n")
+    commands.write_text("time,left,right\n0,-255,255\n1000,127.5,0\n")
+    mapping, out = tmp_path / "m.toml", tmp_path / "o.lcmlog"
+    files = ["import", "--poses", str(poses), "--commands", str(commands)]
+    result = CliRunner().invoke(app, [*files, "--explain-columns", str(mapping)])
+    assert result.exit_code == 0, result.output
+    words = " ".join(result.output.split())
+    assert "looks like mm" in words and "PWM of 255" in words
+    result = CliRunner().invoke(
+        app, [*files, "--mapping", str(mapping), "--robot-id", "4", "-o", str(out)]
+    )
+    assert result.exit_code == 0, result.output
+    robot = read_log(out).robots[4]
+    np.testing.assert_allclose(robot.pose_t_s[1], 0.05)
+    np.testing.assert_allclose(robot.pose[-1, 0], 1.18)
+    np.testing.assert_allclose(robot.pose[-1, 2], np.radians(118))
+    np.testing.assert_allclose(robot.command[[0, -1]], [[-1, 1, -1, 1], [0.5, 0, 0.5, 0]])
+
+
+def test_a_speed_and_a_turn_make_a_velocity_command(tmp_path):
+    (tmp_path / "p.csv").write_text(POSES)
+    (tmp_path / "c.csv").write_text("time,v,w\n0,0.2,0.5\n1.5,-0.2,0\n")
+    mapping = tmp_path / "m.toml"
+    mapping.write_text(
+        "[poses]\n"
+        + "".join(f"{n} = {{column='{n}'}}\n" for n in POSES.split("\n")[0].split(","))
+        + "[commands]\nt_s = {column='time'}\nrobot_id = {value=4}\nvx_mps = {column='v'}\n"
+        + "vy_mps = {value=0}\nomega_radps = {column='w'}\n"
+    )
+    import_log(
+        tmp_path / "p.csv",
+        tmp_path / "c.csv",
+        tmp_path / "o.lcmlog",
+        options=ImportOptions(mapping=mapping),
+    )
+    robot = read_log(tmp_path / "o.lcmlog").robots[4]
+    np.testing.assert_allclose(robot.command, [[0.2, 0, 0.5, 0], [-0.2, 0, 0, 0]])
+
+
+@pytest.mark.parametrize(
+    "text", ["x_m = 3", 'x_m = {colum="x"}', 'zz = {column="x"}', "x_m = {value='a'}", "["]
+)
+def test_a_mapping_that_makes_no_sense_is_refused_in_a_sentence(imported, tmp_path, text):
+    (tmp_path / "m.toml").write_text(f"[poses]\n{text}\n")
+    with pytest.raises(LogError, match=r"m\.toml: .*; (correct it|check the name)\.$"):
+        imported(mapping=tmp_path / "m.toml")
