@@ -32,6 +32,7 @@ void config_default(struct app_config *config)
         .width_px = core.width_px,
         .height_px = core.height_px,
         .rate_Hz = 30,
+        .frozen_ms = 2000,
         .board = "auto",
         .i2c_device = "/dev/i2c-1",
         .uart_device = "/dev/ttyAMA0",

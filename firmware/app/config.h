@@ -29,7 +29,7 @@ struct app_config
     int32_t frame_timeout_ms, duty_cap_pct;
 
     char camera[CONFIG_TEXT_MAX];
-    int32_t width_px, height_px, rate_Hz, exposure_100us, white_balance_K;
+    int32_t width_px, height_px, rate_Hz, exposure_100us, white_balance_K, frozen_ms;
 
     char board[CONFIG_TEXT_MAX];
     char i2c_device[CONFIG_TEXT_MAX], uart_device[CONFIG_TEXT_MAX];

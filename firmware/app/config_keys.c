@@ -50,6 +50,10 @@ const struct config_key config_keys[] = {
     INTEGER(rate_Hz, 1, 240, "frame rate asked for"),
     INTEGER(exposure_100us, -1, 100000, "0: locked as it is, -1: automatic"),
     INTEGER(white_balance_K, -1, 10000, "0: locked as it is, -1: automatic"),
+    INTEGER(
+        frozen_ms, 0, 60000,
+        "motors stop while the picture has been one and the same, bit for bit, for this long; 0: "
+        "never"),
     TEXT(board,
          "auto, i2c (Pi 4 kit), uart (Pi 5 kit), stub, stub:FILE that records duties, stub:camera "
          "that answers them through the camera's socket"),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "devices.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -11,6 +12,7 @@
 #include "hal_stub/stub_board.h"
 #include "hal_stub/stub_camera.h"
 #include "hal_stub/stub_panel.h"
+#include "instance.h"
 
 #define STUB_PACK_MV 8000
 
@@ -232,6 +234,29 @@ static bool use_panel(const struct app_config *config, bool dry_run, struct loop
     return true;
 }
 
+static const char *path_of(const struct app_config *config, enum loop_part part)
+{
+    const char *board = devices_board_path(config, false);
+    return part == LOOP_CAMERA  ? config->camera
+           : part == LOOP_PANEL ? config->gpio_chip
+           : board != NULL      ? board
+                                : config->board;
+}
+
+// Called after the wheels were stopped: looking for who has a device takes a while.
+static void explain(const struct app_config *config, enum loop_part part, enum fw_err err,
+                    char reason[LOOP_REASON_MAX])
+{
+    char who[INSTANCE_WHO_MAX];
+    const char *path = path_of(config, part);
+    const bool is_busy = hal_sys_last_error() == EBUSY && instance_user_of(path, who);
+    const bool is_told =
+        err == FW_ERR_NOT_ZERO || err == FW_ERR_FROZEN || hal_sys_reason()[0] == '\0';
+    (void)snprintf(reason, LOOP_REASON_MAX, "%.100s: %s%s%s", path,
+                   is_told ? fw_err_str(err) : hal_sys_reason(), is_busy ? ": " : "",
+                   is_busy ? who : "");
+}
+
 bool devices_make(const struct app_config *config, bool dry_run, struct loop_devices *devices,
                   char error[CONFIG_ERROR_MAX])
 {
@@ -242,5 +267,8 @@ bool devices_make(const struct app_config *config, bool dry_run, struct loop_dev
         return false;
     }
     use_camera(config, devices);
+    devices->config = config;
+    devices->explain = explain;
+    devices->camera_is_live = after(config->camera, "stub:") == NULL;
     return true;
 }

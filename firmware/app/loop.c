@@ -9,6 +9,8 @@
 
 #define LONGEST_WAIT_US 100000
 #define STOP_TRIES 10
+// Of a picture, for its hash: FNV-1a.
+#define HASHED_BYTES 4096
 #define STOP_PAUSE_US 10000
 
 enum fw_err loop_init(struct loop *loop, const struct app_config *config,
@@ -38,6 +40,7 @@ enum fw_err loop_init(struct loop *loop, const struct app_config *config,
     loop->script.capacity = LOOP_SCRIPT_MAX_ROWS;
     loop->battery_low_mV = config->battery_low_mV;
     loop->watchdog_ms = config->watchdog_ms;
+    loop->frozen_us = devices->camera_is_live ? (int64_t)config->frozen_ms * 1000 : 0;
     loop->may_move = true;
     // Not open yet: lost until the first step opens it.
     loop->lost[LOOP_CAMERA] = FW_ERR_TIMEOUT;
@@ -120,6 +123,24 @@ static void open_camera(struct loop *loop)
     loop_lose(loop, LOOP_CAMERA, err);
 }
 
+// Noise makes every picture of a real camera another: the same one for long comes from a driver
+// that repeats itself, whatever its stamps say. Looks at some thousand bytes of all rows.
+static bool is_frozen(struct loop *loop, const struct fw_frame *frame)
+{
+    const size_t stride = frame->length_bytes / HASHED_BYTES + 1;
+    uint64_t hash = 14695981039346656037u;
+    for (size_t i = 0; i < frame->length_bytes; i += stride)
+    {
+        hash = (hash ^ frame->yuyv[i]) * 1099511628211u;
+    }
+    if (hash != loop->picture_hash)
+    {
+        loop->picture_hash = hash;
+        loop->picture_since_us = loop_now_us(loop);
+    }
+    return loop->frozen_us > 0 && loop_now_us(loop) - loop->picture_since_us > loop->frozen_us;
+}
+
 // @return true if there is a new frame.
 static bool take_frame(struct loop *loop, struct fw_frame *frame)
 {
@@ -131,7 +152,8 @@ static bool take_frame(struct loop *loop, struct fw_frame *frame)
         }
         return false;
     }
-    const enum fw_err err = hal_camera_take(&loop->devices.camera, frame);
+    enum fw_err err = hal_camera_take(&loop->devices.camera, frame);
+    err = err == FW_OK && is_frozen(loop, frame) ? FW_ERR_FROZEN : err;
     if (err == FW_OK || err == FW_ERR_TIMEOUT)
     {
         return err == FW_OK;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "loop_state.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "say.h"
@@ -62,6 +63,18 @@ enum fw_err loop_drive(struct loop *loop, const int8_t wheel_duty_pct[FW_WHEEL_C
     return err;
 }
 
+static void tell_loss(const struct loop *loop, enum loop_part part, enum fw_err err)
+{
+    char reason[LOOP_REASON_MAX];
+    const struct loop_devices *devices = &loop->devices;
+    (void)snprintf(reason, sizeof reason, "%s", fw_err_str(err));
+    if (devices->explain != NULL)
+    {
+        devices->explain(devices->config, part, err, reason);
+    }
+    say("%s: %s: the robot stands still until it is back", part_names[part], reason);
+}
+
 void loop_lose(struct loop *loop, enum loop_part part, enum fw_err err)
 {
     const enum fw_err stop_err = loop_halt(loop);
@@ -70,7 +83,7 @@ void loop_lose(struct loop *loop, enum loop_part part, enum fw_err err)
     loop->retry_us[part] = loop_now_us(loop) + RETRY_US;
     if (is_new)
     {
-        say("%s: %s: the robot stands still until it is back", part_names[part], fw_err_str(err));
+        tell_loss(loop, part, err);
     }
     if (stop_err != FW_OK && loop->lost[LOOP_BOARD] == FW_OK)
     {

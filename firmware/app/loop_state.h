@@ -18,16 +18,7 @@
 #define LOOP_SCRIPT_MAX_ROWS 4096
 #define LOOP_BATTERY_READINGS 5
 
-struct loop_devices
-{
-    struct hal_camera camera;
-    struct hal_motors motors;
-    struct hal_battery battery;
-    struct hal_panel panel;
-    struct hal_clock clock;
-    // "i2c" or "uart", as in the configuration; NULL: neither.
-    const char *board;
-};
+#define LOOP_REASON_MAX 320
 
 // The parts that can be lost and come back. A robot that has lost one stands still.
 enum loop_part
@@ -37,6 +28,23 @@ enum loop_part
     LOOP_BATTERY,
     LOOP_PANEL,
     LOOP_PART_COUNT,
+};
+
+struct loop_devices
+{
+    struct hal_camera camera;
+    struct hal_motors motors;
+    struct hal_battery battery;
+    struct hal_panel panel;
+    struct hal_clock clock;
+    // "i2c" or "uart", as in the configuration; NULL: neither.
+    const char *board;
+    // Looks at the world: a picture that never changes is none. Recordings may stand still.
+    bool camera_is_live;
+    // Says which device failed, why, and what to do; NULL: the error alone is told.
+    void (*explain)(const struct app_config *config, enum loop_part part, enum fw_err err,
+                    char reason[LOOP_REASON_MAX]);
+    const struct app_config *config;
 };
 
 // A start that waits for its instant (monotonic: a clock that is set in between changes nothing),
@@ -95,6 +103,9 @@ struct loop
     // What the board took last, and when a stop is to be confirmed again (monotonic).
     int8_t wheel_duty_pct[FW_WHEEL_COUNT];
     int64_t confirm_us;
+    // What was seen, and since when it has been the same (monotonic); 0 us: never too long.
+    uint64_t picture_hash;
+    int64_t picture_since_us, frozen_us;
     // The camera's recording or the script is over.
     bool camera_over, script_over;
     uint32_t lost_report_count;

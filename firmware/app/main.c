@@ -69,7 +69,7 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
 {
     static struct loop loop;
     static struct reporter reporter;
-    struct loop_devices devices;
+    struct loop_devices devices = {0};
     struct link link;
     char error[CONFIG_ERROR_MAX];
     if (!devices_make(&options->config, options->dry_run, &devices, error))

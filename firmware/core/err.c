@@ -21,6 +21,8 @@ const char *fw_err_str(enum fw_err err)
         case FW_ERR_IO: return "device did not take or give the data";
         case FW_ERR_TIMEOUT: return "device did not answer in time";
         case FW_ERR_NOT_ZERO: return "the board says that it turns its wheels after a stop";
+        case FW_ERR_FROZEN:
+            return "one and the same picture, bit for bit: it is frozen, or covered";
         case FW_ERR_END: return "nothing more to come";
     }
     return "unknown error";

@@ -2,6 +2,7 @@
 // What a camera is asked before it streams.
 #include <errno.h>
 #include <linux/videodev2.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -22,13 +23,19 @@ static enum fw_err check_capability(struct camera_v4l2 *camera)
     const uint32_t has = capability.capabilities & V4L2_CAP_DEVICE_CAPS ? capability.device_caps
                                                                         : capability.capabilities;
     const uint32_t needed = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
-    return (has & needed) == needed ? FW_OK : FW_ERR_FORMAT;
+    if ((has & needed) != needed)
+    {
+        hal_sys_note("streams no video: a camera's second node carries no picture: try the other");
+        return FW_ERR_FORMAT;
+    }
+    return FW_OK;
 }
 
 // YUYV if the camera has it, which costs nothing to read; else Motion-JPEG.
 static enum fw_err choose_format(struct camera_v4l2 *camera)
 {
     struct v4l2_fmtdesc format = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+    char offered[96] = "";
     bool has_mjpg = false;
     for (; call(camera, VIDIOC_ENUM_FMT, &format) == 0; ++format.index)
     {
@@ -37,6 +44,9 @@ static enum fw_err choose_format(struct camera_v4l2 *camera)
             camera->is_mjpg = false;
             return FW_OK;
         }
+        const size_t used = strlen(offered);
+        (void)snprintf(offered + used, sizeof offered - used, " %.4s",
+                       (const char *)&format.pixelformat);
         has_mjpg |= format.pixelformat == V4L2_PIX_FMT_MJPEG;
     }
     if (errno != EINVAL)
@@ -44,6 +54,11 @@ static enum fw_err choose_format(struct camera_v4l2 *camera)
         return hal_sys_err(errno);
     }
     camera->is_mjpg = has_mjpg;
+    if (!has_mjpg)
+    {
+        hal_sys_note("has neither YUYV nor MJPG, but%s: name another camera",
+                     offered[0] != '\0' ? offered : " no format at all");
+    }
     return has_mjpg ? FW_OK : FW_ERR_FORMAT;
 }
 
@@ -101,6 +116,10 @@ static enum fw_err set_format(struct camera_v4l2 *camera)
         pix->width > FW_MAX_WIDTH_PX || pix->width % 2 != 0 || pix->height < 1 ||
         pix->height > FW_MAX_HEIGHT_PX || stride_bytes < row_bytes || stride_bytes > INT32_MAX)
     {
+        hal_sys_note("gives %.4s of %u x %u, not %.4s of at most %d x %d",
+                     (const char *)&pix->pixelformat, pix->width, pix->height,
+                     (const char *)&(uint32_t){pixel_format(camera)}, FW_MAX_WIDTH_PX,
+                     FW_MAX_HEIGHT_PX);
         return FW_ERR_FORMAT;
     }
     camera->width_px = (int)pix->width;

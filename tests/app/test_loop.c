@@ -116,6 +116,31 @@ static void test_frames_from_before_a_loss_decide_nothing(void)
     TEST_ASSERT_TRUE(robot.camera_is_open);
 }
 
+// Stamps and numbers go on, the picture does not.
+static void test_picture_that_never_changes_is_none(void)
+{
+    robot.config.frozen_ms = 2000;
+    robot.devices.camera_is_live = true;
+    robot_drive(VIEW_GREEN);
+    const int64_t since_us = robot.loop.picture_since_us;
+    while (!robot_stands())
+    {
+        TEST_ASSERT_LESS_OR_EQUAL_INT64(2000000 + ROBOT_PERIOD_US,
+                                        robot.hand.monotonic_us - since_us);
+        robot_steps(1);
+    }
+    TEST_ASSERT_GREATER_THAN_INT64(2000000, robot.hand.monotonic_us - since_us);
+    TEST_ASSERT_BITS_HIGH(LINK_STATUS_CAMERA_LOST, robot.report.status_flags);
+    for (int i = 0; i < 300; ++i)
+    {
+        robot_steps(1);
+        TEST_ASSERT_TRUE(robot_stands());
+    }
+    robot.green.yuyv[0] ^= 1;
+    robot_steps(30);
+    ASSERT_DUTIES(left_pct);
+}
+
 static void test_lost_board_is_stopped_before_it_moves_again(void)
 {
     robot_drive(VIEW_GREEN);
@@ -261,6 +286,7 @@ int main(void)
     RUN_TEST(test_motors_stop_200_ms_after_the_last_frame);
     RUN_TEST(test_unplugged_camera_stops_at_once_and_comes_back);
     RUN_TEST(test_frames_from_before_a_loss_decide_nothing);
+    RUN_TEST(test_picture_that_never_changes_is_none);
     RUN_TEST(test_lost_board_is_stopped_before_it_moves_again);
     RUN_TEST(test_end_of_a_recording_stops_and_is_told);
     RUN_TEST(test_button_starts_and_stops_once_per_press);

@@ -23,6 +23,8 @@ SETTINGS = (
     *("--set", "gpio_chip=/dev/gpiochip1", "--set", f"width_px={WIDTH_PX}"),
     # The emulator may be slow: only tests of it have the watchdog's own time.
     *("--set", "watchdog_ms=1000"),
+    # Pictures without noise are all alike.
+    *("--set", "frozen_ms=0"),
     *("--set", f"height_px={HEIGHT_PX}", "--lcm-url", "udpm://239.255.76.67:7667?ttl=0"),
 )
 

@@ -14,6 +14,7 @@ SETTINGS = {
     "height_px": HEIGHT_PX,
     # So that it is no missing frame that stops the motors.
     "frame_timeout_ms": 10000,
+    "frozen_ms": 0,
 }
 COMMAND_LIMIT_S = 120
 UNIT = "twinmill-robot.service"

@@ -26,6 +26,7 @@ enum fw_err
     FW_ERR_IO,
     FW_ERR_TIMEOUT,
     FW_ERR_NOT_ZERO,
+    FW_ERR_FROZEN,
     FW_ERR_END,
 };
 

@@ -23,7 +23,16 @@ struct hal_sys
 // The kernel's own.
 extern const struct hal_sys hal_sys_kernel;
 
-// Translates errno; the text for a log is strerror() of the same value.
+// Translates errno, and remembers it for this thread.
 enum fw_err hal_sys_err(int error_number);
+
+// A failure that is none of the system's calls: the words are remembered instead.
+void hal_sys_note(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+// The errno of the last failure in this thread; 0: none, or one that was noted in words.
+int hal_sys_last_error(void);
+
+// The last failure in this thread in words, and what to do about it.
+const char *hal_sys_reason(void);
 
 #endif
