@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The robot's program: reads its options, wires its parts, and lets them run.
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -79,7 +80,8 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
     }
     if (reporter_start(&reporter, &options->config, &link) != FW_OK)
     {
-        say("io_tsv: '%s': telemetry or log cannot be opened", options->config.io_tsv);
+        say("io_tsv: '%s': telemetry or log cannot be opened: %s", options->config.io_tsv,
+            strerror(errno));
         return EXIT_USAGE;
     }
     int code = prepare(options, &loop, &devices, &link);
@@ -97,7 +99,11 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
         play(&loop, options, stop_fd);
         code = end(&loop, watch);
     }
-    reporter_stop(&reporter);
+    if (!reporter_stop(&reporter))
+    {
+        say("rows of a log are lost: is the disk full?");
+        code = code == 0 ? SUPERVISOR_EXIT_LOG_LOST : code;
+    }
     return code;
 }
 

@@ -37,7 +37,8 @@ static const char help[] =
     "  turbopi: camera: works\n"
     "  turbopi: the recording is over\n"
     "\n"
-    "exit codes: 0 ended as asked, 1 failed, 2 the command line or the configuration is wrong\n"
+    "exit codes: 0 ended as asked, 1 failed, 2 the command line or the configuration is wrong,\n"
+    "            3 another program has the motor board, 4 rows of a log were lost\n"
     "Wheels off the ground at the first try: turbopi --print-config lists signs and speed cap.\n";
 
 enum option_code

@@ -6,8 +6,6 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "io_tsv.h"
-
 #define STACK_BYTES (256 * 1024)
 #define LONGEST_WAIT_MS 500
 
@@ -64,6 +62,11 @@ static int64_t monotonic_us(void)
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
+static bool has_lost_rows(const struct reporter *reporter)
+{
+    return reporter->io_tsv.lost_count > 0 || telemetry_has_lost_log(&reporter->telemetry);
+}
+
 static void pass_on(struct reporter *reporter, const struct message *message)
 {
     if (message->kind == MESSAGE_ACK)
@@ -71,10 +74,12 @@ static void pass_on(struct reporter *reporter, const struct message *message)
         telemetry_publish_ack(&reporter->telemetry, &message->ack);
         return;
     }
-    telemetry_publish(&reporter->telemetry, &message->report);
-    if (reporter->io_tsv != NULL)
+    struct link_report report = message->report;
+    report.status_flags |= has_lost_rows(reporter) ? LINK_STATUS_LOG_LOST : 0;
+    telemetry_publish(&reporter->telemetry, &report);
+    if (reporter->io_tsv.fd >= 0)
     {
-        io_tsv_add(reporter->io_tsv, &message->report);
+        io_tsv_add(&reporter->io_tsv, &report);
     }
 }
 
@@ -119,28 +124,9 @@ static bool start_thread(struct reporter *reporter)
 static void release(struct reporter *reporter)
 {
     telemetry_close(&reporter->telemetry);
-    if (reporter->io_tsv != NULL)
-    {
-        (void)fclose(reporter->io_tsv);
-    }
+    io_tsv_close(&reporter->io_tsv);
     (void)close(reporter->loop_fd);
     (void)close(reporter->thread_fd);
-}
-
-// A program that was started again goes on in the same log.
-static bool open_io_tsv(struct reporter *reporter, const struct app_config *config)
-{
-    reporter->io_tsv = fopen(config->io_tsv, "a");
-    if (reporter->io_tsv == NULL)
-    {
-        return false;
-    }
-    (void)setvbuf(reporter->io_tsv, NULL, _IOLBF, BUFSIZ);
-    if (ftell(reporter->io_tsv) == 0)
-    {
-        io_tsv_begin(reporter->io_tsv, config->vote_frames);
-    }
-    return true;
 }
 
 enum fw_err reporter_start(struct reporter *reporter, const struct app_config *config,
@@ -153,12 +139,12 @@ enum fw_err reporter_start(struct reporter *reporter, const struct app_config *c
     }
     reporter->loop_fd = fds[0];
     reporter->thread_fd = fds[1];
-    reporter->io_tsv = NULL;
+    reporter->io_tsv = (struct io_tsv){.fd = -1};
     telemetry_init(&reporter->telemetry, config, on_command, reporter);
     bool ok = true;
     if (config->io_tsv[0] != '\0')
     {
-        ok = open_io_tsv(reporter, config);
+        ok = io_tsv_open(&reporter->io_tsv, config->io_tsv, config->vote_frames);
     }
     if (!ok || !start_thread(reporter))
     {
@@ -169,9 +155,10 @@ enum fw_err reporter_start(struct reporter *reporter, const struct app_config *c
     return FW_OK;
 }
 
-void reporter_stop(struct reporter *reporter)
+bool reporter_stop(struct reporter *reporter)
 {
     (void)shutdown(reporter->loop_fd, SHUT_WR);
     (void)pthread_join(reporter->thread, NULL);
     release(reporter);
+    return !has_lost_rows(reporter);
 }

@@ -5,9 +5,9 @@
 #define APP_REPORTER_H
 
 #include <pthread.h>
-#include <stdio.h>
 
 #include "config.h"
+#include "io_tsv.h"
 #include "link.h"
 #include "telemetry.h"
 
@@ -17,8 +17,8 @@ struct reporter
     // Two ends of one connection that keeps messages whole.
     int loop_fd, thread_fd;
     struct telemetry telemetry;
-    // NULL: no such log.
-    FILE *io_tsv;
+    // Its descriptor is -1 if there is no such log.
+    struct io_tsv io_tsv;
 };
 
 // Starts the thread. @param config lives as long as the reporter.
@@ -26,7 +26,7 @@ struct reporter
 enum fw_err FW_MUST_CHECK reporter_start(struct reporter *reporter, const struct app_config *config,
                                          struct link *link);
 
-// Ends the thread after it has passed on all that it got.
-void reporter_stop(struct reporter *reporter);
+// Ends the thread after it has passed on all that it got. @return false if rows of a log were lost.
+bool reporter_stop(struct reporter *reporter);
 
 #endif

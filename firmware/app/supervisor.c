@@ -355,7 +355,7 @@ static bool drive_once(struct crew *crew, int *code)
     *code = tell_end(crew, why);
     if (crew->asked_by != 0)
     {
-        *code = stopped ? 0 : 1;
+        *code = !stopped ? 1 : *code == SUPERVISOR_EXIT_LOG_LOST ? *code : 0;
         return false;
     }
     if (*code != 1 || crew->options->config.restart_ms < 0)

@@ -16,6 +16,8 @@ int supervisor_asked_to_end(int stop_fd);
 
 // Exit code if another program has the motor board.
 #define SUPERVISOR_EXIT_HELD 3
+// Exit code if all went as asked, but rows of a log were lost.
+#define SUPERVISOR_EXIT_LOG_LOST 4
 
 // Starts the driver in a child process and again whenever it dies, until a signal asks to end or
 // the driver ends by itself with code 0 or 2. Whatever ended it, the board is told zero, before

@@ -91,6 +91,11 @@ static bool hears_commands(const struct telemetry *telemetry)
     return strncmp(telemetry->config->lcm_url, "file:", 5) != 0;
 }
 
+bool telemetry_has_lost_log(const struct telemetry *telemetry)
+{
+    return !hears_commands(telemetry) && telemetry->unsent_count > 0;
+}
+
 void telemetry_connect(struct telemetry *telemetry, int64_t now_us)
 {
     if (telemetry->lcm != NULL || telemetry->config->lcm_url[0] == '\0' ||

@@ -39,6 +39,9 @@ void telemetry_publish_ack(struct telemetry *telemetry, const struct link_ack *a
 int telemetry_fd(const struct telemetry *telemetry);
 void telemetry_handle(struct telemetry *telemetry);
 
+// Messages to a log file, unlike those to a network, are not to be lost: tells whether any was.
+bool telemetry_has_lost_log(const struct telemetry *telemetry);
+
 void telemetry_close(struct telemetry *telemetry);
 
 #endif

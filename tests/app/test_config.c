@@ -2,8 +2,12 @@
 // Tests of firmware/app/config.c, config_keys.c and io_tsv.c
 #include "config.h"
 
+#include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include "../firmware/support.h"
 #include "config_keys.h"
@@ -146,29 +150,78 @@ static void test_any_bytes_are_read_or_refused(void)
     }
 }
 
+// A log in a temporary file, and its text.
+
+static char log_path[] = "/tmp/test_config.XXXXXX";
+
+static void open_log(struct io_tsv *log)
+{
+    strcpy(log_path, "/tmp/test_config.XXXXXX");
+    const int fd = mkstemp(log_path);
+    TEST_ASSERT_TRUE(fd >= 0 && close(fd) == 0 && io_tsv_open(log, log_path, 10));
+}
+
+static const char *close_log(struct io_tsv *log)
+{
+    static char text[4096];
+    io_tsv_close(log);
+    FILE *file = fopen(log_path, "r");
+    text[fread(text, 1, sizeof text - 1, file)] = '\0';
+    fclose(file);
+    unlink(log_path);
+    return text;
+}
+
 // The authors' header and their milling, (100, 90, -0.5) when seen: left, clockwise negative.
 static void test_io_tsv_speaks_the_authors_language(void)
 {
     struct link_report report = {.utime_us = 1700000000123456};
+    struct io_tsv log;
     report.out.detected_raw = 1;
     report.out.speed_input_pct = 100;
     report.out.turn_input_milli = 500;
-    char *text = NULL;
-    size_t length = 0;
-    FILE *file = open_memstream(&text, &length);
-    io_tsv_begin(file, 10);
-    io_tsv_add(file, &report);
+    open_log(&log);
+    io_tsv_add(&log, &report);
     report.out.detected = 1;
     report.out.speed_input_pct = -50;
     report.out.turn_input_milli = 0;
-    io_tsv_add(file, &report);
-    fclose(file);
+    io_tsv_add(&log, &report);
     TEST_ASSERT_EQUAL_STRING(
         "time_ns\tdetected [0, 1]\tsmoothed_detected [0, 1] (10)\tmoves [(v, d, w), ...]\n"
         "1700000000123456000\t1\t0\t[(100, 90, -0.5)]\n"
         "1700000000123456000\t1\t1\t[(50, 270, 0)]\n",
-        text);
-    free(text);
+        close_log(&log));
+}
+
+// A file that may not grow takes a part of a row, as a full disk does: the part is taken back.
+static void test_io_tsv_loses_whole_rows_and_counts_them(void)
+{
+    struct link_report report = {.utime_us = 1700000000123456};
+    struct io_tsv log;
+    struct rlimit limit, none;
+    signal(SIGXFSZ, SIG_IGN);
+    TEST_ASSERT_EQUAL(0, getrlimit(RLIMIT_FSIZE, &none));
+    open_log(&log);
+    limit = none;
+    limit.rlim_cur = 150;
+    TEST_ASSERT_EQUAL(0, setrlimit(RLIMIT_FSIZE, &limit));
+    for (int i = 0; i < 10; ++i)
+    {
+        io_tsv_add(&log, &report);
+    }
+    TEST_ASSERT_EQUAL(0, setrlimit(RLIMIT_FSIZE, &none));
+    TEST_ASSERT_TRUE(log.is_failing);
+    const uint32_t lost_count = log.lost_count;
+    io_tsv_add(&log, &report);
+    TEST_ASSERT_EQUAL(lost_count, log.lost_count);
+    uint32_t rows = 0;
+    for (char *rest = (char *)(intptr_t)close_log(&log), *row; (row = strsep(&rest, "\n")) != NULL;)
+    {
+        rows += strncmp(row, "1700000000123456000\t0\t0\t[(0, 90, 0)]", 40) == 0;
+        TEST_ASSERT_TRUE(row[0] == '1' || row[0] == 't' || row[0] == '\0');
+    }
+    TEST_ASSERT_EQUAL(11, rows + lost_count);
+    TEST_ASSERT_GREATER_THAN(1, rows);
 }
 
 int main(void)
@@ -182,5 +235,6 @@ int main(void)
     RUN_TEST(test_long_lines_and_texts_are_refused);
     RUN_TEST(test_any_bytes_are_read_or_refused);
     RUN_TEST(test_io_tsv_speaks_the_authors_language);
+    RUN_TEST(test_io_tsv_loses_whole_rows_and_counts_them);
     return UNITY_END();
 }

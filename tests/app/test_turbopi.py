@@ -241,6 +241,23 @@ def test_io_tsv_is_read_by_the_importer(tmp_path):
     assert all(rows[t.utime_us] == list(t.wheel_duty_pct) for t in moving)
 
 
+@pytest.mark.parametrize(
+    "log",
+    [("--io-tsv", "/dev/full"), ("--lcm-url", "file:///nowhere/a.lcmlog?mode=w")],
+    ids=["full disk", "no folder"],
+)
+def test_log_that_cannot_be_written_is_told(tmp_path, log):
+    frames = tmp_path / "frames.yuyv"
+    frames.write_bytes(GREEN * 150)
+    size = ("--set", f"width_px={WIDTH_PX}", "--set", f"height_px={HEIGHT_PX}")
+    done = run(
+        *("--config", "/dev/null", "--start", "--camera", f"stub:{frames}", "--board", "stub"),
+        *("--set", "panel=none", "--set", "rate_Hz=100", "--lcm-url", "", *size, *log),
+    )
+    assert done.returncode == 4
+    assert "rows of a log are lost" in done.stderr
+
+
 def test_systemd_is_told(tmp_path):
     inbox = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     inbox.bind(str(tmp_path / "notify"))
