@@ -274,6 +274,17 @@ static void pause_for(struct crew *crew, int32_t duration_ms)
     }
 }
 
+// A driver does not move before the guard was heard: without this its first frames were lost.
+static void wait_for_guard(struct crew *crew)
+{
+    const int64_t end_us = watch_now_us() + START_PATIENCE_US;
+    keep_guard(crew);
+    while (crew->watch->beat_us[WATCH_GUARD] == 0 && watch_now_us() < end_us)
+    {
+        tick(crew);
+    }
+}
+
 // Waits for a program that is ending to let go of the board. @return false if another keeps it.
 static bool take_board(struct crew *crew)
 {
@@ -394,7 +405,7 @@ int supervise(struct options *options, driver_fn *drive)
     notify("WATCHDOG=1");
     if (settle(&crew, &code))
     {
-        keep_guard(&crew);
+        wait_for_guard(&crew);
         (void)put_to_rest(&crew);
         warn_of_vendor(options);
         while (crew.asked_by == 0 && drive_once(&crew, &code))

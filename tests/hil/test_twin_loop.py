@@ -73,6 +73,7 @@ def drive_twin(rig, words):
     pairs = {
         **{key: settings[key] for key in ("width_px", "height_px", "vote_frames")},
         "frame_timeout_ms": PATIENCE_MS,
+        "watchdog_ms": PATIENCE_MS,
     }
     arguments = itertools.chain(*(("--set", f"{key}={value}") for key, value in pairs.items()))
     with (

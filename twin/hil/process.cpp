@@ -48,8 +48,8 @@ std::vector<std::string> CommandLine(const FirmwareOptions &options, const Camer
     for (const std::string &pair :
          {set("robot_id", robot), set("width_px", camera.width_px),
           set("height_px", camera.height_px), set("vote_frames", vote_frames),
-          set("vote_window_ms", 0), set("frame_timeout_ms", kPatience_ms), set("restart_ms", -1),
-          std::string("panel=none")})
+          set("vote_window_ms", 0), set("frame_timeout_ms", kPatience_ms),
+          set("watchdog_ms", kPatience_ms), set("restart_ms", -1), std::string("panel=none")})
     {
         words.push_back("--set");
         words.push_back(pair);
