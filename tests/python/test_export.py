@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill export`: other programs find what LCM's own reader finds."""
 
+import csv
+import importlib
 import json
 import math
+import shutil
+import subprocess
 
 import lcm
 import numpy as np
@@ -15,6 +19,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from twinmill.data.importers.import_log import import_log
 from twinmill.data.log import read_log
 from twinmill.data.track import command_at
+from twinmill.export import recording
 from twinmill_cli.main import run
 
 T0_US = 1_700_000_000_000_000
@@ -174,3 +179,27 @@ def test_same_log_same_bytes(log, tmp_path):
         run(["export", str(log), "--to", "mcap", "-o", str(out), "--force"])
         made.append(out.read_bytes())
     assert made[0] == made[1]
+
+
+def test_a_new_message_is_exported_with_its_fields(write_log, tmp_path, monkeypatch):
+    """As one who adds a message to lcm_types/: a type that no code here knows."""
+    (tmp_path / "heat_t.lcm").write_text(
+        "package hot; struct heat_t { int64_t utime_us; int32_t robot_id; float motor_degC[2]; "
+        "int32_t n; double spot_degC[n]; string note; }"
+    )
+    made = [shutil.which("lcm-gen") or pytest.skip("no lcm-gen"), "-p", "--ppath", str(tmp_path)]
+    subprocess.run([*made, str(tmp_path / "heat_t.lcm")], check=True)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    heat_t = importlib.import_module("hot").heat_t
+    monkeypatch.setitem(recording.TYPES, heat_t._get_packed_fingerprint(), heat_t)
+    events = []
+    for spots in ([1.5], [2.5, 3.5]):
+        heat = heat_t()
+        heat.utime_us, heat.motor_degC, heat.note = T0_US, [40.0, 41.0], "a, b"
+        heat.n, heat.spot_degC = len(spots), spots
+        events.append(("R01_HEAT", heat))
+    run(["export", str(write_log(*events)), "--to", "csv", "-o", str(tmp_path / "out")])
+    rows = list(csv.DictReader((tmp_path / "out" / "heat.csv").open()))
+    assert [row["motor_degC_1"] for row in rows] == ["41", "41"]
+    assert [row["spot_degC_1"] for row in rows] == ["", "3.5"]
+    assert rows[0]["note"] == "a, b"

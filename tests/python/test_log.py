@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import turbopi
 
+from twinmill.data.lcm_log import decode
 from twinmill.data.log import LogError, read_log
 
 
@@ -140,3 +141,16 @@ def test_valid_pose_without_unit_quaternion_is_lost(write_log, message):
     assert log.robots[7].valid.tolist() == [False, True]
     assert np.isnan(log.robots[7].pose[0]).all()
     assert any("1 poses are marked valid" in w for w in log.warnings)
+
+
+@pytest.mark.parametrize("name", ["telemetry_t", "pose_t", "drive_t", "truth_t"])
+def test_layouts_are_those_that_lcm_writes(name):
+    kind = getattr(turbopi, name)
+    message = kind()
+    for k, field in enumerate(kind.__slots__):
+        value = getattr(message, field)
+        setattr(message, field, [k] * len(value) if isinstance(value, list) else k)
+    (row,) = decode([message.encode()], kind, "R01")
+    assert row.dtype.names[1:] == tuple(kind.__slots__)
+    for k, field in enumerate(kind.__slots__):
+        assert np.all(row[field] == k), field

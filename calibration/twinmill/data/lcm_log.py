@@ -6,8 +6,11 @@ and does not say where the file breaks. Format: sync word, event number, stamp, 
 big-endian), channel, data (LCM 1.5, lcm/eventlog.c).
 """
 
+import re
 import struct
 from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
 
 import numpy as np
 import turbopi
@@ -16,49 +19,18 @@ SYNC = b"\xed\xa1\xda\x01"
 HEADER = struct.Struct(">4sqqii")
 MAX_CHANNEL = 63  # LCM_MAX_CHANNEL_NAME_LENGTH
 
-# Wire order of lcm_types/*.lcm; `hash` is LCM's fingerprint of the type.
-LAYOUT = {
-    turbopi.telemetry_t: np.dtype(
-        [
-            ("hash", "S8"),
-            ("utime_us", ">i8"),
-            ("frame_utime_us", ">i8"),
-            ("robot_id", ">i4"),
-            ("seq", ">i4"),
-            ("frame_seq", ">i4"),
-            ("blob_px", ">i4"),
-            ("detected_raw", "i1"),
-            ("detected", "i1"),
-            ("mode", "i1"),
-            ("speed_input", ">f4"),
-            ("turn_input", ">f4"),
-            ("wheel_duty_pct", "i1", 4),
-            ("battery_V", ">f4"),
-            ("loop_us", ">i4"),
-            ("status_flags", ">i4"),
-        ]
-    ),
-    turbopi.pose_t: np.dtype(
-        [
-            ("hash", "S8"),
-            ("utime_us", ">i8"),
-            ("robot_id", ">i4"),
-            ("seq", ">i4"),
-            ("valid", "i1"),
-            ("position_m", ">f8", 3),
-            ("orientation_wxyz", ">f8", 4),
-        ]
-    ),
-    turbopi.drive_t: np.dtype(
-        [
-            ("hash", "S8"),
-            ("utime_us", ">i8"),
-            ("robot_id", ">i4"),
-            ("kind", "i1"),
-            ("value", ">f8", 4),
-        ]
-    ),
+# Fixed-size types of the LCM language, as they are on the wire.
+NUMBERS = {
+    "int8_t": "i1",
+    "byte": "u1",
+    "boolean": "i1",
+    "int16_t": ">i2",
+    "int32_t": ">i4",
+    "int64_t": ">i8",
+    "float": ">f4",
+    "double": ">f8",
 }
+FIELD = re.compile(r"^\s*(\w+)\s+(\w+)(?:\[(\d+)\])?;", re.MULTILINE)
 
 
 class LogError(ValueError):
@@ -132,18 +104,33 @@ def _event_end(data: bytes, position: int) -> int | None:
     return end if end <= len(data) else None
 
 
+@cache
+def layout_of(message: type) -> np.dtype:
+    """A type of fixed size as numpy reads it: LCM's fingerprint `hash`, then the fields.
+
+    Args:
+        message: class generated from lcm_types/<name>.lcm, which lies beside it.
+    """
+    text = files(turbopi).joinpath(f"{message.__name__}.lcm").read_text()
+    fields = [
+        (name, NUMBERS[kind], int(count)) if count else (name, NUMBERS[kind])
+        for kind, name, count in FIELD.findall(text.partition("{")[2])
+    ]
+    return np.dtype([("hash", "S8"), *fields])
+
+
 def decode(payloads: list[bytes], message: type, channel: str) -> np.ndarray:
     """Messages of one fixed-size type as a structured array, fields as in the .lcm file.
 
     Args:
         payloads: (K,) encoded messages.
-        message: class generated from the .lcm file, one of LAYOUT.
+        message: class generated from the .lcm file, of fixed size.
         channel: for the message of the error.
 
     Raises:
         LogError: if one payload is of another type.
     """
-    layout, fingerprint = LAYOUT[message], message._get_packed_fingerprint()
+    layout, fingerprint = layout_of(message), message._get_packed_fingerprint()
     for payload in payloads:
         if len(payload) != layout.itemsize or payload[:8] != fingerprint:
             raise LogError(

@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
+import turbopi
 
 from twinmill.data.importers.plain import QUATERNION, VALUES
 from twinmill.data.log import KINDS, heading_rad
@@ -63,13 +64,15 @@ def _columns(field: str, messages: list) -> Iterator[tuple[str, np.ndarray]]:
     if not isinstance(values[0], list | tuple):
         yield field, values
         return
-    array = np.array(values)
-    if field in FLAT:
-        yield from zip(FLAT[field], array.T, strict=True)
-    else:
-        yield from _by_kind(array, np.array([message.kind for message in messages]))
+    if isinstance(messages[0], turbopi.drive_t):
+        yield from _by_kind(np.array(values), np.array([message.kind for message in messages]))
+        return
+    count = max(map(len, values))
+    names = FLAT.get(field) or [f"{field}_{k}" for k in range(count)]
+    for k, name in enumerate(names):
+        yield name, [value[k] if k < len(value) else None for value in values]
     if field == "orientation_wxyz":
-        yield "theta_rad", heading_rad(array)
+        yield "theta_rad", heading_rad(np.array(values))
 
 
 def _by_kind(value: np.ndarray, kind: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
