@@ -22,28 +22,18 @@ const std::string &Replaceable(const std::string &path)
 
 }  // namespace
 
-std::string PartialPath(const std::string &path)
+LogWriter::LogWriter(const std::string &path) : path_(Replaceable(path))
 {
-    return path + ".partial";
-}
-
-LogWriter::LogWriter(const std::string &path, bool resume) : path_(Replaceable(path))
-{
-    if (const std::string kept = resume ? FindKept(path) : ""; !kept.empty())
-    {
-        kept_.emplace(kept);
-        resumed_ = true;
-    }
-    else
-        Open("w");
+    log_.reset(lcm_eventlog_create(PartialPath().c_str(), "w"));
+    if (!log_)
+        Fail("cannot be written");
 }
 
 LogWriter::~LogWriter()
 {
     log_.reset();
     std::error_code ignored;
-    if (!resumed_)
-        std::filesystem::remove(PartialPath(path_), ignored);
+    std::filesystem::remove(PartialPath(), ignored);
 }
 
 void LogWriter::Fail(const char *what) const
@@ -51,34 +41,8 @@ void LogWriter::Fail(const char *what) const
     throw std::runtime_error("--log " + path_ + ": " + what + ": " + std::strerror(errno));
 }
 
-void LogWriter::Open(const char *mode)
-{
-    log_.reset(lcm_eventlog_create(PartialPath(path_).c_str(), mode));
-    if (!log_)
-        Fail("cannot be written");
-}
-
-// Behind the last whole message of what is kept.
-void LogWriter::GoOn()
-{
-    const int64_t count = kept_->count();
-    const std::string partial = PartialPath(path_);
-    if (kept_->path() != partial)
-        std::filesystem::rename(kept_->path(), partial);
-    std::filesystem::resize_file(partial, static_cast<uintmax_t>(kept_->bytes()));
-    kept_.reset();
-    Open("a");
-    log_->eventcount = count;
-}
-
 void LogWriter::Write(int64_t utime_us, const std::string &channel, std::vector<uint8_t> &bytes)
 {
-    if (kept_)
-    {
-        if (kept_->Holds(utime_us, channel, bytes))
-            return;
-        GoOn();
-    }
     std::string name = channel;
     lcm_eventlog_event_t event{};
     event.timestamp = utime_us;
@@ -92,14 +56,10 @@ void LogWriter::Write(int64_t utime_us, const std::string &channel, std::vector<
 
 void LogWriter::Finish()
 {
-    if (Repeats())
-        return;
-    if (kept_)
-        GoOn();
     if (std::fflush(log_->f) != 0)
         Fail("writing failed");
     log_.reset();
-    std::filesystem::rename(PartialPath(path_), path_);
+    std::filesystem::rename(PartialPath(), path_);
 }
 
 }  // namespace twin

@@ -81,16 +81,9 @@ void AddOutput(CLI::App &app, Options &o)
                    "1 = real time, 0 = as fast as possible; default 1, but 0 if it only logs for a "
                    "given time")
         ->check(CLI::Range(0.0, 1e6));
-    CLI::Option *log =
-        app.add_option("--log", o.log, "write an LCM log; alone, nothing goes to the bus");
-    CLI::Option *bus = app.add_option(
-        "--lcm-url", o.lcm_url, "bus; default udpm://239.255.76.67:7667?ttl=0, memq:// for none");
-    app.add_flag("--resume", o.resume,
-                 "ends the log of the same command that was interrupted or killed: computes the "
-                 "run anew, checks what is there, adds the rest")
-        ->needs(log)
-        ->excludes(bus)
-        ->excludes(app.get_option("--free-run"));
+    app.add_option("--log", o.log, "write an LCM log; alone, nothing goes to the bus");
+    app.add_option("--lcm-url", o.lcm_url,
+                   "bus; default udpm://239.255.76.67:7667?ttl=0, memq:// for none");
     app.add_option("--channel-prefix", o.channel_prefix,
                    "put before every channel but the truth's, e.g. TWIN_");
     app.add_flag("--wait", o.wait, "stand until `twinmill swarm start`, heard on the bus");

@@ -34,7 +34,7 @@ struct Options
     std::optional<double> duration_s, dt_s, realtime_factor;
     double pose_rate_hz = 120;
     std::string script, behaviors, log, channel_prefix, script_dir = ".";
-    bool wait = false, resume = false;
+    bool wait = false;
     std::optional<std::string> lcm_url;
     std::optional<int64_t> epoch_us;
     bool view = false;

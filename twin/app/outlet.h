@@ -20,13 +20,8 @@ public:
     // in one sentence if messages cannot be sent there.
     void OpenBus(const std::string &url);
     // As LogWriter's constructor.
-    void OpenLog(const std::string &path, bool resume)
-    {
-        log_ = std::make_unique<LogWriter>(path, resume);
-    }
+    void OpenLog(const std::string &path) { log_ = std::make_unique<LogWriter>(path); }
     void Finish();
-    // What is said was said before, by a run that was interrupted.
-    bool Repeats() { return log_ && log_->Repeats(); }
     // nullptr if there is none.
     lcm::LCM *Bus() { return bus_.get(); }
 

@@ -125,7 +125,7 @@ std::vector<Publisher::Robot> DescribeRobots(const Options &options, const Setup
 bool OpenOutlet(const Options &options, Outlet &outlet)
 {
     if (!options.log.empty())
-        outlet.OpenLog(options.log, options.resume);
+        outlet.OpenLog(options.log);
     if (!options.UsesBus())
         return false;
     try
@@ -166,7 +166,7 @@ public:
     {
     }
 
-    void Turn(Swarm &swarm, Outlet &outlet, Publisher &publisher, Commands &commands, Views &views)
+    void Turn(Swarm &swarm, Publisher &publisher, Commands &commands, Views &views)
     {
         publisher.PublishPoses(swarm);
         while (!g_stop && !(duration_s_ && swarm.TimeS() >= *duration_s_ - swarm.PeriodS() / 2))
@@ -177,7 +177,7 @@ public:
             for (int i = 0; i < swarm.Substeps(); ++i)
             {
                 swarm.Advance();
-                KeepPace(swarm.TimeS(), outlet.Repeats());
+                KeepPace(swarm.TimeS());
                 publisher.PublishPoses(swarm);
             }
             Observe(swarm);
@@ -203,14 +203,9 @@ private:
             progress_.Show(swarm.TimeS(), duration_s_, WallS(), now);
     }
 
-    // What is only repeated is not waited for.
-    void KeepPace(double t_s, bool repeats)
+    void KeepPace(double t_s)
     {
-        if (realtime_factor_ == 0)
-            return;
-        if (repeats)
-            begin_ = Clock::now() - ToClock(t_s / realtime_factor_);
-        else
+        if (realtime_factor_ > 0)
             std::this_thread::sleep_until(begin_ + ToClock(t_s / realtime_factor_));
     }
 
@@ -251,8 +246,6 @@ void Run(const Options &options)
         options.realtime_factor.value_or(duration_s && !options.UsesBus() ? 0 : 1);
 
     std::vector<Publisher::Robot> described = DescribeRobots(options, setup);
-    if (const std::string kept = options.resume ? FindKept(options.log) : ""; !kept.empty())
-        CheckSameRequest(kept, described.front().config_toml);
 
     Swarm swarm = MakeSwarm(options, setup, script);
     Outlet outlet;
@@ -264,13 +257,10 @@ void Run(const Options &options)
     Loop loop(options, setup, duration_s, realtime_factor);
     Commands commands(outlet, swarm, publisher, script,
                       {options.channel_prefix, options.script_dir, options.wait, setup.own.All()});
-    loop.Turn(swarm, outlet, publisher, commands, views);
+    loop.Turn(swarm, publisher, commands, views);
     const double wall_s = loop.WallS();
     views.Finish(swarm);
     outlet.Finish();
-    if (outlet.Repeats())
-        std::fprintf(stderr, "twin_run: %s holds more than was repeated, and stays as it is\n",
-                     FindKept(options.log).c_str());
     PrintSummary(options, {setup.command_line, swarm.Size(), swarm.PeriodS(), swarm.TimeS(), wall_s,
                            g_stop != 0, loop.Mean()});
 }
