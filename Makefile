@@ -4,7 +4,7 @@
 PYTHON := .venv/bin/python
 CTEST := ctest --test-dir build --output-on-failure --no-tests=error --parallel $(shell nproc)
 
-.PHONY: bench build check check-long claims demo format lint clean
+.PHONY: bench build check check-long claims demo docs format lint clean wheel
 
 build:
 	@scripts/setup
@@ -42,6 +42,17 @@ format: build
 
 lint: build
 	@scripts/lint
+
+# The documentation site in build/site; what it shows is run. Its generator goes into .deps.
+docs: build
+	@cmp -s docs/requirements.txt .deps/docs/requirements.txt || { rm -rf .deps/docs && \
+	    $(PYTHON) -m pip install --quiet --no-deps --target .deps/docs \
+	    --requirement docs/requirements.txt && cp docs/requirements.txt .deps/docs; }
+	@PYTHONPATH=.deps/docs $(PYTHON) -m mkdocs --quiet build
+
+# One file to install with pip where there is no compiler: dist/twinmill-*.whl.
+wheel: build
+	@scripts/wheel dist
 
 # Removes what was built; `rm -rf .venv .deps` also removes what was installed here.
 clean:

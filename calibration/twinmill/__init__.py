@@ -15,6 +15,8 @@ tm.simulate(better, n=8)
 from importlib import import_module
 from typing import Any
 
+from twinmill.programs import use_own_models
+
 # Where each public name is; imported when it is first used.
 _HOME = {
     "LogError": "twinmill.data.log",
@@ -28,6 +30,9 @@ _HOME = {
     ),
 }
 __all__ = sorted(_HOME)
+
+
+use_own_models()
 
 
 def __getattr__(name: str) -> Any:

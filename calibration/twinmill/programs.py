@@ -1,26 +1,39 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the programs of this installation are."""
+"""Where the programs and the models of this installation are."""
 
+import os
 import shutil
 import sysconfig
 from pathlib import Path
 
-SOURCE = Path(__file__).resolve().parents[2]  # of the project, where this file runs from there
+_PACKAGE = Path(__file__).parent
+_BUILT = _PACKAGE.parents[1] / "build" / "bin"  # where this file runs from the project's folder
 
 
 def find_program(name: str) -> Path:
-    """A program such as `twin_run`: installed with this package, on the path, or just built.
+    """A program such as `twin_run`: of this package, just built, or on the path.
 
     Raises:
         ValueError: there is none.
     """
-    installed = Path(sysconfig.get_path("scripts")) / name
-    built = SOURCE / "build" / "bin" / name
-    on_path = shutil.which(name)
-    for place in (installed, *([Path(on_path)] if on_path else []), built):
+    scripts = Path(sysconfig.get_path("scripts"))  # start the programs by asking here
+    folders = [Path(f) for f in os.environ.get("PATH", "").split(os.pathsep)]
+    others = os.pathsep.join(str(f) for f in folders if f != scripts)
+    on_path = shutil.which(name, path=others)
+    for place in (_PACKAGE / "bin" / name, _BUILT / name, *([Path(on_path)] if on_path else [])):
         if place.is_file():
             return place
     raise ValueError(
-        f"{name}: not found beside this Python, on the path or in {built.parent}; build it with "
-        "`make build`, or install the package twinmill as a wheel."
+        f"{name}: neither in this package, nor built in {_BUILT}, nor on the path; build it with "
+        "`make build`, or install twinmill as a wheel."
     )
+
+
+def use_own_models() -> None:
+    """Lets the native module and the programs look among the models of this package, if it has any.
+
+    A package that runs from the project's folder has none: there they are found without help.
+    """
+    models = _PACKAGE / "models"
+    if models.is_dir():
+        os.environ.setdefault("TWINMILL_MODELS", str(models))
