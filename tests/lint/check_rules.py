@@ -24,6 +24,7 @@ FOLDERS = (
     "calibration",
     "tools",
     "scripts",
+    "examples",
     "benchmarks",
     "tests",
     "cmake",

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hooks of MkDocs: command blocks get the output of a run, the catalogue comes from the twin.
+
+A fenced block marked `console` holds commands, each after `$ `. All of a page that shows a part of
+`runs/<page>/` run one after the other in an empty folder; what they print goes below them, and the
+pictures and pages that they make go there. A command that fails ends the build.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+PICTURES = {".svg", ".png", ".html"}
+MARK = "<!-- catalogue -->"
+
+
+def commands_of(page: str) -> list[str]:
+    """The command lines of a page in their order."""
+    return [
+        line[2:]
+        for block in BLOCK.findall(page)
+        for line in block.splitlines()
+        if line.startswith("$ ")
+    ]
+
+
+def run(command: str, folder: Path) -> str:
+    """What a command prints on stdout.
+
+    Raises:
+        RuntimeError: it failed; its own words.
+    """
+    scripts = f"{Path(sys.executable).parent}{os.pathsep}{ROOT / 'build' / 'bin'}"
+    environment = {**os.environ, "PATH": f"{scripts}{os.pathsep}{os.environ['PATH']}"}
+    environment |= {"EXAMPLES": str(ROOT / "examples"), "COLUMNS": "92"}
+    done = subprocess.run(
+        ["bash", "-c", command],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise RuntimeError(f"$ {command}\n{done.stdout}{done.stderr}")
+    return ANSI.sub("", done.stdout)
+
+
+def with_outputs(page: str, folder: Path) -> str:
+    """The page with the output of each command below it."""
+
+    def replaced(match: re.Match) -> str:
+        lines = []
+        for line in match[1].splitlines():
+            lines.append(line)
+            if line.startswith("$ "):
+                lines += [text.rstrip() for text in run(line[2:], folder).splitlines()]
+        return "\n".join(["```console", *lines, "```"])
+
+    return BLOCK.sub(replaced, page)
+
+
+def catalogue() -> str:
+    """All effects: what each is, its equation, parameters, what it leaves out, and its source."""
+    from twinmill.model.freedom import catalogue as cards
+
+    return "\n".join(_card(card) for _, card in sorted(cards().items()))
+
+
+def _card(card: dict) -> str:
+    rows = [
+        f"| `{p['name']}` | {'' if p['unit'] == '1' else p['unit']} | {p['default']:g} | "
+        f"{p['min']:g} to {p['max']:g} | {p['neutral']:g} | {p['doc']} |"
+        for p in card["parameters"]
+    ]
+    table = ["| parameter | unit | default | bounds | neutral | meaning |", "|---" * 6 + "|", *rows]
+    return "\n".join(
+        [
+            f"## {card['name']}\n",
+            f"{card['summary']}\n",
+            f"<div class='equation' markdown>\\`{_ascii_math(card['equation'])}\\`</div>\n",
+            *(table if rows else []),
+            "",
+            f"- Stage: `{card['stage']}`",
+            f"- Leaves out: {card['leaves_out']}",
+            f"- What to measure: {card['measure']}",
+            f"- Source: {card['reference']}\n",
+        ]
+    )
+
+
+def _ascii_math(equation: str) -> str:
+    """Names of more than one letter upright, as words; words in a row as one text."""
+    known = {"sin", "cos", "tan", "exp", "ln", "log", "min", "max", "tau", "omega", "theta", "abs"}
+    known |= {"sign", "sqrt", "phi", "dt", "dv", "pi", "sum", "int"}
+    word = rf"(?!(?:{'|'.join(sorted(known))})\b)[A-Za-z_]{{2,}}[A-Za-z_0-9]*"
+    words = re.compile(rf"\b{word}(?: {word})*\b")
+    return words.sub(lambda m: f'"{m[0].replace("_", " ")}"', equation)
+
+
+def on_page_markdown(markdown: str, page, config, files) -> str:
+    """Called by MkDocs for each page."""
+    from mkdocs.structure.files import File
+
+    if MARK in markdown:
+        markdown = markdown.replace(MARK, catalogue())
+    if "runs/" in markdown:
+        folder = Path(tempfile.mkdtemp(prefix="twinmill.docs."))
+        markdown = with_outputs(markdown, folder)
+        for path in sorted(folder.rglob("*")):
+            if path.suffix in PICTURES:
+                name = f"runs/{Path(page.file.src_path).stem}/{path.relative_to(folder)}"
+                files.append(File.generated(config, name, abs_src_path=str(path)))
+    return markdown

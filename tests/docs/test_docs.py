@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the documentation shows is what happens: commands, notebook, pages and their links."""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "docs"))
+from site_hooks import catalogue, commands_of, run  # noqa: E402
+
+PAGES = sorted((ROOT / "docs").glob("*.md"))
+LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]+)?\)")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("tutorial")
+
+
+@pytest.fixture(scope="module")
+def outputs(folder) -> dict[str, str]:
+    """What each command of the tutorial prints; it fails if one does."""
+    page = (ROOT / "docs/tutorial.md").read_text()
+    return {command: run(command, folder) for command in commands_of(page)}
+
+
+def test_the_tutorial_names_the_effect_that_the_recording_has(outputs, folder):
+    (said,) = (text for command, text in outputs.items() if " diagnose " in f" {command} ")
+    assert "Missing: coasting." in said
+    text = (folder / "better.toml").read_text()
+    value = float(re.search(r"deceleration_mps2 = ([\d.]+)", text)[1])
+    assert value == pytest.approx(0.7, rel=0.1)  # as examples/make_recording.py hides it
+
+
+def test_what_the_tutorial_links_to_was_written(outputs, folder):
+    page = (ROOT / "docs/tutorial.md").read_text()
+    linked = re.findall(r"\(runs/tutorial/([^)]+)\)", page)
+    assert linked
+    assert [name for name in linked if not (folder / name).is_file()] == []
+
+
+def test_the_notebook_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("EXAMPLES", str(ROOT / "examples"))
+    monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=":")
+    cells = json.loads((ROOT / "examples/first_steps.ipynb").read_text())["cells"]
+    names: dict = {}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            exec("".join(cell["source"]), names)
+    assert names["d"].best.effect == "coasting"
+    assert names["better"].compare(names["log"]).score < names["comparison"].score
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "README.md"], ids=lambda p: p.name)
+def test_links_between_pages_hold(page):
+    linked = [m[0] for m in LINK.findall(page.read_text())]
+    local = [t for t in linked if "://" not in t and not t.startswith("runs/")]
+    assert [target for target in local if not (page.parent / target).exists()] == []
+
+
+def test_the_catalogue_has_a_card_for_each_effect():
+    made = {path.stem for path in (ROOT / "twin/effects").glob("*.cpp")}
+    shown = set(re.findall(r"^## (\w+)$", catalogue(), flags=re.MULTILINE))
+    assert shown and shown <= made
