@@ -2,6 +2,7 @@
 """`twinmill import`: makes a log from motion capture exports and command tables of others."""
 
 import json
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,7 @@ from rich.console import Console
 
 from twinmill.data.importers.columns import Guess, to_toml
 from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
+from twinmill.data.importers.ros_bag import Topic, guess_pairs, list_topics
 from twinmill.data.log import LogError
 from twinmill.files import replacing
 from twinmill.report import show
@@ -58,6 +60,19 @@ def _command(
     io_tsv: Annotated[
         list[Path] | None, typer.Option(help=("io.tsv of a robot; repeat for several."))
     ] = None,
+    bag: Annotated[
+        Path | None,
+        typer.Option(help="ROS bag (rosbag1, rosbag2); without --pose and --command it is listed."),
+    ] = None,
+    pose: Annotated[
+        list[str] | None, typer.Option(metavar="TOPIC", help="Poses of a robot in the bag.")
+    ] = None,
+    command: Annotated[
+        list[str] | None, typer.Option(metavar="TOPIC", help="Commands of that robot.")
+    ] = None,
+    receive_stamps: Annotated[
+        bool, typer.Option("--receive-stamps", help="Times of receipt, not of the headers.")
+    ] = False,
     robot: Annotated[
         list[str] | None,
         typer.Option(
@@ -117,12 +132,18 @@ def _command(
         if explain_columns_to:
             _explain(explain_columns(poses, commands), explain_columns_to, force)
             return
+        if bag and not pose and not command:
+            _list(bag, list_topics(bag), as_json)
+            return
         if out is None:
             raise LogError("--out is missing: name the log to write.")
         options = ImportOptions(
             mapping=mapping,
             flips=frozenset(flip or []),
             pose_clock_ppm=pose_clock_ppm,
+            pose_topics=tuple(pose or []),
+            command_topics=tuple(command or []),
+            receive_stamps=receive_stamps,
             robot_id=robot_id,
             rename=dict(_pair(text, "--rename OLD=NEW") for text in rename or []),
             robots={
@@ -136,7 +157,13 @@ def _command(
             heading_offset_rad=float(np.radians(heading_offset_deg)),
         )
         summary = import_log(
-            poses, commands, out, motive=motive, io_tsv=tuple(io_tsv or ()), options=options
+            poses,
+            commands,
+            out,
+            motive=motive,
+            io_tsv=tuple(io_tsv or ()),
+            bag=bag,
+            options=options,
         )
     except ValueError as error:
         typer.echo(f"twinmill: {error}", err=True)
@@ -145,6 +172,21 @@ def _command(
         typer.echo(json.dumps(summary))
     else:
         _print(summary)
+
+
+def _list(bag: Path, topics: list[Topic], as_json: bool) -> None:
+    """What a bag holds, and the command that imports what seems to belong together."""
+    words = ["twinmill", "import", "--bag", str(bag)]
+    for pose, command in guess_pairs(topics):
+        words += ["--pose", pose, "--command", command]
+    line = shlex.join([*words, "-o", f"{bag.stem}.lcmlog"]) if len(words) > 4 else None
+    if as_json:
+        typer.echo(json.dumps({"topics": [vars(t) for t in topics], "command": line}))
+        return
+    rows = [[Cell(text) for text in (t.name, t.kind, str(t.count), t.role or "-")] for t in topics]
+    table = Table(str(bag), ["topic", "type", "messages", "could be"], rows, words=(0, 1, 3))
+    Console().print(show.table(table))
+    typer.echo(f"Try: {line}" if line else "No pair of poses and commands is seen; name them.")
 
 
 def _explain(guesses: dict[str, list[Guess]], out: Path, force: bool) -> None:

@@ -170,12 +170,16 @@ def _units(subject: Subject, e: Explained) -> list[InputFinding]:
 
 RATES_PPM = (-3000, -2000, -1000, -500, 0, 500, 1000, 2000, 3000)
 LEAST_PPM = 300.0  # less is what crystals and fits of the clock are for
-ROWS_PPM = 2000.0  # rows of encoder logs are often counted, not timed: time_base.py sees to more
 DRIFT_SURE = 5.0
 
 
 def check_drift(subject: Subject, search: Search, own: Explained) -> list[InputFinding]:
-    """Clocks that run apart, by the rate at which the commands explain the motion best."""
+    """Clocks that run apart, by the rate at which the commands explain the motion best.
+
+    Rows of encoder logs are often counted, not timed: of them `time_base.py` judges.
+    """
+    if subject.track.command_kind == "wheel_speed":
+        return []
     span_s = float(np.ptp(search.motion.t_s))
     if own.left > 0.3 or span_s < 30:
         return []
@@ -186,8 +190,7 @@ def check_drift(subject: Subject, search: Search, own: Explained) -> list[InputF
     rate = _vertex(RATES_PPM[near], left[near])
     without = [_vertex(RATES_PPM[near], left[near] - block[near]) for block in by_block.T]
     std = float(np.sqrt((len(without) - 1) * np.var(without)))  # jackknife, Efron and Stein 1981
-    least = ROWS_PPM if subject.track.command_kind == "wheel_speed" else LEAST_PPM
-    if not abs(rate) > max(least, DRIFT_SURE * std):
+    if not (np.isfinite(std) and abs(rate) > max(LEAST_PPM, DRIFT_SURE * std)):
         return []
     return [
         subject.finding(

@@ -13,6 +13,7 @@ from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
 from twinmill.data.importers.motive import read_motive
 from twinmill.data.importers.plain import KNOWN, Columns, read_commands, read_poses
+from twinmill.data.importers.ros_bag import read_bag
 from twinmill.data.importers.series import CommandSeries, PoseSeries, in_body_frame, multiply
 from twinmill.data.log import Log, LogError, read_log
 from twinmill.data.measurement_table import read_table
@@ -37,6 +38,8 @@ class ImportOptions:
         pose_clock_ppm: by which the poses' clock gains on the commands', taken out.
         heading_offset_rad: from the tracked body's x axis to the robot's front, left positive.
         same_clock: one clock stamped poses and commands: no offset is estimated.
+        pose_topics, command_topics: of a ROS bag, one of each for each robot.
+        receive_stamps: of a ROS bag, take the times of receipt, not those in the headers.
         force: replace an output that exists.
     """
 
@@ -50,6 +53,9 @@ class ImportOptions:
     pose_clock_ppm: float = 0.0
     heading_offset_rad: float = 0.0
     same_clock: bool = False
+    pose_topics: tuple[str, ...] = ()
+    command_topics: tuple[str, ...] = ()
+    receive_stamps: bool = False
     force: bool = False
 
 
@@ -60,6 +66,7 @@ def import_log(
     *,
     motive: Path | None = None,
     io_tsv: tuple[Path, ...] = (),
+    bag: Path | None = None,
     options: ImportOptions | None = None,
 ) -> dict:
     """Makes a log from one source of poses and one of commands.
@@ -70,6 +77,7 @@ def import_log(
         out: the log to write; nothing is there until all went well.
         motive: export of OptiTrack Motive.
         io_tsv: one per robot.
+        bag: ROS bag with both, in place of all others.
         options: how to read them.
 
     Returns:
@@ -80,7 +88,9 @@ def import_log(
         LogError: one sentence on what is wrong; nothing was written.
     """
     options = options or ImportOptions()
-    if (poses is None) == (motive is None) or (commands is None) == (not io_tsv):
+    if bag and (poses or motive or commands or io_tsv):
+        raise LogError("--bag: holds poses and commands; give no other source beside it.")
+    if not bag and ((poses is None) == (motive is None) or (commands is None) == (not io_tsv)):
         raise LogError(
             "a log needs one source of poses and one of commands: give --poses or "
             "--motive, and --commands or --io-tsv."
@@ -90,17 +100,14 @@ def import_log(
             f"--robot-id {options.robot_id}: must be in 0..99 and fits one robot; "
             "number several by their folders' names."
         )
-    pose_series = (
-        read_motive(motive, options.robots, options.up, absolute=bool(io_tsv))
-        if motive
-        else read_poses(poses, _columns(options, "poses"))
-    )
+    if bag:
+        topics = list(options.pose_topics), list(options.command_topics)
+        pose_series, command_series = read_bag(
+            bag, *topics, options.robot_id, options.receive_stamps
+        )
+    else:
+        pose_series, command_series = _read_files(poses, commands, motive, io_tsv, options)
     pose_series = [_moved(series, options) for series in pose_series]
-    command_series = (
-        read_commands(commands, _columns(options, "commands"))
-        if commands
-        else [read_io_tsv(path, options.robot_id) for path in io_tsv]
-    )
     _check_times(pose_series, command_series)
     by_robot = {series.robot_id: series for series in pose_series}
     command_series = [
@@ -112,6 +119,27 @@ def import_log(
         write_log(temporary, pose_series, command_series, _provenance(sources, options))
         warnings = [w for series in (*pose_series, *command_series) for w in series.warnings]
         return _summary(read_log(temporary), out, warnings)
+
+
+def _read_files(
+    poses: Path | None,
+    commands: Path | None,
+    motive: Path | None,
+    io_tsv: tuple[Path, ...],
+    options: ImportOptions,
+) -> tuple[list[PoseSeries], list[CommandSeries]]:
+    """Series of one source of poses and one of commands."""
+    pose_series = (
+        read_motive(motive, options.robots, options.up, absolute=bool(io_tsv))
+        if motive
+        else read_poses(poses, _columns(options, "poses"))
+    )
+    command_series = (
+        read_commands(commands, _columns(options, "commands"))
+        if commands
+        else [read_io_tsv(path, options.robot_id) for path in io_tsv]
+    )
+    return pose_series, command_series
 
 
 def _columns(options: ImportOptions, kind: str) -> Columns:
@@ -197,6 +225,8 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
                 "same_clock": options.same_clock,
                 "pose_shift_s": options.pose_shift_s,
                 "pose_clock_ppm": options.pose_clock_ppm,
+                "pose_topics": list(options.pose_topics),
+                "command_topics": list(options.command_topics),
                 "mapping": options.mapping.read_text() if options.mapping else "",
                 "flips": sorted(options.flips),
                 "heading_offset_rad": options.heading_offset_rad,
