@@ -28,7 +28,14 @@ def measure() -> Iterator[Ratio]:
         yield skipped("decision : memcpy, arm64", f"no {' and no '.join(missing)}")
         return
     with tempfile.TemporaryDirectory() as folder:
-        program = _compile(Path(folder))
+        try:
+            program = _compile(Path(folder))
+        except subprocess.CalledProcessError as error:
+            said = error.stderr.strip().splitlines()
+            yield skipped(
+                "decision : memcpy, arm64", f"{COMPILER}: {said[0] if said else 'failed'}"
+            )
+            return
         scenes = {
             "one robot": scene.floor(1, robot_radius_px=40),
             "no robot": scene.floor(1),
@@ -45,7 +52,8 @@ def _compile(folder: Path) -> Path:
     core = ROOT / "firmware/core"
     sources = [*core.glob("*.c"), ROOT / "benchmarks/decision.c", ROOT / "benchmarks/count.c"]
     program = folder / "count"
-    subprocess.run([COMPILER, *FLAGS, f"-I{core / 'include'}", "-o", program, *sources], check=True)
+    command = [COMPILER, *FLAGS, f"-I{core / 'include'}", "-o", program, *sources]
+    subprocess.run(command, check=True, capture_output=True, text=True)
     return program
 
 

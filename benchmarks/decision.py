@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robot's decision on a frame against the usual OpenCV sequence and against a plain copy.
+"""The robot's decision on a frame against OpenCV, as used and as it could be, and against a copy.
 
 All on one thread, in its processor time: waiting for other programs does not count.
 """
@@ -53,6 +53,8 @@ def measure(build: Path) -> Iterator[Ratio]:
         return
     cv2.setNumThreads(1)
     yield from _against_peer(native, peers.Peer())
+    for name, sees in peers.CHAINS.items():
+        yield _against_chain(native, name, sees)
 
 
 def _ring(make: Callable[..., np.ndarray], *arguments: int) -> np.ndarray:
@@ -90,3 +92,19 @@ def _against_peer(native: Native, peer: "peers.Peer") -> Iterator[Ratio]:  # noq
     whole = np.add(capture, loop)
     yield paired("OpenCV : decision", whole, decide, "us", at_least=40)
     yield paired("OpenCV, part : decision", loop, decide, "us")
+
+
+def _against_chain(native: Native, name: str, sees: Callable[[np.ndarray], bool]) -> Ratio:
+    """Without vote and motions, to the chain's advantage."""
+    frames, empty = _ring(scene.floor, 40), scene.floor(FRAMES)
+    decide, chain = [], []
+    for i in range(REPETITIONS):
+        decide.append(native.decide_us(frames)[0])
+        begin_s = time.thread_time()
+        seen = sees(frames[i % FRAMES])
+        chain.append((time.thread_time() - begin_s) * 1e6)
+        if not seen:
+            raise ValueError(f"{name}: the robot in view was not seen: it is not the same work.")
+    if sees(empty):
+        raise ValueError(f"{name}: a robot was seen where none is: it is not the same work.")
+    return paired(f"OpenCV, {name} : decision", chain, decide, "us")

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same decision as TurboPi robots usually take it: the published sequence of OpenCV calls.
+"""The same decision by OpenCV: as TurboPi robots usually take it, and as an expert would.
 
-GMU-ASRC/turbopi-root, hiwonder_common/src/hiwonder_common/camera_binary_program.py, and the
-vendor's Camera.py. Left out, to their advantage: preview, text, logging, LEDs and motors.
+The published sequence is in GMU-ASRC/turbopi-root,
+hiwonder_common/src/hiwonder_common/camera_binary_program.py, and in the vendor's Camera.py. Left
+out, to their advantage: preview, text, logging, LEDs and motors.
 """
 
 from collections import deque
@@ -53,3 +54,42 @@ class Peer:
         """The moving mean of the last passes."""
         self._bits.append(seen)
         return sum(self._bits) / len(self._bits) > 0.5
+
+
+# What three usual chains look for, from the limits of the green that robots ship with
+# (firmware/core/threshold.c), and in HSV from the usual ones of a saturated green.
+HSV_MIN, HSV_MAX = (35, 60, 30), (85, 255, 255)
+YUYV_MIN, YUYV_MAX = (40, 0, 40, 0), (235, 124, 235, 108)
+
+
+def sees_hsv_640(yuyv: np.ndarray) -> bool:
+    """HSV at the camera's own size."""
+    bgr = cv2.cvtColor(yuyv, cv2.COLOR_YUV2BGR_YUY2)
+    mask = cv2.inRange(cv2.cvtColor(bgr, cv2.COLOR_BGR2HSV), HSV_MIN, HSV_MAX)
+    return _has_blob(mask, MIN_BLOB_PX)
+
+
+def sees_hsv_320(yuyv: np.ndarray) -> bool:
+    """HSV at half the width and height, every second pixel of both."""
+    bgr = cv2.cvtColor(yuyv, cv2.COLOR_YUV2BGR_YUY2)
+    small = cv2.resize(bgr, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_NEAREST)
+    mask = cv2.inRange(cv2.cvtColor(small, cv2.COLOR_BGR2HSV), HSV_MIN, HSV_MAX)
+    return _has_blob(mask, MIN_BLOB_PX / 4)
+
+
+def sees_yuyv(yuyv: np.ndarray) -> bool:
+    """No conversion: limits on the bytes as they come, two pixels as one of four channels."""
+    mask = cv2.inRange(yuyv.reshape(HEIGHT_PX, WIDTH_PX // 2, 4), YUYV_MIN, YUYV_MAX)
+    return _has_blob(mask, MIN_BLOB_PX / 2)
+
+
+def _has_blob(mask: np.ndarray, at_least_px: float) -> bool:
+    statistics = cv2.connectedComponentsWithStats(mask)[2]
+    return len(statistics) > 1 and statistics[1:, cv2.CC_STAT_AREA].max() > at_least_px
+
+
+CHAINS = {
+    "HSV 640x480": sees_hsv_640,
+    "HSV 320x240": sees_hsv_320,
+    "inRange on YUYV": sees_yuyv,
+}
