@@ -52,8 +52,7 @@ function(twinmill_harden target)
         -fno-unwind-tables -fno-asynchronous-unwind-tables
         $<$<NOT:$<CONFIG:Debug>>:-U_FORTIFY_SOURCE -D_FORTIFY_SOURCE=3>)
     if(CMAKE_SYSTEM_PROCESSOR STREQUAL "aarch64")
-        target_compile_options(${target} PRIVATE -mbranch-protection=standard)
-        # Whole-program optimisation, for size.
+        # Whole-program optimisation, for size. No Pi's processor knows branch protection.
         set_target_properties(${target} PROPERTIES INTERPROCEDURAL_OPTIMIZATION ON)
     endif()
     get_target_property(type ${target} TYPE)

@@ -7,6 +7,7 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include "priority.h"
 #include "say.h"
 #include "stopper.h"
 
@@ -86,6 +87,7 @@ _Noreturn void guard_run(const struct options *options, struct watch *watch, pid
     sigfillset(&all);
     (void)sigprocmask(SIG_BLOCK, &all, NULL);
     (void)setsid();
+    priority_take();
     struct guard guard = {
         .watch = watch,
         .stopper = {.config = &options->config, .dry_run = options->dry_run},

@@ -8,6 +8,7 @@
 #include "loop.h"
 #include "loop_commands.h"
 #include "options.h"
+#include "priority.h"
 #include "reporter.h"
 #include "say.h"
 #include "stop_command.h"
@@ -73,6 +74,7 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
     struct loop_devices devices = {0};
     struct link link;
     char error[CONFIG_ERROR_MAX];
+    priority_take();
     if (!devices_make(&options->config, options->dry_run, &devices, error))
     {
         say("%s", error);

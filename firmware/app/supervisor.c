@@ -16,6 +16,7 @@
 #include "guard.h"
 #include "instance.h"
 #include "notify.h"
+#include "priority.h"
 #include "say.h"
 #include "stopper.h"
 
@@ -395,6 +396,7 @@ int supervise(struct options *options, driver_fn *drive)
     };
     crew.signal_fd = block_signals();
     crew.watch = watch_make();
+    priority_take();
     int code = 1;
     if (crew.signal_fd < 0 || crew.watch == NULL || !say_never_wait())
     {

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+// What keeps a process on time: its pages stay in memory, and it goes before others.
+#ifndef APP_PRIORITY_H
+#define APP_PRIORITY_H
+
+// Takes what the limits of this process allow, as those of the robot's service do: pages that were
+// touched are never written to the card again, and the scheduler runs it in real time. By hand the
+// limits allow neither, and nothing changes. Children inherit the scheduling, not the locked pages.
+void priority_take(void);
+
+#endif
