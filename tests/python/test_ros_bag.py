@@ -3,15 +3,17 @@
 
 import json
 import math
+import struct
 
 import numpy as np
 import pytest
+from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
-from twinmill.data.importers.ros_bag import guess_pairs, list_topics
+from twinmill.data.importers.ros_bag import _rows, guess_pairs, list_topics
 from twinmill.data.log import LogError, read_log
 from twinmill_cli.main import app
 
@@ -99,3 +101,29 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(tmp_path):
     with pytest.raises(LogError, match=r"no topic /r03/odom; it has /r03/cmd_vel, /r03/pose"):
         import_log(None, None, tmp_path / "o.lcmlog", bag=bag, options=options)
     assert not (tmp_path / "o.lcmlog").exists()
+
+
+def test_a_bag_of_another_writer_is_read(tmp_path):
+    """Packed by hand as CDR (OMG DDS-XTypes), in a file of the package mcap, without metadata."""
+    definition = (
+        "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n" + "=" * 80 + "\n"
+        "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
+    )
+    with (tmp_path / "run.mcap").open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start(profile="ros2", library="test")
+        schema = writer.register_schema(
+            name="geometry_msgs/msg/Twist", encoding="ros2msg", data=definition.encode()
+        )
+        channel = writer.register_channel(
+            topic="/r05/cmd_vel", message_encoding="cdr", schema_id=schema
+        )
+        for k in range(20):
+            data = b"\x00\x01\x00\x00" + struct.pack("<6d", 0.1 * k, 0, 0, 0, 0, -0.5)
+            writer.add_message(channel_id=channel, log_time=10**9 * k, publish_time=0, data=data)
+        writer.finish()
+    topic = "/r05/cmd_vel"
+    kind, utime_us, values, _ = _rows(tmp_path / "run.mcap", [topic], receive=False)[topic]
+    assert kind == "geometry_msgs/msg/Twist"
+    np.testing.assert_array_equal(utime_us, np.arange(20) * 10**6)
+    np.testing.assert_allclose(values, [(0.1 * k, 0, -0.5, 0) for k in range(20)])
