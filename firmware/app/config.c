@@ -49,6 +49,9 @@ void config_default(struct app_config *config)
         .buzzer_line = 6,
         .script_dir = "/etc/turbopi/scripts",
         .lcm_url = "udpm://239.255.76.67:7667?ttl=0",
+        .key_file = "/etc/turbopi/key",
+        .run_dir = "/run/turbopi",
+        .link_timeout_ms = 2000,
         .watchdog_ms = 300,
         .restart_ms = 1000,
     };

@@ -44,6 +44,8 @@ struct app_config
 
     char script[CONFIG_TEXT_MAX], script_dir[CONFIG_TEXT_MAX];
     char lcm_url[CONFIG_TEXT_MAX], io_tsv[CONFIG_TEXT_MAX];
+    char key_file[CONFIG_TEXT_MAX], run_dir[CONFIG_TEXT_MAX];
+    int32_t link_timeout_ms;
     int32_t watchdog_ms, restart_ms;
 };
 

@@ -39,6 +39,12 @@ struct link_report
     int32_t pack_mV;
     int32_t status_flags;
     bool panel_lost;
+    // Packets on the operator's channels that were not even answered.
+    uint32_t ignored_count;
+    // As in link_t.
+    int64_t session_us, counter;
+    int32_t link_timeout_ms;
+    bool stands;
     char behavior[LINK_NAME_MAX];
     struct hal_camera_stats camera;
     uint32_t rejected_count[FW_REJECT_COUNT];
@@ -55,9 +61,14 @@ struct link_command
 
 struct link_ack
 {
-    int64_t utime_us;
+    int64_t utime_us, session_us;
+    // Of the command.
+    int64_t command_utime_us;
     int32_t seq;
+    int8_t verb;
     bool accepted;
+    // The motor board has taken zero for all wheels since.
+    bool stands;
     char reason[LINK_REASON_MAX];
 };
 
@@ -72,6 +83,8 @@ struct link
     bool (*receive)(void *context, struct link_command *command);
     // Readable when a command has come; -1 if there is none.
     int fd;
+    // Of this run of the program: a random number that signed commands must name; 0: obeys none.
+    int64_t session;
 };
 
 #endif

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "loop_commands.h"
+#include "loop_link.h"
 #include "loop_tend.h"
 
 #define LONGEST_WAIT_US 100000
@@ -42,6 +43,7 @@ enum fw_err loop_init(struct loop *loop, const struct app_config *config,
     loop->watchdog_ms = config->watchdog_ms;
     loop->frozen_us = devices->camera_is_live ? (int64_t)config->frozen_ms * 1000 : 0;
     loop->may_move = true;
+    loop_link_init(loop, config);
     // Not open yet: lost until the first step opens it.
     loop->lost[LOOP_CAMERA] = FW_ERR_TIMEOUT;
     return FW_OK;
@@ -261,6 +263,7 @@ static void report(struct loop *loop, const struct fw_output *out, int64_t begin
         .panel_lost = loop->lost[LOOP_PANEL] != FW_OK,
         .lost_report_count = loop->lost_report_count,
     };
+    loop_link_report(loop, &report);
     memcpy(report.behavior, loop->behavior, sizeof report.behavior);
     memcpy(report.rejected_count, loop->core.rejected_count, sizeof report.rejected_count);
     hal_camera_stats(&loop->devices.camera, &report.camera);
@@ -297,6 +300,7 @@ void loop_step(struct loop *loop)
     const bool has_frame = take_frame(loop, &frame);
     decide(loop, has_frame ? &frame : NULL, &out);
     drive(loop, &out);
+    loop_link_tell(loop);
     report(loop, &out, begin_us);
     loop_tend_panel(loop, out.detected);
     loop_tend_battery(loop);

@@ -150,6 +150,8 @@ static bool obey(struct loop *loop, const struct link_command *command, char *re
         case FW_VERB_SCRIPT:
             starts = may_start(loop, reason) && load_named_script(loop, command->name, reason);
             break;
+        case FW_VERB_ARM:
+        case FW_VERB_HOLD: return true;
     }
     if (starts)
     {
@@ -161,18 +163,22 @@ static bool obey(struct loop *loop, const struct link_command *command, char *re
 static void answer(struct loop *loop, const struct link_command *command)
 {
     const struct fw_command *order = &command->order;
-    const int64_t now_us = hal_clock_unix_us(&loop->devices.clock);
-    struct link_ack ack = {.seq = order->seq};
-    const enum fw_verdict verdict = fw_command_judge(&loop->inbox, order, now_us, loop->running);
+    struct link_ack ack = {
+        .seq = order->seq, .command_utime_us = order->utime_us, .verb = order->verb};
+    const enum fw_verdict verdict =
+        fw_command_judge(&loop->inbox, order, hal_clock_unix_us(&loop->devices.clock),
+                         loop_link_session_us(loop), loop->running);
     (void)snprintf(ack.reason, sizeof ack.reason, "%s", fw_verdict_str(verdict));
-    ack.accepted = verdict == FW_VERDICT_COPY ||
-                   (verdict == FW_VERDICT_OBEY && obey(loop, command, ack.reason));
-    if (ack.accepted)
+    const bool obeyed = verdict == FW_VERDICT_OBEY && obey(loop, command, ack.reason);
+    if (obeyed)
     {
-        fw_command_obeyed(&loop->inbox, order);
+        loop_link_obeyed(loop, order);
     }
-    ack.utime_us = hal_clock_unix_us(&loop->devices.clock);
-    loop->link.send_ack(loop->link.context, &ack);
+    ack.accepted = obeyed || verdict == FW_VERDICT_COPY;
+    if (order->verb != FW_VERB_HOLD)
+    {
+        loop_link_answer(loop, &ack);
+    }
 }
 
 void loop_obey_commands(struct loop *loop)
@@ -182,5 +188,6 @@ void loop_obey_commands(struct loop *loop)
     {
         answer(loop, &command);
     }
+    loop_link_watch(loop);
     start_if_due(loop);
 }

@@ -12,6 +12,7 @@
 #include "hal/motors.h"
 #include "hal/panel.h"
 #include "link.h"
+#include "loop_link.h"
 #include "own_tables.h"
 #include "watch.h"
 
@@ -78,6 +79,7 @@ struct loop
     bool running;
     struct loop_plan plan;
     struct fw_inbox inbox;
+    struct loop_link operator_link;
 
     // Playing a script instead of the table, since when (monotonic).
     bool plays_script;

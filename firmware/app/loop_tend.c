@@ -19,7 +19,7 @@ static void press_button(struct loop *loop, bool pressed)
         }
         else if (!loop->battery_low)
         {
-            loop_start(loop);
+            loop_link_start_by_hand(loop);
         }
     }
     loop->button_seen = pressed;

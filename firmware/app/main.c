@@ -9,6 +9,7 @@
 #include "loop_commands.h"
 #include "options.h"
 #include "priority.h"
+#include "radio/seal.h"
 #include "reporter.h"
 #include "say.h"
 #include "stop_command.h"
@@ -67,6 +68,18 @@ static int end(struct loop *loop, struct watch *watch)
     return 0;
 }
 
+// Without a key the robot is driven by its button, and stopped by anybody.
+static struct seal_key load_key(const struct app_config *config)
+{
+    struct seal_key key;
+    char error[SEAL_ERROR_MAX];
+    if (!seal_load(config->key_file, &key, error) && config->lcm_url[0] != '\0')
+    {
+        say("%s: over the network only a stop is obeyed", error);
+    }
+    return key;
+}
+
 static int drive(const struct options *options, struct watch *watch, int stop_fd)
 {
     static struct loop loop;
@@ -80,7 +93,8 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
         say("%s", error);
         return 1;
     }
-    if (reporter_start(&reporter, &options->config, &link) != FW_OK)
+    const struct seal_key key = load_key(&options->config);
+    if (reporter_start(&reporter, &options->config, &key, &link) != FW_OK)
     {
         say("io_tsv: '%s': telemetry or log cannot be opened: %s", options->config.io_tsv,
             strerror(errno));
@@ -92,12 +106,14 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
         loop.wake_fd = stop_fd;
         loop.watch = watch;
         loop.may_move = watch->may_move;
-        if (options->config.autostart)
+        if (options->config.autostart && !loop.inbox.latched)
         {
             loop_start(&loop);
         }
         say("robot %d, %s: %s", (int)options->config.robot_id, options->config.behavior,
-            loop.running ? "started" : "waits for the button or a command");
+            loop.running         ? "started"
+            : loop.inbox.latched ? "was stopped: waits for the button or to be armed"
+                                 : "waits for the button or a command");
         play(&loop, options, stop_fd);
         code = end(&loop, watch);
     }

@@ -6,6 +6,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "say.h"
+
 #define STACK_BYTES (256 * 1024)
 #define LONGEST_WAIT_MS 500
 
@@ -49,12 +51,6 @@ static bool receive(void *context, struct link_command *command)
     return recv(reporter->loop_fd, command, sizeof *command, MSG_DONTWAIT) == sizeof *command;
 }
 
-static void on_command(void *context, const struct link_command *command)
-{
-    const struct reporter *reporter = context;
-    (void)send(reporter->thread_fd, command, sizeof *command, MSG_DONTWAIT | MSG_NOSIGNAL);
-}
-
 static int64_t monotonic_us(void)
 {
     struct timespec now;
@@ -75,6 +71,14 @@ static void pass_on(struct reporter *reporter, const struct message *message)
         return;
     }
     struct link_report report = message->report;
+    const bool is_double = radio_hears_double(&reporter->radio);
+    if (is_double && !reporter->is_double)
+    {
+        say("another robot of this number is on the network: give one of them another");
+    }
+    reporter->is_double = is_double;
+    report.status_flags |= is_double ? LINK_STATUS_DOUBLE : 0;
+    report.ignored_count = atomic_load(&reporter->radio.ignored_count);
     report.status_flags |= has_lost_rows(reporter) ? LINK_STATUS_LOG_LOST : 0;
     telemetry_publish(&reporter->telemetry, &report);
     if (reporter->io_tsv.fd >= 0)
@@ -91,13 +95,8 @@ static void *run(void *context)
     while (got != 0)
     {
         telemetry_connect(&reporter->telemetry, monotonic_us());
-        struct pollfd fds[] = {{.fd = reporter->thread_fd, .events = POLLIN},
-                               {.fd = telemetry_fd(&reporter->telemetry), .events = POLLIN}};
-        (void)poll(fds, 2, LONGEST_WAIT_MS);
-        if (fds[1].revents != 0)
-        {
-            telemetry_handle(&reporter->telemetry);
-        }
+        struct pollfd report = {.fd = reporter->thread_fd, .events = POLLIN};
+        (void)poll(&report, 1, LONGEST_WAIT_MS);
         struct message message;
         got = recv(reporter->thread_fd, &message, sizeof message, MSG_DONTWAIT);
         if (got == sizeof message)
@@ -130,8 +129,9 @@ static void release(struct reporter *reporter)
 }
 
 enum fw_err reporter_start(struct reporter *reporter, const struct app_config *config,
-                           struct link *link)
+                           const struct seal_key *key, struct link *link)
 {
+    const int64_t session = seal_random();
     int fds[2];
     if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, fds) != 0)
     {
@@ -140,23 +140,30 @@ enum fw_err reporter_start(struct reporter *reporter, const struct app_config *c
     reporter->loop_fd = fds[0];
     reporter->thread_fd = fds[1];
     reporter->io_tsv = (struct io_tsv){.fd = -1};
-    telemetry_init(&reporter->telemetry, config, on_command, reporter);
+    telemetry_init(&reporter->telemetry, config, key, session);
     bool ok = true;
     if (config->io_tsv[0] != '\0')
     {
         ok = io_tsv_open(&reporter->io_tsv, config->io_tsv, config->vote_frames);
     }
-    if (!ok || !start_thread(reporter))
+    ok = ok && radio_start(&reporter->radio, config, key, session, reporter->thread_fd);
+    if (ok && !start_thread(reporter))
+    {
+        radio_stop(&reporter->radio);
+        ok = false;
+    }
+    if (!ok)
     {
         release(reporter);
         return FW_ERR_IO;
     }
-    *link = (struct link){reporter, send_report, send_ack, receive, reporter->loop_fd};
+    *link = (struct link){reporter, send_report, send_ack, receive, reporter->loop_fd, session};
     return FW_OK;
 }
 
 bool reporter_stop(struct reporter *reporter)
 {
+    radio_stop(&reporter->radio);
     (void)shutdown(reporter->loop_fd, SHUT_WR);
     (void)pthread_join(reporter->thread, NULL);
     release(reporter);

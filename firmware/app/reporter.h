@@ -9,6 +9,7 @@
 #include "config.h"
 #include "io_tsv.h"
 #include "link.h"
+#include "radio.h"
 #include "telemetry.h"
 
 struct reporter
@@ -17,14 +18,18 @@ struct reporter
     // Two ends of one connection that keeps messages whole.
     int loop_fd, thread_fd;
     struct telemetry telemetry;
+    struct radio radio;
+    // Another robot of this number was heard, and said.
+    bool is_double;
     // Its descriptor is -1 if there is no such log.
     struct io_tsv io_tsv;
 };
 
-// Starts the thread. @param config lives as long as the reporter.
-// @param link the loop's side. @return FW_OK; FW_ERR_IO: see errno; then nothing runs.
+// Starts the thread, and the radio's. @param config lives as long as the reporter.
+// @param key of this robot; may be absent. @param link the loop's side.
+// @return FW_OK; FW_ERR_IO: see errno; then nothing runs.
 enum fw_err FW_MUST_CHECK reporter_start(struct reporter *reporter, const struct app_config *config,
-                                         struct link *link);
+                                         const struct seal_key *key, struct link *link);
 
 // Ends the thread after it has passed on all that it got. @return false if rows of a log were lost.
 bool reporter_stop(struct reporter *reporter);

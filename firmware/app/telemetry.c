@@ -6,17 +6,16 @@
 #include <stdio.h>
 #include <string.h>
 #include <turbopi_ack_t.h>
+#include <turbopi_link_t.h>
 #include <turbopi_run_t.h>
-#include <turbopi_swarm_command_t.h>
+#include <turbopi_signed_ack_t.h>
 #include <turbopi_telemetry_t.h>
 
 #define CONNECT_PERIOD_US 2000000
 #define RUN_PERIOD_US 5000000
-#define COMMAND_CHANNEL "SWARM_COMMAND"
-#define ALL_ROBOTS (-1)
-// Bytes of a swarm_command_t before its text: type, utime_us, seq, robot_id, verb, start_utime_us
-// and the text's length, big-endian.
-#define COMMAND_TEXT_AT (8 + 8 + 4 + 4 + 1 + 8 + 4)
+#define LINK_PERIOD_US 100000
+// More than any signed message takes.
+#define SIGNED_BYTES_MAX 256
 
 struct channel
 {
@@ -31,64 +30,10 @@ static struct channel channel_of(const struct telemetry *telemetry, const char *
     return channel;
 }
 
-// LCM's decoder trusts that a text is as long as it says and ends in 0, but anyone may send.
-static bool decode_command(const lcm_recv_buf_t *buffer, turbopi_swarm_command_t *message)
-{
-    const uint8_t *bytes = buffer->data;
-    if (buffer->data_size <= COMMAND_TEXT_AT || bytes[buffer->data_size - 1] != 0)
-    {
-        return false;
-    }
-    uint32_t length = 0;
-    for (int i = 4; i > 0; --i)
-    {
-        length = length << 8 | bytes[COMMAND_TEXT_AT - i];
-    }
-    return length == buffer->data_size - COMMAND_TEXT_AT &&
-           turbopi_swarm_command_t_decode(bytes, 0, (int)buffer->data_size, message) >= 0;
-}
-
-static void pass_on_command(struct telemetry *telemetry, const turbopi_swarm_command_t *message)
-{
-    if (message->robot_id != ALL_ROBOTS && message->robot_id != telemetry->config->robot_id)
-    {
-        return;
-    }
-    struct link_command command = {
-        .order =
-            {
-                .utime_us = message->utime_us,
-                .seq = message->seq,
-                .verb = message->verb,
-                .start_utime_us = message->start_utime_us,
-            },
-    };
-    (void)snprintf(command.name, sizeof command.name, "%s", message->behavior);
-    telemetry->on_command(telemetry->context, &command);
-}
-
-static void on_swarm_command(const lcm_recv_buf_t *buffer, const char *channel, void *context)
-{
-    turbopi_swarm_command_t message;
-    if (!decode_command(buffer, &message))
-    {
-        (void)fprintf(stderr, "turbopi: %s: ignored: not a command of this version\n", channel);
-        return;
-    }
-    pass_on_command(context, &message);
-    (void)turbopi_swarm_command_t_decode_cleanup(&message);
-}
-
 void telemetry_init(struct telemetry *telemetry, const struct app_config *config,
-                    telemetry_command_fn *on_command, void *context)
+                    const struct seal_key *key, int64_t session)
 {
-    *telemetry = (struct telemetry){.config = config, .on_command = on_command, .context = context};
-}
-
-// A log file is written, not heard.
-static bool hears_commands(const struct telemetry *telemetry)
-{
-    return strncmp(telemetry->config->lcm_url, "file:", 5) != 0;
+    *telemetry = (struct telemetry){.config = config, .key = *key, .session = session};
 }
 
 bool telemetry_has_lost_log(const struct telemetry *telemetry)
@@ -104,11 +49,6 @@ void telemetry_connect(struct telemetry *telemetry, int64_t now_us)
         return;
     }
     telemetry->lcm = lcm_create(telemetry->config->lcm_url);
-    if (telemetry->lcm != NULL && hears_commands(telemetry) &&
-        lcm_subscribe(telemetry->lcm, COMMAND_CHANNEL, on_swarm_command, telemetry) == NULL)
-    {
-        telemetry_close(telemetry);
-    }
     telemetry->next_create_us = now_us + CONNECT_PERIOD_US;
 }
 
@@ -133,9 +73,10 @@ static void publish_run(struct telemetry *telemetry, const struct link_report *r
                          report->rejected_count[reason], fw_reject_str((enum fw_reject)reason));
     }
     used += snprintf(text + used, sizeof text - (size_t)used,
-                     "\n# reports: %" PRIu32 " lost, %" PRIu32 " unsent; panel %s\n",
+                     "\n# reports: %" PRIu32 " lost, %" PRIu32
+                     " unsent; panel %s; commands ignored: %" PRIu32 "\n",
                      report->lost_report_count, telemetry->unsent_count,
-                     report->panel_lost ? "lost" : "ok");
+                     report->panel_lost ? "lost" : "ok", report->ignored_count);
     (void)config_print(telemetry->config, false, text + used, sizeof text - (size_t)used);
     char behavior[LINK_NAME_MAX];
     memcpy(behavior, report->behavior, sizeof behavior);
@@ -175,6 +116,59 @@ static void publish_step(struct telemetry *telemetry, const struct link_report *
                          telemetry->lcm, channel_of(telemetry, "TELEMETRY").name, &message));
 }
 
+// Signs a message that ends in its tag, and sends it.
+static void publish_signed(struct telemetry *telemetry, const char *suffix, uint8_t *bytes,
+                           int size)
+{
+    if (size <= 0)
+    {
+        ++telemetry->unsent_count;
+        return;
+    }
+    seal_sign(&telemetry->key, bytes, (size_t)size);
+    count(telemetry,
+          lcm_publish(telemetry->lcm, channel_of(telemetry, suffix).name, bytes, (unsigned)size));
+}
+
+static void publish_link(struct telemetry *telemetry, const struct link_report *report)
+{
+    uint8_t bytes[SIGNED_BYTES_MAX];
+    const turbopi_link_t message = {
+        .utime_us = report->utime_us,
+        .robot_id = telemetry->config->robot_id,
+        .session = telemetry->session,
+        .session_us = report->session_us,
+        .counter = report->counter,
+        .mode = report->out.mode,
+        .stands = report->stands,
+        .armed = (report->status_flags & LINK_STATUS_LATCHED) == 0,
+        .link_timeout_ms = report->link_timeout_ms,
+        .status_flags = report->status_flags,
+    };
+    publish_signed(telemetry, "LINK", bytes,
+                   turbopi_link_t_encode(bytes, 0, sizeof bytes, &message));
+}
+
+static void publish_signed_ack(struct telemetry *telemetry, const struct link_ack *ack,
+                               char *reason)
+{
+    uint8_t bytes[SIGNED_BYTES_MAX];
+    const turbopi_signed_ack_t message = {
+        .utime_us = ack->utime_us,
+        .robot_id = telemetry->config->robot_id,
+        .session = telemetry->session,
+        .session_us = ack->session_us,
+        .command_utime_us = ack->command_utime_us,
+        .seq = ack->seq,
+        .verb = ack->verb,
+        .accepted = ack->accepted,
+        .stands = ack->stands,
+        .reason = reason,
+    };
+    publish_signed(telemetry, "SIGNED_ACK", bytes,
+                   turbopi_signed_ack_t_encode(bytes, 0, sizeof bytes, &message));
+}
+
 void telemetry_publish(struct telemetry *telemetry, const struct link_report *report)
 {
     if (telemetry->lcm == NULL)
@@ -189,6 +183,11 @@ void telemetry_publish(struct telemetry *telemetry, const struct link_report *re
         telemetry->next_run_us = report->utime_us + RUN_PERIOD_US;
     }
     publish_step(telemetry, report);
+    if (report->session_us >= telemetry->next_link_us)
+    {
+        publish_link(telemetry, report);
+        telemetry->next_link_us = report->session_us + LINK_PERIOD_US;
+    }
 }
 
 void telemetry_publish_ack(struct telemetry *telemetry, const struct link_ack *ack)
@@ -206,18 +205,8 @@ void telemetry_publish_ack(struct telemetry *telemetry, const struct link_ack *a
     {
         count(telemetry,
               turbopi_ack_t_publish(telemetry->lcm, channel_of(telemetry, "ACK").name, &message));
+        publish_signed_ack(telemetry, ack, reason);
     }
-}
-
-int telemetry_fd(const struct telemetry *telemetry)
-{
-    return telemetry->lcm != NULL && hears_commands(telemetry) ? lcm_get_fileno(telemetry->lcm)
-                                                               : -1;
-}
-
-void telemetry_handle(struct telemetry *telemetry)
-{
-    (void)lcm_handle_timeout(telemetry->lcm, 0);
 }
 
 void telemetry_close(struct telemetry *telemetry)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reports to LCM, commands from it. LCM takes heap, threads and time: only the reporter's thread
-// calls these.
+// Reports and answers to LCM, which never hears anything here: see radio.h. It takes heap, threads
+// and time: only the reporter's thread calls these.
 #ifndef APP_TELEMETRY_H
 #define APP_TELEMETRY_H
 
@@ -8,36 +8,30 @@
 
 #include "config.h"
 #include "link.h"
-
-// Called for every command to this robot.
-typedef void telemetry_command_fn(void *context, const struct link_command *command);
+#include "radio/seal.h"
 
 struct telemetry
 {
     const struct app_config *config;
-    telemetry_command_fn *on_command;
-    void *context;
+    struct seal_key key;
+    int64_t session;
     // NULL while there is no network.
     lcm_t *lcm;
-    int64_t next_create_us, next_run_us;
+    int64_t next_create_us, next_run_us, next_link_us;
     // Messages that LCM did not take.
     uint32_t unsent_count;
 };
 
-// @param config and context live as long as telemetry.
+// @param config lives as long as telemetry. @param session as in link.h.
 void telemetry_init(struct telemetry *telemetry, const struct app_config *config,
-                    telemetry_command_fn *on_command, void *context);
+                    const struct seal_key *key, int64_t session);
 
 // Connects if that is due. May take seconds.
 void telemetry_connect(struct telemetry *telemetry, int64_t now_us);
 
-// R<nn>_TELEMETRY, and R<nn>_RUN every 5 s; lost without a network.
+// R<nn>_TELEMETRY, R<nn>_LINK ten times a second, R<nn>_RUN every 5 s; lost without a network.
 void telemetry_publish(struct telemetry *telemetry, const struct link_report *report);
 void telemetry_publish_ack(struct telemetry *telemetry, const struct link_ack *ack);
-
-// @return readable when telemetry_handle() has something to do; -1: never.
-int telemetry_fd(const struct telemetry *telemetry);
-void telemetry_handle(struct telemetry *telemetry);
 
 // Messages to a log file, unlike those to a network, are not to be lost: tells whether any was.
 bool telemetry_has_lost_log(const struct telemetry *telemetry);

@@ -3,8 +3,13 @@
 
 static bool is_copy(const struct fw_inbox *inbox, const struct fw_command *command)
 {
-    return inbox->obeyed_utime_us != 0 && command->utime_us == inbox->obeyed_utime_us &&
-           command->seq == inbox->obeyed_seq;
+    return command->counter == inbox->counter && command->seq == inbox->obeyed_seq &&
+           command->verb == inbox->obeyed_verb;
+}
+
+static bool is_start(const struct fw_command *command)
+{
+    return command->verb == FW_VERB_START || command->verb == FW_VERB_SCRIPT;
 }
 
 static bool clocks_agree(const struct fw_command *command, int64_t now_utime_us)
@@ -15,43 +20,95 @@ static bool clocks_agree(const struct fw_command *command, int64_t now_utime_us)
             command->start_utime_us >= now_utime_us - FW_START_LATE_US);
 }
 
+// Is it from who may command, and for this run of the program?
+static enum fw_verdict judge_sender(const struct fw_inbox *inbox, const struct fw_command *command)
+{
+    switch ((enum fw_seal)command->seal)
+    {
+        case FW_SEAL_GOOD: break;
+        case FW_SEAL_WRONG: return FW_VERDICT_FORGED;
+        case FW_SEAL_NO_KEY: return FW_VERDICT_NO_KEY;
+        case FW_SEAL_NONE:
+        default: return FW_VERDICT_UNSIGNED;
+    }
+    const bool is_ours = inbox->session != 0 && command->session == inbox->session;
+    return is_ours ? FW_VERDICT_OBEY : FW_VERDICT_SESSION;
+}
+
+// Made just now, and after the last stop.
+static bool is_fresh(const struct fw_inbox *inbox, const struct fw_command *command,
+                     int64_t session_us)
+{
+    return command->made_us >= session_us - FW_COMMAND_FRESH_US &&
+           command->made_us <= session_us + FW_COMMAND_AHEAD_US &&
+           (!inbox->latched || command->made_us > inbox->stopped_us);
+}
+
+// Does the robot's state allow it, at the instant that it names?
+static enum fw_verdict judge_state(const struct fw_inbox *inbox, const struct fw_command *command,
+                                   int64_t now_utime_us, bool running)
+{
+    if (command->counter <= inbox->counter)
+    {
+        return FW_VERDICT_OLD;
+    }
+    if (command->verb == FW_VERB_SCRIPT && running)
+    {
+        return FW_VERDICT_RUNNING;
+    }
+    return is_start(command) && !clocks_agree(command, now_utime_us) ? FW_VERDICT_CLOCK
+                                                                     : FW_VERDICT_OBEY;
+}
+
 enum fw_verdict fw_command_judge(const struct fw_inbox *inbox, const struct fw_command *command,
-                                 int64_t now_utime_us, bool running)
+                                 int64_t now_utime_us, int64_t session_us, bool running)
 {
     if (command->verb == FW_VERB_STOP)
     {
         return FW_VERDICT_OBEY;
     }
-    if (is_copy(inbox, command))
+    if (command->verb < FW_VERB_STOP || command->verb > FW_VERB_HOLD)
+    {
+        return FW_VERDICT_UNKNOWN;
+    }
+    const enum fw_verdict verdict = judge_sender(inbox, command);
+    if (verdict != FW_VERDICT_OBEY)
+    {
+        return verdict;
+    }
+    if (inbox->latched && is_start(command))
+    {
+        return FW_VERDICT_LATCHED;
+    }
+    if (command->verb != FW_VERB_HOLD && is_copy(inbox, command))
     {
         return FW_VERDICT_COPY;
     }
-    if (command->utime_us < inbox->obeyed_utime_us)
+    if (!is_fresh(inbox, command, session_us))
     {
-        return FW_VERDICT_OLD;
+        return FW_VERDICT_EXPIRED;
     }
-    switch (command->verb)
-    {
-        case FW_VERB_SELECT: return FW_VERDICT_OBEY;
-        case FW_VERB_START: break;
-        case FW_VERB_SCRIPT:
-            if (running)
-            {
-                return FW_VERDICT_RUNNING;
-            }
-            break;
-        default: return FW_VERDICT_UNKNOWN;
-    }
-    return clocks_agree(command, now_utime_us) ? FW_VERDICT_OBEY : FW_VERDICT_CLOCK;
+    // That the operator is there has no order: it says nothing but that.
+    return command->verb == FW_VERB_HOLD ? FW_VERDICT_OBEY
+                                         : judge_state(inbox, command, now_utime_us, running);
 }
 
-void fw_command_obeyed(struct fw_inbox *inbox, const struct fw_command *command)
+void fw_command_obeyed(struct fw_inbox *inbox, const struct fw_command *command, int64_t session_us)
 {
-    if (command->utime_us >= inbox->obeyed_utime_us)
+    if (command->verb == FW_VERB_STOP)
     {
-        inbox->obeyed_utime_us = command->utime_us;
-        inbox->obeyed_seq = command->seq;
+        inbox->latched = true;
+        inbox->stopped_us = session_us;
+        return;
     }
+    if (command->verb == FW_VERB_HOLD || command->counter <= inbox->counter)
+    {
+        return;
+    }
+    inbox->latched = inbox->latched && command->verb != FW_VERB_ARM;
+    inbox->counter = command->counter;
+    inbox->obeyed_seq = command->seq;
+    inbox->obeyed_verb = command->verb;
 }
 
 const char *fw_verdict_str(enum fw_verdict verdict)
@@ -65,6 +122,13 @@ const char *fw_verdict_str(enum fw_verdict verdict)
         case FW_VERDICT_CLOCK:
             return "start is over 2 s ago or over 600 s ahead: are the clocks set?";
         case FW_VERDICT_RUNNING: return "running: stop before choosing a script";
+        case FW_VERDICT_UNSIGNED: return "not signed: only a stop may be";
+        case FW_VERDICT_FORGED: return "its signature is wrong: signed with another key?";
+        case FW_VERDICT_NO_KEY: return "the robot has no key: `twinmill flash` brings it one";
+        case FW_VERDICT_SESSION: return "made for an earlier run of the robot's program";
+        case FW_VERDICT_EXPIRED:
+            return "came over 3 s after it was made, or was made before the stop";
+        case FW_VERDICT_LATCHED: return "was stopped: arm it first (`twinmill swarm arm`)";
     }
     return "unknown verdict";
 }

@@ -11,10 +11,14 @@ import sys
 import time
 from pathlib import Path
 
-import lcm
 import turbopi
-from robot_process import LEFT, ZERO, Robot, wait_until
+from robot_process import LEFT, ZERO, Robot
 
+from twinmill.robots import tell
+from twinmill.robots.fleet import Fleet
+from twinmill.robots.key import load, of_robot
+
+ID = 3
 URL = "udpm://239.255.76.67:7667?ttl=0"
 
 
@@ -27,56 +31,31 @@ def network(up: bool):
         subprocess.run(command.split(), check=True)
 
 
-class Operator:
-    """Sends commands until they are acknowledged, and listens."""
-
-    def __init__(self):
-        self.acks, self.heard = {}, 0
-        self._connect()
-
-    def _connect(self):
-        self.bus = lcm.LCM(URL)
-        self.bus.subscribe("R03_ACK", self._on_ack)
-        self.bus.subscribe("R03_TELEMETRY", self._on_telemetry)
-
-    def _on_ack(self, _, data):
-        ack = turbopi.ack_t.decode(data)
-        self.acks[ack.seq] = ack
-
-    def _on_telemetry(self, *_):
-        self.heard += 1
-
-    def listen(self, duration_s):
-        end_s = time.monotonic() + duration_s
-        while time.monotonic() < end_s:
-            self.bus.handle_timeout(20)
-
-    def tell(self, seq, verb, behavior="", start_utime_us=0):
-        command = turbopi.swarm_command_t()
-        command.utime_us = int(time.time() * 1e6)
-        command.seq, command.verb, command.behavior = seq, verb, behavior
-        command.robot_id, command.start_utime_us = -1, start_utime_us
-        for _ in range(100):
-            self.bus.publish("SWARM_COMMAND", command.encode())
-            self.listen(0.05)
-            if seq in self.acks:
-                return
+def heard_again(fleet: Fleet) -> bool:
+    """Ten messages from now on."""
+    seq = fleet.robots[ID].telemetry.seq if ID in fleet.robots else 0
+    fleet.listen(10, lambda: ID in fleet.robots and fleet.robots[ID].telemetry.seq > seq + 10)
+    return ID in fleet.robots and fleet.robots[ID].telemetry.seq > seq + 10
 
 
 def main(folder: Path, program: list[str]) -> dict:
     network(up=True)
     result = {}
-    command = turbopi.swarm_command_t
-    with Robot(program, folder, "--lcm-url", URL, "--set", "robot_id=3") as robot:
-        operator = Operator()
-        wait_until(lambda: operator.listen(0.1) or operator.heard > 10)
+    key = load(folder / "operator.key")
+    own_key = folder / "key"
+    own_key.touch(mode=0o600)
+    own_key.write_text(of_robot(key, ID).hex())
+    options = ("--set", f"robot_id={ID}", "--set", f"key_file={own_key}", "--set", "run_dir=")
+    with Robot(program, folder, "--lcm-url", URL, *options) as robot:
+        fleet = Fleet(URL, key=key)
+        heard_again(fleet)
         result["stands_before_start"] = robot.duties() == ZERO
-        start_s = time.time() + 1.0
-        operator.tell(1, command.VERB_START, start_utime_us=int(start_s * 1e6))
+        begun = tell.start(fleet, {ID}, "", 1.0, partial=False, link_timeout_ms=0)
         robot.wait_for(LEFT)
         moved_s = min(t for t, duties in robot.rows() if duties == LEFT)
-        result["start_delay_s"] = moved_s + (time.time() - time.monotonic()) - start_s
-        operator.tell(2, command.VERB_SELECT, "dance")
+        result["start_delay_s"] = moved_s + (time.time() - time.monotonic()) - begun.utime_us / 1e6
+        dance = tell.make_command(turbopi.swarm_command_t.VERB_SELECT, "dance")
+        (refused,) = tell.tell(fleet, dance, {ID}, time.monotonic() + 5)
 
         network(up=False)
         cut_s = time.monotonic()
@@ -88,14 +67,11 @@ def main(folder: Path, program: list[str]) -> dict:
         result["moved_without_network"] = {duties for _, duties in rows} == {LEFT}
 
         network(up=True)
-        operator.heard = 0
-        wait_until(lambda: operator.listen(0.1) or operator.heard > 10)
-        result["heard_again"] = operator.heard > 10
-        operator.tell(3, command.VERB_STOP)
-        result["stopped"] = robot.wait_for(ZERO)
-        result["acks"] = [
-            [seq, ack.accepted, ack.reason] for seq, ack in sorted(operator.acks.items())
-        ]
+        result["heard_again"] = heard_again(fleet)
+        (stopped,) = tell.stop(fleet, {ID})
+        result["stopped"] = stopped.stands and robot.wait_for(ZERO)
+        answers = (*begun.answers, refused, stopped)
+        result["answers"] = [[a.accepted, a.signed, a.reason] for a in answers]
     return result
 
 

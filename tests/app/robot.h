@@ -4,6 +4,7 @@
 #define TESTS_APP_ROBOT_H
 
 #include <stdbool.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "../firmware/support.h"
@@ -18,6 +19,7 @@
 #define ROBOT_HEIGHT_PX 16
 #define ROBOT_PERIOD_US 33333
 #define ROBOT_UNIX_OFFSET_US 1700000000000000
+#define ROBOT_SESSION 77
 
 // What the camera shows at the next take.
 enum robot_view
@@ -53,6 +55,8 @@ static struct robot
     bool has_command;
     struct link_ack ack;
     int ack_count;
+    // Of the commands that are told.
+    int32_t link_timeout_ms;
 } robot;
 
 static enum fw_err robot_camera_open(void *device, struct hal_camera_format *format)
@@ -169,11 +173,13 @@ static inline void robot_make(void)
     config_default(&robot.config);
     robot.config.width_px = ROBOT_WIDTH_PX;
     robot.config.height_px = ROBOT_HEIGHT_PX;
+    robot.config.run_dir[0] = '\0';
 }
 
 static inline void robot_boot(void)
 {
-    const struct link link = {NULL, robot_send_report, robot_send_ack, robot_receive, -1};
+    const struct link link = {NULL, robot_send_report, robot_send_ack, robot_receive,
+                              -1,   ROBOT_SESSION};
     TEST_ASSERT_EQUAL(FW_OK,
                       loop_init(&robot.loop, &robot.config, &robot.own, &robot.devices, &link));
 }
@@ -184,6 +190,43 @@ static inline void robot_steps(int count)
     {
         loop_step(&robot.loop);
     }
+}
+
+static inline int64_t robot_unix_us(void)
+{
+    return robot.hand.monotonic_us + robot.hand.unix_offset_us;
+}
+
+// Sends a command that its operator signed `age_us` ago, and lets the robot read it.
+// @return true if accepted.
+static inline bool robot_tell_as_of(int64_t age_us, enum fw_verb verb, int64_t start_utime_us,
+                                    const char *name)
+{
+    static int32_t seq;
+    ++seq;
+    robot.command =
+        (struct link_command){.order = {.utime_us = robot_unix_us() - age_us,
+                                        .seq = seq,
+                                        .verb = (int8_t)verb,
+                                        .start_utime_us = start_utime_us,
+                                        .seal = FW_SEAL_GOOD,
+                                        .session = ROBOT_SESSION,
+                                        .made_us = loop_link_session_us(&robot.loop) - age_us,
+                                        .counter = seq,
+                                        .link_timeout_ms = robot.link_timeout_ms}};
+    (void)snprintf(robot.command.name, sizeof robot.command.name, "%s", name);
+    robot.has_command = true;
+    const int acks = robot.ack_count;
+    robot_steps(1);
+    TEST_ASSERT_EQUAL(acks + 1, robot.ack_count);
+    TEST_ASSERT_EQUAL(seq, robot.ack.seq);
+    TEST_ASSERT_EQUAL(robot.ack.accepted, robot.ack.reason[0] == '\0');
+    return robot.ack.accepted;
+}
+
+static inline bool robot_tell(enum fw_verb verb, int64_t start_utime_us, const char *name)
+{
+    return robot_tell_as_of(0, verb, start_utime_us, name);
 }
 
 // A robot that has driven for half a second.

@@ -25,34 +25,6 @@ void tearDown(void)
     robot_free();
 }
 
-static int64_t unix_us(void)
-{
-    return robot.hand.monotonic_us + robot.hand.unix_offset_us;
-}
-
-// Sends a command stamped `age_us` ago and lets the robot read it. @return true if accepted.
-static bool tell_as_of(int64_t age_us, enum fw_verb verb, int64_t start_utime_us, const char *name)
-{
-    static int32_t seq;
-    robot.command = (struct link_command){.order = {.utime_us = unix_us() - age_us,
-                                                    .seq = ++seq,
-                                                    .verb = (int8_t)verb,
-                                                    .start_utime_us = start_utime_us}};
-    snprintf(robot.command.name, sizeof robot.command.name, "%s", name);
-    robot.has_command = true;
-    const int acks = robot.ack_count;
-    robot_steps(1);
-    TEST_ASSERT_EQUAL(acks + 1, robot.ack_count);
-    TEST_ASSERT_EQUAL(seq, robot.ack.seq);
-    TEST_ASSERT_EQUAL(robot.ack.accepted, robot.ack.reason[0] == '\0');
-    return robot.ack.accepted;
-}
-
-static bool tell(enum fw_verb verb, int64_t start_utime_us, const char *name)
-{
-    return tell_as_of(0, verb, start_utime_us, name);
-}
-
 static void write_script(const char *text)
 {
     char path[128];
@@ -67,32 +39,32 @@ static void write_script(const char *text)
 
 static void test_start_and_stop(void)
 {
-    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
     ASSERT_DUTIES(left_pct);
-    TEST_ASSERT_TRUE(tell(FW_VERB_STOP, 0, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
     TEST_ASSERT_TRUE(robot_stands());
 }
 
 // Robots that got the command at different times start at one instant, to within a wake-up.
 static void test_start_happens_at_its_instant(void)
 {
-    const int64_t start_us = unix_us() + 700000;
-    TEST_ASSERT_TRUE(tell(FW_VERB_START, start_us, ""));
+    const int64_t start_us = robot_unix_us() + 700000;
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, start_us, ""));
     while (robot_stands())
     {
-        TEST_ASSERT_LESS_OR_EQUAL_INT64(start_us, unix_us());
+        TEST_ASSERT_LESS_OR_EQUAL_INT64(start_us, robot_unix_us());
         robot_steps(1);
     }
-    TEST_ASSERT_EQUAL_INT64(start_us, unix_us());
+    TEST_ASSERT_EQUAL_INT64(start_us, robot_unix_us());
 }
 
 // What a running robot plays changes at the instant, not when the command comes.
 static void test_start_to_come_leaves_a_running_robot_as_it_is(void)
 {
-    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, ""));
-    const int64_t start_us = unix_us() + 700000;
-    TEST_ASSERT_TRUE(tell(FW_VERB_START, start_us, "diffusing_v2"));
-    while (unix_us() < start_us)
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    const int64_t start_us = robot_unix_us() + 700000;
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, start_us, "diffusing_v2"));
+    while (robot_unix_us() < start_us)
     {
         ASSERT_DUTIES(left_pct);
         TEST_ASSERT_EQUAL_STRING("milling", robot.report.behavior);
@@ -109,7 +81,7 @@ static void test_start_that_waits_is_not_moved_by_a_clock_that_is_set(void)
     for (int i = 0; i < 2; ++i)
     {
         const int64_t start_us = robot.hand.monotonic_us + 700000;
-        TEST_ASSERT_TRUE(tell(FW_VERB_START, unix_us() + 700000, ""));
+        TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, robot_unix_us() + 700000, ""));
         robot.hand.unix_offset_us += steps_us[i];
         while (robot_stands())
         {
@@ -117,14 +89,16 @@ static void test_start_that_waits_is_not_moved_by_a_clock_that_is_set(void)
             robot_steps(1);
         }
         TEST_ASSERT_EQUAL_INT64(start_us, robot.hand.monotonic_us);
-        TEST_ASSERT_TRUE(tell(FW_VERB_STOP, 0, ""));
+        TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
+        robot_steps(1);
+        TEST_ASSERT_TRUE(robot_tell(FW_VERB_ARM, 0, ""));
     }
 }
 
 static void test_start_with_an_unknown_table_leaves_all_as_it_is(void)
 {
-    TEST_ASSERT_TRUE(tell(FW_VERB_START, unix_us() + 700000, ""));
-    TEST_ASSERT_FALSE(tell(FW_VERB_START, unix_us() + 100000, "dance"));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, robot_unix_us() + 700000, ""));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_START, robot_unix_us() + 100000, "dance"));
     robot_steps(10);
     TEST_ASSERT_TRUE(robot_stands());
     robot_steps(20);
@@ -133,25 +107,25 @@ static void test_start_with_an_unknown_table_leaves_all_as_it_is(void)
 
 static void test_stop_cancels_a_start_that_waits(void)
 {
-    TEST_ASSERT_TRUE(tell(FW_VERB_START, unix_us() + 700000, ""));
-    TEST_ASSERT_TRUE(tell(FW_VERB_STOP, 0, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, robot_unix_us() + 700000, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
     robot_steps(60);
     TEST_ASSERT_TRUE(robot_stands());
 }
 
 static void test_start_by_a_wrong_clock_is_refused(void)
 {
-    TEST_ASSERT_FALSE(tell(FW_VERB_START, unix_us() - 3600000000, ""));
-    TEST_ASSERT_FALSE(tell(FW_VERB_START, unix_us() + 3600000000, ""));
-    TEST_ASSERT_FALSE(tell(FW_VERB_START, INT64_MIN, ""));
-    TEST_ASSERT_FALSE(tell(FW_VERB_START, INT64_MAX, ""));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_START, robot_unix_us() - 3600000000, ""));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_START, robot_unix_us() + 3600000000, ""));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_START, INT64_MIN, ""));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_START, INT64_MAX, ""));
     robot_steps(5);
     TEST_ASSERT_TRUE(robot_stands());
 }
 
 static void test_copy_is_acknowledged_and_changes_nothing(void)
 {
-    TEST_ASSERT_TRUE(tell(FW_VERB_START, unix_us() + 100000, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, robot_unix_us() + 100000, ""));
     const struct link_command copy = robot.command;
     robot_steps(120);
     robot.command = copy;
@@ -163,10 +137,10 @@ static void test_copy_is_acknowledged_and_changes_nothing(void)
 
 static void test_late_copy_of_a_start_does_not_undo_a_stop(void)
 {
-    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
     const struct link_command copy = robot.command;
     robot_steps(3);
-    TEST_ASSERT_TRUE(tell(FW_VERB_STOP, 0, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
     robot.command = copy;
     robot.has_command = true;
     robot_steps(5);
@@ -176,19 +150,19 @@ static void test_late_copy_of_a_start_does_not_undo_a_stop(void)
 
 static void test_stop_is_obeyed_however_old(void)
 {
-    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, ""));
-    TEST_ASSERT_TRUE(tell_as_of(3600000000, FW_VERB_STOP, 0, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_TRUE(robot_tell_as_of(3600000000, FW_VERB_STOP, 0, ""));
     TEST_ASSERT_TRUE(robot_stands());
 }
 
 static void test_select_changes_the_table(void)
 {
-    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, ""));
-    TEST_ASSERT_TRUE(tell(FW_VERB_SELECT, 0, "diffusing_v2"));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_SELECT, 0, "diffusing_v2"));
     robot_steps(1);
     ASSERT_DUTIES(((const int8_t[4]){100, 100, 100, 100}));
     TEST_ASSERT_EQUAL_STRING("diffusing_v2", robot.report.behavior);
-    TEST_ASSERT_FALSE(tell(FW_VERB_SELECT, 0, "dance"));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_SELECT, 0, "dance"));
     TEST_ASSERT_EQUAL_STRING("no behaviour 'dance'", robot.ack.reason);
     ASSERT_DUTIES(((const int8_t[4]){100, 100, 100, 100}));
 }
@@ -198,12 +172,12 @@ static void test_tables_of_the_users_own_are_known_by_name(void)
     char error[LINES_ERROR_MAX];
     TEST_ASSERT_TRUE(own_tables_add(&robot.own, "ahead", "0,2,100,0", error));
     TEST_ASSERT_TRUE(own_tables_add(&robot.own, "milling", "0,2,-100,0", error));
-    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, "ahead"));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, "ahead"));
     robot_steps(1);
     ASSERT_DUTIES(((const int8_t[4]){100, 100, 100, 100}));
     TEST_ASSERT_EQUAL_STRING("ahead", robot.report.behavior);
     // It goes before a built-in one of its name, and may be given anew.
-    TEST_ASSERT_TRUE(tell(FW_VERB_SELECT, 0, "milling"));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_SELECT, 0, "milling"));
     robot_steps(1);
     ASSERT_DUTIES(((const int8_t[4]){-100, -100, -100, -100}));
     TEST_ASSERT_TRUE(own_tables_add(&robot.own, "milling", "0,2,100,0", error));
@@ -237,7 +211,7 @@ static void test_script_is_played_at_its_times_and_ends_in_a_stop(void)
     write_script(
         "t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,10,20,30,40\n0.05,-50,50,-50,50\n0.1,9,9,9,9\n");
     robot.hand.wait_us = INT64_MAX;  // only the loop's own time-outs wake it
-    TEST_ASSERT_TRUE(tell(FW_VERB_SCRIPT, 0, "s.csv"));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_SCRIPT, 0, "s.csv"));
     const int64_t begin_us = robot.hand.monotonic_us;
     ASSERT_DUTIES(((const int8_t[4]){10, 20, 30, 40}));
     TEST_ASSERT_EQUAL(FW_MODE_SCRIPT, robot.report.out.mode);
@@ -252,27 +226,27 @@ static void test_script_is_played_at_its_times_and_ends_in_a_stop(void)
 
 static void test_bad_scripts_are_refused_in_words(void)
 {
-    TEST_ASSERT_FALSE(tell(FW_VERB_SCRIPT, 0, "absent.csv"));
-    TEST_ASSERT_FALSE(tell(FW_VERB_SCRIPT, 0, "../../etc/passwd"));
-    TEST_ASSERT_FALSE(tell(FW_VERB_SCRIPT, 0, ""));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_SCRIPT, 0, "absent.csv"));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_SCRIPT, 0, "../../etc/passwd"));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_SCRIPT, 0, ""));
     write_script("t_s,speed_input,turn_input\n0,500,0\n");
-    TEST_ASSERT_FALSE(tell(FW_VERB_SCRIPT, 0, "s.csv"));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_SCRIPT, 0, "s.csv"));
     TEST_ASSERT_NOT_NULL(strstr(robot.ack.reason, "line 2"));
-    TEST_ASSERT_TRUE(tell(FW_VERB_START, 0, ""));
-    TEST_ASSERT_FALSE(tell(FW_VERB_SCRIPT, 0, "s.csv"));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_SCRIPT, 0, "s.csv"));
     ASSERT_DUTIES(left_pct);
 }
 
 static void test_unknown_verb_is_refused(void)
 {
-    TEST_ASSERT_FALSE(tell((enum fw_verb)77, 0, ""));
+    TEST_ASSERT_FALSE(robot_tell((enum fw_verb)77, 0, ""));
 }
 
 static void test_start_is_refused_while_the_battery_is_low(void)
 {
     robot.board.pack_mV = 6000;
     robot_steps(30 * 7);
-    TEST_ASSERT_FALSE(tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_START, 0, ""));
     TEST_ASSERT_TRUE(robot_stands());
 }
 

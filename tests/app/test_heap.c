@@ -50,17 +50,6 @@ void tearDown(void)
     robot_free();
 }
 
-static void tell(enum fw_verb verb, const char *name)
-{
-    static int32_t seq;
-    const int64_t utime_us = robot.hand.monotonic_us + ROBOT_UNIX_OFFSET_US;
-    robot.command =
-        (struct link_command){.order = {.utime_us = utime_us, .seq = ++seq, .verb = (int8_t)verb}};
-    (void)snprintf(robot.command.name, sizeof robot.command.name, "%s", name);
-    robot.has_command = true;
-    robot_steps(1);
-}
-
 // Test
 
 static void test_allocations_are_counted(void)
@@ -101,15 +90,17 @@ static void test_failures_take_no_heap(void)
 
 static void test_commands_take_no_heap(void)
 {
-    tell(FW_VERB_SCRIPT, "lap.csv");
+    (void)robot_tell(FW_VERB_SCRIPT, 0, "lap.csv");
     TEST_ASSERT_TRUE(robot.ack.accepted);
     robot_steps(10);
-    tell(FW_VERB_STOP, "");
-    tell(FW_VERB_SCRIPT, "none.csv");
+    (void)robot_tell(FW_VERB_STOP, 0, "");
+    robot_steps(1);
+    (void)robot_tell(FW_VERB_ARM, 0, "");
+    (void)robot_tell(FW_VERB_SCRIPT, 0, "none.csv");
     TEST_ASSERT_FALSE(robot.ack.accepted);
-    tell(FW_VERB_SELECT, "orbit");
-    tell(FW_VERB_SELECT, "dance");
-    tell(FW_VERB_START, "");
+    (void)robot_tell(FW_VERB_SELECT, 0, "orbit");
+    (void)robot_tell(FW_VERB_SELECT, 0, "dance");
+    (void)robot_tell(FW_VERB_START, 0, "");
     robot_steps(10);
     TEST_ASSERT_EQUAL(0, allocation_count);
 }

@@ -97,7 +97,7 @@ static void test_unplugged_camera_stops_at_once_and_comes_back(void)
     robot.view = VIEW_GREEN;
     robot_steps(30);
     ASSERT_DUTIES(left_pct);
-    TEST_ASSERT_EQUAL(0, robot.report.status_flags);
+    TEST_ASSERT_EQUAL(LINK_STATUS_UNTETHERED, robot.report.status_flags);
 }
 
 // However long a frame may decide, none from before the loss does.

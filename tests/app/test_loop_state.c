@@ -132,7 +132,7 @@ static void test_first_write_that_is_torn_leaves_a_robot_that_may_move(void)
     TEST_ASSERT_BITS_HIGH(LINK_STATUS_STOP_UNCONFIRMED | LINK_STATUS_BOARD_LOST,
                           robot.report.status_flags);
     steps(40);
-    TEST_ASSERT_EQUAL(0, robot.report.status_flags);
+    TEST_ASSERT_EQUAL(LINK_STATUS_UNTETHERED, robot.report.status_flags);
     ASSERT_DUTIES(left_pct);
 }
 
@@ -186,7 +186,7 @@ static void test_robot_without_its_watchers_stands(void)
         all_beat();
         steps(10);
         ASSERT_DUTIES(left_pct);
-        TEST_ASSERT_EQUAL(0, robot.report.status_flags);
+        TEST_ASSERT_EQUAL(LINK_STATUS_UNTETHERED, robot.report.status_flags);
     }
 }
 

@@ -12,6 +12,7 @@
 static struct app_config config;
 static struct reporter reporter;
 static struct link link;
+static const struct seal_key no_key;
 
 void setUp(void)
 {
@@ -33,7 +34,7 @@ static int64_t now_us(void)
 // Ten minutes of steps at once: what the thread cannot take is lost, and the caller goes on.
 static void test_flood_of_reports_is_dropped_and_told_to_the_loop(void)
 {
-    TEST_ASSERT_EQUAL(FW_OK, reporter_start(&reporter, &config, &link));
+    TEST_ASSERT_EQUAL(FW_OK, reporter_start(&reporter, &config, &no_key, &link));
     const struct link_report report = {.utime_us = 1};
     int taken = 0, lost = 0;
     const int64_t begin_us = now_us();
@@ -54,7 +55,7 @@ static void test_flood_of_reports_is_dropped_and_told_to_the_loop(void)
 // A second's reports fit even if the thread is not run meanwhile.
 static void test_second_of_reports_fits(void)
 {
-    TEST_ASSERT_EQUAL(FW_OK, reporter_start(&reporter, &config, &link));
+    TEST_ASSERT_EQUAL(FW_OK, reporter_start(&reporter, &config, &no_key, &link));
     const struct link_report report = {.utime_us = 1};
     for (int i = 0; i < 30; ++i)
     {
@@ -68,7 +69,7 @@ static void test_second_of_reports_fits(void)
 static void test_log_that_cannot_be_opened_is_an_error(void)
 {
     strcpy(config.io_tsv, "/nowhere/io.tsv");
-    TEST_ASSERT_EQUAL(FW_ERR_IO, reporter_start(&reporter, &config, &link));
+    TEST_ASSERT_EQUAL(FW_ERR_IO, reporter_start(&reporter, &config, &no_key, &link));
 }
 
 int main(void)

@@ -296,7 +296,11 @@ def bus_session(tmp_path_factory):
 
 def test_bus_commands_are_obeyed_and_acknowledged(bus_session):
     assert bus_session["stands_before_start"]
-    assert bus_session["acks"] == [[1, 1, ""], [2, 0, "no behaviour 'dance'"], [3, 1, ""]]
+    assert bus_session["answers"] == [
+        [True, True, ""],
+        [False, True, "no behaviour 'dance'"],
+        [True, True, ""],
+    ]
     # To the instant: the first moving duties come at most one frame and some load later.
     assert 0 <= bus_session["start_delay_s"] < 0.033 + SLACK_S
     assert bus_session["stopped"]

@@ -31,7 +31,7 @@ LONG = "t_s,speed_input,turn_input\n0,20,0\n60,0,0\n"
 def twin(folder: Path, *options: str):
     """A twin of four robots that wait."""
     command = [os.environ["TWIN_RUN"], "--plant", "planar", "--n", "4", "--wait"]
-    command += ["--script-dir", str(folder), *options]
+    command += ["--script-dir", str(folder), "--key", str(folder / "operator.key"), *options]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
         try:
             time.sleep(0.5)
@@ -46,6 +46,7 @@ def characterise(folder: Path, name: str, script: str, act=lambda: None) -> dict
     code = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
     command = [sys.executable, "-c", code, "characterise", "--robot", "3", "--json"]
     command += ["--script", str(folder / script), "--out", str(log), "--countdown-s", "1"]
+    command += ["--key", str(folder / "operator.key"), "--arm"]
     keyboard, terminal = pty.openpty()
     with subprocess.Popen(
         command, stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -126,6 +127,7 @@ def characterise_fails(folder: Path, script: str) -> dict:
     log = folder / "none.lcmlog"
     code = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
     command = [sys.executable, "-c", code, "characterise", "--robot", "3"]
+    command += ["--key", str(folder / "operator.key")]
     done = subprocess.run(
         [*command, "--script", str(folder / script), "--out", str(log)],
         capture_output=True,

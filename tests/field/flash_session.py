@@ -51,6 +51,7 @@ class Flasher:
         with redirect_stdout(said), redirect_stderr(complaint):
             try:
                 options = ("--json", "--ssh-config", str(self._config), "--wait-s", "4")
+                options += ("--key", str(self._config.with_name("operator.key")))
                 code = cli.run(["flash", *options, *map(str, arguments)])
             except ValueError as error:
                 return {"code": 1, "complaint": str(error), "robots": []}

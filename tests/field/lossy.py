@@ -3,16 +3,16 @@
 
 import random
 
-import lcm
+from twinmill.data.bus import UdpBus
 
 LOSS = 0.5
 
 
 class LossyBus:
-    """As lcm.LCM, but whatever is published or heard is lost at random."""
+    """As UdpBus, but whatever is published or heard is lost at random."""
 
     def __init__(self, url: str, seed: int):
-        self._bus, self._random = lcm.LCM(url), random.Random(seed)
+        self._bus, self._random = UdpBus(url), random.Random(seed)
         self.lost = 0
 
     def _loses(self) -> bool:
@@ -34,16 +34,16 @@ class LossyBus:
 
 
 class DeafBus(LossyBus):
-    """Loses nothing but what one robot acknowledges."""
+    """Loses nothing but what is said on some channels."""
 
-    def __init__(self, url: str, channel: str):
+    def __init__(self, url: str, deaf_to: set[str]):
         super().__init__(url, 0)
-        self._channel = channel
+        self._deaf_to = deaf_to
 
     def _loses(self) -> bool:
         return False
 
     def subscribe(self, channels, handler):
         return self._bus.subscribe(
-            channels, lambda channel, data: channel == self._channel or handler(channel, data)
+            channels, lambda channel, data: channel in self._deaf_to or handler(channel, data)
         )

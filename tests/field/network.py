@@ -16,12 +16,20 @@ NETWORK = (
 
 
 def run_session(script: str, *arguments) -> dict:
-    """What a session found, as it printed it; skips where networks cannot be made."""
+    """What a session of this folder found, as it printed it; skips where networks cannot be."""
+    return run_session_at(Path(__file__).with_name(script), *arguments)
+
+
+def run_session_at(script: Path, *arguments, timeout_s: float = 200) -> dict:
+    """The same of a session that lies anywhere."""
     command = ["unshare", "--net", "--mount", *([] if os.geteuid() == 0 else ["--map-root-user"])]
-    command += ["sh", "-c", NETWORK, "sh", sys.executable, Path(__file__).with_name(script)]
+    command += ["sh", "-c", NETWORK, "sh", sys.executable, script]
     try:
         done = subprocess.run(
-            [*map(str, command), *map(str, arguments)], capture_output=True, text=True, timeout=200
+            [*map(str, command), *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            timeout=timeout_s,
         )
     except FileNotFoundError as error:
         pytest.skip(f"not installed: {error.filename}")

@@ -69,6 +69,8 @@ panel = none
 width_px = 64
 height_px = 48
 lcm_url = "udpm://239.255.76.67:7667?ttl=0"
+key_file = "{folder}/system/etc/turbopi/key"
+run_dir = ""
 """
 
 

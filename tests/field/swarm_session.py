@@ -14,6 +14,7 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+from keyring import operator_key, robot_options
 from lossy import DeafBus, LossyBus
 from robot_process import ZERO, Robot
 
@@ -21,7 +22,8 @@ from twinmill.robots import tell
 from twinmill.robots.fleet import URL, Fleet
 
 IDS = {1, 2, 3}
-ROUNDS = 3
+KEY = b""  # the operator's, from main()
+ROUNDS = 2
 AHEAD_S = 1.0
 PROTOCOL = {  # verb, behaviour, start after now in us, age of the command in us
     "select_unknown": (2, "dance", 0, 0),
@@ -29,7 +31,6 @@ PROTOCOL = {  # verb, behaviour, start after now in us, age of the command in us
     "start_late": (1, "", -3_000_000, 0),
     "start_far_ahead": (1, "", 700_000_000, 0),
     "verb_unknown": (9, "", 0, 0),
-    "old": (1, "", 0, 3_600_000_000),
     "stop_however_old": (0, "", 0, 3_600_000_000),
 }
 
@@ -40,9 +41,10 @@ def first_move_s(robot: Robot, since_s: float) -> float:
 
 def lossy_round(robots: dict, seed: int) -> dict:
     """One start and one stop."""
-    fleet = Fleet(URL, connect=lambda url: LossyBus(url, seed))
-    begin_s = time.monotonic()
+    fleet = Fleet(URL, connect=lambda url: LossyBus(url, seed), key=KEY)
     found = tell.find(fleet, set())
+    armed = tell.arm(fleet, found)
+    begin_s = time.monotonic()
     begun = tell.start(fleet, found, "milling", AHEAD_S, partial=False)
     instant_s = begun.utime_us / 1e6 - (time.time() - time.monotonic())
     late_s = [first_move_s(robot, begin_s) - instant_s for robot in robots.values()]
@@ -50,9 +52,10 @@ def lossy_round(robots: dict, seed: int) -> dict:
     stopped = tell.stop(fleet, set())
     return {
         "found": sorted(found),
+        "armed": [a.accepted and a.signed for a in armed],
         "start_accepted": [a.accepted for a in begun.answers],
         "late_s": late_s,
-        "stop_accepted": [a.accepted for a in stopped],
+        "stop_accepted": [a.accepted and a.signed and a.stands for a in stopped],
         "stop_took_s": time.monotonic() - stop_s,
         "duties_after_stop": [robot.duties() for robot in robots.values()],
         "lost": fleet.bus.lost,
@@ -61,7 +64,9 @@ def lossy_round(robots: dict, seed: int) -> dict:
 
 def deaf_round(robots: dict) -> dict:
     """The operator never hears robot 2's acknowledgements."""
-    fleet = Fleet(URL, connect=lambda url: DeafBus(url, "R02_ACK"))
+    deaf = {"R02_ACK", "R02_SIGNED_ACK"}
+    tell.arm(Fleet(URL, key=KEY), IDS)
+    fleet = Fleet(URL, connect=lambda url: DeafBus(url, deaf), key=KEY)
     fleet.listen(0.5)
     begin_s = time.monotonic()
     begun = tell.start(fleet, IDS, "", AHEAD_S, partial=False)
@@ -76,8 +81,8 @@ def deaf_round(robots: dict) -> dict:
 
 def one_robot_round(robots: dict) -> list:
     """Robot 1 alone is told to start, with another behaviour."""
-    fleet = Fleet(URL)
-    fleet.listen(0.5)
+    fleet = Fleet(URL, key=KEY)
+    tell.arm(fleet, IDS)
     tell.start(fleet, {1}, "diffusing_v2", 0.5, partial=False)
     duties = [robot.duties() for robot in robots.values()]
     tell.stop(fleet, set())
@@ -86,9 +91,10 @@ def one_robot_round(robots: dict) -> list:
 
 def own_table_round() -> dict:
     """Robots 1 and 2 know a table of the user's own by name; robot 3 does not."""
-    fleet = Fleet(URL)
-    fleet.listen(0.5)
+    fleet = Fleet(URL, key=KEY)
+    tell.arm(fleet, IDS)
     refused = tell.start(fleet, IDS, "ahead", 0.5, partial=False)
+    tell.arm(fleet, IDS)
     begun = tell.start(fleet, {1, 2}, "ahead", 0.5, partial=False)
     fleet.listen(0.3)
     return {
@@ -101,13 +107,13 @@ def own_table_round() -> dict:
 
 def answers_to_bad_commands(prefix: str, robot_id: int) -> dict:
     """What a robot answers to each command of PROTOCOL after one that it obeyed."""
-    fleet = Fleet(URL, prefix)
+    fleet = Fleet(URL, prefix, key=KEY)
     fleet.listen(0.5)
     given = {}
+    tell.arm(fleet, {robot_id})
     first = tell.make_command(2, "milling")
     tell.tell(fleet, first, {robot_id}, time.monotonic() + 5)
     for name, (verb, behavior, ahead_us, age_us) in PROTOCOL.items():
-        time.sleep(0.002)  # the number of a command comes from the clock
         command = tell.make_command(verb, behavior)
         command.start_utime_us = command.utime_us + ahead_us if ahead_us else 0
         command.utime_us -= age_us
@@ -124,7 +130,8 @@ def behaviors(fleet: Fleet) -> list:
 def twin_round() -> dict:
     """A twin of two, which know the table, is commanded as robots are."""
     result = {"twin_answers": answers_to_bad_commands("TWIN_", 1)}
-    fleet = Fleet(URL, "TWIN_")
+    fleet = Fleet(URL, "TWIN_", key=KEY)
+    tell.arm(fleet, tell.find(fleet, set()))
     begun = tell.start(fleet, tell.find(fleet, set()), "ahead", 0.5, partial=False)
     result["twin_modes"] = [a.mode for a in begun.answers]
     fleet.listen(6, lambda: behaviors(fleet) == ["ahead"] * 2)
@@ -134,6 +141,8 @@ def twin_round() -> dict:
 
 
 def main(folder: Path) -> dict:
+    global KEY
+    key_file, KEY = operator_key(folder)
     turbopi, result = shlex.split(os.environ["TURBOPI"]), {}
     tables = folder / "behaviors.toml"
     tables.write_text('ahead = "0,0.5,100,0"\n')
@@ -141,7 +150,7 @@ def main(folder: Path) -> dict:
         robots = {}
         for robot_id in sorted(IDS):
             (folder / str(robot_id)).mkdir()
-            options = ["--lcm-url", URL, "--set", f"robot_id={robot_id}"]
+            options = ["--lcm-url", URL, *robot_options(folder, robot_id)]
             options += ["--set", f"behaviors={tables}"] if robot_id < 3 else []
             robots[robot_id] = stack.enter_context(Robot(turbopi, folder / str(robot_id), *options))
         time.sleep(1)
@@ -151,7 +160,7 @@ def main(folder: Path) -> dict:
         result["own_table"] = own_table_round()
         result["robot_answers"] = answers_to_bad_commands("", 1)
     twin = f"{os.environ['TWIN_RUN']} --plant planar --n 2 --wait --channel-prefix TWIN_"
-    twin += f" --behaviors {tables}"
+    twin += f" --behaviors {tables} --key {key_file}"
     with subprocess.Popen(shlex.split(twin), stdout=subprocess.DEVNULL) as process:
         try:
             time.sleep(1)

@@ -31,6 +31,7 @@ def test_half_of_the_packets_were_really_lost(session):
 @needs_programs
 def test_all_robots_start_at_one_instant_under_loss(session):
     for r in session["rounds"]:
+        assert r["armed"] == [True] * 3
         assert r["found"] == [1, 2, 3] and r["start_accepted"] == [True] * 3
         assert all(0 <= late_s < FRAME_S + SLACK_S for late_s in r["late_s"])
 
@@ -67,7 +68,6 @@ def test_bad_commands_are_refused_with_a_reason_and_stop_never_is(session):
     assert {name for name, (accepted, _) in answers.items() if accepted} == {"stop_however_old"}
     assert "'dance'" in answers["select_unknown"][1]
     assert "clocks" in answers["start_late"][1] and "clocks" in answers["start_far_ahead"][1]
-    assert "older" in answers["old"][1]
 
 
 @needs_programs
@@ -77,10 +77,11 @@ def test_twin_answers_as_the_robot_does(session):
     assert session["twin_stopped"] == ["stopped"] * 2
 
 
-def test_numbers_of_commands_rise():
-    first, second = make_command(0), make_command(0)
-    assert second.utime_us >= first.utime_us
-    assert 0 <= first.seq <= second.seq or second.seq == 0
+def test_numbers_of_commands_cannot_be_guessed():
+    numbers = [make_command(0).seq for _ in range(1000)]
+    assert len(set(numbers)) == 1000 and min(numbers) >= 0
+    # Of 1000 numbers below 2^31, none is in the lower or the upper half: once in 2^999.
+    assert min(numbers) < 2**30 < max(numbers)
 
 
 @pytest.mark.parametrize("text", ["a", "1,,2", "100", "-1", "1.5"])

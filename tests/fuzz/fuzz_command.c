@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any messages on the swarm's command channel, through LCM, telemetry and the robot's loop: each is
-// ignored or answered, and a stop stops whatever came before it.
+// Any datagrams, and any signed commands, through the robot's own receiver and loop: each is
+// ignored or answered, none without a signature moves the robot, and a stop stops whatever came
+// before it.
+#include <turbopi_signed_command_t.h>
 #include <turbopi_swarm_command_t.h>
 
 #include "fuzz.h"
@@ -8,29 +10,38 @@
 #include "hal_stub/stub_clock.h"
 #include "hal_stub/stub_panel.h"
 #include "loop.h"
-#include "telemetry.h"
+#include "radio/lcm_packet.h"
+#include "radio/wire.h"
 
-#define CHANNEL "SWARM_COMMAND"
 #define MAX_MESSAGES 32
+#define SESSION 77
+#define ROBOT_ID 3
 
 static struct app_config config;
 static struct own_tables own;
-static struct telemetry telemetry;
 static struct loop loop;
 static struct stub_clock hand;
 static struct stub_board board;
 static struct stub_panel panel;
 static struct link_command waiting;
-static bool has_waiting;
+static bool has_waiting, was_signed;
 static int heard_count, ack_count;
 static struct link_ack last_ack;
+static const struct seal_key key = {.present = true, .bytes = {1, 2, 3}};
 
-static void on_command(void *context, const struct link_command *command)
+// As the radio does with what it reads.
+static void hear(const struct wire_command *command)
 {
-    (void)context;
-    waiting = *command;
+    if (command->robot_id != WIRE_ALL_ROBOTS && command->robot_id != ROBOT_ID)
+    {
+        return;
+    }
+    waiting = (struct link_command){.order = command->order};
+    memcpy(waiting.name, command->name, sizeof waiting.name);
+    CLAIM(memchr(waiting.name, '\0', sizeof waiting.name) != NULL);
+    was_signed = was_signed || command->order.seal == FW_SEAL_GOOD;
     has_waiting = true;
-    ++heard_count;
+    heard_count += command->order.verb != FW_VERB_HOLD;
 }
 
 static bool receive(void *context, struct link_command *command)
@@ -45,7 +56,7 @@ static bool receive(void *context, struct link_command *command)
 static bool send_report(void *context, const struct link_report *report)
 {
     (void)context;
-    telemetry_publish(&telemetry, report);
+    (void)report;
     return true;
 }
 
@@ -54,7 +65,6 @@ static void send_ack(void *context, const struct link_ack *ack)
     (void)context;
     CLAIM(memchr(ack->reason, '\0', sizeof ack->reason) != NULL);
     CLAIM(ack->accepted == (ack->reason[0] == '\0'));
-    telemetry_publish_ack(&telemetry, ack);
     last_ack = *ack;
     ++ack_count;
 }
@@ -110,64 +120,113 @@ static void boot(void)
                                          .battery = stub_board_battery(&board),
                                          .panel = stub_panel_make(&panel),
                                          .clock = clock};
-    const struct link link = {NULL, send_report, send_ack, receive, -1};
-    if (telemetry.lcm == NULL)
-    {
-        config_default(&config);
-        strcpy(config.lcm_url, "memq://");
-        telemetry_init(&telemetry, &config, on_command, NULL);
-        telemetry_connect(&telemetry, 0);
-        CLAIM(telemetry.lcm != NULL);
-    }
+    const struct link link = {NULL, send_report, send_ack, receive, -1, SESSION};
+    config_default(&config);
+    config.run_dir[0] = '\0';
+    config.robot_id = ROBOT_ID;
     heard_count = ack_count = 0;
+    was_signed = false;
     CLAIM(loop_init(&loop, &config, &own, &devices, &link) == FW_OK);
     loop_step(&loop);
 }
 
-// Hears what is on the bus, then does one step. Its own reports are on the bus as well.
-static void hear_and_step(const uint8_t *bytes, size_t count)
+static void step(void)
 {
-    CLAIM(lcm_publish(telemetry.lcm, CHANNEL, bytes, (unsigned)count) == 0);
-    while (lcm_handle_timeout(telemetry.lcm, 0) > 0)
-    {
-    }
     loop_step(&loop);
     CLAIM(ack_count == heard_count);
+    CLAIM(was_signed || (!loop.running && !loop.may_move && !loop.plan.waits));
+}
+
+// A datagram as it comes from the network.
+static void hear_datagram(const uint8_t *bytes, size_t count)
+{
+    struct lcm_packet packet;
+    struct wire_command command;
+    int64_t session;
+    int32_t robot_id;
+    if (!lcm_packet_read(bytes, count, &packet))
+    {
+        return;
+    }
+    (void)wire_peek_session(packet.data, packet.size, &session);
+    (void)wire_peek_robot(packet.data, packet.size, &robot_id);
+    if (wire_read_command(packet.data, packet.size, &command))
+    {
+        hear(&command);
+        step();
+    }
+    if (wire_read_signed(packet.data, packet.size, &key, &command))
+    {
+        hear(&command);
+        step();
+    }
+}
+
+// What an operator with the key may sign, however mad.
+static void hear_operator(struct bytes *in)
+{
+    uint8_t inner[128], bytes[256];
+    char name[] = "........";
+    const int8_t verb = (int8_t)(take(in, 1) % 8);
+    for (size_t i = 0; i + 1 < sizeof name; ++i)
+    {
+        name[i] = (char)take(in, 1);
+    }
+    const turbopi_swarm_command_t order = {.utime_us = (int64_t)take(in, 8),
+                                           .seq = (int32_t)take(in, 1),
+                                           .verb = verb,
+                                           .start_utime_us = (int64_t)take(in, 8),
+                                           .behavior = name};
+    turbopi_signed_command_t message = {
+        .robot_id = ROBOT_ID,
+        .session = take(in, 1) % 4 == 0 ? (int64_t)take(in, 8) : SESSION,
+        .made_us = take(in, 1) % 4 == 0 ? (int64_t)take(in, 8) : loop_link_session_us(&loop),
+        .counter = (int64_t)take(in, take(in, 1) % 9),
+        .link_timeout_ms = (int32_t)take(in, 4),
+        .command = inner};
+    message.command_size = turbopi_swarm_command_t_encode(inner, 0, sizeof inner, &order);
+    const int size = turbopi_signed_command_t_encode(bytes, 0, sizeof bytes, &message);
+    CLAIM(size > 0);
+    seal_sign(&key, bytes, (size_t)size);
+    struct wire_command command;
+    CLAIM(wire_read_signed(bytes, (size_t)size, &key, &command));
+    CLAIM(command.order.seal == FW_SEAL_GOOD);
+    hear(&command);
+    step();
 }
 
 static void stop_for_good(void)
 {
-    static char nothing[] = "";
-    const turbopi_swarm_command_t stop = {.robot_id = -1, .behavior = nothing};
-    uint8_t bytes[64];
-    const int count = turbopi_swarm_command_t_encode(bytes, 0, sizeof bytes, &stop);
+    static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
+    const struct wire_command stop = {.robot_id = WIRE_ALL_ROBOTS};
     const int acks = ack_count;
-    hear_and_step(bytes, (size_t)count);
-    CLAIM(ack_count == acks + 1 && last_ack.accepted);
+    hear(&stop);
+    step();
+    CLAIM(ack_count == acks + 1 && last_ack.accepted && last_ack.stands);
     for (int i = 0; i < 3; ++i)
     {
-        static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
-        CLAIM(!loop.running && !loop.moving);
+        CLAIM(!loop.running && !loop.may_move && loop.inbox.latched);
         CLAIM(memcmp(board.wheel_duty_pct, zero_pct, sizeof zero_pct) == 0);
         loop_step(&loop);
     }
 }
 
-// Each message: one byte that says whether LCM's type precedes it, one of length, its bytes.
+// Each message: one byte that says whether it is a datagram of so many bytes, or an operator's.
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct bytes in = {data, size};
     boot();
-    uint8_t message[8 + 255];
-    const turbopi_swarm_command_t any = {.behavior = ""};
     for (int i = 0; i < MAX_MESSAGES && in.left > 0; ++i)
     {
-        const bool with_type = take(&in, 1) != 0;
+        const size_t length = take(&in, 1);
+        if (length == 0)
+        {
+            hear_operator(&in);
+            continue;
+        }
         size_t count = 0;
-        uint8_t *block = take_block(&in, take(&in, 1), &count);
-        (void)turbopi_swarm_command_t_encode(message, 0, sizeof message, &any);
-        memcpy(message + 8, block, count);
-        hear_and_step(with_type ? message : block, with_type ? count + 8 : count);
+        uint8_t *block = take_block(&in, length, &count);
+        hear_datagram(block, count);
         free(block);
     }
     stop_for_good();

@@ -4,6 +4,7 @@
 import os
 import shutil
 import subprocess
+import sys
 from contextlib import contextmanager
 
 import lcm
@@ -18,6 +19,17 @@ PRIVATE_NETWORK = (
 )
 # Debian's tools: the wrappers of the same name in a Python environment outlive a signal.
 PATH = os.pathsep.join([os.defpath, "/usr/sbin", "/sbin"])
+OPERATOR = """
+import sys, time
+from pathlib import Path
+from twinmill.robots import tell
+from twinmill.robots.fleet import Fleet
+from twinmill.robots.key import load
+
+fleet = Fleet(sys.argv[1], key=load(Path(sys.argv[2])))
+fleet.listen(10, lambda: len(fleet.here()) == 4)
+tell.tell(fleet, tell.make_command(2, "diffusing"), {0, 1, 2, 3}, time.monotonic() + 5)
+"""
 SETTLE_S = 0.5  # for a logger to subscribe, and to take what is under way
 
 
@@ -77,7 +89,8 @@ def test_lcm_logger_hears_what_twin_run_logs_and_lcm_logplayer_says_it_again(tmp
         second.append(f"lcm-logplayer --speed=4 {heard}")
     in_one_network([*first, *second])
     said = events(own)
-    assert len({channel for channel, _ in said}) == 12  # 3 robots: telemetry, pose, run, truth
+    # 3 robots: telemetry, link, pose, run, truth
+    assert len({channel for channel, _ in said}) == 15
     assert events(heard) == said
     assert events(again) == said
 
@@ -107,28 +120,21 @@ def test_malformed_command_does_not_end_twin_run(tmp_path):
 
 def test_selected_behaviour_reaches_the_robots_own_program(tmp_path):
     """Robots 0 and 1 are driven by the program, 2 and 3 by the built-in firmware."""
-    begin_us, select = 1_700_000_000_000_000, turbopi.swarm_command_t()
-    select.utime_us, select.robot_id, select.seq = begin_us, -1, 1
-    select.verb, select.behavior = select.VERB_SELECT, "diffusing"
-    order, own = tmp_path / "order", tmp_path / "own"
-    log = lcm.EventLog(str(order), "w")
-    for i in range(100):  # until it is heard; copies are not obeyed again
-        log.write_event(i * 50_000, "SWARM_COMMAND", select.encode())
-    log.close()
+    own, key = tmp_path / "own", tmp_path / "key"
     bus = "udpm://239.255.76.67:7667?ttl=0"
+    operator = tmp_path / "operator.py"
+    operator.write_text(OPERATOR)
     in_one_network(
         [
-            f"{TWIN_RUN} --plant planar --sensor camera --n 4 --hil 2 --spread-m 0.8 "
-            f"--duration-s 6 --epoch-us {begin_us} --log {own} --lcm-url '{bus}' & twin=$!",
-            f"sleep {2 * SETTLE_S}",
-            f"lcm-logplayer {order} & player=$!",
+            f"{TWIN_RUN} --plant planar --sensor camera --n 4 --hil 2 --spread-m 0.8 --key {key} "
+            f"--duration-s 8 --log {own} --lcm-url '{bus}' & twin=$!",
+            f"{sys.executable} {operator} '{bus}' {key}",
             "wait $twin",
-            "kill $player || true",
         ]
     )
     acks, rows = {}, {}
     for channel, data in events(own):
-        if channel.endswith("_ACK"):
+        if channel[3:] == "_ACK":
             acks.setdefault(channel[:3], turbopi.ack_t.decode(data))
         elif channel.endswith("_TELEMETRY") and channel[:3] in acks:
             said = turbopi.telemetry_t.decode(data)

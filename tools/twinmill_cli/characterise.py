@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill characterise`: drives one robot by a script, open loop, and logs all that is heard."""
 
+import struct
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -20,11 +21,12 @@ from twinmill.files import check_new_file
 from twinmill.model.mixing import duties_from_inputs
 from twinmill.robots import tell
 from twinmill.robots.fleet import RUN_PERIOD_S, URL, Fleet
+from twinmill.robots.key import load
 from twinmill.robots.remote import Remote
 from twinmill_cli.keyboard import any_key
-from twinmill_cli.options import LcmUrl, Prefix, SshConfig
+from twinmill_cli.options import Arm, KeyFile, LcmUrl, Prefix, SshConfig
 from twinmill_cli.output import AsJson, deliver
-from twinmill_cli.swarm import warn_of_clocks
+from twinmill_cli.swarm import refuse_doubles, warn_of_clocks
 
 LOST_S = 0.5  # without telemetry, or without a valid pose: stop
 AFTER_S = 1.0  # logged after the end: the robot still rolls
@@ -56,6 +58,8 @@ def _characterise(
     ] = 60,
     countdown_s: Annotated[float, typer.Option("--countdown-s", min=1, max=60)] = 3.0,
     ssh_config: SshConfig = None,
+    arm: Arm = False,
+    key: KeyFile = None,
     lcm_url: LcmUrl = URL,
     channel_prefix: Prefix = "",
     force: Annotated[bool, typer.Option("--force", help="Replace LOG if it exists.")] = False,
@@ -74,7 +78,7 @@ def _characterise(
     name = Path(script).name
     if host:
         copy_script(Remote(host, ssh_config), Path(script), name)
-    run = Run(Fleet(lcm_url, channel_prefix), robot, channel_prefix)
+    run = Run(Fleet(lcm_url, channel_prefix, key=load(key)), robot, channel_prefix, arm)
     with Recorder(out) as recorder, any_key() as pressed:
         why = run.drive(recorder, name, end_s, countdown_s, pressed)
     ended = why or "played to its end"
@@ -126,6 +130,7 @@ class Run:
     fleet: Fleet
     robot_id: int
     channel_prefix: str
+    arm: bool = False  # though it was stopped
     pose_s: float = -1e9  # when a valid one came last, by time.monotonic()
 
     def drive(
@@ -148,6 +153,9 @@ class Run:
         tell.find(self.fleet, {self.robot_id})
         self._check_ready()
         warn_of_clocks(self.fleet, {self.robot_id})
+        refuse_doubles(self.fleet, {self.robot_id})
+        if self.arm:
+            tell.arm(self.fleet, {self.robot_id})
         try:
             with self._watched("starts; any key stops", countdown_s, pressed):
                 self._start(script, countdown_s)
@@ -161,8 +169,8 @@ class Run:
         finally:
             (answer,) = tell.stop(self.fleet, {self.robot_id})
             self.fleet.listen(AFTER_S)
-        if not answer.accepted:
-            why += "; NO ANSWER TO STOP: switch the robot off by hand"
+        if not (answer.accepted and answer.signed and answer.stands):
+            why += "; NO STOP WAS CONFIRMED: SWITCH THE ROBOT OFF BY HAND"
         return why
 
     def _listen_to(self, recorder: Recorder) -> None:
@@ -170,11 +178,11 @@ class Run:
 
         def on_message(channel: str, data: bytes) -> None:
             recorder.add(channel, data)
-            if channel == f"{prefix}POSE" and turbopi.pose_t.decode(data).valid:
-                self.pose_s = time.monotonic()
+            with suppress(ValueError, struct.error):  # half a message, or another program's
+                if channel == f"{prefix}POSE" and turbopi.pose_t.decode(data).valid:
+                    self.pose_s = time.monotonic()
 
-        subscription = self.fleet.bus.subscribe(prefix + ".*", on_message)
-        subscription.set_queue_capacity(1000)
+        self.fleet.bus.subscribe(prefix + ".*", on_message)
 
     def _check_ready(self) -> None:
         if self.robot_id not in self.fleet.here():

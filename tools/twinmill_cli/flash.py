@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from twinmill.robots.fleet import URL, Fleet
+from twinmill.robots.key import load
 from twinmill.robots.package import Packages, read_package
 from twinmill.robots.robot_update import (
     Outcome,
@@ -23,7 +24,7 @@ from twinmill.robots.robot_update import (
     update,
 )
 from twinmill.swarm.behaviors import find_file, read_tables
-from twinmill_cli.options import LcmUrl, SshConfig
+from twinmill_cli.options import KeyFile, LcmUrl, SshConfig
 from twinmill_cli.output import AsJson, deliver
 
 AT_ONCE = 16
@@ -81,6 +82,7 @@ def _flash(
     ] = False,
     wait_s: Annotated[float, typer.Option("--wait-s", min=1, help="For telemetry.")] = 20.0,
     ssh_config: SshConfig = None,
+    key: KeyFile = None,
     lcm_url: LcmUrl = URL,
     as_json: AsJson = False,
 ) -> int:
@@ -107,6 +109,7 @@ def _flash(
     if give_back and (rollback or take_over or dry_run):
         raise ValueError("--hand-back stands alone: give no --rollback, --take-over, --dry-run.")
     given = read_package(package) if package else None
+    own_key = load(key)
     wish = Wish(
         None if rollback else Packages(given),
         settings,
@@ -115,11 +118,12 @@ def _flash(
         dry_run,
         wait_s,
         ssh_config,
+        own_key,
     )
     if give_back:
         outcomes = [hand_back(target, ssh_config) for target in targets]
     else:
-        outcomes = _update_all(targets, wish, Fleet(lcm_url))
+        outcomes = _update_all(targets, wish, Fleet(lcm_url, key=own_key))
     data = {
         "ok": all(outcome.ok for outcome in outcomes),
         "dry_run": dry_run,

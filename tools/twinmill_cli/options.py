@@ -33,6 +33,18 @@ NewModel = Annotated[
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace M2 if it exists.")]
+KeyFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--key",
+        metavar="FILE",
+        help="The operator's key; made if it is not there. Default: twinmill/swarm.key in "
+        "~/.config.",
+    ),
+]
+Arm = Annotated[
+    bool, typer.Option("--arm", help="Arm robots first that were stopped: else they refuse.")
+]
 LcmUrl = Annotated[str, typer.Option("--lcm-url", help="The bus that the robots are on.")]
 Prefix = Annotated[
     str, typer.Option("--channel-prefix", help="As given to twin_run, to speak to a twin alone.")

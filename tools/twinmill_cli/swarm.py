@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill swarm start`, `stop`, `select` and `status`."""
+"""`twinmill swarm arm`, `start`, `stop`, `select` and `status`."""
 
 import json
+import signal
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from datetime import datetime
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -17,7 +21,8 @@ from rich.text import Text
 from twinmill.files import plain
 from twinmill.robots import tell
 from twinmill.robots.fleet import RUN_PERIOD_S, URL, Fleet, Robot
-from twinmill_cli.options import LcmUrl, Prefix
+from twinmill.robots.key import load
+from twinmill_cli.options import Arm, KeyFile, LcmUrl, Prefix
 from twinmill_cli.output import AsJson, deliver
 
 CLOCK_WARN_S = 0.05
@@ -38,6 +43,7 @@ def register(app: typer.Typer) -> None:
         no_args_is_help=True,
     )
     swarm.command("start")(_start)
+    swarm.command("arm")(_arm)
     swarm.command("stop")(_stop)
     swarm.command("select")(_select)
     swarm.command("status")(_status)
@@ -68,52 +74,177 @@ def _start(
     partial: Annotated[
         bool, typer.Option("--partial", help="Start though some refuse or do not answer.")
     ] = False,
+    arm: Arm = False,
+    untethered: Annotated[
+        bool,
+        typer.Option(
+            "--untethered", help="Robots drive on without this command; it ends once they drive."
+        ),
+    ] = False,
+    link_timeout_s: Annotated[
+        float | None,
+        typer.Option(
+            min=0.2, max=600, help="Robots stop when they lose this command for so long; 2 s."
+        ),
+    ] = None,
+    key: KeyFile = None,
     lcm_url: LcmUrl = URL,
     channel_prefix: Prefix = "",
     as_json: AsJson = False,
 ) -> int:
-    """Arm robots, and start all of them at one instant, or none.
+    """Start all robots at one instant, or none, and hold them: Ctrl-C stops them.
 
-    The instant is one of the robots' own clocks: keep them set (NTP).
+    While this runs they hear that somebody is there; a robot that hears nothing
+    for 2 s stops. The instant is one of the robots' own clocks: keep them set
+    (NTP).
 
     Example: twinmill swarm start --behavior milling --in-s 3
     """
-    fleet = Fleet(lcm_url, channel_prefix)
+    if untethered and link_timeout_s is not None:
+        raise ValueError("--untethered and --link-timeout-s: give one of them.")
+    fleet = Fleet(lcm_url, channel_prefix, key=load(key))
     asked = tell.find(fleet, parse_robots(robots))
+    refuse_doubles(fleet, asked)
     warn_of_clocks(fleet, asked)
-    begun = tell.start(fleet, asked, behavior, in_s, partial)
-    ok = all(answer.accepted and answer.mode != "stopped" for answer in begun.answers)
+    if arm:
+        tell.arm(fleet, asked)
+    timeout_ms = 0 if untethered else round(1e3 * link_timeout_s) if link_timeout_s else -1
+    with ended_by_signals():
+        begun = tell.start(fleet, asked, behavior, in_s, partial, link_timeout_ms=timeout_ms)
+        ok = all(a.accepted and a.signed and a.mode != "stopped" for a in begun.answers)
+        data = {"start_utime_us": begun.utime_us, "called_off": begun.called_off}
+        words = _start_words(begun, ok, untethered)
+        code = _finish("start", begun.answers, ok, words, data, as_json)
+        if begun.called_off or untethered:
+            return code
+        return max(code, _hold(fleet, asked, as_json))
+
+
+def _start_words(begun: tell.Start, ok: bool, untethered: bool) -> str:
     if begun.called_off:
-        words = f"Called off: {_why(begun.answers)}. All were stopped; --partial starts some."
-    else:
-        at = datetime.fromtimestamp(begun.utime_us / 1e6).strftime("%H:%M:%S.%f")[:-3]
-        words = f"Started at {at}." if ok else f"Started at {at}, but not all: see above."
-    data = {"start_utime_us": begun.utime_us, "called_off": begun.called_off}
-    return _finish("start", begun.answers, ok, words, data, as_json)
+        return (
+            f"Called off: {_why(begun.answers)}. All were stopped, and must be armed before they "
+            "start (--arm); --partial starts some."
+        )
+    at = datetime.fromtimestamp(begun.utime_us / 1e6).strftime("%H:%M:%S.%f")[:-3]
+    words = f"Started at {at}." if ok else f"Started at {at}, but not all: see above."
+    return f"{words} {'They drive on by themselves.' if untethered else 'Ctrl-C stops them.'}"
+
+
+def _hold(fleet: Fleet, robots: set[int], as_json: bool) -> int:
+    """Robots hear that somebody is there, until Ctrl-C or until all stand by themselves."""
+    held = [fleet.robots[i] for i in sorted(robots) if i in fleet.robots]
+    console = Console(stderr=True)
+    try:
+        with (
+            Live(console=console, refresh_per_second=4)
+            if console.is_terminal
+            else nullcontext(None) as live
+        ):
+            while not all(robot.mode == "stopped" for robot in held):
+                fleet.listen(0.25)
+                if live:
+                    live.update(status_table(held))
+        words = "All stand: stopped by another command, by their button, or a script is over."
+        print(f"twinmill: {words}", file=sys.stderr)
+        return 0
+    except KeyboardInterrupt:
+        given = tell.stop(fleet, robots)
+        print(f"twinmill: {_stop_words(given, 10)}", file=sys.stderr)
+        return 0 if _all_stand(given) else 1
+
+
+@contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """SIGTERM ends as Ctrl-C does: robots are stopped. What kills, they notice by themselves."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _arm(
+    robots: Robots = "",
+    key: KeyFile = None,
+    lcm_url: LcmUrl = URL,
+    channel_prefix: Prefix = "",
+    as_json: AsJson = False,
+) -> int:
+    """Let robots be started again that were stopped by a command. Nothing moves yet.
+
+    Example: twinmill swarm arm
+    """
+    fleet = Fleet(lcm_url, channel_prefix, key=load(key))
+    asked = tell.find(fleet, parse_robots(robots))
+    refuse_doubles(fleet, asked)
+    given = tell.arm(fleet, asked)
+    ok = all(answer.accepted and answer.signed for answer in given)
+    words = "All are armed." if ok else "Not all are armed: see above."
+    return _finish("arm", given, ok, words, {}, as_json)
 
 
 def _stop(
     robots: Robots = "",
     timeout_s: Annotated[float, typer.Option("--timeout-s", min=0.5, help="Give up after.")] = 10.0,
+    host: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--host",
+            metavar="HOST",
+            help="Tell this machine, too, though it was never heard: where multicast does not "
+            "pass. Repeatable.",
+        ),
+    ] = None,
+    key: KeyFile = None,
     lcm_url: LcmUrl = URL,
     channel_prefix: Prefix = "",
     as_json: AsJson = False,
 ) -> int:
-    """Stop robots: said again until each has acknowledged and stands.
+    """Stop robots: said again until each has signed that it stands.
+
+    They start again only after `twinmill swarm arm`, or by their button.
 
     Example: twinmill swarm stop
     """
-    given = tell.stop(Fleet(lcm_url, channel_prefix), parse_robots(robots), timeout_s)
-    ok = bool(given) and all(a.accepted and a.mode in ("", "stopped") for a in given)
-    words = "All stand." if ok else "NOT ALL STAND: switch off by hand what still drives."
+    fleet = Fleet(lcm_url, channel_prefix, key=_key_to_stop_by(key))
+    given = tell.stop(fleet, parse_robots(robots), timeout_s, host or ())
+    words = _stop_words(given, timeout_s)
+    return _finish("stop", given, _all_stand(given), words, {}, as_json)
+
+
+def _key_to_stop_by(path: Path | None) -> bytes | None:
+    """Without a key a stop is said all the same, and nobody's answer is believed."""
+    try:
+        return load(path)
+    except (ValueError, OSError) as error:
+        print(f"twinmill: {error}", file=sys.stderr)
+        return None
+
+
+def _all_stand(given: list[tell.Answer]) -> bool:
+    return bool(given) and not _moving(given)
+
+
+def _moving(given: list[tell.Answer]) -> list[tell.Answer]:
+    """Robots that have not signed that they stand, or of which there are two."""
+    return [a for a in given if not (a.accepted and a.signed and a.stands) or a.is_double]
+
+
+def _stop_words(given: list[tell.Answer], timeout_s: float) -> str:
+    """Which robots must be stopped by hand."""
     if not given:
-        words = f"No robot was heard in {timeout_s:g} s; stop was said all the time."
-    return _finish("stop", given, ok, words, {}, as_json)
+        return f"No robot was heard in {timeout_s:g} s; stop was said all the time."
+    names = ", ".join(f"R{a.robot_id:02d}" for a in _moving(given))
+    if not names:
+        return "All stand."
+    return f"NOT ALL STAND: {names}: no stop was confirmed. SWITCH OFF BY HAND what still drives."
 
 
 def _select(
     behavior: Annotated[str, typer.Argument(metavar="BEHAVIOR", help="As milling.")],
     robots: Robots = "",
+    key: KeyFile = None,
     lcm_url: LcmUrl = URL,
     channel_prefix: Prefix = "",
     as_json: AsJson = False,
@@ -122,13 +253,24 @@ def _select(
 
     Example: twinmill swarm select diffusing --robots 1,2
     """
-    fleet = Fleet(lcm_url, channel_prefix)
+    fleet = Fleet(lcm_url, channel_prefix, key=load(key))
     asked = tell.find(fleet, parse_robots(robots))
     command = tell.make_command(tell.VERBS.VERB_SELECT, behavior)
     given = tell.tell(fleet, command, asked, time.monotonic() + 5)
-    ok = all(answer.accepted for answer in given)
+    ok = all(answer.accepted and answer.signed for answer in given)
     words = f"All chose {behavior}." if ok else f"Not all did{_hint(given)}."
     return _finish("select", given, ok, words, {}, as_json)
+
+
+def refuse_doubles(fleet: Fleet, robots: set[int]) -> None:
+    """Raises ValueError if two robots have one number: a command would reach either or both."""
+    for robot_id in sorted(robots & set(fleet.robots)):
+        robot = fleet.robots[robot_id]
+        if robot.is_double:
+            raise ValueError(
+                f"two robots say that they are number {robot_id} "
+                f"({', '.join(robot.senders.hosts)}): give one another, `twinmill flash HOST=ID`."
+            )
 
 
 def warn_of_clocks(fleet: Fleet, robots: set[int]) -> None:
@@ -162,8 +304,10 @@ def _finish(
     for column in ("robot", "acknowledged", "now"):
         table.add_column(column)
     for answer in given:
-        said = Text("yes", "green") if answer.accepted else Text(f"no: {answer.reason}", "red")
-        table.add_row(f"R{answer.robot_id:02d}", said, answer.mode or "?")
+        ok = answer.accepted and answer.signed
+        said = Text("yes", "green") if ok else Text(f"no: {answer.reason}", "red")
+        now = Text("; ".join([answer.mode or "?", *answer.alarms]), "red" if answer.alarms else "")
+        table.add_row(f"R{answer.robot_id:02d}", said, now)
     data = {"verb": verb, "ok": ok, **data, "robots": [a.to_json() for a in given]}
     deliver(data, Group(*([table] if given else []), words), as_json)
     return 0 if ok else 1
@@ -171,6 +315,7 @@ def _finish(
 
 def _status(
     once: Annotated[bool, typer.Option("--once", help="Print one table and end.")] = False,
+    key: KeyFile = None,
     lcm_url: LcmUrl = URL,
     channel_prefix: Prefix = "",
     as_json: AsJson = False,
@@ -179,7 +324,7 @@ def _status(
 
     Example: twinmill swarm status
     """
-    fleet = Fleet(lcm_url, channel_prefix)
+    fleet = Fleet(lcm_url, channel_prefix, key=_key_to_stop_by(key))
     if once or as_json or not sys.stdout.isatty():
         fleet.listen(1.0)
         fleet.listen(RUN_PERIOD_S - 1, lambda: all(r.run for r in fleet.robots.values()))
@@ -207,6 +352,8 @@ def status_table(robots: list[Robot]) -> Table | Text:
         table.add_column(column, no_wrap=True)
     for column in ("sees", "clock", "silent"):
         table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("link", no_wrap=True)
+    table.add_column("alarms")
     for robot in robots:
         run, t = robot.run, robot.telemetry
         silent_s = time.monotonic() - robot.heard_s
@@ -222,8 +369,19 @@ def status_table(robots: list[Robot]) -> Table | Text:
                 "red" if abs(robot.clock_s) > CLOCK_WARN_S else "",
             ),
             Text(f"{silent_s:.1f} s", "" if robot.is_here else "red"),
+            _link(robot),
+            Text("; ".join(robot.alarms), "bold red"),
         )
     return table
+
+
+def _link(robot: Robot) -> Text:
+    """What it has signed of how it may be commanded."""
+    if not robot.link:
+        return Text("not signed", "red")
+    if not robot.is_armed:
+        return Text("stopped: arm it", "yellow")
+    return Text({None: "armed", True: "held", False: "untethered"}[robot.is_tethered])
 
 
 def _battery(telemetry) -> Text:

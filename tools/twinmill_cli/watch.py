@@ -65,7 +65,7 @@ def _watch(
     model_file, warnings = open_model(model, None), []
     if save:
         check_new_file(save, force)
-    batches = from_log(log, warnings) if log else from_bus(lcm_url, duration_s)
+    batches = from_log(log, warnings) if log else from_bus(lcm_url, duration_s, _warn)
     with replacing(save, force) if save else nullcontext() as file:
         show = _show(batches, model_file, log.name if log else None, file, connect)
     command = shlex.join(["twinmill", "watch", *([str(log)] if log else []), "--model", model])
@@ -81,6 +81,10 @@ def _watch(
     }
     deliver(data, _text(show, save, warnings), as_json)
     return data
+
+
+def _warn(sentence: str) -> None:
+    print(f"twinmill: {sentence}", file=sys.stderr)
 
 
 def _need_rerun() -> None:

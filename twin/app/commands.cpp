@@ -6,9 +6,19 @@
 
 #include "swarm/species.h"
 #include "turbopi/ack_t.hpp"
+#include "turbopi/link_t.hpp"
+#include "turbopi/signed_ack_t.hpp"
+#include "turbopi/telemetry_t.hpp"
 
 namespace twin
 {
+namespace
+{
+
+constexpr int64_t kLinkPeriod_us = 100'000;
+constexpr int32_t kLinkTimeout_ms = 2000;  // as the robot's, unless a start says otherwise
+
+}  // namespace
 
 Commands::Commands(Outlet &outlet, Swarm &swarm, Publisher &publisher,
                    std::shared_ptr<const Script> script, CommandOptions options)
@@ -18,24 +28,37 @@ Commands::Commands(Outlet &outlet, Swarm &swarm, Publisher &publisher,
       options_(std::move(options)),
       robots_(static_cast<size_t>(swarm.Size()))
 {
+    std::vector<seal_key> keys;
     for (int id = 0; id < swarm.Size(); ++id)
     {
-        robots_[static_cast<size_t>(id)].script = script;
+        Robot &robot = robots_[static_cast<size_t>(id)];
+        robot.script = script;
+        robot.key = seal_derive(&options_.key, id);
+        robot.inbox.session = outlet_.BusUrl().empty() ? 0 : seal_random();
+        keys.push_back(robot.key);
         options_.wait ? Stop(id) : Start(id);
     }
-    if (lcm::LCM *bus = outlet_.Bus())
-        bus->subscribe(options_.channel_prefix + "SWARM_COMMAND", &Commands::OnCommand, this);
+    if (!outlet_.BusUrl().empty())
+        radio_ = std::make_unique<Radio>(outlet_.BusUrl(), options_.channel_prefix, keys);
+}
+
+int64_t Commands::SessionUs() const
+{
+    const auto passed = std::chrono::steady_clock::now() - begin_;
+    return std::chrono::duration_cast<std::chrono::microseconds>(passed).count();
 }
 
 void Commands::Obey()
 {
-    if (lcm::LCM *bus = outlet_.Bus())
-        while (bus->handleTimeout(0) > 0)
-        {
-        }
+    if (radio_)
+    {
+        radio_->Hear([this](const wire_command &command) { OnCommand(command); });
+        PublishLinks();
+    }
     const int64_t now_us = swarm_.UtimeUs();
     for (int id = 0; id < swarm_.Size(); ++id)
     {
+        WatchLink(id);
         const Robot &robot = robots_[static_cast<size_t>(id)];
         if (robot.start_pending && now_us >= robot.start_utime_us)
             Start(id);
@@ -44,48 +67,119 @@ void Commands::Obey()
     }
 }
 
-// Anyone may send, and LCM's decoder throws at a text that says it has less than no characters.
-void Commands::OnCommand(const lcm::ReceiveBuffer *buffer, const std::string &)
+void Commands::OnCommand(const wire_command &command)
 {
-    turbopi::swarm_command_t message;
-    try
-    {
-        if (message.decode(buffer->data, 0, static_cast<int>(buffer->data_size)) < 0)
-            return;
-    }
-    catch (const std::length_error &)
-    {
-        return;
-    }
-    const fw_command order{message.utime_us, message.seq, message.verb, message.start_utime_us};
     for (int id = 0; id < swarm_.Size(); ++id)
-        if (message.robot_id == -1 || message.robot_id == id)
-            Answer(id, order, message.behavior);
+        if (command.robot_id == WIRE_ALL_ROBOTS || command.robot_id == id)
+            Answer(id, command.order, command.name);
 }
 
 void Commands::Answer(int id, const fw_command &order, const std::string &name)
 {
     Robot &robot = robots_[static_cast<size_t>(id)];
-    const int64_t now_us = swarm_.UtimeUs();
-    const fw_verdict verdict = fw_command_judge(&robot.inbox, &order, now_us, robot.running);
-    turbopi::ack_t ack;
-    ack.utime_us = now_us;
-    ack.robot_id = id;
-    ack.seq = order.seq;
-    ack.reason = fw_verdict_str(verdict);
+    const fw_verdict verdict =
+        fw_command_judge(&robot.inbox, &order, swarm_.UtimeUs(), SessionUs(), robot.running);
+    std::string reason = fw_verdict_str(verdict);
     try
     {
         if (verdict == FW_VERDICT_OBEY)
+        {
             ObeyOne(id, order, name);
+            Remember(id, order);
+        }
     }
     catch (const std::exception &error)
     {
-        ack.reason = error.what();
+        reason = error.what();
     }
-    ack.accepted = ack.reason.empty();
-    if (ack.accepted)
-        fw_command_obeyed(&robot.inbox, &order);
-    outlet_.Send(now_us, options_.channel_prefix + RobotName(id) + "_ACK", ack);
+    if (order.verb != FW_VERB_HOLD)
+        SendAck(id, order, reason);
+}
+
+void Commands::Remember(int id, const fw_command &order)
+{
+    Robot &robot = robots_[static_cast<size_t>(id)];
+    fw_command_obeyed(&robot.inbox, &order, SessionUs());
+    if (order.verb == FW_VERB_STOP)
+        return;
+    robot.heard_us = SessionUs();
+    if (order.verb == FW_VERB_START || order.verb == FW_VERB_SCRIPT)
+    {
+        robot.link_timeout_ms =
+            order.link_timeout_ms >= 0 ? order.link_timeout_ms : kLinkTimeout_ms;
+        robot.link_lost = false;
+    }
+}
+
+void Commands::WatchLink(int id)
+{
+    Robot &robot = robots_[static_cast<size_t>(id)];
+    const bool drives = robot.running || robot.start_pending;
+    if (drives && robot.link_timeout_ms > 0 &&
+        SessionUs() - robot.heard_us > int64_t{robot.link_timeout_ms} * 1000)
+    {
+        Stop(id);
+        robot.link_lost = true;
+    }
+}
+
+void Commands::SendAck(int id, const fw_command &order, const std::string &reason)
+{
+    const Robot &robot = robots_[static_cast<size_t>(id)];
+    const std::string name = options_.channel_prefix + RobotName(id);
+    turbopi::ack_t ack{};
+    ack.utime_us = swarm_.UtimeUs();
+    ack.robot_id = id;
+    ack.seq = order.seq;
+    ack.reason = reason;
+    ack.accepted = reason.empty();
+    outlet_.Send(ack.utime_us, name + "_ACK", ack);
+    turbopi::signed_ack_t own{};
+    own.utime_us = ack.utime_us;
+    own.robot_id = id;
+    own.session = robot.inbox.session;
+    own.session_us = SessionUs();
+    own.command_utime_us = order.utime_us;
+    own.seq = order.seq;
+    own.verb = order.verb;
+    own.accepted = ack.accepted;
+    own.stands = !robot.running;
+    own.reason = reason;
+    outlet_.SendSigned(own.utime_us, name + "_SIGNED_ACK", own, robot.key);
+}
+
+int32_t Commands::StatusFlags(int id) const
+{
+    const Robot &robot = robots_[static_cast<size_t>(id)];
+    using turbopi::telemetry_t;
+    int32_t flags = swarm_.Output(id).status_flags;
+    flags |= robot.link_lost ? telemetry_t::STATUS_LINK_LOST : 0;
+    flags |= robot.running && robot.link_timeout_ms == 0 ? telemetry_t::STATUS_UNTETHERED : 0;
+    return flags | (robot.inbox.latched ? telemetry_t::STATUS_LATCHED : 0);
+}
+
+void Commands::PublishLinks()
+{
+    if (SessionUs() < next_link_us_)
+        return;
+    next_link_us_ = SessionUs() + kLinkPeriod_us;
+    for (int id = 0; id < swarm_.Size(); ++id)
+    {
+        const Robot &robot = robots_[static_cast<size_t>(id)];
+        turbopi::link_t link{};
+        link.utime_us = swarm_.UtimeUs();
+        link.robot_id = id;
+        link.session = robot.inbox.session;
+        link.session_us = SessionUs();
+        link.counter = robot.inbox.counter;
+        link.mode = swarm_.Output(id).mode;
+        link.stands = !robot.running;
+        link.armed = !robot.inbox.latched;
+        link.link_timeout_ms = robot.link_timeout_ms;
+        link.status_flags = StatusFlags(id);
+        outlet_.SendSigned(link.utime_us, options_.channel_prefix + RobotName(id) + "_LINK", link,
+                           robot.key);
+    }
 }
 
 void Commands::ObeyOne(int id, const fw_command &order, const std::string &name)
@@ -104,6 +198,8 @@ void Commands::ObeyOne(int id, const fw_command &order, const std::string &name)
                                 std::make_shared<Script>(LoadScript(name)));
             StartAt(id, order.start_utime_us);
             break;
+        case FW_VERB_ARM:
+        case FW_VERB_HOLD: break;
     }
 }
 

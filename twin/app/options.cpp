@@ -87,6 +87,9 @@ void AddOutput(CLI::App &app, Options &o)
     app.add_option("--channel-prefix", o.channel_prefix,
                    "put before every channel but the truth's, e.g. TWIN_");
     app.add_flag("--wait", o.wait, "stand until `twinmill swarm start`, heard on the bus");
+    app.add_option("--key", o.key,
+                   "file of the operator's key, by which commands are signed; made if it is not "
+                   "there; default: twinmill/swarm.key in ~/.config");
     app.add_option("--script-dir", o.script_dir, "folder of the scripts that commands name")
         ->check(CLI::ExistingDirectory)
         ->capture_default_str();

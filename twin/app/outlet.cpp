@@ -14,6 +14,7 @@ void Outlet::OpenBus(const std::string &url)
     if (!bus->good())
         throw std::runtime_error("LCM cannot send to " + where);
     bus_ = std::move(bus);
+    bus_url_ = where;
 }
 
 void Outlet::SendBytes(int64_t utime_us, const std::string &channel)

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "log_writer.h"
+#include "radio/seal.h"
 
 namespace twin
 {
@@ -22,8 +23,8 @@ public:
     // As LogWriter's constructor.
     void OpenLog(const std::string &path) { log_ = std::make_unique<LogWriter>(path); }
     void Finish();
-    // nullptr if there is none.
-    lcm::LCM *Bus() { return bus_.get(); }
+    // Empty if there is no bus.
+    const std::string &BusUrl() const { return bus_url_; }
 
     // `utime_us` is when the message is received: the log's time stamp.
     template <class Message>
@@ -34,10 +35,22 @@ public:
         SendBytes(utime_us, channel);
     }
 
+    // The same of a message that ends in its tag.
+    template <class Message>
+    void SendSigned(int64_t utime_us, const std::string &channel, const Message &message,
+                    const seal_key &key)
+    {
+        bytes_.resize(static_cast<size_t>(message.getEncodedSize()));
+        message.encode(bytes_.data(), 0, static_cast<int>(bytes_.size()));
+        seal_sign(&key, bytes_.data(), bytes_.size());
+        SendBytes(utime_us, channel);
+    }
+
 private:
     void SendBytes(int64_t utime_us, const std::string &channel);
 
-    std::unique_ptr<lcm::LCM> bus_;
+    std::unique_ptr<lcm::LCM> bus_;  // only sends: its receiver believes what packets claim
+    std::string bus_url_;
     std::unique_ptr<LogWriter> log_;
     std::vector<uint8_t> bytes_;
 };

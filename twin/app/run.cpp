@@ -11,6 +11,7 @@
 
 #include "behaviors.h"
 #include "commands.h"
+#include "key.h"
 #include "plant_mujoco/mujoco_plant.h"
 #include "publisher.h"
 #include "show.h"
@@ -256,7 +257,8 @@ void Run(const Options &options)
     Views views(MakeViewOptions(options, setup.robots));
     Loop loop(options, setup, duration_s, realtime_factor);
     Commands commands(outlet, swarm, publisher, script,
-                      {options.channel_prefix, options.script_dir, options.wait, setup.own.All()});
+                      {options.channel_prefix, options.script_dir, options.wait,
+                       on_bus ? LoadKey(options.key) : seal_key{}, setup.own.All()});
     loop.Turn(swarm, publisher, commands, views);
     const double wall_s = loop.WallS();
     views.Finish(swarm);

@@ -20,7 +20,9 @@ CommandKind = Literal["duty", "wheel_speed", "twist", "none"]
 KINDS: tuple[CommandKind, ...] = ("duty", "wheel_speed", "twist")  # by drive_t.kind
 
 _READ = ("TELEMETRY", "POSE", "DRIVE", "RUN")
-_KNOWN_ELSEWHERE = re.compile(r".*(R\d\d_ACK|SWARM_COMMAND|TWIN_TRUTH_R\d\d)$")
+_KNOWN_ELSEWHERE = re.compile(
+    r".*(R\d\d_((SIGNED_)?ACK|LINK)|SWARM_(COMMAND|SIGNED)|TWIN_TRUTH_R\d\d)$"
+)
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,11 @@
 
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import groupby
 from pathlib import Path
 
-import lcm
-
+from twinmill.data.bus import Senders, open_bus
 from twinmill.data.lcm_log import Events, split_events
 from twinmill.data.log import read_bytes
 
@@ -53,20 +52,36 @@ def from_log(path: Path, warnings: list[str]) -> list[tuple[int, Batch]]:
     return [((number + 1) * step_us, Batch.of(list(group))) for number, group in groups]
 
 
-def from_bus(url: str, duration_s: float) -> Iterator[tuple[int, Batch]]:
+def from_bus(
+    url: str, duration_s: float, say: Callable[[str], None] = lambda sentence: None
+) -> Iterator[tuple[int, Batch]]:
     """The same of what is heard from now on, for some time or until Ctrl-C.
+
+    Args:
+        url: of the bus.
+        duration_s: how long.
+        say: told in a sentence, once, that two robots have one number.
 
     Raises:
         ValueError: there is no such bus.
     """
     heard: list[Message] = []
+    senders: dict[str, Senders] = {}
+    doubles: set[str] = set()
 
     def hear(channel: str, payload: bytes) -> None:
         heard.append((time.time_ns() // 1000, channel, payload))
+        if channel.endswith("_TELEMETRY"):
+            who = senders.setdefault(channel, Senders())
+            who.add(getattr(bus, "sender", None))
+            if who.are_double and channel not in doubles:
+                doubles.add(channel)
+                hosts = ", ".join(who.hosts)
+                say(f"two robots speak on {channel} ({hosts}): what is shown is of both.")
 
     try:
-        bus = lcm.LCM(url)
-        bus.subscribe(CHANNELS, hear).set_queue_capacity(10_000)
+        bus = open_bus(url)
+        bus.subscribe(CHANNELS, hear)
     except RuntimeError as error:
         raise ValueError(
             f"--lcm-url {url}: cannot be joined; is there a network with a route for multicast "

@@ -2,14 +2,18 @@
 """What robots say on the LCM bus, and the one channel on which they are told."""
 
 import re
+import struct
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-import lcm
 import turbopi
+
+from twinmill.data.bus import Senders, open_bus
+from twinmill.robots import key as keys
 
 URL = "udpm://239.255.76.67:7667?ttl=1"
 BACKLOG_S = 0.02  # what waits is taken in for so long at once
@@ -17,8 +21,21 @@ WINDOW_S = 2.0  # over which rates and detections are told
 RUN_PERIOD_S = 5.5  # robots say who they are every 5 s
 GONE_S = 1.0  # a robot that said nothing for so long is not there; it speaks 30 times a second
 MODES = ("stopped", "running", "script", "fault")
-CAMERA_LOST = turbopi.telemetry_t.STATUS_CAMERA_LOST
-FRAME_STALE = turbopi.telemetry_t.STATUS_FRAME_STALE
+TELEMETRY = turbopi.telemetry_t
+# What keeps a robot from doing what it is told, or hides it, loudest first.
+ALARMS = (
+    (TELEMETRY.STATUS_STOP_UNCONFIRMED, "STOP NOT CONFIRMED: WHEELS MAY TURN"),
+    (TELEMETRY.STATUS_BOARD_LOST, "BOARD LOST"),
+    (TELEMETRY.STATUS_DOUBLE, "HEARS ANOTHER ROBOT OF ITS NUMBER"),
+    (TELEMETRY.STATUS_UNGUARDED, "unguarded: its watching process is gone"),
+    (TELEMETRY.STATUS_LINK_LOST, "lost its operator"),
+    (TELEMETRY.STATUS_CAMERA_LOST, "camera lost"),
+    (TELEMETRY.STATUS_BATTERY_LOW, "battery low"),
+    (TELEMETRY.STATUS_LOG_LOST, "rows of a log lost"),
+)
+# A robot with one of these may be moving, whatever it was told.
+MAY_MOVE = TELEMETRY.STATUS_BOARD_LOST | TELEMETRY.STATUS_STOP_UNCONFIRMED
+HOLD_S = 0.1  # so often robots that were started hear that the operator is there
 
 
 @dataclass
@@ -27,25 +44,34 @@ class Robot:
 
     Attributes:
         telemetry, run: its newest messages.
-        heard_s: when it said anything last, by time.monotonic().
+        first_s, heard_s: when it said anything first and last, by time.monotonic().
         run_heard_s: when it said who it is.
-        recent: (time.monotonic(), telemetry_t) of the last WINDOW_S.
-        clock_s: how far its clock is ahead of ours, less the delay of the network.
-        acks: by number of the command.
+        recent: (time.monotonic(), time.time(), telemetry_t) of the last WINDOW_S.
+        senders: of its telemetry.
+        acks, signed_acks: by number of the command; the latter with the robot's signature.
+        link, link_s: its newest link_t with its signature, and when that was heard.
     """
 
     robot_id: int
     telemetry: Any = None
     run: Any = None
+    first_s: float = field(default_factory=time.monotonic)
     heard_s: float = 0.0
     run_heard_s: float = 0.0
     recent: deque = field(default_factory=deque)
+    senders: Senders = field(default_factory=Senders)
     acks: dict = field(default_factory=dict)
+    signed_acks: dict = field(default_factory=dict)
+    link: Any = None
+    link_s: float = 0.0
 
     @property
     def mode(self) -> str:
         """In words, or empty before the first telemetry."""
-        return MODES[self.telemetry.mode] if self.telemetry else ""
+        if not self.telemetry:
+            return ""
+        mode = self.telemetry.mode
+        return MODES[mode] if 0 <= mode < len(MODES) else f"unknown mode {mode}"
 
     @property
     def is_here(self) -> bool:
@@ -53,8 +79,65 @@ class Robot:
         return time.monotonic() - self.heard_s < GONE_S
 
     @property
+    def stands(self) -> bool:
+        """Its newest telemetry says so, and its board takes what it is told."""
+        t = self.telemetry
+        return (
+            self.mode == "stopped" and not t.status_flags & MAY_MOVE and not any(t.wheel_duty_pct)
+        )
+
+    def confirms(self, seq: int) -> bool:
+        """It has signed that it obeyed this stop, and that its board took zero since.
+
+        What else it says, signed or not, may only contradict that.
+        """
+        ack = self.signed_acks.get(seq)
+        later = self.link if ack and self.link and self.link.session == ack.session else None
+        if later and later.session_us <= ack.session_us:
+            later = None
+        return bool(
+            ack
+            and ack.accepted
+            and (later.stands if later else ack.stands)
+            and not (later and later.status_flags & MAY_MOVE)
+            and (self.stands or not self.telemetry)
+        )
+
+    @property
+    def session_us(self) -> int:
+        """Now by its clock since its session began, or a little before; it must have a link."""
+        return self.link.session_us + round(1e6 * (time.monotonic() - self.link_s))
+
+    @property
+    def is_armed(self) -> bool | None:
+        """It may be started; None if it has not signed that."""
+        return bool(self.link.armed) if self.link else None
+
+    @property
+    def is_tethered(self) -> bool | None:
+        """It stops when its operator is lost; None if it does not drive or has not signed that."""
+        if not self.link or self.link.mode == TELEMETRY.MODE_STOPPED:
+            return None
+        return self.link.link_timeout_ms > 0
+
+    @property
+    def is_double(self) -> bool:
+        """Two robots speak as this one, as is heard here or by one of them."""
+        flags = self.telemetry.status_flags if self.telemetry else 0
+        return self.senders.are_double or bool(flags & TELEMETRY.STATUS_DOUBLE)
+
+    @property
+    def alarms(self) -> list[str]:
+        """What a person must know of it, loudest first."""
+        hosts = ", ".join(self.senders.hosts)
+        said = [f"TWO ROBOTS OF THIS NUMBER ({hosts})"] if self.senders.are_double else []
+        flags = self.telemetry.status_flags if self.telemetry else 0
+        flags |= self.link.status_flags if self.link else 0
+        return said + [words for flag, words in ALARMS if flags & flag]
+
+    @property
     def clock_s(self) -> float:
-        """NaN before the first telemetry."""
+        """How far its clock is ahead of ours, less the network's delay; NaN before telemetry."""
         return max(
             (t.utime_us / 1e6 - heard_utime_s for _, heard_utime_s, t in self.recent),
             default=float("nan"),
@@ -72,9 +155,9 @@ class Robot:
         """In words: lost, no frames, or how many a second."""
         if not self.telemetry:
             return "?"
-        if self.telemetry.status_flags & CAMERA_LOST:
+        if self.telemetry.status_flags & TELEMETRY.STATUS_CAMERA_LOST:
             return "lost"
-        if self.telemetry.status_flags & FRAME_STALE:
+        if self.telemetry.status_flags & TELEMETRY.STATUS_FRAME_STALE:
             return "no frames"
         frames = {t.frame_seq for _, _, t in self.recent}
         passed_s = self.recent[-1][0] - self.recent[0][0] if self.recent else 0
@@ -89,6 +172,12 @@ class Robot:
             "version": run.version if run else None,
             "behavior": run.behavior if run else None,
             "mode": self.mode or None,
+            "stands": self.stands,
+            "alarms": self.alarms,
+            "hosts": self.senders.hosts,
+            "signed": self.link is not None,
+            "armed": self.is_armed,
+            "tethered": self.is_tethered,
             "battery_V": t.battery_V if t else None,
             "camera": self.camera,
             "clock_ahead_s": self.clock_s,
@@ -106,7 +195,8 @@ class Fleet:
         self,
         url: str = URL,
         channel_prefix: str = "",
-        connect: Callable[[str], Any] = lcm.LCM,
+        connect: Callable[[str], Any] = open_bus,
+        key: bytes | None = None,
     ):
         """Joins the bus.
 
@@ -114,6 +204,7 @@ class Fleet:
             url: of the bus.
             channel_prefix: before all channels, the command's too.
             connect: makes something that behaves like lcm.LCM.
+            key: the operator's; without it nothing is signed, and no signature believed.
 
         Raises:
             ValueError: there is no such bus.
@@ -121,34 +212,50 @@ class Fleet:
         self.robots: dict[int, Robot] = {}
         # Called again and again while listening; what it raises ends that.
         self.watch: Callable[[], None] = lambda: None
-        self._prefix = channel_prefix
+        # Robots that shall hear all the time that the operator is there.
+        self.held: set[int] = set()
+        self._prefix, self._key, self._hold_s = channel_prefix, key, 0.0
         try:
             self.bus = connect(url)
-            channels = re.escape(channel_prefix) + "R[0-9][0-9]+_(TELEMETRY|RUN|ACK)"
-            self.bus.subscribe(channels, self._on_message).set_queue_capacity(1000)
+            channels = re.escape(channel_prefix) + "R[0-9]{2,3}_(TELEMETRY|RUN|ACK|LINK|SIGNED_ACK)"
+            self.bus.subscribe(channels, self._on_message)
         except RuntimeError as error:
             raise ValueError(
-                f"--lcm-url {url}: cannot be joined; is there a network with a route for multicast "
-                "(ip route add 224.0.0.0/4 dev DEVICE)?"
+                f"--lcm-url {url}: cannot be joined ({error}); is there a network with a route for "
+                "multicast (ip route add 224.0.0.0/4 dev DEVICE)?"
             ) from error
 
     def _on_message(self, channel: str, data: bytes) -> None:
         name, _, kind = channel.removeprefix(self._prefix).partition("_")
         try:
             message = getattr(turbopi, f"{kind.lower()}_t").decode(data)
-        except ValueError:
-            return  # another program's type on this channel
+        except (ValueError, struct.error, IndexError):
+            return  # another program's type on this channel, or half a message
         robot = self.robots.setdefault(int(name[1:]), Robot(int(name[1:])))
         now_s = robot.heard_s = time.monotonic()
-        if kind == "ACK":
+        if kind in ("LINK", "SIGNED_ACK"):
+            self._on_signed(robot, kind, message, data)
+        elif kind == "ACK":
             robot.acks[message.seq] = message
         elif kind == "RUN":
             robot.run, robot.run_heard_s = message, now_s
         else:
             robot.telemetry = message
             robot.recent.append((now_s, time.time(), message))
+            robot.senders.add(getattr(self.bus, "sender", None))
             while robot.recent[0][0] < now_s - WINDOW_S:
                 robot.recent.popleft()
+
+    def _on_signed(self, robot: Robot, kind: str, message: Any, data: bytes) -> None:
+        """Believes what the robot of that number has signed; copies of older words are no news."""
+        if not self._key or not keys.is_signed(keys.of_robot(self._key, robot.robot_id), data):
+            return
+        if kind == "SIGNED_ACK":
+            robot.signed_acks[message.seq] = message
+            return
+        old = robot.link
+        if not old or message.session != old.session or message.session_us > old.session_us:
+            robot.link, robot.link_s = message, time.monotonic()
 
     def listen(self, duration_s: float, enough: Callable[[], bool] = lambda: False) -> None:
         """Takes in what robots say for some time, or until that is enough.
@@ -161,11 +268,59 @@ class Fleet:
             backlog_end_s = time.monotonic() + BACKLOG_S
             while time.monotonic() < backlog_end_s and self.bus.handle_timeout(0):
                 pass
+            self._hold()
             self.watch()
 
-    def send(self, command: Any) -> None:
-        """Says a swarm_command_t once."""
-        self.bus.publish(f"{self._prefix}SWARM_COMMAND", command.encode())
+    def _hold(self) -> None:
+        """Tells the robots that the operator is there, where that is due."""
+        if time.monotonic() < self._hold_s:
+            return
+        self._hold_s = time.monotonic() + HOLD_S
+        command = turbopi.swarm_command_t()
+        command.verb = turbopi.signed_command_t.VERB_HOLD
+        for robot_id in sorted(self.held):
+            robot = self.robots.get(robot_id)
+            if robot and robot.link:
+                with suppress(OSError):  # the robots notice
+                    self.send_signed(command, robot, robot.link.session, 0)
+
+    def send_signed(
+        self, command: Any, robot: Robot, session: int, counter: int, link_timeout_ms: int = -1
+    ) -> None:
+        """Says a command once to one robot that has been heard, with the operator's signature.
+
+        Args:
+            command: swarm_command_t.
+            robot: for whom it is; it must have a link.
+            session: for which of its sessions.
+            counter: above that of all commands that it has obeyed; copies have the same.
+            link_timeout_ms: as in signed_command_t.
+
+        Raises:
+            OSError: there is no way to.
+        """
+        sealed = turbopi.signed_command_t()
+        sealed.utime_us = time.time_ns() // 1000
+        sealed.robot_id = command.robot_id = robot.robot_id
+        sealed.session, sealed.counter = session, counter
+        sealed.made_us, sealed.link_timeout_ms = robot.session_us, link_timeout_ms
+        sealed.command = command.encode()
+        sealed.command_size = len(sealed.command)
+        sealed.tag = bytes(keys.TAG_BYTES)
+        message = keys.sign(keys.of_robot(self._key, robot.robot_id), sealed.encode())
+        self.bus.publish(f"{self._prefix}SWARM_SIGNED", message)
+
+    def send(self, command: Any, host: str = "") -> None:
+        """Says a swarm_command_t once, to all or to one machine.
+
+        Raises:
+            OSError: there is no way to.
+        """
+        channel = f"{self._prefix}SWARM_COMMAND"
+        if not host:
+            self.bus.publish(channel, command.encode())
+        elif hasattr(self.bus, "tell"):  # other buses know no machines
+            self.bus.tell(host, channel, command.encode())
 
     def here(self) -> set[int]:
         """Robots that are there now."""

@@ -10,6 +10,7 @@ unit=twinmill-robot.service
 config=$root/etc/turbopi/turbopi.conf
 store=$root/var/lib/twinmill
 scripts=$root/etc/turbopi/scripts
+secret=$root/etc/turbopi/key
 tables=$root/etc/turbopi/behaviors.toml
 
 fail() { echo "failed: $1: $2" >&2; exit 1; }
@@ -251,6 +252,20 @@ behaviors()
     rm -f "$1"
 }
 
+# key UPLOADED_FILE: this robot's own, by which it knows its operator. Nobody but the program reads it.
+key()
+{
+    may_be_root
+    as_root chmod 600 "$1"
+    as_root cp "$1" "$secret.new"
+    rm -f "$1"
+    as_root chmod 600 "$secret.new"
+    if getent passwd turbopi >/dev/null; then
+        as_root chown turbopi "$secret.new"
+    fi
+    as_root mv "$secret.new" "$secret"
+}
+
 # restart: and is it still there after a while?
 restart()
 {
@@ -310,7 +325,7 @@ main()
     step=$1
     shift
     case $step in
-        probe | take_over | hand_back | install | rollback | behaviors | configure | restart | frames | script | upload)
+        probe | take_over | hand_back | install | rollback | behaviors | configure | key | restart | frames | script | upload)
             "$step" "$@" ;;
         *) fail "bad step" "$step" ;;
     esac

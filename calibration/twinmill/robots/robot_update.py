@@ -6,8 +6,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 from twinmill.robots.fleet import Fleet
+from twinmill.robots.key import of_robot
 from twinmill.robots.package import Package, Packages
 from twinmill.robots.remote import Remote, RemoteError
 
@@ -50,6 +52,7 @@ class Wish:
         take_over: stop and disable other services that drive the robot.
         dry_run: only look.
         wait_s: for telemetry.
+        key: the operator's; the robot gets its own of it.
     """
 
     packages: Packages | None
@@ -59,6 +62,7 @@ class Wish:
     dry_run: bool
     wait_s: float
     ssh_config: Path | None
+    key: bytes
 
 
 @dataclass
@@ -138,6 +142,7 @@ def _update(
         say("configuring")
         if wish.behaviors:
             remote.run("behaviors", _upload(remote, wish.behaviors))
+        _bring_key(remote, of_robot(wish.key, target.robot_id))
         remote.run("configure", *(f"{key}={value}" for key, value in settings.items()))
     say("restarting")
     restarted_s = time.monotonic()
@@ -180,6 +185,13 @@ def _choose(wish: Wish, found: dict[str, str], say: Callable[[str], None]) -> Pa
     return package
 
 
+def _bring_key(remote: Remote, key: bytes) -> None:
+    with NamedTemporaryFile() as file:  # nobody else may read it, here and there
+        file.write(f"{key.hex()}\n".encode())
+        file.flush()
+        remote.run("key", _upload(remote, Path(file.name)))
+
+
 def _upload(remote: Remote, path: Path) -> str:
     upload = remote.run("upload")["upload"]
     remote.copy(path, upload)
@@ -203,6 +215,7 @@ def _plan(
         f"copy {package.path.name}, {package.path.stat().st_size // 1024} KB",
         f"install {package.version} over {before}",
         *([f"put {wish.behaviors} there"] if wish.behaviors else []),
+        "bring it its key",
         f"set {changed}",
         "restart twinmill-robot.service and wait for telemetry",
     ]
@@ -236,6 +249,11 @@ def _hear(
             f"installed {version}, but R{target.robot_id:02d} says {outcome.version}: has another "
             "robot the same number?",
         )
+    if robot.is_double:
+        hosts = ", ".join(robot.senders.hosts)
+        raise RemoteError("two robots", f"two robots say that they are this one: {hosts}.")
+    if not _wait(lambda: robot.link is not None, CAMERA_S):
+        raise RemoteError("not signed", "runs, but does not sign with the key that it was brought.")
     if robot.camera in ("lost", "no frames"):
         raise RemoteError("no camera", "runs, but its camera gives no pictures: is it plugged in?")
 

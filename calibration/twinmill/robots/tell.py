@@ -1,12 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands that are repeated until acknowledged: any one packet may be lost, either way."""
+"""Commands that are repeated until acknowledged: any one packet may be lost, either way.
 
+A stop is said unsigned, so that anybody can, and holds until robots are armed. All else carries the
+operator's signature for each robot and its session. Who is believed what: firmware/RADIO.md.
+"""
+
+import secrets
 import time
-from dataclasses import dataclass
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
 
 import turbopi
 
-from twinmill.robots.fleet import Fleet
+from twinmill.robots.fleet import Fleet, Robot
 
 REPEAT_S = 0.03
 ALL = -1
@@ -15,30 +23,62 @@ FIND_S = 1.0  # robots that speak 30 times a second are found, though half of it
 CALL_OFF_S = 0.3
 STOP_LEAST_S = 1.0  # a stop is said for so long at least, for robots not heard of yet
 VERBS = turbopi.swarm_command_t
+SIGNED_VERBS = turbopi.signed_command_t
+NO_SIGNATURE = (
+    "signs nothing with this operator's key: `twinmill flash` brings robots theirs; has it another "
+    "--key?"
+)
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a robot answered: accepted is None if it did not."""
+    """What a robot answered.
+
+    Attributes:
+        accepted: None if it did not answer.
+        signed: the answer has the robot's signature; another may be anybody's.
+        stands: it has signed that its motor board took zero, and nothing contradicts it.
+        is_double: two robots speak as this one.
+        alarms: what a person must know of it, loudest first.
+    """
 
     robot_id: int
     accepted: bool | None
+    signed: bool
     reason: str
     mode: str
+    stands: bool
+    is_double: bool
+    alarms: list[str]
 
     def to_json(self) -> dict:
         """As printed."""
         return vars(self)
 
 
-def make_command(verb: int, behavior: str = "", start_utime_us: int = 0):
-    """A command of this instant to all robots.
+@dataclass
+class Order:
+    """A command and how it is signed.
 
-    Its number comes from the clock, so that two operators do not use the same one.
+    Attributes:
+        message: swarm_command_t.
+        link_timeout_ms: as in signed_command_t.
+        counter: above those of all commands that its robots have obeyed; 0: not known yet.
+        sessions: of the robots that it was signed for: a robot that starts anew meanwhile does not
+            obey what was meant for the one before.
     """
+
+    message: Any
+    link_timeout_ms: int = -1
+    counter: int = 0
+    sessions: dict[int, int] = field(default_factory=dict)
+
+
+def make_command(verb: int, behavior: str = "", start_utime_us: int = 0):
+    """A command of this instant to all robots, with a number that nobody can guess."""
     command = VERBS()
     command.utime_us = time.time_ns() // 1000
-    command.seq = command.utime_us // 1000 % 2**31
+    command.seq = secrets.randbelow(2**31)
     command.robot_id, command.verb = ALL, verb
     command.behavior, command.start_utime_us = behavior, start_utime_us
     return command
@@ -51,7 +91,7 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
         ValueError: none is there.
     """
     if robots:
-        fleet.listen(FIND_S, lambda: robots <= fleet.here())
+        fleet.listen(FIND_S, lambda: robots <= fleet.here() and _all_linked(fleet, robots))
         return robots
     fleet.listen(FIND_S)
     if not fleet.here():
@@ -62,49 +102,112 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
     return fleet.here()
 
 
-def tell(fleet: Fleet, command, robots: set[int], until_s: float) -> list[Answer]:
+def _all_linked(fleet: Fleet, robots: set[int]) -> bool:
+    return all(i in fleet.robots and fleet.robots[i].link for i in robots)
+
+
+def tell(
+    fleet: Fleet, command, robots: set[int], until_s: float, link_timeout_ms: int = -1
+) -> list[Answer]:
     """Repeats one command to some robots until each has answered, or time.monotonic() is until_s.
 
-    Copies carry the same utime_us and seq: a robot that has obeyed acknowledges again.
+    Copies carry the same number and counter: a robot that has obeyed acknowledges again.
+
+    Args:
+        fleet: where they are.
+        command: swarm_command_t; any but a stop is signed.
+        robots: whom to tell.
+        until_s: when to give up.
+        link_timeout_ms: of a start: how long robots drive on without hearing the operator; 0: for
+            ever; -1: as they are configured.
     """
+    order = Order(command, link_timeout_ms)
     while (waiting := _unanswered(fleet, command, robots)) and time.monotonic() < until_s:
-        _say(fleet, command, waiting)
+        for robot_id in sorted(waiting):
+            _say_signed(fleet, order, robot_id)
         fleet.listen(REPEAT_S, lambda: not _unanswered(fleet, command, robots))
     return answers(fleet, command, robots)
 
 
-def stop(fleet: Fleet, robots: set[int], timeout_s: float = 10.0) -> list[Answer]:
-    """Says stop until all robots have acknowledged it and say that they stand.
+def _say_signed(fleet: Fleet, order: Order, robot_id: int) -> None:
+    robot = fleet.robots.get(robot_id)
+    if not robot or not robot.link:
+        return
+    if not order.counter:
+        known = [r.link.counter for r in fleet.robots.values() if r.link]
+        order.counter = max(time.time_ns() // 1000, *(counter + 1 for counter in known))
+    session = order.sessions.setdefault(robot_id, robot.link.session)
+    if session == robot.link.session:
+        fleet.send_signed(order.message, robot, session, order.counter, order.link_timeout_ms)
+
+
+def arm(fleet: Fleet, robots: set[int], timeout_s: float = 5.0) -> list[Answer]:
+    """Lets robots that were stopped be started again."""
+    command = make_command(SIGNED_VERBS.VERB_ARM)
+    return tell(fleet, command, robots, time.monotonic() + timeout_s)
+
+
+def stop(
+    fleet: Fleet, robots: set[int], timeout_s: float = 10.0, hosts: Sequence[str] = ()
+) -> list[Answer]:
+    """Says stop until all robots have signed that they stand.
+
+    By multicast, and to each machine that speaks as one of them: whatever else is wrong on the bus
+    or with what is heard there, this goes out.
 
     Args:
-        fleet: where they are.
+        fleet: where they are; robots that it held are held no more.
         robots: whom to stop; empty: all that are, or come to be, there.
         timeout_s: gives up after.
+        hosts: machines to be told besides.
 
     Returns:
         What each answered.
+
+    Raises:
+        OSError: it could never be said.
     """
     command = make_command(VERBS.VERB_STOP)
+    fleet.held -= robots or set(fleet.held)
     begin_s = time.monotonic()
+    error: OSError | None = None
+    was_said = False
 
     def stopped() -> bool:
         asked = robots or set(fleet.robots)
         return bool(asked) and all(
-            (robot := fleet.robots.get(i)) and command.seq in robot.acks and stands(robot)
+            (robot := fleet.robots.get(i)) and _says_that_it_stands(robot, command.seq)
             for i in asked
         )
 
     while (passed_s := time.monotonic() - begin_s) < timeout_s:
         if stopped() and (robots or passed_s > STOP_LEAST_S):
             break
-        _say(fleet, command, robots or {ALL})
+        try:
+            for command.robot_id in sorted(robots or {ALL}):
+                fleet.send(command)
+            was_said = True
+        except OSError as failure:
+            error = failure
+        _say_to_hosts(fleet, command, robots, hosts)
         fleet.listen(REPEAT_S)
+    if error and not was_said:
+        raise error
     return answers(fleet, command, robots or set(fleet.robots))
 
 
-def stands(robot) -> bool:
-    """Its newest telemetry says so; a robot that never sent any is believed its acknowledgement."""
-    return robot.mode in ("", "stopped")
+def _says_that_it_stands(robot: Robot, seq: int) -> bool:
+    """Enough to go on to the next; a robot without our key can do no better than say so."""
+    return robot.confirms(seq) or (not robot.link and seq in robot.acks and robot.stands)
+
+
+def _say_to_hosts(fleet: Fleet, command, robots: set[int], hosts: Sequence[str]) -> None:
+    """The same to single machines; those that cannot be reached show in what is not answered."""
+    asked = [fleet.robots[i] for i in robots or fleet.robots if i in fleet.robots]
+    for host in {*hosts, *(host for robot in asked for host in robot.senders.hosts)}:
+        for command.robot_id in sorted(robots or {ALL}):
+            with suppress(OSError):
+                fleet.send(command, host)
 
 
 @dataclass(frozen=True)
@@ -129,8 +232,11 @@ def start(
     ahead_s: float,
     partial: bool,
     verb: int = VERBS.VERB_START,
+    link_timeout_ms: int = -1,
 ) -> Start:
     """Starts robots at one instant of their clocks; all of them or, unless partial, none.
+
+    From then on they are held: as long as the fleet listens, they hear that the operator is there.
 
     Args:
         fleet: where they are.
@@ -139,19 +245,21 @@ def start(
         ahead_s: from now to the instant.
         partial: start though some do not answer or refuse.
         verb: start, or play script.
+        link_timeout_ms: as of tell().
     """
     command = make_command(verb, behavior)
     command.start_utime_us = command.utime_us + int(ahead_s * 1e6)
     instant_s = time.monotonic() + ahead_s
+    fleet.held |= robots if link_timeout_ms else set()
     try:
-        given = tell(fleet, command, robots, instant_s - CALL_OFF_S)
-        called_off = not partial and not all(a.accepted for a in given)
+        given = tell(fleet, command, robots, instant_s - CALL_OFF_S, link_timeout_ms)
+        called_off = not partial and not all(a.accepted and a.signed for a in given)
         if called_off:
             stop(fleet, robots)
         else:
             fleet.listen(instant_s - time.monotonic())
             accepted = [fleet.robots[a.robot_id] for a in given if a.accepted]
-            fleet.listen(0.5, lambda: not any(map(stands, accepted)))
+            fleet.listen(0.5, lambda: not any(robot.mode == "stopped" for robot in accepted))
     except BaseException:
         stop(fleet, robots)
         raise
@@ -160,25 +268,38 @@ def start(
 
 def answers(fleet: Fleet, command, robots: set[int]) -> list[Answer]:
     """What each of some robots answered to a command."""
-    made = []
-    for robot_id in sorted(robots):
-        robot = fleet.robots.get(robot_id)
-        ack = robot.acks.get(command.seq) if robot else None
-        made.append(
-            Answer(
-                robot_id,
-                bool(ack.accepted) if ack else None,
-                ack.reason if ack else "no answer",
-                robot.mode if robot else "",
-            )
-        )
-    return made
+    return [_answer(fleet.robots.get(i) or Robot(i), command) for i in sorted(robots)]
+
+
+def _answer(robot: Robot, command) -> Answer:
+    signed = robot.signed_acks.get(command.seq)
+    if signed and (signed.command_utime_us, signed.verb) != (command.utime_us, command.verb):
+        signed = None
+    ack = signed or robot.acks.get(command.seq)
+    reason = ack.reason if ack else "no answer" if robot.link else NO_SIGNATURE
+    if ack and not signed:
+        reason = reason or NO_SIGNATURE
+    return Answer(
+        robot.robot_id,
+        bool(ack.accepted) if ack else None,
+        signed is not None,
+        reason,
+        robot.mode,
+        robot.confirms(command.seq) if command.verb == VERBS.VERB_STOP else robot.stands,
+        robot.is_double,
+        robot.alarms,
+    )
 
 
 def _unanswered(fleet: Fleet, command, robots: set[int]) -> set[int]:
-    return {i for i in robots if i not in fleet.robots or command.seq not in fleet.robots[i].acks}
+    return {i for i in robots if not (i in fleet.robots and _is_done(fleet.robots[i], command))}
 
 
-def _say(fleet: Fleet, command, robots: set[int]) -> None:
-    for command.robot_id in sorted(robots):
-        fleet.send(command)
+def _is_done(robot: Robot, command) -> bool:
+    """It has answered; without its signature, an answer may be anybody's."""
+    return command.seq in robot.signed_acks if robot.link else _is_known(robot)
+
+
+def _is_known(robot: Robot) -> bool:
+    """It was heard for long enough to have signed something, had it the key."""
+    return bool(robot.recent) and time.monotonic() - robot.first_s > FIND_S

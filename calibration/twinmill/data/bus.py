@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: Apache-2.0
+"""LCM's bus on UDP, read by code that any packet may come to.
+
+The C library reads past its buffers where a packet says so, and the program that it is part of
+dies. Here a packet that is not as it should be is dropped.
+"""
+
+import re
+import select
+import socket
+import struct
+import time
+from collections import deque
+from collections.abc import Callable
+from itertools import groupby
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import lcm
+
+Handler = Callable[[str, bytes], Any]
+Address = tuple[str, int]
+
+DEFAULT = ("239.255.76.67", 7667)
+MAGIC_SHORT = b"LC02"  # all of a message in one datagram; longer ones are no message of ours
+HEADER = struct.Struct(">4sI")
+CHANNEL_MAX = 63
+DATAGRAM_MAX = 65535
+RECEIVE_BUFFER_BYTES = 2 << 20
+REJOIN_S = 1.0  # networks come and go: Wi-Fi is made anew, a cable is unplugged
+
+
+def open_bus(url: str) -> Any:
+    """A UdpBus, or what the library has for other kinds of buses, as file:// and tcpq://.
+
+    Raises:
+        RuntimeError: there is no such bus.
+    """
+    if url == "" or url.startswith("udpm:"):
+        return UdpBus(url)
+    return lcm.LCM(url)
+
+
+def parse_packet(packet: bytes) -> tuple[str, bytes] | None:
+    """Channel and payload of a datagram, or None if it is not one of LCM's whole messages."""
+    if len(packet) < HEADER.size or packet[:4] != MAGIC_SHORT:
+        return None
+    end = packet.find(b"\0", HEADER.size, HEADER.size + CHANNEL_MAX + 1)
+    if end < 0:
+        return None
+    try:
+        return packet[HEADER.size : end].decode("ascii"), packet[end + 1 :]
+    except UnicodeDecodeError:
+        return None
+
+
+class Senders:
+    """Who spoke on a channel that is one robot's, in the last seconds."""
+
+    WINDOW_S = 2.0
+
+    def __init__(self):
+        self._recent: deque[tuple[float, Address]] = deque()
+
+    def add(self, sender: Address | None) -> None:
+        """Somebody spoke just now; None: the bus cannot tell who."""
+        now_s = time.monotonic()
+        if sender:
+            self._recent.append((now_s, sender))
+        while self._recent and self._recent[0][0] < now_s - self.WINDOW_S:
+            self._recent.popleft()
+
+    @property
+    def hosts(self) -> list[str]:
+        """Their machines."""
+        return sorted({sender[0] for _, sender in self._recent})
+
+    @property
+    def are_double(self) -> bool:
+        """One program spoke, then another, and then the one again.
+
+        A program that was started anew, or has changed networks, speaks from another address and
+        never again from the first.
+        """
+        return len(list(groupby(sender for _, sender in self._recent))) > 2
+
+
+class UdpBus:
+    """Speaks and hears on every network that this machine is on; otherwise as lcm.LCM.
+
+    Attributes:
+        sender: who sent the message that a handler was called for last, (host, port).
+    """
+
+    def __init__(self, url: str = ""):
+        """Joins the bus.
+
+        Args:
+            url: udpm://ADDRESS:PORT?ttl=N, as LCM has it.
+
+        Raises:
+            RuntimeError: it is no such URL, or there is no network.
+        """
+        self.group, ttl = _parse_url(url)
+        self.sender: Address | None = None
+        self._handlers: list[tuple[re.Pattern, Handler]] = []
+        self._sequence = 0
+        try:
+            self._ear = _listening_socket(self.group[1])
+            self._mouth = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            self._mouth.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, ttl)
+            self._mouth.setblocking(False)
+        except OSError as error:
+            raise RuntimeError(str(error)) from error
+        self._joined: set[int] = set()
+        self._join_s = 0.0
+        self._renew()
+        if not self._joined:
+            raise RuntimeError("no network")
+
+    def _renew(self) -> None:
+        """Joins the group on networks that are new, and forgets those that are gone."""
+        now_s = time.monotonic()
+        if now_s < self._join_s:
+            return
+        self._join_s = now_s + REJOIN_S
+        present = {index for index, _ in socket.if_nameindex()}
+        for index in self._joined - present:
+            self._member(socket.IP_DROP_MEMBERSHIP, index)
+        self._joined &= present
+        self._joined |= {i for i in present if self._member(socket.IP_ADD_MEMBERSHIP, i)}
+
+    def _member(self, what: int, index: int) -> bool:
+        request = struct.pack("=4s4si", socket.inet_aton(self.group[0]), bytes(4), index)
+        try:
+            self._ear.setsockopt(socket.IPPROTO_IP, what, request)
+        except OSError:
+            return index in self._joined
+        return True
+
+    def subscribe(self, channels: str, handler: Handler) -> None:
+        """Has a function called with channel and payload of each message.
+
+        Args:
+            channels: regular expression that matches all of the channel's name.
+            handler: the function.
+        """
+        self._handlers.append((re.compile(channels), handler))
+
+    def publish(self, channel: str, data: bytes) -> None:
+        """Says something on every network.
+
+        Raises:
+            OSError: it could be said on none.
+        """
+        packet, errors, said = self._packet(channel, data), [], False
+        for index in sorted(self._joined):
+            interface = struct.pack("=4s4si", bytes(4), bytes(4), index)
+            try:
+                self._mouth.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
+                self._mouth.sendto(packet, self.group)
+                said = True
+            except OSError as error:
+                errors.append(error)
+        if not said:
+            raise OSError(f"the bus cannot be reached: {errors[0] if errors else 'no network'}")
+
+    def tell(self, host: str, channel: str, data: bytes) -> None:
+        """Says something to one machine alone: some wireless networks carry nothing else.
+
+        Raises:
+            OSError: it cannot be reached.
+        """
+        self._mouth.sendto(self._packet(channel, data), (host, self.group[1]))
+
+    def _packet(self, channel: str, data: bytes) -> bytes:
+        self._sequence = (self._sequence + 1) % 2**32
+        return HEADER.pack(MAGIC_SHORT, self._sequence) + channel.encode() + b"\0" + data
+
+    def handle_timeout(self, timeout_ms: int) -> bool:
+        """Waits for a message that somebody subscribed to, and has it handled.
+
+        Returns:
+            False if none came in time.
+        """
+        end_s = time.monotonic() + timeout_ms / 1e3
+        while True:
+            self._renew()
+            left_s = max(0.0, end_s - time.monotonic())
+            if not select.select([self._ear], [], [], min(left_s, REJOIN_S))[0]:
+                if left_s == 0:
+                    return False
+                continue
+            try:
+                packet, self.sender = self._ear.recvfrom(DATAGRAM_MAX)
+            except OSError:  # taken meanwhile, or its checksum is wrong
+                continue
+            if self._hand_out(packet):
+                return True
+
+    def _hand_out(self, packet: bytes) -> bool:
+        message = parse_packet(packet)
+        if message is None:
+            return False
+        handlers = [h for pattern, h in self._handlers if pattern.fullmatch(message[0])]
+        for handler in handlers:
+            handler(*message)
+        return bool(handlers)
+
+
+def _parse_url(url: str) -> tuple[Address, int]:
+    parts = urlsplit(url)
+    try:
+        address = (parts.hostname or DEFAULT[0], parts.port or DEFAULT[1])
+        multicast = 224 <= socket.inet_aton(address[0])[0] <= 239
+        ttl = int(parse_qs(parts.query).get("ttl", ["0"])[0])
+    except (ValueError, OSError) as error:
+        raise RuntimeError(f"{url}: {error}") from error
+    if not multicast or not 0 <= ttl <= 255:
+        raise RuntimeError(f"{url}: no multicast address or no ttl in 0..255")
+    return address, ttl
+
+
+def _listening_socket(port: int) -> socket.socket:
+    """Hears unicast, too: bound to the port alone."""
+    ear = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    ear.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    ear.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+    ear.bind(("", port))
+    ear.setblocking(False)
+    return ear

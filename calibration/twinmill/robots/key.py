@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The operator's key, each robot's own that follows from it, and signatures: firmware/RADIO.md."""
+
+import hmac
+import os
+import secrets
+from contextlib import suppress
+from hashlib import blake2b
+from pathlib import Path
+
+KEY_BYTES, TAG_BYTES = 32, 16
+
+
+def default_path() -> Path:
+    """Where the user's own key is."""
+    config = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    return Path(config) / "twinmill" / "swarm.key"
+
+
+def load(path: Path | None = None) -> bytes:
+    """The operator's key; one is made if there is none yet.
+
+    Raises:
+        ValueError: the file is no key, or others may read it.
+        OSError: it cannot be read or made.
+    """
+    file = path or default_path()
+    if not file.exists():
+        _make(file)
+    if file.stat().st_mode & 0o077:
+        raise ValueError(
+            f"--key {file}: others may read it; make a new one (remove it, and flash the robots "
+            "again), or chmod 600 if nobody has."
+        )
+    text = file.read_text().strip()
+    if len(text) != 2 * KEY_BYTES or set(text) - set("0123456789abcdef"):
+        raise ValueError(f"--key {file}: is not {2 * KEY_BYTES} hexadecimal digits.")
+    return bytes.fromhex(text)
+
+
+def _make(file: Path) -> None:
+    """Whole or not at all; one that another process made meanwhile stays."""
+    file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    part = file.with_name(f".{file.name}.{os.getpid()}")
+    handle = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    try:
+        os.write(handle, f"{secrets.token_hex(KEY_BYTES)}\n".encode())
+        os.close(handle)
+        with suppress(FileExistsError):
+            os.link(part, file)
+    finally:
+        part.unlink()
+
+
+def of_robot(key: bytes, robot_id: int) -> bytes:
+    """The key that a robot has: it says nothing of the operator's, nor of other robots'."""
+    return blake2b(f"twinmill robot {robot_id}".encode(), key=key, digest_size=KEY_BYTES).digest()
+
+
+def sign(key: bytes, message: bytes) -> bytes:
+    """The message, which ends in its tag, with the right one."""
+    body = message[:-TAG_BYTES]
+    return body + blake2b(body, key=key, digest_size=TAG_BYTES).digest()
+
+
+def is_signed(key: bytes, message: bytes) -> bool:
+    """It was signed with this key."""
+    return len(message) > TAG_BYTES and hmac.compare_digest(sign(key, message), message)

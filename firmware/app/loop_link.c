@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "loop_link.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#include "loop_state.h"
+
+void loop_link_init(struct loop *loop, const struct app_config *config)
+{
+    struct loop_link *state = &loop->operator_link;
+    *state = (struct loop_link){
+        .session_begin_us = loop_now_us(loop),
+        .configured_timeout_ms = config->link_timeout_ms,
+    };
+    loop->inbox.session = loop->link.session;
+    if (config->run_dir[0] != '\0')
+    {
+        (void)snprintf(state->stopped_file, sizeof state->stopped_file, "%s/stopped",
+                       config->run_dir);
+    }
+    state->stopped_file_is_there =
+        state->stopped_file[0] != '\0' && access(state->stopped_file, F_OK) == 0;
+    loop->inbox.latched = state->stopped_file_is_there;
+}
+
+int64_t loop_link_session_us(const struct loop *loop)
+{
+    return loop_now_us(loop) - loop->operator_link.session_begin_us;
+}
+
+void loop_link_obeyed(struct loop *loop, const struct fw_command *command)
+{
+    struct loop_link *state = &loop->operator_link;
+    fw_command_obeyed(&loop->inbox, command, loop_link_session_us(loop));
+    if (command->verb == FW_VERB_STOP)
+    {
+        return;
+    }
+    state->heard_us = loop_now_us(loop);
+    if (command->verb == FW_VERB_START || command->verb == FW_VERB_SCRIPT)
+    {
+        state->timeout_ms =
+            command->link_timeout_ms >= 0 ? command->link_timeout_ms : state->configured_timeout_ms;
+        state->lost = false;
+    }
+}
+
+void loop_link_start_by_hand(struct loop *loop)
+{
+    loop->operator_link.timeout_ms = 0;
+    loop->operator_link.lost = false;
+    loop->inbox.latched = false;
+    loop_start(loop);
+}
+
+void loop_link_watch(struct loop *loop)
+{
+    struct loop_link *state = &loop->operator_link;
+    const bool drives = loop->running || loop->plan.waits;
+    if (drives && state->timeout_ms > 0 &&
+        loop_now_us(loop) - state->heard_us > (int64_t)state->timeout_ms * 1000)
+    {
+        loop_stop(loop);
+        state->lost = true;
+    }
+}
+
+void loop_link_answer(struct loop *loop, const struct link_ack *ack)
+{
+    struct loop_link *state = &loop->operator_link;
+    if (state->ack_count < LOOP_LINK_ACKS_MAX)
+    {
+        state->acks[state->ack_count++] = *ack;
+    }
+}
+
+static bool stands(const struct loop *loop)
+{
+    return !loop->may_move && loop->lost[LOOP_BOARD] == FW_OK;
+}
+
+// A program that dies after a stop must not come back and drive. Without the folder, as where the
+// program is run by hand, only this run knows of the stop.
+static void keep_latch(struct loop *loop)
+{
+    struct loop_link *state = &loop->operator_link;
+    if (state->stopped_file[0] == '\0' || state->stopped_file_is_there == loop->inbox.latched)
+    {
+        return;
+    }
+    state->stopped_file_is_there = loop->inbox.latched;
+    if (!loop->inbox.latched)
+    {
+        (void)unlink(state->stopped_file);
+        return;
+    }
+    const int fd = open(state->stopped_file, O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+    if (fd >= 0)
+    {
+        (void)close(fd);
+    }
+}
+
+void loop_link_tell(struct loop *loop)
+{
+    struct loop_link *state = &loop->operator_link;
+    for (int i = 0; i < state->ack_count; ++i)
+    {
+        struct link_ack *ack = &state->acks[i];
+        ack->stands = stands(loop);
+        ack->utime_us = hal_clock_unix_us(&loop->devices.clock);
+        ack->session_us = loop_link_session_us(loop);
+        loop->link.send_ack(loop->link.context, ack);
+    }
+    state->ack_count = 0;
+    keep_latch(loop);
+}
+
+void loop_link_report(const struct loop *loop, struct link_report *report)
+{
+    const struct loop_link *state = &loop->operator_link;
+    const bool untethered = loop->running && state->timeout_ms == 0;
+    report->session_us = loop_link_session_us(loop);
+    report->counter = loop->inbox.counter;
+    report->stands = stands(loop);
+    report->link_timeout_ms = state->timeout_ms;
+    report->status_flags |= (state->lost ? LINK_STATUS_LINK_LOST : 0) |
+                            (untethered ? LINK_STATUS_UNTETHERED : 0) |
+                            (loop->inbox.latched ? LINK_STATUS_LATCHED : 0);
+}

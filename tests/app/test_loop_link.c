@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests of firmware/app/loop_link.c
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "robot.h"
+
+// Fixture
+
+static char folder[] = "/tmp/test_link.XXXXXX";
+
+void setUp(void)
+{
+    robot_make();
+    robot.view = VIEW_GREEN;
+    robot_boot();
+    robot_steps(15);
+}
+
+void tearDown(void)
+{
+    robot_free();
+}
+
+// Test
+
+static void test_stop_holds_until_armed(void)
+{
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_NOT_NULL(strstr(robot.ack.reason, "arm"));
+    TEST_ASSERT_BITS_HIGH(LINK_STATUS_LATCHED, robot.report.status_flags);
+    robot_steps(1);
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_ARM, 0, ""));
+    TEST_ASSERT_TRUE(robot_stands());
+    TEST_ASSERT_BITS_LOW(LINK_STATUS_LATCHED, robot.report.status_flags);
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    ASSERT_DUTIES(left_pct);
+}
+
+// Starts every 10 ms against one stop.
+static void test_flood_of_starts_does_not_undo_a_stop(void)
+{
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
+    robot.hand.wait_us = 10000;
+    for (int i = 0; i < 500; ++i)
+    {
+        TEST_ASSERT_FALSE(robot_tell(FW_VERB_START, 0, ""));
+        TEST_ASSERT_TRUE(robot_stands());
+    }
+}
+
+// A stop that is stamped far ahead, as by a broken clock or by somebody who means it.
+static void test_stop_from_the_future_locks_nobody_out(void)
+{
+    TEST_ASSERT_TRUE(robot_tell_as_of(-INT64_C(3155760000000000), FW_VERB_STOP, 0, ""));
+    robot_steps(1);
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_ARM, 0, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    ASSERT_DUTIES(left_pct);
+}
+
+static void test_button_starts_a_robot_that_was_stopped(void)
+{
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
+    robot.panel.pressed = true;
+    robot_steps(3);
+    robot.panel.pressed = false;
+    robot_steps(3);
+    ASSERT_DUTIES(left_pct);
+    TEST_ASSERT_BITS_LOW(LINK_STATUS_LATCHED, robot.report.status_flags);
+    TEST_ASSERT_BITS_HIGH(LINK_STATUS_UNTETHERED, robot.report.status_flags);
+}
+
+static void test_stop_outlives_the_program(void)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/stopped", folder);
+    snprintf(robot.config.run_dir, sizeof robot.config.run_dir, "%s", folder);
+    robot_boot();
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
+    TEST_ASSERT_EQUAL(0, access(path, F_OK));
+    robot_boot();
+    TEST_ASSERT_FALSE(robot_tell(FW_VERB_START, 0, ""));
+    robot_steps(1);
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_ARM, 0, ""));
+    TEST_ASSERT_NOT_EQUAL(0, access(path, F_OK));
+    robot_boot();
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+}
+
+static void test_robot_that_loses_its_operator_stops(void)
+{
+    robot.link_timeout_ms = 1000;
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    const int64_t heard_us = robot.hand.monotonic_us;
+    while (!robot_stands())
+    {
+        robot_steps(1);
+        TEST_ASSERT_LESS_OR_EQUAL_INT64(heard_us + 1000000 + ROBOT_PERIOD_US,
+                                        robot.hand.monotonic_us);
+    }
+    TEST_ASSERT_GREATER_THAN_INT64(heard_us + 1000000, robot.hand.monotonic_us);
+    TEST_ASSERT_BITS_HIGH(LINK_STATUS_LINK_LOST, robot.report.status_flags);
+    // It waits for a start, and needs no arming: nobody has said stop.
+    robot_steps(30);
+    TEST_ASSERT_TRUE(robot_stands());
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_BITS_LOW(LINK_STATUS_LINK_LOST, robot.report.status_flags);
+}
+
+static void test_robot_that_hears_its_operator_goes_on(void)
+{
+    robot.link_timeout_ms = 1000;
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    const int acks = robot.ack_count;
+    for (int i = 0; i < 10; ++i)
+    {
+        robot.command.order.verb = FW_VERB_HOLD;
+        robot.command.order.made_us = loop_link_session_us(&robot.loop);
+        robot.has_command = true;
+        robot_steps(20);
+        ASSERT_DUTIES(left_pct);
+    }
+    // It is said too often to be answered.
+    TEST_ASSERT_EQUAL(acks, robot.ack_count);
+}
+
+static void test_robot_that_lost_its_operator_does_not_start_later(void)
+{
+    robot.link_timeout_ms = 1000;
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, robot_unix_us() + 5000000, ""));
+    robot_steps(300);
+    TEST_ASSERT_TRUE(robot_stands());
+}
+
+static void test_start_without_a_word_on_it_has_the_configured_time_out(void)
+{
+    robot.link_timeout_ms = -1;
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_EQUAL(robot.config.link_timeout_ms, robot.report.link_timeout_ms);
+    TEST_ASSERT_EQUAL(2000, robot.config.link_timeout_ms);
+    TEST_ASSERT_BITS_LOW(LINK_STATUS_UNTETHERED, robot.report.status_flags);
+}
+
+static void test_answer_to_a_stop_says_if_the_board_took_it(void)
+{
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
+    TEST_ASSERT_FALSE(robot.ack.stands);
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
+    TEST_ASSERT_TRUE(robot.ack.stands);
+    robot.faults = (struct stub_faults){.fails_at = 1, .fails_count = 1000, .err = FW_ERR_IO};
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
+    TEST_ASSERT_FALSE(robot.ack.stands);
+    TEST_ASSERT_FALSE(robot.report.stands);
+}
+
+int main(void)
+{
+    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    UNITY_BEGIN();
+    RUN_TEST(test_stop_holds_until_armed);
+    RUN_TEST(test_flood_of_starts_does_not_undo_a_stop);
+    RUN_TEST(test_stop_from_the_future_locks_nobody_out);
+    RUN_TEST(test_button_starts_a_robot_that_was_stopped);
+    RUN_TEST(test_stop_outlives_the_program);
+    RUN_TEST(test_robot_that_loses_its_operator_stops);
+    RUN_TEST(test_robot_that_hears_its_operator_goes_on);
+    RUN_TEST(test_robot_that_lost_its_operator_does_not_start_later);
+    RUN_TEST(test_start_without_a_word_on_it_has_the_configured_time_out);
+    RUN_TEST(test_answer_to_a_stop_says_if_the_board_took_it);
+    const int failures = UNITY_END();
+    rmdir(folder);
+    return failures;
+}
