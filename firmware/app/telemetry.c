@@ -38,7 +38,8 @@ void telemetry_init(struct telemetry *telemetry, const struct app_config *config
 
 bool telemetry_has_lost_log(const struct telemetry *telemetry)
 {
-    return !hears_commands(telemetry) && telemetry->unsent_count > 0;
+    const bool is_file = strncmp(telemetry->config->lcm_url, "file:", 5) == 0;
+    return is_file && telemetry->unsent_count > 0;
 }
 
 void telemetry_connect(struct telemetry *telemetry, int64_t now_us)
