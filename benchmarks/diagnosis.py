@@ -12,7 +12,6 @@ import numpy as np
 import sysid_fit
 from ratio import Ratio, single
 
-from twinmill.challenge.cases import DUTY_PCT, ROBOT
 from twinmill.challenge.script import write_rich_script
 from twinmill.data.measurement import Measurement, load_measurements
 from twinmill.data.track import command_at
@@ -20,6 +19,23 @@ from twinmill.diagnosis.diagnose import diagnose
 from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 
+DUTY_PCT = [0, 12.5, 25, 37.5, 50, 75, 100]
+ROBOT = f"""
+[base]
+duty_pct = {DUTY_PCT}
+wheel_speed_mps = [0, 0.11, 0.18, 0.24, 0.28, 0.33, 0.37]
+sideways_gain = 0.89
+yaw_gain = 0.85
+motor_lag_s = 0.09
+
+[noise]
+sensor_m = 0.0003
+sensor_rad = 0.0017
+drive_mps = 0.003
+drive_radps = 0.03
+drive_s = 0.15
+drive_turn_s = 0.15
+"""
 DURATION_S, GOAL_S = 150.0, 10.0
 REST_S = 1.2  # shorter than the script's rests, longer than wheels need to stand
 HIDDEN = {

@@ -1,55 +1,191 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The blind test draws what it says, with noise of its own, and counts right."""
+"""The exam draws what it says, its plants obey algebra, and it cannot be passed by cheating."""
 
 from collections import Counter
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from twinmill.challenge.cases import KINDS, NOT_DRAWN, STRENGTHS, WITHHELD, draw, seal
-from twinmill.challenge.scoring import rate
+from twinmill.challenge.cases import CASES, LEAST, Floors, draw, draw_robots, seal
+from twinmill.challenge.physics import STEP_S, Signals, catalogue_forms, outside_forms
+from twinmill.challenge.robots import KINDS
+from twinmill.challenge.run import Plan, play
+from twinmill.challenge.scoring import BARS, rate, scored, summary
 from twinmill.model.freedom import catalogue
 
-KNOWN = {"planar": ("motor_lag",), "mujoco": ()}
-CASES = [draw(number, 7, KNOWN) for number in range(200)]
+SEED, SECONDS = 7, 40
+ROBOTS = draw_robots(SEED)
+DRAWN = [draw(number, SEED, ROBOTS, SECONDS) for number in range(24)]
+NAMES = sorted(set(catalogue()) - {"equation"})
+
+
+def found(*names, groups=(), verdict="effect_missing", rest=(), parameters=()):
+    """A diagnosis that finds these names, each sure, or in a group of that position."""
+    findings = [
+        {
+            "effect": name,
+            "group": groups[k] if k < len(groups) else None,
+            "parameters": list(parameters),
+            "certainty": "group" if k < len(groups) and groups[k] else "sure",
+        }
+        for k, name in enumerate(names)
+    ]
+    told = {"share": 0.3 if rest else 0.0, "depends_on": list(rest), "formula": None}
+    return {"verdict": verdict, "findings": findings, "rest": told}
+
+
+def case_of(kind):
+    return next(case for case in DRAWN if case.kind == kind)
 
 
 def test_same_seed_same_sealed_answers_and_another_seed_others():
-    again = [draw(number, 7, KNOWN) for number in range(200)]
-    assert seal(again) == seal(CASES)
-    assert seal([draw(number, 8, KNOWN) for number in range(200)]) != seal(CASES)
+    again = [draw(number, SEED, draw_robots(SEED), SECONDS) for number in range(6)]
+    other = [draw(number, SEED + 1, draw_robots(SEED + 1), SECONDS) for number in range(6)]
+    assert seal(again) == seal(DRAWN[:6])
+    assert seal(other) != seal(DRAWN[:6])
 
 
 def test_no_two_logs_share_their_noise():
-    other = [draw(number, 8, KNOWN) for number in range(200)]
-    assert len({c.noise_seed for c in CASES + other}) == 400
+    assert len({case.plan.seed for case in DRAWN}) == len(DRAWN)
 
 
-def test_kinds_and_plants_are_balanced():
-    count = Counter((c.kind, c.plant) for c in CASES)
-    per_kind = Counter(KINDS)
-    assert all(count[k, p] == 20 * per_kind[k] for k in per_kind for p in KNOWN)
+def test_every_kind_of_case_and_every_robot_is_drawn():
+    assert {case.kind for case in DRAWN} == set(CASES)
+    assert {case.robot for case in DRAWN} == set(range(len(KINDS)))
+    assert {r.plant for r in ROBOTS} == {"planar", "mujoco", "rollers"}
+    assert {r.drive for r in ROBOTS} == {"duty", "wheel_speed", "twist"}
 
 
-def test_what_is_hidden_is_within_bounds_and_not_neutral():
-    entries = catalogue()
-    for case in CASES:
-        assert len(case.hidden) == {"none": 0, "one": 1, "two": 2, "outside": 1}[case.kind]
-        assert case.strength in STRENGTHS
-        for hidden in case.hidden:
-            if hidden.effect == "equation":
-                assert case.kind == "outside"
-                continue
-            assert hidden.effect not in (*NOT_DRAWN, *KNOWN[case.plant])
-            for p in entries[hidden.effect]["parameters"]:
-                value = hidden.parameters[p["name"]]
-                assert p["min"] <= value <= p["max"]
-                assert value != p["neutral"]
+def test_what_is_hidden_shows():
+    for case in DRAWN:
+        assert len(case.hidden) == {"none": 0, "two": 2}.get(case.kind, 1)
+        assert all(adds >= LEAST for adds in case.adds_floors)
 
 
-def test_only_what_is_outside_is_withheld():
-    for case in CASES:
-        named = {h.effect for h in case.hidden} & set(WITHHELD)
-        assert set(case.withheld) == (named if case.kind == "outside" else set())
+def test_plain_forms_have_the_catalogues_names_and_numbers():
+    for robot in ROBOTS:
+        for h in catalogue_forms(robot, np.random.default_rng(1)):
+            card = catalogue()[h.name]
+            if h.kind == "plain":
+                assert set(h.values) <= {p["name"] for p in card["parameters"]}
+                for p in card["parameters"]:
+                    value = h.values.get(p["name"], p["neutral"])
+                    assert p["min"] <= value <= p["max"]
+
+
+def test_what_is_outside_is_not_in_the_catalogue_and_says_what_it_depends_on():
+    for robot in ROBOTS:
+        for h in outside_forms(robot, np.random.default_rng(1)):
+            assert h.name not in catalogue()
+            assert h.depends_on
+
+
+@pytest.mark.parametrize("wheels", ["mecanum", "differential", "omni3"])
+def test_wheels_that_roll_as_told_move_the_body_as_told(wheels):
+    robot = next(r for r in ROBOTS if r.wheels == wheels)
+    twist = np.array([0.2, 0.1 * robot.sideways, 0.5])
+    assert robot.to_body @ (robot.to_wheels @ twist) == pytest.approx(twist)
+
+
+def test_a_steady_turn_is_a_circle():
+    """At v = 0.3 m/s and w = 0.6 rad/s the radius is v/w = 0.5 m."""
+    robot = replace(ROBOTS[5], top_mps=0.3, gains=(1.0, 1.0, 1.0), drive="twist", lag_s=0.01)
+    motion = play(Plan(robot, [(20.0, np.array([1.0, 0, 0.3]))], 1), calm=True)
+    late = motion.pose[round(2 / STEP_S) :, :2]
+    middle = 0.5 * (late.max(axis=0) + late.min(axis=0))
+    assert np.hypot(*(late - middle).T) == pytest.approx(0.5, rel=0.002)
+
+
+def test_a_marker_beside_the_middle_moves_only_in_turns():
+    robot = ROBOTS[0]
+    marker = next(
+        h for h in catalogue_forms(robot, np.random.default_rng(1)) if h.name == "marker_offset"
+    )
+    still = np.zeros((3, 3))
+    still[:, 2] = [0, np.pi / 2, np.pi]
+    none = Signals(robot, still, still[:, 0], still, np.random.default_rng(1))
+    seen = marker.act(still, {"x_m": 0.1, "y_m": 0.0}, none)
+    assert seen[:, :2] == pytest.approx(np.array([[0.1, 0], [0, 0.1], [-0.1, 0]]), abs=1e-12)
+
+
+@pytest.mark.parametrize(("plant", "least"), [("mujoco", 0.93), ("rollers", 0.8)])
+def test_robots_of_forces_go_about_as_far_as_rolling_ones(plant, least):
+    """Wheels that slip and rollers that drag lose a share; none is gained."""
+    robot = replace(next(r for r in ROBOTS if r.plant == plant), gains=(1.0, 1.0, 1.0))
+    plan = Plan(robot, [(3.0, np.array([0.6, 0, 0]))], 1)
+    rolls, pushed = (play(plan, forces=f, calm=True).pose[-1, 0] for f in (False, True))
+    assert least < pushed / rolls < 1.01
+
+
+def test_an_effect_twice_as_large_adds_about_twice_as_much():
+    linear = ("marker_offset", "wheel_gain", "input_delay", "reverse_asymmetry")
+    case = next(c for c in DRAWN if c.hidden and c.hidden[0].name in linear)
+    floors = Floors(case.plan)
+    one, two = (floors.adds(case.hidden[0].scaled(by)) for by in (0.5, 1.0))
+    assert two / one == pytest.approx(2, rel=0.2)
+
+
+def test_the_right_name_alone_is_right():
+    case = case_of("one")
+    result = scored(case, found(case.hidden[0].name))
+    assert result["outcome"]["clean"] and not result["outcome"]["wrong_and_sure"]
+
+
+def test_all_names_in_one_group_are_wrong():
+    case = case_of("one")
+    outcome = scored(case, found(case.hidden[0].name, groups=[NAMES], verdict="ambiguous"))[
+        "outcome"
+    ]
+    assert not outcome["first"] and not outcome["clean"] and not outcome["all"]
+
+
+def test_a_group_of_four_with_the_right_name_is_right():
+    case = case_of("one")
+    group = [case.hidden[0].name, *[n for n in NAMES if n != case.hidden[0].name][:3]]
+    outcome = scored(case, found(group[1], groups=[group], verdict="ambiguous"))["outcome"]
+    assert outcome["clean"] and not outcome["wrong_and_sure"]
+
+
+def test_wrong_names_beside_the_right_one_cost():
+    case = case_of("one")
+    wrong = [n for n in NAMES if n != case.hidden[0].name and n != "clock_offset"][:4]
+    outcome = scored(case, found(case.hidden[0].name, *wrong))["outcome"]
+    assert outcome["first"] and not outcome["clean"]
+    assert outcome["others"] == wrong and outcome["wrong_and_sure"]
+
+
+def test_finding_nothing_and_saying_outside_passes_no_other_row():
+    said_outside = found(verdict="outside_catalogue", rest=["heading"])
+    rows = summary([scored(case, said_outside) for case in DRAWN])
+    assert rows["right_first"]["hits"] == rows["both_of_two"]["hits"] == 0
+    assert rows["false_alarm"]["hits"] == rows["false_alarm"]["of"] > 0
+
+
+def test_outside_counts_only_with_the_right_dependence():
+    case = case_of("outside")
+    words = (case.hidden[0].depends_on[0], "battery")
+    told = [scored(case, found(rest=[w], verdict="outside_catalogue")) for w in words]
+    assert [r["outcome"]["depends"] for r in told] == [True, False]
+
+
+def test_estimates_are_held_against_the_truth():
+    case = next(c for c in DRAWN if c.kind == "one")
+    name, value = next(iter(case.hidden[0].values.items()))
+    full = f"{case.hidden[0].name}.{name}"
+    for off, within in ((1.9, True), (2.1, False)):
+        parameter = {"name": full, "value": value + off * 0.01, "std": 0.01}
+        result = scored(case, found(case.hidden[0].name, parameters=[parameter]))
+        assert [e["within"] for e in result["estimates"]] == [within]
+
+
+def test_every_bar_is_a_row():
+    rows = summary([scored(case, found()) for case in DRAWN])
+    assert all({"hits", "of", "low", "high"} <= set(rows[bar.key]) for bar in BARS)
+
+
+def test_cases_are_spread_over_kinds():
+    assert Counter(CASES) == {"one": 3, "cousin": 2, "none": 2, "outside": 2, "two": 1}
 
 
 @pytest.mark.parametrize(

@@ -1,189 +1,179 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws what is hidden, and lets the twin make the logs."""
+"""Draws what is hidden, of a size that shows, and makes the logs."""
 
 import json
-import subprocess
-from collections.abc import Collection
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
-from twinmill.diagnosis.candidates import STAGES
-from twinmill.model.freedom import catalogue
+from twinmill.challenge.drives import STYLES, drive
+from twinmill.challenge.physics import STEP_S, Hidden, catalogue_forms, outside_forms, slow
+from twinmill.challenge.robots import KINDS, Robot, draw_robot
+from twinmill.challenge.run import Plan, path_of, play, write_log
 
-KINDS = ("none", "one", "one", "two", "outside")
-STRENGTHS = {"weak": 0.4, "medium": 1.0, "strong": 2.5}  # times the effect's default
-PLANTS = ("planar", "mujoco")
-# A clock offset and a delay are one thing to a log; a formula is for cases outside the catalogue.
-NOT_DRAWN = ("clock_offset", "clock_rate", "equation")
-# Outside the catalogue: effects that diagnosis is not told of, and formulas that it cannot know.
-WITHHELD = (
-    "carpet_grain",
-    "gain_slope",
-    "reversal_dead_time",
-    "reverse_asymmetry",
-    "slew_limit",
-    "turn_asymmetry",
-    "wheel_eccentricity",
+CASES = ("none", "one", "cousin", "two", "outside", "one", "cousin", "none", "one", "outside")
+AHEAD_S = 2.0
+SIZES = (1.3, 6.0)  # floors that a hidden effect adds to the error at AHEAD_S
+LEAST = 1.1
+TIMING = ("motor_lag", "input_delay", "slew_limit", "lag_by_duty", "coasting")
+# Two effects of one of these families are not hidden together: a log seldom parts them.
+FAMILIES = (
+    TIMING,
+    ("dead_zone", "speed_curve", "speed_slip", "coulomb_friction"),
+    ("wheel_gain", "reverse_asymmetry"),
+    ("battery_sag", "heat_gain"),
+    ("floor_tilt", "carpet_grain", "floor_patch", "gain_slope"),
+    ("yaw_lever", "turn_asymmetry", "lateral_slip", "strafe_loss"),
+    ("marker_offset", "heading_bias"),
 )
-# A formula is a quantity that it adds to, times a carrier, times what modulates it. Sizes are what
-# a script of many drives gives them, so that a usual formula adds USUAL to the velocity.
-USUAL = {"vx_mps": 0.012, "vy_mps": 0.012, "omega_radps": 0.07}
-CARRIERS = {"vx": 0.2, "vy": 0.2, "omega": 1.2, "moves": 1.0}
-MODULATORS = {
-    "abs(vx)": 0.2, "abs(vy)": 0.2, "abs(omega)": 1.2, "vx": 0.2, "vy": 0.2, "omega": 1.2,
-    "sin(theta + {phase})": 0.7, "sin(2*theta + {phase})": 0.7, "sin(3*theta + {phase})": 0.7,
-    "(x*{part} + y*{rest})": 0.4, "sin(t/{slow} + {phase})": 0.7,
-}  # fmt: skip
-DUTY_PCT = [0, 12.5, 25, 37.5, 50, 75, 100]
-ROBOT = f"""
-[base]
-duty_pct = {DUTY_PCT}
-wheel_speed_mps = [0, 0.11, 0.18, 0.24, 0.28, 0.33, 0.37]
-sideways_gain = 0.89
-yaw_gain = 0.85
-motor_lag_s = 0.09
-
-[noise]
-sensor_m = 0.0003
-sensor_rad = 0.0017
-drive_mps = 0.003
-drive_radps = 0.03
-drive_s = 0.15
-drive_turn_s = 0.15
-"""
-CLOCK = """
-[clock]
-offset_s = -0.06
-"""
-
-
-@dataclass(frozen=True)
-class Hidden:
-    """One hidden effect."""
-
-    effect: str
-    parameters: dict[str, float]
-    texts: dict[str, str]
-
-    @property
-    def label(self) -> str:
-        """Its name, or its formula."""
-        return " += ".join(self.texts.values()) or self.effect
 
 
 @dataclass(frozen=True)
 class Case:
-    """One sealed log: which plant makes it, and what is hidden in it.
+    """One sealed log.
 
     Attributes:
-        noise_seed: of the twin; other cases and other seeds of the challenge have other noise.
-        withheld: effects that diagnosis is not told of.
+        robot: number of the robot that drives.
+        hidden: what is in it.
+        adds_floors: for each, what it adds to the error at AHEAD_S over what noise does, once
+            gains and lag have taken of it what they can.
     """
 
     number: int
-    noise_seed: int
-    plant: str
     kind: str
-    strength: str
-    hidden: tuple[Hidden, ...] = ()
-    withheld: tuple[str, ...] = ()
+    robot: int
+    style: str
+    plan: Plan
+    hidden: tuple[Hidden, ...]
+    adds_floors: tuple[float, ...]
+
+    def to_json(self) -> dict:
+        """For the sealed answers."""
+        return {
+            "case": self.number,
+            "kind": self.kind,
+            "plant": self.plan.robot.plant,
+            "drive": self.plan.robot.drive,
+            "wheels": self.plan.robot.wheels,
+            "style": self.style,
+            "hidden": [h.to_json() for h in self.hidden],
+            "adds_floors": list(self.adds_floors),
+        }
 
 
-def draw(number: int, seed: int, known: dict[str, Collection[str]]) -> Case:
-    """Draws a case; the same numbers give the same case.
+def draw_robots(seed: int) -> list[Robot]:
+    """One of each of KINDS."""
+    return [draw_robot(k, np.random.default_rng([seed, 0, k])) for k in range(len(KINDS))]
 
-    Args:
-        number: of the case.
-        seed: of all cases.
-        known: per plant the effects that its base model has already: they are not hidden again.
-    """
-    random = np.random.default_rng([seed, number])
-    noise_seed = noise_seed_of(number, seed)
-    plant, kind = PLANTS[number // len(KINDS) % len(PLANTS)], KINDS[number % len(KINDS)]
-    strength = str(random.choice(list(STRENGTHS)))
-    if kind == "none":
-        return Case(number, noise_seed, plant, kind, strength)
-    if kind == "outside" and random.random() < 0.5:
-        hidden = (_formula(STRENGTHS[strength], random),)
-        return Case(number, noise_seed, plant, kind, strength, hidden)
-    entries = {n: e for n, e in catalogue().items() if _drawable(e) and n not in known[plant]}
-    names = sorted(set(WITHHELD) & set(entries)) if kind == "outside" else sorted(entries)
-    drawn = random.choice(names, 2 if kind == "two" else 1, replace=False)
-    hidden = tuple(
-        Hidden(str(n), _parameters(entries[n], STRENGTHS[strength], random), {}) for n in drawn
+
+def calibration(robot: Robot, seed: int, duration_s: float) -> Plan:
+    """A drive of the robot as it normally is."""
+    random = np.random.default_rng([seed, 1])
+    return Plan(
+        robot, drive("mixed", duration_s, robot.sideways, random), int(random.integers(2**31))
     )
-    withheld = tuple(h.effect for h in hidden) if kind == "outside" else ()
-    return Case(number, noise_seed, plant, kind, strength, hidden, withheld)
 
 
-def noise_seed_of(number: int, seed: int) -> int:
-    """The twin's seed for one log of one challenge."""
-    return seed * 1_000_000 + number
+def draw(number: int, seed: int, robots: Sequence[Robot], duration_s: float) -> Case:
+    """Draws a case; the same numbers give the same case."""
+    random = np.random.default_rng([seed, 2, number])
+    kind = CASES[number % len(CASES)]
+    which = (number + number // len(CASES)) % len(robots)
+    robot = robots[which]
+    while True:
+        style = str(random.choice(STYLES))
+        length_s = duration_s * random.uniform(0.7, 1.3)
+        legs = drive(style, length_s, robot.sideways, random)
+        plan = Plan(robot, legs, int(random.integers(2**31)))
+        drawn = _hidden(kind, plan, random)
+        if drawn is not None:
+            hidden, adds = drawn
+            return Case(number, kind, which, style, plan, hidden, adds)
 
 
-def make_log(program: Path, folder: Path, name: str, case: Case, script: Path) -> Path:
-    """Lets the twin drive the script with what is hidden, and returns the log.
-
-    Raises:
-        ValueError: the twin failed; its own sentence.
-    """
-    model, log = folder / f"{name}.hidden.toml", folder / f"{name}.lcmlog"
-    model.write_text(ROBOT + CLOCK + "".join(map(_table, case.hidden)))
-    command = [
-        program, "--plant", case.plant, "--model", model, "--n", "1", "--seed", case.noise_seed,
-        "--script", script, "--log", log,
-    ]  # fmt: skip
-    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
-    model.unlink()
-    if done.returncode:
-        raise ValueError(f"{program}: {done.stderr.strip() or 'failed'}")
-    return log
+def make_log(case: Case, path: Path) -> None:
+    """Plays the case on its plant and writes what would have been recorded."""
+    write_log(case.plan, play(case.plan, case.hidden, forces=True), path)
 
 
 def seal(cases: list[Case]) -> str:
     """The answers as text, whose hash is shown before anything is diagnosed."""
-    return json.dumps([asdict(c) for c in cases], indent=1, sort_keys=True)
+    robots = [asdict(case.plan.robot) for case in cases]
+    answers = [c.to_json() | {"robot": r} for c, r in zip(cases, robots, strict=True)]
+    return json.dumps(answers, indent=1, sort_keys=True)
 
 
-def _drawable(entry: dict) -> bool:
-    return bool(entry["parameters"]) and entry["stage"] in STAGES and entry["name"] not in NOT_DRAWN
+def _hidden(kind: str, plan: Plan, random: np.random.Generator):
+    """What is hidden with its sizes, or None where what was drawn cannot show in this drive."""
+    if kind == "none":
+        return (), ()
+    robot = plan.robot
+    known = catalogue_forms(robot, random)
+    pool = {
+        "one": [h for h in known if h.kind == "plain"],
+        "cousin": [h for h in known if h.kind == "cousin"],
+        "two": [h for h in known if h.kind == "plain"],
+        "outside": outside_forms(robot, random),
+    }[kind]
+    chosen = [pool[random.integers(len(pool))]]
+    if kind == "two":
+        family = next((f for f in FAMILIES if chosen[0].name in f), ())
+        others = [h for h in pool if h.name not in family and h.name != chosen[0].name]
+        chosen.append(others[random.integers(len(others))])
+    noise = Floors(plan)
+    sized = [noise.sized(h, float(np.exp(random.uniform(*np.log(SIZES))))) for h in chosen]
+    if any(adds < LEAST for _, adds in sized):
+        return None
+    return tuple(h for h, _ in sized), tuple(adds for _, adds in sized)
 
 
-def _formula(strength: float, random: np.random.Generator) -> Hidden:
-    """A product drawn at random; it may resemble an effect of the catalogue by chance."""
-    adds_to, carrier, modulator = (
-        str(random.choice(list(d))) for d in (USUAL, CARRIERS, MODULATORS)
-    )
-    size = CARRIERS[carrier] * MODULATORS[modulator]
-    phase, turned, slow = random.uniform(0, 2 * np.pi, 3)
-    shape = modulator.format(
-        phase=f"{phase:.2f}",
-        part=f"{np.cos(turned):.2f}",
-        rest=f"{np.sin(turned):.2f}",
-        slow=f"{5 + 5 * slow:.1f}",
-    )
-    p0 = USUAL[adds_to] / size * strength * random.uniform(0.8, 1.2) * random.choice([-1, 1])
-    return Hidden(
-        "equation", {"p0": float(p0)}, {"adds_to": adds_to, "formula": f"p0*{carrier}*{shape}"}
-    )
+class Floors:
+    """What noise alone does to a plan, and what a hidden effect adds to it."""
+
+    def __init__(self, plan: Plan):
+        self._plan = plan
+        self._rest = _moves(play(plan, calm=True).pose)
+        noisy = _moves(play(plan).pose) - self._rest
+        sensor = np.array([plan.robot.sensor_m] * 2 + [plan.robot.sensor_rad])
+        self._floor = np.sqrt((noisy**2).mean(axis=0) + 2 * sensor**2)
+        self._base = self._taken_by_a_refit()
+
+    def adds(self, hidden: Hidden) -> float:
+        """RMS over forward, left and turn, in floors, without what a refit of the base takes."""
+        moved = _moves(play(self._plan, [hidden], calm=True).pose) - self._rest
+        whitened = (moved / self._floor).ravel()
+        base = self._base[:, :-1] if hidden.name in TIMING else self._base
+        taken = base @ np.linalg.lstsq(base, whitened, rcond=None)[0]
+        return float(np.sqrt(np.mean((whitened - taken) ** 2)))
+
+    def sized(self, hidden: Hidden, wanted: float) -> tuple[Hidden, float]:
+        """The same effect at the wanted size, as far as it goes."""
+        by, adds = 1.0, self.adds(hidden)
+        for _ in range(4):
+            if not hidden.grows or abs(adds / wanted - 1) < 0.1:
+                break
+            by = float(np.clip(by * np.clip(wanted / max(adds, 1e-3), 0.2, 5), 0.05, hidden.most))
+            adds = self.adds(hidden.scaled(by))
+        return hidden.scaled(by), adds
+
+    def _taken_by_a_refit(self) -> np.ndarray:
+        """(3 windows, 4) whitened changes for a little more of each gain, and of lag."""
+        robot, motion = self._plan.robot, play(self._plan, calm=True)
+        rim, to_body = motion.rim_mps, np.eye(3) if robot.drive == "twist" else robot.to_body.T
+        columns = []
+        for k in range(4):
+            gains = np.array(robot.gains) * np.where(np.arange(3) == k, 1.02, 1)
+            slower = slow(rim, 0.01) if k == 3 else rim
+            columns.append(_moves(path_of(slower @ to_body * gains)) - self._rest)
+        return np.column_stack([(c / self._floor).ravel() for c in columns])
 
 
-def _parameters(entry: dict, strength: float, random: np.random.Generator) -> dict[str, float]:
-    """Defaults moved away from neutral by the strength, with random signs where bounds allow."""
-    values = {}
-    for p in entry["parameters"]:
-        reach = p["default"] - p["neutral"]
-        if p["neutral"] == p["max"]:  # such as a deceleration, whose neutral is `at once`
-            value = p["default"] / strength
-        else:
-            sign = random.choice([-1, 1]) if p["min"] < p["neutral"] else 1
-            value = p["neutral"] + sign * strength * reach * random.uniform(0.8, 1.2)
-        values[p["name"]] = float(np.clip(value, p["min"], p["max"]))
-    return values
-
-
-def _table(hidden: Hidden) -> str:
-    values = {"name": hidden.effect, **hidden.texts, **hidden.parameters}
-    return "\n[[effect]]\n" + "".join(f"{k} = {json.dumps(v)}\n" for k, v in values.items())
+def _moves(pose: np.ndarray) -> np.ndarray:
+    """(M, 3) displacement over AHEAD_S in the frame of its start."""
+    ahead = round(AHEAD_S / STEP_S)
+    start, end = pose[:-ahead:150], pose[ahead::150]
+    d = end - start
+    c, s = np.cos(start[:, 2]), np.sin(start[:, 2])
+    return np.column_stack([c * d[:, 0] + s * d[:, 1], c * d[:, 1] - s * d[:, 0], d[:, 2]])

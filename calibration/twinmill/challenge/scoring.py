@@ -1,83 +1,176 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether what was said of a case is right, and the figures over all cases."""
+"""Whether what was said of a case is right, and the figures over all cases.
+
+Only what `twinmill diagnose --json` prints is looked at. A group of more than four names is as
+wrong as a wrong name, and every name beside the right one that is not there is counted.
+"""
 
 from collections import Counter
+from dataclasses import dataclass
 
+import numpy as np
 from scipy.stats import binomtest
 
 from twinmill.challenge.cases import Case
-from twinmill.challenge.truth import Truth
-from twinmill.diagnosis.result import Diagnosis
+from twinmill.challenge.physics import Hidden
+from twinmill.model.freedom import catalogue
 
-MATTERS = 1.0  # floors that an effect must add to the error at 2 s to be asked for
-AS_GOOD = 1.15  # times the true model's score
-BINS = (0.0, 0.3, 1.0, 3.0, 10.0)  # lower ends of strengths, in floors
+LARGEST_GROUP = 4
+WITHIN = 1.96  # standard errors: 95 %
+TOLD_REST = 0.1  # share of the squared error from which a rest counts as told
+BINS = (1.0, 1.5, 2.5, 4.0)  # lower ends of sizes, in floors
+NAMED = ("effect_missing", "ambiguous")  # verdicts that name something
 
 
-def scored(case: Case, found: Diagnosis, truth: Truth) -> dict:
-    """One case: what was hidden, what was said, whether that was right, what could be had."""
-    hidden = {h.effect for h in case.hidden}
-    first = found.ranking[0] if found.ranking else None
-    leading = {
-        r.effect
-        for r in found.ranking
-        if r is first or (r.group is not None and r.group == first.group)
+@dataclass(frozen=True)
+class Bar:
+    """A row of the exam: its key, what it says, the goal, whether more is better."""
+
+    key: str
+    words: str
+    goal: float
+    more: bool
+
+
+BARS = (
+    Bar("right_first", "one effect hidden: right first, or in its group", 0.95, True),
+    Bar("verdict_right", "the verdict right as well", 0.95, True),
+    Bar("clean", "and no other name", 0.95, True),
+    Bar("rollers_first", "rollers: right first", 0.90, True),
+    Bar("false_alarm", "nothing hidden: false alarms", 0.03, False),
+    Bar("both_of_two", "both of two", 0.85, True),
+    Bar("outside_said", "outside the catalogue: said so", 0.85, True),
+    Bar("depends_right", "what it depends on is right", 0.85, True),
+    Bar("named_wrongly", "named wrongly and surely, all cases", 0.0, False),
+    Bar("within", "estimates within their 95 % intervals", 0.90, True),
+)
+
+
+@dataclass(frozen=True)
+class Said:
+    """One finding: its name, the names it cannot be parted from, whether it is sure of it."""
+
+    effect: str
+    group: frozenset[str]
+    sure: bool
+    parameters: tuple[dict, ...]
+
+    @property
+    def names(self) -> frozenset[str]:
+        """What counts as named: nothing, if the group is too large to help."""
+        return frozenset() if len(self.group) > LARGEST_GROUP else self.group | {self.effect}
+
+
+def said(found: dict) -> list[Said]:
+    """The findings of a diagnosis in their order; those of quantities of the base are left out.
+
+    Args:
+        found: the object of `twinmill diagnose --json`.
+    """
+    known = set(catalogue()) - {"equation"}
+    if "findings" in found:
+        rows = [
+            (f["effect"], f.get("group") or (), f["certainty"], f.get("parameters") or ())
+            for f in found["findings"]
+        ]
+    else:
+        ranked = {r["effect"]: r for r in found["ranking"]}
+        groups = {e: [n for n, r in ranked.items() if r["group"] == ranked[e]["group"]]
+                  for e in ranked if ranked[e]["group"] is not None}  # fmt: skip
+        rows = [
+            (e, groups.get(e, ()), "group" if e in groups else "sure", ranked[e]["parameters"])
+            for e in found["found"]
+            if e in ranked
+        ]
+    return [
+        Said(effect, frozenset(group), certainty == "sure", tuple(parameters))
+        for effect, group, certainty, parameters in rows
+        if effect in known and certainty != "doubtful"
+    ]
+
+
+def scored(case: Case, found: dict) -> dict:
+    """One case: what was hidden, what was said, whether that was right.
+
+    Args:
+        case: with its answer.
+        found: the object of `twinmill diagnose --json`.
+    """
+    findings = said(found)
+    right = [_accepted(h, case) for h in case.hidden if h.kind != "outside"]
+    allowed = frozenset().union(*right, *(h.kin for h in case.hidden))
+    others = [f.effect for f in findings if not (f.names or {f.effect}) & allowed]
+    verdict = found["verdict"]
+    told = _rest(found)
+    first = bool(findings) and bool(right) and bool(findings[0].names & frozenset().union(*right))
+    outcome = {
+        "first": first,
+        "verdict_right": first and verdict in NAMED,
+        "clean": first and verdict in NAMED and not others,
+        "all": bool(right) and all(any(f.names & r for f in findings) for r in right),
+        "alarm": bool(findings) or verdict in (*NAMED, "outside_catalogue", "bad_input"),
+        "told": verdict == "outside_catalogue" or told["share"] >= TOLD_REST,
+        "depends": _depends(case.hidden, told),
+        "others": others,
+        "wrong_and_sure": any(f.sure and not (f.names or {f.effect}) & allowed for f in findings),
     }
-    groups = {r.group for r in found.ranking if r.effect in found.found and r.group is not None}
-    named = {r.effect for r in found.ranking if r.effect in found.found or r.group in groups}
-    right = {
-        "none": found.verdict == "model_adequate" and not found.found,
-        "one": bool(found.found) and bool(hidden & leading),
-        "two": hidden <= named,
-        "outside": found.verdict == "outside_catalogue",
-    }[case.kind]
-    after = found.steps[-1][1]
-    return {
-        "case": case.number,
-        "plant": case.plant,
-        "kind": case.kind,
-        "strength": case.strength,
-        "hidden": [h.label for h in case.hidden],
-        "adds_floors": list(truth.adds),
-        "matters": bool(truth.adds) and min(truth.adds) > MATTERS,
-        "verdict": found.verdict,
-        "found": found.found,
-        "named": sorted(named),
-        "right": bool(right),
-        "score_before": found.before.score,
-        "score_after": after,
-        "score_true": truth.score,
-        "as_good": bool(after <= AS_GOOD * truth.score),
+    return case.to_json() | {
+        "verdict": verdict,
+        "said": [sorted(f.group | {f.effect}) for f in findings],
+        "rest": told,
+        "outcome": outcome,
+        "estimates": [e for h in case.hidden for e in _estimates(h, findings)],
     }
 
 
 def summary(results: list[dict]) -> dict:
-    """Rates with their 95 % intervals (Clopper and Pearson 1934), confusion, power by strength."""
-    kinds = {kind: [r for r in results if r["kind"] == kind] for kind in ("none", "one", "two")}
-    outside = [r for r in results if r["kind"] == "outside" and r["matters"]]
-    asked = [r for kind in ("one", "two") for r in kinds[kind] if r["matters"]]
-    confusion = Counter(
-        (" + ".join(r["hidden"]) or "nothing", " + ".join(r["found"]) or r["verdict"])
-        for r in results
-    )
+    """The rows of the exam with their 95 % intervals, the bias, confusion, and power by size."""
+
+    def of(*kinds: str, plant: str | None = None) -> list[dict]:
+        return [r for r in results if r["kind"] in kinds and plant in (None, r["plant"])]
+
+    def share(key: str, rows: list[dict]) -> dict:
+        return rate([bool(r["outcome"][key]) for r in rows])
+
+    single, outside = of("one", "cousin"), of("outside")
+    estimates = [e for r in results for e in r["estimates"]]
+    ratios = [e["value"] / e["truth"] for e in estimates if e["leads"]]
+    confusion = Counter((_hidden_words(r), _said_words(r)) for r in results)
+    rollers = of("one", "cousin", plant="rollers")
     return {
-        "false_alarm": rate([not r["right"] for r in kinds["none"]]),
-        "right_first": rate([r["right"] for r in kinds["one"] if r["matters"]]),
-        "both_of_two": rate([r["right"] for r in kinds["two"] if r["matters"]]),
-        "outside_called": rate([r["right"] for r in outside]),
-        "as_good_as_true": rate([r["as_good"] for r in asked if r["right"]]),
-        "power": {
-            kind: [_in_bin(results, kind, low) for low in BINS]
-            for kind in ("one", "two", "outside")
-        },
+        "right_first": share("first", single),
+        "verdict_right": share("verdict_right", single),
+        "clean": share("clean", single),
+        "rollers_first": share("first", rollers),
+        "false_alarm": share("alarm", of("none")),
+        "both_of_two": share("all", of("two")),
+        "outside_said": share("told", outside),
+        "depends_right": rate([r["outcome"]["told"] and r["outcome"]["depends"] for r in outside]),
+        "named_wrongly": share("wrong_and_sure", results),
+        "within": rate([e["within"] for e in estimates]),
+        "bias": [float(q) for q in np.percentile(ratios, [25, 50, 75])] if ratios else None,
+        "power": [{"from_floors": low, **_in_bin(single, low)} for low in BINS],
         "confusion": [
             {"hidden": h, "said": s, "cases": n} for (h, s), n in sorted(confusion.items())
         ],
+        "lost": [r for r in results if lost(r)],
     }
 
 
+def lost(result: dict) -> bool:
+    """Whether a case was not answered as it should be."""
+    o = result["outcome"]
+    return not {
+        "none": not o["alarm"],
+        "one": o["clean"],
+        "cousin": o["clean"],
+        "two": o["all"] and not o["others"],
+        "outside": o["told"] and o["depends"] and not o["wrong_and_sure"],
+    }[result["kind"]]
+
+
 def rate(outcomes: list[bool]) -> dict:
-    """Successes, trials, and the interval of the probability."""
+    """Successes, trials, and the interval of the probability (Clopper and Pearson 1934)."""
     hits, trials = sum(outcomes), len(outcomes)
     if not trials:
         return {"hits": 0, "of": 0, "low": 0.0, "high": 1.0}
@@ -85,7 +178,59 @@ def rate(outcomes: list[bool]) -> dict:
     return {"hits": hits, "of": trials, "low": float(interval.low), "high": float(interval.high)}
 
 
-def _in_bin(results: list[dict], kind: str, low: float) -> dict:
+def _accepted(hidden: Hidden, case: Case) -> frozenset[str]:
+    """Names that are right: clocks that are not declared one leave delay and offset open."""
+    if hidden.name == "input_delay" and not case.plan.robot.same_clock:
+        return frozenset({"input_delay", "clock_offset"})
+    return frozenset({hidden.name})
+
+
+def _rest(found: dict) -> dict:
+    rest = found.get("rest") or found.get("unexplained") or {}
+    depends_on = [str(d) for d in rest.get("depends_on") or []]
+    share = float(rest.get("share") or 0) if depends_on or rest.get("formula") else 0.0
+    return {"share": share, "depends_on": depends_on, "formula": rest.get("formula")}
+
+
+def _depends(hidden: tuple[Hidden, ...], told: dict) -> bool:
+    """Whether the strongest dependence, or the formula, speaks of the right thing."""
+    text = " ".join([*told["depends_on"][:2], str(told["formula"] or "")]).lower()
+    words = "".join(c if c.isalpha() else " " for c in text).split()
+    wanted = [w for h in hidden for w in h.depends_on]
+    return any(word == w or (len(w) > 2 and word.startswith(w)) for w in wanted for word in words)
+
+
+def _estimates(hidden: Hidden, findings: list[Said]) -> list[dict]:
+    """Each number of a plain effect that was named first in its group, beside its truth."""
+    mine = next((f for f in findings if f.effect == hidden.name), None)
+    if mine is None or hidden.kind != "plain":
+        return []
+    values = {p["name"].split(".")[-1]: p for p in mine.parameters}
+    truth = {name: v for name, v in hidden.values.items() if name in values}
+    leading = max(truth, key=lambda name: abs(truth[name]), default=None)
+    return [
+        {
+            "name": f"{hidden.name}.{name}",
+            "truth": value,
+            "value": values[name]["value"],
+            "std": values[name]["std"],
+            "within": abs(values[name]["value"] - value) <= WITHIN * values[name]["std"],
+            "leads": name == leading,
+        }
+        for name, value in truth.items()
+        if values[name]["std"] is not None
+    ]
+
+
+def _hidden_words(result: dict) -> str:
+    names = [h["name"] + (" (cousin)" if h["kind"] == "cousin" else "") for h in result["hidden"]]
+    return " + ".join(names) or "nothing"
+
+
+def _said_words(result: dict) -> str:
+    return " + ".join(" or ".join(names) for names in result["said"]) or result["verdict"]
+
+
+def _in_bin(results: list[dict], low: float) -> dict:
     high = next((b for b in BINS if b > low), float("inf"))
-    own = [r for r in results if r["kind"] == kind and low <= min(r["adds_floors"]) < high]
-    return {"from_floors": low, **rate([r["right"] for r in own])}
+    return rate([r["outcome"]["first"] for r in results if low <= min(r["adds_floors"]) < high])
