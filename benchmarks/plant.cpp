@@ -50,7 +50,7 @@ int main()
         for (int i = 0; i < kRobots; ++i)
         {
             Command command;
-            for (size_t k = 0; k < kWheels; ++k)
+            for (size_t k = 0; k < kMaxWheels; ++k)
                 d->ctrl[4 * i + static_cast<int>(k)] = command.value[k] =
                     20 * random.Uniform() - 10;
             plant.SetCommand(i, command);

@@ -13,6 +13,104 @@
 namespace twin::test
 {
 
+// The signals of all stages, to be given to an effect of any.
+struct Signals
+{
+    double t_s = 0, dt_s = 0, battery_V = 0;
+    RobotFacts robot;
+    Wheels duty{}, rim_mps{}, target_mps{}, tau_s{};
+    Wheels max_decel_mps2{kNoLimit, kNoLimit, kNoLimit, kNoLimit};
+    Wheels mean_mps{}, wheel_rad{}, radius_ratio{1, 1, 1, 1};
+    bool moves = false;
+    double x_m = 0, y_m = 0, theta_rad = 0, vx_mps = 0, vy_mps = 0, omega_radps = 0;
+    double observed_t_s = 0;
+};
+
+// One effect by itself.
+class Alone
+{
+public:
+    explicit Alone(BoundEffect effect) : effect_(std::move(effect)) {}
+
+    int StateSize() const { return effect_.StateSize(); }
+    void Look(Sight &sight) const { effect_.Look(sight); }
+    void Touch(Body &body) const { effect_.Touch(body); }
+
+    // What it does to the signals of its stage; of others nothing.
+    void Step(Signals &s, double *state) const
+    {
+        const Numbers numbers = effect_.numbers();
+        if (const auto *on = std::get_if<OnDuty>(&effect_.act()))
+        {
+            DutySignals duty{s.robot, s.t_s, s.battery_V, s.dt_s, s.duty};
+            on->step(duty, numbers, state);
+            s.dt_s = duty.dt_s;
+            s.duty = duty.duty;
+        }
+        if (const auto *on = std::get_if<OnWheels>(&effect_.act()))
+        {
+            WheelSignals wheels{s.robot, s.t_s,           s.dt_s,      s.battery_V,
+                                s.duty,  s.rim_mps,       s.wheel_rad, s.target_mps,
+                                s.tau_s, s.max_decel_mps2};
+            on->step(wheels, numbers, state);
+            s.target_mps = wheels.target_mps;
+            s.tau_s = wheels.tau_s;
+            s.max_decel_mps2 = wheels.max_decel_mps2;
+        }
+        if (const auto *on = std::get_if<OnRolling>(&effect_.act()))
+        {
+            RollSignals roll{s.robot,    s.t_s,     s.dt_s,      s.duty,
+                             s.mean_mps, s.rim_mps, s.wheel_rad, s.radius_ratio};
+            on->step(roll, numbers, state);
+            s.radius_ratio = roll.radius_ratio;
+        }
+        if (const auto *on = std::get_if<OnGround>(&effect_.act()))
+        {
+            GroundSignals ground{s.robot, s.t_s,       s.dt_s,   s.moves,  s.x_m,
+                                 s.y_m,   s.theta_rad, s.vx_mps, s.vy_mps, s.omega_radps};
+            on->step(ground, numbers, state);
+            s.vx_mps = ground.vx_mps;
+            s.vy_mps = ground.vy_mps;
+            s.omega_radps = ground.omega_radps;
+        }
+        Observe(s, [&](const OnObservation &on, ObservedPose &p) { on.observe(p, numbers); });
+    }
+
+    void Invert(Signals &s) const
+    {
+        Observe(s,
+                [&](const OnObservation &on, ObservedPose &p) { on.invert(p, effect_.numbers()); });
+    }
+
+private:
+    template <class Do>
+    void Observe(Signals &s, Do change) const
+    {
+        const auto *on = std::get_if<OnObservation>(&effect_.act());
+        if (!on)
+            return;
+        ObservedPose pose{s.x_m, s.y_m, s.theta_rad, s.observed_t_s};
+        change(*on, pose);
+        s.x_m = pose.x_m;
+        s.y_m = pose.y_m;
+        s.theta_rad = pose.theta_rad;
+        s.observed_t_s = pose.t_s;
+    }
+
+    BoundEffect effect_;
+};
+
+// Of the default robot.
+inline std::vector<Parameter> ParametersOf(const EffectSpec &spec)
+{
+    return ParametersFor(spec, Model().MakeWheels());
+}
+
+inline Alone MakeAlone(const std::string &effect, const std::vector<double> &values)
+{
+    return Alone(BoundEffect(*FindEffect(effect), values));
+}
+
 constexpr Wheels kForward{1, 1, 1, 1}, kBack{-1, -1, -1, -1}, kStop{};
 constexpr Wheels kTurnLeft{-1, 1, -1, 1}, kStrafeLeft{-1, 1, 1, -1};
 constexpr double kFull_mps = 0.36;          // rim speed of the default model at full duty
@@ -22,7 +120,8 @@ constexpr double kLever_m = 0.059 + 0.067;  // its half wheelbase plus half trac
 inline Model With(const std::string &effect, const std::vector<double> &values, Model model = {})
 {
     model.AddEffect(effect);
-    std::copy(values.begin(), values.end(), model.effects.back().values.begin());
+    for (size_t i = 0; i < values.size(); ++i)
+        model.effects.back().parameters[i].value = values[i];
     return model;
 }
 
@@ -38,7 +137,7 @@ inline double DutyAfter(const std::string &effect, const std::vector<double> &va
 {
     Signals s;
     s.duty.fill(duty);
-    FindEffect(effect)->make(values)->Step(s, nullptr);
+    MakeAlone(effect, values).Step(s, nullptr);
     return s.duty[0];
 }
 

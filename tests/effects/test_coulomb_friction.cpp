@@ -31,12 +31,12 @@ TEST(CoulombFriction, KeepsTheDirectionOfTravel)
 
 TEST(CoulombFriction, NeverTurnsTheMotionRoundNorMovesARobotThatStands)
 {
-    const auto effect = FindEffect("coulomb_friction")->make(std::vector<double>{0.3});
+    const auto effect = MakeAlone("coulomb_friction", {0.3});
     for (double v_mps = 0; v_mps < 1; v_mps += 0.01)
     {
         Signals s;
         s.vy_mps = v_mps;
-        effect->Step(s, nullptr);
+        effect.Step(s, nullptr);
         EXPECT_GE(s.vy_mps, 0);
         EXPECT_LE(s.vy_mps, v_mps);
     }

@@ -10,13 +10,12 @@ namespace twin::test
 namespace
 {
 
-constexpr double kNeutral[] = {0, 0, 0, 0};
+const std::vector<double> kNeutral{0, 0, 0, 0};
 
-std::unique_ptr<Effect> Formula(const std::string &adds_to, const std::string &formula,
-                                std::span<const double> values = kNeutral)
+Alone Formula(const std::string &adds_to, const std::string &formula)
 {
-    return FindEffect("equation")
-        ->make_with_texts(values, std::vector<std::string>{adds_to, formula});
+    return Alone(
+        BoundEffect(*FindEffect("equation"), kNeutral, std::vector<std::string>{adds_to, formula}));
 }
 
 std::string Complaint(const std::string &adds_to, const std::string &formula)
@@ -36,7 +35,8 @@ Model WithFormula(const std::string &adds_to, const std::string &formula,
                   const std::vector<double> &values, Model model = {})
 {
     model.AddEffect("equation", {{"adds_to", adds_to}, {"formula", formula}});
-    std::copy(values.begin(), values.end(), model.effects.back().values.begin());
+    for (size_t i = 0; i < values.size(); ++i)
+        model.effects.back().parameters[i].value = values[i];
     return model;
 }
 
@@ -89,14 +89,14 @@ TEST(Equation, KnowsEveryQuantityByItsName)
     for (const auto &c : body)
     {
         Signals after = s;
-        Formula(c.adds_to, c.formula)->Step(after, nullptr);
+        Formula(c.adds_to, c.formula).Step(after, nullptr);
         EXPECT_DOUBLE_EQ(after.*c.body, c.expected) << c.formula;
     }
     Signals after = s;
-    Formula("rim_mps", "rim + 100*left + 1000*front + u*V + angle")->Step(after, nullptr);
+    Formula("rim_mps", "rim + 100*left + 1000*front + u*V + angle").Step(after, nullptr);
     EXPECT_EQ(after.target_mps, (Wheels{17 + 1100 + 15 + 31, 19 + 900 + 21 + 37, 23 - 900 + 33 + 41,
                                         29 - 1100 + 39 + 43}));
-    Formula("duty", "left*t")->Step(s, nullptr);
+    Formula("duty", "left*t").Step(s, nullptr);
     EXPECT_EQ(s.duty, (Wheels{7, 5, 13, 11}));
 }
 
@@ -106,7 +106,7 @@ TEST(Equation, AddsNothingWhereItHasNoValue)
     {
         Signals s;
         s.vx_mps = 0.25;
-        Formula("vx_mps", formula)->Step(s, nullptr);
+        Formula("vx_mps", formula).Step(s, nullptr);
         EXPECT_EQ(s.vx_mps, 0.25) << formula;
     }
 }

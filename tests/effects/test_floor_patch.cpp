@@ -29,14 +29,14 @@ TEST(FloorPatch, SlowsWellInsideAndNotFarOutside)
 // Half the loss on the edge, wherever on it.
 TEST(FloorPatch, HasItsEdgeAtTheRadius)
 {
-    const auto effect = FindEffect("floor_patch")->make(std::vector<double>{0.4, 1, -1, 0.5});
+    const auto effect = MakeAlone("floor_patch", {0.4, 1, -1, 0.5});
     for (double at_rad = 0; at_rad < 6; at_rad += 0.7)
     {
         Signals s;
         s.x_m = 1 + 0.5 * std::cos(at_rad);
         s.y_m = -1 + 0.5 * std::sin(at_rad);
         s.vx_mps = 1;
-        effect->Step(s, nullptr);
+        effect.Step(s, nullptr);
         EXPECT_NEAR(s.vx_mps, 0.8, 1e-12);
     }
 }

@@ -40,15 +40,15 @@ TEST(InputDelay, KeepsTheWayOfAPulse)
 // 60 steps of 5 ms are the longest delay: the command of 60 steps ago comes out.
 TEST(InputDelay, RemembersANewCommandEveryFiveMilliseconds)
 {
-    const auto effect = FindEffect("input_delay")->make(std::vector<double>{0.3});
-    std::vector<double> state(static_cast<size_t>(effect->StateSize()), 0.0);
+    const auto effect = MakeAlone("input_delay", {0.3});
+    std::vector<double> state(static_cast<size_t>(effect.StateSize()), 0.0);
     for (int step = 0; step < 500; ++step)
     {
         Signals s;
         s.t_s = 0.005 * step;
         s.dt_s = 0.005;
         s.duty.fill(1e-3 * step);
-        effect->Step(s, state.data());
+        effect.Step(s, state.data());
         EXPECT_NEAR(s.duty[2], std::max(0.0, 1e-3 * (step - 60)), 1e-12) << step;
     }
 }
@@ -56,8 +56,8 @@ TEST(InputDelay, RemembersANewCommandEveryFiveMilliseconds)
 // Given from 0 to 20 ms, it arrives at 30 ms: the step from 20 ms on is cut there.
 TEST(InputDelay, CutsTheStepWhereACommandArrives)
 {
-    const auto effect = FindEffect("input_delay")->make(std::vector<double>{0.03});
-    std::vector<double> state(static_cast<size_t>(effect->StateSize()), 0.0);
+    const auto effect = MakeAlone("input_delay", {0.03});
+    std::vector<double> state(static_cast<size_t>(effect.StateSize()), 0.0);
     const Wheels command{1, -1, 0.5, 0};
     const struct
     {
@@ -70,7 +70,7 @@ TEST(InputDelay, CutsTheStepWhereACommandArrives)
         s.t_s = step.t_s;
         s.dt_s = step.dt_s;
         s.duty = command;
-        effect->Step(s, state.data());
+        effect.Step(s, state.data());
         EXPECT_EQ(s.duty, step.duty) << step.t_s;
         EXPECT_NEAR(s.dt_s, step.cut_s, 1e-15) << step.t_s;
     }
@@ -113,15 +113,15 @@ TEST(InputDelay, LeavesTheDeadZoneItsWidth)
 // A new command every millisecond overruns what it remembers: late or early, but never lost.
 TEST(InputDelay, KeepsDrivingWhenCommandsComeTooFast)
 {
-    const auto effect = FindEffect("input_delay")->make(std::vector<double>{0.3});
-    std::vector<double> state(static_cast<size_t>(effect->StateSize()), 0.0);
+    const auto effect = MakeAlone("input_delay", {0.3});
+    std::vector<double> state(static_cast<size_t>(effect.StateSize()), 0.0);
     Signals s;
     for (int step = 0; step < 1000; ++step)
     {
         s.t_s = 1e-3 * step;
         s.dt_s = 1e-3;
         s.duty.fill(0.5 + 1e-4 * step);
-        effect->Step(s, state.data());
+        effect.Step(s, state.data());
     }
     EXPECT_GT(s.duty[0], 0.5);
     EXPECT_EQ(s.dt_s, 1e-3);

@@ -13,7 +13,7 @@ double TauAfter(double tau_s, double extra_s, double duty)
     Signals s;
     s.duty.fill(duty);
     s.tau_s.fill(tau_s);
-    FindEffect("lag_by_duty")->make(std::vector<double>{extra_s})->Step(s, nullptr);
+    MakeAlone("lag_by_duty", {extra_s}).Step(s, nullptr);
     return s.tau_s[3];
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 
 #include "drive.h"
 
@@ -61,7 +62,8 @@ std::vector<const EffectSpec *> OfTheDrive()
 {
     std::vector<const EffectSpec *> specs;
     for (const EffectSpec *spec : Catalogue())
-        if (spec->card.stage <= Stage::kGround || spec->card.stage == Stage::kObserve)
+        if (std::set<std::string>{"duty", "wheel", "ground", "observe"}.contains(
+                StageName(spec->act)))
             specs.push_back(spec);
     return specs;
 }
@@ -72,7 +74,7 @@ INSTANTIATE_TEST_SUITE_P(Catalogue, Smooth, testing::ValuesIn(OfTheDrive()),
 // The slope along parameter k, checked; 1 is 1 mm, 1 mrad or 1 ms over the parameter's range.
 double CheckedSlope(const EffectSpec &spec, const std::vector<double> &values, size_t k)
 {
-    const Parameter &p = spec.parameters[k];
+    const Parameter p = ParametersOf(spec)[k];
     const double step = 1e-4 * (p.max - p.min);
     const std::string what = std::string(p.name) + " = " + std::to_string(values[k]);
     const Seen right = Slope(spec, values, k, step);
@@ -86,10 +88,11 @@ TEST_P(Smooth, SlopeIsTheSameFromBothSidesAndAtTwoSteps)
 {
     const EffectSpec &spec = *GetParam();
     std::vector<double> values;
-    for (const Parameter &p : spec.parameters)
+    for (const Parameter &p : ParametersOf(spec))
         values.push_back(p.default_value);
     for (size_t k = 0; k < values.size(); ++k)
-        EXPECT_GT(CheckedSlope(spec, values, k), 1) << spec.parameters[k].name << " does nothing";
+        EXPECT_GT(CheckedSlope(spec, values, k), 1)
+            << ParametersOf(spec)[k].name << " does nothing";
 }
 
 // There the place and size of what has no strength yet have no slope: some parameter must.
@@ -100,7 +103,7 @@ TEST_P(Smooth, FromNeutralTheSlopeIsSeenToo)
     if (std::string(spec.card.name) == "coasting")
         return;
     std::vector<double> values;
-    for (const Parameter &p : spec.parameters)
+    for (const Parameter &p : ParametersOf(spec))
         values.push_back(p.neutral);
     double largest = 0;
     for (size_t k = 0; k < values.size(); ++k)

@@ -33,7 +33,7 @@ TEST(SpeedSlip, NeverTurnsTheMotionRound)
 {
     Signals s;
     s.vx_mps = -3;
-    FindEffect("speed_slip")->make(std::vector<double>{2})->Step(s, nullptr);
+    MakeAlone("speed_slip", {2}).Step(s, nullptr);
     EXPECT_EQ(s.vx_mps, 0);
 }
 

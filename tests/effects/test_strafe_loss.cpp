@@ -25,13 +25,13 @@ TEST(StrafeLoss, TakesSidewaysSpeedOnDiagonals)
     {
         double tangent, part;
     } cases[] = {{1, 1}, {-1, 1}, {std::sqrt(3), 0.75}, {1 / std::sqrt(3), 0.75}};
-    const auto effect = FindEffect("strafe_loss")->make(std::vector<double>{0.4});
+    const auto effect = MakeAlone("strafe_loss", {0.4});
     for (const auto &c : cases)
     {
         Signals s;
         s.vx_mps = 0.2;
         s.vy_mps = 0.2 * c.tangent;
-        effect->Step(s, nullptr);
+        effect.Step(s, nullptr);
         EXPECT_EQ(s.vx_mps, 0.2);
         EXPECT_NEAR(s.vy_mps, 0.2 * c.tangent * (1 - 0.4 * c.part), 1e-15);
     }

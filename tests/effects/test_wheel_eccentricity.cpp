@@ -56,16 +56,16 @@ TEST(WheelEccentricity, FollowsTheAngleOfALaggingWheel)
 
 TEST(WheelEccentricity, EachPairIsItsOwnWheel)
 {
-    for (size_t k = 0; k < kWheels; ++k)
+    for (size_t k = 0; k < kMaxWheels; ++k)
     {
         std::vector<double> values(8, 0.0);
         values[2 * k] = 0.1;
         Signals s;
         s.dt_s = 1e-9;
-        s.wheel_radius_m = kRadius_m;
-        FindEffect("wheel_eccentricity")->make(values)->Step(s, nullptr);
-        for (size_t other = 0; other < kWheels; ++other)
-            EXPECT_NEAR(s.roll[other], other == k ? 1.1 : 1, 1e-12);
+        s.robot.wheel_radius_m = kRadius_m;
+        MakeAlone("wheel_eccentricity", values).Step(s, nullptr);
+        for (size_t other = 0; other < kMaxWheels; ++other)
+            EXPECT_NEAR(s.radius_ratio[other], other == k ? 1.1 : 1, 1e-12);
     }
 }
 

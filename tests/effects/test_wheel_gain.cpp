@@ -51,7 +51,7 @@ TEST(WheelGain, EachNumberIsItsOwnWheel)
 {
     Player player(With("wheel_gain", {0.1, 0.2, 0.3, 0.4}), 0.02);
     player.Play(kForward, 0.02);
-    for (size_t k = 0; k < kWheels; ++k)
+    for (size_t k = 0; k < kMaxWheels; ++k)
         EXPECT_NEAR(player.state.rim_mps[k], kFull_mps * (1.1 + 0.1 * static_cast<double>(k)),
                     1e-12);
 }

@@ -44,7 +44,7 @@ TEST(DriveChain, CountsTheAnglesOfItsWheels)
     player.Play({1, -0.5, 0, 0.25}, 0.4);
     const double way_m = kFull_mps * (0.4 - 0.1 * (1 - std::exp(-4)));
     const Wheels duty{1, -0.5, 0, 0.25};
-    for (size_t k = 0; k < kWheels; ++k)
+    for (size_t k = 0; k < kMaxWheels; ++k)
         EXPECT_NEAR(player.state.wheel_rad[k], duty[k] * way_m / model.robot.wheel_radius_m, 1e-12);
 }
 
@@ -209,6 +209,60 @@ TEST(DriveNoise, DoesNotMoveARobotThatStands)
     EXPECT_NEAR(player.state.pose.x_m, before.x_m, 1e-3 * 0.05);
     EXPECT_NEAR(player.state.pose.y_m, before.y_m, 1e-3 * 0.05);
     EXPECT_EQ(player.state.pose.theta_rad, before.theta_rad);
+}
+
+// A circle driven at constant steering, from the middle between the axles: its radius there is
+// hypot(wheelbase / tan(steering), wheelbase / 2).
+TEST(DriveChain, DrivesASteeredRobotOnItsCircle)
+{
+    Model model;
+    model.base.wheels = WheelKind::kAckermann;
+    model.base.drive = Drive::kSteering;
+    model.robot.half_wheelbase_m = 0.15;
+    const double steering_rad = 0.3, rear_m = 0.3 / std::tan(steering_rad);
+    Player player(model, 0.01);
+    player.Play({0.5, steering_rad, 0, 0}, 4);
+    // The middle of the rear axle goes 2 m along its own circle.
+    const double turned_rad = 2 / rear_m;
+    EXPECT_NEAR(player.state.pose.theta_rad, turned_rad, 1e-12);
+    const double x_m = rear_m * std::sin(turned_rad) + 0.15 * std::cos(turned_rad);
+    const double y_m = rear_m * (1 - std::cos(turned_rad)) + 0.15 * std::sin(turned_rad);
+    EXPECT_NEAR(player.state.pose.x_m, x_m - 0.15, 1e-12);
+    EXPECT_NEAR(player.state.pose.y_m, y_m, 1e-12);
+}
+
+TEST(DriveChain, SteersThroughItsLag)
+{
+    Model model;
+    model.base.wheels = WheelKind::kAckermann;
+    model.base.drive = Drive::kSteering;
+    model.base.steering_lag_s = 0.2;
+    model.robot.max_steering_rad = 0.4;
+    Player player(model, 0.02);
+    player.Play({0.5, 9, 0, 0}, 0.2);
+    EXPECT_NEAR(player.state.steering_rad, 0.4 * (1 - std::exp(-1)), 1e-12);
+}
+
+// 4 % more on the third wheel of three: by the forward kinematics of a circle of wheels that is a
+// third of its share along its own direction, and a third of it over the lever.
+TEST(DriveChain, GivesEachWheelOfThreeItsOwnGain)
+{
+    Model model;
+    model.base.wheels = WheelKind::kOmni3;
+    model.base.drive = Drive::kWheelSpeed;
+    model.AddEffect("wheel_gain");
+    ASSERT_EQ(model.effects[0].parameters.size(), 3u);
+    model.Set("wheel_gain.w3", 0.04);
+    EXPECT_THROW(model.Set("wheel_gain.fl", 0.04), std::invalid_argument);
+    Player player(model, 0.02);
+    player.Play({10, 10, 10, 0}, 0.02);
+    const double rim_mps = 10 * model.robot.wheel_radius_m, more_mps = 0.04 * rim_mps;
+    const double at_rad = 5 * std::acos(-1.0) / 3;
+    EXPECT_NEAR(player.state.omega_radps, (rim_mps + more_mps / 3) / model.robot.half_track_m,
+                1e-12);
+    EXPECT_NEAR(player.state.vx_mps, -std::sin(at_rad) * more_mps * 2 / 3, 1e-12);
+    EXPECT_NEAR(player.state.vy_mps, std::cos(at_rad) * more_mps * 2 / 3, 1e-12);
+    EXPECT_THROW(model.AddEffect("reverse_asymmetry"), std::invalid_argument);
 }
 
 }  // namespace

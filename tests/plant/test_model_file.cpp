@@ -226,8 +226,9 @@ TEST(ModelFile, ReadsWhatIsThereAndLeavesTheRestAtItsDefaults)
     EXPECT_FALSE(Parse("").clock.known);
     ASSERT_EQ(model.effects.size(), 3u);
     EXPECT_STREQ(model.effects[1].spec->card.name, "marker_offset");
-    EXPECT_EQ(model.effects[1].values[1], 0.02);
-    EXPECT_EQ(model.effects[1].values[0], model.effects[1].spec->parameters[0].default_value);
+    EXPECT_EQ(model.effects[1].parameters[1].value, 0.02);
+    EXPECT_EQ(model.effects[1].parameters[0].value,
+              model.effects[1].spec->parameters[0].default_value);
 }
 
 TEST(ModelFile, OneClockIsDeclaredAndNotContradicted)
@@ -251,9 +252,10 @@ TEST(ModelFile, ReadsFormulasAndNarrowerBounds)
     model.Set("equation.p0", 1);
     EXPECT_THROW(model.Set("equation.p0", 1.1), std::invalid_argument);
     model.Set("equation.p1", 1.1);
-    Signals s;
-    s.vx_mps = 2;
-    model.effects[0].Make()->Step(s, nullptr);
+    const BoundEffect effect = model.effects[0].Bind();
+    const RobotFacts robot;
+    GroundSignals s{robot, 0, 0, false, 0, 0, 0, 2, 0, 0};
+    std::get<OnGround>(effect.act()).step(s, effect.numbers(), nullptr);
     EXPECT_EQ(s.vy_mps, 2);
 }
 
@@ -276,7 +278,7 @@ TEST(ModelFile, TakesWholeNumbersForReals)
 TEST(ModelFile, NamesEveryQuantityOnceWithinItsBounds)
 {
     std::set<std::string> names;
-    for (const NamedValue &value : Parse(kGood).Values())
+    for (const Parameter &value : Parse(kGood).Parameters())
     {
         EXPECT_TRUE(names.insert(value.name).second) << value.name << " twice";
         EXPECT_FALSE(value.unit.empty()) << value.name;
@@ -290,14 +292,14 @@ TEST(ModelFile, NamesEveryQuantityOnceWithinItsBounds)
 TEST(ModelFile, GetsBackWhatWasSetUnderEveryName)
 {
     Model model = Parse(kGood);
-    for (const NamedValue &value : model.Values())
+    for (const Parameter &value : model.Parameters())
     {
         const double middle = (value.min + value.max) / 2;
         model.Set(value.name, middle);
         EXPECT_EQ(model.Get(value.name), middle) << value.name;
     }
-    EXPECT_EQ(model.effects[0].values[0], 0.3);
-    EXPECT_EQ(model.effects[2].values[0], 0.3);
+    EXPECT_EQ(model.effects[0].parameters[0].value, 0.3);
+    EXPECT_EQ(model.effects[2].parameters[0].value, 0.3);
 }
 
 TEST(ModelFile, SetsTheSecondOfTwoEffectsAlone)
@@ -305,7 +307,7 @@ TEST(ModelFile, SetsTheSecondOfTwoEffectsAlone)
     Model model = Parse(kGood);
     model.Set("dead_zone#2.width", 0.25);
     EXPECT_EQ(model.Get("dead_zone.width"), 0.1);
-    EXPECT_EQ(model.effects[2].values[0], 0.25);
+    EXPECT_EQ(model.effects[2].parameters[0].value, 0.25);
     model.RemoveEffect(0);
     EXPECT_EQ(model.Get("dead_zone.width"), 0.25);
     EXPECT_THROW(model.Get("dead_zone#2.width"), std::invalid_argument);
@@ -336,7 +338,7 @@ TEST(ModelFile, AddsEffectsAtNeutral)
 {
     Model model;
     model.AddEffect("coasting");
-    EXPECT_EQ(model.effects[0].values[0], model.effects[0].spec->parameters[0].neutral);
+    EXPECT_EQ(model.effects[0].parameters[0].value, model.effects[0].spec->parameters[0].neutral);
     EXPECT_THROW(model.AddEffect("no_such"), std::invalid_argument);
     model.base.drive = Drive::kWheelSpeed;
     EXPECT_THROW(model.AddEffect("coasting"), std::invalid_argument);
@@ -355,6 +357,25 @@ TEST(ModelFile, GivesEachRobotItsOwn)
     EXPECT_EQ(fourth.base.forward_gain, 0.9);
     EXPECT_EQ(fourth.theta_a2, 1);
     EXPECT_EQ(model.base.forward_gain, 0.9);
+}
+
+TEST(ModelFile, TakesASteeredRobotWithCommandsThatSayWhereItSteers)
+{
+    const Model model = Parse(
+        "[robot]\nmax_steering_rad = 0.4\n[base]\nwheels = \"ackermann\"\ndrive = \"steering\"\n");
+    EXPECT_EQ(model.base.wheels, WheelKind::kAckermann);
+    EXPECT_EQ(model.base.drive, Drive::kSteering);
+    EXPECT_THROW(Parse("[base]\nwheels = \"ackermann\"\n"), std::invalid_argument);
+    EXPECT_THROW(Parse("[base]\ndrive = \"steering\"\n"), std::invalid_argument);
+}
+
+TEST(ModelFile, NamesWhatDoesNotActInAPlant)
+{
+    const Model model = Parse("[robot]\nmass_kg = 3\n");
+    ASSERT_EQ(model.InertIn(PlantKind::kPlanar).size(), 1u);
+    EXPECT_EQ(model.InertIn(PlantKind::kPlanar)[0].name, "robot.mass_kg");
+    EXPECT_TRUE(model.InertIn(PlantKind::kMujoco).empty());
+    EXPECT_TRUE(Model().InertIn(PlantKind::kPlanar).empty());
 }
 
 }  // namespace

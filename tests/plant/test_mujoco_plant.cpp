@@ -21,8 +21,8 @@ namespace
 constexpr double kRadius_m = 0.0325, kHalfWheelbase_m = 0.059, kHalfTrack_m = 0.067;
 constexpr double kHalfLength_m = 0.095;  // of the hull
 constexpr double kFriction = 0.8, kRollerDrag = 0.065, kGravity_mps2 = 9.81;
-constexpr double kSide[kWheels] = {-1, 1, 1, -1};
-constexpr double kX[kWheels] = {1, 1, -1, -1}, kY[kWheels] = {1, -1, 1, -1};
+constexpr double kSide[kMaxWheels] = {-1, 1, 1, -1};
+constexpr double kX[kMaxWheels] = {1, 1, -1, -1}, kY[kMaxWheels] = {1, -1, 1, -1};
 constexpr double kControl_s = 0.02;
 
 Model WheelSpeedModel()
@@ -49,7 +49,7 @@ void Simulate(Plant &plant, double duration_s)
 Command Ideal(const Twist &twist)
 {
     Command command;
-    for (size_t k = 0; k < kWheels; ++k)
+    for (size_t k = 0; k < kMaxWheels; ++k)
         command.value[k] =
             (twist.vx_mps - kY[k] * kHalfTrack_m * twist.omega_radps +
              kSide[k] * (twist.vy_mps + kX[k] * kHalfWheelbase_m * twist.omega_radps)) /
@@ -110,8 +110,8 @@ TEST(MujocoPlant, WheelsTouchOnceWithTheRollerAxisAsFirstTangent)
     const double heading_rad = 0.4;
     MujocoPlant plant = MakePlant({{0, 0, heading_rad}});
     Simulate(plant, 0.2);
-    ASSERT_EQ(plant.data()->ncon, kWheels);
-    for (int i = 0; i < kWheels; ++i)
+    ASSERT_EQ(plant.data()->ncon, kMaxWheels);
+    for (int i = 0; i < kMaxWheels; ++i)
     {
         const mjContact &contact = plant.data()->contact[i];
         int k = 0;
@@ -371,11 +371,120 @@ TEST(MujocoPlant, SaysThatItBecameUnstable)
     EXPECT_THROW(plant.Step(kControl_s), std::runtime_error);
 }
 
+// A robot of which only the model's numbers are known, told velocities.
+Model Twisted(WheelKind wheels)
+{
+    Model model;
+    model.base.wheels = wheels;
+    model.base.drive = Drive::kTwist;
+    model.robot.half_track_m = 0.09;
+    model.robot.wheel_radius_m = 0.04;
+    return model;
+}
+
+class MadeRobot : public testing::TestWithParam<WheelKind>
+{
+};
+
+INSTANTIATE_TEST_SUITE_P(MujocoPlant, MadeRobot,
+                         testing::Values(WheelKind::kMecanum, WheelKind::kDifferential,
+                                         WheelKind::kOmni3),
+                         [](const auto &kind) { return std::string(WheelKindName(kind.param)); });
+
+// Where its wheels grip it does what it is told, as the planar plant does exactly.
+TEST_P(MadeRobot, FollowsVelocityCommands)
+{
+    const bool strafes = GetParam() != WheelKind::kDifferential;
+    const double scrub = strafes ? 0.05 : 0.1;  // plain wheels are wide: their edges slip in turns
+    for (const Twist &wanted : {Twist{0.2, 0, 0}, {-0.15, 0, 0.8}, {0, 0, 1.5}, {0.1, 0.1, -0.5}})
+    {
+        if (wanted.vy_mps != 0 && !strafes)
+            continue;
+        MujocoPlant plant("", {Twisted(GetParam())}, {{0, 0, 0.3}}, {});
+        plant.SetCommand(0, {{wanted.vx_mps, wanted.vy_mps, wanted.omega_radps, 0}});
+        Simulate(plant, 1);
+        const double start_rad = plant.State(0).pose.theta_rad;
+        double vx_mps = 0, vy_mps = 0;
+        constexpr int kSteps = 40;
+        for (int i = 0; i < kSteps; ++i)
+        {
+            plant.Step(kControl_s);
+            vx_mps += plant.State(0).vx_mps / kSteps;
+            vy_mps += plant.State(0).vy_mps / kSteps;
+        }
+        const double omega_radps =
+            (plant.State(0).pose.theta_rad - start_rad) / (kSteps * kControl_s);
+        EXPECT_NEAR(vx_mps, wanted.vx_mps, 0.01);
+        EXPECT_NEAR(vy_mps, wanted.vy_mps, 0.01);
+        EXPECT_NEAR(omega_radps, wanted.omega_radps, scrub * std::abs(wanted.omega_radps) + 0.01);
+    }
+}
+
+TEST_P(MadeRobot, StandsStillOnItsWheels)
+{
+    MujocoPlant plant("", {Twisted(GetParam())}, {{1, 2, 0.5}}, {});
+    Simulate(plant, 3);
+    const Pose2 &pose = plant.State(0).pose;
+    EXPECT_LT(std::hypot(pose.x_m - 1, pose.y_m - 2), 1e-3);
+    EXPECT_NEAR(plant.data()->qpos[2], 0, 2e-3);
+    EXPECT_NEAR(plant.data()->qpos[3] * plant.data()->qpos[3] +
+                    plant.data()->qpos[6] * plant.data()->qpos[6],
+                1, 1e-4);  // upright
+}
+
+TEST_P(MadeRobot, WeighsWhatItsModelSays)
+{
+    Model model = Twisted(GetParam());
+    model.Set("robot.mass_kg", 2.5);
+    const MujocoPlant plant("", {model}, {{0, 0, 0}}, {});
+    EXPECT_NEAR(plant.model()->body_subtreemass[0], 2.5, 1e-9);
+}
+
+// Four plain wheels scrub when they turn; straight ahead they do not.
+TEST(MujocoPlant, ScrubsOnFourPlainWheels)
+{
+    Model model = Twisted(WheelKind::kDifferential);
+    model.Set("robot.half_wheelbase_m", 0.08);
+    MujocoPlant plant("", {model}, {{0, 0, 0}}, {});
+    plant.SetCommand(0, {{0, 0, 1.5, 0}});
+    Simulate(plant, 2);
+    EXPECT_GT(plant.State(0).pose.theta_rad, 0.2);
+    EXPECT_LT(plant.State(0).pose.theta_rad, 0.9 * 1.5 * 2);
+}
+
+// The file's robot weighs 1.2 kg: 1.027 of the base, 0.0377 of each wheel, 0.022 of the camera.
+TEST(MujocoPlant, TakesTheMassThatTheModelStates)
+{
+    Model model = WheelSpeedModel();
+    EXPECT_NEAR(MakePlant({{0, 0, 0}}, {}, model).model()->body_subtreemass[0], 1.1998, 1e-9);
+    model.Set("robot.mass_kg", 2.4);
+    const MujocoPlant heavy = MakePlant({{0, 0, 0}}, {}, model);
+    EXPECT_NEAR(heavy.model()->body_subtreemass[0], 2.4, 1e-9);
+}
+
+// Motors of limited torque: at twice the mass a robot takes longer to get going.
+TEST(MujocoPlant, AHeavierRobotStartsMoreSlowly)
+{
+    double way_m[2];
+    for (int i = 0; i < 2; ++i)
+    {
+        Model model = WheelSpeedModel();
+        model.Set("robot.mass_kg", i ? 4.8 : 1.2);
+        MujocoPlant plant = MakePlant({{0, 0, 0}}, {}, model);
+        plant.SetCommand(0, Ideal({0.4, 0, 0}));
+        Simulate(plant, 0.2);
+        way_m[i] = plant.State(0).pose.x_m;
+    }
+    EXPECT_LT(way_m[1], 0.95 * way_m[0]);
+}
+
 TEST(MujocoPlant, RefusesWhatItCannotSimulate)
 {
     Model differential;
     differential.base.wheels = WheelKind::kDifferential;
     EXPECT_THROW(MakePlant({{0, 0, 0}}, {}, differential), std::invalid_argument);
+    EXPECT_THROW(MujocoPlant("", {Twisted(WheelKind::kAckermann)}, {{0, 0, 0}}, {}),
+                 std::invalid_argument);
     EXPECT_THROW(MakePlant({}), std::invalid_argument);
     EXPECT_THROW(MakePlant({{0, 0, 0}}, {.timestep_s = 0}), std::invalid_argument);
 }

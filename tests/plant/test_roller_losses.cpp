@@ -21,14 +21,14 @@ namespace
 namespace fs = std::filesystem;
 
 constexpr double kRadius_m = 0.0325, kHalfWheelbase_m = 0.059, kHalfTrack_m = 0.067;
-constexpr int kSide[kWheels] = {-1, 1, 1, -1}, kX[kWheels] = {1, 1, -1, -1},
-              kY[kWheels] = {1, -1, 1, -1};
+constexpr int kSide[kMaxWheels] = {-1, 1, 1, -1}, kX[kMaxWheels] = {1, 1, -1, -1},
+              kY[kMaxWheels] = {1, -1, 1, -1};
 constexpr double kSettle_s = 0.4, kDrive_s = 2, kMotor_Nms = 0.008;
 
 Wheels Rates(const Twist &twist)
 {
     Wheels rates;
-    for (size_t k = 0; k < kWheels; ++k)
+    for (size_t k = 0; k < kMaxWheels; ++k)
         rates[k] = (twist.vx_mps - kY[k] * kHalfTrack_m * twist.omega_radps +
                     kSide[k] * (twist.vy_mps + kX[k] * kHalfWheelbase_m * twist.omega_radps)) /
                    kRadius_m;
@@ -51,7 +51,7 @@ std::array<double, 3> DriveRollers(const Twist &twist)
     double turned_rad = 0;
     while (d->time < kSettle_s + kDrive_s)
     {
-        for (int k = 0; k < kWheels; ++k)
+        for (int k = 0; k < kMaxWheels; ++k)
             d->ctrl[k] = d->time < kSettle_s ? 0 : rates[static_cast<size_t>(k)];
         const double before_rad = Yaw(d->qpos);
         mj_step(m, d);

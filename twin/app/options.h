@@ -9,16 +9,11 @@
 
 #include "camera_options.h"
 #include "hil_options.h"
+#include "model_file/model.h"
 #include "swarm/starts.h"
 
 namespace twin
 {
-
-enum class PlantKind
-{
-    kMujoco,
-    kPlanar
-};
 
 struct Options
 {

@@ -156,7 +156,7 @@ void Publisher::PublishTruth(int id, double t_s, const Pose2 &pose, const RobotS
     truth.vx_mps = state.vx_mps;
     truth.vy_mps = state.vy_mps;
     truth.omega_radps = state.omega_radps;
-    for (size_t k = 0; k < kWheels; ++k)
+    for (size_t k = 0; k < kMaxWheels; ++k)
         truth.wheel_radps[k] = state.rim_mps[k] / member.wheel_radius_m;
     outlet_.Send(truth.utime_us, member.truth, truth);
 }

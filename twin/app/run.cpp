@@ -79,8 +79,12 @@ std::unique_ptr<Plant> MakePlant(const Options &options, const Setup &setup)
                                    options.spread_m, setup.model.robot.body_radius_m, options.seed);
     if (options.plant == PlantKind::kPlanar)
         return std::make_unique<PlanarBodies>(setup.robots, starts, options.seed);
-    return std::make_unique<MujocoPlant>(FindModelFile(options.mjcf), setup.robots, starts,
-                                         MujocoOptions{.seed = options.seed});
+    const WheelKind wheels = setup.model.base.wheels;
+    // The installed robot has mecanum wheels: others are made of their model's numbers.
+    const bool is_made = options.mjcf == Options{}.mjcf && wheels != WheelKind::kMecanum &&
+                         wheels != WheelKind::kNone;
+    return std::make_unique<MujocoPlant>(is_made ? "" : FindModelFile(options.mjcf), setup.robots,
+                                         starts, MujocoOptions{.seed = options.seed});
 }
 
 Swarm MakeSwarm(const Options &options, const Setup &setup,
@@ -248,6 +252,9 @@ void Run(const Options &options)
 
     std::vector<Publisher::Robot> described = DescribeRobots(options, setup);
 
+    for (const Inert &number : setup.model.InertIn(options.plant))
+        std::fprintf(stderr, "twin_run: %s does nothing here: %s\n", number.name.c_str(),
+                     number.why.c_str());
     Swarm swarm = MakeSwarm(options, setup, script);
     Outlet outlet;
     const bool on_bus = OpenOutlet(options, outlet);

@@ -2,8 +2,7 @@
 // Names, values and per-robot copies of a model; parse.cpp reads the file.
 #include "model_file/model.h"
 
-#include <cmath>
-#include <sstream>
+#include <optional>
 #include <stdexcept>
 
 #include "fields.h"
@@ -12,11 +11,6 @@ namespace twin
 {
 namespace
 {
-
-std::string FieldName(const Field &field)
-{
-    return *field.section ? std::string(field.section) + "." + field.key : field.key;
-}
 
 // "dead_zone", and "dead_zone#2" for the second of its kind.
 std::string InstanceName(const std::vector<EffectInstance> &effects, size_t index)
@@ -28,79 +22,105 @@ std::string InstanceName(const std::vector<EffectInstance> &effects, size_t inde
     return count == 1 ? name : name + "#" + std::to_string(count);
 }
 
-struct Slot
-{
-    double *value;
-    double min, max;
-    std::string unit;
-};
+constexpr double kSpeedPrior_mps = 0.15;  // of a speed of the duty table
+constexpr std::string_view kTable = "base.wheel_speed_mps.";
 
-// Calls visit(name, slot) for every quantity of the model.
+// Speed `i` of the duty table.
+Parameter TableSpeed(const Model &model, size_t i)
+{
+    Parameter p;
+    p.name = std::string(kTable) + std::to_string(i);
+    p.unit = "m/s";
+    p.value = p.neutral = p.default_value = model.base.wheel_speed_mps[i];
+    p.max = 10;
+    p.usual_size = kSpeedPrior_mps;
+    p.stage = "wheel";
+    return p;
+}
+
+// Calls visit(parameter, value) for the numbers of the model whose full name is `name`, or for all
+// if it is empty; `parameter` has its full name.
 template <class Visit>
-void ForEach(Model &model, Visit visit)
+void ForEach(Model &model, std::string_view name, Visit visit)
 {
     for (const Field &field : Fields())
-        visit(FieldName(field), Slot{&field.at(model), field.min, field.max, field.unit});
-    for (size_t i = 1; i < model.base.wheel_speed_mps.size(); ++i)  // speed 0 at duty 0 is fixed
-        visit("base.wheel_speed_mps." + std::to_string(i),
-              Slot{&model.base.wheel_speed_mps[i], 0, 10, "m/s"});
+        if (name.empty() || field.Is(name))
+            visit(field.In(model), field.at(model));
+    if (name.empty() || name.starts_with(kTable))
+        for (size_t i = 1; i < model.base.wheel_speed_mps.size();
+             ++i)  // speed 0 at duty 0 is fixed
+            if (const Parameter p = TableSpeed(model, i); name.empty() || name == p.name)
+                visit(p, model.base.wheel_speed_mps[i]);
     for (size_t i = 0; i < model.effects.size(); ++i)
     {
         const std::string prefix = InstanceName(model.effects, i) + ".";
-        auto &effect = model.effects[i];
-        for (size_t k = 0; k < effect.values.size(); ++k)
+        if (!name.empty() && !name.starts_with(prefix))
+            continue;
+        for (Parameter &own : model.effects[i].parameters)
         {
-            const Parameter &p = effect.spec->parameters[k];
-            const Bounds &bounds = effect.bounds[k];
-            visit(prefix + p.name, Slot{&effect.values[k], bounds.min, bounds.max, p.unit});
+            if (!name.empty() && name.substr(prefix.size()) != own.name)
+                continue;
+            Parameter p = own;
+            p.name = prefix + own.name;
+            p.stage = model.effects[i].stage;
+            visit(p, own.value);
         }
     }
 }
 
 }  // namespace
 
-std::unique_ptr<Effect> EffectInstance::Make() const
+std::vector<double> EffectInstance::Values() const
 {
-    return texts.empty() ? spec->make(values) : spec->make_with_texts(values, texts);
+    std::vector<double> values;
+    for (const Parameter &parameter : parameters)
+        values.push_back(parameter.value);
+    return values;
 }
 
-std::vector<NamedValue> Model::Values() const
+BoundEffect EffectInstance::Bind() const
 {
-    std::vector<NamedValue> values;
+    return BoundEffect(*spec, Values(), texts);
+}
+
+std::vector<Parameter> Model::Parameters() const
+{
+    std::vector<Parameter> all;
     Model copy = *this;
-    ForEach(copy, [&](const std::string &name, const Slot &slot) {
-        values.push_back({name, slot.unit, *slot.value, slot.min, slot.max});
-    });
-    return values;
+    ForEach(copy, "", [&](const Parameter &parameter, double &) { all.push_back(parameter); });
+    return all;
+}
+
+Parameter Model::Find(const std::string &name) const
+{
+    std::optional<Parameter> found;
+    // Reads alone.
+    ForEach(const_cast<Model &>(*this), name,
+            [&](const Parameter &parameter, double &) { found = parameter; });
+    if (!found || name.empty())
+        throw std::invalid_argument("model has no quantity '" + name + "'");
+    return *found;
 }
 
 double Model::Get(const std::string &name) const
 {
-    for (const NamedValue &value : Values())
-        if (value.name == name)
-            return value.value;
-    throw std::invalid_argument("model has no quantity '" + name + "'");
+    return Find(name).value;
 }
 
 void Model::Set(const std::string &name, double value)
 {
-    bool found = false;
-    ForEach(*this, [&](const std::string &other, const Slot &slot) {
-        if (other != name)
-            return;
-        found = true;
-        if (!(value >= slot.min && value <= slot.max))
-        {
-            std::ostringstream text;
-            const std::string tail = slot.unit == "1" ? "" : " " + slot.unit;
-            text << name << " = " << value << tail << " is outside " << slot.min << " to "
-                 << slot.max << tail;
-            throw std::invalid_argument(text.str());
-        }
-        *slot.value = value;
-    });
-    if (!found)
-        throw std::invalid_argument("model has no quantity '" + name + "'");
+    Find(name).CheckBounds(value, name);
+    ForEach(*this, name, [&](const Parameter &, double &own) { own = value; });
+    stated.insert(name);
+}
+
+std::string Model::WhyNot(const EffectSpec &spec) const
+{
+    if (!(spec.card.drives & static_cast<unsigned>(base.drive)))
+        return "acts on wheel duties, and this model's robot is not driven by duties";
+    if (spec.needs_sides && base.wheels == WheelKind::kOmni3)
+        return "acts on left and right wheels, and an omni3 robot has none";
+    return "";
 }
 
 void Model::AddEffect(const std::string &name, const std::map<std::string, std::string> &texts)
@@ -109,16 +129,9 @@ void Model::AddEffect(const std::string &name, const std::map<std::string, std::
     if (!spec)
         throw std::invalid_argument("there is no effect '" + name +
                                     "'; `twinmill effects` lists those there are");
-    if (!(spec->card.drives & static_cast<unsigned>(base.drive)))
-        throw std::invalid_argument("effect '" + name +
-                                    "' acts on wheel duties, and this model's " +
-                                    "robot is not driven by duties");
-    EffectInstance instance{spec, {}, {}, {}};
-    for (const Parameter &parameter : spec->parameters)
-    {
-        instance.values.push_back(parameter.neutral);
-        instance.bounds.push_back({parameter.min, parameter.max});
-    }
+    if (const std::string why = WhyNot(*spec); !why.empty())
+        throw std::invalid_argument("effect '" + name + "' " + why);
+    EffectInstance instance{spec, ParametersFor(*spec, MakeWheels()), {}, ""};
     size_t used = 0;
     for (const TextParameter &text : spec->texts)
     {
@@ -129,8 +142,8 @@ void Model::AddEffect(const std::string &name, const std::map<std::string, std::
     if (used != texts.size())
         throw std::invalid_argument("effect '" + name + "' has no such text; `twinmill effects " +
                                     name + "` lists those it has");
-    instance.Make();
-    effects.push_back(instance);
+    instance.stage = StageName(instance.Bind().act());
+    effects.push_back(std::move(instance));
 }
 
 void Model::RemoveEffect(size_t index)
@@ -138,6 +151,32 @@ void Model::RemoveEffect(size_t index)
     if (index >= effects.size())
         throw std::invalid_argument("model has no effect number " + std::to_string(index));
     effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(index));
+}
+
+std::vector<Inert> Model::InertIn(PlantKind plant) const
+{
+    std::vector<Inert> inert;
+    const auto name = [&](const char *number, const std::string &why) {
+        const Parameter parameter = Find(number);
+        if (States(number) && parameter.value != parameter.default_value)
+            inert.push_back({number, why});
+    };
+    const std::string kind = WheelKindName(base.wheels);
+    if (plant == PlantKind::kPlanar)
+        name("robot.mass_kg", "the planar plant has no forces: use MuJoCo");
+    if (base.wheels == WheelKind::kOmni3)
+        name("robot.half_wheelbase_m",
+             "the wheels of an omni3 robot lie on a circle of radius robot.half_track_m");
+    if (base.wheels == WheelKind::kDifferential && plant == PlantKind::kPlanar)
+        name("robot.half_wheelbase_m", "a differential robot turns by its track alone");
+    if (base.wheels == WheelKind::kDifferential)
+        name("base.sideways_gain", "a differential robot does not move sideways");
+    if (base.wheels != WheelKind::kAckermann)
+        for (const char *number : {"robot.max_steering_rad", "base.steering_lag_s"})
+            name(number, "the wheels of a " + kind + " robot are not steered");
+    if (base.drive != Drive::kSteering)
+        name("base.steering_per_input_rad", "the robot is not commanded by its steering angle");
+    return inert;
 }
 
 Model Model::ForRobot(int robot_id) const
@@ -152,9 +191,9 @@ Model Model::ForRobot(int robot_id) const
         if (field.per_robot && value != found->second.end())
             field.at(model) = value->second;
     }
-    ForEach(model, [&](const std::string &name, const Slot &slot) {
-        if (const auto value = found->second.find(name); value != found->second.end())
-            *slot.value = value->second;
+    ForEach(model, "", [&](const Parameter &parameter, double &own) {
+        if (const auto value = found->second.find(parameter.name); value != found->second.end())
+            own = value->second;
     });
     return model;
 }
@@ -170,7 +209,7 @@ Sight Model::MakeSight() const
     sight.delay_s = sensor.delay_s;
     sight.vote_frames = sensor.vote_frames;
     for (const EffectInstance &effect : effects)
-        effect.Make()->Look(sight);
+        effect.Bind().Look(sight);
     return sight;
 }
 
@@ -178,7 +217,7 @@ Body Model::MakeBody() const
 {
     Body body{robot.body_radius_m, 0};
     for (const EffectInstance &effect : effects)
-        effect.Make()->Touch(body);
+        effect.Bind().Touch(body);
     return body;
 }
 

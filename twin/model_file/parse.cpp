@@ -117,8 +117,11 @@ private:
                     FailUnknown(origin_, "key", key.str(), "[" + name + "]", known);
                 for (const Field &field : Fields())
                     if (name == field.section && key.str() == field.key)
+                    {
                         field.at(model_) =
                             Number(origin_, path, value, field.min, field.max, field.unit);
+                        model_.stated.insert(path);
+                    }
             }
         }
     }
@@ -180,12 +183,22 @@ private:
         ReadChoice<Drive>("drive", base.drive,
                           {{"duty", Drive::kDuty},
                            {"wheel_speed", Drive::kWheelSpeed},
-                           {"twist", Drive::kTwist}});
+                           {"twist", Drive::kTwist},
+                           {"steering", Drive::kSteering}});
         ReadChoice<WheelKind>("wheels", base.wheels,
                               {{"mecanum", WheelKind::kMecanum},
                                {"differential", WheelKind::kDifferential},
                                {"omni3", WheelKind::kOmni3},
+                               {"ackermann", WheelKind::kAckermann},
                                {"none", WheelKind::kNone}});
+        const bool steers = base.wheels == WheelKind::kAckermann;
+        if (steers && base.drive != Drive::kTwist && base.drive != Drive::kSteering)
+            Fail(
+                origin_,
+                "base.wheels = 'ackermann' needs base.drive = 'twist' or 'steering': wheels do not "
+                "say where a robot steers");
+        if (!steers && base.drive == Drive::kSteering)
+            Fail(origin_, "base.drive = 'steering' needs base.wheels = 'ackermann'");
         base.duty_pct = ReadList("duty_pct", 100, "%", base.duty_pct);
         base.wheel_speed_mps = ReadList("wheel_speed_mps", 10, "m/s", base.wheel_speed_mps);
         const auto &duty = base.duty_pct;
@@ -238,8 +251,8 @@ private:
                          const toml::table &table)
     {
         const std::string where = "[robots." + robot + "]";
-        std::map<std::string, NamedValue> known;
-        for (const NamedValue &quantity : model_.Values())
+        std::map<std::string, Parameter> known;
+        for (const Parameter &quantity : model_.Parameters())
             if (FindEffect(effect.substr(0, effect.find('#'))) &&
                 quantity.name.starts_with(effect + "."))
                 known[quantity.name.substr(effect.size() + 1)] = quantity;
@@ -253,7 +266,7 @@ private:
         CheckKeys(table, keys, "effect '" + effect + "' of " + where);
         for (const auto &[key, value] : table)
         {
-            const NamedValue &quantity = known[std::string(key.str())];
+            const Parameter &quantity = known[std::string(key.str())];
             model_.robot_overrides[id][quantity.name] =
                 Number(origin_, "robots." + robot + "." + quantity.name, value, quantity.min,
                        quantity.max, quantity.unit);
@@ -313,16 +326,14 @@ private:
         for (const TextParameter &text : spec.texts)
             known.insert(text.name);
         std::set<std::string> parameters;
-        EffectInstance &effect = model_.effects.back();
-        for (size_t i = 0; i < spec.parameters.size(); ++i)
+        for (Parameter &p : model_.effects.back().parameters)
         {
-            const Parameter &p = spec.parameters[i];
             const std::string name = std::string(spec.card.name) + "." + p.name;
             parameters.insert(p.name);
-            const Bounds &bounds = effect.bounds[i] = ReadBounds(table, name, p);
+            ReadBounds(table, name, p);
             const toml::node *node = table.get(p.name);
-            effect.values[i] = node ? Number(origin_, name, *node, bounds.min, bounds.max, p.unit)
-                                    : std::clamp(p.default_value, bounds.min, bounds.max);
+            p.value = node ? Number(origin_, name, *node, p.min, p.max, p.unit)
+                           : std::clamp(p.default_value, p.min, p.max);
         }
         known.insert(parameters.begin(), parameters.end());
         CheckKeys(table, known, "effect '" + std::string(spec.card.name) + "'");
@@ -339,7 +350,7 @@ private:
     }
 
     // Of one parameter: `bounds = { width = [0, 0.2] }` narrows its own.
-    Bounds ReadBounds(const toml::table &table, const std::string &name, const Parameter &p)
+    void ReadBounds(const toml::table &table, const std::string &name, Parameter &p)
     {
         const toml::node *node = table.get("bounds");
         const toml::table *all = node ? node->as_table() : nullptr;
@@ -347,13 +358,12 @@ private:
         if (node && !all)
             Fail(origin_, name + ": 'bounds' must be a table such as { " + p.name + " = [0, 1] }");
         if (!pair)
-            return {p.min, p.max};
+            return;
         const toml::array *ends = pair->as_array();
         if (!ends || ends->size() != 2)
             Fail(origin_, name + ": its bounds must be two numbers, [min, max]");
-        const double min =
-            Number(origin_, "lower bound of " + name, *ends->get(0), p.min, p.max, p.unit);
-        return {min, Number(origin_, "upper bound of " + name, *ends->get(1), min, p.max, p.unit)};
+        p.min = Number(origin_, "lower bound of " + name, *ends->get(0), p.min, p.max, p.unit);
+        p.max = Number(origin_, "upper bound of " + name, *ends->get(1), p.min, p.max, p.unit);
     }
 
     const toml::table &root_;

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <type_traits>
 
 namespace twin
 {
@@ -78,14 +78,33 @@ Relaxed Relax(double v, double target, double tau_s, double max_decel_mps2, doub
     return {rest.end, (linear_mean * linear_s + rest.mean * rest_s) / dt_s};
 }
 
-Signals Seen(const Pose2 &pose, double t_s)
+double SignOf(double place_m)
 {
-    Signals s;
-    s.x_m = pose.x_m;
-    s.y_m = pose.y_m;
-    s.theta_rad = pose.theta_rad;
-    s.observed_t_s = t_s;
-    return s;
+    constexpr double kMiddle_m = 1e-9;
+    return std::abs(place_m) < kMiddle_m ? 0.0 : std::copysign(1.0, place_m);
+}
+
+RobotFacts FactsOf(const Model &model)
+{
+    const std::vector<Wheel> wheels = model.MakeWheels();
+    RobotFacts facts{static_cast<int>(wheels.size()),
+                     {},
+                     {},
+                     model.robot.wheel_radius_m,
+                     model.robot.battery_nominal_V};
+    for (size_t k = 0; k < wheels.size(); ++k)
+    {
+        facts.left[k] = SignOf(wheels[k].y_m);
+        facts.front[k] = SignOf(wheels[k].x_m);
+    }
+    return facts;
+}
+
+// Depends on nothing but the signals of its step that are the same everywhere in the room.
+bool IsSameEverywhere(const BoundEffect &effect)
+{
+    const Card &card = effect.spec().card;
+    return card.needs != Needs::kRoom && card.family != Family::kFormula && effect.StateSize() == 0;
 }
 
 }  // namespace
@@ -96,27 +115,40 @@ DriveChain::DriveChain(const Model &model)
       clock_(model.clock),
       theta_a1_(model.theta_a1),
       theta_a2_(model.theta_a2),
-      battery_nominal_V_(model.robot.battery_nominal_V),
-      wheel_radius_m_(model.robot.wheel_radius_m),
+      robot_(FactsOf(model)),
       kinematics_(model.robot, model.base.wheels)
 {
     for (const EffectInstance &instance : model.effects)
-    {
-        Bound bound{instance.Make(), state_size_};
-        state_size_ += bound.effect->StateSize();
-        switch (bound.effect->ActsAt(instance.spec->card))
-        {
-            case Stage::kDuty: duty_.push_back(std::move(bound)); break;
-            case Stage::kWheel: wheel_.push_back(std::move(bound)); break;
-            case Stage::kGround: ground_.push_back(std::move(bound)); break;
-            case Stage::kObserve: observe_.push_back(std::move(bound)); break;
-            case Stage::kWorld:
-            case Stage::kView:
-            case Stage::kDecide: break;
-        }
-    }
-    for (auto *stage : {&duty_, &wheel_, &ground_, &observe_})
-        std::ranges::stable_partition(*stage, [](const Bound &b) { return b.effect->ActsFirst(); });
+        Bind(instance);
+}
+
+void DriveChain::Bind(const EffectInstance &instance)
+{
+    const BoundEffect &effect =
+        *effects_.emplace_back(std::make_unique<const BoundEffect>(instance.Bind()));
+    const int offset = state_size_;
+    state_size_ += effect.StateSize();
+    const auto put = [&]<class On>(std::vector<Bound<On>> &stage) {
+        const bool first = effect.spec().acts_first;
+        const auto at = first ? std::ranges::find(stage, false, &Bound<On>::first) : stage.end();
+        stage.insert(at, {std::get<On>(effect.act()), effect.numbers(), offset, first});
+    };
+    std::visit(
+        [&]<class On>(const On &) {
+            if constexpr (std::is_same_v<On, OnDuty>)
+                put(duty_);
+            else if constexpr (std::is_same_v<On, OnWheels>)
+                put(wheel_);
+            else if constexpr (std::is_same_v<On, OnRolling>)
+                put(rolling_);
+            else if constexpr (std::is_same_v<On, OnGround>)
+                put(ground_);
+            else if constexpr (std::is_same_v<On, OnObservation>)
+                put(observe_);
+        },
+        effect.act());
+    if (std::holds_alternative<OnGround>(effect.act()))
+        homogeneous_ = homogeneous_ && IsSameEverywhere(effect);
 }
 
 RobotState DriveChain::Start(const Pose2 &pose) const
@@ -127,66 +159,80 @@ RobotState DriveChain::Start(const Pose2 &pose) const
     return state;
 }
 
-void DriveChain::Run(const std::vector<Bound> &stage, Signals &signals, RobotState &state) const
+template <class On, class S>
+void DriveChain::Run(const std::vector<Bound<On>> &stage, S &signals, RobotState &state)
 {
-    for (const Bound &bound : stage)
-        bound.effect->Step(signals, state.effect_state.data() + bound.state_offset);
+    for (const Bound<On> &bound : stage)
+        bound.act.step(signals, bound.numbers, state.effect_state.data() + bound.state_offset);
 }
 
-Wheels DriveChain::Target(const Wheels &command) const
+WheelMotion DriveChain::Target(const Wheels &command) const
 {
-    Wheels target_mps;
+    WheelMotion target;
     switch (base_.drive)
     {
         case Drive::kDuty:
-            for (int k = 0; k < kWheels; ++k)
-                target_mps[k] = RimSpeed(base_, command[k]);
+            for (int k = 0; k < robot_.wheels; ++k)
+                target.rim_mps[k] = RimSpeed(base_, command[k]);
             break;
         case Drive::kWheelSpeed:
-            for (int k = 0; k < kWheels; ++k)
-                target_mps[k] = command[k] * wheel_radius_m_;
+            for (int k = 0; k < robot_.wheels; ++k)
+                target.rim_mps[k] = command[k] * robot_.wheel_radius_m;
             break;
         case Drive::kTwist:
-            target_mps = kinematics_.Inverse({command[0], command[1], command[2]});
+            target = kinematics_.Inverse({command[0], command[1], command[2]});
             break;
+        case Drive::kSteering: target = kinematics_.Steered(command[0], command[1]); break;
     }
-    return target_mps;
+    return target;
 }
 
-Wheels DriveChain::DriveWheels(const Command &command, double t_s, double dt_s,
-                               RobotState &state) const
+WheelMotion DriveChain::DriveWheels(const Command &command, double t_s, double dt_s,
+                                    RobotState &state) const
 {
-    Wheels mean_mps{};
-    Decay decays;
+    WheelMotion mean;
     for (double done_s = 0; done_s < dt_s;)
     {
-        Signals s;
-        s.t_s = t_s + done_s;
-        s.dt_s = dt_s - done_s;
-        s.battery_V = command.battery_V;
-        s.battery_nominal_V = battery_nominal_V_;
-        s.wheel_radius_m = wheel_radius_m_;
-        s.duty = command.value;
-        Run(duty_, s, state);
-
-        s.rim_mps = state.rim_mps;
-        s.target_mps = Target(s.duty);
-        s.tau_s.fill(base_.motor_lag_s);
-        s.wheel_rad = state.wheel_rad;
-        Run(wheel_, s, state);
-
-        const double part = s.dt_s / dt_s, rad_per_mps = s.dt_s / wheel_radius_m_;
-        for (int k = 0; k < kWheels; ++k)
-        {
-            const Relaxed rim = Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k],
-                                      s.max_decel_mps2[k], s.dt_s, decays);
-            state.rim_mps[k] = rim.end;
-            state.wheel_rad[k] += rim.mean * rad_per_mps;
-            mean_mps[k] += rim.mean * s.roll[k] * part;
-        }
-        done_s += s.dt_s;
+        DutySignals duty{robot_, t_s + done_s, command.battery_V, dt_s - done_s, command.value};
+        Run(duty_, duty, state);
+        DrivePart(duty, dt_s, state, mean);
+        done_s += duty.dt_s;
     }
-    return mean_mps;
+    return mean;
+}
+
+// The part of a step of `whole_s` in which the duties stay the same; adds its share to `mean`.
+void DriveChain::DrivePart(const DutySignals &duty, double whole_s, RobotState &state,
+                           WheelMotion &mean) const
+{
+    const WheelMotion target = Target(duty.duty);
+    WheelSignals s{robot_,    duty.t_s,      duty.dt_s,       duty.battery_V,
+                   duty.duty, state.rim_mps, state.wheel_rad, target.rim_mps};
+    s.tau_s.fill(base_.motor_lag_s);
+    Run(wheel_, s, state);
+
+    Decay decays;
+    Wheels mean_mps{}, end_mps{};
+    for (int k = 0; k < robot_.wheels; ++k)
+    {
+        const Relaxed rim = Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k],
+                                  s.max_decel_mps2[k], s.dt_s, decays);
+        mean_mps[k] = rim.mean;
+        end_mps[k] = rim.end;
+    }
+    const double part = duty.dt_s / whole_s, rad_per_mps = duty.dt_s / robot_.wheel_radius_m;
+    RollSignals roll{robot_, duty.t_s, duty.dt_s, duty.duty, mean_mps, end_mps, state.wheel_rad};
+    Run(rolling_, roll, state);
+    for (int k = 0; k < robot_.wheels; ++k)
+    {
+        state.rim_mps[k] = end_mps[k];
+        state.wheel_rad[k] += mean_mps[k] * rad_per_mps;
+        mean.rim_mps[k] += mean_mps[k] * roll.radius_ratio[k] * part;
+    }
+    const Relaxed steering =
+        Approach(state.steering_rad, target.steering_rad, base_.steering_lag_s, duty.dt_s, decays);
+    state.steering_rad = steering.end;
+    mean.steering_rad += steering.mean * part;
 }
 
 // First-order (Ornstein-Uhlenbeck) velocity noise, mean over a step taken as its value: steps are
@@ -205,40 +251,41 @@ void DriveChain::Disturb(Twist &twist, double dt_s, RobotState &state, Random &r
     twist.omega_radps += state.drive_noise[2];
 }
 
-Twist DriveChain::BodyTwist(const Wheels &rim_mps, double t_s, double dt_s, RobotState &state,
+Twist DriveChain::BodyTwist(const WheelMotion &motion, double t_s, double dt_s, RobotState &state,
                             Random *random) const
 {
-    Twist twist = kinematics_.Forward(rim_mps);
+    Twist twist = kinematics_.Forward(motion);
     twist.vx_mps *= base_.forward_gain * theta_a1_;
     twist.vy_mps *= base_.sideways_gain * theta_a1_;
     twist.omega_radps *= base_.yaw_gain * theta_a2_;
+    if (kinematics_.steers())
+        twist.vy_mps += kinematics_.SidewaysOfTurning(twist.omega_radps);
 
-    const bool moves = std::any_of(rim_mps.begin(), rim_mps.end(),
+    const bool moves = std::any_of(motion.rim_mps.begin(), motion.rim_mps.end(),
                                    [](double v) { return std::abs(v) > kStandstill_mps; });
     if (random && moves)
         Disturb(twist, dt_s, state, *random);
     if (!ground_.empty())
-        ActOnGround(twist, rim_mps, moves, t_s, dt_s, state);
+        ActOnGround(twist, moves, t_s, dt_s, state);
     state.vx_mps = twist.vx_mps;
     state.vy_mps = twist.vy_mps;
     state.omega_radps = twist.omega_radps;
     return twist;
 }
 
-void DriveChain::ActOnGround(Twist &twist, const Wheels &rim_mps, bool moves, double t_s,
-                             double dt_s, RobotState &state) const
+void DriveChain::ActOnGround(Twist &twist, bool moves, double t_s, double dt_s,
+                             RobotState &state) const
 {
-    Signals s;
-    s.t_s = t_s;
-    s.dt_s = dt_s;
-    s.rim_mps = rim_mps;
-    s.moves = moves;
-    s.x_m = state.pose.x_m;
-    s.y_m = state.pose.y_m;
-    s.theta_rad = state.pose.theta_rad;
-    s.vx_mps = twist.vx_mps;
-    s.vy_mps = twist.vy_mps;
-    s.omega_radps = twist.omega_radps;
+    GroundSignals s{robot_,
+                    t_s,
+                    dt_s,
+                    moves,
+                    state.pose.x_m,
+                    state.pose.y_m,
+                    state.pose.theta_rad,
+                    twist.vx_mps,
+                    twist.vy_mps,
+                    twist.omega_radps};
     Run(ground_, s, state);
     twist = {s.vx_mps, s.vy_mps, s.omega_radps};
 }
@@ -247,11 +294,11 @@ void DriveChain::Observe(Pose2 &pose, double &t_s) const
 {
     if (!observe_.empty())
     {
-        Signals s = Seen(pose, t_s);
-        for (const Bound &bound : observe_)
-            bound.effect->Step(s, nullptr);
-        pose = {s.x_m, s.y_m, s.theta_rad};
-        t_s = s.observed_t_s;
+        ObservedPose seen{pose.x_m, pose.y_m, pose.theta_rad, t_s};
+        for (const Bound<OnObservation> &bound : observe_)
+            bound.act.observe(seen, bound.numbers);
+        pose = {seen.x_m, seen.y_m, seen.theta_rad};
+        t_s = seen.t_s;
     }
     t_s = t_s * (1 + clock_.rate_ppm * 1e-6) + clock_.offset_s;
 }
@@ -261,11 +308,11 @@ void DriveChain::Invert(Pose2 &pose, double &t_s) const
     t_s = (t_s - clock_.offset_s) / (1 + clock_.rate_ppm * 1e-6);
     if (observe_.empty())
         return;
-    Signals s = Seen(pose, t_s);
+    ObservedPose seen{pose.x_m, pose.y_m, pose.theta_rad, t_s};
     for (auto bound = observe_.rbegin(); bound != observe_.rend(); ++bound)
-        bound->effect->Invert(s);
-    pose = {s.x_m, s.y_m, s.theta_rad};
-    t_s = s.observed_t_s;
+        bound->act.invert(seen, bound->numbers);
+    pose = {seen.x_m, seen.y_m, seen.theta_rad};
+    t_s = seen.t_s;
 }
 
 }  // namespace twin

@@ -2,65 +2,40 @@
 #include "plant/kinematics.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace twin
 {
 namespace
 {
 
-using InverseMatrix = Eigen::Matrix<double, kWheels, 3>;
-
-InverseMatrix Mecanum(double half_wheelbase_m, double half_track_m)
-{
-    const double lever_m = half_wheelbase_m + half_track_m;
-    InverseMatrix inverse;
-    inverse << 1, -1, -lever_m,  //
-        1, 1, lever_m,           //
-        1, 1, -lever_m,          //
-        1, -1, lever_m;
-    return inverse;
-}
-
-InverseMatrix Differential(double half_track_m)
-{
-    InverseMatrix inverse;
-    inverse << 1, 0, -half_track_m,  //
-        1, 0, half_track_m,          //
-        1, 0, -half_track_m,         //
-        1, 0, half_track_m;
-    return inverse;
-}
-
-InverseMatrix Omni3(double lever_m)
-{
-    InverseMatrix inverse = InverseMatrix::Zero();
-    for (int k = 0; k < 3; ++k)
-    {
-        const double at_rad = std::numbers::pi * (1 + 2 * k) / 3;
-        inverse.row(k) << -std::sin(at_rad), std::cos(at_rad), lever_m;
-    }
-    return inverse;
-}
+using InverseMatrix = Eigen::Matrix<double, kMaxWheels, 3>;
 
 InverseMatrix InverseOf(const Robot &robot, WheelKind kind)
 {
-    switch (kind)
+    InverseMatrix inverse = InverseMatrix::Zero();
+    int row = 0;
+    for (const Wheel &wheel : DrivenWheels(robot, kind))
     {
-        case WheelKind::kDifferential: return Differential(robot.half_track_m);
-        case WheelKind::kOmni3: return Omni3(robot.half_track_m);
-        case WheelKind::kMecanum:
-        case WheelKind::kNone: break;
+        const double g_x = wheel.grip_x(), g_y = wheel.grip_y();
+        inverse.row(row++) << g_x, g_y, wheel.x_m * g_y - wheel.y_m * g_x;
     }
-    return Mecanum(robot.half_wheelbase_m, robot.half_track_m);
+    return inverse;
 }
 
 }  // namespace
 
-Kinematics::Kinematics(const Robot &robot, WheelKind kind) : inverse_(InverseOf(robot, kind))
+Kinematics::Kinematics(const Robot &robot, WheelKind kind)
+    : steers_(kind == WheelKind::kAckermann),
+      wheelbase_m_(2 * robot.half_wheelbase_m),
+      half_track_m_(robot.half_track_m),
+      max_steering_rad_(robot.max_steering_rad),
+      inverse_(InverseOf(robot, kind))
 {
-    // Least squares; the sideways column of a differential drive is zero and stays so.
+    if (steers_)
+        rear_m_ = robot.half_wheelbase_m;
+    // Least squares; the sideways column of a robot that cannot strafe is zero and stays so.
     Eigen::Matrix3d normal = inverse_.transpose() * inverse_;
     for (int i = 0; i < 3; ++i)
         if (normal(i, i) == 0)
@@ -68,18 +43,36 @@ Kinematics::Kinematics(const Robot &robot, WheelKind kind) : inverse_(InverseOf(
     forward_ = normal.inverse() * inverse_.transpose();
 }
 
-Twist Kinematics::Forward(const Wheels &rim_mps) const
+Twist Kinematics::Forward(const WheelMotion &motion) const
 {
-    const Eigen::Vector3d v = forward_ * Eigen::Map<const Eigen::Vector4d>(rim_mps.data());
+    const Eigen::Vector3d v = forward_ * Eigen::Map<const Eigen::Vector4d>(motion.rim_mps.data());
+    if (steers_)
+        return {v.x(), 0, v.x() * std::tan(motion.steering_rad) / wheelbase_m_};
     return {v.x(), v.y(), v.z()};
 }
 
-Wheels Kinematics::Inverse(const Twist &twist) const
+WheelMotion Kinematics::Inverse(const Twist &twist) const
 {
-    Wheels rim_mps;
-    Eigen::Map<Eigen::Vector4d>(rim_mps.data()) =
+    if (steers_)
+    {
+        const double wanted_rad =
+            std::atan2(wheelbase_m_ * twist.omega_radps, std::abs(twist.vx_mps));
+        return Steered(twist.vx_mps, twist.vx_mps < 0 ? -wanted_rad : wanted_rad);
+    }
+    WheelMotion motion;
+    Eigen::Map<Eigen::Vector4d>(motion.rim_mps.data()) =
         inverse_ * Eigen::Vector3d(twist.vx_mps, twist.vy_mps, twist.omega_radps);
-    return rim_mps;
+    return motion;
+}
+
+WheelMotion Kinematics::Steered(double vx_mps, double steering_rad) const
+{
+    WheelMotion motion;
+    motion.steering_rad = std::clamp(steering_rad, -max_steering_rad_, max_steering_rad_);
+    const double omega_radps = vx_mps * std::tan(motion.steering_rad) / wheelbase_m_;
+    motion.rim_mps[0] = vx_mps - half_track_m_ * omega_radps;
+    motion.rim_mps[1] = vx_mps + half_track_m_ * omega_radps;
+    return motion;
 }
 
 }  // namespace twin

@@ -19,19 +19,23 @@ double SinOver(double a)
 
 }  // namespace
 
-void PlanarStep(const DriveChain &chain, const Command &command, double t_s, double dt_s,
-                RobotState &state, Random *random)
+Pose2 AlongArc(const Pose2 &from, const Twist &v, double dt_s)
 {
-    const Wheels rim_mps = chain.DriveWheels(command, t_s, dt_s, state);
-    const Twist v = chain.BodyTwist(rim_mps, t_s, dt_s, state, random);
     // Chord of the arc: its direction is the middle heading, its length shrinks by sin(a)/a.
     const double half_rad = v.omega_radps * dt_s / 2;
     const double chord_s = dt_s * SinOver(half_rad);
-    const double middle_rad = state.pose.theta_rad + half_rad;
+    const double middle_rad = from.theta_rad + half_rad;
     const double c = std::cos(middle_rad), s = std::sin(middle_rad);
-    state.pose.x_m += chord_s * (c * v.vx_mps - s * v.vy_mps);
-    state.pose.y_m += chord_s * (s * v.vx_mps + c * v.vy_mps);
-    state.pose.theta_rad += 2 * half_rad;
+    return {from.x_m + chord_s * (c * v.vx_mps - s * v.vy_mps),
+            from.y_m + chord_s * (s * v.vx_mps + c * v.vy_mps), from.theta_rad + 2 * half_rad};
+}
+
+void PlanarStep(const DriveChain &chain, const Command &command, double t_s, double dt_s,
+                RobotState &state, Random *random)
+{
+    const WheelMotion motion = chain.DriveWheels(command, t_s, dt_s, state);
+    const Twist velocity = chain.BodyTwist(motion, t_s, dt_s, state, random);
+    state.pose = AlongArc(state.pose, velocity, dt_s);
 }
 
 PlanarPlant::PlanarPlant(const std::vector<Model> &models, const std::vector<Pose2> &starts,

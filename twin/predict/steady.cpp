@@ -27,7 +27,7 @@ Values Now(const RobotState &state)
 void WriteSteady(const DriveChain &chain, const double *command, double *out)
 {
     Command held;
-    std::copy_n(command, kWheels, held.value.begin());
+    std::copy_n(command, kMaxWheels, held.value.begin());
     RobotState state = chain.Start({});
     Values sum{}, now{};
     int steps = 0;
@@ -56,7 +56,7 @@ std::vector<double> PredictSteady(const Model &model, std::span<const double> co
                                   std::span<const double> values)
 {
     const size_t rows = names.empty() ? 1 : values.size() / names.size();
-    const size_t count = commands.size() / kWheels;
+    const size_t count = commands.size() / kMaxWheels;
     std::vector<double> steady(rows * count * kSteadyValues);
     for (size_t b = 0; b < rows; ++b)
     {
@@ -65,7 +65,7 @@ std::vector<double> PredictSteady(const Model &model, std::span<const double> co
             own.Set(names[p], values[b * names.size() + p]);
         const DriveChain chain(own);
         for (size_t k = 0; k < count; ++k)
-            WriteSteady(chain, &commands[k * kWheels], &steady[(b * count + k) * kSteadyValues]);
+            WriteSteady(chain, &commands[k * kMaxWheels], &steady[(b * count + k) * kSteadyValues]);
     }
     return steady;
 }

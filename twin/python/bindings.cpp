@@ -4,7 +4,11 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include "arrays.h"
+
+#include "fw/mixing.h"
+#include "plant/kinematics.h"
 #include "predict/predict.h"
 #include "predict/steady.h"
 #include "sensor/view.h"
@@ -30,7 +34,7 @@ struct PyTrack
           segment(segment_)
     {
         const size_t m = command_t_s.size(), n = pose_t_s.size();
-        if (command.shape(0) != m || command.shape(1) != kWheels || battery_V.size() != m)
+        if (command.shape(0) != m || command.shape(1) != kMaxWheels || battery_V.size() != m)
             throw std::invalid_argument(
                 "command must be (M, 4) and battery_V (M), as long as command_t_s");
         if (pose.shape(0) != n || pose.shape(1) != 3 || segment.size() != n)
@@ -59,11 +63,14 @@ nb::dict ParameterEntry(const Parameter &p)
     nb::dict row;
     row["name"] = p.name;
     row["unit"] = p.unit;
+    row["value"] = p.value;
     row["neutral"] = p.neutral;
     row["default"] = p.default_value;
     row["min"] = p.min;
     row["max"] = p.max;
-    row["usual_size"] = UsualSize(p);
+    row["usual_size"] = p.usual_size;
+    row["held"] = p.held;
+    row["stage"] = p.stage;
     row["role"] = RoleName(p.role);
     row["place_like"] = p.role == Role::kPlace;
     row["above"] = p.above;
@@ -72,12 +79,12 @@ nb::dict ParameterEntry(const Parameter &p)
     return row;
 }
 
-nb::dict CardEntry(const EffectSpec &spec)
+nb::dict CardEntry(const EffectSpec &spec, const std::vector<Wheel> &wheels)
 {
     const Card &card = spec.card;
     nb::dict entry;
     entry["name"] = card.name;
-    entry["stage"] = StageName(card.stage);
+    entry["stage"] = StageName(spec.act);
     entry["family"] = FamilyName(card.family);
     entry["phrase"] = card.phrase;
     entry["summary"] = card.summary;
@@ -91,10 +98,13 @@ nb::dict CardEntry(const EffectSpec &spec)
     entry["duty_only"] = card.drives == kDutyOnly;
     bool place_like = false;
     nb::list parameters;
-    for (const Parameter &p : spec.parameters)
+    for (const Parameter &p : ParametersFor(spec, wheels))
     {
         place_like |= p.role == Role::kPlace;
-        parameters.append(ParameterEntry(p));
+        nb::dict row = ParameterEntry(p);
+        for (const char *key : {"value", "held", "stage"})  // of a model's parameter alone
+            nb::del(row[key]);
+        parameters.append(row);
     }
     entry["place_like"] = place_like;
     entry["parameters"] = parameters;
@@ -111,28 +121,96 @@ nb::dict CardEntry(const EffectSpec &spec)
     return entry;
 }
 
+// The effects that a robot like `model`'s can have.
+nb::list CatalogueOf(const Model &model)
+{
+    nb::list effects;
+    for (const EffectSpec *spec : Catalogue())
+        if (model.WhyNot(*spec).empty())
+            effects.append(CardEntry(*spec, model.MakeWheels()));
+    return effects;
+}
+
 nb::list CatalogueList()
 {
     nb::list effects;
     for (const EffectSpec *spec : Catalogue())
-        effects.append(CardEntry(*spec));
+        effects.append(CardEntry(*spec, Model().MakeWheels()));
     return effects;
 }
 
-nb::list ValueList(const Model &model)
+nb::list ParameterList(const Model &model)
 {
     nb::list values;
-    for (const NamedValue &v : model.Values())
+    for (const Parameter &p : model.Parameters())
+        values.append(ParameterEntry(p));
+    return values;
+}
+
+nb::list WheelList(const Model &model)
+{
+    nb::list wheels;
+    for (const Wheel &wheel : model.MakeWheels())
     {
         nb::dict entry;
-        entry["name"] = v.name;
-        entry["unit"] = v.unit;
-        entry["value"] = v.value;
-        entry["min"] = v.min;
-        entry["max"] = v.max;
-        values.append(entry);
+        entry["name"] = wheel.name;
+        entry["words"] = wheel.words;
+        entry["x_m"] = wheel.x_m;
+        entry["y_m"] = wheel.y_m;
+        entry["roll"] = nb::make_tuple(wheel.roll_x, wheel.roll_y);
+        entry["grip"] = nb::make_tuple(wheel.grip_x(), wheel.grip_y());
+        wheels.append(entry);
     }
-    return values;
+    return wheels;
+}
+
+nb::list InertList(const Model &model, const std::string &plant)
+{
+    if (plant != "planar" && plant != "mujoco")
+        throw std::invalid_argument("plant '" + plant + "' must be 'planar' or 'mujoco'");
+    nb::list inert;
+    for (const Inert &number :
+         model.InertIn(plant == "planar" ? PlantKind::kPlanar : PlantKind::kMujoco))
+        inert.append(nb::make_tuple(number.name, number.why));
+    return inert;
+}
+
+// Wheel motion (rad/s) of a body velocity, and back.
+std::vector<double> WheelSpeeds(const Model &model, double vx_mps, double vy_mps,
+                                double omega_radps)
+{
+    const WheelMotion motion =
+        Kinematics(model.robot, model.base.wheels).Inverse({vx_mps, vy_mps, omega_radps});
+    std::vector<double> radps;
+    for (size_t k = 0; k < model.MakeWheels().size(); ++k)
+        radps.push_back(motion.rim_mps[k] / model.robot.wheel_radius_m);
+    return radps;
+}
+
+std::vector<double> BodyVelocity(const Model &model, const std::vector<double> &wheel_radps)
+{
+    if (wheel_radps.size() != model.MakeWheels().size())
+        throw std::invalid_argument("wheel_radps must have one speed per driven wheel");
+    if (model.base.wheels == WheelKind::kAckermann)
+        throw std::invalid_argument("the wheels of an ackermann robot do not say how it turns");
+    WheelMotion motion;
+    for (size_t k = 0; k < wheel_radps.size(); ++k)
+        motion.rim_mps[k] = wheel_radps[k] * model.robot.wheel_radius_m;
+    const Twist twist = Kinematics(model.robot, model.base.wheels).Forward(motion);
+    return {twist.vx_mps, twist.vy_mps, twist.omega_radps};
+}
+
+// The firmware's own mixing, bound here once.
+std::vector<int> MixedDuties(int speed_input_pct, int turn_input_milli)
+{
+    const fw_input input{speed_input_pct, turn_input_milli};
+    if (fw_input_check(&input) != FW_OK)
+        throw std::invalid_argument(
+            "mix: speed_input_pct must be within -100 to 100, turn_input_milli within -2000 to "
+            "2000");
+    int8_t duty_pct[FW_WHEEL_COUNT];
+    fw_mix(&input, duty_pct);
+    return {duty_pct, duty_pct + FW_WHEEL_COUNT};
 }
 
 const char *DriveName(const Model &model)
@@ -142,6 +220,7 @@ const char *DriveName(const Model &model)
         case Drive::kDuty: return "duty";
         case Drive::kWheelSpeed: return "wheel_speed";
         case Drive::kTwist: return "twist";
+        case Drive::kSteering: return "steering";
     }
     return "";
 }
@@ -195,6 +274,36 @@ Array Windows(const Model &model, const PyTrack &track, Indices starts, IndexMat
     return ToNumpy(std::move(predicted), {starts.size(), ends.shape(1), 3});
 }
 
+Array WindowsBatch(const Model &model, const PyTrack &track, Indices starts, IndexMatrix ends,
+                   const std::vector<std::string> &names, Matrix values)
+{
+    if (ends.shape(0) != starts.size() || values.shape(1) != names.size())
+        throw std::invalid_argument("ends must have one row per start, values one column per name");
+    std::vector<double> predicted;
+    {
+        nb::gil_scoped_release unlocked;
+        predicted =
+            PredictWindowsBatch(model, track.View(), Span(starts), Span(ends), names, Span(values));
+    }
+    return ToNumpy(std::move(predicted), {values.shape(0), starts.size(), ends.shape(1), 3});
+}
+
+Array WindowSlopes(const Model &model, const PyTrack &track, Indices starts, IndexMatrix ends,
+                   const std::vector<std::string> &names, Vector steps)
+{
+    if (ends.shape(0) != starts.size() || steps.size() != names.size())
+        throw std::invalid_argument("ends must have one row per start, steps one entry per name");
+    if (!std::ranges::all_of(Span(steps), [](double step) { return step > 0; }))
+        throw std::invalid_argument("steps must be above 0");
+    std::vector<double> rows;
+    {
+        nb::gil_scoped_release unlocked;
+        rows =
+            PredictWindowSlopes(model, track.View(), Span(starts), Span(ends), names, Span(steps));
+    }
+    return ToNumpy(std::move(rows), {1 + names.size(), starts.size(), ends.shape(1), 3});
+}
+
 Array OneStep(const Model &model, const PyTrack &track)
 {
     return ToNumpy(PredictOneStep(model, track.View()), {track.pose_t_s.size(), 3});
@@ -229,7 +338,7 @@ nb::list TextsList(const Model &model)
 Array Steady(const Model &model, Matrix commands, const std::vector<std::string> &names,
              Matrix values)
 {
-    if (commands.shape(1) != kWheels || values.shape(1) != names.size())
+    if (commands.shape(1) != kMaxWheels || values.shape(1) != names.size())
         throw std::invalid_argument("commands must be (K, 4), values have one column per name");
     const size_t rows = names.empty() ? 1 : values.shape(0);
     std::vector<double> steady;
@@ -258,13 +367,26 @@ NB_MODULE(twinmill_native, m)
             },
             "text"_a, "origin"_a)
         .def_static("load", &Model::Load, "name"_a)
-        .def("values", &ValueList, "Every quantity: name, unit, value, min, max.")
+        .def("values", &ParameterList,
+             "Every parameter: name, unit, value, min, max, neutral, default, usual_size (0: not "
+             "known), held (no fit moves it unless told to), stage and more.")
         .def("get", &Model::Get, "name"_a)
         .def("set", &Model::Set, "name"_a, "value"_a)
         .def("add_effect", &Model::AddEffect, "name"_a,
              "texts"_a = std::map<std::string, std::string>(),
              "Appends an effect at its neutral values; texts: its formula and the like, by name.")
         .def("remove_effect", &Model::RemoveEffect, "index"_a)
+        .def("catalogue", &CatalogueOf,
+             "Effects that this robot can have, per-wheel parameters by its own wheels.")
+        .def("wheels", &WheelList,
+             "Driven wheels: name, words, place, and unit vectors along which each rolls and "
+             "grips, body frame.")
+        .def("wheel_speeds", &WheelSpeeds, "vx_mps"_a, "vy_mps"_a, "omega_radps"_a,
+             "Speeds in rad/s of the driven wheels at that body velocity.")
+        .def("body_velocity", &BodyVelocity, "wheel_radps"_a,
+             "(vx_mps, vy_mps, omega_radps) of those speeds of the driven wheels.")
+        .def("inert", &InertList, "plant"_a,
+             "(name, why) of the numbers that were stated and do not act in 'planar' or 'mujoco'.")
         .def("for_robot", &Model::ForRobot, "robot_id"_a)
         .def(
             "stated_of",
@@ -277,6 +399,8 @@ NB_MODULE(twinmill_native, m)
         .def("sight", &SightDict, "What the robot's camera sees and how it errs, effects included.")
         .def("copy", [](const Model &model) { return Model(model); })
         .def_prop_ro("drive", &DriveName)
+        .def_prop_ro("wheel_kind",
+                     [](const Model &model) { return WheelKindName(model.base.wheels); })
         .def_prop_ro("clock_known", [](const Model &model) { return model.clock.known; })
         .def_prop_ro("clock_same", [](const Model &model) { return model.clock.same; })
         .def_prop_ro("texts", &TextsList, "By effect in their order: its texts by name.")
@@ -299,6 +423,14 @@ NB_MODULE(twinmill_native, m)
           "(B, K, 7) steady vx_mps, vy_mps, omega_radps and rim speeds at K constant commands.");
     m.def("windows", &Windows, "model"_a, "track"_a, "starts"_a, "ends"_a,
           "(W, H, 3) poses predicted at `ends` from the poses at `starts`.");
+    m.def("windows_batch", &WindowsBatch, "model"_a, "track"_a, "starts"_a, "ends"_a, "names"_a,
+          "values"_a, "(B, W, H, 3) the same for B rows of values, on all cores.");
+    m.def("window_slopes", &WindowSlopes, "model"_a, "track"_a, "starts"_a, "ends"_a, "names"_a,
+          "steps"_a,
+          "(1 + P, W, H, 3): the windows, then for each of P names their one-sided difference over "
+          "its step, per unit; downwards where the upper bound is nearer than the step.");
+    m.def("mix", &MixedDuties, "speed_input_pct"_a, "turn_input_milli"_a,
+          "Duties in percent (fl, fr, rl, rr) that the firmware gives at these inputs.");
     m.def("in_view", &InViewOf, "model"_a, "self"_a, "poses"_a, "position_m"_a, "heading_rad"_a,
           "(T,) probability that robot `self` of poses (T, N, 3), known to these standard "
           "deviations, has another in view; poses of NaN are seen by nobody.");

@@ -32,7 +32,11 @@ void CheckModel(const Model &model, const fw_config &config)
     if (model.base.drive == Drive::kWheelSpeed)
         throw std::invalid_argument(
             "the model's base.drive is 'wheel_speed', which the firmware cannot command: a swarm "
-            "needs 'duty' or 'twist'");
+            "needs 'duty', 'twist' or 'steering'");
+    if (model.base.drive == Drive::kDuty && model.base.wheels == WheelKind::kOmni3)
+        throw std::invalid_argument(
+            "the model's base.wheels is 'omni3', and the firmware mixes duties for left and right "
+            "wheels alone: a swarm of such robots needs base.drive = 'twist'");
     const double timeout_s = static_cast<double>(config.frame_timeout_us) * 1e-6;
     if (model.sensor.delay_s > timeout_s)
         throw std::invalid_argument("sensor.delay_s = " + std::to_string(model.sensor.delay_s) +
@@ -50,11 +54,15 @@ int SubstepCount(double period_s, double max_step_s)
 Command CommandFor(const Base &base, const fw_input &input, const int8_t *wheel_duty_pct)
 {
     Command command;
+    const double turn_input = input.turn_input_milli / 1000.0;
     if (base.drive == Drive::kTwist)
         command.value = {input.speed_input_pct * base.speed_per_input_mps, 0,
-                         input.turn_input_milli / 1000.0 * base.turn_per_input_radps, 0};
+                         turn_input * base.turn_per_input_radps, 0};
+    else if (base.drive == Drive::kSteering)
+        command.value = {input.speed_input_pct * base.speed_per_input_mps,
+                         turn_input * base.steering_per_input_rad, 0, 0};
     else
-        for (size_t k = 0; k < kWheels; ++k)
+        for (size_t k = 0; k < kMaxWheels; ++k)
             command.value[k] = wheel_duty_pct[k] / 100.0;
     return command;
 }
@@ -93,8 +101,8 @@ void Swarm::Play(int robot, std::shared_ptr<const Script> script)
     Member &member = members_[static_cast<size_t>(robot)];
     if (script && script->has_duties() && member.base.drive != Drive::kDuty)
         throw std::invalid_argument(
-            "the script gives wheel duties, but the model's base.drive is 'twist': give "
-            "speed_input and turn_input instead");
+            "the script gives wheel duties, but the model's base.drive is 'twist' or 'steering': "
+            "give speed_input and turn_input instead");
     member.script = std::move(script);
     member.script_begin_s = TimeS();
 }
@@ -188,7 +196,7 @@ void Swarm::DecideOne(Member &member, const std::optional<SensorFrame> &frame, i
 
     double duty = 0;
     for (const int8_t pct : member.output.wheel_duty_pct)
-        duty += std::abs(pct) / 100.0 / kWheels;
+        duty += std::abs(pct) / 100.0 / kMaxWheels;
     const double charge_As = (kComputer_A + kMotors_A * duty) * period_s_;
     member.battery_V -= (kFullPack_V - kEmptyPack_V) * charge_As / kPackCharge_As;
 }

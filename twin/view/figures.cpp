@@ -28,7 +28,7 @@ Figures::Figures(const std::string &mjcf, size_t robots)
     for (size_t i = 0; i < robots; ++i)
     {
         Joints joints{};
-        for (size_t k = 0; k < kWheels; ++k)
+        for (size_t k = 0; k < kMaxWheels; ++k)
             joints.wheels[k] = address(i, kWheelNames[k]);
         const int wheel = mj_name2id(m, mjOBJ_GEOM, NameInWorld(static_cast<int>(i), "fl").c_str());
         joints.base = m->jnt_qposadr[m->body_jntadr[m->body_rootid[m->geom_bodyid[wheel]]]];
@@ -50,7 +50,7 @@ void Figures::Place(const Swarm &swarm)
         q[3] = std::cos(state.pose.theta_rad / 2);
         q[4] = q[5] = 0;
         q[6] = std::sin(state.pose.theta_rad / 2);
-        for (size_t k = 0; k < kWheels; ++k)
+        for (size_t k = 0; k < kMaxWheels; ++k)
             data_->qpos[joints_[i].wheels[k]] += state.rim_mps[k] / wheel_radius_m_ * dt_s;
     }
     mj_fwdPosition(model_.get(), data_.get());

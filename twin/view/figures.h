@@ -38,7 +38,7 @@ private:
     struct Joints
     {
         int base;
-        std::array<int, kWheels> wheels;
+        std::array<int, kMaxWheels> wheels;
     };
     std::unique_ptr<mjModel, Deleter> model_;
     std::unique_ptr<mjData, Deleter> data_;

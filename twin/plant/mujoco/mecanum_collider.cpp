@@ -17,7 +17,7 @@ mjfCollision stock_collision = nullptr;
 // that a contact pair can grip along that axis and let go across it.
 //
 //   axle a, floor normal n, rolling direction t = a x n:    tangent = (t + s l) / sqrt(2)
-//   l = a without its part along n, s = geom_user[0]
+//   l = a without its part along n, s = geom_user[0]; rollers across (omni wheels): t alone
 int CollideWheel(const mjModel *m, mjData *d, mjPreContact *contact, int plane, int wheel,
                  mjtNum margin)
 {
@@ -45,6 +45,11 @@ int CollideWheel(const mjModel *m, mjData *d, mjPreContact *contact, int plane, 
     mju_copy3(contact->normal, n);
     mju_cross(t, a, n);
     mju_normalize3(t);
+    if (side == kRollersAcrossCode)
+    {
+        mju_copy3(contact->tangent, t);
+        return 1;
+    }
     mju_addScl3(contact->tangent, t, l, side);
     mju_scl3(contact->tangent, contact->tangent, 1 / std::numbers::sqrt2);
     return 1;

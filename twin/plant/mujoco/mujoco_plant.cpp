@@ -40,32 +40,38 @@ void CheckInputs(const std::vector<Model> &models, const std::vector<Pose2> &sta
             "mujoco plant: timestep_s " + std::to_string(options.timestep_s) +
             " must be above 0 and at most 0.01: contacts are stiffer than that");
     for (const Model &model : models)
-        if (model.base.wheels == WheelKind::kDifferential || model.base.wheels == WheelKind::kOmni3)
+    {
+        if (model.base.wheels == WheelKind::kAckermann)
             throw std::invalid_argument(
-                "mujoco plant: base.wheels is not \"mecanum\" or \"none\": the MJCF robot has "
-                "mecanum wheels; use the planar plant");
+                "mujoco plant: base.wheels is \"ackermann\", and steered wheels are built in the "
+                "planar plant alone: use --plant planar");
+        if (model.base.wheels != models[0].base.wheels)
+            throw std::invalid_argument("mujoco plant: all robots must have the same base.wheels");
+    }
 }
 
 // Radius and places of the wheels as the MJCF file has them.
-Robot Geometry(const mjModel *m)
+Robot Geometry(const mjModel *m, const Model &model)
 {
     Robot robot;
-    const int wheel = Id(m, mjOBJ_GEOM, 0, "fl");
+    const int wheel = Id(m, mjOBJ_GEOM, 0, model.MakeWheels()[0].name);
     const mjtNum *hub = m->body_pos + 3 * m->geom_bodyid[wheel];
     robot.wheel_radius_m = m->geom_size[3 * wheel];
     robot.half_wheelbase_m = std::abs(hub[0]);
-    robot.half_track_m = std::abs(hub[1]);
+    robot.half_track_m =
+        model.base.wheels == WheelKind::kOmni3 ? std::hypot(hub[0], hub[1]) : std::abs(hub[1]);
     return robot;
 }
 
-// Drag across the grip of one wheel that carries a quarter of its robot.
-double RollerDrag(const mjModel *m)
+// Drag across the grip of one wheel that carries its share of the robot.
+double RollerDrag(const mjModel *m, const std::vector<Wheel> &wheels)
 {
     const int numeric = mj_name2id(m, mjOBJ_NUMERIC, kRollerDrag);
     if (numeric < 0)
         return 0;
-    const int base = m->body_rootid[m->geom_bodyid[Id(m, mjOBJ_GEOM, 0, "fl")]];
-    const double load_N = m->body_subtreemass[base] * -m->opt.gravity[2] / kWheels;
+    const int base = m->body_rootid[m->geom_bodyid[Id(m, mjOBJ_GEOM, 0, wheels[0].name)]];
+    const double load_N =
+        m->body_subtreemass[base] * -m->opt.gravity[2] / static_cast<double>(wheels.size());
     return m->numeric_data[m->numeric_adr[numeric]] * load_N;
 }
 
@@ -79,10 +85,10 @@ MujocoPlant::MujocoPlant(const std::string &mjcf, const std::vector<Model> &mode
     mju_user_warning = PrintWarning;
     model_.reset(CompileWorld(mjcf, models, starts, options));
     data_.reset(mj_makeData(model_.get()));
-    const Robot geometry = Geometry(model_.get());
+    const Robot geometry = Geometry(model_.get(), models[0]);
     wheel_radius_m_ = geometry.wheel_radius_m;
-    kinematics_ = Kinematics(geometry, WheelKind::kMecanum);
-    drag_N_ = RollerDrag(model_.get());
+    kinematics_ = Kinematics(geometry, models[0].base.wheels);
+    drag_N_ = RollerDrag(model_.get(), models[0].MakeWheels());
     for (size_t i = 0; i < models.size(); ++i)
         robots_.push_back(MakeMember(static_cast<int>(i), models[i], starts[i], options.seed));
     mj_forward(model_.get(), data_.get());
@@ -94,16 +100,20 @@ MujocoPlant::Member MujocoPlant::MakeMember(int robot, const Model &model, const
     const mjModel *m = model_.get();
     DriveChain chain(model);
     const RobotState state = chain.Start(start);
-    const int base = m->body_rootid[m->geom_bodyid[Id(m, mjOBJ_GEOM, robot, "fl")]];
+    const std::vector<Wheel> layout = model.MakeWheels();
+    const int base = m->body_rootid[m->geom_bodyid[Id(m, mjOBJ_GEOM, robot, layout[0].name)]];
     const int joint = m->body_jntadr[base];
-    std::array<Wheel, kWheels> wheels;
-    for (size_t k = 0; k < kWheels; ++k)
+    std::vector<DrivenWheel> wheels;
+    for (const Wheel &wheel : layout)
     {
-        const int geom = Id(m, mjOBJ_GEOM, robot, kWheelNames[k]);
-        const mjtNum *hub = m->body_pos + 3 * m->geom_bodyid[geom];
-        wheels[k] = {m->jnt_dofadr[Id(m, mjOBJ_JOINT, robot, kWheelNames[k])],
-                     Id(m, mjOBJ_ACTUATOR, robot, kWheelNames[k]), hub[0], hub[1],
-                     m->geom_user[m->nuser_geom * geom]};
+        const mjtNum *hub = m->body_pos + 3 * m->geom_bodyid[Id(m, mjOBJ_GEOM, robot, wheel.name)];
+        // Square to the grip, unit length.
+        const double g_x = wheel.grip_x(), g_y = wheel.grip_y();
+        const double length =
+            wheel.tread == Tread::kPlain ? kNoLimit : std::sqrt(g_x * g_x + g_y * g_y);
+        wheels.push_back({m->jnt_dofadr[Id(m, mjOBJ_JOINT, robot, wheel.name)],
+                          Id(m, mjOBJ_ACTUATOR, robot, wheel.name), hub[0], hub[1], wheel.roll_x,
+                          wheel.roll_y, -g_y / length, g_x / length});
     }
     return {std::move(chain),
             Random(seed, robot, "drive_noise"),
@@ -112,7 +122,7 @@ MujocoPlant::Member MujocoPlant::MakeMember(int robot, const Model &model, const
             {},
             m->jnt_qposadr[joint],
             m->jnt_dofadr[joint],
-            wheels,
+            std::move(wheels),
             {}};
 }
 
@@ -153,42 +163,44 @@ void MujocoPlant::Step(double dt_s)
 }
 
 // The wheels are told to turn so that, where they grip, the body moves as the drive chain says.
-// What the four wheels disagree about remains: they work against each other.
+// What the wheels disagree about remains: they work against each other.
 void MujocoPlant::Drive(Member &member, double dt_s)
 {
     RobotState &memory = member.chain_state;
     memory.pose = member.state.pose;
     const double t_s = data_->time;
-    const Wheels rim_mps = member.chain.DriveWheels(member.command, t_s, dt_s, memory);
-    const Twist wanted = member.chain.BodyTwist(rim_mps, t_s, dt_s, memory, &member.random);
-    const Twist rolled = kinematics_.Forward(rim_mps);
-    member.offset_mps =
-        kinematics_.Inverse({wanted.vx_mps - rolled.vx_mps, wanted.vy_mps - rolled.vy_mps,
-                             wanted.omega_radps - rolled.omega_radps});
-    for (size_t k = 0; k < kWheels; ++k)
+    const WheelMotion motion = member.chain.DriveWheels(member.command, t_s, dt_s, memory);
+    const Twist wanted = member.chain.BodyTwist(motion, t_s, dt_s, memory, &member.random);
+    const Twist rolled = kinematics_.Forward(motion);
+    member.offset_mps = kinematics_
+                            .Inverse({wanted.vx_mps - rolled.vx_mps, wanted.vy_mps - rolled.vy_mps,
+                                      wanted.omega_radps - rolled.omega_radps})
+                            .rim_mps;
+    for (size_t k = 0; k < member.wheels.size(); ++k)
         data_->ctrl[member.wheels[k].actuator] =
-            (rim_mps[k] + member.offset_mps[k]) / wheel_radius_m_;
+            (motion.rim_mps[k] + member.offset_mps[k]) / wheel_radius_m_;
 }
 
 // Across its grip a wheel rolls on its rollers, at w over the floor: drag -F tanh(w / w0) along
-// e = (-s, 1)/sqrt(2), on the body and, through the axle, on the wheel.
+// that direction e, on the body and, through the axle, on the wheel.
 void MujocoPlant::DragRollers(const Member &member)
 {
     const mjtNum *v_world = data_->qvel + member.dof, omega = v_world[5];
     mjtNum to_body[4], v[3], force[3] = {0, 0, 0}, torque = 0;
     mju_negQuat(to_body, data_->qpos + member.qpos + 3);
     mju_rotVecQuat(v, v_world, to_body);
-    for (const Wheel &wheel : member.wheels)
+    for (const DrivenWheel &wheel : member.wheels)
     {
-        const double e_x = -wheel.side / std::numbers::sqrt2, e_y = 1 / std::numbers::sqrt2;
+        const double e_x = wheel.free_x, e_y = wheel.free_y;
         const double rim_mps = data_->qvel[wheel.dof] * wheel_radius_m_;
-        const double w_mps =
-            e_x * (v[0] - omega * wheel.y_m - rim_mps) + e_y * (v[1] + omega * wheel.x_m);
+        const double w_mps = e_x * (v[0] - omega * wheel.y_m - rim_mps * wheel.roll_x) +
+                             e_y * (v[1] + omega * wheel.x_m - rim_mps * wheel.roll_y);
         const double drag_N = -drag_N_ * std::tanh(w_mps / kDragSpeed_mps);
         force[0] += e_x * drag_N;
         force[1] += e_y * drag_N;
         torque += (wheel.x_m * e_y - wheel.y_m * e_x) * drag_N;
-        data_->qfrc_applied[wheel.dof] = -wheel_radius_m_ * e_x * drag_N;
+        const double along = e_x * wheel.roll_x + e_y * wheel.roll_y;
+        data_->qfrc_applied[wheel.dof] = -wheel_radius_m_ * along * drag_N;
     }
     mju_rotVecQuat(data_->qfrc_applied + member.dof, force, data_->qpos + member.qpos + 3);
     data_->qfrc_applied[member.dof + 5] = torque;
@@ -207,7 +219,7 @@ void MujocoPlant::Sense(Member &member) const
     state.vx_mps += c * v[0] + s * v[1];
     state.vy_mps += -s * v[0] + c * v[1];
     state.omega_radps += v[5];
-    for (size_t k = 0; k < kWheels; ++k)
+    for (size_t k = 0; k < member.wheels.size(); ++k)
         state.rim_mps[k] =
             data_->qvel[member.wheels[k].dof] * wheel_radius_m_ - member.offset_mps[k];
 }

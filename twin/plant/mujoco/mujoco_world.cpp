@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "mecanum_collider.h"
+#include "robot_mjcf.h"
 
 namespace twin
 {
@@ -29,13 +30,16 @@ using Spec = std::unique_ptr<mjSpec, SpecDeleter>;
 
 [[noreturn]] void Fail(const std::string &mjcf, const std::string &why)
 {
-    throw std::invalid_argument(mjcf + ": " + why);
+    throw std::invalid_argument((mjcf.empty() ? "mujoco plant" : mjcf) + ": " + why);
 }
 
-Spec Parse(const std::string &mjcf)
+// The file's robot, or without a file one made of the model's numbers.
+Spec Parse(const std::string &mjcf, const Model &model)
 {
     char error[1000] = "";
-    Spec spec(mj_parseXML(mjcf.c_str(), nullptr, error, sizeof error));
+    Spec spec(mjcf.empty()
+                  ? mj_parseXMLString(RobotMjcf(model).c_str(), nullptr, error, sizeof error)
+                  : mj_parseXML(mjcf.c_str(), nullptr, error, sizeof error));
     if (!spec)
         Fail(mjcf, std::string("is no valid MJCF: ") + error);
     return spec;
@@ -47,23 +51,32 @@ mjsGeom *FindGeom(mjSpec *spec, const std::string &name)
     return element ? mjs_asGeom(element) : nullptr;
 }
 
-void CheckWheel(const std::string &mjcf, mjSpec *spec, const char *name)
+void CheckWheel(const std::string &mjcf, mjSpec *spec, const Wheel &wheel)
 {
     const struct
     {
         mjtObj type;
         const char *word;
     } parts[] = {{mjOBJ_JOINT, "joint"}, {mjOBJ_GEOM, "geom"}, {mjOBJ_ACTUATOR, "actuator"}};
+    const std::string name = wheel.name;
     for (const auto &part : parts)
-        if (!mjs_findElement(spec, part.type, name))
-            Fail(mjcf,
-                 std::string("has no ") + part.word + " \"" + name +
-                     "\"; a robot needs a joint, a geom and an actuator for each of its wheels "
-                     "fl, fr, rl, rr (see turbopi.xml)");
+        if (!mjs_findElement(spec, part.type, wheel.name))
+            Fail(mjcf, std::string("has no ") + part.word + " \"" + name +
+                           "\"; a robot needs a joint, a geom and an actuator for each of its "
+                           "wheels fl, fr, rl, rr, or w1, w2, w3 of an omni3 robot (see "
+                           "turbopi.xml)");
     const mjsGeom *geom = FindGeom(spec, name);
     int size = 0;
-    const double *side = mjs_getDouble(geom->userdata, &size);
-    if (geom->type != mjGEOM_CYLINDER || size != 1 || std::abs(*side) != 1)
+    const double *user = mjs_getDouble(geom->userdata, &size);
+    const double code = size == 1 ? *user : 0;
+    if (geom->type == mjGEOM_CYLINDER && RollerCode(wheel.tread) == code)
+        return;
+    if (wheel.tread == Tread::kPlain || wheel.tread == Tread::kRollersAcross)
+        Fail(mjcf, "geom \"" + name + "\" must be a cylinder" +
+                       (wheel.tread == Tread::kPlain
+                            ? " without user data: the model's robot has plain wheels"
+                            : " with user=\"2\": the model's robot has omni wheels"));
+    if (geom->type != mjGEOM_CYLINDER || std::abs(code) != 1)
         Fail(
             mjcf,
             std::string("geom \"") + name +
@@ -72,11 +85,12 @@ void CheckWheel(const std::string &mjcf, mjSpec *spec, const char *name)
 }
 
 // The body that carries the wheels.
-mjsBody *FindBase(const std::string &mjcf, mjSpec *spec)
+mjsBody *FindBase(const std::string &mjcf, mjSpec *spec, const std::vector<Wheel> &wheels)
 {
-    for (const char *name : kWheelNames)
-        CheckWheel(mjcf, spec, name);
-    mjsBody *base = mjs_getParent(mjs_getParent(mjs_findElement(spec, mjOBJ_JOINT, "fl"))->element);
+    for (const Wheel &wheel : wheels)
+        CheckWheel(mjcf, spec, wheel);
+    mjsElement *first = mjs_findElement(spec, mjOBJ_JOINT, wheels[0].name);
+    mjsBody *base = mjs_getParent(mjs_getParent(first)->element);
     mjsElement *joint = mjs_firstChild(base, mjOBJ_JOINT, 0);
     if (!joint || mjs_asJoint(joint)->type != mjJNT_FREE)
         Fail(mjcf, "the body that carries the wheels has no free joint, so the robot cannot move");
@@ -84,30 +98,31 @@ mjsBody *FindBase(const std::string &mjcf, mjSpec *spec)
 }
 
 // Everything but the robot: the file's own world if it has a floor, else the installed one.
-Spec MakeSurroundings(const std::string &mjcf, mjSpec *robot)
+Spec MakeSurroundings(const std::string &mjcf, mjSpec *robot, const Model &model)
 {
     Spec world;
     if (FindGeom(robot, kFloor))
     {
         world.reset(mj_copySpec(robot));
-        mjs_delete(world.get(), FindBase(mjcf, world.get())->element);
+        mjs_delete(world.get(), FindBase(mjcf, world.get(), model.MakeWheels())->element);
     }
     else
-        world = Parse(FindModelFile("turbopi_world.xml"));
+        world = Parse(FindModelFile("turbopi_world.xml"), model);
     world->nuser_geom = 1;
     return world;
 }
 
-// A contact pair that grips along the rollers' axes, with the friction and softness of the wheel's
-// geom. It takes the place of the contact that floor and wheel would have by themselves.
-void AddWheelContact(mjSpec *world, const mjsGeom &wheel, const std::string &name)
+// A contact pair that grips along the rollers' axes, or all around if there are none, with the
+// friction and softness of the wheel's geom. It takes the place of the contact that floor and wheel
+// would have by themselves.
+void AddWheelContact(mjSpec *world, const mjsGeom &wheel, const std::string &name, Tread tread)
 {
     mjsPair *pair = mjs_addPair(world, nullptr);
     mjs_setString(pair->geomname1, kFloor);
     mjs_setString(pair->geomname2, name.c_str());
     pair->condim = 3;
     pair->friction[0] = wheel.friction[0];
-    pair->friction[1] = kCrossFriction;
+    pair->friction[1] = tread == Tread::kPlain ? wheel.friction[0] : kCrossFriction;
     for (int i = 0; i < mjNREF; ++i)
         pair->solref[i] = wheel.solref[i];
 }
@@ -131,6 +146,44 @@ void ChangeHull(mjsBody *base, const Model &model)
     }
 }
 
+double CompiledMass(mjSpec *robot)
+{
+    const std::unique_ptr<mjModel, void (*)(mjModel *)> model(mj_compile(robot, nullptr),
+                                                              mj_deleteModel);
+    return model ? model->body_subtreemass[0] : 0;
+}
+
+void ScaleMass(mjsBody *body, double factor)
+{
+    body->mass *= factor;
+    for (double &moment : body->inertia)
+        moment *= factor;
+    for (double &moment : body->fullinertia)
+        moment *= factor;
+    for (mjsElement *e = mjs_firstChild(body, mjOBJ_GEOM, 0); e; e = mjs_nextChild(body, e, 0))
+    {
+        mjs_asGeom(e)->mass *= factor;
+        mjs_asGeom(e)->density *= factor;
+    }
+    for (mjsElement *e = mjs_firstChild(body, mjOBJ_BODY, 0); e; e = mjs_nextChild(body, e, 0))
+        ScaleMass(mjs_asBody(e), factor);
+}
+
+// The model's mass, where it states one, spread as in the file.
+void TakeMass(const std::string &mjcf, mjSpec *robot, mjsBody *base, const Model &model)
+{
+    constexpr double kRounded = 1e-3;  // files give the masses of parts to a few digits
+    if (mjcf.empty() || !model.States("robot.mass_kg"))
+        return;
+    const Spec alone(mj_copySpec(robot));
+    const double file_kg = CompiledMass(alone.get());
+    if (!(file_kg > 0))
+        Fail(mjcf, "its robot has no mass that robot.mass_kg could change");
+    const double factor = model.robot.mass_kg / file_kg;
+    if (std::abs(factor - 1) > kRounded)
+        ScaleMass(base, factor);
+}
+
 void AddRobot(const std::string &mjcf, mjSpec *world, mjSpec *robot, int id, const Pose2 &start,
               const Model &model)
 {
@@ -141,14 +194,16 @@ void AddRobot(const std::string &mjcf, mjSpec *world, mjSpec *robot, int id, con
     frame->quat[3] = std::sin(start.theta_rad / 2);
 
     const Spec copy(mj_copySpec(robot));
-    mjsBody *base = FindBase(mjcf, copy.get());
+    const std::vector<Wheel> wheels = model.MakeWheels();
+    mjsBody *base = FindBase(mjcf, copy.get(), wheels);
     ChangeHull(base, model);
+    TakeMass(mjcf, robot, base, model);
     if (!mjs_attach(frame->element, base->element, NameInWorld(id, "").c_str(), ""))
         Fail(mjcf, std::string("cannot be put into the world: ") + mjs_getError(world));
-    for (const char *name : kWheelNames)
+    for (const Wheel &wheel : wheels)
     {
-        const std::string wheel = NameInWorld(id, name);
-        AddWheelContact(world, *FindGeom(world, wheel), wheel);
+        const std::string name = NameInWorld(id, wheel.name);
+        AddWheelContact(world, *FindGeom(world, name), name, wheel.tread);
     }
 }
 
@@ -196,9 +251,9 @@ mjModel *CompileWorld(const std::string &mjcf, const std::vector<Model> &models,
                       const std::vector<Pose2> &starts, const MujocoOptions &options)
 {
     InstallMecanumCollider();
-    const Spec robot = Parse(mjcf);
-    FindBase(mjcf, robot.get());
-    const Spec world = MakeSurroundings(mjcf, robot.get());
+    const Spec robot = Parse(mjcf, models[0]);
+    FindBase(mjcf, robot.get(), models[0].MakeWheels());
+    const Spec world = MakeSurroundings(mjcf, robot.get(), models[0]);
     CopyRollerDrag(world.get(), robot.get());
     for (size_t i = 0; i < starts.size(); ++i)
         AddRobot(mjcf, world.get(), robot.get(), static_cast<int>(i), starts[i], models[i]);

@@ -8,8 +8,6 @@
 namespace twin
 {
 
-constexpr const char *kWheelNames[kWheels] = {"fl", "fr", "rl", "rr"};
-
 // Numeric of the MJCF file: drag across the grip, as a fraction of a wheel's load (0 if absent).
 constexpr const char *kRollerDrag = "roller_drag";
 

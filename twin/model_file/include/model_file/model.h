@@ -4,22 +4,16 @@
 #define MODEL_FILE_MODEL_H
 
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "effects/effect.h"
+#include "model_file/wheels.h"
 
 namespace twin
 {
-
-enum class WheelKind
-{
-    kMecanum,
-    kDifferential,
-    kOmni3,
-    kNone
-};
 
 struct Robot
 {
@@ -27,7 +21,8 @@ struct Robot
     double half_wheelbase_m = 0.059;
     double half_track_m = 0.067;
     double body_radius_m = 0.1;
-    double mass_kg = 1.2;
+    double mass_kg = 1.2;           // acts in MuJoCo, where a file or a call states it
+    double max_steering_rad = 0.5;  // Ackermann
     double battery_nominal_V = 7.4;
 };
 
@@ -38,10 +33,12 @@ struct Base
     WheelKind wheels = WheelKind::kMecanum;
     std::vector<double> duty_pct{0, 100};          // ascending from 0
     std::vector<double> wheel_speed_mps{0, 0.36};  // rim speed at that duty, driving straight
-    double speed_per_input_mps = 0.0036;           // twist drive: speed of speed_input 1
+    double speed_per_input_mps = 0.0036;           // twist, steering: speed of speed_input 1
     double turn_per_input_radps = 1.0;             // twist drive: rate of turn_input 1
+    double steering_per_input_rad = 0.25;          // steering drive: angle of turn_input 1
     double forward_gain = 1, sideways_gain = 1, yaw_gain = 1;
     double motor_lag_s = 0;
+    double steering_lag_s = 0;  // Ackermann: time constant of the steering
     double control_period_s = 0.022;
 };
 
@@ -77,28 +74,28 @@ struct Clock
     double offset_s = 0, rate_ppm = 0;
 };
 
-struct Bounds
-{
-    double min, max;
-};
-
 struct EffectInstance
 {
     const EffectSpec *spec;
-    std::vector<double> values;      // in the order of spec->parameters
-    std::vector<Bounds> bounds;      // the same; within the parameters' own
-    std::vector<std::string> texts;  // in the order of spec->texts
+    std::vector<Parameter> parameters;  // of this model's robot: per-wheel ones for each wheel
+    std::vector<std::string> texts;     // in the order of spec->texts
+    const char *stage;                  // where it acts, with these texts
 
+    std::vector<double> Values() const;
     // Throws std::invalid_argument if a text makes no sense.
-    std::unique_ptr<Effect> Make() const;
+    BoundEffect Bind() const;
 };
 
-// A quantity of a model under its name: "base.forward_gain", "dead_zone.width",
-// "dead_zone#2.width".
-struct NamedValue
+// What a model states and a plant cannot do.
+struct Inert
 {
-    std::string name, unit;
-    double value, min, max;
+    std::string name, why;
+};
+
+enum class PlantKind
+{
+    kPlanar,
+    kMujoco
 };
 
 class Model
@@ -109,7 +106,11 @@ public:
     // Finds `name` in the working directory, then among the installed models; reads it.
     static Model Load(const std::string &name);
 
-    std::vector<NamedValue> Values() const;
+    // Every number of the model under its full name: "base.forward_gain", "dead_zone.width",
+    // "dead_zone#2.width".
+    std::vector<Parameter> Parameters() const;
+    // One of them. Throws std::invalid_argument if there is none of that name; so does Get().
+    Parameter Find(const std::string &name) const;
     double Get(const std::string &name) const;
     // Throws std::invalid_argument if the name is unknown or the value out of bounds.
     void Set(const std::string &name, double value);
@@ -117,12 +118,20 @@ public:
     // Throws if it or a text's name is unknown, if a text makes no sense, or if made for another
     // drive.
     void AddEffect(const std::string &name, const std::map<std::string, std::string> &texts = {});
+    // Why this robot cannot have that effect, as a clause; empty: it can.
+    std::string WhyNot(const EffectSpec &spec) const;
     void RemoveEffect(size_t index);
     // The model of one robot: its [robots.Rnn] overrides applied.
     Model ForRobot(int robot_id) const;
     // What this robot's camera sees and its body does on contact, effects included.
     Sight MakeSight() const;
     Body MakeBody() const;
+    // The robot's driven wheels.
+    std::vector<Wheel> MakeWheels() const { return DrivenWheels(robot, base.wheels); }
+    // Numbers that were stated, are not the default and do not act in that plant, and why.
+    std::vector<Inert> InertIn(PlantKind plant) const;
+    // Whether the file or Set() gave that number of a table.
+    bool States(const std::string &name) const { return stated.contains(name); }
 
     Robot robot;
     Base base;
@@ -134,6 +143,8 @@ public:
     std::vector<EffectInstance> effects;
     // By robot: "range_m" and the like for fields, "wheel_gain.front_left" for effects.
     std::map<int, std::map<std::string, double>> robot_overrides;
+    std::set<std::string, std::less<>>
+        stated;  // names of table numbers that did not come by default
 };
 
 // Path of an installed file (model, MJCF) or of one in the working directory; throws if there is

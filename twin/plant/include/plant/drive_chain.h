@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One robot's path from command to velocity over the floor: duty, wheel and ground stages, shared
-// by both plants.
+// One robot's path from command to velocity over the floor: the stages of duty, wheel, rolling and
+// ground, shared by both plants.
 #ifndef PLANT_DRIVE_CHAIN_H
 #define PLANT_DRIVE_CHAIN_H
 
@@ -22,12 +22,13 @@ public:
     explicit DriveChain(const Model &model);
 
     RobotState Start(const Pose2 &pose) const;
-    // Duty and wheel stages: advances the wheels' speed and angle by `dt_s`; returns the mean
-    // speeds at which they roll meanwhile.
-    Wheels DriveWheels(const Command &command, double t_s, double dt_s, RobotState &state) const;
-    // Ground stage: the body velocity that these rim speeds give, gains, effects and, if `random`
-    // is not null, drive noise included. Stores it in `state`.
-    Twist BodyTwist(const Wheels &rim_mps, double t_s, double dt_s, RobotState &state,
+    // Up to rolling: advances the wheels' speed and angle and the steering by `dt_s`; returns the
+    // mean motion with which they roll meanwhile.
+    WheelMotion DriveWheels(const Command &command, double t_s, double dt_s,
+                            RobotState &state) const;
+    // Ground stage: the body velocity that this motion gives, gains, effects and, if `random` is
+    // not null, drive noise included. Stores it in `state`.
+    Twist BodyTwist(const WheelMotion &motion, double t_s, double dt_s, RobotState &state,
                     Random *random) const;
 
     // Observe stage: the pose and time stamp that motion capture reports, and the way back.
@@ -35,26 +36,43 @@ public:
     void Invert(Pose2 &pose, double &t_s) const;
 
     const Kinematics &kinematics() const { return kinematics_; }
+    int WheelCount() const { return robot_.wheels; }
+    // No effect of the ground reads where the robot is or heads, nor remembers anything: its
+    // velocity in the body frame depends on its commands alone.
+    bool IsHomogeneous() const { return homogeneous_; }
 
 private:
+    template <class On>
     struct Bound
     {
-        std::unique_ptr<Effect> effect;
+        On act;
+        Numbers numbers;
         int state_offset;
+        bool first;  // acts before the others of its stage
     };
-    void Run(const std::vector<Bound> &stage, Signals &signals, RobotState &state) const;
-    Wheels Target(const Wheels &command) const;
-    void ActOnGround(Twist &twist, const Wheels &rim_mps, bool moves, double t_s, double dt_s,
-                     RobotState &state) const;
+    void Bind(const EffectInstance &instance);
+    template <class On, class S>
+    static void Run(const std::vector<Bound<On>> &stage, S &signals, RobotState &state);
+    WheelMotion Target(const Wheels &command) const;
+    void DrivePart(const DutySignals &duty, double whole_s, RobotState &state,
+                   WheelMotion &mean) const;
+    void ActOnGround(Twist &twist, bool moves, double t_s, double dt_s, RobotState &state) const;
     void Disturb(Twist &twist, double dt_s, RobotState &state, Random &random) const;
 
     Base base_;
     Noise noise_;
     Clock clock_;
-    double theta_a1_, theta_a2_, battery_nominal_V_, wheel_radius_m_;
+    double theta_a1_, theta_a2_;
+    RobotFacts robot_;
     Kinematics kinematics_;
-    std::vector<Bound> duty_, wheel_, ground_, observe_;
+    std::vector<std::unique_ptr<const BoundEffect>> effects_;  // the stages point into them
+    std::vector<Bound<OnDuty>> duty_;
+    std::vector<Bound<OnWheels>> wheel_;
+    std::vector<Bound<OnRolling>> rolling_;
+    std::vector<Bound<OnGround>> ground_;
+    std::vector<Bound<OnObservation>> observe_;
     int state_size_ = 0;
+    bool homogeneous_ = true;
 };
 
 }  // namespace twin

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rim speeds of the wheels to body velocity and back.
+// Wheel motion to body velocity and back, for every layout of wheels.
 #ifndef PLANT_KINEMATICS_H
 #define PLANT_KINEMATICS_H
 
@@ -15,21 +15,37 @@ struct Twist
     double vx_mps = 0, vy_mps = 0, omega_radps = 0;  // forward, left, counter-clockwise
 };
 
-// Mecanum: rim_k = vx + s_k vy + (-y_k + s_k x_k) omega, s = -,+,+,-; forward by least squares.
+struct WheelMotion
+{
+    Wheels rim_mps{};
+    double steering_rad = 0;  // Ackermann: of the middle of the front axle, left positive
+};
+
+// A wheel at (x, y) that rolls along t and grips along g turns with the part of its contact point's
+// velocity along g: rim = g . (vx - y omega, vy + x omega) / (g . t); forward by least squares.
 // (Muir and Neuman 1987, "Kinematic modeling for feedback control of an omnidirectional wheeled
-// robot".) Differential: left and right pairs, no sideways motion. Omni3: three wheels at 60, 180
-// and 300 degrees, rolling counter-clockwise; the fourth rim is unused. None: the ideal mecanum
-// equations.
+// robot".) Differential: no sideways motion. Ackermann: the middle of the rear axle moves along the
+// robot, and omega = vx tan(steering) / wheelbase (Rajamani 2012, Vehicle Dynamics and Control,
+// sec. 2.2).
 class Kinematics
 {
 public:
     Kinematics(const Robot &robot, WheelKind kind);
-    Twist Forward(const Wheels &rim_mps) const;
-    Wheels Inverse(const Twist &twist) const;
+    Twist Forward(const WheelMotion &motion) const;
+    // The motion nearest to `twist` that the wheels can make. A steered robot cannot turn on the
+    // spot; its steering stays within its limit.
+    WheelMotion Inverse(const Twist &twist) const;
+    // Of a robot that is steered at this speed and angle.
+    WheelMotion Steered(double vx_mps, double steering_rad) const;
+    bool steers() const { return steers_; }
+    // Sideways speed at the robot's middle that comes from turning about the rear axle.
+    double SidewaysOfTurning(double omega_radps) const { return rear_m_ * omega_radps; }
 
 private:
-    Eigen::Matrix<double, 3, kWheels> forward_;
-    Eigen::Matrix<double, kWheels, 3> inverse_;
+    bool steers_;
+    double rear_m_ = 0, wheelbase_m_, half_track_m_, max_steering_rad_;
+    Eigen::Matrix<double, 3, kMaxWheels> forward_;
+    Eigen::Matrix<double, kMaxWheels, 3> inverse_;
 };
 
 }  // namespace twin

@@ -10,6 +10,9 @@
 namespace twin
 {
 
+// The pose after `dt_s` at constant velocity: the exact arc.
+Pose2 AlongArc(const Pose2 &from, const Twist &twist, double dt_s);
+
 // Moves one robot by `dt_s`: wheels, ground velocity, then the exact arc at constant velocity.
 void PlanarStep(const DriveChain &chain, const Command &command, double t_s, double dt_s,
                 RobotState &state, Random *random);

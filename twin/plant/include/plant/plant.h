@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "effects/effect.h"
+#include "effects/signals.h"
 
 namespace twin
 {
@@ -23,8 +23,8 @@ struct Pose2
 // What a robot is told in one step. Which part counts is said by the model's drive.
 struct Command
 {
-    // Duty drive: duties -1..1. Wheel-speed drive: rad/s. Twist drive: vx_mps, vy_mps, omega_radps,
-    // 0.
+    // Duty drive: duties -1..1. Wheel-speed drive: rad/s. Twist drive: vx_mps, vy_mps, omega_radps.
+    // Steering drive: vx_mps, steering_rad (of the middle of the front axle, left positive).
     Wheels value{};
     double battery_V = 0;  // 0: the model's nominal voltage
 };
@@ -35,6 +35,7 @@ struct RobotState
     double vx_mps = 0, vy_mps = 0, omega_radps = 0;  // body frame, mean over the last step
     Wheels rim_mps{};
     Wheels wheel_rad{};                   // angle turned since the start
+    double steering_rad = 0;              // Ackermann
     std::array<double, 3> drive_noise{};  // velocity disturbance: forward, left, turn
     std::vector<double> effect_state;
 };

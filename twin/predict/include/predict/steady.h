@@ -13,7 +13,8 @@ namespace twin
 {
 
 // Means over one second, after enough seconds from rest for every lag of the catalogue to pass.
-constexpr int kSteadyValues = 3 + kWheels;  // vx_mps, vy_mps, omega_radps (body), rim speeds in m/s
+constexpr int kSteadyValues =
+    3 + kMaxWheels;  // vx_mps, vy_mps, omega_radps (body), rim speeds in m/s
 
 // For each parameter vector and each command (K, 4; in the unit of the model's drive, duties
 // -1..1) the steady values: (B, K, kSteadyValues). Row b of `values` (B, P) sets the quantities

@@ -30,9 +30,10 @@ std::string NameInWorld(int robot, const std::string &name);
 class MujocoPlant : public Plant
 {
 public:
-    // `mjcf` holds one robot, or a scene with one robot; wheels are joints, geoms and actuators
-    // named fl, fr, rl, rr. One model (Model::ForRobot) and start pose per robot. Throws
-    // std::invalid_argument in one sentence if the file or the models do not fit.
+    // `mjcf` is the file of one robot, or of a scene with one robot; wheels are joints, geoms and
+    // actuators named as the model's wheels. Without a file ("") the robot is made of the model's
+    // numbers. One model (Model::ForRobot) and start pose per robot, all with the same wheels.
+    // Throws std::invalid_argument in one sentence if the file or the models do not fit.
     MujocoPlant(const std::string &mjcf, const std::vector<Model> &models,
                 const std::vector<Pose2> &starts, const MujocoOptions &options);
 
@@ -58,10 +59,12 @@ private:
     {
         void operator()(mjData *data) const { mj_deleteData(data); }
     };
-    struct Wheel
+    struct DrivenWheel
     {
         int dof, actuator;
-        double x_m, y_m, side;  // place on the robot; roller axis (1, side)/sqrt(2) at the floor
+        double x_m, y_m;        // place on the robot
+        double roll_x, roll_y;  // where it rolls
+        double free_x, free_y;  // where its rollers let it go; both 0: it has none
     };
     struct Member
     {
@@ -71,7 +74,7 @@ private:
         RobotState state;        // what happened
         Command command;
         int qpos, dof;  // of the free joint
-        std::array<Wheel, kWheels> wheels;
+        std::vector<DrivenWheel> wheels;
         Wheels offset_mps;  // rim speed asked beyond the chain's, for gains and ground effects
     };
     Member MakeMember(int robot, const Model &model, const Pose2 &start, uint64_t seed) const;

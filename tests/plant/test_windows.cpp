@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+// Predictions over windows against the planar plant, driven window by window.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "drive.h"
+#include "predict/predict.h"
+
+namespace twin::test
+{
+namespace
+{
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// Half a minute of random commands; poses that a robot could have had, but no robot had.
+struct Course
+{
+    Course()
+    {
+        std::mt19937_64 engine(5);
+        std::uniform_real_distribution<double> duty(-1, 1), jitter(0, 0.01);
+        for (int i = 0; i < 60; ++i)
+        {
+            command_t_s.push_back(0.5 * i + jitter(engine));
+            for (int k = 0; k < kMaxWheels; ++k)
+                command.push_back(duty(engine));
+            battery_V.push_back(i % 7 ? 7.2 : kNaN);
+        }
+        for (int i = 0; i < 1500; ++i)
+        {
+            pose_t_s.push_back(0.02 * i + 0.003);
+            for (int axis = 0; axis < 3; ++axis)
+                pose.push_back(std::sin(0.01 * i + axis));
+            segment.push_back(i < 700 ? 0 : 1);
+        }
+        for (int64_t k = 0; k + 60 < 1500; k += 40)
+        {
+            starts.push_back(k);
+            for (const int64_t ahead : {5, 25, 60})
+                ends.push_back(segment[static_cast<size_t>(k + ahead)] ==
+                                       segment[static_cast<size_t>(k)]
+                                   ? k + ahead
+                                   : -1);
+        }
+    }
+    Track track() const { return {command_t_s, command, battery_V, pose_t_s, pose, segment}; }
+
+    std::vector<double> command_t_s, command, battery_V, pose_t_s, pose;
+    std::vector<int64_t> segment, starts, ends;
+};
+
+// Moves in millisecond steps cut at each command.
+void Drive(const DriveChain &chain, const Course &run, double from_s, double to_s,
+           RobotState &state)
+{
+    for (double t_s = from_s; t_s < to_s;)
+    {
+        Command command;
+        double end_s = std::min(to_s, t_s + 1e-3);
+        for (size_t i = 0; i < run.command_t_s.size(); ++i)
+        {
+            if (run.command_t_s[i] > t_s)
+            {
+                end_s = std::min(end_s, run.command_t_s[i]);
+                break;
+            }
+            std::copy_n(&run.command[kMaxWheels * i], kMaxWheels, command.value.begin());
+            command.battery_V = run.battery_V[i];
+        }
+        PlanarStep(chain, command, t_s, end_s - t_s, state, nullptr);
+        t_s = end_s;
+    }
+}
+
+// Each window by itself: the wheels from the first command on, the body from the measured pose.
+std::vector<double> OneByOne(const Model &model, const Course &run)
+{
+    const DriveChain chain(model);
+    std::vector<double> predicted(3 * run.ends.size(), kNaN);
+    for (size_t w = 0; w < run.starts.size(); ++w)
+        for (size_t h = 3 * w; h < 3 * w + 3; ++h)
+        {
+            if (run.ends[h] < 0)
+                continue;
+            const auto body = [&](int64_t k) {
+                const auto at = static_cast<size_t>(k);
+                Pose2 pose{run.pose[3 * at], run.pose[3 * at + 1], run.pose[3 * at + 2]};
+                double t_s = run.pose_t_s[at];
+                chain.Invert(pose, t_s);
+                return std::pair{pose, t_s};
+            };
+            const auto [start, start_s] = body(run.starts[w]);
+            RobotState state = chain.Start({});
+            Drive(chain, run, run.command_t_s[0], start_s, state);
+            state.pose = start;
+            Drive(chain, run, std::max(start_s, run.command_t_s[0]), body(run.ends[h]).second,
+                  state);
+            double t_s = 0;
+            chain.Observe(state.pose, t_s);
+            predicted[3 * h] = state.pose.x_m;
+            predicted[3 * h + 1] = state.pose.y_m;
+            predicted[3 * h + 2] = state.pose.theta_rad;
+        }
+    return predicted;
+}
+
+void ExpectNear(std::span<const double> a, std::span<const double> b, double tolerance)
+{
+    ASSERT_EQ(a.size(), b.size());
+    for (size_t i = 0; i < a.size(); ++i)
+    {
+        ASSERT_EQ(std::isnan(a[i]), std::isnan(b[i])) << i;
+        if (std::isnan(a[i]))
+            continue;
+        ASSERT_NEAR(a[i], b[i], tolerance) << i;
+    }
+}
+
+Model Base(double motor_lag_s = 0.08)
+{
+    Model model = Lagging(motor_lag_s);
+    model.base.sideways_gain = 0.9;
+    model.clock.offset_s = 0.03;
+    return With("marker_offset", {0.03, -0.02}, With("wheel_gain", {0.05, 0, -0.04, 0}, model));
+}
+
+// Without a lag the speed is constant from command to command, and steps are exact; with one they
+// are right to second order in their length.
+TEST(Windows, AreWhatThePlantDoesFromEachStart)
+{
+    const Course run;
+    const Model model = Base(0);
+    ASSERT_TRUE(DriveChain(model).IsHomogeneous());
+    ExpectNear(PredictWindows(model, run.track(), run.starts, run.ends), OneByOne(model, run),
+               1e-9);
+    ExpectNear(PredictWindows(Base(), run.track(), run.starts, run.ends), OneByOne(Base(), run),
+               1e-4);
+}
+
+// Effects of the room are right to second order in the step of 20 ms.
+TEST(Windows, AreWhatThePlantDoesWhereTheRoomMatters)
+{
+    const Course run;
+    const Model model =
+        With("floor_patch", {0.3, 0.2, 0.4, 0.3}, With("carpet_grain", {0.1, 0.05}, Base()));
+    ASSERT_FALSE(DriveChain(model).IsHomogeneous());
+    ExpectNear(PredictWindows(model, run.track(), run.starts, run.ends), OneByOne(model, run),
+               1e-3);
+}
+
+// Parameters of wheels, of the ground, of what is seen and of the clock.
+const std::vector<std::string> kNames{"wheel_gain.fr", "base.yaw_gain", "marker_offset.x_m",
+                                      "clock.offset_s", "base.motor_lag_s"};
+
+TEST(Windows, AreTheSameInABatchAsAlone)
+{
+    const Course run;
+    const std::vector<double> rows{0,    1,   0.03, 0.03, 0.08, 0.1, 1,   0.03, 0.03, 0.08,
+                                   0,    0.8, 0.03, 0.03, 0.08, 0,   1.1, 0.01, 0.03, 0.08,
+                                   -0.1, 1,   0.03, 0.05, 0.08, 0,   1,   0.03, 0.03, 0.2};
+    const std::vector<double> batch =
+        PredictWindowsBatch(Base(), run.track(), run.starts, run.ends, kNames, rows);
+    const size_t size = 3 * run.ends.size();
+    ASSERT_EQ(batch.size(), 6 * size);
+    for (size_t b = 0; b < 6; ++b)
+    {
+        Model model = Base();
+        for (size_t p = 0; p < kNames.size(); ++p)
+            model.Set(kNames[p], rows[b * kNames.size() + p]);
+        ExpectNear(std::span(batch).subspan(b * size, size),
+                   PredictWindows(model, run.track(), run.starts, run.ends), 0);
+    }
+}
+
+// Half the sum of the slopes up and down is right to second order: with steps of a thousandth the
+// one-sided slopes agree with it to some thousandths.
+TEST(Windows, SlopesAreThoseOfTheModel)
+{
+    const Course run;
+    const std::vector<double> steps{1e-4, 1e-4, 1e-4, 1e-4, 1e-4};
+    const std::vector<double> slopes =
+        PredictWindowSlopes(Base(), run.track(), run.starts, run.ends, kNames, steps);
+    const size_t size = 3 * run.ends.size();
+    ASSERT_EQ(slopes.size(), 6 * size);
+    ExpectNear(std::span(slopes).first(size),
+               PredictWindows(Base(), run.track(), run.starts, run.ends), 0);
+    for (size_t p = 0; p < kNames.size(); ++p)
+    {
+        Model up = Base(), down = Base();
+        const double value = up.Get(kNames[p]);
+        up.Set(kNames[p], value + 1e-4);
+        down.Set(kNames[p], value - 1e-4);
+        std::vector<double> central = PredictWindows(up, run.track(), run.starts, run.ends);
+        const std::vector<double> below = PredictWindows(down, run.track(), run.starts, run.ends);
+        for (size_t i = 0; i < size; ++i)
+            central[i] = (central[i] - below[i]) / 2e-4;
+        ExpectNear(std::span(slopes).subspan((p + 1) * size, size), central, 2e-2);
+    }
+}
+
+TEST(Windows, SlopesAreTakenDownwardsAtTheUpperBound)
+{
+    const Course run;
+    Model model = Base();
+    model.Set("wheel_gain.fr", 0.5);
+    const std::vector<double> steps{1e-3};
+    const std::vector<double> slopes =
+        PredictWindowSlopes(model, run.track(), run.starts, run.ends, {"wheel_gain.fr"}, steps);
+    EXPECT_TRUE(std::isfinite(slopes[3 * run.ends.size()]));
+    EXPECT_THROW(PredictWindowSlopes(model, run.track(), run.starts, run.ends, {"no.such"}, steps),
+                 std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace twin::test

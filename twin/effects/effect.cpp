@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "effects/effect.h"
+
+namespace twin
+{
+
+const char *StageName(const Act &act)
+{
+    static constexpr const char *kNames[] = {"duty",  "wheel",   "wheel", "ground",
+                                             "world", "observe", "view",  "decide"};
+    static_assert(std::size(kNames) == std::variant_size_v<Act>);
+    return kNames[act.index()];
+}
+
+BoundEffect::BoundEffect(const EffectSpec &spec, std::vector<double> values,
+                         std::span<const std::string> texts)
+    : spec_(&spec), values_(std::move(values)), act_(spec.act)
+{
+    if (!spec.compile)
+        return;
+    std::vector<std::string> own(texts.begin(), texts.end());
+    for (size_t i = own.size(); i < spec.texts.size(); ++i)
+        own.emplace_back(spec.texts[i].default_value);
+    EffectSpec::Compiled compiled = spec.compile(values_, own);
+    act_ = compiled.act;
+    formula_ = std::move(compiled.formula);
+}
+
+void BoundEffect::Look(Sight &sight) const
+{
+    if (const auto *view = std::get_if<OnView>(&act_))
+        view->look(sight, numbers());
+    if (const auto *decision = std::get_if<OnDecision>(&act_))
+        decision->look(sight, numbers());
+}
+
+void BoundEffect::Touch(Body &body) const
+{
+    if (const auto *on = std::get_if<OnBody>(&act_))
+        on->touch(body, numbers());
+}
+
+const EffectSpec *FindEffect(std::string_view name)
+{
+    for (const EffectSpec *spec : Catalogue())
+        if (name == spec->card.name)
+            return spec;
+    return nullptr;
+}
+
+}  // namespace twin
