@@ -169,8 +169,8 @@ def _units(subject: Subject, e: Explained) -> list[InputFinding]:
 
 
 RATES_PPM = (-3000, -2000, -1000, -500, 0, 500, 1000, 2000, 3000)
-LEAST_PPM = 300.0  # less is what crystals and fits of the clock are for
-DRIFT_SURE = 5.0
+LEAST_PPM = 870.0  # less is for fits of the clock, and slow changes of a robot imitate it
+DRIFT_SURE = 7.0
 
 
 def check_drift(subject: Subject, search: Search, own: Explained) -> list[InputFinding]:
