@@ -29,12 +29,12 @@ from twinmill.data.multi_log import read_everyone
 from twinmill.data.steady_table import Sheet, is_sheet
 from twinmill.diagnosis import diagnose as _diagnose
 from twinmill.diagnosis.detections.add import BitAddition, add_to_camera, is_of_camera
-from twinmill.diagnosis.ranking import Ranked
+from twinmill.diagnosis.findings import Ranked
 from twinmill.files import plain, replacing
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
-from twinmill.model.freedom import catalogue
+from twinmill.model.parameters import catalogue
 from twinmill.model.model_file import DEFAULT_MODEL, ModelFile
 from twinmill.programs import find_program
 from twinmill.report import detections, error_figures, show, steady_figures, views

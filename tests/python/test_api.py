@@ -14,7 +14,7 @@ import twinmill as tm
 from twinmill import api
 from twinmill.challenge.script import write_rich_script
 from twinmill.data.log import read_log
-from twinmill.model.freedom import catalogue
+from twinmill.model.parameters import catalogue
 from twinmill_cli.main import run
 
 pytestmark = pytest.mark.skipif(

@@ -12,7 +12,7 @@ from twinmill.challenge.physics import STEP_S, Signals, catalogue_forms, outside
 from twinmill.challenge.robots import KINDS
 from twinmill.challenge.run import Plan, play
 from twinmill.challenge.scoring import BARS, rate, scored, summary
-from twinmill.model.freedom import catalogue
+from twinmill.model.parameters import catalogue
 
 SEED, SECONDS = 7, 40
 ROBOTS = draw_robots(SEED)

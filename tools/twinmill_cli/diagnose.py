@@ -75,7 +75,7 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
             "Each robot was judged by itself; the swarm as a whole can be once the model predicts "
             "each robot: `twinmill compare-swarm`."
         ), None
-    log, model = read_log(path), result.state.model
+    log, model = read_log(path), result.model
     if not all((robot.mode == TABLE).any() for robot in log.robots.values()):
         return "Each robot was judged by itself: not all play a table, as a swarm does.", None
     scale = model.get("sensor.range_m"), model.get("robot.body_radius_m")

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from twinmill.model.freedom import catalogue
+from twinmill.model.parameters import catalogue
 from twinmill.report import show, tables
 from twinmill_cli.output import AsJson, deliver
 

@@ -13,7 +13,6 @@ from twinmill.diagnosis.diagnose import diagnose
 from twinmill.experiment.design import Limits, Plan, check, design
 from twinmill.experiment.script_file import csv_text
 from twinmill.files import check_new_file
-from twinmill.fitting.compare import open_scenes
 from twinmill.model.model_file import DEFAULT_MODEL, write_whole
 from twinmill.report import next_run as present
 from twinmill_cli import inputs
@@ -60,7 +59,7 @@ def _next(
     check_new_file(output, force)
     with telling(f"designing a run with {model}") as say:
         measurements = inputs.load(logs, model_file, as_json)
-        check(open_scenes(measurements, model_file), limits)
+        check(measurements, model_file, limits)
         plan = design(diagnose(measurements, model_file, say), model_file, limits, say)
     write_whole(output, csv_text(plan.rows))
     how = _how(plan, logs, model, output)

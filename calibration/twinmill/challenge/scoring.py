@@ -13,7 +13,7 @@ from scipy.stats import binomtest
 
 from twinmill.challenge.cases import Case
 from twinmill.challenge.physics import Hidden
-from twinmill.model.freedom import catalogue
+from twinmill.model.parameters import catalogue
 
 LARGEST_GROUP = 4
 WITHIN = 1.96  # standard errors: 95 %

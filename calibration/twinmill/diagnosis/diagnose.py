@@ -1,153 +1,264 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names what a model lacks, says so when nothing is missing, and when the log cannot tell."""
+"""Names what a model lacks, says so when nothing is missing, and when the data cannot tell."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
-from twinmill.diagnosis.alike import Common, free_gains, search_alike
-from twinmill.diagnosis.bumps import bump_notes
+from twinmill.data.steady_table import Sheet
 from twinmill.diagnosis.detections.merge import with_bits
-from twinmill.diagnosis.evidence import State
-from twinmill.diagnosis.omnibus import NOTHING, Omnibus, unexplained
-from twinmill.diagnosis.ranking import rank
-from twinmill.diagnosis.remarks import next_experiment, noisier, not_identifiable, notes_of
+from twinmill.diagnosis.encoders import geometry_notes, time_base_notes
+from twinmill.diagnosis.findings import findings_of, lateness, ranking_of
+from twinmill.diagnosis.outliers import Outlier, outliers, sentence
+from twinmill.diagnosis.rest import rest_of
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.robots import judge, sentence
-from twinmill.diagnosis.search import Search
-from twinmill.diagnosis.settled import Settled
+from twinmill.diagnosis.search import REFIT, Search, Settings, State, attempt, search
 from twinmill.diagnosis.verdict import Weighed
-from twinmill.fitting.compare import Comparison, comparison, open_scenes
-from twinmill.fitting.fit import refit, share_noise
-from twinmill.fitting.solve import excited
-from twinmill.model.freedom import Free, base_quantities, effect_names, effect_quantities
+from twinmill.fitting.compare import comparison
+from twinmill.fitting.fit import base_names
+from twinmill.fitting.opening import Opened, judged, open_measurements, with_own_gains
 from twinmill.model.model_file import ModelFile
-from twinmill.predict.floor import floor_of
-from twinmill.predict.problem import Scene
-from twinmill.steady.limits import unseen_by_tables
+from twinmill.model.parameters import (
+    BASE_GAINS,
+    LAG,
+    all_effect_parameters,
+    base_parameters,
+    catalogue,
+)
+
+DRIFT_STD = 0.04  # gains of a calibrated robot wander so much with battery and heat
+NOISIER = 2.0  # drive noise over that of the model file, beyond which it is a finding
+# What a measurement must have for an effect to show, and what to say where it has not.
+LACKS = {
+    "changes": "acts only while the speed changes, and a steady table has no starts and stops",
+    "clocks": "a steady table has no clocks",
+    "poses": "a steady table has no poses",
+    "room": "a steady table does not say where and in which direction of the room the robot drove",
+    "battery": "a steady table does not say how full the battery was",
+    "history": "a steady table does not say how long the robot had been driving",
+    "wheel_angle": "a steady table gives means over many turns of the wheels",
+}
+CONTACTS = "predictions of one robot have no contacts; twinmill compare-swarm looks at whole swarms"
 
 
 def diagnose(
-    measurements: list[Measurement],
+    measurements: Sequence[Measurement | Sheet],
     model_file: ModelFile,
-    say: Callable[[str], None] = lambda _: None,
-    barred: Collection[str] = (),
+    progress: Callable[[str], None] = lambda _: None,
+    excluded: Collection[str] = (),
+    settings: Settings = Settings(),
 ) -> Diagnosis:
     """Diagnoses all measurements with one model.
 
     Args:
         measurements: one robot, or several of a kind.
-        model_file: the model; what other logs told of it is held, its gains are refitted.
-        say: told in words what is being done.
-        barred: effects that are not to be thought of.
+        model_file: the model; what other logs told of it is held, its gains may drift.
+        progress: told in words what is being done.
+        excluded: effects that are not to be thought of.
+        settings: numbers that decide.
+
+    Raises:
+        LogError: no measurement can be judged.
     """
-    say("refitting the base")
-    given = open_scenes(measurements, model_file)
-    scenes, base, known = _refitted(given, model_file)
-    floors = [floor_of(s).rms for s in scenes]
-    unseen = unseen_by_tables(measurements)
-    hidden = {*barred, *unseen}
-    common = search_alike(scenes, base + known, base, floors, say, hidden)
-    bumped = bump_notes(*([s.measurement for s in part] for part in (common.scenes, scenes)))
-    odd, alike = ([common.scenes[i] for i in which] for which in (common.odd, common.alike))
-    for earlier in ([given[i] for i in common.alike], alike):
-        share_noise(common.state.scenes, earlier)
-    before, fitted = comparison(model_file, given), comparison(model_file, alike)
-    final = replace(common.state, floors=[r.floor.rms for r in fitted.robots])
-    off = judge(final, odd, say, hidden)
-    say("looking for what no effect explains")
-    found = _concluded(replace(common, state=final), model_file, before, fitted, unseen)
-    found = replace(found, notes=[*found.notes, *bumped], robots_off=tuple(off))
-    whole = with_bits(found, given, model_file, say, barred)
+    progress("finding the noise floor")
+    opened = open_measurements(measurements, model_file)
+    before = comparison(model_file, opened)
+    unseen = _unseen(opened)
+    known = with_own_gains(judged(opened))
+    first = first_state(known, model_file, {*excluded, *unseen})
+    usual = model_file.usual_score([o.measurement.log_sha256 for o in known])
+    usual = usual if np.isfinite(usual) else 1.0
+    done = search(first, progress, settings, usual)
+    progress("looking for robots that differ")
+    off = outliers(known, done, progress)
+    if off and done.found:
+        alike = [o for o in known if _robot_of(o) not in {r.robot_id for r in off}]
+        progress("looking again without them")
+        first = first_state(alike, model_file, {*excluded, *unseen})
+        done = search(first, progress, settings, usual)
+        known = alike
+    progress("looking for what no effect explains")
+    found = _concluded(opened, known, first, done, model_file, before, unseen, off)
+    whole = with_bits(found, [r.scene for r in before.robots], model_file, progress, excluded)
     return replace(whole, sentence=" ".join([whole.sentence, *map(sentence, whole.robots_off)]))
 
 
-def _refitted(
-    given: list[Scene], model_file: ModelFile
-) -> tuple[list[Scene], list[Free], list[Free]]:
-    """Scenes with the base refitted, and what of base and known effects is free in them."""
-    told = model_file.told_by_others([s.measurement.log_sha256 for s in given])
-    known = effect_quantities(model_file.model)
-    base = excited(given, base_quantities(model_file.model, told), known)
-    scenes = free_gains([s.with_model(model_file.model) for s in given])
-    refit(scenes, base + known)
-    return scenes, base, known
+def first_state(
+    opened: Sequence[Opened], model_file: ModelFile, excluded: Collection[str]
+) -> State:
+    """Where the search starts: the model as given, and what is free in it without being a finding.
+
+    The base of a model that other logs told is held, but for gains that drift with battery and
+    heat. A base that was fitted to these very logs moves with whatever is added. The numbers of a
+    data sheet are a candidate like any effect: `refit`.
+    """
+    model = model_file.model
+    hashes = [o.measurement.log_sha256 for o in opened]
+    told = model_file.told_by_others(hashes)
+    names = base_names(model, opened, told)
+    free = []
+    if told and model.drive == "duty":
+        gains = [n for n in BASE_GAINS if n in names]
+        free = [replace(p, std=DRIFT_STD) for p in base_parameters(opened[0].model, gains)]
+    elif model_file.fitted_on(hashes):
+        free = base_parameters(opened[0].model, names) + all_effect_parameters(opened[0].model)
+    base = tuple(n for n in names if n != LAG and n not in {p.name for p in free})
+    excluded = {*excluded, *_by_clocks(opened)}
+    return State(
+        [o.data for o in opened],
+        [o.model for o in opened],
+        tuple(free),
+        base,
+        frozenset(excluded),
+    )
+
+
+def _by_clocks(opened: Sequence[Opened]) -> set[str]:
+    """Effects that the clocks make meaningless: their own offsets are fitted, or known to be none."""
+    logs = [o for o in opened if o.floor]
+    if any(not o.same_clock for o in logs):
+        return {"clock_offset", "clock_rate", "input_delay"}
+    declared = any(o.measurement.same_clock for o in logs)
+    return {"clock_offset"} if declared else set()
+
+
+def _robot_of(own: Opened) -> int:
+    return own.measurement.track.robot_id if own.floor else own.measurement.robot_id
+
+
+def _unseen(opened: Sequence[Opened]) -> dict[str, str]:
+    """Effects that these measurements cannot show by their kind, and why."""
+    tables = all(o.floor is None for o in opened)
+    found = {}
+    for name, entry in catalogue().items():
+        if tables and entry["needs"] in LACKS:
+            found[name] = LACKS[entry["needs"]]
+    if not tables:
+        shared = any(not o.same_clock for o in opened if o.floor)
+        if shared:
+            found["input_delay"] = (
+                "the clocks are two, and their offset hides a delay; say that they are one "
+                "(twinmill import --same-clock), or fit a calibration log on the same clocks first"
+            )
+        if len({_robot_of(o) for o in opened}) > 1:
+            found["collision"] = CONTACTS
+    return found
 
 
 def _concluded(
-    common: Common,
+    opened: Sequence[Opened],
+    known: Sequence[Opened],
+    first: State,
+    done: Search,
     model_file: ModelFile,
-    before: Comparison,
-    fitted: Comparison,
+    before,
     unseen: dict[str, str],
+    off: Sequence[Outlier],
 ) -> Diagnosis:
-    """What the search of the motion tells, before cameras and odd robots are looked at.
-
-    Args:
-        common: of the search; floors as of the last noise.
-        model_file: the model.
-        before: of the model as given.
-        fitted: of its base refitted.
-        unseen: effects that no table shows, and why.
-    """
-    done, final = common.done, common.state
-    hashes = [r.scene.measurement.log_sha256 for r in before.robots]
-    omnibus = _rest(final, model_file.left_over(hashes))
-    explained = done.rounds[0].before.chi2 - _last(done)
-    share = float(omnibus.gain / max(omnibus.gain + explained, 1e-9)) if omnibus.groups else 0.0
-    names = effect_names(final.model)[len(model_file.model.effects) :]
-    settled, steps = Settled.of(final), _steps(done, final.floors)
+    """What the search of the motion tells, before cameras are looked at."""
+    hashes = [o.measurement.log_sha256 for o in known]
+    start, last = done.rounds[0].before, done.last
+    findings, chain = findings_of(done, first)
+    rest = rest_of(known, last.fit, start.held_score, last.held_score, model_file.left_over(hashes))
+    after = [o.with_fitted(m) for o, m in zip(known, last.state.models, strict=True)]
+    noise = _noises(model_file, after)
+    hidden = [*_hidden(done, first.model), *unseen.items()]
+    refit = _refit(done)
     weighed = Weighed(
-        float(np.sqrt(np.mean([before.robots[i].score ** 2 for i in common.alike]))),
-        fitted.score,
-        names,
-        settled.put_into(rank(done, names, explained + omnibus.gain, final.floors), names),
-        omnibus,
-        share,
-        steps[-1][1],
+        before.score,
+        start.held_score,
+        refit,
+        last.held_score,
+        findings,
+        rest,
+        [name for name, _ in hidden],
+        noise,
         model_file.usual_score(hashes),
-        noisier(model_file, final),
-        settled.at_bound(names),
     )
-    blind = dict(not_identifiable(done))
-    if any(r.scene.measurement.time_base for r in before.robots):
-        blind.pop("clock_rate", None)
+    steps = [(None, start.held_score), *chain]
+    late = lateness(done, findings, all(o.same_clock for o in known if o.floor))
+    fitted = {id(o.measurement): o for o in after}
+    after = [fitted.get(id(o.measurement), o) for o in opened]
+    scenes = [o.scene() for o in after]
     return Diagnosis(
-        weighed.verdict,
-        weighed.sentence,
-        before,
-        fitted.score,
-        names,
-        weighed.ranking,
-        [*blind.items(), *unseen.items()],
-        omnibus,
-        share,
-        final,
-        steps,
-        settled.notes(names) + weighed.noises + notes_of(final, omnibus, names),
-        next_experiment(weighed.verdict, weighed.ranking, done),
-        settled.sums,
+        verdict=weighed.verdict,
+        sentence=weighed.sentence,
+        before=before,
+        score_refit=refit,
+        findings=findings,
+        ranking=ranking_of(done, findings),
+        not_identifiable=hidden,
+        rest=rest,
+        late=late if any(o.floor for o in known) else None,
+        search=done,
+        opened=after,
+        scenes=scenes,
+        steps=steps,
+        notes=[*time_base_notes(scenes), *geometry_notes(last.state.model), *noise, *weighed.notes],
+        next_experiment=_next(weighed.verdict, findings, hidden),
+        robots_off=tuple(off),
+        base_names=tuple(base_names(first.model, known, model_file.told_by_others(hashes))),
     )
 
 
-def _rest(state: State, left_before: dict[str, float]) -> Omnibus:
-    """What the effects leave of the logs; tables have no such test."""
-    logs = [s for s in state.scenes if s.noise]
-    return unexplained(logs, state.free, left_before) if logs else NOTHING
+def _refit(done: Search) -> float:
+    """Score after a refit of the base alone."""
+    start = done.rounds[0].before
+    trial = next((t for t in done.rounds[0].trials if t.names == (REFIT,)), None)
+    if trial is None and start.state.base:
+        trial = attempt(start, (REFIT,))
+    return min(start.held_score, trial.held_score) if trial else start.held_score
 
 
-def _last(done: Search) -> float:
-    """Held-out chi2 of the final model."""
-    accepted = [r.accepted for r in done.rounds if r.accepted]
-    return accepted[-1].trial.chi2 if accepted else done.rounds[0].before.chi2
+def _hidden(done: Search, model: native.Model) -> list[tuple[str, str]]:
+    """Effects that could be there and not be seen."""
+    hidden = []
+    for s in done.rounds[-1].screened:
+        if s.name == REFIT:
+            continue
+        if s.size < 1e-6:
+            hidden.append((s.name, "the data have no drive on which it acts"))
+        elif 9 * s.size < done.settings.faint:
+            hidden.append((s.name, "three times its usual strength would not show"))
+    return hidden
 
 
-def _steps(done: Search, floors: list[np.ndarray]) -> list[tuple[str | None, float]]:
-    steps: list[tuple[str | None, float]] = [(None, done.rounds[0].before.held.over(floors))]
-    for this in done.rounds:
-        if this.accepted:
-            trial = this.accepted.trial
-            steps.append((" + ".join(trial.effects), trial.held.over(floors)))
-    return steps
+def _noises(model_file: ModelFile, opened: Sequence[Opened]) -> list[str]:
+    """A note for each log whose drive noise is far above what another log told."""
+    usual = model_file.model.get("noise.drive_mps")
+    if usual <= 0:
+        return []
+    notes = []
+    for own in opened:
+        noise = own.scene().noise
+        ratio = noise.position.drive / usual if noise else 0.0
+        if ratio > NOISIER:
+            notes.append(
+                f"{own.measurement.label}: the random disturbance of the motion is {ratio:.1f} "
+                "times what the model file says; no effect that follows from commands, place or "
+                "time is like that (slipping wheels or a rough floor may be)."
+            )
+    return notes
+
+
+def _next(verdict: str, findings, hidden: list[tuple[str, str]]) -> dict | None:
+    """What to drive next, in words; the script itself is designed by `twinmill next`."""
+    tied = next((f.group for f in findings if f.group), None)
+    if verdict == "ambiguous" and tied:
+        return {
+            "script": None,
+            "separates": list(tied),
+            "why": f"this log cannot tell {' from '.join(tied)}: drive all three axes at five or "
+            "more duties, from rest and through zero, on clocks tied by a calibration log",
+        }
+    if hidden:
+        return {
+            "script": None,
+            "separates": [name for name, _ in hidden],
+            "why": "these effects leave no trace in this log: drive sideways as well, and at five "
+            "or more duties on all axes",
+        }
+    return None

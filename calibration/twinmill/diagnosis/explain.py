@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Diagnoses, adds what was found, and writes the model that has it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from twinmill.data.measurement import Measurement
+from twinmill.data.steady_table import Sheet
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.robots import own_effects, own_values
 from twinmill.fitting.compare import Comparison, comparison
-from twinmill.fitting.fit import common_clock, refit
-from twinmill.model.freedom import Estimate
+from twinmill.fitting.fit import common_clock
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import Fitted, ModelFile, write_child
+from twinmill.model.parameters import GAINS, Estimate, base_parameters
+from twinmill.predict.datasets import total_score
 
 
 @dataclass(frozen=True)
@@ -43,48 +45,78 @@ class Explanation:
 
 
 def steps(diagnosis: Diagnosis) -> list[dict]:
-    """The model as given, its base refitted, then each added effect, on held-out data."""
-    given = {"effect": None, "score_heldout": diagnosis.before.score}
-    refitted, *added = diagnosis.steps
-    rest = [{"effect": name, "score_heldout": score} for name, score in added]
-    return [given, {"effect": "refit", "score_heldout": refitted[1]}, *rest]
+    """The model as given, then each finding, on held-out data; stale numbers are named `refit`."""
+    return [{"effect": name, "score_heldout": score} for name, score in diagnosis.steps]
 
 
 def explain(
-    measurements: list[Measurement],
+    measurements: Sequence[Measurement | Sheet],
     model_file: ModelFile,
     out: Path,
     command: str,
-    say: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Explanation:
-    """Adds effects until the model is adequate or nothing helps, and writes it.
+    """Adds what helps on left-out data until nothing more does, and writes the model.
 
     Raises:
+        LogError: no measurement can be judged.
         ModelError: the new file cannot be written.
     """
-    diagnosis = diagnose(measurements, model_file, say)
-    state = diagnosis.state
-    solution = refit(state.scenes, state.free)
+    diagnosis = diagnose(measurements, model_file, progress)
+    fit = _polished(diagnosis)
     off = diagnosis.robots_off
-    after = comparison(model_file, [*state.scenes, *(s for r in off for s in r.scenes)])
     model = model_file.model.copy()
-    for effect in [*diagnosis.found, *own_effects(off)]:
+    own_effects = [e.name.split(".")[0] for r in off for e in r.parameters if e.name not in GAINS]
+    for effect in dict.fromkeys([*diagnosis.found, *own_effects]):
         model.add_effect(effect.split("#")[0])
-    estimates = [*solution.estimates, *diagnosis.bit_estimates]
+    estimates = [*fit.shared_estimates(), *diagnosis.bit_estimates]
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
     logs = {m.log_name: m.log_sha256 for m in measurements}
-    fitted = Fitted(
+    noise = next((s.noise for s in diagnosis.scenes if s.noise), None)
+    written = Fitted(
         model,
-        estimates,
+        [e for e in estimates if e.seen],
         logs,
         diagnosis.before.score,
-        after.score,
-        state.scenes[0].noise,
-        common_clock(solution),
+        total_score(fit.held_scores),
+        noise,
+        common_clock(fit),
         bool(model_file.told_by_others(logs.values())),
-        diagnosis.omnibus.left_over,
-        own_values(state.scenes, solution, off),
+        dict(diagnosis.rest.left_over or {}),
+        _own_values(diagnosis, fit),
     )
-    write_child(model_file, fitted, out, command)
+    write_child(model_file, written, out, command)
+    child = ModelFile.load(str(out))
+    after = comparison(child, [o.with_model(child.model) for o in diagnosis.opened])
     return Explanation(diagnosis, after, estimates, Path(out))
+
+
+def _polished(diagnosis: Diagnosis) -> ScoreFit:
+    """All found effects and the base fitted to the score; never to a worse one on held-out data.
+
+    So that a later diagnosis knows what these logs told of the base, found stale or not.
+    """
+    last = diagnosis.search.last
+    state = last.state
+    known = {p.name for p in state.free}
+    base = [n for n in diagnosis.base_names if n not in known]
+    free = [*state.begun(), *base_parameters(state.model, base)]
+    whole = ScoreFit(state.datasets, state.models, free).fit()
+    if total_score(whole.held_scores) <= last.held_score:
+        return whole
+    held = ScoreFit(state.datasets, state.models, free)
+    held.store()
+    return held
+
+
+def _own_values(diagnosis: Diagnosis, fit: ScoreFit) -> dict[int, list[Estimate]]:
+    """By robot, what [robots.Rnn] states: its gains, and the effects that only it has."""
+    values: dict[int, dict[str, Estimate]] = {}
+    for i, data in enumerate(fit.datasets):
+        gains = {n: e for n, e in fit.own_estimates(i).items() if n in GAINS}
+        if gains:
+            values.setdefault(data.robot_id, {}).update(gains)
+    for robot in diagnosis.robots_off:
+        values[robot.robot_id] = {e.name: e for e in robot.parameters}
+    return {robot_id: list(own.values()) for robot_id, own in values.items()}

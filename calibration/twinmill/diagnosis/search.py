@@ -1,193 +1,573 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Searches for missing effects: one at a time, then pairs; drops what later ones replace."""
+"""Searches for what a model lacks, by the score on parts of the data that were not fitted to.
 
-from collections.abc import Callable, Collection
+In each round every candidate is screened by what it would take away if all were linear; the best
+are fitted. One is accepted if its held-out evidence is beyond doubt, blocks agree on it, and it
+matters. Afterwards those that later ones made needless are dropped.
+"""
+
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
+import twinmill_native as native
+from twinmill.predict.datasets import Dataset, Trajectory, total_score
+from twinmill.model.parameters import (
+    MOTION_STAGES,
+    Parameter,
+    base_parameters,
+    catalogue,
+    effect_names,
+    effect_parameters,
+)
+from twinmill.fitting.score_fit import ScoreFit
 
-from twinmill.diagnosis.candidates import candidates
-from twinmill.diagnosis.evidence import State, Trial, attempt, fall, without
-from twinmill.diagnosis.screen import Screening, screen
-from twinmill.model.freedom import catalogue, effect_names
-
-ALPHA = 0.01  # chance of accepting anything if nothing is missing, over all candidates
-TRIED, PAIRED = 6, 8
-SURE, BEHIND = 2, 0.2  # so many are tried in any case, others above this share of the best gain
-CLOSE = 1.02  # held-out scores whose ratio is nearer to 1 are decided by chi2
-TIE_CHI2 = 6.0  # difference of held-out chi2, over the excess scatter, that decides nothing
-DELAY, CLOCK_OFF = "input_delay", "clock_offset"
-SILENT = 0.5  # score below which the rest is arithmetic of who made the log, and no physics
-MOST = 4
-WORTH = 0.98  # each effect must lower the held-out score to this share: certain is not important
+STRICTEST = 3.0
+NEWS = 1.1  # times the known score: less is no news
+REFIT = "refit"  # the base's numbers were stale: a candidate like any effect
 
 
 @dataclass(frozen=True)
-class Judged:
-    """A trial and what it is worth: log evidence against the state it started from."""
+class Settings:
+    """Numbers that decide a search; printed in reports.
 
-    trial: Trial
+    Attributes:
+        evidence: least fall of the held-out cost (twice a log likelihood ratio) of one candidate ...
+        without_best: ... and without the block that speaks loudest for it.
+        less_evidence, blocks_t: the same where what the model lacks besides drowns the evidence, and
+            blocks agree: t of the relative fall over blocks.
+        worth: least share of the first excess that one takes, in a single data set ...
+        enough: ... or this fall of the squared score, if that is less.
+        fitted: so many candidates are fitted in each round.
+        pairs: so many pairs are tried where no single candidate is accepted.
+        most: rounds.
+        alike: canonical correlation of signatures from which two candidates are one group.
+        tie: difference of the held-out cost that decides nothing within a group.
+        group: most members of a group, the most alike: more is no answer.
+        faint: a candidate of less expected evidence at three times its usual size is not shown.
+    """
+
+    evidence: float = 16.0
+    without_best: float = 8.0
+    less_evidence: float = 9.0
+    blocks_t: float = 3.7
+    worth: float = 0.01
+    enough: float = 0.1
+    fitted: int = 7
+    pairs: int = 3
+    most: int = 6
+    alike: float = 0.95
+    tie: float = 6.0
+    group: int = 4
+    faint: float = 16.0
+
+    def stricter(self, times: float) -> "Settings":
+        """The same with so many times the evidence."""
+        times = min(max(times, 1.0), STRICTEST)
+        raised = ("evidence", "without_best", "less_evidence")
+        return replace(self, **{k: times * getattr(self, k) for k in raised})
+
+
+@dataclass(frozen=True)
+class State:
+    """Where a search stands: data sets, a model for each, and what is free in all of them."""
+
+    datasets: Sequence[Dataset]
+    models: Sequence[native.Model]
+    free: tuple[Parameter, ...]
+    base: tuple[str, ...] = ()
+    excluded: frozenset[str] = frozenset()
+
+    @property
+    def model(self) -> native.Model:
+        """The common model: of a robot of which nothing special is stated, if there is one."""
+        ids = [d.robot_id for d in self.datasets]
+        stated = [len(m.stated_of(i)) for m, i in zip(self.models, ids, strict=True)]
+        return self.models[int(np.argmin(stated))]
+
+    @property
+    def by_channel(self) -> bool:
+        """Logs have enough errors for a scale of each channel; tables do not."""
+        return all(isinstance(d, Trajectory) for d in self.datasets)
+
+    def begun(self) -> tuple[Parameter, ...]:
+        """Free parameters, begun at the model's values."""
+        return tuple(p.at(self.model.get(p.name)) for p in self.free)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A fit with something added.
+
+    Attributes:
+        names: what was added: effects, or REFIT.
+        fit: of all free parameters.
+        state: with the fitted models.
+        evidence: fall of the held-out cost against the state it started from.
+        without_best: the same without the block that speaks loudest for it.
+        blocks_t: t of the relative fall over blocks.
+    """
+
+    names: tuple[str, ...]
+    fit: ScoreFit
+    state: State
     evidence: float
-    p_value: float
+    without_best: float
+    blocks_t: float
+
+    @property
+    def held_score(self) -> float:
+        """On parts that were not fitted to."""
+        return total_score(self.fit.held_scores)
+
+
+@dataclass(frozen=True)
+class Screened:
+    """What the linear screening says of one candidate.
+
+    Attributes:
+        columns: (R, k) of all data sets, weighted, what is free projected out.
+        gain: expected fall of the cost.
+        size: expected fall of the cost if it had its usual strength.
+        start: values that the fit begins at, by name; those of a place are searched.
+    """
+
+    name: str
+    columns: np.ndarray
+    gain: float
+    size: float
+    start: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
 class Round:
-    """One step of the search: what was screened, tried, and accepted (None: nothing)."""
+    """One step of a search."""
 
     before: Trial
-    screening: Screening
-    judged: list[Judged]
-    accepted: Judged | None = None
+    screened: list[Screened]
+    trials: list[Trial]
+    accepted: Trial | None = None
+    tied: list[Trial] = field(default_factory=list)
 
 
 @dataclass
 class Search:
-    """The whole search."""
+    """A whole search: rounds, the last trial, and what was dropped again."""
 
-    rounds: list[Round] = field(default_factory=list)
-    blind: list[str] = field(default_factory=list)
-    dropped: list[str] = field(default_factory=list)
+    rounds: list[Round]
+    last: Trial
+    dropped: list[str]
+    settings: Settings
+
+    @property
+    def found(self) -> list[str]:
+        """Names accepted and kept, in order."""
+        names = [n for r in self.rounds if r.accepted for n in r.accepted.names]
+        return [n for n in names if n not in self.dropped]
+
+    @property
+    def passes(self) -> int:
+        """How often a plant ran over a whole data set, on the average."""
+        fits = [t.fit for r in self.rounds for t in (r.before, *r.trials)]
+        return round(sum(f.passes for f in fits) / max(len(self.last.state.datasets), 1))
 
 
 def search(
-    state: State, say: Callable[[str], None], barred: Collection[str] = ()
-) -> tuple[Search, State]:
-    """Adds effects until none is worth it.
+    state: State,
+    progress: Callable[[str], None] = lambda _: None,
+    settings: Settings = Settings(),
+    known: float = 1.0,
+) -> Search:
+    """Adds what is missing until nothing is worth it.
 
     Args:
-        state: the refitted base.
-        say: told in words what is being done.
-        barred: effects that are not to be thought of.
+        state: where it starts.
+        progress: told in words what is being done.
+        settings: numbers that decide.
+        known: score that the model has on the logs that it was fitted to. What it missed there it
+            misses here, too, and in the same way over and over: where the score is no worse than
+            that, evidence must be so many times as strong.
     """
-    done = Search()
-    for number in range(MOST):
-        say(f"round {number + 1}: screening the catalogue")
-        found, blind = candidates(state.scenes, barred)
-        done.blind = blind if number == 0 else done.blind
-        screening = screen(state.scenes, state.free, found)
-        before = attempt(state, ())
-        limit = np.log(max(len(found), 1) / ALPHA)
-        this = Round(before, screening, [])
-        done.rounds.append(this)
-        if before.score < SILENT:
-            break
-        for i in _worth_trying(screening, limit):
-            say(f"round {number + 1}: trying {screening.found[i].candidate.effect}")
-            this.judged.append(_judge(state, before, screening, (i,)))
-        this.accepted = _best(before, this.judged, limit)
-        if this.accepted is None or _only_tables(state):
-            say(f"round {number + 1}: trying pairs")
-            likely = _pairs(screening, 2 * limit)[:2]
-            for pair in _drive_pairs(screening) if _only_tables(state) else likely:
-                this.judged.append(_judge(state, before, screening, pair))
-            this.accepted = _best(before, this.judged, limit + np.log(len(found)))
-        this.accepted = _delay_for_clock(this)
-        this.judged.sort(key=lambda j: j.trial.score)
+    before = fitted(state)
+    if before.held_score < NEWS * known:
+        settings = settings.stricter(known)
+    rounds: list[Round] = []
+    dropped: list[str] = []
+    first_excess = max(before.held_score**2 - 1, 0.0)
+    for number in range(settings.most):
+        progress(f"round {number + 1}: screening the catalogue")
+        screened = screen(before)
+        this = Round(before, screened, [])
+        rounds.append(this)
+        for candidate in _promising(screened, settings)[: settings.fitted]:
+            progress(f"round {number + 1}: trying {candidate.name}")
+            this.trials.append(attempt(before, (candidate.name,), candidate.start))
+        this.accepted = _best(before, this.trials, first_excess, settings)
+        if this.accepted is None:
+            progress(f"round {number + 1}: trying pairs")
+            for pair in _pairs(before, screened, settings):
+                this.trials.append(attempt(before, pair))
+            this.accepted = _best(before, this.trials, first_excess, settings)
+        this.trials.sort(key=lambda t: t.fit.held_cost)
         if this.accepted is None:
             break
-        state = _settle(replace(state, scenes=this.accepted.trial.scenes))
-        state = _prune(state, done, limit)
-    return done, state
+        this.tied = _tied(this, settings)
+        before, gone = _pruned(this.accepted, [n for r in rounds for n in r.accepted.names if n not in dropped], settings)
+        dropped += gone
+    return Search(rounds, before, dropped, settings)
 
 
-def _promising(screening: Screening, least: float) -> list[int]:
-    """Candidates whose linear gain leaves a chance of acceptance, best first."""
-    worth = [s.gain / s.excess for s in screening.found]
-    return [i for i in np.argsort(worth)[::-1] if worth[i] > least]
+# -- trials -------------------------------------------------------------------------------------
 
 
-def _worth_trying(screening: Screening, least: float) -> list[int]:
-    """The best few, and of the next those that are not far behind."""
-    top = _promising(screening, least)[:TRIED]
-    worth = [screening.found[i].gain / screening.found[i].excess for i in top]
-    return [i for k, i in enumerate(top) if k < SURE or worth[k] > BEHIND * worth[0]]
+def fitted(state: State) -> Trial:
+    """The state's free parameters fitted."""
+    fit = ScoreFit(state.datasets, state.models, state.begun(), state.by_channel).fit()
+    return Trial((), fit, replace(state, models=fit.models), 0.0, 0.0, 0.0)
 
 
-def _judge(state: State, before: Trial, screening: Screening, which: tuple[int, ...]) -> Judged:
-    found = [screening.found[i] for i in which]
-    trial = attempt(state, tuple(f.candidate.effect for f in found))
-    excess = max(f.excess for f in found)
-    evidence = fall(before, trial) / (2 * excess)
-    return Judged(trial, evidence, min(f.p_value for f in found))
+def grown(state: State, names: Sequence[str], start: dict[str, float] | None = None) -> State:
+    """The state with effects added at where their fit begins, or the base set free."""
+    models = [m.copy() for m in state.models]
+    free = list(state.begun())
+    for name in names:
+        if name == REFIT:
+            free += base_parameters(models[0], [n for n in state.base if n not in {p.name for p in free}])
+            continue
+        for model in models:
+            model.add_effect(name)
+        fresh = effect_parameters(models[0], effect_names(models[0])[-1], fresh=True)
+        fresh = [p.at((start or {}).get(p.name, p.value)) for p in fresh]
+        for model in models:
+            for p in fresh:
+                model.set(p.name, p.value)
+        free += fresh
+    return replace(state, models=models, free=tuple(free))
 
 
-def _best(before: Trial, judged: list[Judged], limit: float) -> Judged | None:
-    """Of those with enough evidence, and that matter, the one with the smallest held-out error."""
-    good = [
-        j
-        for j in judged
-        if j.evidence > limit and j.trial.score < WORTH ** len(j.trial.effects) * before.score
-    ]
-    if not good:
-        return None
-    smallest = min(j.trial.score for j in good)
-    close = [j for j in good if j.trial.score <= CLOSE * smallest]
-    return min(close, key=lambda j: j.trial.chi2)
+def attempt(before: Trial, names: tuple[str, ...], start: dict[str, float] | None = None) -> Trial:
+    """A fit of the state before with something added, judged on held-out parts."""
+    state = grown(before.state, names, start)
+    fit = ScoreFit(state.datasets, state.models, state.free, state.by_channel)
+    fit.begin_at_best(len(state.free) - len(before.state.free))
+    fit.fit()
+    return Trial(names, fit, replace(state, models=fit.models), *_against(before.fit, fit))
 
 
-def _delay_for_clock(this: Round) -> Judged | None:
-    """A delay in place of a clock that is off, where both explain the same.
-
-    The clock's offset is in question only if a calibration log told it: it is then the delay that
-    is new.
-    """
-    if this.accepted is None or this.accepted.trial.effects != (CLOCK_OFF,):
-        return this.accepted
-    enough = this.accepted.evidence - TIE_CHI2 / 2
-    delays = [j for j in this.judged if j.trial.effects == (DELAY,) and j.evidence > enough]
-    return delays[0] if delays else this.accepted
+def _against(less: ScoreFit, more: ScoreFit) -> tuple[float, float, float]:
+    """Evidence for the richer fit, the same without the best block, and how well blocks agree."""
+    a, b = less.block_costs(less), more.block_costs(less)
+    falls = (a - b) / np.maximum(a + b, 1e-300)
+    spread = np.std(falls, ddof=1) / np.sqrt(len(falls)) if len(falls) > 1 else np.inf
+    least = float(np.min(less.without_blocks() - more.without_blocks()))
+    return less.held_cost - more.held_cost, least, float(falls.mean() / max(spread, 1e-12))
 
 
-def _pairs(screening: Screening, least: float) -> list[tuple[int, int]]:
-    """Pairs of effects, by what they explain together beyond the better one alone."""
-    top = _promising(screening, 0.0)[:PAIRED]
+def _best(
+    before: Trial, trials: list[Trial], first_excess: float, settings: Settings
+) -> Trial | None:
+    """Of those with enough evidence, and that matter, the one with the least held-out cost."""
+    alone = len(before.state.datasets) == 1
+    good = []
+    for trial in trials:
+        fall = before.held_score**2 - trial.held_score**2
+        if fall <= 0:
+            continue
+        least = min(settings.worth * first_excess, settings.enough)
+        matters = fall >= least * len(trial.names) or not alone
+        at_nothing = all(_is_neutral(trial, n) for n in trial.names)
+        if matters and not at_nothing and _proven(trial, settings):
+            good.append(trial)
+    best = min(good, key=lambda t: t.fit.held_cost, default=None)
+    # Stale numbers of the base are more likely than an effect that does the same.
+    stale = [t for t in good if t.names == (REFIT,) and t.fit.held_cost - best.fit.held_cost < settings.tie]
+    return stale[0] if stale else best
+
+
+def _proven(trial: Trial, settings: Settings) -> bool:
+    """Enough evidence, and blocks that agree."""
+    count = len(trial.names)
+    loud = trial.evidence >= settings.evidence * count
+    spread = trial.without_best >= settings.without_best * count
+    agreed = trial.evidence >= settings.less_evidence * count and trial.blocks_t >= settings.blocks_t
+    return (loud and spread) or agreed
+
+
+def _is_neutral(trial: Trial, name: str) -> bool:
+    """An effect whose numbers are all where it does nothing explains nothing."""
+    if name == REFIT:
+        return False
+    instance = [n for n in effect_names(trial.state.model) if n.split("#")[0] == name][-1]
+    for p in catalogue()[name]["parameters"]:
+        value = trial.state.model.get(f"{instance}.{p['name']}")
+        if abs(value - p["neutral"]) > 1e-3 * abs(p["default"] - p["neutral"]):
+            return False
+    return True
+
+
+# -- screening ----------------------------------------------------------------------------------
+
+
+def candidates(state: State) -> list[str]:
+    """What could be added."""
+    model = state.model
+    names = []
+    if any(n not in {p.name for p in state.free} for n in state.base):
+        names.append(REFIT)
+    for name, entry in catalogue().items():
+        usable = entry["stage"] in MOTION_STAGES and not entry["texts"]
+        fits = not entry["duty_only"] or model.drive == "duty"
+        if usable and fits and name not in model.effects and name not in state.excluded:
+            names.append(name)
+    return names
+
+
+def screen(before: Trial) -> list[Screened]:
+    """Every candidate's expected worth, by its signature over what is free."""
+    fit, state = before.fit, before.state
+    rows, slopes = fit.state
+    weights = [np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)]
+    left = np.concatenate([w * r for w, r in zip(weights, rows, strict=True)])
+    columns = np.zeros((len(left), len(fit.x)))
+    edges = np.cumsum([0, *(len(r) for r in rows)])
+    for i, (w, j) in enumerate(zip(weights, slopes, strict=True)):
+        columns[edges[i] : edges[i + 1], fit.columns[i]] = w[:, None] * j
+    free = np.vstack([columns, np.diag(1 / fit.std)]) if len(fit.x) else np.zeros((len(left), 0))
+    padded = np.concatenate([left, (fit.usual - fit.x) / fit.std * -1]) if len(fit.x) else left
+    basis = np.linalg.qr(free)[0] if len(fit.x) else free
+    rest = padded - basis @ (basis.T @ padded)
+    found = []
+    for name in candidates(state):
+        start = _best_place(name, state, rows, weights, rest) if _has_place(name) else {}
+        found.append(_screened(name, state, rows, weights, basis, rest, start))
+    return found
+
+
+def _widths(parameters: Sequence[Parameter], start: dict[str, float]) -> np.ndarray:
+    """(k,) standard deviations of the prior, in default strengths."""
+    reach = np.array([abs(start.get(p.name, p.value) - p.usual) for p in parameters])
+    std = np.array([p.std for p in parameters])
+    return np.maximum(std / np.maximum(reach, 1e-12), 1.0)
+
+
+def _has_place(name: str) -> bool:
+    """Whether an effect acts somewhere in the room, so that its place must be searched."""
+    return name != REFIT and any(p["role"] == "place" for p in catalogue()[name]["parameters"])
+
+
+def _best_place(
+    name: str, state: State, rows: list[np.ndarray], weights: list[np.ndarray], rest: np.ndarray
+) -> dict[str, float]:
+    """Of several places the one where the usual strength explains most."""
+    starts = _places(name, state)
+    if len(starts) < 2:
+        return {}
+    gains = np.zeros(len(starts))
+    parts = [[] for _ in starts]
+    for dataset, model, row, weight in zip(state.datasets, state.models, rows, weights, strict=True):
+        points = [_points(name, state, model, s) for s in starts]
+        names = points[0][1]
+        values = np.array([p[2].values[-1] for p in points])
+        changed = weight * (row - dataset.rows(points[0][2].model, names, values))
+        for k, column in enumerate(changed):
+            parts[k].append(column)
+    for k, columns in enumerate(parts):
+        column = np.concatenate(columns)
+        gains[k] = (column @ rest[: len(column)]) ** 2 / (column @ column + 1e-12)
+    return starts[int(np.argmax(gains))]
+
+
+def _screened(
+    name: str,
+    state: State,
+    rows: list[np.ndarray],
+    weights: list[np.ndarray],
+    basis: np.ndarray,
+    rest: np.ndarray,
+    start: dict[str, float],
+) -> Screened:
+    """Slopes at neutral, or the way to the usual strength where these say nothing of it."""
+    parameters, small, whole = _signatures(name, state, rows, weights, start)
+    pad = len(rest) - len(small)
+    small, whole = (np.vstack([c, np.zeros((pad, c.shape[1]))]) for c in (small, whole))
+    small, whole = (c - basis @ (basis.T @ c) for c in (small, whole))
+    linear = small.sum(axis=1)
+    size, reached = np.linalg.norm(linear), np.linalg.norm(whole)
+    agree = linear @ whole[:, 0] / max(size * reached, 1e-12)
+    used = small if agree > 0.5 and 1 / 3 < size / max(reached, 1e-12) < 3 else whole
+    # Columns are in default strengths, and the prior's width in these.
+    widths = np.ones(used.shape[1]) if used is whole else _widths(parameters, start)
+    gram = used.T @ used + np.diag(1 / widths**2)
+    moment = used.T @ rest
+    gain = float(moment @ np.linalg.solve(gram, moment))
+    size = float((whole**2).sum())
+    if used is small:  # half of the prior's width is a usual strength
+        size = float(np.max((small**2).sum(axis=0) * widths**2)) / 4
+    return Screened(name, used, gain, size, start)
+
+
+def _signatures(
+    name: str,
+    state: State,
+    rows: list[np.ndarray],
+    weights: list[np.ndarray],
+    start: dict[str, float],
+) -> tuple[list[Parameter], np.ndarray, np.ndarray]:
+    """(R, k) change of rows by a small part of each parameter's usual strength, scaled up to it,
+    and (R, 1) by the usual strength of all."""
+    small, whole, parameters = [], [], []
+    for dataset, model, row, weight in zip(state.datasets, state.models, rows, weights, strict=True):
+        parameters, names, points = _points(name, state, model, start)
+        values = dataset.rows(points.model, names, points.values)
+        steps = points.share
+        small.append(weight[:, None] * (row - values[:-1]).T / steps)
+        whole.append(weight[:, None] * (row - values[-1:]).T)
+    return parameters, np.concatenate(small), np.concatenate(whole)
+
+
+@dataclass(frozen=True)
+class _Points:
+    model: native.Model
+    values: np.ndarray
+    share: float
+
+
+SMALL = 0.05
+
+
+def _points(
+    name: str, state: State, model: native.Model, start: dict[str, float]
+) -> tuple[list[Parameter], list[str], _Points]:
+    """Parameters, their names, and values: a small step of each alone, then the usual of all."""
+    model = model.copy()
+    if name == REFIT:
+        free = {p.name for p in state.free}
+        parameters = base_parameters(model, [n for n in state.base if n not in free])
+        origin = np.array([p.value for p in parameters])
+        reach = np.array([0.3 * p.std for p in parameters])
+    else:
+        model.add_effect(name)
+        parameters = effect_parameters(model, effect_names(model)[-1], fresh=True)
+        origin = np.array([p.usual for p in parameters])
+        reach = np.array([start.get(p.name, p.value) - p.usual for p in parameters])
+        for p in parameters:
+            model.set(p.name, p.usual)
+    values = np.vstack([origin + SMALL * np.diag(reach), origin + reach])
+    low, high = (np.array([getattr(p, k) for p in parameters]) for k in ("min", "max"))
+    return parameters, [p.name for p in parameters], _Points(model, np.clip(values, low, high), SMALL)
+
+
+PLACES = 5  # along each side of the floor that was driven
+
+
+def _places(name: str, state: State) -> list[dict[str, float]]:
+    """Starts of an effect with a place, over the floor that was driven."""
+    instance = f"{name}#2" if name in state.model.effects else name
+    logs = [d.measurement.track for d in state.datasets if isinstance(d, Trajectory)]
+    if not logs:
+        return [{}]
+    xy = np.concatenate([t.pose[t.segment >= 0, :2] for t in logs])
+    low, high = np.nanquantile(xy, 0.03, axis=0), np.nanquantile(xy, 0.97, axis=0)
+    radius_m = max(0.15, 0.2 * float(np.max(high - low)))
+    starts = []
+    for x in np.linspace(low[0], high[0], PLACES):
+        for y in np.linspace(low[1], high[1], PLACES):
+            if np.min(np.hypot(*(xy[::20] - (x, y)).T)) < radius_m:
+                at = {"x_m": float(x), "y_m": float(y), "radius_m": radius_m}
+                starts.append({f"{instance}.{key}": value for key, value in at.items()})
+    return starts or [{}]
+
+
+def _promising(screened: list[Screened], settings: Settings) -> list[Screened]:
+    """Those whose linear gain leaves a chance of acceptance, best first."""
+    best = sorted(screened, key=lambda s: -s.gain)
+    return [s for s in best if s.gain > settings.evidence / 2 and s.gain > 0.02 * best[0].gain]
+
+
+def _pairs(before: Trial, screened: list[Screened], settings: Settings) -> list[tuple[str, str]]:
+    """Pairs by what they explain together beyond the better one alone."""
+    fit = before.fit
+    rows, slopes = fit.state
+    top = sorted(screened, key=lambda s: -s.gain)[:10]
+    if before.held_score < 1.0:
+        return []
+    weights = [np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)]
+    left = np.concatenate([w * r for w, r in zip(weights, rows, strict=True)])
     worth = {}
-    for i, j in combinations(top, 2):
-        both = np.hstack([screening.signatures[i], screening.signatures[j]])
-        gram, moment = both.T @ both, both.T @ screening.left
-        gain = moment @ np.linalg.lstsq(gram, moment, rcond=1e-9)[0]
-        alone = max(screening.found[i].gain, screening.found[j].gain)
-        excess = max(screening.found[i].excess, screening.found[j].excess)
-        worth[i, j] = (gain - alone) / excess
-    return [p for p in sorted(worth, key=lambda pair: -worth[pair]) if worth[p] > least]
+    for a, b in combinations(top, 2):
+        both = np.hstack([a.columns, b.columns])[: len(left)]
+        gram = both.T @ both + 0.25 * np.eye(both.shape[1])
+        moment = both.T @ left
+        worth[a.name, b.name] = float(moment @ np.linalg.solve(gram, moment)) - max(a.gain, b.gain)
+    best = sorted(worth, key=lambda pair: -worth[pair])
+    return [p for p in best if worth[p] > settings.evidence][: settings.pairs]
 
 
-def _only_tables(state: State) -> bool:
-    """Nothing but steady-state tables: a trial is cheap, and the drive's curve is all there is."""
-    return all(s.noise is None for s in state.scenes)
+# -- what cannot be told apart --------------------------------------------------------------------
 
 
-def _drive_pairs(screening: Screening) -> list[tuple[int, int]]:
-    """Pairs of effects between duty and wheel, which hide each other: dead zone and curve."""
-    stages = {name: entry["stage"] for name, entry in catalogue().items()}
-    drive = [
-        i for i, s in enumerate(screening.found) if stages[s.candidate.effect] in ("duty", "wheel")
-    ]
-    return list(combinations(drive, 2))
+def canonical_correlation(a: np.ndarray, b: np.ndarray) -> float:
+    """Largest cosine between the smaller space and its image in the other: 1 if one imitates it.
+
+    Smallest of the canonical correlations over the dimensions of the smaller space.
+    """
+    qa, qb = (_orthonormal(x) for x in (a, b))
+    if not qa.shape[1] or not qb.shape[1]:
+        return 0.0
+    values = np.linalg.svd(qa.T @ qb, compute_uv=False)
+    return float(values[: min(qa.shape[1], qb.shape[1])].min())
 
 
-def _settle(state: State) -> State:
-    """Takes the noise that the richer model leaves."""
-    for scene in state.scenes:
-        scene.settle_noise()
-    return state
+def _orthonormal(x: np.ndarray) -> np.ndarray:
+    u, s, _ = np.linalg.svd(x, full_matrices=False)
+    return u[:, s > 1e-6 * max(s[0], 1e-300)] if len(s) else u
 
 
-def _prune(state: State, done: Search, limit: float) -> State:
+def _tied(this: Round, settings: Settings) -> list[Trial]:
+    """Other trials of the round that the data cannot tell from the accepted one."""
+    accepted = this.accepted
+    assert accepted is not None
+    if len(accepted.names) > 1 or accepted.names[0] == REFIT:
+        return []
+    columns = {s.name: s.columns for s in this.screened}
+    tied = []
+    for trial in this.trials:
+        if trial is accepted or len(trial.names) > 1 or trial.names[0] == REFIT:
+            continue
+        apart = trial.fit.held_cost - accepted.fit.held_cost
+        *_, blocks_t = _against(trial.fit, accepted.fit)
+        same = canonical_correlation(columns[accepted.names[0]], columns[trial.names[0]])
+        if (apart < settings.tie and blocks_t < 2.0) or (same > settings.alike and apart < settings.evidence):
+            tied.append((same, trial))
+    nearest = sorted(tied, key=lambda pair: -pair[0])[: settings.group - 1]
+    return [trial for _, trial in nearest]
+
+
+def _pruned(trial: Trial, names: list[str], settings: Settings) -> tuple[Trial, list[str]]:
     """Drops effects that the latest made needless."""
-    names = effect_names(state.model)
-    fresh = len(names) - len(done.rounds[-1].accepted.trial.effects)
-    given = (
-        fresh
-        - sum(len(r.accepted.trial.effects) for r in done.rounds[:-1] if r.accepted)
-        + len(done.dropped)
-    )
-    whole = attempt(state, ()) if fresh > given else None
-    for index in range(fresh - 1, given - 1, -1):
-        less = without(state, index)
-        if fall(less, whole) / 2 < limit:
-            done.dropped.append(names[index])
-            state, whole = replace(state, scenes=less.scenes), less
-    return state
+    gone = []
+    for name in [n for n in names if n != REFIT and n not in trial.names]:
+        less = without(trial, name)
+        if less is None:
+            continue
+        evidence, *_ = _against(less.fit, trial.fit)
+        if evidence < settings.evidence / 2:
+            gone.append(name)
+            trial = replace(less, names=trial.names)
+    return trial, gone
+
+
+def without(trial: Trial, name: str) -> Trial | None:
+    """The trial's state without an effect, refitted; None if it is not in the model."""
+    names = effect_names(trial.state.model)
+    own = [i for i, n in enumerate(names) if n.split("#")[0] == name]
+    if not own:
+        return None
+    models = []
+    for model in trial.state.models:
+        model = model.copy()
+        model.remove_effect(own[-1])
+        models.append(model)
+    free = tuple(p for p in trial.state.begun() if not p.name.startswith(f"{names[own[-1]]}."))
+    return fitted(replace(trial.state, models=models, free=free))

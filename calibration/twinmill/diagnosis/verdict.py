@@ -1,28 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verdict of a diagnosis, and its sentence."""
+"""The verdict of a diagnosis, and its sentence: findings first, then what is left."""
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from twinmill.diagnosis.omnibus import CHANGE, Omnibus
-from twinmill.diagnosis.ranking import Ranked, groups_of
-from twinmill.diagnosis.search import SILENT
-from twinmill.fitting.compare import GOOD
-from twinmill.model.freedom import Estimate
+import numpy as np
 
-HELPED = 0.95  # a refit that lowers the score below this share of it was worth it
-OUTSIDE = 0.1  # share of what could be explained that no effect does
-# Effects that hold back what follows a change of the command: one imitates another.
-LATE = {
-    "input_delay",
-    "clock_offset",
-    "motor_lag",
-    "lag_by_duty",
-    "slew_limit",
-    "reversal_dead_time",
-    "coasting",
-}
+from twinmill.diagnosis.findings import Finding
+from twinmill.diagnosis.rest import Rest
+from twinmill.diagnosis.search import REFIT
+from twinmill.fitting.compare import GOOD, MISSING
+from twinmill.model.parameters import catalogue
+
+LEAST_SHARE = 0.1  # of the first excess: findings that take less leave the verdict to the rest
+DRIFTED = 0.85  # share of the score as given that drifting gains leave, where they were stale
 WORSE = 1.5  # score over the usual one, beyond which it is a finding
-IMITATED = 0.02  # the same share, of what depends on the kind of change, where one of LATE is found
 
 
 @dataclass(frozen=True)
@@ -30,73 +22,153 @@ class Weighed:
     """What the verdict rests on.
 
     Attributes:
-        score, score_refit: of the model as given, and with its base refitted.
-        names: of the effects found.
-        share: of what could be explained, unexplained by them.
-        left: held-out score with the effects found.
-        usual: score of the model on the logs that it was fitted to.
+        score: of the model as given, as `compare` has it.
+        first, refit, last: held-out scores: where the search started, with the base refitted, with
+            what was found.
+        hidden: effects that the data cannot show.
         noises: what was said of unusual noise.
-        at_bound: estimates of found effects that are at their bounds.
+        usual: score of the model on the logs that it was fitted to.
     """
 
     score: float
-    score_refit: float
-    names: list[str]
-    ranking: list[Ranked]
-    omnibus: Omnibus
-    share: float
-    left: float
+    first: float
+    refit: float
+    last: float
+    findings: Sequence[Finding]
+    rest: Rest
+    hidden: Collection[str]
+    noises: Sequence[str]
     usual: float
-    noises: list[str]
-    at_bound: list[Estimate]
+
+    @property
+    def effects(self) -> list[Finding]:
+        """Findings but for stale numbers of the base."""
+        return [f for f in self.findings if f.effect != REFIT]
 
     @property
     def verdict(self) -> str:
         """As in Diagnosis."""
-        if self._outside:
+        if self.effects and not self._noise_outweighs:
+            top = self.effects[0]
+            return "ambiguous" if top.group else "effect_missing"
+        if self._outside or self._noise_outweighs:
             return "outside_catalogue"
-        if self.names:
-            tied = {r.group for r in self.ranking if r.effect in self.names and r.group is not None}
-            return "ambiguous" if tied else "effect_missing"
-        if self.score_refit < HELPED * self.score and self.score > GOOD:
+        if self.findings:
+            return "refit_enough" if self.last <= MISSING * self.known else "outside_catalogue"
+        if self._drifted and self.last <= MISSING * self.known:
             return "refit_enough"
-        return "model_adequate"
+        if self.last > MISSING * self.known:
+            return "outside_catalogue"
+        return "cannot_tell" if self.silent or self.last > MISSING else "model_adequate"
+
+    @property
+    def _drifted(self) -> bool:
+        """Gains that were let drift took the error: the base's numbers are stale."""
+        return self.score > GOOD * self.known and self.last < DRIFTED * self.score
+
+    @property
+    def silent(self) -> list[str]:
+        """Effects of the drive that only several levels of the command show, and these data do not.
+
+        Without them a robot that is driven at other commands may do something else altogether.
+        """
+        drives = {name: catalogue()[name]["identify"] for name in self.hidden}
+        return [n for n, own in drives.items() if "levels" in own and "arcs" not in own]
 
     @property
     def _outside(self) -> bool:
-        changes = any(g.group == CHANGE for g in self.omnibus.groups)
-        imitated = changes and bool(LATE & set(self.names)) and self.share > IMITATED
-        random = bool(self.noises) and not self.names
-        unexplained = (self.share > OUTSIDE or imitated) and self.left > SILENT
-        return unexplained or self.left > WORSE * self.usual or random
+        """Something predictable is left that no effect takes."""
+        if self.last <= GOOD * self.known:
+            return False
+        predictable = self.rest.firm and self.rest.share > LEAST_SHARE
+        return predictable or bool(self.rest.depends_on) or self.last > WORSE * self.known
+
+    @property
+    def known(self) -> float:
+        """Score that is no news: that of the model on the logs it was fitted to."""
+        return self.usual if np.isfinite(self.usual) else 1.0
+
+    @property
+    def _noise_outweighs(self) -> bool:
+        """The motion is far noisier than it was, and what was found takes little beside."""
+        if not self.noises:
+            return False
+        return sum(f.share for f in self.effects) < 0.5
 
     @property
     def sentence(self) -> str:
         """The verdict for people."""
-        verdict, names = self.verdict, " and ".join(self.names)
+        verdict = self.verdict
         if verdict == "model_adequate":
-            return "Nothing is missing that these logs would show."
+            return f"Nothing is missing that these logs would show.{self._as_before}"
+        if verdict == "cannot_tell" and self.last > MISSING:
+            return f"Nothing new is missing that these logs would show.{self._as_before}"
+        if verdict == "cannot_tell":
+            return (
+                "Nothing is missing that these logs would show, but they cannot show "
+                f"{', '.join(self.silent)}."
+            )
         if verdict == "refit_enough":
             return (
                 "No effect is missing; the base model's numbers were stale, and a refit is enough."
             )
-        if verdict == "effect_missing":
-            return f"Missing: {names}.{self._doubt}"
-        if verdict == "ambiguous":
-            same = " or ".join(groups_of(self.ranking, self.names))
-            return f"Missing: one of {same}; these logs cannot tell which.{self._doubt}"
-        if self.noises and not self.names and (self.left < GOOD or not self.omnibus.groups):
+        if verdict in ("effect_missing", "ambiguous"):
+            return f"Missing: {' and '.join(_named(f) for f in self.findings)}.{self._left}"
+        return self._outside_sentence
+
+    @property
+    def _as_before(self) -> str:
+        """What the model left in the logs that it was fitted to, it leaves here, too."""
+        if self.last <= GOOD:
+            return ""
+        return (
+            f" The model misses as it did on the logs that it was fitted to (score {self.last:.2f}, "
+            f"there {self.known:.2f}): explain those first."
+        )
+
+    @property
+    def _left(self) -> str:
+        """What is left, where it is more than the noise."""
+        if self.last <= GOOD or self.rest.share < 0.02:
+            return ""
+        on = self.rest.depends_on
+        depends = f", and depends on {' and '.join(on)}" if on else ""
+        return (
+            f" Something else is left: {100 * self.rest.share:.0f} % of the squared error above the "
+            f"noise{depends}; no effect of the catalogue takes it."
+        )
+
+    @property
+    def _outside_sentence(self) -> str:
+        if self.noises and not self.rest.depends_on:
             return "Something random disturbs the motion that no effect of the catalogue describes."
-        on = " and ".join(g.group for g in self.omnibus.groups)
+        on = " and ".join(self.rest.depends_on)
         depends = f"it depends on {on}" if on else "no formula that was tried describes it"
-        also = f" {names} explain{'s' if len(self.names) == 1 else ''} part of it." if names else ""
+        names = " and ".join(f.effect for f in self.findings)
+        also = f" {names} explain{'s' if len(self.findings) == 1 else ''} part of it." if names else ""
         return f"Something outside the catalogue is there; {depends}.{also}"
 
     @property
-    def _doubt(self) -> str:
-        """What makes a name doubtful."""
-        if not self.at_bound:
-            return ""
-        named = " and ".join(e.name for e in self.at_bound)
-        are = "is at its bound" if len(self.at_bound) == 1 else "are at their bounds"
-        return f" {named} {are}: another effect may be behind it."
+    def notes(self) -> list[str]:
+        """Sentences on doubts, and on what was left before."""
+        doubts = [f"Doubtful: {f.why}." for f in self.findings if f.why]
+        old = self.rest.old
+        if old:
+            doubts.append(
+                f"What still depends on {' and '.join(old)} was left by this model before, in the "
+                "log that it was fitted to."
+            )
+        return doubts
+
+
+def _named(finding: Finding) -> str:
+    """A finding in the sentence, with what it takes."""
+    takes = f"{100 * finding.share:.0f} %"
+    if finding.effect == REFIT:
+        values = ", ".join(f"{e.name.split('.', 1)[1]} {e.value:.3g}" for e in finding.parameters[:3])
+        return f"stale numbers of the base ({values}; {takes})"
+    name = finding.effect
+    if finding.group:
+        name = f"one of {' or '.join(finding.group)}, which these logs cannot tell apart"
+    doubt = ", doubtful" if finding.certainty == "doubtful" else ""
+    return f"{name} ({takes}{doubt})"

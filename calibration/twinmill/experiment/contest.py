@@ -1,21 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which effects the next run must part, and the model without them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from twinmill.diagnosis.candidates import Candidate, candidates
-from twinmill.diagnosis.evidence import State
-from twinmill.diagnosis.ranking import Ranked
+from twinmill.diagnosis.findings import Ranked
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.screen import screen
+from twinmill.diagnosis.search import without
+from twinmill.experiment.candidates import Candidate, candidates
 from twinmill.experiment.information import Subject
-from twinmill.fitting.fit import refit
-from twinmill.model.freedom import Free, catalogue
+from twinmill.experiment.screen import screen
+from twinmill.model.parameters import Parameter, all_effect_parameters, catalogue
 from twinmill.predict.problem import Scene
 
 WEAKEST = 4  # effects that show least, where nothing else is in question
+
+
+@dataclass(frozen=True)
+class State:
+    """Logs and tables with the model so far, what is free of it, and (H, 3) floors of the logs."""
+
+    scenes: list[Scene]
+    free: list[Parameter]
+    floors: list[np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -40,15 +48,15 @@ class Contest:
     fitted: dict[str, dict[str, float]]
 
 
-def contest(diagnosis: Diagnosis, base: list[Free]) -> Contest:
+def contest(diagnosis: Diagnosis, base: list[Parameter]) -> Contest:
     """What a diagnosis leaves open; `base`: of the model, also what these logs do not tell."""
     ranking = diagnosis.ranking
     top = next((r.group for r in ranking if r.group is not None), None)
     alike = [r.effect for r in ranking if r.group == top and top is not None]
-    named = [] if alike else diagnosis.found
+    named = [] if alike else diagnosis.motion
     hidden = [effect for effect, _ in diagnosis.not_identifiable]
     closest = [r.effect for r in ranking[:2]]
-    state = replace(_without(diagnosis, [*alike, *named]), base=base)
+    state = _without(diagnosis, [*alike, *named], base)
     told = [r for r in ranking if r.effect in (*alike, *named)]
     return Contest(alike, named, hidden, closest, state, _values(told))
 
@@ -117,18 +125,15 @@ def _whole(effect: str, fitted: dict[str, dict[str, float]]) -> Candidate:
     )
 
 
-def _without(diagnosis: Diagnosis, names: list[str]) -> State:
-    """The diagnosis' state without these effects, the rest refitted."""
-    state = diagnosis.state
-    if not names:
-        return state
-    model = state.model.copy()
-    for index in reversed(range(len(model.effects))):
-        if model.effects[index] in names:
-            model.remove_effect(index)
-    reduced = State([s.with_model(model) for s in state.scenes], state.base, state.floors)
-    refit(reduced.scenes, reduced.free)
-    return reduced
+def _without(diagnosis: Diagnosis, names: list[str], base: list[Parameter]) -> State:
+    """The diagnosis' model without these effects, the rest refitted; its logs alone."""
+    last = diagnosis.search.last
+    for name in names:
+        last = without(last, name) or last
+    model = last.state.model
+    logs = [o for o in diagnosis.opened if o.floor and o.data is not None]
+    free = [p.at(model.get(p.name)) for p in [*base, *all_effect_parameters(model)]]
+    return State([o.scene().with_model(model) for o in logs], free, [o.floor.rms for o in logs])
 
 
 def _values(ranked: list[Ranked]) -> dict[str, dict[str, float]]:

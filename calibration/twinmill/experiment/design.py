@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Puts a script together, move by move, that parts most within the time and the floor given."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
 
-from twinmill.data.measurement import SHORTEST_LOG_S
+from twinmill.data.measurement import SHORTEST_LOG_S, Measurement
+from twinmill.data.steady_table import Sheet
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.experiment.contest import Contest, contest, question, subjects
 from twinmill.experiment.foresight import LEAD_S, Played, Rows, rows_of
@@ -15,9 +16,11 @@ from twinmill.experiment.information import Ledger, Subject
 from twinmill.experiment.moves import Move, family
 from twinmill.experiment.power import power
 from twinmill.experiment.relevance import relevance
-from twinmill.model.freedom import base_quantities, catalogue
+from twinmill.fitting.fit import base_names
+from twinmill.model.parameters import base_parameters, catalogue
 from twinmill.model.model_file import ModelFile
 from twinmill.predict.problem import Scene
+from twinmill.predict.residual import StepGrid
 from twinmill.predict.windows import Windows, score
 
 ENOUGH_CHI2 = 20.0  # a margin of this is about what an acceptance needs
@@ -25,6 +28,10 @@ BESIDES = 0.05  # weight of effects that are not in question: once these are see
 WANDER_M = 0.08  # of a real robot from the predicted path within a minute, beside the candidates'
 SHORTEST_RUN_S = SHORTEST_LOG_S + 3  # as much may be left where no further move fits
 CENTRE = np.zeros(3)
+NO_LOG = (
+    "only steady-state tables were given; the next run is designed for the noise and the clocks of a "
+    "log, so give one of any drive besides."
+)
 
 
 @dataclass(frozen=True)
@@ -122,12 +129,14 @@ def design(
     Raises:
         ValueError: there is no log, or no move shows what is in question.
     """
-    hashes = [s.measurement.log_sha256 for s in diagnosis.state.scenes if s.noise]
+    logs = [o for o in diagnosis.opened if o.floor]
+    hashes = [o.measurement.log_sha256 for o in logs]
     usual = model_file.usual_score(hashes)
     usual = usual if np.isfinite(usual) else 1.0
     moves = family(limits.max_duty)
     say("playing the moves in the twin")
-    asked = contest(diagnosis, base_quantities(model_file.model, model_file.told_by_others(hashes)))
+    names = base_names(model_file.model, logs, model_file.told_by_others(hashes))
+    asked = contest(diagnosis, base_parameters(model_file.model, names))
     scene = log_of(asked.state.scenes)
     foreseen = Played.of([[m] for m in moves], scene).scene(scene, CENTRE)
     known = subjects(asked.state.scenes, foreseen, asked.state, asked, usual)
@@ -166,16 +175,19 @@ def log_of(scenes: list[Scene]) -> Scene:
     """
     logs = [scene for scene in scenes if scene.noise]
     if not logs:
-        raise ValueError(
-            "only steady-state tables were given; the next run is designed for the noise and the "
-            "clocks of a log, so give one of any drive besides."
-        )
+        raise ValueError(NO_LOG)
     return logs[0]
 
 
-def check(scenes: list[Scene], limits: Limits) -> None:
+def check(
+    measurements: Sequence[Measurement | Sheet], model_file: ModelFile, limits: Limits
+) -> None:
     """Raises ValueError, before the long work, where no script can be."""
-    scene = log_of(scenes)
+    logs = [m for m in measurements if isinstance(m, Measurement)]
+    if not logs:
+        raise ValueError(NO_LOG)
+    model = model_file.model.for_robot(logs[0].track.robot_id)
+    scene = Scene(logs[0], model, StepGrid.of(logs[0]), clock_free=True)
     if scene.model.drive != "duty":
         raise ValueError(
             f"the model is driven by {scene.model.drive}; scripts are made of wheel duties, so "

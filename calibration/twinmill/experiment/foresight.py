@@ -9,7 +9,8 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import Timing, Track
 from twinmill.experiment.moves import Move
-from twinmill.predict.problem import CLOCK, Scene
+from twinmill.model.parameters import CLOCK
+from twinmill.predict.problem import Scene
 from twinmill.predict.residual import StepGrid
 
 LEAD_S = 1.0  # stands before the first move, and as long after the last

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinmill.diagnosis.candidates import Candidate
-from twinmill.fitting.solve import System
-from twinmill.model.freedom import EFFECT_PRIOR, Free
+from twinmill.experiment.candidates import Candidate
+from twinmill.experiment.one_step_fit import System
+from twinmill.experiment.screen import EFFECT_PRIOR
+from twinmill.model.parameters import Parameter
 from twinmill.predict.problem import Scene
 
 CLOCKS = 2  # offset and rate of a run
@@ -44,7 +45,7 @@ class Ledger:
     whole step, then the clock of the planned run.
     """
 
-    def __init__(self, free: list[Free], subjects: list[Subject]) -> None:
+    def __init__(self, free: list[Parameter], subjects: list[Subject]) -> None:
         self.free, self.subjects = free, subjects
         counts = [len(s.candidate.strength) + 1 for s in subjects]
         ends = len(free) + np.cumsum(counts)
@@ -104,7 +105,7 @@ class Ledger:
     def _inner(self, grams: np.ndarray) -> np.ndarray:
         """Products of the free quantities and the clock, with their priors."""
         at = self.nuisance
-        widths = np.array([f.prior_std for f in self.free] + [np.inf] * CLOCKS)
+        widths = np.array([f.std for f in self.free] + [np.inf] * CLOCKS)
         return grams[..., at[:, None], at] + np.diag(1 / widths**2 + 1e-9)
 
     def _columns(self, scene: Scene) -> tuple[np.ndarray, np.ndarray]:

@@ -4,10 +4,12 @@
 import numpy as np
 from scipy.stats import ncx2, norm
 
-from twinmill.diagnosis.ranking import ALIKE, FAINT_CHI2
-from twinmill.diagnosis.search import ALPHA, TIE_CHI2
 from twinmill.experiment.relevance import Relevance
 
+ALPHA = 0.01  # chance of accepting anything if nothing is missing, over all candidates
+TIE_CHI2 = 6.0  # difference of held-out chi2 that decides nothing
+ALIKE = 0.9  # share of a signature that another effect imitates
+FAINT_CHI2 = 2 * TIE_CHI2  # of what is not imitated: the difference is often no more than that
 STRENGTHS = (0.4, 1.0, 2.5)  # times the usual, each as probable
 
 

@@ -5,12 +5,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from twinmill.data.measurement import Measurement
-from twinmill.fitting.compare import Comparison, comparison, open_scenes
-from twinmill.fitting.fit import common_clock, refit, share_noise
-from twinmill.fitting.heldout import HeldOut, held_out
-from twinmill.fitting.solve import excited, solve
-from twinmill.model.freedom import Estimate, base_quantities, effect_names, effect_quantities
+from twinmill.fitting.compare import Comparison, comparison
+from twinmill.fitting.fit import base_names, common_clock, fitted, noise_of, with_estimates
+from twinmill.fitting.heldout import HeldOut
+from twinmill.fitting.opening import judged, open_measurements
 from twinmill.model.model_file import Fitted, ModelFile, write_child
+from twinmill.model.parameters import (
+    Estimate,
+    all_effect_parameters,
+    base_parameters,
+    effect_names,
+    effect_parameters,
+)
 
 
 @dataclass(frozen=True)
@@ -74,40 +80,30 @@ def add(
     richer = model_file.model.copy()
     richer.add_effect(effect, texts or {})
     name = effect_names(richer)[-1]
-    scenes = open_scenes(measurements, model_file)
-    known = effect_quantities(model_file.model)
+    opened = open_measurements(measurements, model_file)
     logs = {m.log_name: m.log_sha256 for m in measurements}
     told = model_file.told_by_others(logs.values())
-    old = excited(scenes, base_quantities(model_file.model, told), known) + known
-    fresh = [f for f in effect_quantities(richer, fresh=name) if f.name.startswith(f"{name}.")]
-    free = old + fresh
-    grown = [scene.with_model(richer) for scene in scenes]
-    solution = refit(grown, free)
-    share_noise(grown, scenes)
-    before, after = comparison(model_file, scenes), comparison(model_file, grown)
-    floors = [r.floor.rms for r in after.robots]
-    refitted = [scene.with_model(model_file.model) for scene in scenes]
-    solve(refitted, old)
-    held = [
-        held_out(scenes, [], floors),
-        held_out(refitted, old, floors),
-        held_out(grown, free, floors),
-    ]
-    for estimate in solution.estimates:
-        richer.set(estimate.name, estimate.value)
+    base = base_parameters(model_file.model, base_names(model_file.model, judged(opened), told))
+    old = [*base, *all_effect_parameters(model_file.model)]
+    fresh = effect_parameters(richer, name, fresh=True)
+    grown = [o.with_model(richer) for o in opened]
+    moved, found = fitted(grown, [*old, *fresh], fresh=len(fresh))
+    held = [HeldOut.of(f) for f in (fitted(opened, [])[1], fitted(opened, old)[1], found)]
+    before, after = comparison(model_file, opened), comparison(model_file, moved)
+    estimates = found.shared_estimates()
     write_child(
         model_file,
         Fitted(
-            richer,
-            solution.estimates,
+            with_estimates(richer, estimates),
+            [e for e in estimates if e.seen],
             logs,
             before.score,
             after.score,
-            grown[0].noise,
-            common_clock(solution),
+            noise_of(after),
+            common_clock(found),
             bool(told),
         ),
         out,
         command,
     )
-    return AddResult(name, before, after, solution.estimates, *held, Path(out))
+    return AddResult(name, before, after, estimates, *held, Path(out))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits the base model, and the effects it has, to measurements."""
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,11 +9,22 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
-from twinmill.fitting.compare import Comparison, comparison, open_scenes
-from twinmill.fitting.solve import Solution, excited, solve
-from twinmill.model.freedom import Estimate, Free, base_quantities, effect_quantities
+from twinmill.fitting.compare import Comparison, comparison
+from twinmill.fitting.opening import Opened, judged, open_measurements
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import Fitted, ModelFile, write_child
-from twinmill.predict.problem import CLOCK, CLOCK_RATE, Scene
+from twinmill.model.parameters import (
+    BASE_GAINS,
+    CLOCK,
+    CLOCK_RATE,
+    LAG,
+    Estimate,
+    Parameter,
+    all_effect_parameters,
+    base_parameters,
+    duty_table,
+)
+from twinmill.steady.scene import SteadyScene
 
 AGREE_SIGMA = 5.0  # clock offsets of several logs that differ by less are one
 
@@ -22,7 +34,7 @@ class FitResult:
     """What a fit did.
 
     Attributes:
-        before, after: comparisons on the same noise and floor.
+        before, after: comparisons over the same floors.
         parameters: estimates.
         clock: offset that all logs share, or None.
         path: of the new model.
@@ -45,84 +57,118 @@ class FitResult:
         }
 
 
-def share_noise(source: list[Scene], scenes: list[Scene]) -> None:
-    """Judges scenes by the noise of others of the same measurements."""
-    for given, scene in zip(source, scenes, strict=True):
-        scene.noise = given.noise
+def base_names(
+    model: native.Model, opened: Sequence[Opened], told: Collection[str] = ()
+) -> list[str]:
+    """Gains, duty table and lag of the base that these measurements move.
 
-
-def refit(scenes: list[Scene], free: list[Free]) -> Solution:
-    """Fits twice: the second time with the noise that the first fit leaves, if that is less.
-
-    Where much stays unexplained, the errors tell less than they seem to: the prior is then given as
-    much more weight as they are too large.
+    Args:
+        model: whose base it is.
+        opened: measurements.
+        told: names of what other logs told; of these only the gains are free, since batteries and
+            floors change. Without any, the speeds of the duty table stand for the forward gain.
     """
-    excess = np.sqrt(max(1.0, solve(scenes, free).chi2))
-    for scene in scenes:
-        scene.settle_noise()
-    return solve(
-        scenes,
-        [
-            replace(f, prior_std=f.prior_std / excess, begin=scenes[0].model.get(f.name))
-            for f in free
-        ],
-    )
+    gains = [n for n in BASE_GAINS if any(_moves(o, n) for o in opened)]
+    table = [] if told else duty_table(model)
+    if len(table) > 1:
+        gains = [*table, *(n for n in gains if n != BASE_GAINS[0])]
+    changes = any(o.floor for o in opened) and LAG not in told
+    return [*gains, LAG] if changes else gains
+
+
+def _moves(own: Opened, gain: str) -> bool:
+    """Whether the commands move the robot along what a gain scales."""
+    if isinstance(own.data, SteadyScene):
+        return True
+    track = own.measurement.track
+    return track.command_kind != "twist" or bool(track.command[:, BASE_GAINS.index(gain)].any())
+
+
+def fitted(
+    opened: Sequence[Opened], free: Sequence[Parameter], fresh: int = 0
+) -> tuple[list[Opened], ScoreFit]:
+    """The measurements with their models fitted together; never to a worse score.
+
+    Those without a floor get the shared quantities alone. The last `fresh` of the free quantities
+    are new: their fit begins at the best of several strengths.
+    """
+    known = judged(opened)
+    fit = ScoreFit([o.data for o in known], [o.model for o in known], free)
+    if fresh:
+        fit.begin_at_best(fresh)
+    fit.fit()
+    models = iter(fit.models)
+    moved = [replace(o, model=next(models)) if o.data is not None else o for o in opened]
+    shared = {e.name: e.value for e in fit.shared_values}
+    for own in moved:
+        if own.data is None:
+            for name, value in shared.items():
+                own.model.set(name, value)
+    return moved, fit
 
 
 def fit(
-    measurements: list[Measurement], model_file: ModelFile, out: Path, command: str
+    measurements: Sequence[Measurement], model_file: ModelFile, out: Path, command: str
 ) -> FitResult:
     """Fits all free quantities of the model to all measurements and writes the new model.
 
     Raises:
+        LogError: no measurement can be judged.
         ModelError: the new file cannot be written.
     """
-    scenes = open_scenes(measurements, model_file)
-    known = effect_quantities(model_file.model)
-    free = excited(scenes, base_quantities(model_file.model, ()), known) + known
-    fitted = [s.with_model(model_file.model) for s in scenes]
-    solution = refit(fitted, free)
-    share_noise(fitted, scenes)
-    before, after = comparison(model_file, scenes), comparison(model_file, fitted)
-    clock = common_clock(solution)
-    model = fitted_model(model_file, solution.estimates)
+    opened = open_measurements(measurements, model_file)
+    model = model_file.model
+    free = [
+        *base_parameters(model, base_names(model, judged(opened))),
+        *all_effect_parameters(model),
+    ]
+    moved, found = fitted(opened, free)
+    before, after = comparison(model_file, opened), comparison(model_file, moved)
+    estimates = found.shared_estimates()
+    clock = common_clock(found)
     write_child(
         model_file,
         Fitted(
-            model,
-            solution.estimates,
+            with_estimates(model, estimates),
+            [e for e in estimates if e.seen],
             {m.log_name: m.log_sha256 for m in measurements},
             before.score,
             after.score,
-            fitted[0].noise,
+            noise_of(after),
             clock,
         ),
         out,
         command,
     )
-    return FitResult(before, after, solution.estimates, clock.get(CLOCK), Path(out))
+    return FitResult(before, after, estimates, clock.get(CLOCK), Path(out))
 
 
-def fitted_model(model_file: ModelFile, estimates: list[Estimate]) -> native.Model:
-    """The file's model with estimates put in."""
-    model = model_file.model.copy()
+def noise_of(after: Comparison):
+    """Of the first log that has a score; None of tables."""
+    return next((r.scene.noise for r in after.robots if r.scene.noise and np.isfinite(r.score)), None)
+
+
+def with_estimates(model: native.Model, estimates: Sequence[Estimate]) -> native.Model:
+    """The model with estimates put in."""
+    model = model.copy()
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
     return model
 
 
-def common_clock(solution: Solution) -> dict[str, Estimate]:
+def common_clock(fit: ScoreFit) -> dict[str, Estimate]:
     """Offset and rate that the logs share; empty if they differ, or were known before."""
-    if not all(solution.clocks):
+    own = [fit.own_estimates(i) for i in range(len(fit.datasets))]
+    if not own or not all(CLOCK in e for e in own):
         return {}
     common = {}
     for name, least in ((CLOCK, 0.001), (CLOCK_RATE, 5.0)):
-        values = np.array([c[name].value for c in solution.clocks])
-        stds = np.array([c[name].std for c in solution.clocks])
+        values = np.array([e[name].value for e in own])
+        stds = np.maximum(np.array([e[name].std for e in own]), 1e-9)
         weights = 1 / stds**2
         mean = float(np.sum(weights * values) / weights.sum())
         if np.any(np.abs(values - mean) > AGREE_SIGMA * np.hypot(stds, least)):
             return {}
-        unit = solution.clocks[0][name].unit
-        common[name] = Estimate(name, mean, float(1 / np.sqrt(weights.sum())), unit, False, True)
+        std = float(1 / np.sqrt(weights.sum()))
+        common[name] = Estimate(name, mean, std, own[0][name].unit, False, True)
     return common

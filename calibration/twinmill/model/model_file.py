@@ -13,7 +13,7 @@ from typing import Protocol
 import tomlkit
 import twinmill_native as native
 
-from twinmill.model.freedom import Estimate, catalogue, effect_names
+from twinmill.model.parameters import Estimate, catalogue, effect_names
 
 DEFAULT_MODEL = "turbopi.toml"
 
@@ -62,6 +62,11 @@ class ModelFile:
                 else {f"base.{key}"}
             )
         return told
+
+    def fitted_on(self, log_sha256: Collection[str]) -> bool:
+        """Whether the base was fitted to one of these very logs."""
+        base = tomlkit.parse(self.text).get("base", {})
+        return bool(set(base.get("fitted_on", [])) & set(log_sha256))
 
     def usual_score(self, log_sha256: Collection[str]) -> float:
         """Score that the model reached on the other logs it was fitted to; infinite without any.

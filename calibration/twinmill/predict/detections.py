@@ -8,9 +8,10 @@ import twinmill_native as native
 
 from twinmill.data.camera_frames import Frames
 from twinmill.data.track import Track
-from twinmill.predict.folds import BLOCK_S, thue_morse
-from twinmill.predict.problem import CLOCK, CLOCK_RATE, Scene
+from twinmill.model.parameters import CLOCK, CLOCK_RATE
+from twinmill.predict.problem import Scene
 
+BLOCK_S = 4.0  # bits of one block may hang together
 # Poses are never better known than this: markers sit off the wheels' centre, cameras off theirs.
 LEAST_M, LEAST_RAD = 0.003, 0.005
 SURE = 1e-3  # no frame is ever surer: one strange bit must not decide
@@ -132,6 +133,11 @@ def majority(chance: np.ndarray, frames: int) -> np.ndarray:
         moved = np.pad(counts[:, :-1], ((0, 0), (1, 0)))
         counts = counts * (1 - p) + moved * p
     return counts[:, frames // 2 + 1 :].sum(axis=1)
+
+
+def thue_morse(number: np.ndarray) -> np.ndarray:
+    """(N,) 0 or 1: the sequence 0 1 1 0 1 0 0 1 ... at these places, which no rhythm follows."""
+    return np.array([bin(int(n)).count("1") % 2 for n in number])
 
 
 def pose_at(track: Track, t_s: np.ndarray) -> np.ndarray:

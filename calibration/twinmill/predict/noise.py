@@ -99,7 +99,8 @@ def fit_noise(errors: list[np.ndarray], moving: np.ndarray, grid: StepGrid) -> N
     """Estimates the noise from what a flexible model leaves.
 
     Args:
-        errors: (S, 3) one-step errors; their mean power is taken.
+        errors: (S, 3) one-step errors; their mean power is taken. A channel that was not measured
+            (NaN) has the least noise of all.
         moving: (S,) bool: the disturbance acts only then.
         grid: of the steps.
 
@@ -109,7 +110,7 @@ def fit_noise(errors: list[np.ndarray], moving: np.ndarray, grid: StepGrid) -> N
     while (pieces := _pieces(grid, moving, chunk)) is None:
         chunk //= 2
     bins = _bins(chunk)
-    power = np.mean([_median_power(e, pieces, bins) for e in errors], axis=0)
+    power = np.mean([_median_power(np.nan_to_num(e), pieces, bins) for e in errors], axis=0)
     return Noise(
         _fit_channel(power[:, :2].mean(1), bins, grid.period_s, LEAST[0]),
         _fit_channel(power[:, 2], bins, grid.period_s, LEAST[1]),

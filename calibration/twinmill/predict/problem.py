@@ -6,16 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import twinmill_native as native
 
-from twinmill.data.clock import estimate_offset
-from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import command_at
+from twinmill.model.parameters import CLOCK, CLOCK_RATE, stated_names
 from twinmill.predict.flexible import unexplained
 from twinmill.predict.noise import Noise, fit_noise
 from twinmill.predict.residual import StepGrid
-
-CLOCK, CLOCK_RATE = "clock.offset_s", "clock.rate_ppm"
-GAINS = ("theta_a1", "theta_a2")  # of one robot: speed, and rate of turn
 
 
 @dataclass
@@ -23,8 +19,7 @@ class Scene:
     """One measurement with the model of its own robot and clock, its step grid and its noise.
 
     Attributes:
-        clock_free: offset and rate of the clock are fitted.
-        gains_free: the robot's own gains are fitted: robots of a kind differ by a few percent.
+        clock_free: the clock's offset was found from this log itself.
     """
 
     measurement: Measurement
@@ -32,7 +27,6 @@ class Scene:
     grid: StepGrid
     clock_free: bool
     noise: Noise | None = None
-    gains_free: bool = False
 
     @property
     def stated(self) -> set[str]:
@@ -40,33 +34,19 @@ class Scene:
         return stated_names(self.model, self.measurement.track.robot_id)
 
     @classmethod
-    def of(
-        cls,
-        measurement: Measurement,
-        model: native.Model,
-        clock_free: bool,
-        offset_s: float | None = None,
-    ) -> "Scene":
-        """Starts from the offset given, else the model's if it is known there, else the log's own.
-
-        Raises:
-            LogError: the log's own cannot be told.
-        """
-        own = model.for_robot(measurement.track.robot_id)
-        alone_s = _own_offset(measurement, needed=offset_s is None and not own.clock_known)
-        if offset_s is not None:
-            own.set(CLOCK, offset_s)
-        elif not own.clock_known:
-            own.set(CLOCK, alone_s)
-        scene = cls(measurement, own, StepGrid.of(measurement), clock_free)
-        scene.noise = scene._own_noise(own.get(CLOCK) if alone_s is None else alone_s)
+    def on_clock(cls, measurement: Measurement, model: native.Model, clock_free: bool) -> "Scene":
+        """Of a robot's own model on the measurement's clock, with the noise that the log shows."""
+        scene = cls(measurement, model, StepGrid.of(measurement), clock_free)
+        scene.noise = fit_noise(
+            unexplained(measurement, scene.grid, model.get(CLOCK)), scene._moving(), scene.grid
+        )
         scene.settle_noise()
         return scene
 
     def with_model(self, model: native.Model) -> "Scene":
         """The same measurement, clock and noise with another model."""
         model = model.for_robot(self.measurement.track.robot_id)
-        for name in (CLOCK, CLOCK_RATE, *(GAINS if self.gains_free else ())):
+        for name in (CLOCK, CLOCK_RATE):
             model.set(name, self.model.get(name))
         return replace(self, model=model)
 
@@ -92,33 +72,9 @@ class Scene:
         t_s = self.grid.t_s - self.model.get(CLOCK)
         return np.any(command_at(t_s, track.command_t_s, track.command) != 0, axis=1)
 
-    def _own_noise(self, offset_s: float) -> Noise:
-        """Noise of the log, whatever the model: what no response to the commands explains.
-
-        By the log's own clock: with a wrong one from elsewhere all motion would count as noise.
-        """
-        errors = unexplained(self.measurement, self.grid, offset_s)
-        return fit_noise(errors, self._moving(), self.grid)
-
     def whitened(self, names: list[str], rows: np.ndarray) -> np.ndarray:
         """(B, P) values to (B, S, 3) whitened one-step errors."""
         predicted = native.one_step_batch(
             self.model, self.measurement.played, names, np.ascontiguousarray(rows)
         )
         return self.noise.whiten(self.grid.errors(predicted, self.measurement), self.grid)
-
-
-def _own_offset(measurement: Measurement, needed: bool) -> float | None:
-    """What the log itself tells; None if it tells none and need not."""
-    try:
-        return estimate_offset(measurement.track).offset_s
-    except LogError:
-        if needed:
-            raise
-        return None
-
-
-def stated_names(model: native.Model, robot_id: int) -> set[str]:
-    """Quantities, by name, that [robots.Rnn] states of one robot."""
-    keys = model.stated_of(robot_id)
-    return {k if "." in k or k in GAINS else f"base.{k}" for k in keys}

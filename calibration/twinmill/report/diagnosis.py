@@ -7,7 +7,7 @@ from rich.text import Text
 
 from twinmill.diagnosis.explain import Explanation, steps
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.model.freedom import Estimate
+from twinmill.model.parameters import Estimate
 from twinmill.report import Figure, Section, show, tables, views
 from twinmill.report.detection_figures import field_of_view
 from twinmill.report.detection_tables import bit_steps, bit_tables
@@ -15,13 +15,52 @@ from twinmill.report.error_figures import waterfall
 from twinmill.report.sections import robot_pictures
 from twinmill.report.tables import Cell, Table, Tone, number, tone
 
+LEAST_TAKES = 0.05  # share of what is left that a formula must take to be worth a word
+
 TONES: dict[str, Tone] = {
+    "cannot_tell": "warn",
+    "bad_input": "bad",
     "model_adequate": "good",
     "refit_enough": "warn",
     "effect_missing": "bad",
     "ambiguous": "warn",
     "outside_catalogue": "bad",
 }
+
+
+def findings(diagnosis: Diagnosis) -> Table:
+    """What was found, most important first, and what is left."""
+    rows = []
+    for f in diagnosis.findings:
+        names = f" or {' or '.join(f.group[1:])}" if f.group else ""
+        certainty: Tone = "good" if f.certainty == "sure" else "warn"
+        rows.append(
+            [
+                Cell(f"{f.effect}{names}", "good"),
+                Cell(f"{100 * f.share:.0f} %", "", f.share),
+                Cell(f.certainty, certainty),
+                Cell(", ".join(_estimate(e) for e in f.parameters)),
+            ]
+        )
+    if rows:
+        rest = diagnosis.rest
+        on = ", ".join(rest.depends_on)
+        rows.append(
+            [
+                Cell("left over", "dim"),
+                Cell(f"{100 * rest.share:.0f} %", "dim", rest.share),
+                Cell("firm" if rest.firm else "may be noise", "dim"),
+                Cell(f"depends on {on}" if on else "", "dim"),
+            ]
+        )
+    return Table(
+        "What was found",
+        ["effect", "takes away", "certainty", "estimates"],
+        rows,
+        "Takes away: share of the squared error at 0.5 s above the log's noise, on parts of the data "
+        "that were not fitted to.",
+        words=(0, 2, 3),
+    )
 
 
 def ranking(diagnosis: Diagnosis) -> Table:
@@ -82,24 +121,39 @@ def robots_off(diagnosis: Diagnosis) -> Table:
 def lines(diagnosis: Diagnosis) -> list[str]:
     """What the tables do not say."""
     told = list(diagnosis.notes)
-    term = diagnosis.omnibus.term
-    if term:
+    rest = diagnosis.rest
+    if rest.term and rest.takes >= LEAST_TAKES:
         told.append(
-            f"{100 * diagnosis.share_unexplained:.0f} % of what could be explained depends on "
-            f"{' and '.join(g.group for g in diagnosis.omnibus.groups)}; best formula: "
-            f"{term.adds_to} += {diagnosis.omnibus.coefficient:.3g} * {term.formula}."
+            f"The best formula for what is left takes {100 * rest.takes:.0f} % of it: "
+            f"{rest.term.adds_to} += {rest.coefficient:.3g} * {rest.term.formula}."
         )
-    if equation := diagnosis.omnibus.equation:
-        told.append(
-            f"To add it: twinmill add equation LOG --adds-to {equation['adds_to']} --formula "
-            f"'{equation['formula']}', with the same logs and model."
-        )
+        if equation := rest.equation:
+            told.append(
+                f"To add it: twinmill add equation LOG --adds-to {equation['adds_to']} --formula "
+                f"'{equation['formula']}', with the same logs and model."
+            )
+    if diagnosis.late and (late := _late(diagnosis)):
+        told.append(late)
     if diagnosis.next_experiment:
         told.append(
             f"Next run: {diagnosis.next_experiment['why']}; `twinmill next`, given the same logs "
             "and model, writes the script."
         )
     return told
+
+
+def _late(diagnosis: Diagnosis) -> str:
+    """How late the robot is, where that was a finding."""
+    late = diagnosis.late
+    if late is None or late.sum_std_s is None:
+        return ""
+    total = f"{late.sum_s:.2f} ± {late.sum_std_s:.1g} s in all"
+    if late.parted:
+        return f"Late by {total}: {late.lag_s:.2f} s lag, {late.delay_s:.2f} s delay."
+    if late.lag_s is not None:
+        rest_s = late.sum_s - late.lag_s
+        return f"Late by {total}: {late.lag_s:.2f} s lag; {rest_s:.2f} s delay or clocks."
+    return f"Late by {total}: these logs cannot part lag and delay."
 
 
 def terminal(diagnosis: Diagnosis) -> RenderableType:
@@ -147,7 +201,13 @@ def section(diagnosis: Diagnosis) -> Section:
 
 
 def _tables(diagnosis: Diagnosis) -> list[Table]:
-    return [t for t in (robots_off(diagnosis), ranking(diagnosis), unseen(diagnosis)) if t.rows]
+    made = (
+        findings(diagnosis),
+        robots_off(diagnosis),
+        ranking(diagnosis),
+        unseen(diagnosis),
+    )
+    return [t for t in made if t.rows]
 
 
 def _bit_steps(diagnosis: Diagnosis) -> list[Table]:

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from twinmill.experiment.design import Chance, Plan
 from twinmill.experiment.power import percent
-from twinmill.model.freedom import catalogue
+from twinmill.model.parameters import catalogue
 from twinmill.report import Section, show
 from twinmill.report import next_run_figures as figures
 from twinmill.report.tables import Cell, Table, Tone, number

@@ -9,7 +9,7 @@ import numpy as np
 
 from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import GOOD, MISSING, SUSPECT, Comparison, RobotComparison
-from twinmill.model.freedom import Estimate
+from twinmill.model.parameters import Estimate
 from twinmill.predict.noise import Noise
 from twinmill.predict.regimes import HORIZON, Regime
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms

@@ -6,13 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinmill.predict.floor import Floor, floor_of
 from twinmill.predict.regimes import Regime
-from twinmill.predict.windows import score
 from twinmill.steady.scene import CHANNELS, SteadyScene
 
 SLOW, FAST = 0.45, 0.75  # duty below and above which an input counts as slow and fast
 SPOT_MPS = 0.05
+
+
+@dataclass(frozen=True)
+class SteadyFloor:
+    """Errors of a table are given over their floor: the scatter of runs, or with that of robots."""
+
+    kind: str
 
 
 @dataclass(frozen=True)
@@ -22,14 +27,14 @@ class SteadyComparison:
     Attributes:
         scene: table and model.
         predicted, errors: (U, 3); m/s, rad/s, m/s.
-        floor: kind of the floor.
+        floor: where it comes from.
         where: regimes.
     """
 
     scene: SteadyScene
     predicted: np.ndarray
     errors: np.ndarray
-    floor: Floor
+    floor: SteadyFloor
     where: list[Regime]
 
     @property
@@ -40,7 +45,7 @@ class SteadyComparison:
     @property
     def score(self) -> float:
         """Of this robot alone."""
-        return score(self.ratios[:, None], np.ones((1, len(CHANNELS))))
+        return self.scene.score(self.scene.model)
 
     @property
     def size(self) -> int:
@@ -114,8 +119,13 @@ class SteadyComparison:
 
 def compare_steady(scene: SteadyScene) -> SteadyComparison:
     """Compares one robot of a table."""
+    kind = "repeat" if scene.measurement.fold is None else "spread"
     return SteadyComparison(
-        scene, scene.predicted(), scene.errors(), floor_of(scene), _where(scene, scene.ratios())
+        scene,
+        scene.predicted(),
+        scene.errors(),
+        SteadyFloor(kind),
+        _where(scene, scene.ratios()),
     )
 
 

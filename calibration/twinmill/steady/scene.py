@@ -9,43 +9,27 @@ import twinmill_native as native
 from twinmill.data.log import LogError
 from twinmill.data.steady_table import STILL_MPS, Sheet
 from twinmill.model.mixing import duties_from_vendor_move
-from twinmill.predict.floor import Floor, floor_of
-from twinmill.predict.folds import BLOCK_S, halves, held_errors, step_mask
-from twinmill.predict.problem import stated_names
+from twinmill.predict.datasets import PARTS
 
 CHANNELS = (("speed", "m/s"), ("turn", "rad/s"), ("standing side", "m/s"))
 
 TYPING_ERROR = 10.0  # times the floor: beyond it, more likely the sheet is wrong than the model
 
 
-@dataclass(frozen=True)
-class SteadyGrid:
-    """The inputs as steps of a grid: each is a block of its own.
-
-    Attributes:
-        source: (U,) place of the input in the sheet.
-        t_s: (U,) far enough apart to be blocks.
-    """
-
-    source: np.ndarray
-    t_s: np.ndarray
-
-
 @dataclass
 class SteadyScene:
-    """One robot of a table with its model. Residuals are (U, 3), as CHANNELS; NaN if not measured.
+    """One robot of a table with its model: a data set. Values are (U, 3), as CHANNELS.
 
     The third is the rim speed of the slower side where a note says that it stood still: an input
-    that could not be measured tells something, too.
+    that could not be measured tells something, too. NaN is not measured.
     """
 
     measurement: Sheet
     model: native.Model
     commands: np.ndarray
-    grid: SteadyGrid
-    clock_free: bool = False
-    gains_free: bool = False
+    own: tuple = ()
     noise: None = None
+    clock_free: bool = False
 
     @classmethod
     def of(cls, sheet: Sheet, model: native.Model) -> "SteadyScene":
@@ -55,25 +39,46 @@ class SteadyScene:
             LogError: the model is driven by measured wheel speeds, which a table does not have.
         """
         own = model.for_robot(sheet.robot_id)
-        number = np.arange(len(sheet.inputs))
-        grid = SteadyGrid(number, BLOCK_S * (number + 0.5))
-        return cls(sheet, own, _commands(sheet, own), grid)
+        return cls(sheet, own, _commands(sheet, own))
+
+    @property
+    def label(self) -> str:
+        """Of table and robot."""
+        return f"{self.measurement.log_name} R{self.robot_id:02d}"
+
+    @property
+    def robot_id(self) -> int:
+        """Of the robot."""
+        return self.measurement.robot_id
+
+    @property
+    def block(self) -> np.ndarray:
+        """(R,) the input of each row: what the runs at one input have in common."""
+        return np.repeat(np.arange(len(self.commands)), len(CHANNELS))
+
+    @property
+    def part(self) -> np.ndarray:
+        """(R,) left out together: a robot among several, an input of one alone."""
+        fold = self.measurement.fold
+        return self.block % PARTS if fold is None else np.full(len(self.block), fold)
+
+    @property
+    def channel(self) -> np.ndarray:
+        """(R,) as CHANNELS."""
+        return np.tile(np.arange(len(CHANNELS)), len(self.commands))
+
+    @property
+    def n_eff(self) -> float:
+        """Values measured."""
+        return float(max(np.isfinite(self._measured()).sum(), 1))
 
     def with_model(self, model: native.Model) -> "SteadyScene":
         """The same table with another model."""
         return replace(self, model=model.for_robot(self.measurement.robot_id))
 
-    @property
-    def stated(self) -> set[str]:
-        """Names that the model file states of this robot alone."""
-        return stated_names(self.model, self.measurement.robot_id)
-
-    def settle_noise(self) -> None:
-        """Nothing: the scatter of a table does not depend on the model."""
-
     def predicted(self) -> np.ndarray:
         """(U, 3) what the model predicts, as CHANNELS."""
-        return self._predicted([], np.zeros((1, 0)))[0]
+        return self._predicted(self.model, [], np.zeros((1, 0)))[0]
 
     def errors(self) -> np.ndarray:
         """(U, 3) measured less predicted."""
@@ -84,18 +89,28 @@ class SteadyScene:
 
         What was only seen to be zero, and is predicted so, was not measured: NaN.
         """
-        ratios = self.errors() / self.floor()
+        return self._cut(self.errors() / self.floor())
+
+    def _cut(self, ratios: np.ndarray) -> np.ndarray:
         agreed = (self._measured() == 0) & (np.abs(ratios) < 1)
         return np.where(agreed, np.nan, np.clip(ratios, -TYPING_ERROR, TYPING_ERROR))
 
-    def white_errors(self) -> np.ndarray:
-        """(U, 3) errors over their floor; zero where nothing was measured."""
-        return np.nan_to_num(self.errors() / self.floor())
+    def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
+        """(B, R) errors over floor for B rows of values; the sum of squares is the score squared."""
+        predicted = self._predicted(model, names, np.ascontiguousarray(values))
+        ratios = self._cut((self._measured() - predicted) / self.floor())
+        return np.nan_to_num(ratios).reshape(len(values), -1) * np.sqrt(self.judged)
 
-    def whitened(self, names: list[str], rows: np.ndarray) -> np.ndarray:
-        """(B, P) values to (B, U, 3) the same."""
-        predicted = self._predicted(names, np.ascontiguousarray(rows))
-        return np.nan_to_num((self._measured() - predicted) / self.floor())
+    @property
+    def judged(self) -> np.ndarray:
+        """(R,) share of the squared score that each row would make up if all were 1."""
+        known = np.isfinite(self._measured())
+        count = known.sum(axis=0)
+        return (known / (np.maximum(count, 1) * np.count_nonzero(count))).reshape(-1)
+
+    def score(self, model: native.Model) -> float:
+        """RMS over channels of error over floor."""
+        return float(np.sqrt(np.sum(self.rows(model, [], np.zeros((1, 0))) ** 2)))
 
     def floor(self) -> np.ndarray:
         """(U, 3) standard deviations."""
@@ -106,8 +121,8 @@ class SteadyScene:
         still = np.where(self.measurement.still, 0.0, np.nan)
         return np.column_stack([self.measurement.value, still])
 
-    def _predicted(self, names: list[str], rows: np.ndarray) -> np.ndarray:
-        steady = native.steady(self.model, self.commands, names, rows)
+    def _predicted(self, model: native.Model, names: list[str], rows: np.ndarray) -> np.ndarray:
+        steady = native.steady(model, self.commands, names, rows)
         vx, vy, turn = np.moveaxis(steady[..., :3], -1, 0)
         rim = steady[..., 3:]
         forward, left = _direction(self.measurement.inputs)
@@ -140,30 +155,3 @@ def _commands(sheet: Sheet, model: native.Model) -> np.ndarray:
         f"{sheet.log_name}: the model is driven by measured wheel speeds, and a steady-state table "
         'has inputs; take a model with drive = "duty" or "twist".'
     )
-
-
-@halves.register
-def _(scene: SteadyScene) -> np.ndarray:
-    """(U,) 0 or 1: by robots, so that what is judged is another robot; by inputs if it is alone."""
-    sheet, count = scene.measurement, len(scene.commands)
-    if sheet.fold is None:
-        return np.array([bin(k).count("1") % 2 for k in range(count)])
-    return np.full(count, sheet.fold)
-
-
-@step_mask.register
-def _(scene: SteadyScene, half: np.ndarray, which: int) -> np.ndarray:
-    return half == which
-
-
-@held_errors.register
-def _(scene: SteadyScene, half: np.ndarray, which: int) -> np.ndarray:
-    """(U, 1, 3) errors over their floor."""
-    return np.where((half == which)[:, None], scene.ratios(), np.nan)[:, None]
-
-
-@floor_of.register
-def _(scene: SteadyScene) -> Floor:
-    """One: errors of a table are given over their floor."""
-    alone = scene.measurement.fold is None
-    return Floor(np.ones((1, len(CHANNELS))), "repeat" if alone else "spread")

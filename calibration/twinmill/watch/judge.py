@@ -12,18 +12,16 @@ from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement
 from twinmill.data.multi_log import Actor
 from twinmill.data.track import REST_S, Track, make_track
-from twinmill.model.model_file import DEFAULT_MODEL, ModelFile
-from twinmill.predict.floor import Floor, measure_floor
-from twinmill.predict.noise import ChannelNoise, Noise
-from twinmill.predict.problem import CLOCK, Scene
-from twinmill.predict.residual import StepGrid
-from twinmill.predict.windows import Windows, score
+from twinmill.fitting.floor import NoiseFloor, noise_floor
+from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import CLOCK
+from twinmill.predict.datasets import Trajectory
+from twinmill.predict.windows import Windows
 
-WINDOW_S = 12.0  # of poses that are judged
+WINDOW_S = 30.0  # of poses that are judged: less does not tell noise from motion
 AHEAD_S = 2.0  # of the prediction that is shown
 NEAR_S = 0.03  # how far the clock's offset is searched from where it was
 OFFSETS = 21  # of which the median is used: clocks drift less in so many seconds
-NOISE = (("sensor_m", "drive_mps", "drive_s"), ("sensor_rad", "drive_radps", "drive_turn_s"))
 POINTS = 20  # of a prediction's line
 
 
@@ -44,49 +42,49 @@ class Judgement:
 class Judge:
     """Judges one robot by its model again and again.
 
-    The floor is that of the model's own noise, of turbopi.toml's where it names none, in the first
-    window: a log's noise takes longer to fit than a window lasts.
+    The floor is that of the first whole window, as `twinmill compare` finds it.
     """
 
     model_file: ModelFile
     _offsets_s: list[float] = field(default_factory=list)
-    _floor: Floor | None = None
+    _floor: NoiseFloor | None = None
 
     def judge(self, actor: Actor) -> Judgement | None:
         """None while poses and commands are too few, or the robot stands."""
         try:
             measurement = Measurement.live(make_track(actor.log))
-            scene = self._scene(measurement)
             windows = _settled(measurement.track)
             drives = np.any(measurement.track.command != 0)
             if not drives or not (windows.ends[:, -1] >= 0).any():
                 return None
-            self._settle_clock(scene, windows)
+            data = Trajectory.at(measurement, windows)
+            model, known = self._own(measurement)
+            if self._floor is None or self._floor.kind is None:
+                self._floor = noise_floor(data, model, known)
+            data = data.over(self._floor.rms)
+            if not known:
+                self._settle_clock(data, model)
         except (LogError, ValueError):
             return None
-        if self._floor is None:
-            self._floor = measure_floor(scene, windows)
-        return Judgement(score(windows.errors(scene), self._floor.rms), _ahead(scene))
+        return Judgement(data.score(model), _ahead(measurement, model))
 
-    def _scene(self, measurement: Measurement) -> Scene:
+    def _own(self, measurement: Measurement) -> tuple[native.Model, bool]:
+        """The robot's model on its clock, and whether that clock is known."""
         own = self.model_file.model.for_robot(measurement.track.robot_id)
-        if not own.clock_known:
+        known = own.clock_known or measurement.same_clock
+        if not known:
             if not self._offsets_s:
                 self._offsets_s.append(estimate_offset(measurement.track).offset_s)
             own.set(CLOCK, float(np.median(self._offsets_s)))
-        grid = StepGrid.of(measurement)
-        return Scene(measurement, own, grid, not own.clock_known, _noise_of(own))
+        return own, known
 
-    def _settle_clock(self, scene: Scene, windows: Windows) -> None:
+    def _settle_clock(self, data: Trajectory, model: native.Model) -> None:
         """Finds the offset at which this very model predicts best, near where it was."""
-        if not scene.clock_free:
-            return
+        middle_s = float(np.median(self._offsets_s))
 
         def loss(offset_s: float) -> float:
-            scene.model.set(CLOCK, offset_s)
-            return float(np.nanmean(windows.errors(scene)[..., 0] ** 2))
+            return float(np.sum(data.rows(model, [CLOCK], np.array([[offset_s]])) ** 2))
 
-        middle_s = float(np.median(self._offsets_s))
         found = minimize_scalar(
             loss,
             bounds=(middle_s - NEAR_S, middle_s + NEAR_S),
@@ -94,7 +92,7 @@ class Judge:
             options={"xatol": 1e-3},
         )
         self._offsets_s = [*self._offsets_s[1 - OFFSETS :], float(found.x)]
-        scene.model.set(CLOCK, float(np.median(self._offsets_s)))
+        model.set(CLOCK, float(np.median(self._offsets_s)))
 
 
 def _settled(track: Track) -> Windows:
@@ -103,15 +101,9 @@ def _settled(track: Track) -> Windows:
     return Windows.at(track, starts[track.pose_t_s[starts] > track.command_t_s[0] + REST_S])
 
 
-def _noise_of(model: native.Model) -> Noise:
-    if model.get("noise.sensor_m") == 0:
-        model = ModelFile.load(DEFAULT_MODEL).model
-    return Noise(*(ChannelNoise(*(model.get(f"noise.{n}") for n in names)) for names in NOISE))
-
-
-def _ahead(scene: Scene) -> np.ndarray:
+def _ahead(measurement: Measurement, model: native.Model) -> np.ndarray:
     """The model's path from the pose AHEAD_S before the newest usable one."""
-    track = scene.measurement.track
+    track = measurement.track
     newest = np.flatnonzero(track.segment >= 0)[-1]
     same = np.flatnonzero(track.segment == track.segment[newest])
     start = same[np.searchsorted(track.pose_t_s[same], track.pose_t_s[newest] - AHEAD_S)]
@@ -119,5 +111,5 @@ def _ahead(scene: Scene) -> np.ndarray:
     if start >= newest:
         return track.pose[[start]]
     starts = np.array([start], np.int64)
-    path = native.windows(scene.model, scene.measurement.played, starts, ends[None])
+    path = native.windows(model, measurement.played, starts, ends[None])
     return np.vstack([track.pose[start], path[0]])

@@ -13,8 +13,7 @@ from twinmill.data.track import make_track
 from twinmill.diagnosis.detections.robots import odd_cameras
 from twinmill.diagnosis.detections.search import search_bits
 from twinmill.predict.detection_errors import compare_bits
-from twinmill.predict.detections import BitScene, majority
-from twinmill.predict.folds import BLOCK_S, thue_morse
+from twinmill.predict.detections import BLOCK_S, BitScene, majority, thue_morse
 
 RANGE_M, CONE_RAD, MISS, FALSE = 1.1, 0.855, 0.05, 0.1
 MODEL = f"""

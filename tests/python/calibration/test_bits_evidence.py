@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from twinmill.diagnosis.detections.evidence import HeldOut, weigh
-from twinmill.predict.folds import thue_morse
+from twinmill.predict.detections import thue_morse
 
 BLOCKS, FRAMES = 400, 60
 ONE, OTHER = 0.4, 0.1

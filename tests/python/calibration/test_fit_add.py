@@ -46,7 +46,7 @@ def test_fit_finds_speeds_gains_and_lag(fitted, tanh_robot):
 
 def test_fit_finds_the_clock_offset(fitted):
     assert fitted.clock.value == pytest.approx(OFFSET_S, abs=3 * fitted.clock.std + EULER_S / 2)
-    assert fitted.clock.std < 1e-3
+    assert fitted.clock.std < 5e-3  # beside a free lag, by errors from 0.1 to 2 s ahead
 
 
 def test_a_right_model_is_as_good_as_its_log_can_tell(fitted):

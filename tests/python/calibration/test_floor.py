@@ -1,116 +1,133 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The floor against closed forms, and against runs that a log repeats."""
+"""The floor is a property of the log: found by a smooth response, whatever model is judged over it.
+
+Truth: what noise that was put in does, and logs that robots of known constants leave.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from twinmill.data.measurement import Measurement, _played
 from twinmill.data.track import make_track
-from twinmill.fitting.compare import compare, open_scenes
-from twinmill.predict.floor import measure_floor
-from twinmill.predict.noise import ChannelNoise, Noise
-from twinmill.predict.problem import Scene
-from twinmill.predict.residual import StepGrid
-from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms
+from twinmill.fitting.compare import compare
+from twinmill.fitting.opening import open_measurements
+from twinmill.predict.datasets import displacement
+from twinmill.predict.windows import difference, rms
 
-SPEED_MPS = 0.3
-NOISE = Noise(ChannelNoise(3e-4, 3e-3, 0.15), ChannelNoise(1.75e-3, 0.03, 0.25))
-HORIZON = np.array(HORIZONS_S)
-
-
-def wandered(drive, memory_s, weight):
-    """(H,) variance of the integral of a first-order process times a weight, by quadrature."""
-    variances = []
-    for horizon_s in HORIZON:
-        t_s = (np.arange(400) + 0.5) * horizon_s / 400
-        kernel = drive**2 * np.exp(-np.abs(t_s[:, None] - t_s) / memory_s)
-        w = weight(t_s, horizon_s) * horizon_s / 400
-        variances.append(w @ kernel @ w)
-    return np.array(variances)
-
-
-def closed_form():
-    """(H, 3) RMS for straight driving: sensor at both ends, heading at the start, drive noise."""
-    position, heading = NOISE.position, NOISE.heading
-    pushed = wandered(position.drive, position.memory_s, lambda t, h: np.ones_like(t))
-    # A turn at time t bends all of the way that is left; heading noise at the start, all of it.
-    bent = SPEED_MPS**2 * wandered(heading.drive, heading.memory_s, lambda t, h: h - t)
-    askew = (SPEED_MPS * HORIZON * heading.sensor) ** 2
-    turned = wandered(heading.drive, heading.memory_s, lambda t, h: np.ones_like(t))
-    return np.sqrt(
-        np.column_stack(
-            [
-                2 * position.sensor**2 + pushed,
-                2 * position.sensor**2 + pushed + bent + askew,
-                2 * heading.sensor**2 + turned,
-            ]
-        )
-    )
-
-
-def test_quadrature_agrees_with_the_integral_by_hand():
-    # Uhlenbeck and Ornstein 1930: 2 s^2 tau^2 (h/tau - 1 + exp(-h/tau)).
-    ratio = HORIZON / 0.15
-    by_hand = 2 * (3e-3 * 0.15) ** 2 * (ratio - 1 + np.exp(-ratio))
-    assert wandered(3e-3, 0.15, lambda t, h: np.ones_like(t)) == pytest.approx(by_hand, rel=1e-3)
-
-
-def test_bootstrap_floor_of_straight_driving_is_the_closed_form(driven, model_file):
-    """10 %: three times the scatter of the RMS of 400 s x 4 replicas / 2 s independent errors."""
-    robot = driven(400.0)
-    robot.command[:] = SPEED_MPS / 0.4
-    robot.pose[:] = 0
-    robot.pose[:, 0] = SPEED_MPS * robot.pose_t_s
-    model = model_file(
-        ("[0, 25, 50, 75, 100]", "[0, 100]"), ("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.4]")
-    ).model
-    track = make_track(robot)
-    run = Measurement("run", "0", track, _played(track), [], 0)
-    scene = Scene(run, model, StepGrid.of(run), False, NOISE)
-    floor = measure_floor(scene, Windows.of(track))
-    assert floor.kind == "bootstrap"
-    assert floor.rms == pytest.approx(closed_form(), rel=0.10)
-
-
-def legs(random):
-    """Arcs of half a second to one and a half, each of four wheels' duties in percent."""
-    sides = random.choice([-100, -75, -50, 50, 75, 100], (20, 2))
-    return np.repeat([(a, b, a, b) for a, b in sides], random.integers(24, 72, 20), axis=0)
+NO_NOISE = dict(sensor_m=0, sensor_rad=0, drive_mps=0, drive_radps=0)
+SWAPPED = [1, 0, 2, 3]
 
 
 @pytest.fixture(scope="module")
-def scripts():
-    """One that repeats itself, and one that does not."""
-    random, rest = np.random.default_rng(4), np.zeros((48, 4), int)
-    once, other = legs(random), legs(random)
-    return np.vstack([once, rest, once, rest]), np.vstack([once, rest, other, rest])
+def drive(tanh_robot, measure):
+    """A rich run of 40 s."""
+    return measure(tanh_robot(), 2, 40.0)
 
 
-def test_repeats_are_found_where_they_are(scripts, tanh_robot, measure, model_file):
-    kinds = [
-        compare([measure(tanh_robot(), 2, script_pct=s)], model_file()).robots[0].floor.kind
-        for s in scripts
-    ]
-    assert kinds == ["repeat", "bootstrap"]
+@pytest.fixture(scope="module")
+def opened(drive, model_file):
+    """The run under a guess."""
+    return open_measurements([drive], model_file())[0]
 
 
-def test_floor_of_repeats_is_the_noise_whatever_the_model(scripts, tanh_robot, measure, model_file):
-    """Its truth: how far noise takes the robot from where it would have gone without any.
+@pytest.fixture(scope="module")
+def true_model(tanh_robot, model_file):
+    """The robot as the twin writes it; its curve by twenty straight lines."""
+    robot = tanh_robot()
+    duty_pct = list(range(0, 101, 5))
+    speeds = [round(float(v), 5) for v in robot.speed_mps(np.array(duty_pct) / 100)]
+    gains = f"sideways_gain = {robot.sideways}\nyaw_gain = {robot.yaw}\n"
+    return model_file(
+        ("[0, 25, 50, 75, 100]", str(duty_pct)),
+        ("[0, 0.1, 0.2, 0.3, 0.4]", str(speeds)),
+        ("motor_lag_s = 0.05", f"motor_lag_s = {robot.lag_s}\n{gains}"),
+        name="true.toml",
+    )
 
-    25 %: the scatter of an RMS of some ten independent pairs 2 s ahead; most cells are far nearer.
+
+def test_two_models_have_the_same_floor_on_one_log(opened, drive, model_file):
+    """5 % a cell: a model too slow by a half, with an effect and a lag of a third of a second."""
+    bad = model_file(
+        ("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.02, 0.05, 0.1, 0.2]"),
+        ("motor_lag_s = 0.05", "motor_lag_s = 0.3\nyaw_gain = 1.4"),
+        extra='[[effect]]\nname = "dead_zone"\nwidth = 0.2\n',
+    )
+    (other,) = open_measurements([drive], bad)
+    assert other.floor.rms == pytest.approx(opened.floor.rms, rel=0.05)
+    assert np.array_equal(other.floor.keep, opened.floor.keep)
+    assert other.score > 1.5 * opened.score
+
+
+def test_floor_is_how_far_noise_takes_the_robot(opened, tanh_robot, measure):
+    """Its truth: the same drive without any noise, which is what a perfect prediction says.
+
+    So it must score 1. At 2 s some 40 errors are independent, which is 10 % of their RMS.
     """
-    runs = [
-        measure(robot, 2, script_pct=scripts[0])
-        for robot in (
-            tanh_robot(),
-            tanh_robot(sensor_m=0, sensor_rad=0, drive_mps=0, drive_radps=0),
-        )
-    ]
-    poor = model_file(("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.3, 0.4, 0.5, 0.6]"))
-    scene, ideal = (open_scenes([run], model_file())[0] for run in runs)
-    windows = Windows.of(scene.measurement.track)
-    floor = measure_floor(scene, windows)
-    truth = rms(difference(windows.measured(scene), windows.measured(ideal)))
-    assert floor.rms == pytest.approx(truth, rel=0.25)
-    (blind,) = open_scenes([runs[0]], poor)
-    assert measure_floor(blind, windows).rms == pytest.approx(floor.rms)
+    ideal = measure(tanh_robot(**NO_NOISE), 2, 40.0)
+    path = displacement(ideal, opened.data.windows, None)
+    errors = difference(opened.data.measured, path)
+    truth = rms(np.where(opened.floor.keep[:, None, None], errors, np.nan))
+    assert 0.8 < np.sqrt(np.mean((truth / opened.floor.rms) ** 2)) < 1.1
+    assert np.all((opened.floor.rms / truth > 0.6) & (opened.floor.rms / truth < 1.6))
+
+
+def test_the_right_model_scores_one_and_a_wrong_one_more(drive, true_model, model_file):
+    right = compare([drive], true_model).score
+    assert 0.85 <= right <= 1.1
+    assert compare([drive], model_file()).score > 3
+
+
+def test_a_better_prediction_never_scores_worse(opened, true_model):
+    """Models between the guess and the truth: each cell's error falls, and so the score does."""
+    guess, truth = opened.model.copy(), true_model.model.for_robot(3)
+    for model in (guess, truth):
+        model.set("clock.offset_s", 0.0)  # as the robot's clocks are
+    wrong, right = (opened.data.errors(m) for m in (guess, truth))
+    scores = []
+    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+        errors = right + (1 - share) * (wrong - right)
+        cells = rms(np.where(opened.data.keep[:, None, None], errors, np.nan))
+        scores.append(np.sqrt(np.mean((cells / opened.floor.rms) ** 2)))
+    assert scores == sorted(scores, reverse=True)
+    assert opened.data.score(guess) == pytest.approx(scores[0], rel=1e-3)
+    assert opened.data.score(truth) == pytest.approx(scores[-1], rel=1e-3)
+
+
+def test_two_wheels_swapped_score_far_above_one(drive, true_model):
+    """The log says that each front wheel got what the other had."""
+    track = replace(drive.track, command=np.ascontiguousarray(drive.track.command[:, SWAPPED]))
+    assert compare([replace(drive, track=track, played=_played(track))], true_model).score > 3
+
+
+def test_a_log_too_short_gives_no_floor_and_says_why(tanh_robot, measure, model_file):
+    """Cut by losses into stretches shorter than the longest prediction."""
+
+    def broken(pose, valid):
+        valid = valid.copy()
+        valid[np.arange(len(valid)) % 240 < 30] = False  # 0.25 s every 2 s
+        return pose, valid
+
+    short, long = measure(tanh_robot(), 3, 20.0, spoil=broken), measure(tanh_robot(), 4, 30.0)
+    both = compare([short, long], model_file())
+    first, second = both.robots
+    assert np.isnan(first.score) and np.isfinite(second.score)
+    assert both.score == second.score
+    assert any("too short to tell the noise from the motion" in w for w in both.warnings)
+
+
+def test_what_never_moves_is_not_judged(driven, model_file):
+    """Straight on by a robot that holds its heading: nothing turns, nothing is asked of it."""
+    robot = driven(40.0)
+    steps = np.sign(np.sin(0.9 * robot.command_t_s))
+    robot.command[:] = 0.5 * steps[:, None]
+    speed = 0.3 * np.sign(np.sin(0.9 * robot.pose_t_s))
+    random = np.random.default_rng(1)
+    pose = np.zeros((len(speed), 3))
+    pose[:, 0] = np.cumsum(speed) / 120
+    pose[:, :2] += 3e-4 * random.normal(size=(len(speed), 2))
+    measured = Measurement.live(make_track(replace(robot, pose=pose)))
+    (opened,) = open_measurements([measured], model_file())
+    assert np.isnan(opened.floor.rms[:, 2]).all() and np.isfinite(opened.floor.rms[:, 0]).all()
+    assert np.isfinite(opened.score)

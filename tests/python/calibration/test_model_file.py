@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import pytest
 
-from twinmill.model.freedom import Estimate
 from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child, write_whole
+from twinmill.model.parameters import Estimate
 from twinmill.predict.noise import ChannelNoise, Noise
 
 NOISE = Noise(ChannelNoise(1e-4, 2e-3, 0.1), ChannelNoise(1e-3, 2e-2, 0.2))

@@ -14,17 +14,16 @@ from twinmill.data.log import read_log
 from twinmill.data.measurement import Measurement
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.search import ALPHA
 from twinmill.experiment.design import Limits, Plan, check, design
 from twinmill.experiment.foresight import Rows, rows_of
 from twinmill.experiment.information import CLOCKS, Ledger
 from twinmill.experiment.moves import AXES, family
-from twinmill.experiment.power import told_apart
+from twinmill.experiment.power import ALPHA, told_apart
 from twinmill.experiment.relevance import Relevance
 from twinmill.experiment.script_file import csv_text
 from twinmill.fitting.fit import fit
-from twinmill.model.freedom import Free
 from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import Parameter
 from twinmill_cli import main as cli
 from twinmill_cli import next as next_run
 
@@ -35,7 +34,7 @@ COMMAND_S = 10 / 480  # of the robot in conftest.py
 
 def ledger_of(widths: list[float], sizes: list[int]) -> Ledger:
     """Free quantities with priors of these widths, and effects with so many parameters."""
-    free = [Free("x", "1", 0, -1, 1, width, 0.1) for width in widths]
+    free = [Parameter("x", "1", 0, -1, 1, 0, width, 0.1) for width in widths]
     subjects = [
         SimpleNamespace(name=str(k), candidate=SimpleNamespace(strength=np.ones(size)))
         for k, size in enumerate(sizes)
@@ -257,4 +256,4 @@ def test_a_floor_that_is_none_is_refused_in_one_sentence(floor, tmp_path):
 )
 def test_where_no_move_fits_it_is_said_at_once(designed, limits, words):
     with pytest.raises(ValueError, match=words):
-        check(designed.before.state.scenes, Limits(*limits))
+        check([designed.milling], designed.model, Limits(*limits))

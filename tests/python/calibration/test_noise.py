@@ -9,7 +9,6 @@ from scipy.signal import freqz, lfilter
 from scipy.stats import chi2
 
 from twinmill.data.track import command_at
-from twinmill.fitting.compare import open_scenes
 from twinmill.predict.flexible import unexplained
 from twinmill.predict.noise import TRANSIENT, ChannelNoise, Noise, fit_noise
 from twinmill.predict.problem import Scene
@@ -188,13 +187,5 @@ def test_noise_of_a_scene_does_not_hang_on_the_model(driven_log, model_file):
         model_file(),
         model_file(("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.2, 0.3, 0.4, 0.5]"), ("0.05", "0.2")),
     ]
-    first, second = (Scene.of(measurement, g.model, clock_free=False).noise for g in guesses)
+    first, second = (Scene.on_clock(measurement, g.model, clock_free=False).noise for g in guesses)
     assert first == second
-
-
-def test_a_short_log_takes_no_missing_physics_for_noise_beside_a_longer_one(measure, model_file):
-    """The guessed curve is wrong by tenths; the robot's own drive noise is 3 mm/s."""
-    short = measure(seed=8, duration_s=12)
-    long = measure(seed=9, duration_s=60)
-    (_, beside) = open_scenes([long, short], model_file())
-    assert beside.noise.position.drive == pytest.approx(3e-3, rel=0.3)

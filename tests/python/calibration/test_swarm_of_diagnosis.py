@@ -32,8 +32,8 @@ def true() -> str:
 
 def judged(tmp_path: Path, log: Path, model: str, found=()) -> tuple[str, dict | None]:
     (tmp_path / "judge.toml").write_text(model)
-    state = SimpleNamespace(model=ModelFile.load(str(tmp_path / "judge.toml")).model)
-    return _judge_swarm(log, SimpleNamespace(verdict="", state=state, found=list(found)))
+    loaded = ModelFile.load(str(tmp_path / "judge.toml")).model
+    return _judge_swarm(log, SimpleNamespace(verdict="", model=loaded, found=list(found)))
 
 
 def test_a_model_that_fails_each_robot_is_not_held_against_the_swarm():

@@ -7,8 +7,8 @@ from pathlib import Path
 from twinmill.data.measurement import Measurement
 from twinmill.diagnosis.detections.fit import STAGES
 from twinmill.diagnosis.detections.search import attempt
-from twinmill.fitting.compare import open_scenes
-from twinmill.model.freedom import Estimate, catalogue
+from twinmill.fitting.opening import open_measurements
+from twinmill.model.parameters import Estimate, catalogue
 from twinmill.model.model_file import Fitted, ModelFile, write_child
 from twinmill.predict.detection_errors import BitComparison, compare_bits
 from twinmill.predict.detections import bit_scenes
@@ -58,7 +58,7 @@ def add_to_camera(
         raise ValueError(
             f"effect '{effect}': {model_file.path.name} has it already; remove its [[effect]]."
         )
-    scenes = bit_scenes(open_scenes(measurements, model_file))
+    scenes = bit_scenes([o.scene() for o in open_measurements(measurements, model_file)])
     if not scenes:
         raise ValueError(
             f"effect '{effect}': acts on the camera's bit, and no log has bits of a robot and the "

@@ -8,7 +8,7 @@ import numpy as np
 import twinmill_native as native
 from scipy.optimize import minimize
 
-from twinmill.model.freedom import Estimate, catalogue, effect_names
+from twinmill.model.parameters import Estimate, catalogue, effect_names
 from twinmill.predict.detections import BitScene
 
 STAGES = ("view", "decide")

@@ -8,12 +8,12 @@ import numpy as np
 
 from twinmill.diagnosis.detections.robots import judge_cameras, odd_cameras
 from twinmill.diagnosis.detections.search import BitSearch, Round, Trial, search_bits
-from twinmill.diagnosis.ranking import Ranked
+from twinmill.diagnosis.findings import Ranked
 from twinmill.model.model_file import ModelFile
 from twinmill.predict.detection_errors import BitComparison, compare_bits
 from twinmill.predict.detections import bit_scenes
 
-ADEQUATE = ("model_adequate", "refit_enough")
+ADEQUATE = ("model_adequate", "refit_enough", "cannot_tell")
 
 
 def with_bits(
@@ -51,7 +51,7 @@ def with_bits(
         diagnosis,
         verdict=verdict,
         sentence=_sentence(diagnosis, done),
-        found=[*diagnosis.found, *done.found],
+        camera=tuple(done.found),
         ranking=[*ranking, *diagnosis.ranking] if done.found else [*diagnosis.ranking, *ranking],
         not_identifiable=[*diagnosis.not_identifiable, *done.hidden],
         notes=[*diagnosis.notes, *_notes(bits)],

@@ -7,10 +7,10 @@ import numpy as np
 import twinmill_native as native
 from scipy.stats import t
 
-from twinmill.diagnosis.alike import ODD, middle_and_scale, odd_ones
+from twinmill.diagnosis.odd import ODD, middle_and_scale, odd_ones
 from twinmill.diagnosis.detections.search import search_bits
-from twinmill.diagnosis.robots import RobotOff
-from twinmill.model.freedom import Estimate
+from twinmill.diagnosis.outliers import Outlier
+from twinmill.model.parameters import Estimate
 from twinmill.predict.detection_errors import BitComparison, compare_bits
 from twinmill.predict.detections import BitScene
 
@@ -60,7 +60,7 @@ def judge_cameras(
     model: native.Model,
     say: Callable[[str], None],
     barred: Collection[str] = (),
-) -> list[RobotOff]:
+) -> list[Outlier]:
     """Says of each odd camera what is different, with the model of the others held.
 
     Args:
@@ -88,7 +88,7 @@ def _judge_camera(
     barred: Collection[str],
     away: dict[int, float],
     others: float,
-) -> RobotOff:
+) -> Outlier:
     robot_id, count = own[0].robot_id, len(away)
     done = search_bits(own, model.for_robot(robot_id), barred=barred)
     before, after = done.rounds[0].before, done.rounds[-1].before
@@ -107,17 +107,25 @@ def _judge_camera(
         if done.found
         else "no effect of the catalogue explains it"
     )
-    return RobotOff(
+    return Outlier(
         robot_id,
         " + ".join(done.found) or None,
         parameters,
         before.score,
         after.score,
         float(min(1.0, p_value)),
+        _plain(robot_id, parameters),
         told,
-        [],
+        {},
         [],
     )
+
+
+def _plain(robot_id: int, parameters: list[Estimate]) -> str:
+    label = f"R{robot_id:02d}"
+    if not parameters:
+        return f"The camera of {label} differs, and no effect of the catalogue explains how."
+    return f"{label}: {', '.join(f'{e.name} {e.value:.3g}' for e in parameters)}."
 
 
 def _scores(scenes: list[BitScene], model: native.Model) -> list[float]:

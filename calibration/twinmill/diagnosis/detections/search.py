@@ -21,7 +21,7 @@ from twinmill.diagnosis.detections.fit import (
     model_knobs,
     start,
 )
-from twinmill.model.freedom import Estimate
+from twinmill.model.parameters import Estimate
 from twinmill.predict.detection_errors import brier_ratio
 from twinmill.predict.detections import BitScene
 

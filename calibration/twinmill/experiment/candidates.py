@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
-from twinmill.model.freedom import catalogue
+from twinmill.model.parameters import catalogue
 from twinmill.predict.problem import Scene
 
 STAGES = ("duty", "wheel", "ground", "observe")

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinmill.diagnosis.candidates import Candidate
-from twinmill.fitting.solve import HUBER_SIGMA, System
-from twinmill.model.freedom import EFFECT_PRIOR, Free
+from twinmill.experiment.candidates import Candidate
+from twinmill.experiment.one_step_fit import HUBER_SIGMA, System
+from twinmill.model.parameters import Parameter
 from twinmill.predict.problem import Scene
 
+EFFECT_PRIOR = 2.0  # standard deviation of an effect over its usual strength
 RIDGE = 1e-9  # of the trace
 SIGNS = 999  # random signs of blocks that make the null distribution
 
@@ -60,7 +61,7 @@ class Screening:
 
 
 def screen(
-    scenes: list[Scene], base: list[Free], found: list[tuple[Candidate, np.ndarray]]
+    scenes: list[Scene], base: list[Parameter], found: list[tuple[Candidate, np.ndarray]]
 ) -> Screening:
     """Tests all candidates, given with their columns, against what the scenes' models leave."""
     system = System(scenes, base)

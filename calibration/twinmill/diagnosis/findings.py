@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Findings of a diagnosis: each effect with what it takes away, how sure it is, and what rivals it has."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twinmill.diagnosis.search import REFIT, Round, Search, State, Trial, fitted, grown, without
+from twinmill.model.parameters import LAG, Estimate, catalogue, effect_names
+from twinmill.predict.datasets import Trajectory
+from twinmill.predict.windows import HORIZONS_S
+
+HORIZON = HORIZONS_S.index(0.5)
+BEYOND = 3.0  # usual sizes: a larger value is doubtful
+DELAY, CLOCK_OFF, MOTOR_LAG = "input_delay", "clock_offset", "motor_lag"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One effect that is missing, or `refit`: the base's numbers were stale.
+
+    Attributes:
+        group: names that the data cannot tell apart, its own first; None if it is alone.
+        parameters: of the final model.
+        share: of the squared held-out error at 0.5 s above the floor that it takes away.
+        certainty: sure, group or doubtful.
+        why: of a doubt; empty otherwise.
+    """
+
+    effect: str
+    group: tuple[str, ...] | None
+    parameters: list[Estimate]
+    share: float
+    certainty: str
+    why: str = ""
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        parameters = [e.to_json() for e in self.parameters]
+        group = list(self.group) if self.group else None
+        return {**vars(self), "parameters": parameters, "group": group}
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One effect of the ranking.
+
+    Attributes:
+        score_heldout: of the model with it, on parts it was not fitted to.
+        share_explained: of the squared score above 1 that the model as given had.
+        p_value: chance of such evidence if nothing were missing, for all effects together.
+        evidence: half the fall of the held-out cost.
+        group: number shared by effects that the data cannot tell apart; None if they can.
+    """
+
+    effect: str
+    score_heldout: float
+    share_explained: float
+    p_value: float
+    evidence: float
+    parameters: list[Estimate]
+    group: int | None
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return {**vars(self), "parameters": [e.to_json() for e in self.parameters]}
+
+
+@dataclass(frozen=True)
+class Late:
+    """How late the motion follows its commands.
+
+    Attributes:
+        sum_s, sum_std_s: lag and delay together; with the clocks' offset where that is not known.
+        delay_s, lag_s, clock_s: its parts; None where the data cannot part them.
+        parted: whether they can.
+    """
+
+    sum_s: float
+    sum_std_s: float | None
+    delay_s: float | None
+    lag_s: float | None
+    clock_s: float | None
+    parted: bool
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return vars(self)
+
+
+def findings_of(done: Search, first: State) -> tuple[list[Finding], list[tuple[str, float]]]:
+    """Findings in the order of worth, and the held-out score after each of them.
+
+    Worth is what the final model loses without the effect. Shares are those of a chain that adds
+    the effects in this order.
+    """
+    names = list(dict.fromkeys(done.found))
+    loss = {name: _loss(done.last, name) for name in names}
+    names.sort(key=lambda n: -loss[n])
+    state, chain = first, [fitted(first)]
+    for name in names:
+        state = grown(state, [name])
+        chain.append(_from_final(state, done.last))
+    errors = [_squared(t) for t in chain]
+    # Where the floor itself holds a part of what was found, the final error stands for it.
+    excess = max(errors[0] - min(errors[-1], 1.0), 1e-9)
+    found = []
+    for k, name in enumerate(names):
+        share = float(np.clip((errors[k] - errors[k + 1]) / excess, 0.0, 1.0))
+        found.append(_finding(done, name, share))
+    return found, [(n, t.held_score) for n, t in zip(names, chain[1:], strict=True)]
+
+
+def _from_final(state: State, last: Trial) -> Trial:
+    """A fit of the state that begins at the final model's values."""
+    values = {p.name: last.state.model.get(p.name) for p in last.state.free}
+    models = []
+    for model in state.models:
+        model = model.copy()
+        for p in state.free:
+            model.set(p.name, values.get(p.name, p.value))
+        models.append(model)
+    return fitted(replace(state, models=models))
+
+
+def _loss(last: Trial, name: str) -> float:
+    """Rise of the squared held-out score without one effect."""
+    if name == REFIT:
+        return np.inf if len(last.state.free) == len(last.state.base) else 0.0
+    less = without(last, name)
+    return 0.0 if less is None else less.held_score**2 - last.held_score**2
+
+
+def _squared(trial: Trial) -> float:
+    """Squared held-out error at 0.5 s over the floor: geometric mean over logs, as the score."""
+    parts = []
+    for data, rows in zip(trial.fit.datasets, trial.fit.held_out, strict=True):
+        if isinstance(data, Trajectory):
+            over = data.as_errors(rows)[:, HORIZON] / data.floor[HORIZON]
+            parts.append(float(np.nanmean(over**2)))
+        else:
+            parts.append(float(rows @ rows))
+    return float(np.exp(np.mean(np.log(np.maximum(parts, 1e-12)))))
+
+
+def _round_of(done: Search, name: str) -> Round:
+    return next(r for r in reversed(done.rounds) if r.accepted and name in r.accepted.names)
+
+
+def _finding(done: Search, name: str, share: float) -> Finding:
+    estimates = done.last.fit.shared_estimates()
+    if name == REFIT:
+        own = [e for e in estimates if e.name in done.last.state.base]
+        return Finding(REFIT, None, own, share, "sure")
+    instance = [n for n in effect_names(done.last.state.model) if n.split("#")[0] == name][-1]
+    own = [e for e in estimates if e.name.startswith(f"{instance}.")]
+    tied = [n for t in _round_of(done, name).tied for n in t.names]
+    group = (name, *tied) if tied else None
+    doubt = _doubt(name, own)
+    certainty = "doubtful" if doubt else "group" if group else "sure"
+    return Finding(name, group, own, share, certainty, doubt)
+
+
+def _doubt(name: str, own: Sequence[Estimate]) -> str:
+    """Why an estimate is no usual one; empty if it is."""
+    entry = {p["name"]: p for p in catalogue()[name]["parameters"]}
+    for e in own:
+        p = entry[e.name.split(".", 1)[1]]
+        away = abs(e.value - p["neutral"])
+        if e.at_bound and away > 1e-3:
+            return f"{e.name} is at its bound ({e.value:.3g}): another effect may be behind it"
+        if p["role"] == "size" and away > BEYOND * p["usual_size"]:
+            return f"{e.name} = {e.value:.3g} is far beyond what is usual: another effect may be behind it"
+    return ""
+
+
+def ranking_of(done: Search, found: Sequence[Finding]) -> list[Ranked]:
+    """Found effects in the order of worth with their rivals, then the rest of the first round."""
+    first = done.rounds[0].before.held_score**2
+    ranking: list[Ranked] = []
+    number = 0
+    for finding in found:
+        if finding.effect == REFIT:
+            continue
+        this = _round_of(done, finding.effect)
+        group = None
+        if finding.group:
+            number += 1
+            group = number
+        for trial in [this.accepted, *this.tied]:
+            entries = [_ranked(trial, n, this, first, group) for n in trial.names if n != REFIT]
+            ranking += [e for e in entries if e.effect == finding.effect or trial is not this.accepted]
+    named = {r.effect for r in ranking}
+    for trial in done.rounds[0].trials:
+        if len(trial.names) == 1 and trial.names[0] not in {*named, REFIT}:
+            ranking.append(_ranked(trial, trial.names[0], done.rounds[0], first, None))
+    return ranking
+
+
+def _ranked(trial: Trial, name: str, this: Round, first: float, group: int | None) -> Ranked:
+    own = [e for e in trial.fit.shared_estimates() if e.name.split(".")[0].split("#")[0] == name]
+    fall = this.before.held_score**2 - trial.held_score**2
+    share = float(np.clip(fall / max(first - 1, fall, 1e-9), 0.0, 1.0))
+    half = trial.evidence / 2
+    p_value = float(min(1.0, len(this.screened) * np.exp(-max(half, 0.0))))
+    return Ranked(name, trial.held_score, share, p_value, float(half), own, group)
+
+
+def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:
+    """How late the final model is."""
+    model, fit = done.last.state.model, done.last.fit
+    names = [u.parameter.name for u in fit.unknowns]
+    parts = {"lag": [LAG], "delay": [], "clock": []}
+    for instance in effect_names(model):
+        kind = {MOTOR_LAG: "lag", DELAY: "delay", CLOCK_OFF: "clock"}.get(instance.split("#")[0])
+        if kind:
+            key = {"lag": "extra_s", "delay": "delay_s", "clock": "offset_s"}[kind]
+            parts[kind].append(f"{instance}.{key}")
+    value = {k: sum(model.get(n) for n in own) for k, own in parts.items()}
+    every = [n for own in parts.values() for n in own]
+    if not same_clock:
+        offsets = [m.get("clock.offset_s") for m in done.last.state.models]
+        value["clock"] += float(np.median(offsets))
+        every.append("clock.offset_s")
+    mask = np.array([n in every for n in names], float)
+    free = bool(mask.any())
+    std = float(np.sqrt(mask @ fit.covariance @ mask)) if free else None
+    late = {MOTOR_LAG, DELAY, CLOCK_OFF}
+    tied = any(f.group and len(late & set(f.group)) > 1 for f in found)
+    lag_tied = any(f.group and MOTOR_LAG in f.group and len(late & set(f.group)) > 1 for f in found)
+    parted = same_clock and not tied
+    return Late(
+        float(sum(value.values())),
+        std,
+        float(value["delay"]) if parted else None,
+        float(value["lag"]) if not lag_tied else None,
+        float(value["clock"]) if parted else None,
+        bool(parted),
+    )

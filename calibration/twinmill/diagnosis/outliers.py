@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Robots that differ from the others of their kind, how, and how small a difference would have shown.
+
+The common model is held. On each robot alone its own gains and every effect of the catalogue are
+tried. What a robot would take sets it apart if it is far from what each of the others would take:
+far over its own uncertainty and over the spread of the others, all parameters of an effect together
+(Mahalanobis 1936).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from twinmill.diagnosis.odd import ODD, middle_and_scale
+from twinmill.diagnosis.search import REFIT, Search, State, Trial, attempt, fitted, screen
+from twinmill.fitting.opening import Opened
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.model.parameters import (
+    GAINS,
+    Estimate,
+    base_parameters,
+    catalogue,
+)
+from twinmill.predict.datasets import total_score
+
+FEWEST = 3  # robots, below which none can be called the odd one
+TRIED = 3
+EVIDENCE = 16.0  # as in the search, for one robot
+WIDE_STD = 0.15  # of a robot's gains where they are in question
+SPREAD = 0.01  # by which robots of a kind differ at least
+ALPHA = 0.001  # chance that one of robots that are alike is called different
+SIDES = {
+    ("fl", "rl"): "left wheels",
+    ("fr", "rr"): "right wheels",
+    ("fl", "fr"): "front wheels",
+    ("rl", "rr"): "rear wheels",
+}
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """One robot that differs.
+
+    Attributes:
+        effect: what sets it apart: effects, or gains; None if nothing that was tried does.
+        parameters: of its own.
+        score_before, score_after: held out, with the model of all and with its own.
+        p_value: chance of such a difference among as many robots that are alike.
+        sentence: in plain words.
+        why: in numbers.
+        smallest_shown: by effect the smallest difference that this log would have shown.
+        gains: its speed and turn, over the model's.
+    """
+
+    robot_id: int
+    effect: str | None
+    parameters: list[Estimate]
+    score_before: float
+    score_after: float
+    p_value: float
+    sentence: str
+    why: str
+    smallest_shown: dict[str, float]
+    gains: list[Estimate]
+
+    @property
+    def label(self) -> str:
+        """Short name."""
+        return f"R{self.robot_id:02d}"
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        fields = ("robot_id", "effect", "score_before", "score_after", "p_value", "why", "sentence")
+        parameters = [e.to_json() for e in self.parameters]
+        return {
+            **{k: getattr(self, k) for k in fields},
+            "parameters": parameters,
+            "smallest_shown": self.smallest_shown,
+        }
+
+
+def sentence(off: Outlier) -> str:
+    """One line on a robot."""
+    return off.sentence
+
+
+@dataclass(frozen=True)
+class _Alone:
+    """One robot alone: the common model held, its clock free, and its trials by name."""
+
+    robot_id: int
+    before: Trial
+    trials: dict[str, Trial]
+
+
+def outliers(
+    opened: Sequence[Opened], done: Search, progress: Callable[[str], None] = lambda _: None
+) -> list[Outlier]:
+    """Robots of logs that differ; none among fewer than three, and never as many as half.
+
+    Args:
+        opened: of the search, in its order.
+        done: the common search.
+    """
+    ids = sorted({o.measurement.track.robot_id for o in opened if o.floor})
+    if len(ids) < FEWEST:
+        return []
+    states = {i: _alone_state(opened, done, i) for i in ids}
+    names = _suspects(states, progress)
+    if not names:
+        return []
+    alone = []
+    for i in ids:
+        progress(f"robot {i} alone")
+        before = fitted(states[i])
+        trials = {n: _attempt(before, n) for n in names}
+        alone.append(_Alone(i, before, trials))
+    found = [off for a in alone if (off := _judged(a, alone))]
+    found.sort(key=lambda off: off.p_value)
+    return found[: max(len(ids) - 1, 0) // 2]
+
+
+def _alone_state(opened: Sequence[Opened], done: Search, robot_id: int) -> State:
+    """One robot's data with the common model; of its own only the clock is free."""
+    own = [i for i, o in enumerate(opened) if o.floor and o.measurement.track.robot_id == robot_id]
+    data, models = [], []
+    for i in own:
+        clock = tuple(p for p in opened[i].data.own if p.name not in GAINS)
+        data.append(replace(opened[i].data, own=clock))
+        model = done.last.state.models[i].copy()
+        for name in GAINS:
+            model.set(name, 1.0)
+        models.append(model)
+    last = done.last.state
+    return State(data, models, (), (), last.excluded)
+
+
+def _suspects(states: dict[int, State], progress: Callable[[str], None]) -> list[str]:
+    """What some robot would take beyond doubt, by the linear screening: few, the surest first."""
+    worth: dict[str, list[float]] = {}
+    for robot_id, state in states.items():
+        progress(f"screening robot {robot_id}")
+        for s in screen(fitted(state)):
+            worth.setdefault(s.name, []).append(s.gain)
+    # What all robots would take alike is no difference.
+    apart = {n: max(g) - np.median(g) for n, g in worth.items()}
+    best = sorted((n for n in apart if apart[n] > EVIDENCE / 2 and n != REFIT), key=lambda n: -apart[n])
+    return ["gains", *best[:TRIED]]
+
+
+def _attempt(before: Trial, name: str) -> Trial:
+    if name != "gains":
+        return attempt(before, (name,))
+    model = before.state.model
+    free = tuple(replace(p, usual=1.0, std=WIDE_STD) for p in base_parameters(model, GAINS))
+    state = replace(before.state, free=free)
+    fit = ScoreFit(state.datasets, state.models, free).fit()
+    evidence = before.fit.held_cost - fit.held_cost
+    return Trial(("gains",), fit, replace(state, models=fit.models), evidence, evidence, 0.0)
+
+
+def _values(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+    """(k,) values and (k, k) covariance of what a trial added."""
+    count = len(trial.state.free)
+    return trial.fit.x[:count], trial.fit.covariance[:count, :count]
+
+
+def _judged(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
+    """The robot as an outlier, or None: of what sets it apart the most probable."""
+    best, best_name, best_p = None, "", 1.0
+    for name, trial in own.trials.items():
+        if trial.evidence < EVIDENCE:
+            continue
+        p_value = _p_value(own, name, alone)
+        better = best is None or trial.fit.held_cost < best.fit.held_cost
+        if p_value < ALPHA and better:
+            best, best_name, best_p = trial, name, p_value
+    if best is None:
+        return _unexplained(own, alone)
+    parameters = best.fit.shared_estimates()
+    after = best.held_score
+    before = own.before.held_score
+    others = total_score([a.before.held_score for a in alone if a is not own])
+    effect = best_name if best_name != "gains" else " + ".join(e.name for e in parameters)
+    return Outlier(
+        own.robot_id,
+        effect,
+        parameters,
+        before,
+        after,
+        best_p,
+        _plain(own.robot_id, parameters),
+        f"its errors are {before:.2f} times the floor with the model of all, those of the others "
+        f"{others:.2f}; with {effect} of its own {after:.2f}",
+        _smallest(own),
+        parameters if best_name == "gains" else [],
+    )
+
+
+def _p_value(own: _Alone, name: str, alone: Sequence[_Alone]) -> float:
+    """Chance that a robot like the others is so far from them, for all robots and trials."""
+    mine, spread = _values(own.trials[name])
+    theirs = np.array([_values(a.trials[name])[0] for a in alone if a is not own])
+    middle = np.median(theirs, axis=0)
+    scale = np.array([middle_and_scale(list(column))[1] for column in theirs.T])
+    usual = np.array([p.std for p in own.trials[name].state.free])
+    least = SPREAD * np.ones(len(mine)) if name in ("gains", "wheel_gain") else 0.03 * usual
+    total = spread + np.diag(np.maximum(scale, least) ** 2)
+    away = float((mine - middle) @ np.linalg.solve(total, mine - middle))
+    return float(min(1.0, len(alone) * len(own.trials) * chi2.sf(away, len(mine))))
+
+
+def _unexplained(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
+    """A robot whose errors stand out although nothing that was tried explains them."""
+    sizes = [np.log(max(a.before.held_score, 1.0)) for a in alone]
+    middle, scale = middle_and_scale(sizes)
+    mine = np.log(max(own.before.held_score, 1.0))
+    if mine - middle < max(ODD * max(scale, 0.06), np.log(1.5)):
+        return None
+    before = own.before.held_score
+    others = float(np.exp(middle))
+    return Outlier(
+        own.robot_id,
+        None,
+        [],
+        before,
+        before,
+        ALPHA,
+        f"R{own.robot_id:02d} differs, and no effect of the catalogue explains how.",
+        f"its errors are {before:.2f} times the floor, those of the others {others:.2f}; pushes and "
+        "bumps by others would look so",
+        _smallest(own),
+        [],
+    )
+
+
+def _smallest(own: _Alone) -> dict[str, float]:
+    """Four standard deviations of each first parameter: less would not have been beyond doubt."""
+    shown = {}
+    for name, trial in own.trials.items():
+        values, spread = _values(trial)
+        for p, variance in zip(trial.state.free, np.diag(spread), strict=True):
+            shown[p.name if name != "gains" else p.name] = float(4 * np.sqrt(variance))
+    return shown
+
+
+# -- plain words --------------------------------------------------------------------------------
+
+
+def _plain(robot_id: int, parameters: Sequence[Estimate]) -> str:
+    label = f"R{robot_id:02d}"
+    told = [e for e in parameters if abs(_away(e)) > max(2 * e.std, _least(e))]
+    told = told or sorted(parameters, key=lambda e: -abs(_away(e)) / max(e.std, 1e-9))[:1]
+    gains = {e.name: e.value - 1 for e in told if e.name in GAINS}
+    if gains:
+        return f"{label}: {' and '.join(_gain_words(gains))}."
+    wheels = {e.name.split(".")[1]: e.value for e in told if e.name.startswith("wheel_gain.")}
+    if wheels:
+        return f"{label}: {_wheel_words(wheels)}."
+    return f"{label}: {'; '.join(_effect_words(e) for e in told)}."
+
+
+def _away(estimate: Estimate) -> float:
+    """From where nothing happens."""
+    if estimate.name in GAINS:
+        return estimate.value - 1
+    effect, key = estimate.name.split("#")[0].split(".")[0], estimate.name.split(".")[1]
+    p = next(p for p in catalogue()[effect]["parameters"] if p["name"] == key)
+    return estimate.value - p["neutral"]
+
+
+def _least(estimate: Estimate) -> float:
+    """Less is not worth a word."""
+    return 2 * SPREAD if estimate.name in GAINS or estimate.name.startswith("wheel_gain.") else 0.0
+
+
+def _gain_words(gains: dict[str, float]) -> list[str]:
+    words = {
+        "theta_a1": ("drives {:.0f} % faster", "drives {:.0f} % slower"),
+        "theta_a2": ("turns {:.0f} % more", "turns {:.0f} % less"),
+    }
+    return [words[n][v < 0].format(100 * abs(v)) + " than the others" for n, v in gains.items()]
+
+
+def _wheel_words(wheels: dict[str, float]) -> str:
+    """Two wheels of a side that agree are one thing."""
+    for pair, side in SIDES.items():
+        values = [wheels.get(w) for w in pair]
+        if set(wheels) == set(pair) and values[0] * values[1] > 0:
+            mean = float(np.mean(values))
+            return f"{side} {100 * abs(mean):.0f} % {'weak' if mean < 0 else 'strong'}"
+    entry = {p["name"]: p for p in catalogue()["wheel_gain"]["parameters"]}
+    told = sorted(wheels, key=lambda w: -abs(wheels[w]))
+    return ", ".join(
+        f"{entry[w]['below' if wheels[w] < 0 else 'above']} by {100 * abs(wheels[w]):.0f} %"
+        for w in told
+    )
+
+
+def _effect_words(estimate: Estimate) -> str:
+    effect, key = estimate.name.split("#")[0].split(".")[0], estimate.name.split(".")[1]
+    p = next(p for p in catalogue()[effect]["parameters"] if p["name"] == key)
+    words = p["above" if _away(estimate) > 0 else "below"] or catalogue()[effect]["phrase"]
+    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
+    return f"{words} ({estimate.name} {estimate.value:.3g}{unit})"
+
+

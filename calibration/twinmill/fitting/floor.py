@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The noise floor: how far the best smooth response to the commands misses, whatever the model.
+
+It is a property of the log. Of the model file only the robot's form is used (drive, wheels,
+geometry), with numbers refitted to this very log. So better predictions never get a worse score.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import twinmill_native as native
+from twinmill.predict.datasets import Trajectory
+from twinmill.model.parameters import BASE_GAINS, CLOCK, LAG, base_parameters, duty_table, effect_parameters
+from twinmill.fitting.response import Response
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.predict.windows import rms
+
+BUMP = 20.0  # times the median squared error: pushed, slipped, or a lost pose
+MOST_BUMPS = 0.25  # share of the windows
+FEWEST_WINDOWS = 40  # 10 s
+FEWEST_LONG = 20  # windows of the longest horizon, below which nothing is held out
+REACH_S = 1.0  # delays and offsets that are looked for
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """Of one robot in one log.
+
+    Attributes:
+        rms: (H, 3) errors that count as one; NaN where a channel does not move.
+        keep: (W,) bool: windows that are judged; the others hold a bump.
+        kind: "response"; None if the log cannot give a floor.
+        reason: why it cannot; empty otherwise.
+        offset_s: capture's clock less the robot's, with which it was found.
+        lateness_s: lag and delay of the base refitted to the log; NaN where the clocks are two.
+        across: (W, H, 3) errors of the response on parts that it was not fitted to.
+        response: itself.
+    """
+
+    rms: np.ndarray
+    keep: np.ndarray
+    kind: str | None
+    reason: str
+    offset_s: float
+    lateness_s: float
+    across: np.ndarray
+    response: Response | None
+
+
+def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> NoiseFloor:
+    """Finds the floor.
+
+    Args:
+        data: windows.
+        model: of the robot; only its form is used.
+        same_clock: commands and poses are stamped by one clock.
+    """
+    reason = _too_poor(data)
+    if reason:
+        return _none(data, reason)
+    velocity, base = base_response(data, model, same_clock)
+    offset_s = base.get(CLOCK)
+    response = Response(data, velocity, base.get(LAG), offset_s)
+    first = np.sqrt((rms(response.within) ** 2 + rms(response.across) ** 2) / 2)
+    keep = _without_bumps(response.across, first)
+    if not keep.all():
+        calm = replace(data, measured=np.where(keep[:, None, None], data.measured, np.nan))
+        response = Response(calm, velocity, base.get(LAG), offset_s)
+    within, across = (np.where(keep[:, None, None], e, np.nan) for e in (response.within, response.across))
+    floor = np.sqrt((rms(within) ** 2 + rms(across) ** 2) / 2)
+    moves = rms(data.measured) > 1e-9
+    return NoiseFloor(
+        np.where(moves, np.maximum(floor, 1e-9), np.nan),
+        keep,
+        "response",
+        "",
+        offset_s,
+        base.get(LAG) + (base.get("input_delay.delay_s") if same_clock else np.nan),
+        response.across,
+        response,
+    )
+
+
+def base_response(
+    data: Trajectory, model: native.Model, same_clock: bool
+) -> tuple[np.ndarray, native.Model]:
+    """(N, 3) velocity at each pose, m/s and rad/s, of the base refitted to this log; that base."""
+    base = model.copy()
+    while len(base.effects):
+        base.remove_effect(0)
+    names = [n for n in BASE_GAINS if _acts(data, n)] + [LAG]
+    table = duty_table(base)
+    if len(table) > 1:
+        names = [n for n in names if n != "base.forward_gain"] + table
+    clock = []
+    if same_clock:
+        base.add_effect("input_delay")
+        base.set("input_delay.delay_s", 0.02)
+        late = effect_parameters(base, "input_delay")
+    else:
+        base.set(CLOCK, coarse_offset_s(data, base))
+        late = base_parameters(base, [CLOCK])
+    for _ in range(3):
+        own = data.over(rms(data.errors(base)))
+        free = [p.at(base.get(p.name)) for p in base_parameters(base, names) + late]
+        base = ScoreFit([own], [base], free).fit(8).models[0]
+    return body_velocity_at(data, base, slice(None)), base
+
+
+def body_velocity_at(
+    data: Trajectory, model: native.Model, points: np.ndarray | slice
+) -> np.ndarray:
+    """(N, 3) predicted body velocity, m/s and rad/s, in the step that ends at each of some poses.
+
+    Zero where there is none.
+    """
+    predicted = native.one_step(model, data.measurement.played)
+    track = data.measurement.track
+    step_s = np.diff(track.pose_t_s, prepend=track.pose_t_s[0] - 1.0)
+    before = np.roll(track.pose, 1, axis=0)
+    step = predicted - before
+    middle = before[:, 2] + step[:, 2] / 2
+    c, s = np.cos(middle), np.sin(middle)
+    body = np.column_stack([c * step[:, 0] + s * step[:, 1], c * step[:, 1] - s * step[:, 0], step[:, 2]])
+    return np.nan_to_num(body / step_s[:, None])[points]
+
+
+def coarse_offset_s(data: Trajectory, base: native.Model) -> float:
+    """Offset of the clocks at which the base predicts best, of a grid from -1 to 1 s."""
+    grid = np.arange(-REACH_S, REACH_S + 0.01, 0.05) + base.get(CLOCK)
+    own = data.over(rms(data.measured))
+    squares = (own.rows(base, [CLOCK], grid[:, None]) ** 2).sum(axis=1)
+    return float(grid[np.argmin(squares)])
+
+
+def _acts(data: Trajectory, name: str) -> bool:
+    """Whether the log's commands move the robot along what this gain scales."""
+    track = data.measurement.track
+    if track.command_kind != "twist":
+        return True
+    return bool(track.command[:, BASE_GAINS.index(name)].any())
+
+
+def _without_bumps(across: np.ndarray, floor: np.ndarray) -> np.ndarray:
+    with np.errstate(all="ignore"):
+        over = np.where(floor > 1e-9, (across / floor) ** 2, np.nan)
+        counts = np.isfinite(over).sum(axis=(1, 2))
+        mean = np.nansum(over, axis=(1, 2)) / np.where(counts, counts, np.nan)
+    keep = ~(mean > BUMP * np.nanmedian(mean))
+    return keep if (~keep).mean() <= MOST_BUMPS else np.ones(len(keep), bool)
+
+
+def _too_poor(data: Trajectory) -> str:
+    """Why a log can give no floor; empty if it can."""
+    whole = np.count_nonzero(np.isfinite(data.measured[:, -1, 0]))
+    if len(data.windows.starts) < FEWEST_WINDOWS or whole < FEWEST_LONG:
+        return (
+            f"{data.label}: {len(data.windows.starts) * 0.25:.0f} s of unbroken poses are too short to "
+            "tell the noise from the motion; record half a minute or more"
+        )
+    if not np.diff(data.measurement.track.command, axis=0).any():
+        return f"{data.label}: the commands never change, so nothing tells the noise from the motion"
+    return ""
+
+
+def _none(data: Trajectory, reason: str) -> NoiseFloor:
+    nothing = np.full(data.floor.shape, np.nan)
+    empty = np.full(data.measured.shape, np.nan)
+    everything = np.ones(len(data.measured), bool)
+    return NoiseFloor(nothing, everything, None, reason, 0.0, np.nan, empty, None)

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Makes measurements ready to be scored by a model: data set, floor, and the model of its robot."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.log import LogError
+from twinmill.data.measurement import Measurement
+from twinmill.data.steady_table import Sheet
+from twinmill.fitting.floor import NoiseFloor, noise_floor
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import CLOCK, CLOCK_RATE, GAINS, Parameter, base_parameters
+from twinmill.predict.datasets import Trajectory
+from twinmill.predict.problem import Scene
+from twinmill.steady.scene import SteadyScene
+
+CLOCK_REACH_S = 1.0  # how far from its start an offset of the clocks is looked for
+RATE_REACH_PPM = 500.0
+SPREAD = 0.03  # standard deviation of gains among robots of a kind where the model states none
+
+
+@dataclass(frozen=True)
+class Opened:
+    """One measurement with what scoring it takes.
+
+    Attributes:
+        measurement: of a log or a table.
+        data: over its floor; None where the log gives none.
+        model: of its robot, on its clock.
+        floor: of a log; None of a table.
+        same_clock: commands and poses are stamped by one clock.
+    """
+
+    measurement: Measurement | Sheet
+    data: Trajectory | SteadyScene | None
+    model: native.Model
+    floor: NoiseFloor | None
+    same_clock: bool
+
+    @property
+    def score(self) -> float:
+        """Of its model; NaN without a floor."""
+        return float("nan") if self.data is None else self.data.score(self.model)
+
+    def scene(self) -> Scene | SteadyScene:
+        """What reports and other tests look at: measurement, model, noise."""
+        if isinstance(self.data, SteadyScene):
+            return self.data.with_model(self.model)
+        return Scene.on_clock(self.measurement, self.model, clock_free=not self.same_clock)
+
+    def with_fitted(self, model: native.Model) -> "Opened":
+        """The same with a model of its own robot, its clock included."""
+        return replace(self, model=model)
+
+    def with_model(self, model: native.Model) -> "Opened":
+        """The same with another model, on the same clock."""
+        own = model.for_robot(self.measurement.track.robot_id) if self.floor else model
+        if self.floor:
+            for name in (CLOCK, CLOCK_RATE):
+                own.set(name, self.model.get(name))
+        else:
+            own = model.for_robot(self.measurement.robot_id)
+        return replace(self, model=own)
+
+
+def open_measurements(
+    measurements: Sequence[Measurement | Sheet], model_file: ModelFile
+) -> list[Opened]:
+    """Floors of all, and clocks aligned to the model as given.
+
+    An offset that another log on the same clocks told is kept, and one that was declared to be zero:
+    only so can a delay be told from it. A robot whose own run does not tell it (one that saw nobody
+    all the while has one command) takes that of the others in its log.
+
+    """
+    opened = [_open(m, model_file) for m in measurements]
+    opened = [_on_clock_of_others(o, opened) for o in opened]
+    return opened
+
+
+def _open(measurement: Measurement | Sheet, model_file: ModelFile) -> Opened:
+    if isinstance(measurement, Sheet):
+        table = SteadyScene.of(measurement, model_file.model)
+        return Opened(measurement, table, table.model, None, True)
+    model = model_file.model.for_robot(measurement.track.robot_id)
+    told = model.clock_known and measurement.log_sha256 not in model_file.clock_logs
+    declared = measurement.same_clock
+    if declared and not told:
+        model.set(CLOCK, 0.0)
+    data = Trajectory.of(measurement)
+    floor = noise_floor(data, model, told or declared)
+    if floor.kind is None:
+        return Opened(measurement, None, model, floor, told or declared)
+    data = data.over(floor.rms, floor.keep)
+    if told or declared:
+        return Opened(measurement, data, model, floor, True)
+    model.set(CLOCK, floor.offset_s)
+    data = replace(data, own=_clock(model))
+    aligned = ScoreFit([data], [model], []).fit()
+    return Opened(measurement, data, aligned.models[0], floor, False)
+
+
+def _clock(model: native.Model) -> tuple[Parameter, ...]:
+    """Offset and rate of one measurement's clock."""
+    offset, rate = base_parameters(model, [CLOCK, CLOCK_RATE])
+    at = offset.value
+    return (
+        replace(offset, min=at - CLOCK_REACH_S, max=at + CLOCK_REACH_S),
+        replace(rate, usual=0.0, min=-RATE_REACH_PPM, max=RATE_REACH_PPM),
+    )
+
+
+def _on_clock_of_others(own: Opened, opened: list[Opened]) -> Opened:
+    if own.data is not None or own.same_clock:
+        return own
+    log = own.measurement.log_sha256
+    known = [o for o in opened if o.data is not None and o.floor and o.measurement.log_sha256 == log]
+    if not known:
+        return own
+    offset_s = float(np.median([o.model.get(CLOCK) for o in known]))
+    model = own.model.copy()
+    model.set(CLOCK, offset_s)
+    told = (
+        "its commands do not tell its clock offset; that of the log's other robots is taken "
+        f"({offset_s:.3f} s)."
+    )
+    measurement = replace(own.measurement, warnings=[*own.measurement.warnings, told])
+    return replace(own, measurement=measurement, model=model)
+
+
+def judged(opened: Sequence[Opened]) -> list[Opened]:
+    """Those that have a floor.
+
+    Raises:
+        LogError: none has.
+    """
+    known = [o for o in opened if o.data is not None]
+    if not known:
+        raise LogError(f"{' '.join(o.floor.reason for o in opened if o.floor)}.")
+    return known
+
+
+def with_own_gains(opened: Sequence[Opened]) -> list[Opened]:
+    """Each robot of several with gains of its own: robots of a kind differ by a few percent."""
+    logs = [o for o in opened if o.floor]
+    if len({o.measurement.track.robot_id for o in logs}) < 2:
+        return list(opened)
+    return [_with_gains(o) if o.floor else o for o in opened]
+
+
+def _with_gains(own: Opened) -> Opened:
+    gains = []
+    for p in base_parameters(own.model, GAINS):
+        spread = own.model.get(f"idiosyncrasy.{p.name}_std") or SPREAD
+        gains.append(replace(p, usual=1.0, std=spread))
+    return replace(own, data=replace(own.data, own=(*own.data.own, *gains)))

@@ -1,0 +1,410 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A smooth response to the commands, found without the model under test.
+
+The body's velocity is taken to be linear in a few hundred features: averages of each command over a
+dozen delays, shapes of it, products, heading, place and time, and the velocity of the base model
+refitted to this very log. A window's displacement is then linear in the same coefficients, so that
+ridge regression on the windows of the score gives them. A ridge for each group of features is
+chosen by the errors of left-out blocks (Hoerl and Kennard 1970; generalised to groups).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.signal import lfilter
+from twinmill.predict.datasets import Trajectory
+from twinmill.predict.windows import difference, rms
+
+# Edges of the averages, s before the motion; the coarse ones for poses slower than 10 Hz.
+EDGES_S = np.array([0.0, 0.03, 0.07, 0.12, 0.18, 0.26, 0.36, 0.50, 0.70, 1.0, 1.5])
+COARSE_S = np.array([0.0, 0.07, 0.18, 0.26, 0.36, 0.50, 0.70, 1.0, 1.5])
+SLOW_POSES_S = 0.1
+LEVELS = np.arange(0.05, 0.951, 0.05)  # peaks of the hats over the duty
+HAT_LAGS = (0.5, 1.0, 1.8)  # times the base's lag
+BASE_LAGS_S = (0.0, 0.1, 0.3)
+SHORTEST_LAG_S = 0.03
+NEAR_S = 0.3  # delays whose mean stands for the command in products
+LADDER = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 1e5)  # ridge over a group's mean square; the last: out
+GROUPS = ("base", "own", "cross", "shape", "product", "room", "place")
+FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
+WORTH = 0.998  # a ridge is taken if it lowers the left-out error to this share
+THIN_S = 0.03  # between points at which features are taken, beside those where windows end
+GRID_S = 0.01
+PLACE_SCALE_M = 2.0
+MIXING = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # of four mecanum wheels
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Normal matrices of one left-out part: rows that touch it, and rows inside it."""
+
+    touching: tuple[np.ndarray, np.ndarray]
+    inside: tuple[np.ndarray, np.ndarray, float]
+
+
+class Response:
+    """The response of one robot in one log, fitted to its windows.
+
+    Args:
+        data: windows and measured displacements.
+        base_mps: (N, 3) velocity of the base model at each pose, refitted to this log.
+        lag_s: of that base.
+        offset_s: capture's clock less the robot's.
+    """
+
+    def __init__(
+        self, data: Trajectory, base_mps: np.ndarray, lag_s: float, offset_s: float
+    ) -> None:
+        self.data, self.offset_s = data, offset_s
+        self.lag_s = max(SHORTEST_LAG_S, lag_s)
+        self._lay_points()
+        self.features, self.groups = self._features(base_mps[self.points])
+        self._lay_windows()
+        self._fit()
+
+    # -- where features are taken ---------------------------------------------------------------
+
+    def _lay_points(self) -> None:
+        """Poses at windows' ends and some between: points, steps to each from the one before."""
+        track, windows = self.data.measurement.track, self.data.windows
+        wanted = [windows.starts, windows.ends[windows.ends >= 0]]
+        usable = np.flatnonzero(track.segment >= 0)
+        every = max(1, int(THIN_S / track.timing.pose_period_s))
+        self.points = np.unique(np.concatenate([*wanted, usable[::every]]))
+        t_s, segment = track.pose_t_s[self.points], track.segment[self.points]
+        step_s = np.diff(t_s, prepend=t_s[0])
+        step_s[np.r_[True, segment[1:] != segment[:-1]]] = 0.0
+        self.step_s = step_s
+        self.middle_s = t_s - step_s / 2 - self.offset_s  # robot's clock
+        place = np.full(len(track.pose_t_s), -1)
+        place[self.points] = np.arange(len(self.points))
+        self.starts = place[windows.starts]
+        self.ends = np.where(windows.ends >= 0, place[windows.ends], -1)
+        heading = np.nan_to_num(track.heading_smooth[self.points])
+        self.heading_rad = (heading + np.r_[heading[0], heading[:-1]]) / 2
+        self.pose = np.nan_to_num(track.pose[self.points])
+
+    # -- features -------------------------------------------------------------------------------
+
+    def _features(self, base_mps: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Per body axis the (N, F) features and the (F,) number of their group."""
+        linear, shapes, axes = self._commands()
+        taps = self._averages(linear)
+        shaped = self._shaped(shapes)
+        near = self.edges_s[1:] <= NEAR_S
+        soft = taps[:, near].mean(axis=1)
+        base = self._lagged_base(base_mps)
+        features, groups = [], []
+        for axis in range(3):
+            own = [k for k, a in enumerate(axes) if a in (axis, None)]
+            cross = [k for k in range(linear.shape[1]) if k not in own]
+            parts = {
+                "base": base,
+                "own": taps[:, :, own],
+                "cross": taps[:, :, cross],
+                "shape": shaped[:, :, own],
+                "product": _products(soft),
+                "room": self._room(axis, soft),
+                "place": self._places(soft),
+            }
+            flat = {g: p.reshape(len(p), -1) for g, p in parts.items()}
+            features.append(np.concatenate(list(flat.values()), axis=1))
+            groups.append(np.repeat(np.arange(len(GROUPS)), [f.shape[1] for f in flat.values()]))
+        return features, groups
+
+    def _commands(self) -> tuple[np.ndarray, np.ndarray, list[int | None]]:
+        """(M, n) linear commands over their largest, (M, n, k) shapes of them, body axis of each."""
+        track = self.data.measurement.track
+        command = track.command
+        if track.command_kind == "duty":
+            duty = command / max(np.abs(command).max(), 1e-9)
+            level = np.abs(duty)
+            nodes = np.r_[0.0, LEVELS, 1.0]
+            hats = [np.interp(level, nodes, np.eye(len(nodes))[i]) for i in range(1, len(nodes) - 1)]
+            shapes = np.stack([(np.sign(duty) * h) @ MIXING.T for h in hats] + [level @ MIXING.T], -1)
+            return duty @ MIXING.T, shapes, [0, 1, 2]
+        used = np.flatnonzero(command.any(axis=0))
+        linear = command[:, used] / np.maximum(np.abs(command[:, used]).max(axis=0), 1e-9)
+        shapes = np.stack([linear * np.abs(linear), np.tanh(6 * linear), np.abs(linear)], -1)
+        axes = [int(k) for k in used] if track.command_kind == "twist" else [None] * len(used)
+        return linear, shapes, axes
+
+    @cached_property
+    def edges_s(self) -> np.ndarray:
+        """Of the averages."""
+        slow = self.data.measurement.track.timing.pose_period_s >= SLOW_POSES_S
+        return COARSE_S if slow else EDGES_S
+
+    def _averages(self, signal: np.ndarray) -> np.ndarray:
+        """(M, n) held commands to (N, taps, n) means between each two edges before the middle."""
+        t_s = self.data.measurement.track.command_t_s
+        area = np.vstack([np.zeros(signal.shape[1]), np.cumsum(signal[:-1] * np.diff(t_s)[:, None], 0)])
+        knots_s, areas = np.append(t_s, t_s[-1] + 1e3), np.vstack([area, area[-1] + 1e3 * signal[-1]])
+        at = self.middle_s[:, None] - self.edges_s
+        value = np.stack([np.interp(at, knots_s, a) for a in areas.T], axis=-1)
+        return (value[:, :-1] - value[:, 1:]) / np.diff(self.edges_s)[None, :, None]
+
+    def _shaped(self, shapes: np.ndarray) -> np.ndarray:
+        """(N, k, n) of (M, n, k) shapes: of duties through lags, of others averaged over delays."""
+        track = self.data.measurement.track
+        if track.command_kind != "duty":
+            few = np.unique(np.linspace(0, len(self.edges_s) - 3, 5).astype(int))
+            averaged = [self._averages(shapes[..., k])[:, few] for k in range(shapes.shape[2])]
+            return np.concatenate(averaged, axis=1)
+        held = self._held(shapes.reshape(len(shapes), -1))
+        lagged = [self._low_pass(held, f * self.lag_s) for f in HAT_LAGS]
+        at = np.stack([self._at(signal) for signal in lagged], axis=-1)
+        curve = at.reshape(len(at), shapes.shape[1], -1).transpose(0, 2, 1)
+        stopped = self._at((self._held(track.command) == 0).all(axis=1)[:, None].astype(float))
+        duty = self._commands()[0]
+        return np.concatenate([curve, stopped[:, :, None] * self._averages(duty)[:, :6]], axis=1)
+
+    @cached_property
+    def _grid_s(self) -> np.ndarray:
+        t_s = self.data.measurement.track.command_t_s
+        return np.arange(min(t_s[0], self.middle_s[0]), max(t_s[-1], self.middle_s[-1]), GRID_S)
+
+    def _held(self, signal: np.ndarray) -> np.ndarray:
+        """(M, c) commands held, on an even grid."""
+        t_s = self.data.measurement.track.command_t_s
+        k = np.searchsorted(t_s, self._grid_s, side="right") - 1
+        return np.where((k >= 0)[:, None], signal[np.maximum(k, 0)], 0.0)
+
+    def _at(self, signal: np.ndarray) -> np.ndarray:
+        """(G, c) on the grid to (N, c) at the middles of the steps."""
+        place = np.clip((self.middle_s - self._grid_s[0]) / GRID_S, 0, len(self._grid_s) - 1.001)
+        k, part = place.astype(int), (place % 1)[:, None]
+        return signal[k] * (1 - part) + signal[k + 1] * part
+
+    @staticmethod
+    def _low_pass(signal: np.ndarray, lag_s: float) -> np.ndarray:
+        gain = 1 - np.exp(-GRID_S / lag_s)
+        return lfilter([gain], [1, gain - 1], signal, axis=0)
+
+    def _lagged_base(self, base_mps: np.ndarray) -> np.ndarray:
+        """(N, 3 lags) of each axis: the base's velocity, and late."""
+        period_s = float(np.median(self.step_s[self.step_s > 0]))
+        parts = [base_mps]
+        for lag_s in BASE_LAGS_S[1:]:
+            gain = 1 - np.exp(-period_s / lag_s)
+            parts.append(lfilter([gain], [1, gain - 1], base_mps, axis=0))
+        return np.stack(parts, axis=1)
+
+    def _room(self, axis: int, soft: np.ndarray) -> np.ndarray:
+        """Creep along the room's axes while something is commanded."""
+        moves = (np.abs(soft).max(axis=1) > 1e-6).astype(float)
+        c, s = np.cos(self.heading_rad) * moves, np.sin(self.heading_rad) * moves
+        return np.stack({0: [c, s], 1: [-s, c], 2: [moves]}[axis], axis=-1)
+
+    def _places(self, soft: np.ndarray) -> np.ndarray:
+        """Gains that depend on heading, place and time."""
+        h = self.heading_rad
+        away = (self.pose[:, :2] - np.median(self.pose[:, :2], axis=0)) / PLACE_SCALE_M
+        time = (self.middle_s - self.middle_s.mean()) / max(np.ptp(self.middle_s), 1e-9)
+        on = np.stack(
+            [np.cos(h), np.sin(h), np.cos(2 * h), np.sin(2 * h), away[:, 0], away[:, 1], time], -1
+        )
+        return soft[:, :, None] * on[:, None, :]
+
+    # -- windows --------------------------------------------------------------------------------
+
+    def _lay_windows(self) -> None:
+        """Blocks and parts of windows, and the rows (w, F) of each horizon and channel."""
+        data = self.data
+        start_s = data.start_s - data.start_s[0]
+        length_s = float(start_s[-1])
+        self.block_s = float(np.clip(length_s / 10, 3.0, 8.0))
+        self.folds = int(np.clip(length_s / self.block_s, 3, 8))
+        t_s = data.measurement.track.pose_t_s
+        end_s = t_s[np.maximum(data.windows.ends, 0)] - data.start_s[0]
+        self.fold = self._part(start_s)
+        self.end_fold = self._part(end_s)
+        self.tail_fold = self._part(start_s - 2.0)
+        c, s = np.cos(self.heading_rad) * self.step_s, np.sin(self.heading_rad) * self.step_s
+        forward, left, turn = self.features
+        sums = [
+            np.cumsum(weight[:, None] * f, axis=0)
+            for weight, f in ((c, forward), (s, forward), (c, left), (s, left), (self.step_s, turn))
+        ]
+        track = data.measurement.track
+        heading = np.nan_to_num(track.heading_smooth[data.windows.starts])
+        self.rows = []
+        for h in range(self.ends.shape[1]):
+            ok = (self.ends[:, h] >= 0) & np.isfinite(data.measured[:, h, :2]).all(axis=1)
+            cx, sx, cy, sy, w = (q[self.ends[ok, h]] - q[self.starts[ok]] for q in sums)
+            ch, sh = np.cos(heading[ok])[:, None], np.sin(heading[ok])[:, None]
+            along = np.concatenate([ch * cx + sh * sx, -ch * sy + sh * cy], axis=1)
+            across = np.concatenate([ch * sx - sh * cx, ch * cy + sh * sy], axis=1)
+            self.rows.append((ok, along, across, w))
+
+    def _part(self, t_s: np.ndarray) -> np.ndarray:
+        return np.floor(t_s / self.block_s).astype(int) % self.folds
+
+    # -- regression -----------------------------------------------------------------------------
+
+    def _fit(self) -> None:
+        """Two passes: the second with the errors of the first as weights."""
+        scale = rms(self.data.measured)
+        ridge: list[np.ndarray | None] = [None, None]
+        for _ in range(2):
+            scale = _isotropic(scale)
+            self.coefficients = []
+            for part in (0, 1):
+                equations = self._equations(part, scale)
+                if equations is None:
+                    self.coefficients.append(None)
+                    continue
+                groups = np.concatenate(self.groups[:2]) if part == 0 else self.groups[2]
+                ridge[part], *found = _ridge(*equations, groups, ridge[part])
+                self.coefficients.append(found)
+            within = difference(self.data.measured, self.predict(None))
+            across = difference(self.data.measured, self.predict(self.fold))
+            scale = np.sqrt((rms(within) ** 2 + rms(across) ** 2) / 2)
+        self.within, self.across = within, across
+
+    def _equations(
+        self, part: int, scale: np.ndarray
+    ) -> tuple[tuple[np.ndarray, np.ndarray], list[Fold]] | None:
+        """Normal matrices of all rows of the plane (0) or of turning (1), and of each fold."""
+        total, folds = None, []
+        for h, (ok, along, across, w) in enumerate(self.rows):
+            chosen = ((0, along), (1, across)) if part == 0 else ((2, w),)
+            for channel, x in chosen:
+                size, y = scale[h, channel], self.data.measured[ok, h, channel]
+                known = np.isfinite(y)
+                if not size > 1e-9 or not known.any():
+                    continue
+                weight = 1 / (size * np.sqrt(known.sum()))
+                x, y = x[known] * weight, y[known] * weight
+                fold, end, tail = (
+                    f[ok][known] for f in (self.fold, self.end_fold[:, h], self.tail_fold)
+                )
+                if total is None:
+                    total = [np.zeros((x.shape[1],) * 2), np.zeros(x.shape[1])]
+                    folds = [[np.zeros_like(total[0]), np.zeros_like(total[1]),
+                              np.zeros_like(total[0]), np.zeros_like(total[1]), 0.0]
+                             for _ in range(self.folds)]  # fmt: skip
+                for k, sums in enumerate(folds):
+                    inside = fold == k
+                    beside = ((end == k) | (tail == k)) & ~inside
+                    a, b = x[inside].T @ x[inside], x[inside].T @ y[inside]
+                    sums[2] += a
+                    sums[3] += b
+                    sums[4] += y[inside] @ y[inside]
+                    sums[0] += a + x[beside].T @ x[beside]
+                    sums[1] += b + x[beside].T @ y[beside]
+                    total[0] += a
+                    total[1] += b
+        if total is None:
+            return None
+        return (total[0], total[1]), [Fold((s[0], s[1]), (s[2], s[3], s[4])) for s in folds]
+
+    def velocity(self, fold: int | None) -> np.ndarray:
+        """(N, 3) forward, left, turning at each point; of the fit without a fold."""
+        found = np.zeros((len(self.points), 3))
+        width = self.features[0].shape[1]
+        plane, turn = self.coefficients
+        if plane is not None:
+            beta = plane[0] if fold is None else plane[1][fold]
+            found[:, 0], found[:, 1] = self.features[0] @ beta[:width], self.features[1] @ beta[width:]
+        if turn is not None:
+            found[:, 2] = self.features[2] @ (turn[0] if fold is None else turn[1][fold])
+        return found
+
+    def predict(self, fold: np.ndarray | None) -> np.ndarray:
+        """(W, H, 3) displacements, the heading integrated by the response itself.
+
+        Args:
+            fold: (W,) each window is predicted without its part; None: by the fit to all.
+        """
+        out = np.full(self.data.measured.shape, np.nan)
+        for k in range(self.folds) if fold is not None else [None]:
+            own = np.flatnonzero(fold == k) if fold is not None else np.arange(len(self.starts))
+            if not len(own):
+                continue
+            run = _integrate(self.velocity(k), self.step_s)
+            start, ends = run[self.starts[own]], run[np.maximum(self.ends[own], 0)]
+            out[own] = _seen_from(start, ends)
+            out[own] = np.where((self.ends[own] >= 0)[..., None], out[own], np.nan)
+        out[~np.isfinite(self.data.measured)] = np.nan
+        return out
+
+
+def _isotropic(scale: np.ndarray) -> np.ndarray:
+    """The same scale for forward and left: in the floor both are one plane."""
+    scale = scale.copy()
+    scale[:, :2] = np.sqrt(np.nanmean(scale[:, :2] ** 2, axis=1, keepdims=True))
+    return scale
+
+
+def _products(soft: np.ndarray) -> np.ndarray:
+    pairs = [(i, j) for i in range(soft.shape[1]) for j in range(i + 1)]
+    return np.stack([soft[:, i] * soft[:, j] for i, j in pairs], axis=-1)
+
+
+def _integrate(velocity: np.ndarray, step_s: np.ndarray) -> np.ndarray:
+    """(N, 3) poses of one run that starts at the origin."""
+    turn = velocity[:, 2] * step_s
+    heading = np.cumsum(turn)
+    middle = heading - turn / 2
+    c, s = np.cos(middle) * step_s, np.sin(middle) * step_s
+    x = np.cumsum(c * velocity[:, 0] - s * velocity[:, 1])
+    y = np.cumsum(s * velocity[:, 0] + c * velocity[:, 1])
+    return np.column_stack([x, y, heading])
+
+
+def _seen_from(start: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """(W, 3), (W, H, 3) to (W, H, 3) displacements in the frame of the start."""
+    step = ends - start[:, None]
+    c, s = np.cos(start[:, None, 2]), np.sin(start[:, None, 2])
+    return np.stack(
+        [c * step[..., 0] + s * step[..., 1], c * step[..., 1] - s * step[..., 0], step[..., 2]], -1
+    )
+
+
+def _ridge(
+    total: tuple[np.ndarray, np.ndarray],
+    folds: list[Fold],
+    groups: np.ndarray,
+    ridge: np.ndarray | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Ridge of each group, coefficients (F,) of all rows, and (K, F) without each fold."""
+    mean = np.diag(total[0]).copy()
+    for g in np.unique(groups):
+        mean[groups == g] = mean[groups == g].mean()
+    mean += 1e-9 * mean.max() + 1e-30
+    grams = np.array([total[0] - f.touching[0] for f in folds])
+    moments = np.array([total[1] - f.touching[1] for f in folds])
+
+    def left_out(values: np.ndarray) -> float:
+        lift = np.diag(mean * values[groups])
+        error = 0.0
+        for gram, moment, fold in zip(grams, moments, folds, strict=True):
+            beta = cho_solve(cho_factor(gram + lift, check_finite=False), moment, check_finite=False)
+            inner, push, square = fold.inside
+            error += square - 2 * beta @ push + beta @ inner @ beta
+        return error
+
+    if ridge is None:
+        ridge = np.array([FIRST_RIDGE.get(g, 1e5) for g in GROUPS])
+    best = left_out(ridge)
+    for _ in range(2):
+        moved = False
+        for g in np.unique(groups):
+            trials = []
+            for value in LADDER:
+                trial = ridge.copy()
+                trial[g] = value
+                trials.append(left_out(trial) if value != ridge[g] else best)
+            k = int(np.argmin(trials))
+            if trials[k] < best * WORTH:
+                best, ridge, moved = trials[k], ridge.copy(), True
+                ridge[g] = LADDER[k]
+        if not moved:
+            break
+    lift = np.diag(mean * ridge[groups])
+    every = np.linalg.solve(total[0] + lift, total[1])
+    each = np.linalg.solve(grams + lift, moments[..., None])[..., 0]
+    return ridge, every, each

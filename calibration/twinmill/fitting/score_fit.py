@@ -1,0 +1,419 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fits what is scored: the score of all data sets with weak priors on the sizes of parameters.
+
+Minimises  sum_i n_i ln S_i^2(theta) + sum_p ((theta_p - usual_p) / std_p)^2  with S_i the score of
+data set i and n_i its number of independent errors: a Gaussian likelihood whose scale each data set
+tells by itself, so that no disturbed log speaks for all. For evidence each channel of a data set has
+a scale of its own: what the model lacks in one must not drown what the others show. Levenberg and
+Marquardt, bounded; weights n_i / S_i^2 are renewed in each step.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import twinmill_native as native
+from scipy.stats import t as student
+from twinmill.predict.datasets import PARTS, Dataset
+from twinmill.model.parameters import GAINS, Estimate, Parameter, stated_names
+
+ROUNDS = 12
+CONVERGED = 1e-4  # relative change of the cost
+FEW_ROWS = 2000  # of all data sets: below it every part is fitted anew
+LEAST_SQUARE = 0.25  # of a squared score: errors far below the floor tell nothing more
+# Strengths at which a fit of something new may begin, times the usual, from where nothing happens.
+STARTS = (1.0, 0.3, 0.1, -0.1, -0.3, -1.0, 3.0)
+SEEN = 0.5  # times the prior's width: a wider estimate is the prior's
+AT_BOUND = 0.005  # share of the range
+NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A parameter with its columns: the data sets that it acts on."""
+
+    parameter: Parameter
+    members: frozenset[int]
+
+
+class _LeftOut:
+    """A data set of which some rows count and others do not."""
+
+    def __init__(self, whole: Dataset, kept: np.ndarray) -> None:
+        self._whole, self._kept = whole, kept
+        self.judged = whole.judged * kept
+        self.n_eff = max(whole.n_eff * self.judged.sum() / whole.judged.sum(), 1e-9)
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._whole, name)
+
+    def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
+        return self._whole.rows(model, names, values) * self._kept
+
+
+class ScoreFit:
+    """A model fitted to data sets; `x` holds the values, the models have them.
+
+    Args:
+        datasets: over their floors.
+        models: one for each data set (of its own robot).
+        shared: parameters that all data sets share, but for what the model states of a robot.
+        by_channel: each channel has a scale of its own, for evidence; else the score is minimised.
+    """
+
+    def __init__(
+        self,
+        datasets: Sequence[Dataset],
+        models: Sequence[native.Model],
+        shared: Sequence[Parameter],
+        by_channel: bool = False,
+    ) -> None:
+        self.by_channel = by_channel
+        self.scales = [d.channel if by_channel else np.zeros_like(d.channel) for d in datasets]
+        self.datasets, self.shared = list(datasets), list(shared)
+        self.models = [m.copy() for m in models]
+        self.unknowns = self._unknowns()
+        parts = [u.parameter for u in self.unknowns]
+        self.low, self.high, self.usual, self.std, self.step = (
+            np.array([getattr(p, k) for p in parts], float) for k in ("min", "max", "usual", "std", "step")
+        )
+        self.central = np.array([p.central for p in parts], bool)
+        self.x = np.clip(np.array([p.value for p in parts], float), self.low, self.high)
+        self.columns = [
+            np.array([c for c, u in enumerate(self.unknowns) if i in u.members], int)
+            for i in range(len(self.datasets))
+        ]
+        self.names = [[parts[c].name for c in own] for own in self.columns]
+        self.passes = 0
+
+    def _unknowns(self) -> list[Unknown]:
+        stated = [stated_names(m, d.robot_id) for d, m in zip(self.datasets, self.models, strict=True)]
+        unknowns = []
+        for p in self.shared:
+            members = frozenset(i for i, s in enumerate(stated) if p.name not in s)
+            if members:
+                unknowns.append(Unknown(p, members))
+        by_robot: dict[tuple[int, str], list[int]] = {}
+        for i, d in enumerate(self.datasets):
+            for p in d.own:
+                if p.name in GAINS:  # a robot has one gain in all its logs
+                    by_robot.setdefault((d.robot_id, p.name), []).append(i)
+                else:
+                    unknowns.append(Unknown(p, frozenset([i])))
+        for (_, name), members in by_robot.items():
+            first = self.datasets[members[0]]
+            p = next(p for p in first.own if p.name == name)
+            unknowns.append(Unknown(p, frozenset(members)))
+        return unknowns
+
+    # -- errors ---------------------------------------------------------------------------------
+
+    def batch(self, i: int, x: np.ndarray) -> np.ndarray:
+        """(B, R) of data set i at (B, P) values."""
+        own = x[:, self.columns[i]]
+        if not own.shape[1]:
+            name = "clock.offset_s"  # any name: one row that changes nothing
+            row = np.array([[self.models[i].get(name)]])
+            self.passes += 1
+            return np.repeat(self.datasets[i].rows(self.models[i], [name], row), len(x), axis=0)
+        distinct, place = np.unique(own, axis=0, return_inverse=True)
+        self.passes += len(distinct)
+        rows = self.datasets[i].rows(self.models[i], self.names[i], np.ascontiguousarray(distinct))
+        return rows[place.ravel()]
+
+    def rows(self, x: np.ndarray) -> list[np.ndarray]:
+        """(R,) rows of each data set at (P,) values."""
+        return [self.batch(i, x[None])[0] for i in range(len(self.datasets))]
+
+    def _slopes(self, x: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Rows of each data set, and (R, P_i) slopes by its own columns."""
+        up = np.where(x + self.step <= self.high, self.step, -self.step)
+        both = self.central & (x + self.step <= self.high) & (x - self.step >= self.low)
+        rows, slopes = [], []
+        for i, own in enumerate(self.columns):
+            points = [x]
+            for c in own:
+                for sign in (1, -1) if both[c] else (1,):
+                    point = x.copy()
+                    point[c] += sign * up[c]
+                    points.append(point)
+            values = self.batch(i, np.array(points))
+            columns, k = [], 1
+            for c in own:
+                if both[c]:
+                    columns.append((values[k] - values[k + 1]) / (2 * up[c]))
+                    k += 2
+                else:
+                    columns.append((values[k] - values[0]) / up[c])
+                    k += 1
+            rows.append(values[0])
+            slopes.append(np.array(columns).T.reshape(len(values[0]), len(own)))
+        return rows, slopes
+
+    # -- cost -----------------------------------------------------------------------------------
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """(D,) independent errors of each data set."""
+        return np.array([d.n_eff for d in self.datasets])
+
+    def cost(self, rows: list[np.ndarray], x: np.ndarray) -> float:
+        """What is minimised."""
+        fit = sum(self._misfit(i, r) for i, r in enumerate(rows))
+        return float(fit + np.sum(((x - self.usual) / self.std) ** 2))
+
+    def _misfit(self, i: int, rows: np.ndarray) -> float:
+        """sum over scales of n ln S^2, with S^2 no less than LEAST_SQUARE."""
+        square, n = self._squares(i, rows)
+        return float(n @ np.log(square))
+
+    def _squares(self, i: int, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(G,) squared score of each scale of data set i, and its number of independent errors."""
+        scale = self.scales[i]
+        square = np.bincount(scale, rows**2, scale.max() + 1)
+        judged = self._judged(i)
+        share = judged / max(judged.sum(), 1e-12)
+        n = self.datasets[i].n_eff * (judged > 0) / max(np.count_nonzero(judged), 1)
+        square = np.where(judged > 0, square / np.where(judged > 0, share, 1), 1.0)
+        return np.maximum(square, LEAST_SQUARE), n
+
+    def _judged(self, i: int) -> np.ndarray:
+        """(G,) share of data set i's score that each scale makes up."""
+        return np.bincount(self.scales[i], self.datasets[i].judged, self.scales[i].max() + 1)
+
+    def _normal(
+        self, rows: list[np.ndarray], slopes: list[np.ndarray], x: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        gram = np.diag(1 / self.std**2)
+        pull = (x - self.usual) / self.std**2
+        for i, (r, j) in enumerate(zip(rows, slopes, strict=True)):
+            weighted = j * self.weight(i, r)[:, None]
+            own = self.columns[i]
+            gram[np.ix_(own, own)] += weighted.T @ j
+            pull[own] += weighted.T @ r
+        return gram, pull
+
+    def weight(self, i: int, rows: np.ndarray) -> np.ndarray:
+        """(R,) weights with which squares of rows add up to the cost, near these rows."""
+        square, n = self._squares(i, rows)
+        judged = self._judged(i)
+        share = np.where(judged > 0, judged / max(judged.sum(), 1e-12), 1.0)
+        return (n / square / share)[self.scales[i]]
+
+    # -- fit ------------------------------------------------------------------------------------
+
+    def _without_part(self, part: int, begin: np.ndarray) -> np.ndarray:
+        """A whole fit without one part: where rows are few, one step is not enough."""
+        datasets = [_LeftOut(d, d.part != part) for d in self.datasets]
+        fit = ScoreFit(datasets, self.models, self.shared, self.by_channel)
+        fit.x = begin
+        return fit.fit().x
+
+    def begin_at_best(self, fresh: int) -> None:
+        """Begins with the last `fresh` shared parameters at the best of several strengths."""
+        names = {p.name for p in self.shared[len(self.shared) - fresh :] if p.role != "place"}
+        new = np.array([u.parameter.name in names for u in self.unknowns], bool)
+        points = [np.where(new, self.usual + s * (self.x - self.usual), self.x) for s in STARTS]
+        points = np.clip(np.array(points), self.low, self.high)
+        rows = [self.batch(i, points) for i in range(len(self.datasets))]
+        cost = [sum(self._misfit(i, r[k]) for i, r in enumerate(rows)) for k in range(len(points))]
+        self.x = points[int(np.argmin(cost))]
+
+    def fit(self, rounds: int = ROUNDS) -> "ScoreFit":
+        """Minimises the cost and leaves the values in the models."""
+        x, damping = self.x, 1e-3
+        if len(x):
+            rows, slopes = self._slopes(x)
+            cost = self.cost(rows, x)
+            for _ in range(rounds):
+                gram, pull = self._normal(rows, slopes, x)
+                moved = None
+                for _ in range(6):
+                    lifted = gram + damping * np.diag(np.diag(gram))
+                    trial = self._stepped(lifted, pull, x)
+                    then = self.rows(trial)
+                    trial_cost = self.cost(then, trial)
+                    if trial_cost < cost:
+                        moved = trial
+                        break
+                    damping *= 10
+                if moved is None:
+                    break
+                fell = cost - trial_cost
+                x, cost, damping = moved, trial_cost, max(damping / 10, 1e-9)
+                rows, slopes = self._slopes(x)
+                if fell < CONVERGED * max(1.0, self.sizes.sum() * 1e-2):
+                    break
+            self.__dict__["state"] = (rows, slopes)
+        self.x = x
+        self.store()
+        return self
+
+    def _stepped(self, gram: np.ndarray, pull: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Newton's step; what would leave its bounds stops there, and the rest moves as it then must."""
+        free, moved = np.ones(len(x), bool), x.copy()
+        while free.any():
+            held = moved - x
+            held[free] = 0.0
+            push = pull[free] + gram[np.ix_(free, ~free)] @ held[~free]
+            moved[free] = x[free] - np.linalg.solve(gram[np.ix_(free, free)], push)
+            outside = free & ((moved < self.low) | (moved > self.high))
+            if not outside.any():
+                break
+            moved = np.clip(moved, self.low, self.high)
+            free &= ~outside
+        return moved
+
+    def store(self) -> None:
+        """Puts the values into the models."""
+        for i, own in enumerate(self.columns):
+            for name, c in zip(self.names[i], own, strict=True):
+                self.models[i].set(name, float(self.x[c]))
+
+    @cached_property
+    def state(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Rows and slopes at the values found."""
+        return self._slopes(self.x)
+
+    @property
+    def scores(self) -> np.ndarray:
+        """(D,) score of each data set."""
+        return np.sqrt([r @ r for r in self.state[0]])
+
+    # -- held out -------------------------------------------------------------------------------
+
+    @cached_property
+    def held_out(self) -> list[np.ndarray]:
+        """(R,) rows of each data set, each part predicted by a fit to the other five parts.
+
+        One Newton step from the joint fit, with its slopes.
+        """
+        rows, slopes = self.state
+        if not len(self.x):
+            return rows
+        gram, pull = self._normal(rows, slopes, self.x)
+        points = []
+        for k in range(PARTS):
+            g, p = gram.copy(), pull.copy()
+            for i, (r, j) in enumerate(zip(rows, slopes, strict=True)):
+                out = self.datasets[i].part == k
+                weighted, own = j[out] * self.weight(i, r)[out, None], self.columns[i]
+                g[np.ix_(own, own)] -= weighted.T @ j[out]
+                p[own] -= weighted.T @ r[out]
+            points.append(self._stepped(g, p, self.x))
+        if sum(len(r) for r in rows) < FEW_ROWS:
+            points = [self._without_part(k, x) for k, x in enumerate(points)]
+        held = []
+        for i in range(len(rows)):
+            each = self.batch(i, np.array(points))
+            held.append(each[self.datasets[i].part, np.arange(each.shape[1])])
+        return held
+
+    @cached_property
+    def block_squares(self) -> list[np.ndarray]:
+        """Squared held-out score of each data set, block by block."""
+        return [np.bincount(d.block, h**2) for d, h in zip(self.datasets, self.held_out, strict=True)]
+
+    def block_costs(self, like: "ScoreFit") -> np.ndarray:
+        """(B,) held-out squares of all blocks, weighted as another fit weighs them."""
+        parts = []
+        for i, (d, held) in enumerate(zip(self.datasets, self.held_out, strict=True)):
+            parts.append(np.bincount(d.block, like.weight(i, like.held_out[i]) * held**2))
+        return np.concatenate(parts)
+
+    def without_blocks(self) -> np.ndarray:
+        """(B,) held-out cost of the data without each block, the prior left aside."""
+        costs = []
+        whole = [self._misfit(i, r) for i, r in enumerate(self.held_out)]
+        for i, (d, held) in enumerate(zip(self.datasets, self.held_out, strict=True)):
+            rest = sum(whole) - whole[i]
+            scale, block = self.scales[i], d.block
+            shape = (block.max() + 1, scale.max() + 1)
+            place = np.ravel_multi_index((block, scale), shape)
+            squares, judged = (
+                np.bincount(place, v, shape[0] * shape[1]).reshape(shape)
+                for v in (held**2, d.judged)
+            )
+            left, share = squares.sum(0) - squares, judged.sum(0) - judged
+            known = share > 1e-9
+            n = d.n_eff * share.sum(1, keepdims=True) / d.judged.sum() / known.sum(1, keepdims=True)
+            square = np.maximum(left / np.where(known, share, 1.0), LEAST_SQUARE)
+            costs.append(rest + np.sum(np.where(known, n * np.log(square), 0.0), axis=1))
+        return np.concatenate(costs)
+
+    @property
+    def held_scores(self) -> np.ndarray:
+        """(D,) held-out score of each data set."""
+        return np.sqrt([b.sum() for b in self.block_squares])
+
+    @property
+    def held_cost(self) -> float:
+        """The cost on held-out parts."""
+        return self.cost(self.held_out, self.x)
+
+    # -- uncertainty ----------------------------------------------------------------------------
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """(P, P) by leaving out a block at a time; no less than the curvature of the cost says."""
+        rows, slopes = self.state
+        gram, pull = self._normal(rows, slopes, self.x)
+        inverse = np.linalg.pinv(gram)
+        spread = np.zeros_like(gram)
+        for i, (r, j) in enumerate(zip(rows, slopes, strict=True)):
+            weight, own, block = self.weight(i, r), self.columns[i], self.datasets[i].block
+            for b in np.unique(block):
+                out = block == b
+                weighted = j[out] * weight[out, None]
+                less, push = gram.copy(), np.zeros(len(gram))
+                less[np.ix_(own, own)] -= weighted.T @ j[out]
+                push[own] = weighted.T @ r[out]
+                try:
+                    moved = np.linalg.solve(less, push)
+                except np.linalg.LinAlgError:
+                    moved = inverse @ push
+                spread += np.outer(moved, moved)
+        blocks = self.blocks
+        spread *= (blocks - 1) / max(blocks, 1)
+        # What the data leave undetermined is as wide as the curvature, and so the prior, says.
+        return spread + np.diag(np.maximum(np.diag(inverse) - np.diag(spread), 0.0))
+
+    @property
+    def blocks(self) -> int:
+        """Of all data sets."""
+        return int(sum(len(np.unique(d.block)) for d in self.datasets))
+
+    @property
+    def stds(self) -> np.ndarray:
+        """(P,) half 95 % intervals over 1.96: Student's t for so few blocks."""
+        factor = student.ppf(0.975, max(self.blocks - 1, 1)) / NORMAL_95
+        return factor * np.sqrt(np.diag(self.covariance))
+
+    @cached_property
+    def estimates(self) -> list[Estimate]:
+        """Of all unknowns, shared ones first."""
+        found = []
+        for u, value, std in zip(self.unknowns, self.x, self.stds, strict=True):
+            p = u.parameter
+            near = AT_BOUND * (p.max - p.min)
+            at_bound = bool(value - p.min < near or p.max - value < near)
+            found.append(
+                Estimate(p.name, float(value), float(std), p.unit, at_bound, bool(std < SEEN * p.std))
+            )
+        return found
+
+    @property
+    def shared_values(self) -> list[Parameter]:
+        """Quantities that all data sets share, at the values found."""
+        count = sum(1 for u in self.unknowns if u.parameter in self.shared)
+        return [u.parameter.at(float(v)) for u, v in zip(self.unknowns[:count], self.x, strict=False)]
+
+    def shared_estimates(self) -> list[Estimate]:
+        """Of the quantities that all data sets share."""
+        return self.estimates[: sum(1 for u in self.unknowns if u.parameter in self.shared)]
+
+    def own_estimates(self, i: int) -> dict[str, Estimate]:
+        """Of data set i alone: its clock and its robot's gains."""
+        count = len(self.shared_estimates())
+        return {self.estimates[c].name: self.estimates[c] for c in self.columns[i] if c >= count}

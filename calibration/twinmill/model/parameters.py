@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters of a model: what a fit may change, within which bounds, and what is usual."""
+
+import re
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
+from functools import cache
+
+import twinmill_native as native
+
+MOTION_STAGES = ("duty", "wheel", "ground", "observe")  # what the path of one robot shows
+CLOCK, CLOCK_RATE = "clock.offset_s", "clock.rate_ppm"
+GAINS = ("theta_a1", "theta_a2")  # of one robot: speed, and rate of turn
+BASE_GAINS = ("base.forward_gain", "base.sideways_gain", "base.yaw_gain")
+LAG = "base.motor_lag_s"
+
+# Standard deviations of the base's priors: as robots differ from their data sheets.
+USUAL_STD = {LAG: 0.3, CLOCK: 0.3, CLOCK_RATE: 30.0}
+GAIN_STD = 0.15
+BASE_STEP = {LAG: 0.004, CLOCK: 0.006, CLOCK_RATE: 5.0}
+GAIN_STEP = 0.004
+EFFECT_STEP = 0.05  # times the distance of an effect's default from its neutral value
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One free quantity of a fit.
+
+    Attributes:
+        name, unit: in the model.
+        value: where the fit begins.
+        min, max: bounds.
+        usual: centre of the prior.
+        std: standard deviation of the prior.
+        step: of finite differences.
+        central: differences are taken to both sides, where times make one-sided ones crude.
+        role: "size", "place" (where in the room) or "lateness", as on the effect's card.
+    """
+
+    name: str
+    unit: str
+    value: float
+    min: float
+    max: float
+    usual: float
+    std: float
+    step: float
+    central: bool = False
+    role: str = "size"
+
+    def at(self, value: float) -> "Parameter":
+        """The same, begun elsewhere."""
+        return replace(self, value=value)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted quantity.
+
+    Attributes:
+        std: half of a 95 % interval over 1.96, from left-out blocks.
+        at_bound: it ended at a bound.
+        seen: false where the log does not tell it and the prior holds it.
+    """
+
+    name: str
+    value: float
+    std: float
+    unit: str
+    at_bound: bool
+    seen: bool
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return vars(self)
+
+
+@cache
+def catalogue() -> dict[str, dict]:
+    """The twin's effects by name."""
+    return {entry["name"]: entry for entry in native.catalogue()}
+
+
+def effect_names(model: native.Model) -> list[str]:
+    """Instance names of a model's effects in their order: `dead_zone`, `dead_zone#2`."""
+    seen: dict[str, int] = {}
+    names = []
+    for name in model.effects:
+        seen[name] = seen.get(name, 0) + 1
+        names.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
+    return names
+
+
+def base_parameters(model: native.Model, names: Iterable[str]) -> list[Parameter]:
+    """Quantities of the base by name; the centre of each prior is the model's value."""
+    values = {v["name"]: v for v in model.values()}
+    found = []
+    for name in names:
+        v = values[name]
+        std, step = USUAL_STD.get(name, GAIN_STD), BASE_STEP.get(name, GAIN_STEP)
+        timed = name in (LAG, CLOCK)
+        at = v["value"]
+        found.append(Parameter(name, v["unit"], at, v["min"], v["max"], at, std, step, timed))
+    return found
+
+
+def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -> list[Parameter]:
+    """Free quantities of one effect of a model; a fresh one begins at its defaults.
+
+    Of a formula only those parameters that it names are free, and nothing is known of their size.
+    """
+    place = effect_names(model).index(instance)
+    texts, name = model.texts[place], instance.split("#")[0]
+    bounds = {v["name"]: (v["min"], v["max"]) for v in model.values()}
+    found = []
+    for p in catalogue()[name]["parameters"]:
+        if texts and not any(p["name"] in words(text) for text in texts.values()):
+            continue
+        full = f"{instance}.{p['name']}"
+        low, high = bounds[full]
+        found.append(
+            Parameter(
+                full,
+                p["unit"],
+                p["default"] if fresh else model.get(full),
+                low,
+                high,
+                p["neutral"],
+                high - low if texts else p["usual_size"],
+                EFFECT_STEP * abs(p["default"] - p["neutral"]),
+                p["unit"] == "s",
+                p["role"],
+            )
+        )
+    return found
+
+
+def all_effect_parameters(model: native.Model) -> list[Parameter]:
+    """Free quantities of all of a model's effects on motion."""
+    return [
+        p
+        for instance in effect_names(model)
+        if catalogue()[instance.split("#")[0]]["stage"] in MOTION_STAGES
+        for p in effect_parameters(model, instance)
+    ]
+
+
+def duty_table(model: native.Model) -> list[str]:
+    """Names of the free speeds of a duty robot's table; empty for other drives."""
+    if model.drive != "duty":
+        return []
+    return [v["name"] for v in model.values() if v["name"].startswith("base.wheel_speed_mps.")]
+
+
+def words(formula: str) -> set[str]:
+    """Names in a formula."""
+    return set(re.findall(r"[A-Za-z_]\w*", formula))
+
+
+def stated_names(model: native.Model, robot_id: int) -> set[str]:
+    """Quantities, by name, that [robots.Rnn] states of one robot: no fit of all robots moves them."""
+    keys: Collection[str] = model.stated_of(robot_id)
+    return {k if "." in k or k in GAINS else f"base.{k}" for k in keys}

@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Data sets that a model is scored on: rows of error over floor, whose squares add up to the score's.
+
+All fits, searches and tests see a data set through `Dataset` alone. `Trajectory` is one robot in
+one log.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+import twinmill_native as native
+from twinmill.model.parameters import Parameter
+from twinmill.data.measurement import Measurement
+from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms
+from twinmill.predict.residual import rotate
+
+BLOCK_S = 8.0  # errors of different blocks count as independent
+FEWEST_BLOCKS = 6  # a shorter log has shorter blocks
+PARTS = 6  # of the held-out score: each is predicted by a fit to the other five
+INDEPENDENT_S = 2.0  # predictions that start so far apart share nothing
+
+
+class Dataset(Protocol):
+    """What a fit needs of a data set.
+
+    Attributes:
+        label: short name.
+        robot_id: of the robot.
+        own: quantities of this data set alone (its clock, its robot's gains), fitted with the rest.
+        block: (R,) number of the block that each row belongs to.
+        part: (R,) number of the part of the data with which each row is left out.
+        channel: (R,) number of the channel that each row belongs to.
+        judged: (R,) share of the squared score that each row would make up if all were 1.
+        n_eff: number of independent errors.
+    """
+
+    label: str
+    robot_id: int
+    own: Sequence[Parameter]
+    block: np.ndarray
+    part: np.ndarray
+    channel: np.ndarray
+    judged: np.ndarray
+    n_eff: float
+
+    def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
+        """(B, R) errors over floor for B rows of values; the sum of squares is the score squared."""
+        ...
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One robot in one log: predictions from measured poses, at all horizons.
+
+    Attributes:
+        measurement: of the robot.
+        windows: where predictions start and end.
+        measured: (W, H, 3) displacements seen from the start; m, m, rad.
+        floor: (H, 3) errors that count as one; infinite where a channel is not judged.
+        keep: (W,) bool: windows that are judged.
+        own: see Dataset.
+    """
+
+    measurement: Measurement
+    windows: Windows
+    measured: np.ndarray
+    floor: np.ndarray
+    keep: np.ndarray
+    own: tuple[Parameter, ...] = ()
+    weight: np.ndarray = field(init=False, repr=False)
+    block: np.ndarray = field(init=False, repr=False)
+    part: np.ndarray = field(init=False, repr=False)
+    channel: np.ndarray = field(init=False, repr=False)
+    judged: np.ndarray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        counted = np.isfinite(self.measured) & self.keep[:, None, None]
+        count = counted.sum(axis=0)
+        judged = np.isfinite(self.floor) & (count > 0)
+        scale = np.where(judged, self.floor * np.sqrt(np.maximum(count, 1) * judged.sum()), np.inf)
+        object.__setattr__(self, "weight", np.where(counted, 1 / scale, 0.0))
+        block = np.floor((self.start_s - self.start_s[0]) / self.block_s).astype(int)
+        object.__setattr__(self, "block", np.repeat(block, self.measured[0].size))
+        object.__setattr__(self, "part", self.block % PARTS)
+        object.__setattr__(self, "channel", np.arange(self.measured.size) % 3)
+        # Each horizon of a channel counts alike, however many windows it has.
+        share = counted / (np.maximum(count, 1) * max(judged.sum(), 1)) * judged
+        object.__setattr__(self, "judged", share.reshape(-1))
+
+    @classmethod
+    def of(cls, measurement: Measurement) -> "Trajectory":
+        """With a floor of one everywhere: to be given a floor by `over`."""
+        return cls.at(measurement, Windows.of(measurement.track))
+
+    @classmethod
+    def at(cls, measurement: Measurement, windows: Windows) -> "Trajectory":
+        """The same with some windows alone."""
+        measured = displacement(measurement, windows, None)
+        return cls(
+            measurement, windows, measured, np.ones((len(HORIZONS_S), 3)), np.ones(len(measured), bool)
+        )
+
+    def over(self, floor: np.ndarray, keep: np.ndarray | None = None) -> "Trajectory":
+        """The same over another floor; channels that never move (floor 0 or NaN) are not judged."""
+        known = np.where(floor > 1e-9, floor, np.inf)
+        return replace(self, floor=known, keep=self.keep if keep is None else keep)
+
+    @property
+    def label(self) -> str:
+        """Of log and robot."""
+        return self.measurement.label
+
+    @property
+    def robot_id(self) -> int:
+        """Of the robot."""
+        return self.measurement.track.robot_id
+
+    @property
+    def start_s(self) -> np.ndarray:
+        """(W,) capture's clock."""
+        return self.measurement.track.pose_t_s[self.windows.starts]
+
+    @property
+    def block_s(self) -> float:
+        """Length of a block."""
+        span_s = float(np.ptp(self.start_s))
+        return min(BLOCK_S, max(span_s / FEWEST_BLOCKS, 1e-3))
+
+    @property
+    def covered_s(self) -> float:
+        """Time in which predictions start."""
+        return float(np.count_nonzero(self.keep)) * 0.25
+
+    @property
+    def n_eff(self) -> float:
+        """See Dataset."""
+        channels = np.count_nonzero(np.isfinite(self.floor).any(axis=0))
+        return max(channels * self.covered_s / INDEPENDENT_S, 1.0)
+
+    def errors(self, model: native.Model) -> np.ndarray:
+        """(W, H, 3) measured less predicted."""
+        return difference(self.measured, displacement(self.measurement, self.windows, model))
+
+    def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
+        """See Dataset."""
+        ahead = native.windows_batch(
+            model, self.measurement.played, self.windows.starts, self.windows.ends, names, values
+        )
+        apart = difference(self.measured, _seen(self.measurement, self.windows, ahead))
+        return (np.nan_to_num(apart) * self.weight).reshape(len(values), -1)
+
+    def as_errors(self, rows: np.ndarray) -> np.ndarray:
+        """(R,) rows to (W, H, 3) errors in m, m, rad; NaN where not judged."""
+        weight = self.weight.reshape(-1)
+        errors = np.where(weight > 0, rows / np.where(weight > 0, weight, 1), np.nan)
+        return errors.reshape(self.measured.shape)
+
+    def score(self, model: native.Model) -> float:
+        """RMS over horizons and channels of error over floor."""
+        return float(np.sqrt(np.sum((np.nan_to_num(self.errors(model)) * self.weight) ** 2)))
+
+
+def displacement(
+    measurement: Measurement, windows: Windows, model: native.Model | None
+) -> np.ndarray:
+    """(W, H, 3) forward, left (m) and turn (rad) seen from the start; of the model if one is given."""
+    if model is None:
+        ahead = measurement.track.pose[windows.ends]
+    else:
+        ahead = native.windows(model, measurement.played, windows.starts, windows.ends)
+    return _seen(measurement, windows, ahead)
+
+
+def _seen(measurement: Measurement, windows: Windows, end: np.ndarray) -> np.ndarray:
+    track = measurement.track
+    step = end - track.pose[windows.starts][:, None]
+    heading_rad = track.heading_smooth[windows.starts][:, None]
+    seen = np.stack([*rotate(step[..., 0], step[..., 1], -heading_rad), step[..., 2]], -1)
+    seen[..., windows.ends < 0, :] = np.nan
+    return seen
+
+
+def total_score(parts: Sequence[float]) -> float:
+    """Score of several data sets: the geometric mean of each one's, no less than 1 each.
+
+    A fit of several minimises just this; a plain mean would let one disturbed log speak for all.
+    """
+    if len(parts) == 1:
+        return float(parts[0])
+    return float(np.exp(np.mean(np.log(np.maximum(parts, 1.0)))))
+
+
+__all__ = ["Dataset", "Trajectory", "displacement", "rms", "total_score"]

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fits of the score, against the constants of a robot of another form and their own scatter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from twinmill.fitting.fit import base_names, fit
+from twinmill.fitting.opening import judged, open_measurements
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import base_parameters
+
+LOGS = 6
+LAG = "base.motor_lag_s"
+
+
+@pytest.fixture(scope="module")
+def truth(tanh_robot):
+    """Its speeds at the table's duties, gains, lag."""
+    robot = tanh_robot()
+    speeds = robot.speed_mps(np.array([0.25, 0.5, 0.75, 1]))
+    return {
+        **{f"base.wheel_speed_mps.{i + 1}": s for i, s in enumerate(speeds)},
+        "base.sideways_gain": robot.sideways,
+        "base.yaw_gain": robot.yaw,
+        LAG: robot.lag_s,
+    }
+
+
+def parameters(guess, opened, **changes):
+    """The base's free quantities; fields of one may be changed by its name."""
+    names = {name.replace("__", "."): fields for name, fields in changes.items()}
+    free = base_parameters(guess.model, base_names(guess.model, opened))
+    assert set(names) <= {p.name for p in free}
+    return [replace(p, **names.get(p.name, {})) for p in free]
+
+
+def score_fit(runs, guess, **changes):
+    """A fit of the base to runs."""
+    opened = judged(open_measurements(runs, guess))
+    free = parameters(guess, opened, **changes)
+    return ScoreFit([o.data for o in opened], [o.model for o in opened], free).fit()
+
+
+@pytest.fixture(scope="module")
+def fits(tanh_robot, measure, model_file):
+    """(LOGS, P) values and standard errors of logs that differ in script and noise."""
+    guess = model_file()
+    found = [
+        score_fit([measure(tanh_robot(), 100 + seed, 30.0)], guess).shared_estimates()
+        for seed in range(LOGS)
+    ]
+    values, stds = (np.array([[getattr(e, k) for e in f] for f in found]) for k in ("value", "std"))
+    return [e.name for e in found[0]], values, stds
+
+
+def test_estimates_are_right_on_average(fits, truth):
+    """Within three standard errors of the mean, and half a step of the robot's 1/480 s Euler."""
+    names, values, _ = fits
+    scatter = values.std(axis=0, ddof=1) / np.sqrt(LOGS)
+    for name, mean, error in zip(names, values.mean(axis=0), scatter, strict=True):
+        form = 1 / 960 if name == LAG else 0.005 * truth[name]
+        assert mean == pytest.approx(truth[name], abs=3 * error + form), name
+
+
+def test_intervals_cover_the_truth(fits, truth):
+    """Of 42 intervals of 95 % at least 36: a binomial of 0.95 has fewer once in 70 times."""
+    names, values, stds = fits
+    true = np.array([truth[name] for name in names])
+    inside = np.abs(values - true) < 1.96 * stds
+    assert inside.sum() >= 0.85 * inside.size, dict(zip(names, inside.mean(axis=0), strict=True))
+
+
+def test_intervals_are_not_so_wide_that_they_say_nothing(fits):
+    """The stated error of most quantities is within three times their scatter."""
+    _, values, stds = fits
+    ratio = np.sqrt(np.mean(stds**2, axis=0)) / values.std(axis=0, ddof=1)
+    assert np.median(ratio) < 3
+
+
+def test_intervals_cover_the_truth_beside_a_small_effect_that_is_not_modelled(
+    tanh_robot, measure, model_file, truth
+):
+    """Left turns are 3 % faster than right ones, and no model knows it."""
+
+    class Lopsided(tanh_robot):
+        def wheels_mps(self, duty):
+            speeds = super().wheels_mps(duty)
+            spin = (speeds * (-1, 1, -1, 1)).mean(axis=1)
+            return speeds + 0.03 * np.abs(spin)[:, None] * (-1, 1, -1, 1)
+
+    inside = []
+    for seed in range(3):
+        found = score_fit([measure(Lopsided(), 150 + seed, 30.0)], model_file())
+        inside += [
+            abs(e.value - truth[e.name]) < 1.96 * e.std + 0.003 * truth[e.name]
+            for e in found.shared_estimates()
+        ]
+    assert np.mean(inside) >= 0.8
+
+
+@pytest.mark.parametrize("lag_s", [0.02, 0.2])
+def test_a_fit_never_raises_the_score(lag_s, fits, tanh_robot, measure, model_file, tmp_path):
+    """From a guess, and again from what was fitted to another log. 1 %: the prior's pull."""
+    run = measure(tanh_robot(), 100, 30.0)
+    guess = model_file(("motor_lag_s = 0.05", f"motor_lag_s = {lag_s}"))
+    once = fit([run], guess, tmp_path / "once.toml", "")
+    assert once.after.score <= once.before.score
+    other = measure(tanh_robot(yaw=0.75), 101, 30.0)
+    again = fit([other], ModelFile.load(str(once.path)), tmp_path / "again.toml", "")
+    assert again.after.score <= 1.01 * again.before.score
+
+
+def test_a_smoothed_log_keeps_its_gains(tanh_robot, measure, model_file, truth):
+    """Poses averaged over 0.3 s, as many a capture program gives them: gains stay within 0.02."""
+
+    def smoothed(pose, valid):
+        kernel = np.ones(36) / 36
+        padded = np.pad(pose, ((18, 17), (0, 0)), mode="edge")
+        return np.column_stack([np.convolve(c, kernel, "valid") for c in padded.T]), valid
+
+    found = {
+        e.name: e.value
+        for e in score_fit(
+            [measure(tanh_robot(), 7, 60.0, spoil=smoothed)], model_file()
+        ).shared_estimates()
+    }
+    for name in ("base.sideways_gain", "base.yaw_gain"):
+        assert found[name] == pytest.approx(truth[name], abs=0.02), name
+    full = "base.wheel_speed_mps.4"
+    assert found[full] / truth[full] == pytest.approx(1, abs=0.02)
+
+
+def test_left_out_parts_are_predicted_by_fits_to_the_others(tanh_robot, measure, model_file):
+    """One Newton step stands for a refit: here the refit is made."""
+    guess = model_file()
+    (opened,) = open_measurements([measure(tanh_robot(), 5, 30.0)], guess)
+    free = parameters(guess, [opened])
+    whole = ScoreFit([opened.data], [opened.model], free).fit()
+    out = whole.datasets[0].part == 2
+    windows = ~out.reshape(opened.data.measured.shape).any(axis=(1, 2))
+    rest = replace(opened.data, keep=opened.data.keep & windows)
+    alone = ScoreFit([rest], [opened.model], free).fit()
+    other = opened.data.rows(alone.models[0], [LAG], np.array([[alone.models[0].get(LAG)]]))[0]
+    by_refit, by_step = np.sum(other[out] ** 2), np.sum(whole.held_out[0][out] ** 2)
+    assert by_step == pytest.approx(by_refit, rel=0.1)
+    assert by_step > np.sum(whole.state[0][0][out] ** 2)
+
+
+def test_a_jump_of_few_poses_does_not_move_the_fit(tanh_robot, measure, model_file, truth):
+    """One pose in a thousand is 6 mm off, twenty times its noise: below what counts as a jump."""
+
+    def spoil(pose, valid):
+        random = np.random.default_rng(7)
+        hit = random.random(len(pose)) < 0.001
+        angle = random.uniform(0, 2 * np.pi, len(pose))
+        pose = pose.copy()
+        pose[hit, :2] += 6e-3 * np.column_stack([np.cos(angle), np.sin(angle)])[hit]
+        return pose, valid
+
+    clean, dirty = (
+        score_fit([measure(tanh_robot(), 5, 40.0, spoil=s)], model_file()).shared_estimates()
+        for s in (None, spoil)
+    )
+    for a, b in zip(clean, dirty, strict=True):
+        assert b.value == pytest.approx(a.value, abs=3 * a.std + 0.002 * abs(truth[a.name])), a.name
+        assert b.std < 3 * a.std
+
+
+@pytest.fixture(scope="module")
+def straight(tanh_robot, measure):
+    """Straight runs at 50 and 100 %, which tell nothing of strafing, turning or other duties."""
+    legs = [[(d,) * 4] * 48 for d in (100, 0, -100, 0, 50, 0, -50, 0)] * 4
+    return measure(tanh_robot(), 6, script_pct=np.concatenate(legs))
+
+
+def test_what_a_log_does_not_tell_stays_and_is_said_to(straight, model_file):
+    guess = model_file()
+    fitted = score_fit([straight], guess)
+    told = {"base.wheel_speed_mps.2", "base.wheel_speed_mps.4", LAG}
+    for estimate, start in zip(fitted.shared_estimates(), fitted.shared, strict=True):
+        assert estimate.seen == (estimate.name in told), estimate.name
+        if not estimate.seen:
+            assert estimate.value == pytest.approx(start.value, abs=0.3 * start.std)
+            assert estimate.std > 0.5 * start.std
+
+
+def test_a_narrow_prior_holds_and_a_wide_one_does_not(straight, model_file, truth):
+    held, let_go = (
+        score_fit([straight], model_file(), base__motor_lag_s={"std": width}).shared_estimates()[-1]
+        for width in (1e-6, 0.3)
+    )
+    assert held.value == pytest.approx(0.05, abs=1e-4) and not held.seen
+    assert let_go.value == pytest.approx(truth[LAG], abs=0.01) and let_go.seen
+
+
+def test_an_estimate_at_its_bound_is_marked(straight, model_file):
+    for bound, value in (({"max": 0.07}, 0.07), ({"min": 0.12, "value": 0.13}, 0.12)):
+        found = score_fit([straight], model_file(), base__motor_lag_s=bound).shared_estimates()
+        lag = next(e for e in found if e.name == LAG)
+        assert lag.at_bound and lag.value == pytest.approx(value, abs=1e-3)
+    assert not any(e.at_bound for e in score_fit([straight], model_file()).shared_estimates())
+
+
+def test_a_disturbed_log_does_not_speak_for_all(tanh_robot, measure, model_file):
+    """Two calm robots and one whose gains are 30 % off: the common gain is that of the two."""
+    runs = [measure(tanh_robot(), 160 + i, 30.0) for i in range(2)]
+    runs.append(measure(tanh_robot(yaw=0.55), 162, 30.0))
+    found = {e.name: e.value for e in score_fit(runs, model_file()).shared_estimates()}
+    assert found["base.yaw_gain"] == pytest.approx(tanh_robot().yaw, abs=0.08)
