@@ -68,7 +68,7 @@ def with_outputs(page: str, folder: Path) -> str:
 
 def catalogue() -> str:
     """All effects: what each is, its equation, parameters, what it leaves out, and its source."""
-    from twinmill.model.freedom import catalogue as cards
+    from twinmill.model.parameters import catalogue as cards
 
     return "\n".join(_card(card) for _, card in sorted(cards().items()))
 

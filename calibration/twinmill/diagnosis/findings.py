@@ -177,7 +177,7 @@ def _doubt(name: str, own: Sequence[Estimate]) -> str:
 
 def ranking_of(done: Search, found: Sequence[Finding]) -> list[Ranked]:
     """Found effects in the order of worth with their rivals, then the rest of the first round."""
-    first = done.rounds[0].before.held_score**2
+    first = done.rounds[0].before.held_score ** 2
     ranking: list[Ranked] = []
     number = 0
     for finding in found:
@@ -190,7 +190,9 @@ def ranking_of(done: Search, found: Sequence[Finding]) -> list[Ranked]:
             group = number
         for trial in [this.accepted, *this.tied]:
             entries = [_ranked(trial, n, this, first, group) for n in trial.names if n != REFIT]
-            ranking += [e for e in entries if e.effect == finding.effect or trial is not this.accepted]
+            ranking += [
+                e for e in entries if e.effect == finding.effect or trial is not this.accepted
+            ]
     named = {r.effect for r in ranking}
     for trial in done.rounds[0].trials:
         if len(trial.names) == 1 and trial.names[0] not in {*named, REFIT}:

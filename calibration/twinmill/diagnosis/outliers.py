@@ -146,7 +146,9 @@ def _suspects(states: dict[int, State], progress: Callable[[str], None]) -> list
             worth.setdefault(s.name, []).append(s.gain)
     # What all robots would take alike is no difference.
     apart = {n: max(g) - np.median(g) for n, g in worth.items()}
-    best = sorted((n for n in apart if apart[n] > EVIDENCE / 2 and n != REFIT), key=lambda n: -apart[n])
+    best = sorted(
+        (n for n in apart if apart[n] > EVIDENCE / 2 and n != REFIT), key=lambda n: -apart[n]
+    )
     return ["gains", *best[:TRIED]]
 
 
@@ -305,5 +307,3 @@ def _effect_words(estimate: Estimate) -> str:
     words = p["above" if _away(estimate) > 0 else "below"] or catalogue()[effect]["phrase"]
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
     return f"{words} ({estimate.name} {estimate.value:.3g}{unit})"
-
-

@@ -142,9 +142,7 @@ def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:
 # -- the library --------------------------------------------------------------------------------
 
 
-def _dependences(
-    logs: list[tuple[int, Opened]], fit: ScoreFit, known: Mapping[str, float]
-) -> Rest:
+def _dependences(logs: list[tuple[int, Opened]], fit: ScoreFit, known: Mapping[str, float]) -> Rest:
     rows, slopes = fit.state
     terms, sizes = _terms_of(logs, fit)
     left, columns, blocks, frees = [], [], [], []
@@ -400,5 +398,3 @@ def _rate(values: np.ndarray, step_s: np.ndarray) -> np.ndarray:
     """Rate of change; zero where a stretch begins."""
     rate = np.diff(values, prepend=values[0]) / np.where(step_s > 0, step_s, np.inf)
     return rate
-
-

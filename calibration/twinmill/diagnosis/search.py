@@ -213,7 +213,11 @@ def search(
         if this.accepted is None:
             break
         this.tied = _tied(this, settings)
-        before, gone = _pruned(this.accepted, [n for r in rounds for n in r.accepted.names if n not in dropped], settings)
+        before, gone = _pruned(
+            this.accepted,
+            [n for r in rounds for n in r.accepted.names if n not in dropped],
+            settings,
+        )
         dropped += gone
     return Search(rounds, before, dropped, settings)
 
@@ -233,7 +237,9 @@ def grown(state: State, names: Sequence[str], start: dict[str, float] | None = N
     free = list(state.begun())
     for name in names:
         if name == REFIT:
-            free += base_parameters(models[0], [n for n in state.base if n not in {p.name for p in free}])
+            free += base_parameters(
+                models[0], [n for n in state.base if n not in {p.name for p in free}]
+            )
             continue
         for model in models:
             model.add_effect(name)
@@ -281,7 +287,11 @@ def _best(
             good.append(trial)
     best = min(good, key=lambda t: t.fit.held_cost, default=None)
     # Stale numbers of the base are more likely than an effect that does the same.
-    stale = [t for t in good if t.names == (REFIT,) and t.fit.held_cost - best.fit.held_cost < settings.tie]
+    stale = [
+        t
+        for t in good
+        if t.names == (REFIT,) and t.fit.held_cost - best.fit.held_cost < settings.tie
+    ]
     return stale[0] if stale else best
 
 
@@ -290,7 +300,9 @@ def _proven(trial: Trial, settings: Settings) -> bool:
     count = len(trial.names)
     loud = trial.evidence >= settings.evidence * count
     spread = trial.without_best >= settings.without_best * count
-    agreed = trial.evidence >= settings.less_evidence * count and trial.blocks_t >= settings.blocks_t
+    agreed = (
+        trial.evidence >= settings.less_evidence * count and trial.blocks_t >= settings.blocks_t
+    )
     return (loud and spread) or agreed
 
 
@@ -365,7 +377,9 @@ def _best_place(
         return {}
     gains = np.zeros(len(starts))
     parts = [[] for _ in starts]
-    for dataset, model, row, weight in zip(state.datasets, state.models, rows, weights, strict=True):
+    for dataset, model, row, weight in zip(
+        state.datasets, state.models, rows, weights, strict=True
+    ):
         points = [_points(name, state, model, s) for s in starts]
         names = points[0][1]
         values = np.array([p[2].values[-1] for p in points])
@@ -417,7 +431,9 @@ def _signatures(
     """(R, k) change of rows by a small part of each parameter's usual strength, scaled up to it,
     and (R, 1) by the usual strength of all."""
     small, whole, parameters = [], [], []
-    for dataset, model, row, weight in zip(state.datasets, state.models, rows, weights, strict=True):
+    for dataset, model, row, weight in zip(
+        state.datasets, state.models, rows, weights, strict=True
+    ):
         parameters, names, points = _points(name, state, model, start)
         values = dataset.rows(points.model, names, points.values)
         steps = points.share
@@ -455,7 +471,11 @@ def _points(
             model.set(p.name, p.usual)
     values = np.vstack([origin + SMALL * np.diag(reach), origin + reach])
     low, high = (np.array([getattr(p, k) for p in parameters]) for k in ("min", "max"))
-    return parameters, [p.name for p in parameters], _Points(model, np.clip(values, low, high), SMALL)
+    return (
+        parameters,
+        [p.name for p in parameters],
+        _Points(model, np.clip(values, low, high), SMALL),
+    )
 
 
 PLACES = 5  # along each side of the floor that was driven
@@ -538,7 +558,9 @@ def _tied(this: Round, settings: Settings) -> list[Trial]:
         apart = trial.fit.held_cost - accepted.fit.held_cost
         *_, blocks_t = _against(trial.fit, accepted.fit)
         same = canonical_correlation(columns[accepted.names[0]], columns[trial.names[0]])
-        if (apart < settings.tie and blocks_t < 2.0) or (same > settings.alike and apart < settings.evidence):
+        if (apart < settings.tie and blocks_t < 2.0) or (
+            same > settings.alike and apart < settings.evidence
+        ):
             tied.append((same, trial))
     nearest = sorted(tied, key=lambda pair: -pair[0])[: settings.group - 1]
     return [trial for _, trial in nearest]

@@ -145,7 +145,9 @@ class Weighed:
         on = " and ".join(self.rest.depends_on)
         depends = f"it depends on {on}" if on else "no formula that was tried describes it"
         names = " and ".join(f.effect for f in self.findings)
-        also = f" {names} explain{'s' if len(self.findings) == 1 else ''} part of it." if names else ""
+        also = (
+            f" {names} explain{'s' if len(self.findings) == 1 else ''} part of it." if names else ""
+        )
         return f"Something outside the catalogue is there; {depends}.{also}"
 
     @property
@@ -165,7 +167,9 @@ def _named(finding: Finding) -> str:
     """A finding in the sentence, with what it takes."""
     takes = f"{100 * finding.share:.0f} %"
     if finding.effect == REFIT:
-        values = ", ".join(f"{e.name.split('.', 1)[1]} {e.value:.3g}" for e in finding.parameters[:3])
+        values = ", ".join(
+            f"{e.name.split('.', 1)[1]} {e.value:.3g}" for e in finding.parameters[:3]
+        )
         return f"stale numbers of the base ({values}; {takes})"
     name = finding.effect
     if finding.group:

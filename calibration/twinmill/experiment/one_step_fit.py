@@ -57,7 +57,5 @@ class System:
 
     def blocks(self) -> np.ndarray:
         """(R,) number of the block that each whitened error belongs to, over all scenes."""
-        label = [
-            np.repeat(1e6 * i + s.grid.t_s // BLOCK_S, 3) for i, s in enumerate(self.scenes)
-        ]
+        label = [np.repeat(1e6 * i + s.grid.t_s // BLOCK_S, 3) for i, s in enumerate(self.scenes)]
         return np.unique(np.concatenate(label), return_inverse=True)[1]

@@ -145,7 +145,9 @@ def fit(
 
 def noise_of(after: Comparison):
     """Of the first log that has a score; None of tables."""
-    return next((r.scene.noise for r in after.robots if r.scene.noise and np.isfinite(r.score)), None)
+    return next(
+        (r.scene.noise for r in after.robots if r.scene.noise and np.isfinite(r.score)), None
+    )
 
 
 def with_estimates(model: native.Model, estimates: Sequence[Estimate]) -> native.Model:

@@ -10,7 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import twinmill_native as native
 from twinmill.predict.datasets import Trajectory
-from twinmill.model.parameters import BASE_GAINS, CLOCK, LAG, base_parameters, duty_table, effect_parameters
+from twinmill.model.parameters import (
+    BASE_GAINS,
+    CLOCK,
+    LAG,
+    base_parameters,
+    duty_table,
+    effect_parameters,
+)
 from twinmill.fitting.response import Response
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.predict.windows import rms
@@ -66,7 +73,9 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     if not keep.all():
         calm = replace(data, measured=np.where(keep[:, None, None], data.measured, np.nan))
         response = Response(calm, velocity, base.get(LAG), offset_s)
-    within, across = (np.where(keep[:, None, None], e, np.nan) for e in (response.within, response.across))
+    within, across = (
+        np.where(keep[:, None, None], e, np.nan) for e in (response.within, response.across)
+    )
     floor = np.sqrt((rms(within) ** 2 + rms(across) ** 2) / 2)
     moves = rms(data.measured) > 1e-9
     return NoiseFloor(
@@ -121,7 +130,9 @@ def body_velocity_at(
     step = predicted - before
     middle = before[:, 2] + step[:, 2] / 2
     c, s = np.cos(middle), np.sin(middle)
-    body = np.column_stack([c * step[:, 0] + s * step[:, 1], c * step[:, 1] - s * step[:, 0], step[:, 2]])
+    body = np.column_stack(
+        [c * step[:, 0] + s * step[:, 1], c * step[:, 1] - s * step[:, 0], step[:, 2]]
+    )
     return np.nan_to_num(body / step_s[:, None])[points]
 
 
@@ -159,7 +170,9 @@ def _too_poor(data: Trajectory) -> str:
             "tell the noise from the motion; record half a minute or more"
         )
     if not np.diff(data.measurement.track.command, axis=0).any():
-        return f"{data.label}: the commands never change, so nothing tells the noise from the motion"
+        return (
+            f"{data.label}: the commands never change, so nothing tells the noise from the motion"
+        )
     return ""
 
 

@@ -118,7 +118,9 @@ def _on_clock_of_others(own: Opened, opened: list[Opened]) -> Opened:
     if own.data is not None or own.same_clock:
         return own
     log = own.measurement.log_sha256
-    known = [o for o in opened if o.data is not None and o.floor and o.measurement.log_sha256 == log]
+    known = [
+        o for o in opened if o.data is not None and o.floor and o.measurement.log_sha256 == log
+    ]
     if not known:
         return own
     offset_s = float(np.median([o.model.get(CLOCK) for o in known]))

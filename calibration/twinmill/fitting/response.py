@@ -122,8 +122,12 @@ class Response:
             duty = command / max(np.abs(command).max(), 1e-9)
             level = np.abs(duty)
             nodes = np.r_[0.0, LEVELS, 1.0]
-            hats = [np.interp(level, nodes, np.eye(len(nodes))[i]) for i in range(1, len(nodes) - 1)]
-            shapes = np.stack([(np.sign(duty) * h) @ MIXING.T for h in hats] + [level @ MIXING.T], -1)
+            hats = [
+                np.interp(level, nodes, np.eye(len(nodes))[i]) for i in range(1, len(nodes) - 1)
+            ]
+            shapes = np.stack(
+                [(np.sign(duty) * h) @ MIXING.T for h in hats] + [level @ MIXING.T], -1
+            )
             return duty @ MIXING.T, shapes, [0, 1, 2]
         used = np.flatnonzero(command.any(axis=0))
         linear = command[:, used] / np.maximum(np.abs(command[:, used]).max(axis=0), 1e-9)
@@ -140,8 +144,13 @@ class Response:
     def _averages(self, signal: np.ndarray) -> np.ndarray:
         """(M, n) held commands to (N, taps, n) means between each two edges before the middle."""
         t_s = self.data.measurement.track.command_t_s
-        area = np.vstack([np.zeros(signal.shape[1]), np.cumsum(signal[:-1] * np.diff(t_s)[:, None], 0)])
-        knots_s, areas = np.append(t_s, t_s[-1] + 1e3), np.vstack([area, area[-1] + 1e3 * signal[-1]])
+        area = np.vstack(
+            [np.zeros(signal.shape[1]), np.cumsum(signal[:-1] * np.diff(t_s)[:, None], 0)]
+        )
+        knots_s, areas = (
+            np.append(t_s, t_s[-1] + 1e3),
+            np.vstack([area, area[-1] + 1e3 * signal[-1]]),
+        )
         at = self.middle_s[:, None] - self.edges_s
         value = np.stack([np.interp(at, knots_s, a) for a in areas.T], axis=-1)
         return (value[:, :-1] - value[:, 1:]) / np.diff(self.edges_s)[None, :, None]
@@ -308,7 +317,10 @@ class Response:
         plane, turn = self.coefficients
         if plane is not None:
             beta = plane[0] if fold is None else plane[1][fold]
-            found[:, 0], found[:, 1] = self.features[0] @ beta[:width], self.features[1] @ beta[width:]
+            found[:, 0], found[:, 1] = (
+                self.features[0] @ beta[:width],
+                self.features[1] @ beta[width:],
+            )
         if turn is not None:
             found[:, 2] = self.features[2] @ (turn[0] if fold is None else turn[1][fold])
         return found
@@ -382,7 +394,9 @@ def _ridge(
         lift = np.diag(mean * values[groups])
         error = 0.0
         for gram, moment, fold in zip(grams, moments, folds, strict=True):
-            beta = cho_solve(cho_factor(gram + lift, check_finite=False), moment, check_finite=False)
+            beta = cho_solve(
+                cho_factor(gram + lift, check_finite=False), moment, check_finite=False
+            )
             inner, push, square = fold.inside
             error += square - 2 * beta @ push + beta @ inner @ beta
         return error

@@ -76,7 +76,8 @@ class ScoreFit:
         self.unknowns = self._unknowns()
         parts = [u.parameter for u in self.unknowns]
         self.low, self.high, self.usual, self.std, self.step = (
-            np.array([getattr(p, k) for p in parts], float) for k in ("min", "max", "usual", "std", "step")
+            np.array([getattr(p, k) for p in parts], float)
+            for k in ("min", "max", "usual", "std", "step")
         )
         self.central = np.array([p.central for p in parts], bool)
         self.x = np.clip(np.array([p.value for p in parts], float), self.low, self.high)
@@ -88,7 +89,9 @@ class ScoreFit:
         self.passes = 0
 
     def _unknowns(self) -> list[Unknown]:
-        stated = [stated_names(m, d.robot_id) for d, m in zip(self.datasets, self.models, strict=True)]
+        stated = [
+            stated_names(m, d.robot_id) for d, m in zip(self.datasets, self.models, strict=True)
+        ]
         unknowns = []
         for p in self.shared:
             members = frozenset(i for i, s in enumerate(stated) if p.name not in s)
@@ -313,7 +316,9 @@ class ScoreFit:
     @cached_property
     def block_squares(self) -> list[np.ndarray]:
         """Squared held-out score of each data set, block by block."""
-        return [np.bincount(d.block, h**2) for d, h in zip(self.datasets, self.held_out, strict=True)]
+        return [
+            np.bincount(d.block, h**2) for d, h in zip(self.datasets, self.held_out, strict=True)
+        ]
 
     def block_costs(self, like: "ScoreFit") -> np.ndarray:
         """(B,) held-out squares of all blocks, weighted as another fit weighs them."""
@@ -399,7 +404,9 @@ class ScoreFit:
             near = AT_BOUND * (p.max - p.min)
             at_bound = bool(value - p.min < near or p.max - value < near)
             found.append(
-                Estimate(p.name, float(value), float(std), p.unit, at_bound, bool(std < SEEN * p.std))
+                Estimate(
+                    p.name, float(value), float(std), p.unit, at_bound, bool(std < SEEN * p.std)
+                )
             )
         return found
 
@@ -407,7 +414,9 @@ class ScoreFit:
     def shared_values(self) -> list[Parameter]:
         """Quantities that all data sets share, at the values found."""
         count = sum(1 for u in self.unknowns if u.parameter in self.shared)
-        return [u.parameter.at(float(v)) for u, v in zip(self.unknowns[:count], self.x, strict=False)]
+        return [
+            u.parameter.at(float(v)) for u, v in zip(self.unknowns[:count], self.x, strict=False)
+        ]
 
     def shared_estimates(self) -> list[Estimate]:
         """Of the quantities that all data sets share."""

@@ -99,7 +99,11 @@ class Trajectory:
         """The same with some windows alone."""
         measured = displacement(measurement, windows, None)
         return cls(
-            measurement, windows, measured, np.ones((len(HORIZONS_S), 3)), np.ones(len(measured), bool)
+            measurement,
+            windows,
+            measured,
+            np.ones((len(HORIZONS_S), 3)),
+            np.ones(len(measured), bool),
         )
 
     def over(self, floor: np.ndarray, keep: np.ndarray | None = None) -> "Trajectory":
