@@ -34,8 +34,8 @@ from twinmill.files import plain, replacing
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
-from twinmill.model.parameters import catalogue
 from twinmill.model.model_file import DEFAULT_MODEL, ModelFile
+from twinmill.model.parameters import catalogue
 from twinmill.programs import find_program
 from twinmill.report import detections, error_figures, show, steady_figures, views
 from twinmill.report import diagnosis as diagnosis_report

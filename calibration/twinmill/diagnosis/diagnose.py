@@ -15,7 +15,7 @@ from twinmill.diagnosis.findings import findings_of, lateness, ranking_of
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
 from twinmill.diagnosis.rest import rest_of
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.search import REFIT, Search, Settings, State, attempt, search
+from twinmill.diagnosis.search import REFIT, SETTINGS, Search, Settings, State, attempt, search
 from twinmill.diagnosis.verdict import Weighed
 from twinmill.fitting.compare import comparison
 from twinmill.fitting.fit import base_names
@@ -49,7 +49,7 @@ def diagnose(
     model_file: ModelFile,
     progress: Callable[[str], None] = lambda _: None,
     excluded: Collection[str] = (),
-    settings: Settings = Settings(),
+    settings: Settings = SETTINGS,
 ) -> Diagnosis:
     """Diagnoses all measurements with one model.
 
@@ -117,7 +117,7 @@ def first_state(
 
 
 def _by_clocks(opened: Sequence[Opened]) -> set[str]:
-    """Effects that the clocks make meaningless: their own offsets are fitted, or known to be none."""
+    """Effects that the clocks make meaningless: offsets are fitted, or known to be none."""
     logs = [o for o in opened if o.floor]
     if any(not o.same_clock for o in logs):
         return {"clock_offset", "clock_rate", "input_delay"}

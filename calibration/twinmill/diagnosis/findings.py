@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Findings of a diagnosis: each effect with what it takes away, how sure it is, and what rivals it has."""
+"""Findings of a diagnosis: what each effect takes away, how sure it is, and its rivals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -171,7 +171,10 @@ def _doubt(name: str, own: Sequence[Estimate]) -> str:
         if e.at_bound and away > 1e-3:
             return f"{e.name} is at its bound ({e.value:.3g}): another effect may be behind it"
         if p["role"] == "size" and away > BEYOND * p["usual_size"]:
-            return f"{e.name} = {e.value:.3g} is far beyond what is usual: another effect may be behind it"
+            return (
+                f"{e.name} = {e.value:.3g} is far beyond what is usual: another effect may be "
+                "behind it"
+            )
     return ""
 
 

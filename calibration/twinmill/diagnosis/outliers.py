@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robots that differ from the others of their kind, how, and how small a difference would have shown.
+"""Robots that differ from the others of their kind, how, and what difference would have shown.
 
 The common model is held. On each robot alone its own gains and every effect of the catalogue are
 tried. What a robot would take sets it apart if it is far from what each of the others would take:
@@ -103,6 +103,7 @@ def outliers(
     Args:
         opened: of the search, in its order.
         done: the common search.
+        progress: told in words what is being done.
     """
     ids = sorted({o.measurement.track.robot_id for o in opened if o.floor})
     if len(ids) < FEWEST:
@@ -231,8 +232,8 @@ def _unexplained(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
         before,
         ALPHA,
         f"R{own.robot_id:02d} differs, and no effect of the catalogue explains how.",
-        f"its errors are {before:.2f} times the floor, those of the others {others:.2f}; pushes and "
-        "bumps by others would look so",
+        f"its errors are {before:.2f} times the floor, those of the others {others:.2f}; pushes "
+        "and bumps by others would look so",
         _smallest(own),
         [],
     )
@@ -241,10 +242,10 @@ def _unexplained(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
 def _smallest(own: _Alone) -> dict[str, float]:
     """Four standard deviations of each first parameter: less would not have been beyond doubt."""
     shown = {}
-    for name, trial in own.trials.items():
-        values, spread = _values(trial)
+    for trial in own.trials.values():
+        _, spread = _values(trial)
         for p, variance in zip(trial.state.free, np.diag(spread), strict=True):
-            shown[p.name if name != "gains" else p.name] = float(4 * np.sqrt(variance))
+            shown[p.name] = float(4 * np.sqrt(variance))
     return shown
 
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is left over once the found effects are in the model: how much, how firm, and on what it depends.
+"""What is left over once the found effects are in the model: how much, how firm, depending on what.
 
-How much: the squared score above 1. How firm: whether the smooth response of the noise floor predicts
-left-out parts better than the model does, block by block. On what: ridge regression of the errors on
-groups of velocity terms without physics names, each judged on parts that it was not fitted to.
+How much: the squared score above 1. How firm: whether the smooth response of the noise floor
+predicts left-out parts better than the model does, block by block. On what: ridge regression of
+the errors on groups of velocity terms without physics names, each judged on parts that it was not
+fitted to.
 """
 
 from collections.abc import Mapping, Sequence
@@ -112,7 +113,8 @@ def rest_of(
     Args:
         opened: the fit's measurements, in its order.
         fit: of the final model.
-        first_score, last_score: held out, of the model as given and of the fit.
+        first_score: held out, of the model as given.
+        last_score: held out, of the fit.
         known: what the model left in other logs already, as `left_over`.
     """
     excess = max(first_score**2 - 1, last_score**2 - 1, 1e-9)
@@ -248,7 +250,7 @@ class _Products:
         self.moments = np.array([columns[p].T @ left[p] for p in parts])
 
     def held_out(self, own: np.ndarray) -> tuple[float, np.ndarray]:
-        """Fall of the cost by these columns on blocks not fitted to, and (F,) that chance would bring.
+        """Fall of the cost by these columns on blocks not fitted to, and (F,) what chance brings.
 
         Chance: random signs of what each block still scatters after the columns are fitted to all.
         """

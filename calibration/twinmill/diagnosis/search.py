@@ -6,13 +6,14 @@ are fitted. One is accepted if its held-out evidence is beyond doubt, blocks agr
 matters. Afterwards those that later ones made needless are dropped.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
 import twinmill_native as native
-from twinmill.predict.datasets import Dataset, Trajectory, total_score
+
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     MOTION_STAGES,
     Parameter,
@@ -21,7 +22,7 @@ from twinmill.model.parameters import (
     effect_names,
     effect_parameters,
 )
-from twinmill.fitting.score_fit import ScoreFit
+from twinmill.predict.datasets import Dataset, Trajectory, total_score
 
 STRICTEST = 3.0
 NEWS = 1.1  # times the known score: less is no news
@@ -33,10 +34,10 @@ class Settings:
     """Numbers that decide a search; printed in reports.
 
     Attributes:
-        evidence: least fall of the held-out cost (twice a log likelihood ratio) of one candidate ...
+        evidence: least fall of the held-out cost (twice a log likelihood ratio) of one addition ...
         without_best: ... and without the block that speaks loudest for it.
-        less_evidence, blocks_t: the same where what the model lacks besides drowns the evidence, and
-            blocks agree: t of the relative fall over blocks.
+        less_evidence, blocks_t: the same where what the model lacks besides drowns the evidence,
+            and blocks agree: t of the relative fall over blocks.
         worth: least share of the first excess that one takes, in a single data set ...
         enough: ... or this fall of the squared score, if that is less.
         fitted: so many candidates are fitted in each round.
@@ -67,6 +68,9 @@ class Settings:
         times = min(max(times, 1.0), STRICTEST)
         raised = ("evidence", "without_best", "less_evidence")
         return replace(self, **{k: times * getattr(self, k) for k in raised})
+
+
+SETTINGS = Settings()
 
 
 @dataclass(frozen=True)
@@ -176,7 +180,7 @@ class Search:
 def search(
     state: State,
     progress: Callable[[str], None] = lambda _: None,
-    settings: Settings = Settings(),
+    settings: Settings = SETTINGS,
     known: float = 1.0,
 ) -> Search:
     """Adds what is missing until nothing is worth it.
@@ -428,8 +432,12 @@ def _signatures(
     weights: list[np.ndarray],
     start: dict[str, float],
 ) -> tuple[list[Parameter], np.ndarray, np.ndarray]:
-    """(R, k) change of rows by a small part of each parameter's usual strength, scaled up to it,
-    and (R, 1) by the usual strength of all."""
+    """How the rows change with what is new.
+
+    Returns:
+        Its parameters; (R, k) change by a small part of each one's usual strength, scaled up to it;
+        (R, 1) change by the usual strength of all.
+    """
     small, whole, parameters = [], [], []
     for dataset, model, row, weight in zip(
         state.datasets, state.models, rows, weights, strict=True
@@ -508,7 +516,7 @@ def _promising(screened: list[Screened], settings: Settings) -> list[Screened]:
 def _pairs(before: Trial, screened: list[Screened], settings: Settings) -> list[tuple[str, str]]:
     """Pairs by what they explain together beyond the better one alone."""
     fit = before.fit
-    rows, slopes = fit.state
+    rows, _ = fit.state
     top = sorted(screened, key=lambda s: -s.gain)[:10]
     if before.held_score < 1.0:
         return []

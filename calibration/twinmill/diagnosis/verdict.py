@@ -122,8 +122,8 @@ class Weighed:
         if self.last <= GOOD:
             return ""
         return (
-            f" The model misses as it did on the logs that it was fitted to (score {self.last:.2f}, "
-            f"there {self.known:.2f}): explain those first."
+            " The model misses as it did on the logs that it was fitted to (score "
+            f"{self.last:.2f}, there {self.known:.2f}): explain those first."
         )
 
     @property
@@ -134,8 +134,8 @@ class Weighed:
         on = self.rest.depends_on
         depends = f", and depends on {' and '.join(on)}" if on else ""
         return (
-            f" Something else is left: {100 * self.rest.share:.0f} % of the squared error above the "
-            f"noise{depends}; no effect of the catalogue takes it."
+            f" Something else is left: {100 * self.rest.share:.0f} % of the squared error above "
+            f"the noise{depends}; no effect of the catalogue takes it."
         )
 
     @property

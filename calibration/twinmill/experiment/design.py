@@ -17,8 +17,8 @@ from twinmill.experiment.moves import Move, family
 from twinmill.experiment.power import power
 from twinmill.experiment.relevance import relevance
 from twinmill.fitting.fit import base_names
-from twinmill.model.parameters import base_parameters, catalogue
 from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import base_parameters, catalogue
 from twinmill.predict.problem import Scene
 from twinmill.predict.residual import StepGrid
 from twinmill.predict.windows import Windows, score
@@ -29,8 +29,8 @@ WANDER_M = 0.08  # of a real robot from the predicted path within a minute, besi
 SHORTEST_RUN_S = SHORTEST_LOG_S + 3  # as much may be left where no further move fits
 CENTRE = np.zeros(3)
 NO_LOG = (
-    "only steady-state tables were given; the next run is designed for the noise and the clocks of a "
-    "log, so give one of any drive besides."
+    "only steady-state tables were given; the next run is designed for the noise and the clocks "
+    "of a log, so give one of any drive besides."
 )
 
 

@@ -9,7 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import twinmill_native as native
-from twinmill.predict.datasets import Trajectory
+
+from twinmill.fitting.response import Response
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     BASE_GAINS,
     CLOCK,
@@ -18,8 +20,7 @@ from twinmill.model.parameters import (
     duty_table,
     effect_parameters,
 )
-from twinmill.fitting.response import Response
-from twinmill.fitting.score_fit import ScoreFit
+from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import rms
 
 BUMP = 20.0  # times the median squared error: pushed, slipped, or a lost pose
@@ -101,7 +102,6 @@ def base_response(
     table = duty_table(base)
     if len(table) > 1:
         names = [n for n in names if n != "base.forward_gain"] + table
-    clock = []
     if same_clock:
         base.add_effect("input_delay")
         base.set("input_delay.delay_s", 0.02)
@@ -166,8 +166,8 @@ def _too_poor(data: Trajectory) -> str:
     whole = np.count_nonzero(np.isfinite(data.measured[:, -1, 0]))
     if len(data.windows.starts) < FEWEST_WINDOWS or whole < FEWEST_LONG:
         return (
-            f"{data.label}: {len(data.windows.starts) * 0.25:.0f} s of unbroken poses are too short to "
-            "tell the noise from the motion; record half a minute or more"
+            f"{data.label}: {len(data.windows.starts) * 0.25:.0f} s of unbroken poses are too "
+            "short to tell the noise from the motion; record half a minute or more"
         )
     if not np.diff(data.measurement.track.command, axis=0).any():
         return (

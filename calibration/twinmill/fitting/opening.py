@@ -72,9 +72,9 @@ def open_measurements(
 ) -> list[Opened]:
     """Floors of all, and clocks aligned to the model as given.
 
-    An offset that another log on the same clocks told is kept, and one that was declared to be zero:
-    only so can a delay be told from it. A robot whose own run does not tell it (one that saw nobody
-    all the while has one command) takes that of the others in its log.
+    An offset that another log on the same clocks told is kept, and one that was declared to be
+    zero: only so can a delay be told from it. A robot whose own run does not tell it (one that saw
+    nobody all the while has one command) takes that of the others in its log.
 
     """
     opened = [_open(m, model_file) for m in measurements]

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import lfilter
+
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import difference, rms
 
@@ -115,7 +116,7 @@ class Response:
         return features, groups
 
     def _commands(self) -> tuple[np.ndarray, np.ndarray, list[int | None]]:
-        """(M, n) linear commands over their largest, (M, n, k) shapes of them, body axis of each."""
+        """(M, n) linear commands over their largest, (M, n, k) shapes, body axis of each."""
         track = self.data.measurement.track
         command = track.command
         if track.command_kind == "duty":

@@ -2,10 +2,10 @@
 """Fits what is scored: the score of all data sets with weak priors on the sizes of parameters.
 
 Minimises  sum_i n_i ln S_i^2(theta) + sum_p ((theta_p - usual_p) / std_p)^2  with S_i the score of
-data set i and n_i its number of independent errors: a Gaussian likelihood whose scale each data set
-tells by itself, so that no disturbed log speaks for all. For evidence each channel of a data set has
-a scale of its own: what the model lacks in one must not drown what the others show. Levenberg and
-Marquardt, bounded; weights n_i / S_i^2 are renewed in each step.
+data set i and n_i its number of independent errors: a Gaussian likelihood whose scale each data
+set tells by itself, so that no disturbed log speaks for all. For evidence each channel of a data
+set has a scale of its own: what the model lacks in one must not drown what the others show.
+Levenberg and Marquardt, bounded; weights n_i / S_i^2 are renewed in each step.
 """
 
 from collections.abc import Sequence
@@ -15,8 +15,9 @@ from functools import cached_property
 import numpy as np
 import twinmill_native as native
 from scipy.stats import t as student
-from twinmill.predict.datasets import PARTS, Dataset
+
 from twinmill.model.parameters import GAINS, Estimate, Parameter, stated_names
+from twinmill.predict.datasets import PARTS, Dataset
 
 ROUNDS = 12
 CONVERGED = 1e-4  # relative change of the cost
@@ -167,7 +168,7 @@ class ScoreFit:
         return float(fit + np.sum(((x - self.usual) / self.std) ** 2))
 
     def _misfit(self, i: int, rows: np.ndarray) -> float:
-        """sum over scales of n ln S^2, with S^2 no less than LEAST_SQUARE."""
+        """Sum over scales of n ln S^2, with S^2 no less than LEAST_SQUARE."""
         square, n = self._squares(i, rows)
         return float(n @ np.log(square))
 
@@ -254,7 +255,7 @@ class ScoreFit:
         return self
 
     def _stepped(self, gram: np.ndarray, pull: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Newton's step; what would leave its bounds stops there, and the rest moves as it then must."""
+        """Newton's step; what would leave its bounds stops there, and the rest adapts."""
         free, moved = np.ones(len(x), bool), x.copy()
         while free.any():
             held = moved - x
@@ -363,7 +364,7 @@ class ScoreFit:
     def covariance(self) -> np.ndarray:
         """(P, P) by leaving out a block at a time; no less than the curvature of the cost says."""
         rows, slopes = self.state
-        gram, pull = self._normal(rows, slopes, self.x)
+        gram, _ = self._normal(rows, slopes, self.x)
         inverse = np.linalg.pinv(gram)
         spread = np.zeros_like(gram)
         for i, (r, j) in enumerate(zip(rows, slopes, strict=True)):

@@ -158,6 +158,6 @@ def words(formula: str) -> set[str]:
 
 
 def stated_names(model: native.Model, robot_id: int) -> set[str]:
-    """Quantities, by name, that [robots.Rnn] states of one robot: no fit of all robots moves them."""
+    """Names of what [robots.Rnn] states of one robot: no fit of all robots moves it."""
     keys: Collection[str] = model.stated_of(robot_id)
     return {k if "." in k or k in GAINS else f"base.{k}" for k in keys}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Data sets that a model is scored on: rows of error over floor, whose squares add up to the score's.
+"""Data sets that a model is scored on: rows of error over floor.
 
 All fits, searches and tests see a data set through `Dataset` alone. `Trajectory` is one robot in
 one log.
@@ -11,10 +11,11 @@ from typing import Protocol
 
 import numpy as np
 import twinmill_native as native
-from twinmill.model.parameters import Parameter
+
 from twinmill.data.measurement import Measurement
-from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms
+from twinmill.model.parameters import Parameter
 from twinmill.predict.residual import rotate
+from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms
 
 BLOCK_S = 8.0  # errors of different blocks count as independent
 FEWEST_BLOCKS = 6  # a shorter log has shorter blocks
@@ -46,7 +47,7 @@ class Dataset(Protocol):
     n_eff: float
 
     def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
-        """(B, R) errors over floor for B rows of values; the sum of squares is the score squared."""
+        """(B, R) errors over floor for B rows of values; squares add up to the score's."""
         ...
 
 
@@ -169,7 +170,7 @@ class Trajectory:
 def displacement(
     measurement: Measurement, windows: Windows, model: native.Model | None
 ) -> np.ndarray:
-    """(W, H, 3) forward, left (m) and turn (rad) seen from the start; of the model if one is given."""
+    """(W, H, 3) forward, left (m) and turn (rad) seen from the start; a model's if given."""
     if model is None:
         ahead = measurement.track.pose[windows.ends]
     else:

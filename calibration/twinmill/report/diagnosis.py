@@ -57,8 +57,8 @@ def findings(diagnosis: Diagnosis) -> Table:
         "What was found",
         ["effect", "takes away", "certainty", "estimates"],
         rows,
-        "Takes away: share of the squared error at 0.5 s above the log's noise, on parts of the data "
-        "that were not fitted to.",
+        "Takes away: share of the squared error at 0.5 s above the log's noise, on parts of the "
+        "data that were not fitted to.",
         words=(0, 2, 3),
     )
 

@@ -96,7 +96,7 @@ class SteadyScene:
         return np.where(agreed, np.nan, np.clip(ratios, -TYPING_ERROR, TYPING_ERROR))
 
     def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
-        """(B, R) errors over floor for B rows of values; the sum of squares is the score squared."""
+        """(B, R) errors over floor for B rows of values; squares add up to the score's."""
         predicted = self._predicted(model, names, np.ascontiguousarray(values))
         ratios = self._cut((self._measured() - predicted) / self.floor())
         return np.nan_to_num(ratios).reshape(len(values), -1) * np.sqrt(self.judged)

@@ -8,8 +8,8 @@ from twinmill.data.measurement import Measurement
 from twinmill.diagnosis.detections.fit import STAGES
 from twinmill.diagnosis.detections.search import attempt
 from twinmill.fitting.opening import open_measurements
-from twinmill.model.parameters import Estimate, catalogue
 from twinmill.model.model_file import Fitted, ModelFile, write_child
+from twinmill.model.parameters import Estimate, catalogue
 from twinmill.predict.detection_errors import BitComparison, compare_bits
 from twinmill.predict.detections import bit_scenes
 

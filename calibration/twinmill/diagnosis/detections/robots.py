@@ -7,8 +7,8 @@ import numpy as np
 import twinmill_native as native
 from scipy.stats import t
 
-from twinmill.diagnosis.odd import ODD, middle_and_scale, odd_ones
 from twinmill.diagnosis.detections.search import search_bits
+from twinmill.diagnosis.odd import ODD, middle_and_scale, odd_ones
 from twinmill.diagnosis.outliers import Outlier
 from twinmill.model.parameters import Estimate
 from twinmill.predict.detection_errors import BitComparison, compare_bits
