@@ -117,10 +117,16 @@ def test_what_can_do_all_that_another_does_stands_in_one_group_with_it(behind, t
     # cos of the angle between (1, 1, 0) and the plane's own e1 alone.
     assert canonical_correlation(line, np.eye(6)[:, [0]]) == pytest.approx(np.sqrt(0.5))
     squares = np.array([1.0, 1.1, 0.9, 1.05])
-    trials = [
-        SimpleNamespace(
-            names=(name,), fit=SimpleNamespace(held_cost=cost, block_squares=[squares * factor])
+
+    def fit_of(cost, factor):
+        return SimpleNamespace(
+            held_cost=cost,
+            block_costs=lambda _: squares * factor,
+            without_blocks=lambda: cost - squares,
         )
+
+    trials = [
+        SimpleNamespace(names=(name,), fit=fit_of(cost, factor))
         for name, cost, factor in (
             ("line", 100.0, 1.0),
             ("plane", 100.0 + behind, np.exp(behind / 100)),
