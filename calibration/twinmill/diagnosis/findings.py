@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twinmill.diagnosis.search import REFIT, Round, Search, State, Trial, fitted, grown, without
-from twinmill.model.parameters import LAG, Estimate, catalogue, effect_names
+from twinmill.model.parameters import LAG, Estimate, catalogue_of, effect_names
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
@@ -157,14 +157,14 @@ def _finding(done: Search, name: str, share: float) -> Finding:
     own = [e for e in estimates if e.name.startswith(f"{instance}.")]
     tied = [n for t in _round_of(done, name).tied for n in t.names]
     group = (name, *tied) if tied else None
-    doubt = _doubt(name, own)
+    doubt = _doubt(catalogue_of(done.last.state.model)[name], own)
     certainty = "doubtful" if doubt else "group" if group else "sure"
     return Finding(name, group, own, share, certainty, doubt)
 
 
-def _doubt(name: str, own: Sequence[Estimate]) -> str:
+def _doubt(card: dict, own: Sequence[Estimate]) -> str:
     """Why an estimate is no usual one; empty if it is."""
-    entry = {p["name"]: p for p in catalogue()[name]["parameters"]}
+    entry = {p["name"]: p for p in card["parameters"]}
     for e in own:
         p = entry[e.name.split(".", 1)[1]]
         away = abs(e.value - p["neutral"])

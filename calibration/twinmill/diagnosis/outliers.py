@@ -270,8 +270,13 @@ def _away(estimate: Estimate) -> float:
     if estimate.name in GAINS:
         return estimate.value - 1
     effect, key = estimate.name.split("#")[0].split(".")[0], estimate.name.split(".")[1]
-    p = next(p for p in catalogue()[effect]["parameters"] if p["name"] == key)
-    return estimate.value - p["neutral"]
+    return estimate.value - _entry(effect, key)["neutral"]
+
+
+def _entry(effect: str, key: str) -> dict:
+    """A parameter's card; that of a wheel of another robot says no more than its name."""
+    plain = {"name": key, "neutral": 0.0, "above": f"{key} strong", "below": f"{key} weak"}
+    return next((p for p in catalogue()[effect]["parameters"] if p["name"] == key), plain)
 
 
 def _least(estimate: Estimate) -> float:
@@ -294,7 +299,7 @@ def _wheel_words(wheels: dict[str, float]) -> str:
         if set(wheels) == set(pair) and values[0] * values[1] > 0:
             mean = float(np.mean(values))
             return f"{side} {100 * abs(mean):.0f} % {'weak' if mean < 0 else 'strong'}"
-    entry = {p["name"]: p for p in catalogue()["wheel_gain"]["parameters"]}
+    entry = {w: _entry("wheel_gain", w) for w in wheels}
     told = sorted(wheels, key=lambda w: -abs(wheels[w]))
     return ", ".join(
         f"{entry[w]['below' if wheels[w] < 0 else 'above']} by {100 * abs(wheels[w]):.0f} %"
@@ -304,7 +309,7 @@ def _wheel_words(wheels: dict[str, float]) -> str:
 
 def _effect_words(estimate: Estimate) -> str:
     effect, key = estimate.name.split("#")[0].split(".")[0], estimate.name.split(".")[1]
-    p = next(p for p in catalogue()[effect]["parameters"] if p["name"] == key)
+    p = _entry(effect, key)
     words = p["above" if _away(estimate) > 0 else "below"] or catalogue()[effect]["phrase"]
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
     return f"{words} ({estimate.name} {estimate.value:.3g}{unit})"

@@ -19,6 +19,7 @@ from twinmill.model.parameters import (
     Parameter,
     base_parameters,
     catalogue,
+    catalogue_of,
     effect_names,
     effect_parameters,
 )
@@ -315,7 +316,7 @@ def _is_neutral(trial: Trial, name: str) -> bool:
     if name == REFIT:
         return False
     instance = [n for n in effect_names(trial.state.model) if n.split("#")[0] == name][-1]
-    for p in catalogue()[name]["parameters"]:
+    for p in catalogue_of(trial.state.model)[name]["parameters"]:
         value = trial.state.model.get(f"{instance}.{p['name']}")
         if abs(value - p["neutral"]) > 1e-3 * abs(p["default"] - p["neutral"]):
             return False
@@ -331,7 +332,7 @@ def candidates(state: State) -> list[str]:
     names = []
     if any(n not in {p.name for p in state.free} for n in state.base):
         names.append(REFIT)
-    for name, entry in catalogue().items():
+    for name, entry in catalogue_of(model).items():
         usable = entry["stage"] in MOTION_STAGES and not entry["texts"]
         fits = not entry["duty_only"] or model.drive == "duty"
         if usable and fits and name not in model.effects and name not in state.excluded:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
-from twinmill.model.parameters import catalogue
+from twinmill.model.parameters import catalogue_of
 from twinmill.predict.problem import Scene
 
 STAGES = ("duty", "wheel", "ground", "observe")
@@ -76,7 +76,7 @@ def candidates(
     model = scenes[0].model
     without = [s.white_errors() for s in scenes]
     found, blind = [], []
-    for name, entry in catalogue().items():
+    for name, entry in catalogue_of(model).items():
         if name in model.effects or name in barred or entry["stage"] not in STAGES:
             continue
         if entry["duty_only"] and model.drive != "duty":

@@ -13,7 +13,7 @@ from typing import Protocol
 import tomlkit
 import twinmill_native as native
 
-from twinmill.model.parameters import Estimate, catalogue, effect_names
+from twinmill.model.parameters import Estimate, catalogue_of, effect_names
 
 DEFAULT_MODEL = "turbopi.toml"
 
@@ -212,7 +212,7 @@ def _write_robots(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
 
 
 def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
-    entries, stds = catalogue(), {e.name: e.std for e in fitted.estimates}
+    entries, stds = catalogue_of(fitted.model), {e.name: e.std for e in fitted.estimates}
     old = list(document.get("effect", []))
     tables = tomlkit.aot()
     instances = zip(effect_names(fitted.model), fitted.model.texts, strict=True)

@@ -81,6 +81,17 @@ def catalogue() -> dict[str, dict]:
     return {entry["name"]: entry for entry in native.catalogue()}
 
 
+_of_kind: dict[tuple[str, str], dict[str, dict]] = {}
+
+
+def catalogue_of(model: native.Model) -> dict[str, dict]:
+    """Effects that a robot like the model's can have, parameters by its own wheels."""
+    kind = (model.wheel_kind, model.drive)
+    if kind not in _of_kind:
+        _of_kind[kind] = {entry["name"]: entry for entry in model.catalogue()}
+    return _of_kind[kind]
+
+
 def effect_names(model: native.Model) -> list[str]:
     """Instance names of a model's effects in their order: `dead_zone`, `dead_zone#2`."""
     seen: dict[str, int] = {}
@@ -113,7 +124,7 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
     texts, name = model.texts[place], instance.split("#")[0]
     bounds = {v["name"]: (v["min"], v["max"]) for v in model.values()}
     found = []
-    for p in catalogue()[name]["parameters"]:
+    for p in catalogue_of(model)[name]["parameters"]:
         if texts and not any(p["name"] in words(text) for text in texts.values()):
             continue
         full = f"{instance}.{p['name']}"

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from twinmill.challenge.script import write_rich_script
-from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
@@ -116,7 +115,9 @@ def test_explain_writes_the_difference_as_that_robots_own(logged, tmp_path):
         + model.model.for_robot(i).get("motor_lag.extra_s")
         for i in range(ROBOTS)
     ]
-    assert lag_s == pytest.approx([0.06, 0.06, 0.12], abs=0.005)
+    # Each clock is the log's own, and takes up a part of a lag.
+    assert lag_s == pytest.approx([0.06, 0.06, 0.12], abs=0.01)
+    assert lag_s[2] - lag_s[0] == pytest.approx(0.06, abs=0.005)
     assert compare(measurements, model).score < 1.15
 
 
@@ -125,8 +126,8 @@ def test_a_robot_of_one_command_takes_the_clock_of_the_others(tanh_robot, measur
     lively = measure(robot, 1, 30.0)
     circling = measure(robot, 2, script_pct=np.tile([50, 100, 50, 100], (1440, 1)))
     circling = replace(circling, track=mute(circling.track))
-    with pytest.raises(LogError, match="never change"):
-        open_measurements([circling], model_file())
+    (alone,) = open_measurements([circling], model_file())
+    assert alone.data is None and "never change" in alone.floor.reason
     together = [lively, replace(circling, log_sha256=lively.log_sha256)]
     first, second = open_measurements(together, model_file())
     own, taken = (o.model.get("clock.offset_s") for o in (first, second))
