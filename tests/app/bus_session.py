@@ -34,7 +34,12 @@ def network(up: bool):
 def heard_again(fleet: Fleet) -> bool:
     """Ten messages from now on."""
     seq = fleet.robots[ID].telemetry.seq if ID in fleet.robots else 0
-    fleet.listen(10, lambda: ID in fleet.robots and fleet.robots[ID].telemetry.seq > seq + 10)
+
+    def heard() -> bool:
+        telemetry = fleet.robots[ID].telemetry if ID in fleet.robots else None
+        return telemetry is not None and telemetry.seq > seq + 10
+
+    fleet.listen(10, heard)
     return ID in fleet.robots and fleet.robots[ID].telemetry.seq > seq + 10
 
 

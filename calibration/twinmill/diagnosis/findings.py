@@ -96,7 +96,7 @@ def findings_of(done: Search, first: State) -> tuple[list[Finding], list[tuple[s
     the effects in this order.
     """
     names = list(dict.fromkeys(done.found))
-    loss = {name: _loss(done.last, name) for name in names}
+    loss = {name: _loss(done.last, name, first) for name in names}
     names.sort(key=lambda n: -loss[n])
     state, chain = first, [fitted(first)]
     for name in names:
@@ -124,12 +124,22 @@ def _from_final(state: State, last: Trial) -> Trial:
     return fitted(replace(state, models=models))
 
 
-def _loss(last: Trial, name: str) -> float:
-    """Rise of the squared held-out score without one effect."""
-    if name == REFIT:
-        return np.inf if len(last.state.free) == len(last.state.base) else 0.0
-    less = without(last, name)
+def _loss(last: Trial, name: str, first: State) -> float:
+    """Rise of the squared held-out score without one effect, or with the base as it was given."""
+    less = _as_given(last, first) if name == REFIT else without(last, name)
     return 0.0 if less is None else less.held_score**2 - last.held_score**2
+
+
+def _as_given(last: Trial, first: State) -> Trial:
+    """The trial's effects refitted on the base of the model as given."""
+    models = []
+    for model, given in zip(last.state.models, first.models, strict=True):
+        model = model.copy()
+        for name in last.state.base:
+            model.set(name, given.get(name))
+        models.append(model)
+    free = tuple(p for p in last.state.begun() if p.name not in last.state.base)
+    return fitted(replace(last.state, models=models, free=free))
 
 
 def _squared(trial: Trial) -> float:
