@@ -33,14 +33,14 @@ def network(up: bool):
 
 def heard_again(fleet: Fleet) -> bool:
     """Ten messages from now on."""
-    seq = fleet.robots[ID].telemetry.seq if ID in fleet.robots else 0
 
-    def heard() -> bool:
+    def newest() -> int:
         telemetry = fleet.robots[ID].telemetry if ID in fleet.robots else None
-        return telemetry is not None and telemetry.seq > seq + 10
+        return telemetry.seq if telemetry else 0
 
-    fleet.listen(10, heard)
-    return ID in fleet.robots and fleet.robots[ID].telemetry.seq > seq + 10
+    seq = newest()
+    fleet.listen(10, lambda: newest() > seq + 10)
+    return newest() > seq + 10
 
 
 def main(folder: Path, program: list[str]) -> dict:

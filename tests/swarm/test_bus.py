@@ -122,7 +122,7 @@ def test_selected_behaviour_reaches_the_robots_own_program(tmp_path):
     """Robots 0 and 1 are driven by the program, 2 and 3 by the built-in firmware."""
     own, key = tmp_path / "own", tmp_path / "key"
     bus = "udpm://239.255.76.67:7667?ttl=0"
-    operator = tmp_path / "operator.py"
+    operator = tmp_path / "run_operator.py"
     operator.write_text(OPERATOR)
     in_one_network(
         [
