@@ -65,7 +65,8 @@ def test_a_comparison_is_that_of_the_command(here, capsys):
     told = json.loads(capsys.readouterr().out)
     found = tm.compare("run.lcmlog", "fitted.toml")
     assert found.to_json().items() <= told.items()
-    assert set(told) - set(found.to_json()) == {"command", "version", "model_sha256", "report"}
+    beside = {"command", "version", "model_sha256", "report", "input"}
+    assert set(told) - set(found.to_json()) == beside
     assert f"{found.score:.3g}" in repr(found)
     assert found.verdict in " ".join(str(found).split())
     assert "<table" in found._repr_html_()

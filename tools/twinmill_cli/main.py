@@ -55,8 +55,8 @@ COMMANDS = (
     (
         "challenge",
         "challenge",
-        "Draw effects at random, seal the answers, let the twin make logs, "
-        "diagnose, unseal, score.",
+        "Draw robots and what is hidden in them, seal the answers, diagnose their logs, "
+        "unseal, score.",
     ),
     (
         "effects",
