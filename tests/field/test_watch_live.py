@@ -35,9 +35,9 @@ def payloads(log):
 
 
 def logged(folder, driver):
-    """Of the robots or twins themselves; the truth is not for watchers."""
+    """Of the robots or twins themselves; truth and the operator's link are not for watchers."""
     said = payloads(folder / driver)
-    return {channel: data for channel, data in said.items() if "TRUTH" not in channel}
+    return {c: d for c, d in said.items() if "TRUTH" not in c and not c.endswith("_LINK")}
 
 
 def test_robots_and_twins_are_told_apart(session):
