@@ -9,7 +9,7 @@ import errno
 
 import pytest
 import turbopi
-from rig import BUILD, KERNEL, ZERO
+from rig import BUILD, KERNEL, SUITE, ZERO
 from robot import LEFT, RIGHT, VIVID, Robot
 
 SLACK_S = 1.0
@@ -80,7 +80,7 @@ def test_camera_is_unplugged_and_plugged_in_again(rig, driving):
     rig.wait(lambda: len(driving.telemetry()) > later)
     assert driving.has(CAMERA_LOST) and driving.wire() == ZERO
 
-    order = (BUILD / f"{KERNEL}.root/modules/order").read_text().splitlines()
+    order = (BUILD / f"{KERNEL}.{SUITE}.root/modules/order").read_text().splitlines()
     parameters = next(line for line in order if line.startswith("vivid.ko ")).partition(" ")[2]
     assert rig.words("l", "/modules/vivid.ko", parameters)[0] == 0
     plug(rig)
