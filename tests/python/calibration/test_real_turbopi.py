@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """One real TurboPi under OptiTrack, straight runs: what was measured by hand from its poses."""
 
+import itertools
+
 import numpy as np
+import pandas as pd
 import pytest
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
@@ -70,15 +73,45 @@ def test_steady_speeds_are_those_of_the_table(chain, duty):
     assert curved(model, duty) * top_mps == pytest.approx(TOP_MPS[duty], rel=0.02)
 
 
-def test_deceleration_is_in_the_range_measured_by_hand(chain):
-    """Constant there, here with a part that grows with speed: taken at half of the top speed.
+@pytest.fixture(scope="module")
+def stops(data_dir):
+    """(N, 2) top speed (m/s) and way after each command to stand (m), from the poses alone."""
+    folder = data_dir / "turbopi_optitrack_straight"
+    poses, commands = (pd.read_csv(folder / f"{name}.csv") for name in ("poses", "commands"))
+    poses = poses[poses.valid == 1]
+    t_s, xy_m = poses.t_s.to_numpy(), poses[["x_m", "y_m"]].to_numpy()
+    found = []
+    for moving, standing in itertools.pairwise(commands.itertuples()):
+        if moving.fl_pct != 0 and standing.fl_pct == 0:
+            at_s = standing.t_s + np.array([-0.3, 0.0, 1.2])
+            points = np.column_stack([np.interp(at_s, t_s, c) for c in xy_m.T])
+            before_m, after_m = np.linalg.norm(np.diff(points, axis=0), axis=1)
+            found.append((before_m / 0.3, after_m))
+    return np.array(found)
 
-    5 % beside the range: what the hand's range was read from was smoothed poses.
-    """
+
+def test_the_robot_rolls_as_far_as_it_did(chain, stops):
+    """The delay and constant drag from top speed: the way of the poses, 5 % on average."""
     model = chain[1]
-    drag = model.get("coasting.deceleration_mps2") + 0.17 * model.get("coasting.viscous_per_s")
+    speed_mps, way_m = stops.T
+    drag_mps2 = deceleration_mps2(model)
+    predicted_m = speed_mps * model.get("clock.offset_s") + speed_mps**2 / (2 * drag_mps2)
+    assert len(stops) > 10
+    assert np.median(predicted_m / way_m) == pytest.approx(1, abs=0.05)
+
+
+def deceleration_mps2(model):
+    """At half of the top speed: the model's drag has a part that grows with speed."""
+    return model.get("coasting.deceleration_mps2") + 0.17 * model.get("coasting.viscous_per_s")
+
+
+def test_deceleration_is_near_that_measured_by_hand(chain):
+    """15 %: the way after a stop is told, but delay and drag share it.
+
+    The rises need a later onset than the stops do, and the model has one clock for both.
+    """
     low, high = DECELERATION_MPS2
-    assert 0.95 * low < drag < 1.05 * high
+    assert 0.85 * low < deceleration_mps2(chain[1]) < 1.15 * high
 
 
 @pytest.mark.parametrize("duty", LAG_S)
