@@ -158,6 +158,11 @@ def _round_of(done: Search, name: str) -> Round:
     return next(r for r in reversed(done.rounds) if r.accepted and name in r.accepted.names)
 
 
+def _rivals(done: Search, name: str) -> list[Trial]:
+    """Trials that the data could not tell from this effect's, unless they were found besides."""
+    return [t for t in _round_of(done, name).tied if not set(t.names) & set(done.found)]
+
+
 def _finding(done: Search, name: str, share: float) -> Finding:
     estimates = done.last.fit.shared_estimates()
     if name == REFIT:
@@ -165,7 +170,7 @@ def _finding(done: Search, name: str, share: float) -> Finding:
         return Finding(REFIT, None, own, share, "sure")
     instance = [n for n in effect_names(done.last.state.model) if n.split("#")[0] == name][-1]
     own = [e for e in estimates if e.name.startswith(f"{instance}.")]
-    tied = [n for t in _round_of(done, name).tied for n in t.names]
+    tied = [n for t in _rivals(done, name) for n in t.names]
     group = (name, *tied) if tied else None
     doubt = _doubt(catalogue_of(done.last.state.model)[name], own)
     certainty = "doubtful" if doubt else "group" if group else "sure"
@@ -196,12 +201,12 @@ def ranking_of(done: Search, found: Sequence[Finding]) -> list[Ranked]:
     for finding in found:
         if finding.effect == REFIT:
             continue
-        this = _round_of(done, finding.effect)
+        this, rivals = _round_of(done, finding.effect), _rivals(done, finding.effect)
         group = None
         if finding.group:
             number += 1
             group = number
-        for trial in [this.accepted, *this.tied]:
+        for trial in [this.accepted, *rivals]:
             entries = [_ranked(trial, n, this, first, group) for n in trial.names if n != REFIT]
             ranking += [
                 e for e in entries if e.effect == finding.effect or trial is not this.accepted

@@ -216,7 +216,10 @@ def test_what_only_resembles_a_lag_is_not_surely_called_one(
 
 
 def test_dead_zone_and_curve_are_both_found_in_a_log(tanh_robot, measure, model_file):
-    """Wheels stand below 0.2 of the duty and then rise as a root; the base is a straight line."""
+    """Wheels stand below 0.2 of the duty and then rise as a root; the base is a straight line.
+
+    Their lag is 0.09 s and the base's 0.05 s: that is a finding, too.
+    """
 
     class Worn(tanh_robot):
         def speed_mps(self, duty):
@@ -225,7 +228,11 @@ def test_dead_zone_and_curve_are_both_found_in_a_log(tanh_robot, measure, model_
 
     line = model_file(("[0, 25, 50, 75, 100]", "[0, 100]"), ("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.4]"))
     found = diagnose([measure(Worn(), 12, 40.0)], line)
-    assert set(found.found) == {"dead_zone", "speed_curve"}
+    assert set(found.found) == {"dead_zone", "speed_curve", "motor_lag"}
+    (extra,) = next(f.parameters for f in found.findings if f.effect == "motor_lag")
+    assert extra.value == pytest.approx(0.04, abs=2.5 * extra.std)
+    for finding in found.findings:
+        assert not set(finding.group or ()) & (set(found.found) - {finding.effect})
     assert found.steps[-1][1] < 0.4 * found.steps[0][1]
 
 
