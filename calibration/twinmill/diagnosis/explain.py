@@ -85,6 +85,7 @@ def explain(
         bool(model_file.told_by_others(logs.values())),
         dict(diagnosis.rest.left_over or {}),
         _own_values(diagnosis, fit),
+        fit.shared_covariance(),
     )
     write_child(model_file, written, out, command)
     child = ModelFile.load(str(out))

@@ -102,6 +102,7 @@ def add(
             noise_of(after),
             common_clock(found),
             bool(told),
+            covariance=found.shared_covariance(),
         ),
         out,
         command,

@@ -136,6 +136,7 @@ def fit(
             after.score,
             noise_of(after),
             clock,
+            covariance=found.shared_covariance(),
         ),
         out,
         command,

@@ -16,6 +16,7 @@ import numpy as np
 import twinmill_native as native
 from scipy.stats import t as student
 
+from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import GAINS, Estimate, Parameter, stated_names
 from twinmill.predict.datasets import PARTS, Dataset
 
@@ -391,10 +392,14 @@ class ScoreFit:
         return int(sum(len(np.unique(d.block)) for d in self.datasets))
 
     @property
+    def _widening(self) -> float:
+        """Of standard errors: Student's t for so few blocks."""
+        return float(student.ppf(0.975, max(self.blocks - 1, 1)) / NORMAL_95)
+
+    @property
     def stds(self) -> np.ndarray:
-        """(P,) half 95 % intervals over 1.96: Student's t for so few blocks."""
-        factor = student.ppf(0.975, max(self.blocks - 1, 1)) / NORMAL_95
-        return factor * np.sqrt(np.diag(self.covariance))
+        """(P,) half 95 % intervals over 1.96."""
+        return self._widening * np.sqrt(np.diag(self.covariance))
 
     @cached_property
     def estimates(self) -> list[Estimate]:
@@ -422,6 +427,12 @@ class ScoreFit:
     def shared_estimates(self) -> list[Estimate]:
         """Of the quantities that all data sets share."""
         return self.estimates[: sum(1 for u in self.unknowns if u.parameter in self.shared)]
+
+    def shared_covariance(self) -> Covariance:
+        """Of the quantities that all data sets share and that these tell, as wide as their stds."""
+        told = [c for c, e in enumerate(self.shared_estimates()) if e.seen]
+        values = self._widening**2 * self.covariance[np.ix_(told, told)]
+        return Covariance(tuple(self.estimates[c].name for c in told), values)
 
     def own_estimates(self, i: int) -> dict[str, Estimate]:
         """Of data set i alone: its clock and its robot's gains."""

@@ -13,6 +13,7 @@ from typing import Protocol
 import tomlkit
 import twinmill_native as native
 
+from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import Estimate, catalogue_of, effect_names
 
 DEFAULT_MODEL = "turbopi.toml"
@@ -86,6 +87,19 @@ class ModelFile:
         return {str(g): float(v) for g, v in table.items() if g != "fitted_on"}
 
     @property
+    def covariance(self) -> Covariance:
+        """Of what fits told; empty if there was none, or an older version wrote the file.
+
+        Raises:
+            ModelError: what stands there is none.
+        """
+        table = tomlkit.parse(self.text).get("fit", {}).get("covariance", {})
+        try:
+            return Covariance.from_toml(table)
+        except ValueError as error:
+            raise ModelError(f"{self.path}: [fit.covariance] {error}") from error
+
+    @property
     def hash(self) -> str:
         """Of the text, as a child names its parent."""
         return hashlib.sha256(self.text.encode()).hexdigest()
@@ -112,6 +126,7 @@ class Fitted:
         base_told: the base was held near what other logs told; they keep the credit.
         left_over: what a diagnosis found that no effect explains; None if there was none.
         robots: what is a robot's own, by its number.
+        covariance: of the estimates; None where the fit has none.
     """
 
     model: native.Model
@@ -124,6 +139,7 @@ class Fitted:
     base_told: bool = False
     left_over: dict[str, float] | None = None
     robots: dict[int, list[Estimate]] = field(default_factory=dict)
+    covariance: Covariance | None = None
 
 
 def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> None:
@@ -148,6 +164,7 @@ def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> 
         section["std"] = {key: _short(e.std) for key, e in clock.items()}
         section["fitted_on"] = list(fitted.logs.values())
     old = document.get("fit", {}).get("left_over", {})
+    covariance = parent.covariance.replaced_by(fitted.covariance)
     document["fit"] = {
         "logs": list(fitted.logs),
         "score_before": _short(fitted.score_before),
@@ -158,6 +175,8 @@ def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> 
         old = {**left, "fitted_on": list(fitted.logs.values())} if left else {}
     if old:
         document["fit"]["left_over"] = old
+    if covariance.names:
+        document["fit"]["covariance"] = covariance.to_toml()
     write_whole(Path(path), tomlkit.dumps(document))
 
 

@@ -6,8 +6,10 @@ import os
 import tomllib
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from twinmill.model.covariance import Covariance
 from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child, write_whole
 from twinmill.model.parameters import Estimate
 from twinmill.predict.noise import ChannelNoise, Noise
@@ -132,3 +134,35 @@ def test_an_old_file_survives_a_write_that_fails(tmp_path, monkeypatch):
     with pytest.raises(ModelError, match="No space left"):
         write_whole(path, "new")
     assert path.read_text() == "old" and os.listdir(tmp_path) == ["child.toml"]
+
+
+def test_a_covariance_is_kept_and_a_later_fit_replaces_its_own_part(parent, fitted, tmp_path):
+    """Of what a later fit left alone the block stays; between the two fits nothing is known."""
+    first = Covariance(("base.motor_lag_s", "dead_zone.width"), np.array([[4.0, 1], [1, 9]]) * 1e-6)
+    then = Covariance(
+        ("dead_zone.width", "floor_tilt.drift_x_mps"), np.array([[16.0, -2], [-2, 1]])
+    )
+    path = tmp_path / "once.toml"
+    write_child(parent, replace(fitted, covariance=first), path, "")
+    once = ModelFile.load(str(path))
+    assert once.covariance.names == first.names
+    np.testing.assert_allclose(once.covariance.values, first.values, rtol=1e-5)
+    write_child(once, replace(fitted, covariance=then), tmp_path / "twice.toml", "")
+    twice = ModelFile.load(str(tmp_path / "twice.toml")).covariance
+    assert twice.names == ("base.motor_lag_s", *then.names)
+    np.testing.assert_allclose(twice.values, [[4e-6, 0, 0], [0, 16, -2], [0, -2, 1]], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ('names = ["a"]\nvalues = [[1, 2]]', "1 rows of 1 numbers"),
+        ('names = ["a"]\nvalues = [["x"]]', "rows of numbers"),
+        ('names = ["a", "b"]\nvalues = [[1, 0.5], [0.2, 1]]', "symmetric"),
+        ('names = ["a", "b"]\nvalues = [[1, 2], [2, 1]]', "negative variance"),
+    ],
+)
+def test_what_is_no_covariance_is_said_in_one_sentence(text, why, model_file):
+    file = model_file(extra=f"[fit.covariance]\n{text}\n")
+    with pytest.raises(ModelError, match=why):
+        _ = file.covariance

@@ -108,6 +108,8 @@ def test_a_fit_never_raises_the_score(lag_s, fits, tanh_robot, measure, model_fi
     guess = model_file(("motor_lag_s = 0.05", f"motor_lag_s = {lag_s}"))
     once = fit([run], guess, tmp_path / "once.toml", "")
     assert once.after.score <= once.before.score
+    kept = ModelFile.load(str(once.path)).covariance
+    assert kept.names == tuple(e.name for e in once.parameters if e.seen)
     other = measure(tanh_robot(yaw=0.75), 101, 30.0)
     again = fit([other], ModelFile.load(str(once.path)), tmp_path / "again.toml", "")
     assert again.after.score <= 1.01 * again.before.score
@@ -174,6 +176,14 @@ def straight(tanh_robot, measure):
     """Straight runs at 50 and 100 %, which tell nothing of strafing, turning or other duties."""
     legs = [[(d,) * 4] * 48 for d in (100, 0, -100, 0, 50, 0, -50, 0)] * 4
     return measure(tanh_robot(), 6, script_pct=np.concatenate(legs))
+
+
+def test_the_covariance_is_of_what_the_log_tells_and_as_wide_as_the_stds(straight, model_file):
+    fitted = score_fit([straight], model_file())
+    told = [e for e in fitted.shared_estimates() if e.seen]
+    covariance = fitted.shared_covariance()
+    assert covariance.names == tuple(e.name for e in told)
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance.values)), [e.std for e in told])
 
 
 def test_what_a_log_does_not_tell_stays_and_is_said_to(straight, model_file):
