@@ -27,6 +27,7 @@ if(NOT "${_mujoco_line}" MATCHES " ${_mujoco_header_version}$")
         "'pip install mujoco-core==${_mujoco_version}', or set TWINMILL_MUJOCO_DIR.")
 endif()
 
+set(MuJoCo_FOUND TRUE)
 if(NOT TARGET MuJoCo::MuJoCo)
     add_library(MuJoCo::MuJoCo SHARED IMPORTED)
     set_target_properties(MuJoCo::MuJoCo PROPERTIES

@@ -24,10 +24,11 @@ if(TWINMILL_FUZZ)
     add_compile_options(-fsanitize=fuzzer-no-link)
 endif()
 
-# Warnings are errors in our own code.
+# Warnings are errors in our own code; another project's compiler may know more warnings.
 function(twinmill_strict target)
     target_compile_options(${target} PRIVATE
-        -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wswitch -Werror
+        -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wswitch
+        $<$<BOOL:${PROJECT_IS_TOP_LEVEL}>:-Werror>
         $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes>)
 endfunction()
 
@@ -36,7 +37,9 @@ endfunction()
 function(twinmill_library target)
     cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
     add_library(${target} STATIC ${ARG_SOURCES})
-    target_include_directories(${target} PUBLIC "${CMAKE_CURRENT_SOURCE_DIR}/include")
+    target_include_directories(${target} PUBLIC
+        "$<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>"
+        "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/twinmill>")
     target_link_libraries(${target} PUBLIC ${ARG_DEPENDS})
     twinmill_strict(${target})
 endfunction()

@@ -407,7 +407,10 @@ std::string FindModelFile(const std::string &name)
     if (fs::is_regular_file(name))
         return name;
     const char *from_environment = std::getenv("TWINMILL_MODELS");
-    const fs::path installed = from_environment ? from_environment : TWINMILL_MODELS_DIR;
+    const fs::path installed = from_environment ? from_environment
+                               : fs::is_directory(TWINMILL_MODELS_DIR)
+                                   ? TWINMILL_MODELS_DIR
+                                   : TWINMILL_INSTALLED_MODELS_DIR;
     std::set<std::string> others;
     std::error_code unreadable;
     for (const auto &entry : fs::recursive_directory_iterator(installed, unreadable))

@@ -74,7 +74,7 @@ def test_intervals_cover_the_truth(fits, truth):
 
 
 def test_intervals_are_not_so_wide_that_they_say_nothing(fits):
-    """Stated errors are within three times the scatter, over all quantities: 35 degrees of freedom."""
+    """Stated errors are within three times the scatter, pooled: 35 degrees of freedom."""
     _, values, stds = fits
     scatter = (values - values.mean(axis=0)) / np.sqrt(np.mean(stds**2, axis=0))
     assert np.sum(scatter**2) / ((LOGS - 1) * values.shape[1]) > 1 / 9
