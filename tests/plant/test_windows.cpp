@@ -175,44 +175,5 @@ TEST(Windows, AreTheSameInABatchAsAlone)
     }
 }
 
-// Half the sum of the slopes up and down is right to second order: with steps of a thousandth the
-// one-sided slopes agree with it to some thousandths.
-TEST(Windows, SlopesAreThoseOfTheModel)
-{
-    const Course run;
-    const std::vector<double> steps{1e-4, 1e-4, 1e-4, 1e-4, 1e-4};
-    const std::vector<double> slopes =
-        PredictWindowSlopes(Base(), run.track(), run.starts, run.ends, kNames, steps);
-    const size_t size = 3 * run.ends.size();
-    ASSERT_EQ(slopes.size(), 6 * size);
-    ExpectNear(std::span(slopes).first(size),
-               PredictWindows(Base(), run.track(), run.starts, run.ends), 0);
-    for (size_t p = 0; p < kNames.size(); ++p)
-    {
-        Model up = Base(), down = Base();
-        const double value = up.Get(kNames[p]);
-        up.Set(kNames[p], value + 1e-4);
-        down.Set(kNames[p], value - 1e-4);
-        std::vector<double> central = PredictWindows(up, run.track(), run.starts, run.ends);
-        const std::vector<double> below = PredictWindows(down, run.track(), run.starts, run.ends);
-        for (size_t i = 0; i < size; ++i)
-            central[i] = (central[i] - below[i]) / 2e-4;
-        ExpectNear(std::span(slopes).subspan((p + 1) * size, size), central, 2e-2);
-    }
-}
-
-TEST(Windows, SlopesAreTakenDownwardsAtTheUpperBound)
-{
-    const Course run;
-    Model model = Base();
-    model.Set("wheel_gain.fr", 0.5);
-    const std::vector<double> steps{1e-3};
-    const std::vector<double> slopes =
-        PredictWindowSlopes(model, run.track(), run.starts, run.ends, {"wheel_gain.fr"}, steps);
-    EXPECT_TRUE(std::isfinite(slopes[3 * run.ends.size()]));
-    EXPECT_THROW(PredictWindowSlopes(model, run.track(), run.starts, run.ends, {"no.such"}, steps),
-                 std::invalid_argument);
-}
-
 }  // namespace
 }  // namespace twin::test

@@ -149,11 +149,21 @@ void Predict(const DriveChain &chain, const Windows &windows, const std::vector<
     }
 }
 
-// Whether a change of that quantity leaves the wheels' motion as it is, but for the times of poses.
-bool LeavesWheelsAlone(const Model &model, const std::string &name)
+// By row of values: whether they leave the wheels' motion as it is, but for the times of poses.
+std::vector<char> OnGroundAlone(const Model &model, const std::vector<std::string> &names,
+                                std::span<const double> values)
 {
-    const std::string_view stage = model.Find(name).stage;
-    return stage == "ground" || stage == "observe";
+    std::vector<char> alone(names.empty() ? 0 : values.size() / names.size(), true);
+    for (size_t p = 0; p < names.size(); ++p)
+    {
+        const Parameter own = model.Find(names[p]);
+        const std::string_view stage = own.stage;
+        if (stage == "ground" || stage == "observe")
+            continue;
+        for (size_t b = 0; b < alone.size(); ++b)
+            alone[b] = alone[b] && values[b * names.size() + p] == own.value;
+    }
+    return alone;
 }
 
 }  // namespace
@@ -177,56 +187,24 @@ std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
 {
     const Windows windows{track, starts, ends};
     const std::vector<size_t> poses = Events(windows);
-    const DriveChain own(model);
-    const Recording shared = Record(own, track, MeasuredAt(own, track, poses));
-    std::vector<double> before(names.size());
-    std::vector<char> grounded(names.size());
-    for (size_t p = 0; p < names.size(); ++p)
-    {
-        before[p] = model.Get(names[p]);
-        grounded[p] = LeavesWheelsAlone(model, names[p]);
-    }
-
     const std::vector<Model> models = ModelsOf(model, names, values);
+    const std::vector<char> grounded = OnGroundAlone(model, names, values);
+    Recording shared;
+    if (std::ranges::count(grounded, true) > 0)
+    {
+        const DriveChain own(model);
+        shared = Record(own, track, MeasuredAt(own, track, poses));
+    }
     std::vector<double> predicted(models.size() * 3 * ends.size(), kNaN);
     InParallel(models.size(), [&](size_t b) {
         const DriveChain chain(models[b]);
         const auto events = MeasuredAt(chain, track, poses);
-        bool same = shared.IsAt(events);
-        for (size_t p = 0; p < names.size(); ++p)
-            same = same && (grounded[p] || values[b * names.size() + p] == before[p]);
-        const Recording own_recording = same ? Recording{} : Record(chain, track, events);
-        Predict(chain, windows, events, same ? shared : own_recording,
+        const bool same = grounded[b] && shared.IsAt(events);
+        const Recording own = same ? Recording{} : Record(chain, track, events);
+        Predict(chain, windows, events, same ? shared : own,
                 predicted.data() + b * 3 * ends.size());
     });
     return predicted;
-}
-
-std::vector<double> PredictWindowSlopes(const Model &model, const Track &track,
-                                        std::span<const int64_t> starts,
-                                        std::span<const int64_t> ends,
-                                        const std::vector<std::string> &names,
-                                        std::span<const double> steps)
-{
-    const size_t count = names.size(), size = 3 * ends.size();
-    std::vector<double> values, signed_steps;
-    for (size_t b = 0; b <= count; ++b)
-        for (size_t p = 0; p < count; ++p)
-        {
-            const Parameter own = model.Find(names[p]);
-            const bool up = own.value + steps[p] <= own.max;
-            if (b == 0)
-                signed_steps.push_back(up ? steps[p] : -steps[p]);
-            values.push_back(own.value + (b == p + 1 ? signed_steps[p] : 0));
-        }
-    std::vector<double> rows = PredictWindowsBatch(model, track, starts, ends, names, values);
-    for (size_t p = 0; p < count; ++p)
-        for (size_t i = 0; i < size; ++i)
-        {
-            double &row = rows[(p + 1) * size + i];
-            row = (row - rows[i]) / signed_steps[p];
-        }
-    return rows;
 }
 
 }  // namespace twin

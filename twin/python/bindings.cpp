@@ -288,22 +288,6 @@ Array WindowsBatch(const Model &model, const PyTrack &track, Indices starts, Ind
     return ToNumpy(std::move(predicted), {values.shape(0), starts.size(), ends.shape(1), 3});
 }
 
-Array WindowSlopes(const Model &model, const PyTrack &track, Indices starts, IndexMatrix ends,
-                   const std::vector<std::string> &names, Vector steps)
-{
-    if (ends.shape(0) != starts.size() || steps.size() != names.size())
-        throw std::invalid_argument("ends must have one row per start, steps one entry per name");
-    if (!std::ranges::all_of(Span(steps), [](double step) { return step > 0; }))
-        throw std::invalid_argument("steps must be above 0");
-    std::vector<double> rows;
-    {
-        nb::gil_scoped_release unlocked;
-        rows =
-            PredictWindowSlopes(model, track.View(), Span(starts), Span(ends), names, Span(steps));
-    }
-    return ToNumpy(std::move(rows), {1 + names.size(), starts.size(), ends.shape(1), 3});
-}
-
 Array OneStep(const Model &model, const PyTrack &track)
 {
     return ToNumpy(PredictOneStep(model, track.View()), {track.pose_t_s.size(), 3});
@@ -425,10 +409,6 @@ NB_MODULE(twinmill_native, m)
           "(W, H, 3) poses predicted at `ends` from the poses at `starts`.");
     m.def("windows_batch", &WindowsBatch, "model"_a, "track"_a, "starts"_a, "ends"_a, "names"_a,
           "values"_a, "(B, W, H, 3) the same for B rows of values, on all cores.");
-    m.def("window_slopes", &WindowSlopes, "model"_a, "track"_a, "starts"_a, "ends"_a, "names"_a,
-          "steps"_a,
-          "(1 + P, W, H, 3): the windows, then for each of P names their one-sided difference over "
-          "its step, per unit; downwards where the upper bound is nearer than the step.");
     m.def("mix", &MixedDuties, "speed_input_pct"_a, "turn_input_milli"_a,
           "Duties in percent (fl, fr, rl, rr) that the firmware gives at these inputs.");
     m.def("in_view", &InViewOf, "model"_a, "self"_a, "poses"_a, "position_m"_a, "heading_rad"_a,

@@ -28,6 +28,8 @@ from twinmill.model.parameters import (
     base_parameters,
     catalogue,
 )
+from twinmill.predict.problem import Scene
+from twinmill.steady.scene import SteadyScene
 
 DRIFT_STD = 0.04  # gains of a calibrated robot wander so much with battery and heat
 NOISIER = 2.0  # drive noise over that of the model file, beyond which it is a finding
@@ -164,7 +166,10 @@ def _concluded(
     findings, chain = findings_of(done, first)
     rest = rest_of(known, last.fit, start.held_score, last.held_score, model_file.left_over(hashes))
     after = [o.with_fitted(m) for o, m in zip(known, last.state.models, strict=True)]
-    noise = _noises(model_file, after)
+    fitted = {id(o.measurement): o for o in after}
+    after = [fitted.get(id(o.measurement), o) for o in opened]
+    scenes = [r.scene.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
+    noise = _noises(model_file, scenes)
     hidden = [*_hidden(done, first.model), *unseen.items()]
     refit = _refit(done)
     weighed = Weighed(
@@ -180,9 +185,6 @@ def _concluded(
     )
     steps = [(None, start.held_score), *chain]
     late = lateness(done, findings, all(o.same_clock for o in known if o.floor))
-    fitted = {id(o.measurement): o for o in after}
-    after = [fitted.get(id(o.measurement), o) for o in opened]
-    scenes = [o.scene() for o in after]
     return Diagnosis(
         verdict=weighed.verdict,
         sentence=weighed.sentence,
@@ -226,18 +228,18 @@ def _hidden(done: Search, model: native.Model) -> list[tuple[str, str]]:
     return hidden
 
 
-def _noises(model_file: ModelFile, opened: Sequence[Opened]) -> list[str]:
+def _noises(model_file: ModelFile, scenes: Sequence[Scene | SteadyScene]) -> list[str]:
     """A note for each log whose drive noise is far above what another log told."""
     usual = model_file.model.get("noise.drive_mps")
     if usual <= 0:
         return []
     notes = []
-    for own in opened:
-        noise = own.scene().noise
+    for scene in scenes:
+        noise = scene.noise
         ratio = noise.position.drive / usual if noise else 0.0
         if ratio > NOISIER:
             notes.append(
-                f"{own.measurement.label}: the random disturbance of the motion is {ratio:.1f} "
+                f"{scene.measurement.label}: the random disturbance of the motion is {ratio:.1f} "
                 "times what the model file says; no effect that follows from commands, place or "
                 "time is like that (slipping wheels or a rough floor may be)."
             )

@@ -69,11 +69,10 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     velocity, base = base_response(data, model, same_clock)
     offset_s = base.get(CLOCK)
     response = Response(data, velocity, base.get(LAG), offset_s)
-    first = np.sqrt((rms(response.within) ** 2 + rms(response.across) ** 2) / 2)
-    keep = _without_bumps(response.across, first)
+    keep = _without_bumps(response.across, response.errors)
     if not keep.all():
         calm = replace(data, measured=np.where(keep[:, None, None], data.measured, np.nan))
-        response = Response(calm, velocity, base.get(LAG), offset_s)
+        response = Response(calm, velocity, base.get(LAG), offset_s, response)
     within, across = (
         np.where(keep[:, None, None], e, np.nan) for e in (response.within, response.across)
     )

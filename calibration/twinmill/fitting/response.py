@@ -8,11 +8,11 @@ ridge regression on the windows of the score gives them. A ridge for each group 
 chosen by the errors of left-out blocks (Hoerl and Kennard 1970; generalised to groups).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import lfilter
 
 from twinmill.predict.datasets import Trajectory
@@ -53,17 +53,27 @@ class Response:
         base_mps: (N, 3) velocity of the base model at each pose, refitted to this log.
         lag_s: of that base.
         offset_s: capture's clock less the robot's.
+        begin: a response to the same commands whose ridges and weights are nearly right.
     """
 
     def __init__(
-        self, data: Trajectory, base_mps: np.ndarray, lag_s: float, offset_s: float
+        self,
+        data: Trajectory,
+        base_mps: np.ndarray,
+        lag_s: float,
+        offset_s: float,
+        begin: "Response | None" = None,
     ) -> None:
         self.data, self.offset_s = data, offset_s
         self.lag_s = max(SHORTEST_LAG_S, lag_s)
         self._lay_points()
         self.features, self.groups = self._features(base_mps[self.points])
         self._lay_windows()
-        self._fit()
+        if begin is None:
+            self._fit(rms(data.measured), [None, None])
+            self._fit(self.errors, self.ridges)
+        else:
+            self._fit(begin.errors, begin.ridges)
 
     # -- where features are taken ---------------------------------------------------------------
 
@@ -254,25 +264,25 @@ class Response:
 
     # -- regression -----------------------------------------------------------------------------
 
-    def _fit(self) -> None:
-        """Two passes: the second with the errors of the first as weights."""
-        scale = rms(self.data.measured)
-        ridge: list[np.ndarray | None] = [None, None]
-        for _ in range(2):
-            scale = _isotropic(scale)
-            self.coefficients = []
-            for part in (0, 1):
-                equations = self._equations(part, scale)
-                if equations is None:
-                    self.coefficients.append(None)
-                    continue
-                groups = np.concatenate(self.groups[:2]) if part == 0 else self.groups[2]
-                ridge[part], *found = _ridge(*equations, groups, ridge[part])
-                self.coefficients.append(found)
-            within = difference(self.data.measured, self.predict(None))
-            across = difference(self.data.measured, self.predict(self.fold))
-            scale = np.sqrt((rms(within) ** 2 + rms(across) ** 2) / 2)
-        self.within, self.across = within, across
+    def _fit(self, scale: np.ndarray, ridges: list[np.ndarray | None]) -> None:
+        """Coefficients with the errors (H, 3) of another fit as weights."""
+        scale = _isotropic(scale)
+        self.coefficients, self.ridges = [], list(ridges)
+        for part in (0, 1):
+            equations = self._equations(part, scale)
+            if equations is None:
+                self.coefficients.append(None)
+                continue
+            groups = np.concatenate(self.groups[:2]) if part == 0 else self.groups[2]
+            self.ridges[part], *found = _ridge(*equations, groups, ridges[part])
+            self.coefficients.append(found)
+        self.within = difference(self.data.measured, self.predict(None))
+        self.across = difference(self.data.measured, self.predict(self.fold))
+
+    @property
+    def errors(self) -> np.ndarray:
+        """(H, 3) between those of the fit to all, too small, and those on left-out parts."""
+        return np.sqrt((rms(self.within) ** 2 + rms(self.across) ** 2) / 2)
 
     def _equations(
         self, part: int, scale: np.ndarray
@@ -377,49 +387,87 @@ def _seen_from(start: np.ndarray, ends: np.ndarray) -> np.ndarray:
     )
 
 
+class _LeftOut:
+    """Fits without each of K folds, and what they would be if the ridge of one group changed.
+
+    Args:
+        total: normal matrix (F, F) and moments (F,) of all rows.
+        folds: the parts that are left out.
+        mean: (F,) mean square of each feature's group.
+        groups: (F,) number of each feature's group.
+    """
+
+    def __init__(
+        self,
+        total: tuple[np.ndarray, np.ndarray],
+        folds: list[Fold],
+        mean: np.ndarray,
+        groups: np.ndarray,
+    ) -> None:
+        self.mean, self.groups = mean, groups
+        self.grams = np.array([total[0] - f.touching[0] for f in folds])
+        self.moments = np.array([total[1] - f.touching[1] for f in folds])
+        self.inner = np.array([f.inside[0] for f in folds])
+        self.push = np.array([f.inside[1] for f in folds])
+        self.square = sum(f.inside[2] for f in folds)
+
+    def at(self, ridge: np.ndarray) -> float:
+        """Squared error at the ridge (G,) of each group, from which `trials` go on."""
+        self.ridge = ridge
+        self.inverse = np.linalg.inv(self.grams + np.diag(self.mean * ridge[self.groups]))
+        self.beta = np.einsum("kfg,kg->kf", self.inverse, self.moments)
+        return self._error(self.beta)
+
+    def _error(self, beta: np.ndarray) -> float:
+        """Squared error of (K, F) coefficients on the folds that they left out."""
+        curved = np.einsum("kfg,kg->kf", self.inner, beta)
+        return float(self.square + np.sum(beta * (curved - 2 * self.push)))
+
+    def trials(self, group: int, values: Sequence[float]) -> list[float]:
+        """Squared error with each of these ridges of one group: Woodbury's identity.
+
+        A ridge that rises by s on the group's diagonal changes the coefficients b to
+        b - B (I/s + B_g)^-1 b_g, with B the inverse's columns of the group.
+        """
+        own = np.flatnonzero(self.groups == group)
+        columns, block = self.inverse[:, :, own], self.inverse[:, own[:, None], own]
+        begun = self.beta[:, own, None]
+        errors = []
+        for value in values:
+            rise = self.mean[own[0]] * (value - self.ridge[group])
+            less = np.linalg.solve(np.eye(len(own)) + rise * block, rise * begun)
+            errors.append(self._error(self.beta - (columns @ less)[..., 0]))
+        return errors
+
+
 def _ridge(
     total: tuple[np.ndarray, np.ndarray],
     folds: list[Fold],
     groups: np.ndarray,
     ridge: np.ndarray | None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Ridge of each group, coefficients (F,) of all rows, and (K, F) without each fold."""
+    """Ridge of each group, coefficients (F,) of all rows, and (K, F) without each fold.
+
+    Groups are searched one after the other, twice.
+    """
     mean = np.diag(total[0]).copy()
     for g in np.unique(groups):
         mean[groups == g] = mean[groups == g].mean()
     mean += 1e-9 * mean.max() + 1e-30
-    grams = np.array([total[0] - f.touching[0] for f in folds])
-    moments = np.array([total[1] - f.touching[1] for f in folds])
-
-    def left_out(values: np.ndarray) -> float:
-        lift = np.diag(mean * values[groups])
-        error = 0.0
-        for gram, moment, fold in zip(grams, moments, folds, strict=True):
-            beta = cho_solve(
-                cho_factor(gram + lift, check_finite=False), moment, check_finite=False
-            )
-            inner, push, square = fold.inside
-            error += square - 2 * beta @ push + beta @ inner @ beta
-        return error
-
+    left_out = _LeftOut(total, folds, mean, groups)
     if ridge is None:
         ridge = np.array([FIRST_RIDGE.get(g, 1e5) for g in GROUPS])
-    best = left_out(ridge)
+    best = left_out.at(ridge)
     for _ in range(2):
         moved = False
         for g in np.unique(groups):
-            trials = []
-            for value in LADDER:
-                trial = ridge.copy()
-                trial[g] = value
-                trials.append(left_out(trial) if value != ridge[g] else best)
+            trials = left_out.trials(g, LADDER)
             k = int(np.argmin(trials))
             if trials[k] < best * WORTH:
-                best, ridge, moved = trials[k], ridge.copy(), True
-                ridge[g] = LADDER[k]
+                ridge = np.where(np.arange(len(ridge)) == g, LADDER[k], ridge)
+                best, moved = left_out.at(ridge), True
         if not moved:
             break
-    lift = np.diag(mean * ridge[groups])
-    every = np.linalg.solve(total[0] + lift, total[1])
-    each = np.linalg.solve(grams + lift, moments[..., None])[..., 0]
+    each = left_out.beta
+    every = np.linalg.solve(total[0] + np.diag(mean * ridge[groups]), total[1])
     return ridge, every, each

@@ -35,10 +35,10 @@ class ChannelNoise:
 
     def spectrum(self, frequency_Hz: np.ndarray, period_s: float) -> np.ndarray:
         """Power of one-step errors per sample at these frequencies."""
-        phase = np.exp(-2j * np.pi * frequency_Hz * period_s)
+        cosine = np.cos(2 * np.pi * frequency_Hz * period_s)
         phi = np.exp(-period_s / self.memory_s)
-        drive = (period_s * self.drive) ** 2 * (1 - phi**2) / np.abs(1 - phi * phase) ** 2
-        return self.sensor**2 * np.abs(1 - phase) ** 2 + drive
+        drive = (period_s * self.drive) ** 2 * (1 - phi**2) / (1 + phi**2 - 2 * phi * cosine)
+        return self.sensor**2 * (2 - 2 * cosine) + drive
 
     def whitening(self, period_s: float) -> tuple[np.ndarray, np.ndarray, float]:
         """Filter (numerator, denominator) and standard deviation of what comes out of it."""

@@ -50,6 +50,12 @@ class Scene:
             model.set(name, self.model.get(name))
         return replace(self, model=model)
 
+    def fitted(self, model: native.Model) -> "Scene":
+        """The same with a model of its own robot that was fitted to it, its clock included."""
+        scene = replace(self, model=model)
+        scene.settle_noise()
+        return scene
+
     def errors(self) -> np.ndarray:
         """(S, 3) one-step errors of the scene's model."""
         return self.grid.errors(

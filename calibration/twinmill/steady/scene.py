@@ -76,6 +76,10 @@ class SteadyScene:
         """The same table with another model."""
         return replace(self, model=model.for_robot(self.measurement.robot_id))
 
+    def fitted(self, model: native.Model) -> "SteadyScene":
+        """The same with a model of its own robot that was fitted to it."""
+        return replace(self, model=model)
+
     def predicted(self) -> np.ndarray:
         """(U, 3) what the model predicts, as CHANNELS."""
         return self._predicted(self.model, [], np.zeros((1, 0)))[0]

