@@ -14,6 +14,17 @@ from twinmill_cli.lazy import Later
 COMMANDS = (
     ("import", "import_log", "Make a log from motion capture exports and command tables."),
     ("export", "export", "Write a log as MCAP for Foxglove, or as tables, CSV or Parquet."),
+    ("tags", "tags", "Print tags for robots, to scale, for `twinmill track`."),
+    (
+        "track",
+        "track",
+        "Find tagged robots in a film of one camera over the floor, and write their poses.",
+    ),
+    (
+        "track-calibrate",
+        "track",
+        "Find a camera's lens from a film of a board that is moved about before it.",
+    ),
     ("plot", "plot", "Draw paths, speeds, bits and wheel commands of all robots in a log."),
     (
         "watch",

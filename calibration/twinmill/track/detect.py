@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tags in a picture, found by OpenCV: AprilTag 36h11 (Wang and Olson 2016)."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+FAMILY = cv2.aruco.DICT_APRILTAG_36h11
+ROBOTS = range(100)  # a robot's tag is its number
+FLOOR = range(500, 504)  # as `twinmill tags --floor` prints them
+TAGS = 587  # in the family
+WINDOW_PX, WINDOW_MODULES = 5, 0.8  # half width: a corner is refined without its neighbours
+
+
+@dataclass(frozen=True)
+class Sightings:
+    """Tags found in a film.
+
+    Attributes:
+        frame: (N,) int, ascending.
+        number: (N,) int, the tag's.
+        corners_px: (N, 4, 2) front left, front right, rear right, rear left; a pixel's centre is a
+            whole number.
+    """
+
+    frame: np.ndarray
+    number: np.ndarray
+    corners_px: np.ndarray
+
+    def of(self, rows: np.ndarray) -> "Sightings":
+        """Some of them."""
+        return Sightings(self.frame[rows], self.number[rows], self.corners_px[rows])
+
+
+class Detector:
+    """Finds tags in pictures."""
+
+    def __init__(self):
+        settings = cv2.aruco.DetectorParameters()
+        settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        settings.cornerRefinementWinSize = WINDOW_PX
+        settings.relativeCornerRefinmentWinSize = WINDOW_MODULES
+        book = cv2.aruco.getPredefinedDictionary(FAMILY)
+        self._detector = cv2.aruco.ArucoDetector(book, settings)
+
+    def find(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) numbers and (K, 4, 2) corners in (H, W, 3) or (H, W) bytes."""
+        grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture
+        corners, numbers, _ = self._detector.detectMarkers(grey)
+        if numbers is None or len(numbers) == 0:
+            return np.empty(0, int), np.empty((0, 4, 2))
+        return numbers.ravel().astype(int), np.array(corners, float).reshape(-1, 4, 2)
+
+
+def gather(found: list[tuple[np.ndarray, np.ndarray]]) -> Sightings:
+    """What Detector.find gave for each frame of a film."""
+    counts = [len(numbers) for numbers, _ in found]
+    return Sightings(
+        np.repeat(np.arange(len(found)), counts),
+        np.concatenate([np.empty(0, int), *(numbers for numbers, _ in found)]),
+        np.concatenate([np.empty((0, 4, 2)), *(corners for _, corners in found)]),
+    )
+
+
+def centres(corners_px: np.ndarray) -> np.ndarray:
+    """(N, 2) pixels where the diagonals of (N, 4, 2) corners cross: a square's centre, as seen."""
+    a, b, c, d = np.moveaxis(corners_px, 1, 0)
+    along, across = c - a, d - b
+    part = _cross(b - a, across) / _cross(along, across)
+    return a + part[:, None] * along
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the camera is over the floor, from points whose places on it were measured."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from twinmill.track.camera import Camera
+from twinmill.track.detect import ROBOTS, TAGS, Sightings, centres
+
+FEWEST = 4  # three leave two places for the camera, and nothing to check by
+FLAT = 0.05  # points are on a line if they stretch less than this share across it
+WORST_PX = 20.0
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera over the floor.
+
+    Attributes:
+        camera: its lens.
+        rotation: (3, 3) from W to the camera's axes: x right, y down, z ahead.
+        position_m: (3,) of the camera in W.
+        error_px: RMS miss of the floor's points.
+    """
+
+    camera: Camera
+    rotation: np.ndarray
+    position_m: np.ndarray
+    error_px: float
+
+    @property
+    def tilt_rad(self) -> float:
+        """From looking straight down."""
+        return float(np.arccos(np.clip(-self.rotation[2, 2], -1, 1)))
+
+    def on_plane(self, pixels: np.ndarray, height_m: float) -> np.ndarray:
+        """(N, 2) px to (N, 2) m: where their rays meet the plane z = height_m; NaN above it."""
+        rays = self.camera.rays(pixels) @ self.rotation
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach = (height_m - self.position_m[2]) / rays[:, 2]
+        met = self.position_m[:2] + reach[:, None] * rays[:, :2]
+        return np.where((reach > 0)[:, None], met, np.nan)
+
+    def project(self, points_m: np.ndarray) -> np.ndarray:
+        """(N, 3) in W to (N, 2) px."""
+        turn, _ = cv2.Rodrigues(self.rotation)
+        shift = -self.rotation @ self.position_m
+        pixels, _ = cv2.projectPoints(
+            np.ascontiguousarray(points_m, float), turn, shift,
+            self.camera.matrix, self.camera.distortion,
+        )  # fmt: skip
+        return pixels.reshape(-1, 2)
+
+
+@dataclass(frozen=True)
+class Floor:
+    """What was measured.
+
+    Attributes:
+        place_m: (N, 2) in W.
+        pixel: (N, 2); NaN for tags, whose centres are looked for.
+        tag: (N,) number; -1 for points.
+    """
+
+    place_m: np.ndarray
+    pixel: np.ndarray
+    tag: np.ndarray
+
+
+def read_floor(path: Path) -> Floor:
+    """Reads [[tag]] number, x_m, y_m and [[point]] u_px, v_px, x_m, y_m.
+
+    Raises:
+        ValueError: it is no such file, or its points do not fix a plane.
+    """
+    try:
+        data = tomlkit.parse(path.read_text()).unwrap()
+        tags, points = data.get("tag", []), data.get("point", [])
+        place = [[float(row["x_m"]), float(row["y_m"])] for row in [*tags, *points]]
+        pixel = [[np.nan, np.nan]] * len(tags)
+        pixel += [[float(row["u_px"]), float(row["v_px"])] for row in points]
+        number = [int(row["number"]) for row in tags] + [-1] * len(points)
+    except KeyError as error:
+        raise ValueError(
+            f"{path}: {error} is missing; a [[tag]] has number, x_m, y_m, and a [[point]] has "
+            "u_px, v_px, x_m, y_m."
+        ) from error
+    except (OSError, UnicodeDecodeError, TOMLKitError, TypeError, ValueError, AttributeError) as e:
+        raise ValueError(f"{path}: is no floor file ({e}).") from e
+    floor = Floor(np.array(place).reshape(-1, 2), np.array(pixel).reshape(-1, 2), np.array(number))
+    known = floor.tag[floor.tag >= 0]
+    if wrong := [n for n in known.tolist() if n in ROBOTS or n >= TAGS]:
+        raise ValueError(
+            f"{path}: tag {wrong[0]} is no floor tag; they are {ROBOTS.stop} to {TAGS - 1}, as a "
+            "smaller number is a robot's."
+        )
+    if len(np.unique(known)) < len(known):
+        raise ValueError(f"{path}: a tag is listed twice; each lies at one place.")
+    if not np.isfinite(floor.place_m).all():
+        raise ValueError(f"{path}: x_m and y_m must be numbers.")
+    _check_spread(f"{path}: has", floor.place_m)
+    return floor
+
+
+def _check_spread(who: str, place_m: np.ndarray) -> None:
+    if len(place_m) < FEWEST:
+        raise ValueError(
+            f"{who} {len(place_m)} floor points, and {FEWEST} are needed; measure more of them."
+        )
+    stretch = np.linalg.svd(place_m - place_m.mean(axis=0), compute_uv=False)
+    if stretch[1] < FLAT * stretch[0]:
+        raise ValueError(f"{who} floor points that are all on one line; lay one beside it.")
+
+
+def look(camera: Camera, floor: Floor, seen: Sightings) -> View:
+    """Where the camera is: planar pose (Collins and Bartoli 2014), refined by least squares.
+
+    Args:
+        camera: its lens.
+        floor: what was measured.
+        seen: tags of a film; each floor tag's centre is the median over it.
+
+    Raises:
+        ValueError: too few of the tags were seen, or the points do not fit.
+    """
+    pixel = floor.pixel.copy()
+    for k in np.flatnonzero(floor.tag >= 0):
+        rows = seen.number == floor.tag[k]
+        if rows.any():
+            pixel[k] = np.median(centres(seen.corners_px[rows]), axis=0)
+    known = np.isfinite(pixel).all(axis=1)
+    if not known.all():
+        missing = ", ".join(str(n) for n in floor.tag[~known])
+        if np.count_nonzero(known) < FEWEST:
+            raise ValueError(
+                f"floor: tags {missing} are nowhere in the film, and {FEWEST} points are needed; "
+                "see that they are in view, lit and flat."
+            )
+    place_m, pixel = floor.place_m[known], pixel[known]
+    _check_spread("floor: sees", place_m)
+    solid = np.column_stack([place_m, np.zeros(len(place_m))])
+    lens = camera.matrix, camera.distortion
+    found, turns, shifts, _ = cv2.solvePnPGeneric(solid, pixel, *lens, flags=cv2.SOLVEPNP_IPPE)
+    views = []
+    for turn, shift in zip(turns[:found], shifts[:found], strict=True):
+        turn, shift = cv2.solvePnPRefineLM(solid, pixel, *lens, turn.copy(), shift.copy())
+        rotation, _ = cv2.Rodrigues(turn)
+        view = View(camera, rotation, -rotation.T @ shift.ravel(), 0.0)
+        miss = np.sqrt(np.mean(np.sum((view.project(solid) - pixel) ** 2, axis=1)))
+        if view.position_m[2] > 0:
+            views.append(View(camera, rotation, view.position_m, float(miss)))
+    if not views:
+        raise ValueError(
+            "floor: the points are mirrored, the camera would be under the floor; x to y must turn "
+            "counter-clockwise, seen from above."
+        )
+    best = min(views, key=lambda view: view.error_px)
+    if best.error_px > WORST_PX:
+        raise ValueError(
+            f"floor: the points miss the picture by {best.error_px:.0f} px; check their places, "
+            "which is which, and that the lens file is this camera's."
+        )
+    return best
