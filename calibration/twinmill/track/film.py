@@ -105,7 +105,8 @@ class LiveCamera:
 
 
 def _open(source: str | int) -> cv2.VideoCapture:
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what is wrong is said in our words
+    logging = cv2.utils.logging
+    logging.setLogLevel(logging.LOG_LEVEL_SILENT)  # what is wrong is said in our words
     return cv2.VideoCapture(source)
 
 

@@ -9,6 +9,7 @@ codec are OpenCV's.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -71,15 +72,12 @@ class Lens:
         return np.column_stack(self._distorted(x / z, y / z)) * self.focal_px + self.centre_px
 
     def rays(self, u_px: np.ndarray, v_px: np.ndarray) -> np.ndarray:
-        """(..., 3) directions in W, by Newton's iteration with a unit slope."""
-        wanted = (
-            (u_px - self.centre_px[0]) / self.focal_px[0],
-            (v_px - self.centre_px[1]) / self.focal_px[1],
-        )
-        x, y = wanted
+        """(..., 3) directions in W, by fixed-point iteration."""
+        x0 = x = (u_px - self.centre_px[0]) / self.focal_px[0]
+        y0 = y = (v_px - self.centre_px[1]) / self.focal_px[1]
         for _ in range(12):
-            got = self._distorted(x, y)
-            x, y = x + wanted[0] - got[0], y + wanted[1] - got[1]
+            bent_x, bent_y = self._distorted(x, y)
+            x, y = x + x0 - bent_x, y + y0 - bent_y
         return np.stack([x, y, np.ones_like(x)], axis=-1) @ self.rotation
 
 
@@ -92,6 +90,7 @@ class Tag:
         path: where its centre is, and the angle of its front.
         size_m, height_m: of the black square; over the floor.
         hidden_s: from when until when something is held over it.
+        lies: it never moves.
     """
 
     number: int
@@ -99,8 +98,9 @@ class Tag:
     size_m: float = 0.10
     height_m: float = 0.12
     hidden_s: tuple[tuple[float, float], ...] = ()
+    lies: bool = False
 
-    @property
+    @cached_property
     def bits(self) -> np.ndarray:
         """(MODULES, MODULES) bool, white; the first row is the front."""
         book = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
@@ -133,18 +133,23 @@ class Film:
     def __post_init__(self):
         random, (width, height) = np.random.default_rng(self.seed), self.lens.size_px
         texture = cv2.GaussianBlur(random.normal(0, 60, (height, width)), (0, 0), 3)
-        self._floor = FLOOR + texture
+        self._floor = (FLOOR + texture).astype(np.float32)
+        for tag in self.tags:
+            if tag.lies:
+                self._draw(self._floor, tag, 0.0)
         v, u = np.mgrid[:height, :width]
         edge = (u - 0.45 * width) + 0.4 * (v - 0.5 * height)
-        self._light = self.shadow + (1 - self.shadow) / (1 + np.exp(-edge / 3))
+        light = self.shadow + (1 - self.shadow) / (1 + np.exp(-edge / 3))
+        self._light = light.astype(np.float32)
         self._noise = random.normal(0, self.noise, (2 * height, width)).astype(np.float32)
 
     def frame(self, k: int) -> np.ndarray:
         """(H, W, 3) bytes of frame k."""
         picture, t_s = self._floor.copy(), k / self.rate_hz
         for tag in self.tags:
-            self._draw(picture, tag, t_s)
-        picture = cv2.GaussianBlur(picture * self._light, (0, 0), 0.6)
+            if not tag.lies:
+                self._draw(picture, tag, t_s)
+        picture = cv2.GaussianBlur(picture * self._light, (5, 5), 0.6)
         first = np.random.default_rng([self.seed, k]).integers(0, len(picture))
         picture += self._noise[first : first + len(picture)]
         return np.repeat(np.clip(picture, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
@@ -175,7 +180,9 @@ class Film:
         v, u = np.mgrid[low[1] : high[1], low[0] : high[0]].astype(float)
         ink, paper = np.zeros(u.shape), np.zeros(u.shape)
         offsets = (np.arange(GRID) + 0.5) / GRID - 0.5
-        rays = [self.lens.rays(u + du, v + dv) for du in offsets for dv in offsets]
+        middle = self.lens.rays(u, v)  # within a pixel rays change evenly
+        down, across = np.gradient(middle, axis=(0, 1))
+        rays = [middle + du * across + dv * down for du in offsets for dv in offsets]
         for step in range(BLUR_STEPS):
             row_s = t_s + self.line_delay_s * v[:, 0] + (step + 0.5) / BLUR_STEPS * self.exposure_s
             pose = tag.path(row_s)
@@ -221,3 +228,32 @@ def circle(x_m: float, y_m: float, radius_m: float, rate_radps: float, phase_rad
 def still(x_m: float, y_m: float, theta_rad: float) -> Path:
     """What lies there."""
     return lambda t_s: np.tile([x_m, y_m, theta_rad], (len(t_s), 1))
+
+
+def board_view(lens: Lens, board: np.ndarray, square_px: int, square_m: float, seed: int):
+    """(H, W, 3) bytes of a board, given as a picture, held before a camera somewhere and tilted."""
+    random = np.random.default_rng(seed)
+    turn, _ = cv2.Rodrigues(random.uniform([-0.6, -0.6, -3], [0.6, 0.6, 3]))
+    height_px, width_px = board.shape
+    half_m = np.array([width_px, height_px, 0]) / square_px * square_m / 2
+    away_m = random.uniform(0.35, 0.6)
+    size = np.array(lens.size_px)
+    aim = (random.uniform(0.25, 0.75, 2) * size - lens.centre_px) / lens.focal_px
+    middle_m = away_m * np.array([*aim, 1.0])
+    v, u = np.mgrid[: size[1], : size[0]].astype(float)
+    rays = lens.rays(u, v) @ lens.rotation.T  # in the camera's axes
+    down, across = np.gradient(rays, axis=(0, 1))
+    total = np.zeros(u.shape)
+    for du, dv in ((-0.25, -0.25), (0.25, 0.25)):
+        ray = rays + du * across + dv * down
+        depth = (turn[:, 2] @ middle_m) / (ray @ turn[:, 2])
+        place = (depth[..., None] * ray - middle_m) @ turn + half_m
+        x, y = (
+            np.floor(place[..., 0] / square_m * square_px),
+            np.floor(place[..., 1] / square_m * square_px),
+        )
+        on = (x >= 0) & (x < width_px) & (y >= 0) & (y < height_px)
+        x, y = np.where(on, x, 0).astype(int), np.where(on, y, 0).astype(int)
+        total += np.where(on, board[y, x], 235.0) / 2
+    picture = cv2.GaussianBlur(0.7 * total + 30, (5, 5), 0.6) + random.normal(0, 3, u.shape)
+    return np.repeat(np.clip(picture, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
