@@ -16,7 +16,9 @@ from rich.table import Table
 from rich.text import Text
 
 from twinmill.data.bus import open_bus
+from twinmill.data.importers.plain import Columns, read_commands
 from twinmill.files import check_new_file
+from twinmill.track.align import align, shifted
 from twinmill.track.boards import Board
 from twinmill.track.camera import Camera, read_camera
 from twinmill.track.detect import ROBOTS, Detector, gather
@@ -83,6 +85,10 @@ def _track(
     start_s: Annotated[
         float, typer.Option("--start-s", help="Stamp of the first frame on the other clock.")
     ] = 0.0,
+    commands: Annotated[
+        Path | None,
+        typer.Option("--commands", metavar="CSV", help="Or the commands, to find it by."),
+    ] = None,
     duration_s: Annotated[
         float | None, typer.Option("--duration-s", min=0.1, help="Live; else until Ctrl-C.")
     ] = None,
@@ -97,6 +103,8 @@ def _track(
 
     Example: twinmill track run.mp4 --lens camera.toml --floor floor.toml --height 0.12
     """
+    if commands and (camera or start_s):
+        raise ValueError("--commands: say when a film began; give it a video, and no --start-s.")
     if bool(video) == bool(camera):
         raise ValueError("track: give a video, or --camera: one of them.")
     wanted = frozenset(parse_numbers("--robots", robots, ROBOTS)) if robots else None
@@ -110,6 +118,7 @@ def _track(
     check_new_file(out, force)
     measured, film = read_floor(floor), _film(video, rate_hz)
     _check_size(str(video), film.size_px, eye)
+    orders = read_commands(commands, Columns()) if commands else []
     detector, stamp_s, found = Detector(), [], []
     for at_s, picture in _shown(f"looking for tags in {video}", film):
         stamp_s.append(start_s + at_s)
@@ -117,11 +126,23 @@ def _track(
     seen = gather(found)
     view = look(eye, measured, seen)
     paths = follow(np.array(stamp_s), seen, view, tags)
+    if orders:
+        start_s = align(paths, orders)
+        paths = shifted(paths, start_s)
     quality = judge(paths, view, size_m)
     write_poses(out, paths, height_m, force)
     strangers = sorted(set(seen.number.tolist()) & set(ROBOTS) - {p.robot_id for p in paths})
-    data = {"out": str(out), "frames": len(found), "strangers": strangers, **quality.to_json()}
-    deliver(data, _text(out, paths, quality, view, strangers), as_json)
+    data = {
+        "out": str(out),
+        "frames": len(found),
+        "start_s": start_s,
+        "strangers": strangers,
+        **quality.to_json(),
+    }
+    notes = [f"The film began at {start_s:.2f} s of the commands."] if orders else []
+    if strangers:
+        notes.append(f"! Tags that were not asked for: {', '.join(map(str, strangers))}.")
+    deliver(data, _text(out, paths, quality, view, notes), as_json)
     return data
 
 
@@ -159,7 +180,7 @@ def _shown(what: str, film: Film) -> Iterator[tuple[float, np.ndarray]]:
 
 
 def _text(
-    out: Path, paths: list[RobotPath], quality: Quality, view: View, strangers: list[int]
+    out: Path, paths: list[RobotPath], quality: Quality, view: View, notes: list[str]
 ) -> Group:
     table = Table(box=frame.SIMPLE_HEAD)
     for name in ("robot", "lost", "longest gap", "left out", "corners", "noise", "heading"):
@@ -178,10 +199,8 @@ def _text(
         f"The camera is {view.position_m[2]:.2f} m over the floor, tilted by "
         f"{np.degrees(view.tilt_rad):.1f}°; the floor's points miss by {view.error_px:.2f} px."
     )
-    lines = [f"{out}: {len(paths)} robots, {len(paths[0].t_s)} frames at {quality.rate_hz:.1f} Hz"]
-    if strangers:
-        lines.append(f"! Tags that were not asked for: {', '.join(map(str, strangers))}.")
-    return Group(Text(lines[0]), table, *map(Text, [*lines[1:], where, quality.sentence]))
+    head = f"{out}: {len(paths)} robots, {len(paths[0].t_s)} frames at {quality.rate_hz:.1f} Hz"
+    return Group(Text(head), table, *map(Text, [*notes, where, quality.sentence]))
 
 
 def _live(

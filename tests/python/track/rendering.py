@@ -108,7 +108,7 @@ class Tag:
 
 
 @dataclass
-class Film:
+class Scene:
     """The floor, the light, and the camera's time.
 
     Attributes:

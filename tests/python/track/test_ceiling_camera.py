@@ -3,6 +3,7 @@
 
 import csv
 import json
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from twinmill.data.importers.plain import Columns, read_poses
 from twinmill.track.boards import Board
 from twinmill.track.camera import Camera, read_camera
 from twinmill.track.detect import Sightings, centres
+from twinmill.track.film import Film
 from twinmill.track.floor import View
 from twinmill.track.live import publish
 from twinmill.track.locate import locate
@@ -23,7 +25,7 @@ from twinmill.track.paths import Tags, follow
 from twinmill_cli import main as cli
 
 sys.path.insert(0, str(Path(__file__).parent))
-from rendering import Film, Lens, Tag, board_view, circle, still
+from rendering import Lens, Scene, Tag, board_view, circle, still
 
 FRAMES, RATE_HZ, HEIGHT_M = 48, 30.0, 0.12
 HIDDEN_S = (0.5, 0.8)
@@ -66,7 +68,7 @@ def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("track")
     (path / "camera.toml").write_text(camera_toml(LENS))
     (path / "floor.toml").write_text(floor_toml(FLOOR))
-    film = Film(LENS, FLOOR + ROBOTS, RATE_HZ, exposure_s=0.003, line_delay_s=25e-6)
+    film = Scene(LENS, FLOOR + ROBOTS, RATE_HZ, exposure_s=0.003, line_delay_s=25e-6)
     film.write(str(path / "run.mp4"), FRAMES)
     film.write(str(path / "short.mp4"), 3)
     replace(film, tags=FLOOR).write(str(path / "empty.mp4"), 2)
@@ -235,7 +237,7 @@ def test_shear_of_a_rolling_shutter_is_taken_out():
 
 
 def test_live_poses_are_published_as_motion_capture_does():
-    film = Film(LENS, FLOOR + ROBOTS[:2], RATE_HZ, exposure_s=0.003)
+    film = Scene(LENS, FLOOR + ROBOTS[:2], RATE_HZ, exposure_s=0.003)
     first, said = 13, []
     frames = ((1000 + k / RATE_HZ, film.frame(k)) for k in range(first, first + 5))
     view = replace(view_of(LENS), camera=replace(view_of(LENS).camera, exposure_s=0.003))
@@ -252,6 +254,27 @@ def test_live_poses_are_published_as_motion_capture_does():
         assert pose.position_m[:2] == pytest.approx(
             ROBOTS[0].path(np.array([t_s]))[0, :2], abs=3e-3
         )
+
+
+def test_a_camera_is_tracked_until_it_ends(folder, capsys):
+    words = ["--lens", "camera.toml", "--floor", "floor.toml", "--height", str(HEIGHT_M)]
+    files = [str(folder / w) if w.endswith(".toml") else w for w in words]
+    found = cli.run(["track", "--camera", str(folder / "run.mp4"), "--lcm-url", "memq://", *files,
+                     "--json"])  # fmt: skip
+    assert found["frames"] == FRAMES - 30  # the first 30 find the floor
+    assert found["poses"] == {robot: FRAMES - 30 for robot in (1, 2, 3)}
+
+
+def test_frames_that_were_dropped_leave_the_others_their_stamps(folder, tmp_path):
+    dropped = (5, 6, 20)
+    chosen = "*".join(f"not(eq(n,{k}))" for k in dropped)
+    subprocess.run(
+        ["ffmpeg", "-loglevel", "error", "-i", folder / "run.mp4", "-vf", f"select='{chosen}'",
+         "-vsync", "vfr", "-c:v", "mpeg4", tmp_path / "gaps.mp4"], check=True,
+    )  # fmt: skip
+    stamps = [stamp_s for stamp_s, _ in Film(tmp_path / "gaps.mp4").frames()]
+    kept = [k for k in range(FRAMES) if k not in dropped]
+    assert stamps == pytest.approx(np.array(kept) / RATE_HZ, abs=1e-4)
 
 
 @pytest.mark.parametrize("kind", ["charuco", "checkerboard"])
@@ -293,6 +316,8 @@ def test_lens_is_found_from_a_film_of_a_board(tmp_path, kind):
         (["--camera", "0"], "one of them"),
         (["--rate-hz", "0"], "above 0"),
         (["--height", "7"], "--height"),
+        (["--commands", "none.csv", "--start-s", "3"], "no --start-s"),
+        (["--commands", "none.csv"], "none.csv"),
         (["--out", "run.mp4"], "exists"),
         (["--floor", "none.toml"], "no floor file"),
         (["--lens", "floor.toml"], "track-calibrate"),
