@@ -25,6 +25,11 @@ COMMANDS = (
         "track",
         "Find a camera's lens from a film of a board that is moved about before it.",
     ),
+    (
+        "export-model",
+        "export_model",
+        "Write a model for other simulators, and name what their file cannot carry.",
+    ),
     ("plot", "plot", "Draw paths, speeds, bits and wheel commands of all robots in a log."),
     (
         "watch",

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers for drive controllers that know a wheel radius and distances, and no gains.
+
+They turn a wanted velocity into wheel speeds by  w_k = (vx -+ vy -+ (a + b) omega) / r. A robot
+whose true velocity is (f vx, s vy, y omega) of the ideal one does what is wanted with r' = r f and
+(a + b)' = (a + b) f / y; s other than f is what such a controller cannot know.
+"""
+
+from dataclasses import dataclass
+
+from twinmill.export.carried import Left, RobotModel
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What a controller is told.
+
+    Attributes:
+        radius_m: of the wheels, gain of speed put in.
+        scale: of the robot's half wheelbase and half track, so that it turns as fast as told.
+        top_mps: highest speed forward; None where the model states none.
+        top_radps: of turning on the spot.
+    """
+
+    radius_m: float
+    scale: float
+    top_mps: float | None
+    top_radps: float | None
+
+
+def drive_of(robot: RobotModel) -> Drive:
+    """Of a robot with its gains."""
+    forward = robot.get("base.forward_gain") * robot.get("theta_a1")
+    yaw = robot.get("base.yaw_gain") * robot.get("theta_a2")
+    top_mps = robot.top_rim_mps
+    turning = None
+    if top_mps:
+        radius_m = robot.get("robot.wheel_radius_m")
+        per_radps = max(abs(w) for w in robot.model.wheel_speeds(0, 0, 1)) * radius_m
+        turning = yaw * top_mps / per_radps
+    return Drive(
+        robot.get("robot.wheel_radius_m") * forward,
+        forward / yaw,
+        forward * top_mps if top_mps else None,
+        turning,
+    )
+
+
+def left_by_drive(robot: RobotModel, target: str) -> list[Left]:
+    """What such controllers do not know of the base."""
+    left = [
+        Left(name, f"{target} has no place for it") for name in ("duty table", "motor lag", "noise")
+    ]
+    forward, sideways = robot.get("base.forward_gain"), robot.get("base.sideways_gain")
+    if sideways != forward and robot.model.wheel_kind in ("mecanum", "none"):
+        why = f"{target} knows one wheel radius; sideways the robot goes "
+        left.append(
+            Left("base.sideways_gain", f"{why}{sideways / forward:.3g} times as far as told")
+        )
+    return left

@@ -1,0 +1,344 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A model as one MJCF file for MuJoCo as it is, without plugins and without the twin.
+
+The body moves on the floor by two slides and a hinge. Of each wheel an actuator pulls at the body
+along the wheel's grip, by the difference between the rim's speed and the body's:
+
+    force_k = kv (a_k - J_k v),  a_k the actuator's activation, J_k its gear, v the body's velocity
+
+A body that light settles within about a millisecond where the forces cancel, which is the least
+squares of J v = a: the rolling of mecanum, omni and plain wheels. Gains of the body's speeds are in
+the gears, the motors' lag is the activation's filter, a delay of commands is the actuator's own.
+"""
+
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.export.carried import HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
+
+STEP_S = 0.001
+SETTLE_S = 0.001  # of the body behind its wheels
+DELAY_SLOTS_PER_S = 1000  # commands that a delay keeps: one each step
+ASPECT = 4 / 3  # of the camera's picture
+CURVES = ("dead_zone", "speed_curve")
+STATIC = (*CURVES, "wheel_gain", "reverse_asymmetry")  # in the duty table
+LAGS = (*CURVES, "motor_lag", "lag_by_duty")
+PLACED = ("marker_offset", "heading_bias", "collision", "view_angle", "view_pan")
+DUTIES_PCT = np.arange(-100, 101)
+USUAL_PCT = 75  # a duty between those that robots drive at
+LONG_S = 20.0  # after which no lag is left
+BY_TABLE = {
+    "lag_by_duty": "MuJoCo's filter has one time constant, here that of duty "
+    f"{USUAL_PCT} %; set each wheel's actuator_dynprm from lag_s in <custom> with its duty",
+    "coasting": "MuJoCo's filter slows down by a share, not evenly; lag_s in <custom> at duty 0 "
+    f"rolls as far, from the speed of duty {USUAL_PCT} %",
+}
+
+
+def mjcf(robot: RobotModel) -> tuple[str, list[Left]]:
+    """The file's text, and what it does not carry.
+
+    Raises:
+        ValueError: the robot steers.
+    """
+    model = robot.model
+    if model.wheel_kind == "ackermann":
+        raise ValueError(
+            f"{robot.file.path}: a steered robot's wheels have no MJCF here; "
+            "use --to urdf, sdf or json."
+        )
+    left = _left(robot)
+    lags_s = _lags_s(robot)
+    root = ET.Element("mujoco", model=robot.name)
+    root.append(ET.Comment(_about(robot, left)))
+    ET.SubElement(root, "compiler", angle="radian", autolimits="true")
+    ET.SubElement(root, "option", timestep=_n(STEP_S), integrator="implicitfast")
+    root.append(_custom(robot, lags_s))
+    world = ET.SubElement(root, "worldbody")
+    ET.SubElement(world, "light", pos="0 0 3", dir="0 0 -1")
+    ET.SubElement(
+        world,
+        "geom",
+        name="floor",
+        type="plane",
+        size="5 5 0.1",
+        contype="0",
+        conaffinity="0",
+        rgba="0.8 0.8 0.8 1",
+    )
+    world.append(_body(robot))
+    root.append(_actuators(robot, float(lags_s[USUAL_PCT - DUTIES_PCT[0]])))
+    root.append(_sensors(robot))
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n", left
+
+
+def rim_table(model: native.Model) -> np.ndarray:
+    """(201, K) steady rim speed (m/s) of each wheel at duties -100..100 %, with STATIC effects."""
+    still = _with(model, STATIC)
+    still.set("base.motor_lag_s", 0.0)
+    commands = np.repeat(DUTIES_PCT[:, None] / 100.0, 4, axis=1)
+    return native.steady(still, commands, [], np.zeros((0, 0)))[0][:, 3 : 3 + len(model.wheels())]
+
+
+def lag_table(model: native.Model) -> np.ndarray:
+    """(201,) time constant (s) of a wheel after a change to duties -100..100 %.
+
+    By how far the robot falls behind from rest; at duty 0 by how far it rolls. Where a duty does
+    not move it, as at the next that does.
+    """
+    lags_s = np.full(101, np.nan)
+    slow = _with(model, LAGS)
+    for duty in range(1, 101):
+        way_m, then_m = _ways_m(slow, [duty / 100])
+        if then_m > 1e-6:
+            lags_s[duty] = LONG_S * (1 - way_m / then_m)
+    speed_mps = _ways_m(slow, [USUAL_PCT / 100])[1] / LONG_S
+    rolled = _with(model, (*LAGS, "coasting"))
+    lags_s[0] = _ways_m(rolled, [USUAL_PCT / 100, 0.0])[1] / speed_mps
+    known = np.isfinite(lags_s)
+    lags_s = np.interp(np.arange(101), np.flatnonzero(known), lags_s[known])
+    return np.concatenate([lags_s[:0:-1], lags_s])
+
+
+def _ways_m(model: native.Model, duties: list[float]) -> tuple[float, float]:
+    """Way forward in the first and in the second 20 s, the duties sharing that time evenly."""
+    count = len(duties)
+    track = native.Track(
+        np.arange(count) * LONG_S,
+        np.repeat(np.array(duties)[:, None], 4, axis=1),
+        np.full(count, np.nan),
+        np.arange(3) * LONG_S,
+        np.zeros((3, 3)),
+        np.zeros(3, np.int64),
+    )
+    ahead = native.windows(model, track, np.array([0]), np.array([[1, 2]]))[0]
+    return float(np.hypot(*ahead[0, :2])), float(np.hypot(*(ahead[1] - ahead[0])[:2]))
+
+
+def _with(model: native.Model, effects: tuple[str, ...]) -> native.Model:
+    """The model with these effects alone, on one clock."""
+    kept = model.copy()
+    for i in reversed(range(len(kept.effects))):
+        if kept.effects[i] not in effects:
+            kept.remove_effect(i)
+    kept.set("clock.offset_s", 0.0)
+    kept.set("clock.rate_ppm", 0.0)
+    return kept
+
+
+def _about(robot: RobotModel, left: list[Left]) -> str:
+    ctrl = {
+        "duty": "rim speed of the wheel in m/s: look a duty up in <custom>, "
+        "ctrl = interp(duty, duty_pct, NAME_rim_mps)",
+        "wheel_speed": "speed of the wheel in rad/s",
+        "twist": "velocity of the body: forward and left in m/s, turn to the left in rad/s",
+    }[robot.model.drive]
+    lines = [
+        f"Written by twinmill from {robot.file.path.name} (sha256 {robot.file.hash}).",
+        f"ctrl: {ctrl}.",
+        "Joints x, y, yaw are the pose; the floor is drawn and does not touch.",
+        "Not carried:",
+        *(f"- {item.sentence()}" for item in left),
+    ]
+    # A comment must not hold two hyphens in a row, nor end in one.
+    return "\n    " + "\n    ".join(line.replace("--", "- -") for line in lines) + "\n  "
+
+
+def _left(robot: RobotModel) -> list[Left]:
+    carried = [*PLACED, "motor_lag", "input_delay"]
+    if robot.model.drive == "duty":
+        carried += STATIC
+    elif robot.model.drive == "wheel_speed":
+        carried.append("wheel_gain")
+    target = "stock MuJoCo"
+    left = [
+        replace(item, why=BY_TABLE.get(item.name, item.why))
+        for item in robot.left_effects(carried, target)
+    ]
+    if robot.get("noise.drive_mps") or robot.get("noise.drive_radps"):
+        left.append(Left("noise.drive", "MuJoCo adds no noise by itself; its size is in <custom>"))
+    left.append(Left("sensor", "no bit of detection is made; its numbers are in <custom>"))
+    left.append(Left("motor torque", "the model tells none: the wheels never slip or stall"))
+    return left
+
+
+def _custom(robot: RobotModel, lags_s: np.ndarray) -> ET.Element:
+    """Numbers on which MuJoCo itself does not act, for the program that drives it."""
+    custom = ET.Element("custom")
+    if robot.model.drive == "duty":
+        _numeric(custom, "duty_pct", DUTIES_PCT)
+        for wheel, rim_mps in zip(robot.model.wheels(), rim_table(robot.model).T, strict=True):
+            _numeric(custom, f"{wheel['name']}_rim_mps", rim_mps)
+        _numeric(custom, "lag_s", lags_s)
+    _numeric(custom, "control_period_s", [robot.get("base.control_period_s")])
+    for key in ("sensor_m", "sensor_rad", "drive_mps", "drive_s", "drive_radps", "drive_turn_s"):
+        _numeric(custom, f"noise_{key}", [robot.get(f"noise.{key}")])
+    for key, value in robot.model.sight().items():
+        _numeric(custom, f"sight_{key}", [value])
+    return custom
+
+
+def _numeric(custom: ET.Element, name: str, data: np.ndarray | list[float]) -> None:
+    ET.SubElement(custom, "numeric", name=name, data=_n(*data))
+
+
+def _body(robot: RobotModel) -> ET.Element:
+    radius_m, wheel_m = robot.get("robot.body_radius_m"), robot.get("robot.wheel_radius_m")
+    body = ET.Element("body", name="base")
+    for name, kind, axis in (
+        ("x", "slide", "1 0 0"),
+        ("y", "slide", "0 1 0"),
+        ("yaw", "hinge", "0 0 1"),
+    ):
+        ET.SubElement(body, "joint", name=name, type=kind, axis=axis)
+    middle = _n(0, 0, wheel_m + HULL_HEIGHT_M / 2)
+    ET.SubElement(
+        body,
+        "inertial",
+        pos=middle,
+        mass=_n(robot.get("robot.mass_kg")),
+        diaginertia=_n(*robot.hull_inertia_kgm2()),
+    )
+    touch_m = max(0.001, radius_m + sum(v["radius_m"] for v in _values(robot, "collision")))
+    ET.SubElement(
+        body,
+        "geom",
+        name="hull",
+        type="cylinder",
+        pos=middle,
+        mass="0",
+        size=_n(touch_m, HULL_HEIGHT_M / 2),
+        rgba="0.2 0.5 0.4 0.6",
+    )
+    for wheel in robot.model.wheels():
+        axle = (-wheel["roll"][1], wheel["roll"][0], 0)
+        ET.SubElement(
+            body,
+            "geom",
+            name=wheel["name"],
+            type="cylinder",
+            mass="0",
+            contype="0",
+            conaffinity="0",
+            size=_n(wheel_m, WHEEL_WIDTH * wheel_m / 2),
+            pos=_n(wheel["x_m"], wheel["y_m"], wheel_m),
+            zaxis=_n(*axle),
+            rgba="0.1 0.1 0.1 1",
+        )
+    ET.SubElement(body, "site", name="drive")
+    x_m, y_m, bias_rad = _marker(robot)
+    ET.SubElement(
+        body,
+        "site",
+        name="marker",
+        pos=_n(x_m, y_m, wheel_m + HULL_HEIGHT_M),
+        euler=_n(0, 0, bias_rad),
+        size="0.005",
+    )
+    _camera(robot, body, radius_m, wheel_m + HULL_HEIGHT_M / 2)
+    return body
+
+
+def _camera(robot: RobotModel, body: ET.Element, x_m: float, z_m: float) -> None:
+    """Looks ahead, turned by the pan; its picture is as wide as the cone that the model sees."""
+    sight = robot.model.sight()
+    wide_rad = min(sight["cone_rad"], 0.95 * np.pi)
+    fovy_deg = np.degrees(2 * np.arctan(np.tan(wide_rad / 2) / ASPECT))  # as MuJoCo has it
+    c, s = np.cos(sight["pan_rad"]), np.sin(sight["pan_rad"])
+    ET.SubElement(
+        body,
+        "camera",
+        name="camera",
+        pos=_n(x_m, 0, z_m),
+        xyaxes=_n(s, -c, 0, 0, 0, 1),
+        fovy=_n(fovy_deg),
+        resolution="640 480",
+    )
+
+
+def _actuators(robot: RobotModel, lag_s: float) -> ET.Element:
+    """One for each wheel, or for each direction of a robot told its velocity."""
+    gains = np.array([robot.get(f"base.{d}_gain") for d in ("forward", "sideways", "yaw")])
+    gains *= [robot.get(n) for n in ("theta_a1", "theta_a1", "theta_a2")]
+    wheels = robot.model.wheels()
+    rows = np.array([_grip(w) for w in wheels])
+    strafes = bool(np.any(rows[:, 1]))
+    kv = robot.get("robot.mass_kg") / SETTLE_S
+    actuator = ET.Element("actuator")
+    if robot.model.drive == "twist":
+        gains[1] *= strafes
+        # The body is as hard to turn as to push: an arm of its own radius of gyration.
+        arm_m = np.sqrt(robot.hull_inertia_kgm2()[2] / robot.get("robot.mass_kg"))
+        for name, row, gain in zip(("forward", "left", "turn"), np.eye(3), gains, strict=True):
+            scale = arm_m if name == "turn" else 1.0
+            actuator.append(_servo(robot, lag_s, name, row, kv * scale**2, gain))
+        return actuator
+    kv /= len(wheels)
+    unit = robot.get("robot.wheel_radius_m") if robot.model.drive == "wheel_speed" else 1.0
+    for k, (wheel, row) in enumerate(zip(wheels, rows, strict=True)):
+        gain = unit * np.prod([1 + list(v.values())[k] for v in _values(robot, "wheel_gain")])
+        own = unit if robot.model.drive == "duty" else gain
+        actuator.append(_servo(robot, lag_s, wheel["name"], row / gains, kv, float(own)))
+    if not strafes:  # plain wheels hold the robot sideways
+        actuator.append(_servo(robot, lag_s, "left", np.array([0.0, 1, 0]), kv * len(wheels), 0.0))
+    return actuator
+
+
+def _grip(wheel: dict) -> np.ndarray:
+    """(3,) rim speed per forward, left and turning speed of the body."""
+    x, y = wheel["grip"]
+    return np.array([x, y, wheel["x_m"] * y - wheel["y_m"] * x])
+
+
+def _servo(
+    robot: RobotModel, lag_s: float, name: str, row: np.ndarray, kv: float, gain: float
+) -> ET.Element:
+    """Pulls along `row` (forward, left, turn) until the speed there is `gain` times its filter."""
+    delay_s = sum(v["delay_s"] for v in _values(robot, "input_delay"))
+    top_mps = robot.top_rim_mps
+    options = {"name": name, "site": "drive", "gear": _n(row[0], row[1], 0, 0, 0, row[2])}
+    if lag_s > 1e-6:
+        options |= {"dyntype": "filterexact", "dynprm": _n(lag_s), "actearly": "true"}
+    if delay_s > 0:
+        options |= {"delay": _n(delay_s), "nsample": str(round(DELAY_SLOTS_PER_S * delay_s) + 1)}
+    if top_mps:
+        options["ctrlrange"] = _n(-2 * top_mps, 2 * top_mps)
+    options |= {"gainprm": _n(kv * gain), "biastype": "affine", "biasprm": _n(0, 0, -kv)}
+    return ET.Element("general", options)
+
+
+def _lags_s(robot: RobotModel) -> np.ndarray:
+    """(201,) time constants at DUTIES_PCT; of other drives the same everywhere."""
+    if robot.model.drive == "duty":
+        return lag_table(robot.model)
+    more_s = sum(v["extra_s"] for v in _values(robot, "motor_lag"))
+    return np.full(len(DUTIES_PCT), max(0.0, robot.get("base.motor_lag_s") + more_s))
+
+
+def _sensors(robot: RobotModel) -> ET.Element:
+    """What motion capture sees, with its noise as MuJoCo keeps it."""
+    sensor = ET.Element("sensor")
+    noise_m, noise_rad = (robot.get(f"noise.sensor_{u}") for u in ("m", "rad"))
+    marker = {"objtype": "site", "objname": "marker"}
+    ET.SubElement(sensor, "framepos", name="position", noise=_n(noise_m), **marker)
+    ET.SubElement(sensor, "framequat", name="orientation", noise=_n(noise_rad), **marker)
+    return sensor
+
+
+def _marker(robot: RobotModel) -> tuple[float, float, float]:
+    """Where motion capture sees the robot, in its own frame."""
+    x_m, y_m = (sum(v[k] for v in _values(robot, "marker_offset")) for k in ("x_m", "y_m"))
+    return x_m, y_m, sum(v["bias_rad"] for v in _values(robot, "heading_bias"))
+
+
+def _values(robot: RobotModel, effect: str) -> list[dict[str, float]]:
+    """Of every effect of that name."""
+    return [values for _, card, values in robot.effects() if card["name"] == effect]
+
+
+def _n(*values: float) -> str:
+    return " ".join(f"{v:.9g}" for v in np.asarray(values, float) + 0.0)

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A model as parameters for the controllers of ros2_control; joints as in the URDF."""
+
+import yaml
+
+from twinmill.export.carried import Left, RobotModel
+from twinmill.export.drive import drive_of, left_by_drive
+
+TIMEOUT_S = 0.5  # without a command: stop
+
+
+def ros2_control(robot: RobotModel) -> tuple[str, list[Left]]:
+    """The file's text, and what it does not carry.
+
+    Raises:
+        ValueError: ros2_control has no controller for these wheels.
+    """
+    kind = robot.model.wheel_kind
+    if kind not in CONTROLLERS:
+        raise ValueError(
+            f"{robot.file.path}: ros2_control drives {' and '.join(CONTROLLERS)} wheels here, not "
+            f"'{kind}'; use --to json."
+        )
+    plugin, parameters = CONTROLLERS[kind]
+    name = plugin.split("/")[0]
+    left = [
+        *left_by_drive(robot, "ros2_control"),
+        Left("sensor", "ros2_control moves the robot, and sees nothing"),
+        *robot.left_effects((), "ros2_control"),
+    ]
+    data = {
+        "controller_manager": {
+            "ros__parameters": {
+                "update_rate": round(1 / robot.get("base.control_period_s")),
+                name: {"type": plugin},
+            }
+        },
+        name: {"ros__parameters": parameters(robot)},
+    }
+    said = [f"Written by twinmill from {robot.file.path.name} (sha256 {robot.file.hash})."]
+    said += [
+        "Radius and distances hold the robot's gains: it goes and turns as fast as it is told.",
+        "Not carried:",
+        *(f"- {item.sentence()}" for item in left),
+    ]
+    return "".join(f"# {s}\n" for s in said) + yaml.safe_dump(data, sort_keys=False), left
+
+
+def _mecanum(robot: RobotModel) -> dict:
+    """https://control.ros.org, mecanum_drive_controller."""
+    drive = drive_of(robot)
+    lever_m = robot.get("robot.half_wheelbase_m") + robot.get("robot.half_track_m")
+    words = {"fl": "front_left", "fr": "front_right", "rr": "rear_right", "rl": "rear_left"}
+    joints = {f"{w}_wheel_command_joint_name": f"{k}_wheel_joint" for k, w in words.items()}
+    return {
+        "reference_timeout": TIMEOUT_S,
+        **joints,
+        "kinematics": {
+            "base_frame_offset": {"x": 0.0, "y": 0.0, "theta": 0.0},
+            "wheels_radius": _short(drive.radius_m),
+            "sum_of_robot_center_projection_on_X_Y_axis": _short(drive.scale * lever_m),
+        },
+        "base_frame_id": "base_link",
+        "odom_frame_id": "odom",
+    }
+
+
+def _differential(robot: RobotModel) -> dict:
+    """https://control.ros.org, diff_drive_controller."""
+    drive, wheels = drive_of(robot), robot.model.wheels()
+    sides = {
+        f"{side}_wheel_names": [
+            f"{w['name']}_wheel_joint" for w in wheels if (w["y_m"] > 0) == (side == "left")
+        ]
+        for side in ("left", "right")
+    }
+    limits = {}
+    if drive.top_mps and drive.top_radps:
+        for axis, top in (("linear.x", drive.top_mps), ("angular.z", drive.top_radps)):
+            limits[f"{axis}.max_velocity"] = _short(top)
+            limits[f"{axis}.min_velocity"] = -_short(top)
+    return {
+        **sides,
+        "wheel_separation": _short(2 * drive.scale * robot.get("robot.half_track_m")),
+        "wheel_radius": _short(drive.radius_m),
+        "cmd_vel_timeout": TIMEOUT_S,
+        "base_frame_id": "base_link",
+        "odom_frame_id": "odom",
+        **limits,
+    }
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+CONTROLLERS = {
+    "mecanum": ("mecanum_drive_controller/MecanumDriveController", _mecanum),
+    "differential": ("diff_drive_controller/DiffDriveController", _differential),
+}

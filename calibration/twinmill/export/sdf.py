@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A model as SDF 1.9 for Gazebo: body, wheels, camera, and Gazebo's own drive where it has one."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+
+from twinmill.export.carried import HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
+from twinmill.export.drive import drive_of, left_by_drive
+
+VERSION = "1.9"  # Gazebo Fortress and later
+DRIVES = {
+    "mecanum": ("gz-sim-mecanum-drive-system", "gz::sim::systems::MecanumDrive"),
+    "differential": ("gz-sim-diff-drive-system", "gz::sim::systems::DiffDrive"),
+}
+LONG = {"f": "front", "r": "back"}
+ROLLERS = {1: "1 1 0", -1: "1 -1 0"}  # along which a mecanum wheel grips, by the sign of its y
+
+
+def sdf(robot: RobotModel) -> tuple[str, list[Left]]:
+    """The file's text, and what it does not carry."""
+    left = _left(robot)
+    root = ET.Element("sdf", version=VERSION)
+    said = [f"Written by twinmill from {robot.file.path.name} (sha256 {robot.file.hash})."]
+    said += ["Not carried:", *(f"- {item.sentence()}" for item in left)]
+    text = "\n    ".join(line.replace("--", "- -") for line in said)
+    root.append(ET.Comment(f"\n    {text}\n  "))
+    model = ET.SubElement(root, "model", name=robot.name)
+    wheel_m, body_m = robot.get("robot.wheel_radius_m"), robot.get("robot.body_radius_m")
+    base = _solid(
+        model,
+        "base_link",
+        (0, 0, wheel_m + HULL_HEIGHT_M / 2, 0, 0, 0),
+        body_m,
+        HULL_HEIGHT_M,
+        robot.hull_mass_kg,
+        robot.hull_inertia_kgm2(),
+    )
+    _camera(base, robot, body_m)
+    for wheel in robot.model.wheels():
+        _wheel(model, robot, wheel)
+    if robot.model.wheel_kind in DRIVES:
+        _drive(model, robot)
+    ET.indent(root)
+    return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n", left
+
+
+def _left(robot: RobotModel) -> list[Left]:
+    left = left_by_drive(robot, "SDF")
+    if robot.model.wheel_kind not in DRIVES:
+        left.append(Left("drive", f"Gazebo has none for {robot.model.wheel_kind} wheels"))
+    left.append(Left("sensor", "a camera's picture is carried, no bit of detection"))
+    return [*left, *robot.left_effects(("view_angle", "view_pan", "view_range"), "Gazebo")]
+
+
+def _camera(base: ET.Element, robot: RobotModel, x_m: float) -> None:
+    """As wide as the cone that the model sees, as far as its range."""
+    sight = robot.model.sight()
+    sensor = ET.SubElement(base, "sensor", name="camera", type="camera")
+    _text(sensor, "pose", _n(x_m, 0, 0, 0, 0, sight["pan_rad"]))
+    _text(sensor, "update_rate", _n(1 / robot.get("base.control_period_s")))
+    camera = ET.SubElement(sensor, "camera", name="camera")
+    _text(camera, "horizontal_fov", _n(min(sight["cone_rad"], 3.1)))
+    image = ET.SubElement(camera, "image")
+    _text(image, "width", "640")
+    _text(image, "height", "480")
+    clip = ET.SubElement(camera, "clip")
+    _text(clip, "near", "0.01")
+    _text(clip, "far", _n(max(sight["range_m"], 0.02)))
+
+
+def _wheel(model: ET.Element, robot: RobotModel, wheel: dict) -> None:
+    name, radius_m = wheel["name"], robot.get("robot.wheel_radius_m")
+    heading_rad = float(np.arctan2(wheel["roll"][1], wheel["roll"][0]))
+    pose = (wheel["x_m"], wheel["y_m"], radius_m, -np.pi / 2, 0, heading_rad)
+    link = _solid(
+        model,
+        f"{name}_wheel",
+        pose,
+        radius_m,
+        WHEEL_WIDTH * radius_m,
+        robot.wheel_mass_kg,
+        robot.wheel_inertia_kgm2(),
+    )
+    if robot.model.wheel_kind == "mecanum":
+        surface = ET.SubElement(link.find("collision"), "surface")
+        ode = ET.SubElement(ET.SubElement(surface, "friction"), "ode")
+        _text(ode, "mu", "1")
+        _text(ode, "mu2", "0")
+        along = ET.SubElement(ode, "fdir1")
+        along.text = ROLLERS[int(np.sign(wheel["grip"][1]))]
+        along.set("{http://gazebosim.org/schema}expressed_in", "base_link")
+    joint = ET.SubElement(model, "joint", name=f"{name}_wheel_joint", type="revolute")
+    _text(joint, "parent", "base_link")
+    _text(joint, "child", f"{name}_wheel")
+    axis = ET.SubElement(joint, "axis")
+    _text(axis, "xyz", "0 0 1")
+    limit = ET.SubElement(axis, "limit")
+    _text(limit, "lower", "-1e16")
+    _text(limit, "upper", "1e16")
+    if robot.top_rim_mps:
+        _text(limit, "velocity", _n(robot.top_rim_mps / radius_m))
+
+
+def _drive(model: ET.Element, robot: RobotModel) -> None:
+    """Gazebo's controller, with distances that make the robot turn as fast as it really does."""
+    kind, drive = robot.model.wheel_kind, drive_of(robot)
+    filename, name = DRIVES[kind]
+    plugin = ET.SubElement(model, "plugin", filename=filename, name=name)
+    for wheel in robot.model.wheels():
+        side = "left" if wheel["y_m"] > 0 else "right"
+        row = f"{LONG[wheel['name'][0]]}_" if kind == "mecanum" else ""
+        _text(plugin, f"{row}{side}_joint", f"{wheel['name']}_wheel_joint")
+    _text(plugin, "wheel_separation", _n(2 * drive.scale * robot.get("robot.half_track_m")))
+    if kind == "mecanum":
+        _text(plugin, "wheelbase", _n(2 * drive.scale * robot.get("robot.half_wheelbase_m")))
+    _text(plugin, "wheel_radius", _n(drive.radius_m))
+    if drive.top_mps and drive.top_radps:
+        for key, top in (("linear", drive.top_mps), ("angular", drive.top_radps)):
+            _text(plugin, f"min_{key}_velocity", _n(-top))
+            _text(plugin, f"max_{key}_velocity", _n(top))
+
+
+def _solid(
+    model: ET.Element,
+    name: str,
+    pose: tuple[float, ...],
+    radius_m: float,
+    length_m: float,
+    mass_kg: float,
+    inertia_kgm2: tuple[float, float, float],
+) -> ET.Element:
+    """A link that is a full cylinder along its z."""
+    link = ET.SubElement(model, "link", name=name)
+    _text(link, "pose", _n(*pose))
+    inertial = ET.SubElement(link, "inertial")
+    _text(inertial, "mass", _n(mass_kg))
+    inertia = ET.SubElement(inertial, "inertia")
+    for key, value in zip(("ixx", "iyy", "izz"), inertia_kgm2, strict=True):
+        _text(inertia, key, _n(value))
+    for kind in ("visual", "collision"):
+        part = ET.SubElement(link, kind, name=kind)
+        cylinder = ET.SubElement(ET.SubElement(part, "geometry"), "cylinder")
+        _text(cylinder, "radius", _n(radius_m))
+        _text(cylinder, "length", _n(length_m))
+    return link
+
+
+def _text(parent: ET.Element, name: str, text: str) -> None:
+    ET.SubElement(parent, name).text = text
+
+
+def _n(*values: float) -> str:
+    return " ".join(f"{v:.9g}" for v in np.asarray(values, float) + 0.0)

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A model as URDF: the body, wheels on continuous joints, and the camera's frame."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+
+from twinmill.export.carried import HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
+
+EFFORT_NM = 1000.0  # a joint must state a limit, and the model knows none
+
+
+def urdf(robot: RobotModel) -> tuple[str, list[Left]]:
+    """The file's text, and what it does not carry."""
+    left = _left(robot)
+    root = ET.Element("robot", name=robot.name)
+    said = [f"Written by twinmill from {robot.file.path.name} (sha256 {robot.file.hash})."]
+    said += ["Not carried:", *(f"- {item.sentence()}" for item in left)]
+    text = "\n    ".join(line.replace("--", "- -") for line in said)
+    root.append(ET.Comment(f"\n    {text}\n  "))
+    wheel_m, body_m = robot.get("robot.wheel_radius_m"), robot.get("robot.body_radius_m")
+    ET.SubElement(root, "link", name="base_footprint")
+    _joint(root, "base_joint", "fixed", "base_footprint", "base_link", (0, 0, wheel_m))
+    _solid(
+        root,
+        "base_link",
+        (0, 0, HULL_HEIGHT_M / 2),
+        (0, 0, 0),
+        body_m,
+        HULL_HEIGHT_M,
+        robot.hull_mass_kg,
+        robot.hull_inertia_kgm2(),
+    )
+    for wheel in robot.model.wheels():
+        _wheel(root, robot, wheel)
+    pan_rad = robot.model.sight()["pan_rad"]
+    ET.SubElement(root, "link", name="camera_link")
+    place = (body_m, 0, HULL_HEIGHT_M / 2)
+    _joint(root, "camera_joint", "fixed", "base_link", "camera_link", place, (0, 0, pan_rad))
+    ET.indent(root)
+    return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n", left
+
+
+def _left(robot: RobotModel) -> list[Left]:
+    left = [
+        Left(name, "URDF holds geometry, masses and limits alone")
+        for name in ("gains of speed and turning", "duty table", "motor lag", "noise", "sensor")
+    ]
+    return [*left, *robot.left_effects(("view_pan",), "URDF")]
+
+
+def _wheel(root: ET.Element, robot: RobotModel, wheel: dict) -> None:
+    """Turns about its axle (z of its link, to the left of where it rolls)."""
+    name, radius_m = wheel["name"], robot.get("robot.wheel_radius_m")
+    _solid(
+        root,
+        f"{name}_wheel",
+        (0, 0, 0),
+        (0, 0, 0),
+        radius_m,
+        WHEEL_WIDTH * radius_m,
+        robot.wheel_mass_kg,
+        robot.wheel_inertia_kgm2(),
+    )
+    heading_rad = float(np.arctan2(wheel["roll"][1], wheel["roll"][0]))
+    place, turned = (wheel["x_m"], wheel["y_m"], 0), (-np.pi / 2, 0, heading_rad)
+    joint = _joint(
+        root, f"{name}_wheel_joint", "continuous", "base_link", f"{name}_wheel", place, turned
+    )
+    ET.SubElement(joint, "axis", xyz="0 0 1")
+    if top_mps := robot.top_rim_mps:
+        speed = f"{top_mps / radius_m:.6g}"
+        ET.SubElement(joint, "limit", effort=f"{EFFORT_NM:g}", velocity=speed)
+
+
+def _solid(
+    root: ET.Element,
+    name: str,
+    place: tuple[float, ...],
+    turned: tuple[float, ...],
+    radius_m: float,
+    length_m: float,
+    mass_kg: float,
+    inertia_kgm2: tuple[float, float, float],
+) -> None:
+    """A link that is a full cylinder along z."""
+    link = ET.SubElement(root, "link", name=name)
+    inertial = ET.SubElement(link, "inertial")
+    _origin(inertial, place, turned)
+    ET.SubElement(inertial, "mass", value=f"{mass_kg:.9g}")
+    diagonal = dict(zip(("ixx", "iyy", "izz"), (f"{v:.9g}" for v in inertia_kgm2), strict=True))
+    ET.SubElement(inertial, "inertia", ixy="0", ixz="0", iyz="0", **diagonal)
+    for kind in ("visual", "collision"):
+        part = ET.SubElement(link, kind)
+        _origin(part, place, turned)
+        shape = ET.SubElement(part, "geometry")
+        ET.SubElement(shape, "cylinder", radius=f"{radius_m:.9g}", length=f"{length_m:.9g}")
+
+
+def _joint(
+    root: ET.Element,
+    name: str,
+    kind: str,
+    parent: str,
+    child: str,
+    place: tuple[float, ...],
+    turned: tuple[float, ...] = (0, 0, 0),
+) -> ET.Element:
+    joint = ET.SubElement(root, "joint", name=name, type=kind)
+    ET.SubElement(joint, "parent", link=parent)
+    ET.SubElement(joint, "child", link=child)
+    _origin(joint, place, turned)
+    return joint
+
+
+def _origin(parent: ET.Element, place: tuple[float, ...], turned: tuple[float, ...]) -> None:
+    xyz, rpy = (" ".join(f"{v:.9g}" for v in values) for values in (place, turned))
+    ET.SubElement(parent, "origin", xyz=xyz, rpy=rpy)
