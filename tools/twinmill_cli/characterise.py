@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill characterise`: drives one robot by a script, open loop, and logs all that is heard."""
 
+import shlex
 import struct
 import time
 from collections.abc import Callable, Iterator
@@ -9,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import turbopi
 import typer
 from rich.console import Console
@@ -17,15 +19,27 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import read_table
 from twinmill.data.recorder import Recorder
+from twinmill.export.script import TwistScript
 from twinmill.files import check_new_file
 from twinmill.model.mixing import duties_from_inputs
+from twinmill.model.model_file import DEFAULT_MODEL, ModelFile
 from twinmill.robots import tell
 from twinmill.robots.fleet import RUN_PERIOD_S, URL, Fleet
 from twinmill.robots.key import load
 from twinmill.robots.remote import Remote
 from twinmill_cli.keyboard import any_key
-from twinmill_cli.options import Arm, KeyFile, LcmUrl, Prefix, SshConfig
+from twinmill_cli.options import (
+    Arm,
+    KeyFile,
+    LcmUrl,
+    Model,
+    Prefix,
+    ScriptAs,
+    ScriptForm,
+    SshConfig,
+)
 from twinmill_cli.output import AsJson, deliver
+from twinmill_cli.ros_script import write_script
 from twinmill_cli.swarm import refuse_doubles, warn_of_clocks
 
 LOST_S = 0.5  # without telemetry, or without a valid pose: stop
@@ -49,7 +63,12 @@ def _characterise(
         str,
         typer.Option("--script", metavar="CSV", help="Input script, or its name there."),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="LOG", help="The log to write.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", "-o", metavar="LOG", help="The log to write; with --script-as, that file."
+        ),
+    ],
     host: Annotated[
         str, typer.Option("--host", help="Copy the script there first, by ssh: pi@robot03.local.")
     ] = "",
@@ -62,6 +81,8 @@ def _characterise(
     key: KeyFile = None,
     lcm_url: LcmUrl = URL,
     channel_prefix: Prefix = "",
+    script_as: ScriptAs = None,
+    model: Model = DEFAULT_MODEL,
     force: Annotated[bool, typer.Option("--force", help="Replace LOG if it exists.")] = False,
     as_json: AsJson = False,
 ) -> int:
@@ -71,8 +92,13 @@ def _characterise(
     logged until then is kept. Without --host, the script must lie on the robot
     (/etc/turbopi/scripts) or in twin_run's --script-dir under the same name.
 
+    With --script-as nothing is driven: the script is written for ROS, its
+    duties as the velocities that the model reaches at them.
+
     Example: twinmill characterise --robot 3 --script steps.csv --out run.lcmlog
     """
+    if script_as:
+        return _for_ros(Path(script), script_as, out, model, cap_pct, force, as_json)
     check_new_file(out, force)
     end_s = check_script(Path(script), cap_pct)
     name = Path(script).name
@@ -87,6 +113,38 @@ def _characterise(
     return 1 if why else 0
 
 
+def _for_ros(
+    script: Path, form: ScriptForm, out: Path, model: str, cap_pct: int, force: bool, as_json: bool
+) -> int:
+    """Writes the script as a bag or a publisher."""
+    end_s = check_script(script, cap_pct)
+    if end_s is None:
+        raise ValueError(f"{script}: no such script here; --script-as needs the file itself.")
+    t_s, duties_pct = read_script(script)
+    twists = TwistScript.of(ModelFile.load(model).model, t_s, duties_pct / 100, end_s)
+    words = ["twinmill", "characterise", "--script", str(script), "--script-as", form]
+    write_script(twists, form, out, force, shlex.join([*words, "--model", model]))
+    deliver({"script_as": str(out), "duration_s": end_s}, f"Written: {out}", as_json)
+    return 0
+
+
+def read_script(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """(K,) times in s and (K, 4) duties in percent of a script.
+
+    Raises:
+        ValueError: it is no script.
+    """
+    try:
+        table = read_table(path, {}, frozenset({"t_s", *INPUTS, *DUTIES}))
+        columns = INPUTS if table.has(INPUTS[0]) else DUTIES
+        t_s, values = table.finite("t_s"), [table.finite(name) for name in columns]
+    except LogError as error:
+        raise ValueError(str(error)) from error
+    rows = list(zip(*values, strict=True))
+    duties = [duties_from_inputs(*row) for row in rows] if columns == INPUTS else rows
+    return t_s, np.array(duties, float)
+
+
 def check_script(path: Path, cap_pct: int) -> float | None:
     """How long a script takes, or None if it is not here but on the robot.
 
@@ -97,15 +155,8 @@ def check_script(path: Path, cap_pct: int) -> float | None:
         if path.name != str(path):
             raise ValueError(f"{path}: no such script; a name without folder is one on the robot.")
         return None
-    try:
-        table = read_table(path, {}, frozenset({"t_s", *INPUTS, *DUTIES}))
-        columns = INPUTS if table.has(INPUTS[0]) else DUTIES
-        t_s, values = table.finite("t_s"), [table.finite(name) for name in columns]
-    except LogError as error:
-        raise ValueError(str(error)) from error
-    rows = list(zip(*values, strict=True))
-    duties = [duties_from_inputs(*row) for row in rows] if columns == INPUTS else rows
-    for at_s, row in zip(t_s, duties, strict=True):
+    t_s, duties_pct = read_script(path)
+    for at_s, row in zip(t_s, duties_pct, strict=True):
         if max(map(abs, row)) > cap_pct:
             raise ValueError(
                 f"{path}: a wheel's duty is {max(map(abs, row)):g} % at {at_s:g} s, above the cap "

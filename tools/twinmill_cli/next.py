@@ -12,13 +12,15 @@ import typer
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.experiment.design import Limits, Plan, check, design
 from twinmill.experiment.script_file import csv_text
+from twinmill.export.script import TwistScript
 from twinmill.files import check_new_file
 from twinmill.model.model_file import DEFAULT_MODEL, write_whole
 from twinmill.report import next_run as present
 from twinmill_cli import inputs
 from twinmill_cli.calibrate import command_line, finish, open_model, provenance
-from twinmill_cli.options import Logs, Model, Out
+from twinmill_cli.options import Logs, Model, Out, ScriptAs
 from twinmill_cli.output import AsJson, telling
+from twinmill_cli.ros_script import check_new_script, ros_path, write_script
 
 
 def register(app: typer.Typer) -> None:
@@ -40,6 +42,7 @@ def _next(
         int, typer.Option("--max-duty-pct", min=20, max=100, help="Highest duty of a wheel.")
     ] = 100,
     force: Annotated[bool, typer.Option("--force", help="Replace SCRIPT if it exists.")] = False,
+    script_as: ScriptAs = None,
     as_json: AsJson = False,
     out: Out = None,
 ) -> Plan:
@@ -57,6 +60,8 @@ def _next(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
     check_new_file(output, force)
+    if script_as:
+        check_new_script(script_as, ros_path(script_as, output), force)
     with telling(f"designing a run with {model}") as say:
         measurements = inputs.load(logs, model_file, as_json)
         check(measurements, model_file, limits)
@@ -64,6 +69,10 @@ def _next(
     write_whole(output, csv_text(plan.rows))
     how = _how(plan, logs, model, output)
     data = {"script": str(output), **plan.to_json()}
+    if script_as:
+        data["script_as"] = str(ros_path(script_as, output))
+        twists = TwistScript.of(model_file.model, plan.rows.t_s, plan.rows.duty, plan.rows.end_s)
+        write_script(twists, script_as, Path(data["script_as"]), force, source.command)
     finish(data, present.terminal(plan, how), source, present.section(plan, how), as_json, out)
     return plan
 

@@ -1,11 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Options that several subcommands share."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+
+class ScriptForm(StrEnum):
+    """In which a script is written for robots that listen to velocities."""
+
+    BAG = "bag"
+    PUBLISHER = "publisher"
+
+
+ScriptAs = Annotated[
+    ScriptForm | None,
+    typer.Option(
+        "--script-as",
+        help="For robots on ROS: a bag with /cmd_vel, or a Python program that publishes it.",
+    ),
+]
 Logs = Annotated[
     list[Path],
     typer.Argument(

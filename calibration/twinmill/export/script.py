@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A script of duties for robots that listen to geometry_msgs/Twist: as a ROS bag or a publisher.
+
+Duties become the body velocities that the model reaches at them. Robots stop when no command comes
+for a while, so each is said again every PERIOD_S.
+"""
+
+import shutil
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from string import Template
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.files import check_new_file, check_new_folder
+from twinmill.model.model_file import write_whole
+
+TOPIC = "/cmd_vel"
+PERIOD_S = 0.05
+TWIST = "geometry_msgs/msg/Twist"
+BAG_VERSION = 9  # of rosbag2's metadata: Iron and later
+
+
+@dataclass(frozen=True)
+class TwistScript:
+    """Body velocities over time.
+
+    Attributes:
+        t_s: (K,) when each begins, ascending.
+        twist: (K, 3) vx_mps, vy_mps, omega_radps.
+        end_s: when the robot stops.
+    """
+
+    t_s: np.ndarray
+    twist: np.ndarray
+    end_s: float
+
+    @classmethod
+    def of(cls, model: native.Model, t_s: np.ndarray, duty: np.ndarray, end_s: float):
+        """From (K, 4) duties, -1..1, as the model drives them.
+
+        Raises:
+            ValueError: the model's robot is not told duties.
+        """
+        if model.drive != "duty":
+            raise ValueError(
+                f"--script-as: the script holds duties, and the model's robot is told by "
+                f"'{model.drive}'; give the model of a duty robot with --model."
+            )
+        steady = native.steady(model, np.ascontiguousarray(duty), [], np.zeros((0, 0)))[0]
+        return cls(np.asarray(t_s, float), np.round(steady[:, :3], 6) + 0.0, float(end_s))
+
+    def repeated(self) -> tuple[np.ndarray, np.ndarray]:
+        """(M,) times every PERIOD_S and at every change, (M, 3) velocities; the last is zero."""
+        ticks = np.arange(self.t_s[0], self.end_s, PERIOD_S)
+        t_s = np.unique(np.round(np.concatenate([ticks, self.t_s[self.t_s < self.end_s]]), 6))
+        row = np.searchsorted(self.t_s, t_s + 1e-9, "right") - 1
+        return np.append(t_s, self.end_s), np.vstack([self.twist[row], np.zeros(3)])
+
+
+def write_bag(script: TwistScript, out: Path, force: bool) -> None:
+    """A rosbag2 folder (sqlite3) with the topic /cmd_vel; there whole or not at all.
+
+    Raises:
+        ValueError: it exists, or cannot be written.
+    """
+    from rosbags.rosbag2 import Writer  # slow to import
+    from rosbags.typesys import Stores, get_typestore
+
+    if out.exists() and not (force and out.is_dir()):
+        raise ValueError(f"{out}: exists; choose another name, or replace it with --force.")
+    check_new_folder(out)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    vector, twist = store.types["geometry_msgs/msg/Vector3"], store.types[TWIST]
+    with tempfile.TemporaryDirectory(prefix=f".{out.name}.", dir=out.parent) as folder:
+        bag = Path(folder) / out.name
+        with Writer(bag, version=BAG_VERSION) as writer:
+            topic = writer.add_connection(TOPIC, TWIST, typestore=store)
+            for t_s, (vx, vy, omega) in zip(*script.repeated(), strict=True):
+                message = twist(vector(x=vx, y=vy, z=0.0), vector(x=0.0, y=0.0, z=omega))
+                raw = store.serialize_cdr(message, TWIST)
+                writer.write(topic, round(t_s * 1e9), raw)
+        if out.exists():
+            shutil.rmtree(out)
+        bag.rename(out)
+
+
+def write_publisher(script: TwistScript, out: Path, force: bool, command: str) -> None:
+    """A Python program that needs ROS 2 alone.
+
+    Raises:
+        ValueError: it exists, or cannot be written.
+    """
+    check_new_file(out, force)
+    rows = [
+        f"    ({t_s:.6g}, {vx:.6g}, {vy:.6g}, {omega:.6g}),"
+        for t_s, (vx, vy, omega) in zip(script.t_s, script.twist, strict=True)
+    ]
+    template = Template((Path(__file__).parent / "publisher.py.in").read_text())
+    said = command.replace("\\", "/").replace('"', "'")
+    text = template.substitute(
+        command=said, rows="\n".join(rows), end_s=f"{script.end_s:.6g}", period_s=f"{PERIOD_S:g}"
+    )
+    write_whole(out, text)

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scripts of drives for robots on ROS, as `next` and `characterise` write them."""
+
+from pathlib import Path
+
+from twinmill.export.script import TwistScript, write_bag, write_publisher
+from twinmill.files import check_new_file, check_new_folder
+from twinmill_cli.options import ScriptForm
+
+
+def ros_path(form: ScriptForm, script: Path) -> Path:
+    """Beside the script: `script_bag/`, or `script_publisher.py`."""
+    suffix = "" if form is ScriptForm.BAG else ".py"
+    return script.with_name(f"{script.stem}_{form}{suffix}")
+
+
+def check_new_script(form: ScriptForm, path: Path, force: bool) -> None:
+    """Raises ValueError if it could not be written, before the long work."""
+    if form is ScriptForm.PUBLISHER:
+        check_new_file(path, force)
+        return
+    if path.exists() and not force:
+        raise ValueError(f"{path}: exists; choose another name, or replace it with --force.")
+    check_new_folder(path)
+
+
+def write_script(
+    script: TwistScript, form: ScriptForm, path: Path, force: bool, command: str
+) -> None:
+    """Whole or not at all."""
+    if form is ScriptForm.BAG:
+        write_bag(script, path, force)
+    else:
+        write_publisher(script, path, force, command)
