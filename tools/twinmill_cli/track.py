@@ -32,6 +32,8 @@ from twinmill_cli.numbers import parse_numbers
 from twinmill_cli.options import LcmUrl
 from twinmill_cli.output import AsJson, deliver
 
+WHOLE = 0.98  # of the frames that a container promises; some count them wrongly by a few
+
 Rate = Annotated[
     float | None,
     typer.Option("--rate-hz", help="The frames' rate, where the file's stamps are no good."),
@@ -135,11 +137,14 @@ def _track(
     data = {
         "out": str(out),
         "frames": len(found),
+        "frames_in_file": film.count,
         "start_s": start_s,
         "strangers": strangers,
         **quality.to_json(),
     }
     notes = [f"The film began at {start_s:.2f} s of the commands."] if orders else []
+    if len(found) < WHOLE * film.count:
+        notes.append(f"! The film breaks off: of {film.count} frames {len(found)} can be read.")
     if strangers:
         notes.append(f"! Tags that were not asked for: {', '.join(map(str, strangers))}.")
     deliver(data, _text(out, paths, quality, view, notes), as_json)

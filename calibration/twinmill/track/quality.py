@@ -89,7 +89,8 @@ def judge(paths: list[RobotPath], view: View, size_m: float) -> Quality:
     it; the floor's error tells of that.
     """
     robots = [_robot(path, size_m) for path in paths]
-    heading = np.array([robot.heading_noise_rad for robot in robots])
+    # Corners that are off alike for a while are no noise from frame to frame, but an error.
+    heading = np.array([max(r.corner_heading_rad, r.heading_noise_rad) for r in robots])
     noise_rad = float(np.nanmedian(heading)) if np.isfinite(heading).any() else np.nan
     # A wheel of four that loses the share g turns a robot at speed v by g v / (4 lever).
     turn_rad = SPEED_MPS * WINDOW_S / (4 * LEVER_M)
@@ -110,11 +111,8 @@ def _robot(path: RobotPath, size_m: float) -> RobotQuality:
     heading[valid] = np.unwrap(heading[valid])
     rms_px = float(np.sqrt(np.mean(path.error_px[valid] ** 2))) if valid.any() else np.nan
     # Eight coordinates less three that were fitted make the misses; four corners make the place.
-    one_m = (
-        rms_px / np.sqrt(2) * np.sqrt(8 / 5) / np.median(path.scale_px_per_m[valid])
-        if valid.any()
-        else np.nan
-    )
+    scale = np.median(path.scale_px_per_m[valid]) if valid.any() else np.nan
+    one_m = rms_px / np.sqrt(2) * np.sqrt(8 / 5) / scale
     return RobotQuality(
         path.robot_id,
         len(valid),

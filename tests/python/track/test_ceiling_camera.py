@@ -342,6 +342,15 @@ def test_a_film_that_is_none_or_shows_no_robot_is_said(folder, tmp_path):
     assert not (tmp_path / "o.csv").exists()
 
 
+def test_a_film_that_breaks_off_is_read_so_far_and_that_is_said(folder, tmp_path, capsys):
+    Scene(LENS, FLOOR + ROBOTS).write(str(tmp_path / "whole.avi"), 6, "MJPG")
+    data = (tmp_path / "whole.avi").read_bytes()
+    (tmp_path / "cut.avi").write_bytes(data[: len(data) * 6 // 10])
+    found = track(folder, "--out", tmp_path / "o.csv", video=tmp_path / "cut.avi")
+    assert 2 <= found["frames"] < 6 == found["frames_in_file"]
+    assert "The film breaks off: of 6 frames" in capsys.readouterr().out
+
+
 def points(rows):
     return "".join(f"[[point]]\nu_px={u}\nv_px={v}\nx_m={x}\ny_m={y}\n" for u, v, x, y in rows)
 
