@@ -312,11 +312,13 @@ def _proven(trial: Trial, settings: Settings) -> bool:
 
 
 def _is_neutral(trial: Trial, name: str) -> bool:
-    """An effect whose numbers are all where it does nothing explains nothing."""
+    """An effect whose sizes are all where it does nothing explains nothing, wherever it is."""
     if name == REFIT:
         return False
     instance = [n for n in effect_names(trial.state.model) if n.split("#")[0] == name][-1]
     for p in catalogue_of(trial.state.model)[name]["parameters"]:
+        if p["role"] == "place":
+            continue
         value = trial.state.model.get(f"{instance}.{p['name']}")
         if abs(value - p["neutral"]) > 1e-3 * abs(p["default"] - p["neutral"]):
             return False

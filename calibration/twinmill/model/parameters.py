@@ -49,8 +49,8 @@ class Parameter:
     role: str = "size"
 
     def at(self, value: float) -> "Parameter":
-        """The same, begun elsewhere."""
-        return replace(self, value=value)
+        """The same, begun elsewhere; no place is usual, so the prior of one goes with it."""
+        return replace(self, value=value, usual=value if self.role == "place" else self.usual)
 
 
 @dataclass(frozen=True)

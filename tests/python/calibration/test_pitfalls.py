@@ -173,6 +173,38 @@ def test_a_patch_of_the_floor_wins_on_fit_and_is_no_evidence(tanh_robot, measure
         assert trial.evidence < Settings().evidence
 
 
+ORIGIN_M = np.array([-40.0, 25.0])
+
+
+def test_a_patch_is_found_however_far_away_the_origin_is(tanh_robot, measure, fitted):
+    """A hall's corner is the origin; on a square of 0.6 m the robot is 40 % slower.
+
+    A round patch with a soft edge is not a square: its strength is not quite that.
+    """
+
+    class Slowed(tanh_robot):
+        def poses(self, duty, seed):
+            """Retraces the free robot's steps, shorter where it stands on the square."""
+            free = tanh_robot.poses(replace(self, sensor_m=0, sensor_rad=0), duty, seed)
+            random = np.random.default_rng(seed + 1)
+            pose = np.zeros_like(free)
+            pose[0] = (*ORIGIN_M, 0)
+            for k, step in enumerate(np.diff(free, axis=0)):
+                c, s = np.cos(pose[k, 2] - free[k, 2]), np.sin(pose[k, 2] - free[k, 2])
+                turned = np.array([c * step[0] - s * step[1], s * step[0] + c * step[1], step[2]])
+                on = np.all(np.abs(pose[k, :2] - ORIGIN_M - (-0.9, -0.3)) < 0.3)
+                pose[k + 1] = pose[k] + (0.6 if on else 1.0) * turned
+            sensor = np.array([self.sensor_m, self.sensor_m, self.sensor_rad])
+            return pose + random.normal(size=pose.shape) * sensor
+
+    found = diagnose([measure(Slowed(), 320, 150.0)], fitted)
+    assert found.found[:1] == ["floor_patch"]
+    values = {e.name.partition(".")[2]: e.value for e in found.findings[0].parameters}
+    assert values["strength"] == pytest.approx(0.4, abs=0.15)
+    assert values["x_m"] == pytest.approx(ORIGIN_M[0] - 0.9, abs=0.1)
+    assert values["y_m"] == pytest.approx(ORIGIN_M[1] - 0.3, abs=0.1)
+
+
 RAMP_S, PLAY_S = 0.1, 0.05
 
 

@@ -29,11 +29,12 @@ constexpr Card kCard = {
 constexpr ParameterSpec kParameters[] = {
     {"strength", "1", 0, 0.2, -1, 0.95, "relative loss of speed on the patch",
      "slower on a patch of the floor", "faster on a patch of the floor"},
-    {"x_m", "m", 0, 0.3, -5, 5, "centre in W; means nothing at strength 0", "", "", 0,
+    {"x_m", "m", 0, 0.3, -100, 100, "centre in W; means nothing at strength 0", "", "", 1,
      Role::kPlace},
-    {"y_m", "m", 0, 0.2, -5, 5, "centre in W; means nothing at strength 0", "", "", 0,
+    {"y_m", "m", 0, 0.2, -100, 100, "centre in W; means nothing at strength 0", "", "", 1,
      Role::kPlace},
-    {"radius_m", "m", 0.5, 0.3, 0.02, 3, "of the patch; means nothing at strength 0"},
+    {"radius_m", "m", 0.5, 0.3, 0.02, 3, "of the patch; means nothing at strength 0", "", "", 0,
+     Role::kPlace},
 };
 
 // A robot's wheels reach a patch one by one: its edge is about as wide as the robot.

@@ -12,7 +12,7 @@ namespace twin
 enum class Role
 {
     kSize,      // how strong the effect is
-    kPlace,     // where in the room it acts: a search starts from several places
+    kPlace,     // where in the room it acts, how far: a search starts from several places
     kLateness,  // how late a response comes: only the sum with other such parameters is firm
 };
 
