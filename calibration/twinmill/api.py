@@ -27,6 +27,7 @@ from twinmill.data.log import read_log
 from twinmill.data.measurement import Measurement, load_measurements
 from twinmill.data.multi_log import read_everyone
 from twinmill.data.steady_table import Sheet, is_sheet
+from twinmill.defaults import DEFAULT_MODEL
 from twinmill.diagnosis import diagnose as _diagnose
 from twinmill.diagnosis.detections.add import BitAddition, add_to_camera, is_of_camera
 from twinmill.diagnosis.findings import Ranked
@@ -34,7 +35,7 @@ from twinmill.files import plain, replacing
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
-from twinmill.model.model_file import DEFAULT_MODEL, ModelFile
+from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import catalogue
 from twinmill.programs import find_program
 from twinmill.report import detections, error_figures, show, steady_figures, views

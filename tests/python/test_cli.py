@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from twinmill.files import plain
 from twinmill.report.tables import number
 from twinmill_cli import main as cli
-from twinmill_cli.lazy import Later
+from twinmill_cli.lazy import LazyCommand
 
 
 @pytest.fixture
@@ -226,13 +226,38 @@ def test_numbers_are_shown_to_three_digits(value):
 
 @pytest.mark.parametrize(("name", "module", "summary"), cli.COMMANDS)
 def test_the_list_of_commands_says_what_each_says_of_itself(name, module, summary):
-    command = Later(name, f"twinmill_cli.{module}", summary).command()
+    command = LazyCommand(name, f"twinmill_cli.{module}", summary).command()
     assert " ".join((command.short_help or command.help).split("\n\n")[0].split()) == summary
 
 
-def test_help_needs_no_numbers():
-    code = "import sys; from twinmill_cli.main import run; run(['--help']); print(*sys.modules)"
+HEAVY = {"mujoco", "numpy", "pandas", "PIL", "matplotlib", "pyarrow", "pydantic", "ribs", "scipy"}
+HELPS = [[], *([name] for name, _, _ in cli.COMMANDS), ["swarm", "stop"], ["swarm", "status"]]
+
+
+def test_no_help_imports_what_only_work_needs():
+    code = (
+        "import json, sys\n"
+        "from twinmill_cli.main import run\n"
+        "def loaded(words):\n"
+        "    before = set(sys.modules)\n"
+        "    assert run([*words, '--help']) == 0\n"
+        "    return [*set(sys.modules) - before]\n"
+        f"found = {{' '.join(words): loaded(words) for words in {HELPS}}}\n"
+        "print(json.dumps([found, [*sys.modules]]))\n"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.split("\n")[-2].split())
+    by_help, loaded = json.loads(done.stdout.splitlines()[-1])
     assert "typer" in loaded
-    assert not loaded & {"numpy", "scipy", "matplotlib", "ribs", "twinmill_native"}
+    for words, modules in by_help.items():
+        assert not set(modules) & {*HEAVY, "twinmill_native", "twinmill.model"}, words
+
+
+def test_a_command_works_after_its_help_was_shown(twinmill):
+    assert twinmill("effects", "--help")[0] == 0
+    code, out, _ = twinmill("effects", "coasting", "--json")
+    assert code == 0 and strict(out)["name"] == "coasting"
+
+
+def test_help_may_be_the_value_of_an_option(twinmill):
+    code, _, err = twinmill("effects", "--json", "--", "--help")
+    assert code == 1 and "effect '--help': not in the catalogue" in err

@@ -1,29 +1,36 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill ask`: how many robots, how fast, how good their sensors, how alike."""
 
-import hashlib
+from __future__ import annotations
+
 import shlex
-import tempfile
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from matplotlib.axes import Axes
-from rich.console import Group
 
-from twinmill.files import check_new_folder
-from twinmill.model.model_file import ModelFile
-from twinmill.report import Figure, Provenance, Section, write_report
-from twinmill.report.canvas import FLOOR, MEASURED, draw
-from twinmill.swarm.axes import Axis
-from twinmill.swarm.classes import check_goal, goal_of, interval, reached
-from twinmill.swarm.request import Request
-from twinmill.swarm.store import read_sweep
-from twinmill.swarm.sweep import make_request, sweep
+from twinmill_cli.lazy import working
 from twinmill_cli.options import Out
 from twinmill_cli.output import AsJson, deliver
+
+if working():  # not for --help
+    import hashlib
+    import tempfile
+
+    from matplotlib.axes import Axes
+    from rich.console import Group
+
+    from twinmill.files import check_new_folder
+    from twinmill.model.model_file import ModelFile
+    from twinmill.report import Figure, Provenance, Section, write_report
+    from twinmill.report.canvas import FLOOR, MEASURED, draw
+    from twinmill.swarm.axes import Axis
+    from twinmill.swarm.classes import check_goal, goal_of, interval, reached
+    from twinmill.swarm.request import Request
+    from twinmill.swarm.store import read_sweep
+    from twinmill.swarm.sweep import make_request, sweep
 
 
 class Question(StrEnum):

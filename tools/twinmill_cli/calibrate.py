@@ -1,34 +1,42 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill compare`, `fit` and `add`: from logs and a model to errors and a better model."""
 
+from __future__ import annotations
+
 import shlex
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import RenderableType
 
-from twinmill.diagnosis.detections.add import BitAddition, add_to_camera, is_of_camera
-from twinmill.files import check_new_file, check_new_folder
-from twinmill.fitting.add import AddResult, add
-from twinmill.fitting.compare import Comparison, compare
-from twinmill.fitting.fit import FitResult, fit
-from twinmill.model.model_file import DEFAULT_MODEL, ModelFile
-from twinmill.report import (
-    Provenance,
-    Section,
-    added_section,
-    comparison_section,
-    fit_section,
-    show,
-    write_report,
-)
-from twinmill.report import detections as bits
-from twinmill_cli import inputs
-from twinmill_cli.effects import find_effect
+from twinmill.defaults import DEFAULT_MODEL
+from twinmill_cli.lazy import working
 from twinmill_cli.options import Force, Logs, Model, NewModel, Out
 from twinmill_cli.output import AsJson, busy, deliver
+
+if working():  # not for --help
+    from importlib.metadata import version
+
+    from rich.console import RenderableType
+
+    from twinmill.diagnosis.detections.add import BitAddition, add_to_camera, is_of_camera
+    from twinmill.files import check_new_file, check_new_folder
+    from twinmill.fitting.add import AddResult, add
+    from twinmill.fitting.compare import Comparison, compare
+    from twinmill.fitting.fit import FitResult, fit
+    from twinmill.model.model_file import ModelFile
+    from twinmill.report import (
+        Provenance,
+        Section,
+        added_section,
+        comparison_section,
+        fit_section,
+        show,
+        write_report,
+    )
+    from twinmill.report import detections as bits
+    from twinmill_cli import inputs
+    from twinmill_cli.effects import find_effect
 
 
 def register(app: typer.Typer) -> None:

@@ -1,35 +1,42 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill challenge`: the blind test from end to end."""
 
+from __future__ import annotations
+
 import contextlib
-import hashlib
 import io
 import json
-import multiprocessing
 import os
-import shutil
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
-from rich.console import Console
-from rich.progress import MofNCompleteColumn, Progress, TimeRemainingColumn
 
-import twinmill as tm
-from twinmill.challenge.cases import Case, calibration, draw, draw_robots, make_log, seal
-from twinmill.challenge.robots import Robot
-from twinmill.challenge.run import play, write_log
-from twinmill.challenge.scoring import scored, summary
-from twinmill.files import check_new_folder
-from twinmill.model.model_file import write_whole
-from twinmill.report import challenge as page
-from twinmill_cli.main import run
+from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, deliver
+
+if working():  # not for --help
+    import hashlib
+    import multiprocessing
+    import shutil
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from importlib.metadata import version
+
+    import numpy as np
+    from rich.console import Console
+    from rich.progress import MofNCompleteColumn, Progress, TimeRemainingColumn
+
+    import twinmill as tm
+    from twinmill.challenge.cases import Case, calibration, draw, draw_robots, make_log, seal
+    from twinmill.challenge.robots import Robot
+    from twinmill.challenge.run import play, write_log
+    from twinmill.challenge.scoring import scored, summary
+    from twinmill.files import check_new_folder
+    from twinmill.model.model_file import write_whole
+    from twinmill.report import challenge as page
+    from twinmill_cli.main import run
 
 DONE = "done"  # folder of the cases that are done, while others are not
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill characterise`: drives one robot by a script, open loop, and logs all that is heard."""
 
+from __future__ import annotations
+
 import shlex
 import struct
 import time
@@ -10,24 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-import turbopi
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from twinmill.data.log import LogError
-from twinmill.data.measurement_table import read_table
-from twinmill.data.recorder import Recorder
-from twinmill.export.script import TwistScript
-from twinmill.files import check_new_file
-from twinmill.model.mixing import duties_from_inputs
-from twinmill.model.model_file import DEFAULT_MODEL, ModelFile
-from twinmill.robots import tell
-from twinmill.robots.fleet import RUN_PERIOD_S, URL, Fleet
-from twinmill.robots.key import load
-from twinmill.robots.remote import Remote
-from twinmill_cli.keyboard import any_key
+from twinmill.defaults import DEFAULT_MODEL, URL
+from twinmill_cli.lazy import working
 from twinmill_cli.options import (
     Arm,
     KeyFile,
@@ -39,8 +27,27 @@ from twinmill_cli.options import (
     SshConfig,
 )
 from twinmill_cli.output import AsJson, deliver
-from twinmill_cli.ros_script import write_script
-from twinmill_cli.swarm import refuse_doubles, warn_of_clocks
+
+if working():  # not for --help
+    import numpy as np
+    import turbopi
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from twinmill.data.log import LogError
+    from twinmill.data.measurement_table import read_table
+    from twinmill.data.recorder import Recorder
+    from twinmill.export.script import TwistScript
+    from twinmill.files import check_new_file
+    from twinmill.model.mixing import duties_from_inputs
+    from twinmill.model.model_file import ModelFile
+    from twinmill.robots import tell
+    from twinmill.robots.fleet import RUN_PERIOD_S, Fleet
+    from twinmill.robots.key import load
+    from twinmill.robots.remote import Remote
+    from twinmill_cli.keyboard import any_key
+    from twinmill_cli.ros_script import write_script
+    from twinmill_cli.swarm import refuse_doubles, warn_of_clocks
 
 LOST_S = 0.5  # without telemetry, or without a valid pose: stop
 AFTER_S = 1.0  # logged after the end: the robot still rolls

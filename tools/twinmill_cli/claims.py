@@ -1,24 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill claims`: does this program do what was published?"""
 
-import hashlib
+from __future__ import annotations
+
 import json
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Group
-from rich.text import Text
 
-from twinmill.claims.claims import CLAIMS, ODD_TURNS
-from twinmill.claims.rows import Claim, Row
-from twinmill.files import check_new_folder, plain
-from twinmill.model.model_file import ModelFile, write_whole
-from twinmill.report import Provenance, Section, show, write_report
-from twinmill.report.tables import Cell, Table, number
+from twinmill_cli.lazy import working
 from twinmill_cli.options import Out
 from twinmill_cli.output import AsJson, deliver, telling
+
+if working():  # not for --help
+    import hashlib
+    from importlib.metadata import version
+
+    from rich.console import Group
+    from rich.text import Text
+
+    from twinmill.claims.claims import CLAIMS, ODD_TURNS
+    from twinmill.claims.rows import Claim, Row
+    from twinmill.files import check_new_folder, plain
+    from twinmill.model.model_file import ModelFile, write_whole
+    from twinmill.report import Provenance, Section, show, write_report
+    from twinmill.report.tables import Cell, Table, number
 
 NOTE = (
     "Claims of Vega et al. 2024 (arXiv 2410.16444). The reference is an independent C program of "
@@ -38,7 +45,8 @@ def register(app: typer.Typer) -> None:
 
 def _claims(
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="NAME", help=f"Of {', '.join(CLAIMS)}.")
+        list[str] | None,
+        typer.Option("--only", metavar="NAME", help="One of them; a wrong name lists all."),
     ] = None,
     seeds: Annotated[int, typer.Option("--seeds", min=20, help="Runs of each cell.")] = 200,
     odd_turn: Annotated[

@@ -1,45 +1,56 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill compare-swarm`: does a recorded swarm behave as the twin's swarms do?"""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-import twinmill_native as native
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from twinmill.data.log import Log, read_log
-from twinmill.model.model_file import DEFAULT_MODEL
-from twinmill.report import Figure, Section, write_report
-from twinmill.report.canvas import FLOOR, MEASURED, PREDICTED, draw, plain_ticks
-from twinmill.swarm.behaviors import find_table
-from twinmill.swarm.compare import (
-    BLOCK_S,
-    COMPARED,
-    FALSE_ALARMS,
-    Judgement,
-    blocks,
-    compared,
-    first_motion,
-    judge,
-    least_seeds,
-    least_spread,
-    plain,
-    twin_values,
-)
-from twinmill.swarm.metrics import STEP_S, SwarmSeries, swarm_metrics
-from twinmill.swarm.sweep import parse_table
-from twinmill_cli.calibrate import command_line, open_model, provenance
-from twinmill_cli.metrics import robot_ids
+from twinmill.defaults import DEFAULT_MODEL, FALSE_ALARMS, least_seeds
+from twinmill_cli.lazy import working
 from twinmill_cli.options import Model, Out
 from twinmill_cli.output import AsJson, busy, deliver
+
+if working():  # not for --help
+    from concurrent.futures import ThreadPoolExecutor
+
+    import numpy as np
+    import twinmill_native as native
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    from twinmill.data.log import Log, read_log
+    from twinmill.report import Figure, Section, write_report
+    from twinmill.report.canvas import FLOOR, MEASURED, PREDICTED, draw, plain_ticks
+    from twinmill.swarm.behaviors import find_table
+    from twinmill.swarm.compare import (
+        BLOCK_S,
+        COMPARED,
+        Judgement,
+        blocks,
+        compared,
+        first_motion,
+        judge,
+        least_spread,
+        plain,
+        twin_values,
+    )
+    from twinmill.swarm.metrics import STEP_S, SwarmSeries, swarm_metrics
+    from twinmill.swarm.sweep import parse_table
+    from twinmill_cli.calibrate import command_line, open_model, provenance
+    from twinmill_cli.metrics import robot_ids
 
 NOTE = (
     "The twin runs from the recorded start with many seeds. The chance that a true model is called "

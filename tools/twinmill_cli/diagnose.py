@@ -1,25 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill diagnose` and `explain`: which physical effect a model lacks."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 
 import typer
 
-from twinmill.data.log import read_log
-from twinmill.data.measurement import Measurements
-from twinmill.data.steady_table import is_sheet
-from twinmill.diagnosis.diagnose import diagnose
-from twinmill.diagnosis.explain import Explanation, explain
-from twinmill.diagnosis.result import Diagnosis
-from twinmill.model.model_file import DEFAULT_MODEL
-from twinmill.report import diagnosis as present
-from twinmill.swarm.metrics import swarm_metrics
-from twinmill_cli import inputs
-from twinmill_cli.calibrate import check_output, command_line, finish, open_model, provenance
-from twinmill_cli.compare_swarm import LOOK, compare_swarm
+from twinmill.defaults import DEFAULT_MODEL
+from twinmill_cli.lazy import working
 from twinmill_cli.options import Force, Logs, Model, NewModel, Out
 from twinmill_cli.output import AsJson, telling
+
+if working():  # not for --help
+    from twinmill.data.log import read_log
+    from twinmill.data.measurement import Measurements
+    from twinmill.data.steady_table import is_sheet
+    from twinmill.diagnosis.diagnose import diagnose
+    from twinmill.diagnosis.explain import Explanation, explain
+    from twinmill.diagnosis.result import Diagnosis
+    from twinmill.report import diagnosis as present
+    from twinmill.swarm.metrics import swarm_metrics
+    from twinmill_cli import inputs
+    from twinmill_cli.calibrate import check_output, command_line, finish, open_model, provenance
+    from twinmill_cli.compare_swarm import LOOK, compare_swarm
 
 TWIN_RUNS = 50
 TABLE = 1  # telemetry_t.mode

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill discover`: looks for behaviours that nobody thought of."""
 
-import hashlib
+from __future__ import annotations
+
 import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,18 +10,31 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from twinmill.files import check_new_folder
-from twinmill.report import Provenance, write_report
-from twinmill.report.discover import section
-from twinmill.swarm.discover.changes import with_changes
-from twinmill.swarm.discover.entries import Entry, confirm, entries, write_entries
-from twinmill.swarm.discover.kinds import KIND_COLORS
-from twinmill.swarm.discover.search import PER_GENERATION, Hunt, search
-from twinmill.swarm.sweep import make_request
+from twinmill.defaults import PER_GENERATION
+from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, busy, deliver
+
+if working():  # not for --help
+    import hashlib
+
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    from twinmill.files import check_new_folder
+    from twinmill.report import Provenance, write_report
+    from twinmill.report.discover import section
+    from twinmill.swarm.discover.changes import with_changes
+    from twinmill.swarm.discover.entries import Entry, confirm, entries, write_entries
+    from twinmill.swarm.discover.kinds import KIND_COLORS
+    from twinmill.swarm.discover.search import Hunt, search
+    from twinmill.swarm.sweep import make_request
 
 NOTE = (
     "A search by quality and diversity: of each sort of swarm it keeps the one that does the same "

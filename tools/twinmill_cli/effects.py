@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill effects`: the catalogue."""
 
+from __future__ import annotations
+
 from difflib import get_close_matches
 from typing import Annotated
 
 import typer
 
-from twinmill.model.parameters import catalogue
-from twinmill.report import show, tables
+from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, deliver
+
+if working():  # not for --help
+    from twinmill.model.parameters import catalogue
+    from twinmill.report import show, tables
 
 
 def find_effect(name: str) -> dict:

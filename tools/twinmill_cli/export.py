@@ -1,27 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill export`: a log for other programs."""
 
+from __future__ import annotations
+
 import os
 import shlex
-import tempfile
 from collections.abc import Callable
 from enum import StrEnum
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
-import pyarrow as pa
 import typer
 
-from twinmill.export.mcap_file import write_mcap
-from twinmill.export.recording import Recording, read_recording
-from twinmill.export.tables import tables_of, write_csv, write_parquet
-from twinmill.files import check_new_folder, replacing
-from twinmill.model.model_file import DEFAULT_MODEL
-from twinmill.model.outlines import Body
-from twinmill_cli.calibrate import open_model
+from twinmill.defaults import DEFAULT_MODEL
+from twinmill_cli.lazy import working
 from twinmill_cli.options import Model
 from twinmill_cli.output import AsJson, busy, deliver
+
+if working():  # not for --help
+    import tempfile
+    from importlib.metadata import version
+
+    import pyarrow as pa
+
+    from twinmill.export.mcap_file import write_mcap
+    from twinmill.export.recording import Recording, read_recording
+    from twinmill.export.tables import tables_of, write_csv, write_parquet
+    from twinmill.files import check_new_folder, replacing
+    from twinmill.model.outlines import Body
+    from twinmill_cli.calibrate import open_model
 
 
 class Format(StrEnum):

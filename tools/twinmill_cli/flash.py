@@ -1,31 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill flash`: puts the robot's program on many robots at once."""
 
-from concurrent.futures import Future, ThreadPoolExecutor
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich import box
-from rich.console import Console, Group
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
-from rich.text import Text
 
-from twinmill.robots.fleet import URL, Fleet
-from twinmill.robots.key import load
-from twinmill.robots.package import Packages, read_package
-from twinmill.robots.robot_update import (
-    Outcome,
-    Target,
-    Wish,
-    hand_back,
-    parse_target,
-    update,
-)
-from twinmill.swarm.behaviors import find_file, read_tables
+from twinmill.defaults import URL
+from twinmill_cli.lazy import working
 from twinmill_cli.options import KeyFile, LcmUrl, SshConfig
 from twinmill_cli.output import AsJson, deliver
+
+if working():  # not for --help
+    from concurrent.futures import Future, ThreadPoolExecutor
+
+    from rich import box
+    from rich.console import Console, Group
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.table import Table
+    from rich.text import Text
+
+    from twinmill.robots.fleet import Fleet
+    from twinmill.robots.key import load
+    from twinmill.robots.package import Packages, read_package
+    from twinmill.robots.robot_update import Outcome, Target, Wish, hand_back, parse_target, update
+    from twinmill.swarm.behaviors import find_file, read_tables
 
 AT_ONCE = 16
 

@@ -1,22 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill import`: makes a log from motion capture exports and command tables of others."""
 
+from __future__ import annotations
+
 import json
 import shlex
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
-from rich.console import Console
 
-from twinmill.data.importers.columns import Guess, to_toml
-from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
-from twinmill.data.importers.ros_bag import Topic, guess_pairs, list_topics
-from twinmill.data.log import LogError
-from twinmill.files import replacing
-from twinmill.report import show
-from twinmill.report.tables import Cell, Table
+from twinmill_cli.lazy import working
+
+if working():  # not for --help
+    import numpy as np
+    from rich.console import Console
+
+    from twinmill.data.importers.columns import Guess, to_toml
+    from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
+    from twinmill.data.importers.ros_bag import Topic, guess_pairs, list_topics
+    from twinmill.data.log import LogError
+    from twinmill.files import replacing
+    from twinmill.report import show
+    from twinmill.report.tables import Cell, Table
 
 SHOWN = 10  # warnings in the terminal; --json has all
 

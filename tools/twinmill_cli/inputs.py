@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Logs for the commands that judge a model: what is wrong with them is said, here and in JSON."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import typer
 
-from twinmill.data.measurement import BadInputError, Measurements, load_measurements
-from twinmill.model.model_file import ModelFile
+from twinmill_cli.lazy import working
 from twinmill_cli.output import deliver
+
+if working():  # not for --help
+    from twinmill.data.measurement import BadInputError, Measurements, load_measurements
+    from twinmill.model.model_file import ModelFile
 
 
 def load(logs: list[Path], model_file: ModelFile, as_json: bool) -> Measurements:

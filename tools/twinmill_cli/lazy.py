@@ -1,14 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subcommands whose modules are imported when they are called: `twinmill --help` needs none."""
+"""Subcommands whose modules are imported when they are called, and what those import to work.
 
+The help of a command needs its options alone. What else the command needs takes seconds to import,
+and its module imports that below `if working():`.
+"""
+
+import sys
 from importlib import import_module
 from typing import Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand, TyperGroup, TyperOption
+
+_working = True
 
 
-class Later(TyperCommand):
+def working() -> bool:
+    """Whether a command's module is imported to work, and not to show its help alone."""
+    return _working
+
+
+class CommandGroup(TyperGroup):
+    """A group of commands whose --help is quick."""
+
+    def get_help_option(self, ctx: typer.Context) -> TyperOption | None:
+        """Typer's, but false and not None unless given: Typer checks None with pydantic."""
+        option = super().get_help_option(ctx)
+        if option is not None:
+            option.default = False
+        return option
+
+
+class LazyCommand(TyperCommand):
     """Stands for a subcommand until that is called.
 
     Args:
@@ -25,8 +48,34 @@ class Later(TyperCommand):
         """The subcommand itself."""
         app = typer.Typer()
         import_module(self.module).register(app)
+        for command in app.registered_commands:
+            # Typer reads all annotations; what a command returns is a type of the library.
+            command.callback.__annotations__.pop("return", None)
         return typer.main.get_group(app).commands[self.name]
 
-    def make_context(self, *arguments: Any, **options: Any) -> typer.Context:
+    def make_context(
+        self, info_name: str | None, args: list[str], *rest: Any, **options: Any
+    ) -> typer.Context:
         """That of the subcommand, which is then what runs."""
-        return self.command().make_context(*arguments, **options)
+        if {"-h", "--help"} & set(args):
+            self._show_help(info_name, args, *rest, **options)
+        return self.command().make_context(info_name, args, *rest, **options)
+
+    def _show_help(
+        self, info_name: str | None, args: list[str], *rest: Any, **options: Any
+    ) -> None:
+        """Leaves with typer.Exit, unless --help is no option here but the value of one."""
+        global _working
+        known = set(sys.modules)
+        _working = False
+        try:
+            command = self.command()
+            context = command.make_context(info_name, [*args], *rest, **options)
+            if isinstance(command, TyperGroup):
+                name, subcommand, others = command.resolve_command(context, [*args])
+                subcommand.make_context(name, others, parent=context)
+        finally:
+            _working = True
+            for name in set(sys.modules) - known:
+                if name.startswith("twinmill_cli."):
+                    del sys.modules[name]

@@ -2,13 +2,11 @@
 """The command `twinmill`: all subcommands, and one sentence on what went wrong."""
 
 import sys
-from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
-from twinmill_cli.lazy import Later
+from twinmill_cli.lazy import CommandGroup, LazyCommand
 
 # Name, module and what it does, in the order of the help. The modules are imported when called.
 COMMANDS = (
@@ -128,13 +126,13 @@ COMMANDS = (
 )
 
 
-class Commands(TyperGroup):
+class Commands(CommandGroup):
     """All of them."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         for name, module, summary in COMMANDS:
-            self.add_command(Later(name, f"twinmill_cli.{module}", summary))
+            self.add_command(LazyCommand(name, f"twinmill_cli.{module}", summary))
 
 
 app = typer.Typer(
@@ -147,6 +145,8 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
+        from importlib.metadata import version  # as slow to import as all the rest
+
         typer.echo(f"twinmill {version('twinmill')}")
         raise typer.Exit
 

@@ -1,27 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill metrics`: what the swarm in a log or on the bus does, real or simulated."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-import twinmill_native as native
 import typer
 
-from twinmill.data.log import read_log
-from twinmill.data.stream import FOREVER_S
-from twinmill.model.model_file import DEFAULT_MODEL
-from twinmill.report import Figure, Section, write_report
-from twinmill.report.canvas import MEASURED, PREDICTED, draw, plain_ticks
-from twinmill.robots.fleet import URL
-from twinmill.swarm.classes import COLORS, WORDS
-from twinmill.swarm.live_metrics import Question
-from twinmill.swarm.metrics import SwarmSeries, swarm_metrics
-from twinmill_cli.calibrate import command_line, open_model, provenance
-from twinmill_cli.metrics_screen import follow
+from twinmill.defaults import DEFAULT_MODEL, FOREVER_S, URL
+from twinmill_cli.lazy import working
 from twinmill_cli.options import DurationS, LcmUrl, Model, Out
 from twinmill_cli.output import AsJson, busy, deliver
+
+if working():  # not for --help
+    import numpy as np
+    import twinmill_native as native
+
+    from twinmill.data.log import read_log
+    from twinmill.report import Figure, Section, write_report
+    from twinmill.report.canvas import MEASURED, PREDICTED, draw, plain_ticks
+    from twinmill.swarm.classes import COLORS, WORDS
+    from twinmill.swarm.live_metrics import Question
+    from twinmill.swarm.metrics import SwarmSeries, swarm_metrics
+    from twinmill_cli.calibrate import command_line, open_model, provenance
+    from twinmill_cli.metrics_screen import follow
 
 LAST_S = 10.0
 NOTE = (

@@ -1,19 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill metrics --live`: what the swarms on the bus do now, as a screen or lines of JSON."""
 
+from __future__ import annotations
+
 import json
 from contextlib import nullcontext
 
-import twinmill_native as native
-from rich.console import Group, RenderableType
-from rich.live import Live
-from rich.table import Table
-from rich.text import Text
+from twinmill_cli.lazy import working
 
-from twinmill.files import plain
-from twinmill.swarm.classes import COLORS, WORDS
-from twinmill.swarm.live_metrics import Look, Question, look_around
-from twinmill.swarm.metrics import WINDOW_S, SwarmSeries
+if working():  # not for --help
+    import twinmill_native as native
+    from rich.console import Group, RenderableType
+    from rich.live import Live
+    from rich.table import Table
+    from rich.text import Text
+
+    from twinmill.files import plain
+    from twinmill.swarm.classes import COLORS, WORDS
+    from twinmill.swarm.live_metrics import Look, Question, look_around
+    from twinmill.swarm.metrics import WINDOW_S, SwarmSeries
 
 ROWS = {  # name: what people read, format
     "circliness": ("circliness", ".3f"),

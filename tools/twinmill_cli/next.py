@@ -1,26 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill next`: a script for the robot that tells apart what the logs so far cannot."""
 
+from __future__ import annotations
+
 import re
 import shlex
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from twinmill.diagnosis.diagnose import diagnose
-from twinmill.experiment.design import Limits, Plan, check, design
-from twinmill.experiment.script_file import csv_text
-from twinmill.export.script import TwistScript
-from twinmill.files import check_new_file
-from twinmill.model.model_file import DEFAULT_MODEL, write_whole
-from twinmill.report import next_run as present
-from twinmill_cli import inputs
-from twinmill_cli.calibrate import command_line, finish, open_model, provenance
+from twinmill.defaults import DEFAULT_MODEL
+from twinmill_cli.lazy import working
 from twinmill_cli.options import Logs, Model, Out, ScriptAs
 from twinmill_cli.output import AsJson, telling
-from twinmill_cli.ros_script import check_new_script, ros_path, write_script
+
+if working():  # not for --help
+    import numpy as np
+
+    from twinmill.diagnosis.diagnose import diagnose
+    from twinmill.experiment.design import Limits, Plan, check, design
+    from twinmill.experiment.script_file import csv_text
+    from twinmill.export.script import TwistScript
+    from twinmill.files import check_new_file
+    from twinmill.model.model_file import write_whole
+    from twinmill.report import next_run as present
+    from twinmill_cli import inputs
+    from twinmill_cli.calibrate import command_line, finish, open_model, provenance
+    from twinmill_cli.ros_script import check_new_script, ros_path, write_script
 
 
 def register(app: typer.Typer) -> None:

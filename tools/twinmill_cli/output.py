@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """What all subcommands share: JSON or text, and the spinner."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Annotated
 
 import typer
-from rich.console import Console, RenderableType
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from twinmill.files import plain
+from twinmill_cli.lazy import working
+
+if working():  # not for --help
+    from rich.console import Console, RenderableType
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from twinmill.files import plain
 
 AsJson = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on stdout, nothing else.")

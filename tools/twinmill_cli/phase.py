@@ -1,24 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill phase`: a sweep as a phase diagram, with experiments on it."""
 
-import hashlib
+from __future__ import annotations
+
 import shlex
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from twinmill.files import check_new_folder
-from twinmill.report import Provenance, Section, write_report
-from twinmill.report.phase_figures import map_figure, probability_figure, thumbnail_figure
-from twinmill.report.phase_slider import slider_figure
-from twinmill.report.tables import Cell, Table, number
-from twinmill.swarm.axes import ALIASES
-from twinmill.swarm.classes import check_goal, goal_of
-from twinmill.swarm.experiments import Experiment, agreement, next_cells, read_experiments
-from twinmill.swarm.phase import CLASSES, Phase, phase_of
-from twinmill.swarm.store import read_sweep
+from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, busy, deliver
+
+if working():  # not for --help
+    import hashlib
+
+    from twinmill.files import check_new_folder
+    from twinmill.report import Provenance, Section, write_report
+    from twinmill.report.phase_figures import map_figure, probability_figure, thumbnail_figure
+    from twinmill.report.phase_slider import slider_figure
+    from twinmill.report.tables import Cell, Table, number
+    from twinmill.swarm.axes import ALIASES
+    from twinmill.swarm.classes import check_goal, goal_of
+    from twinmill.swarm.experiments import Experiment, agreement, next_cells, read_experiments
+    from twinmill.swarm.phase import CLASSES, Phase, phase_of
+    from twinmill.swarm.store import read_sweep
 
 NOTE = (
     "Each run is simulated from its own random start, with robots drawn from the model's spread; "

@@ -1,22 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill plot`: a log at one glance."""
 
+from __future__ import annotations
+
 import shlex
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
-import matplotlib
 import typer
-from matplotlib.figure import Figure as Canvas
 
-from twinmill.data.log import LogError
-from twinmill.data.multi_log import Cast, read_everyone
-from twinmill.files import replacing
-from twinmill.report import Figure, Provenance, Section, render_page
-from twinmill.report.canvas import STYLE, draw
-from twinmill.report.log_figures import Drawing
+from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, busy, deliver
+
+if working():  # not for --help
+    from importlib.metadata import version
+
+    import matplotlib
+    from matplotlib.figure import Figure as Canvas
+
+    from twinmill.data.log import LogError
+    from twinmill.data.multi_log import Cast, read_everyone
+    from twinmill.files import replacing
+    from twinmill.report import Figure, Provenance, Section, render_page
+    from twinmill.report.canvas import STYLE, draw
+    from twinmill.report.log_figures import Drawing
 
 SUFFIXES = (".png", ".svg", ".html")
 WIDTH_IN, DPI = 8.0, 150

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill swarm arm`, `start`, `stop`, `select` and `status`."""
 
+from __future__ import annotations
+
 import json
 import signal
 import sys
@@ -12,18 +14,23 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich import box
-from rich.console import Console, Group
-from rich.live import Live
-from rich.table import Table
-from rich.text import Text
 
-from twinmill.files import plain
-from twinmill.robots import tell
-from twinmill.robots.fleet import RUN_PERIOD_S, URL, Fleet, Robot
-from twinmill.robots.key import load
+from twinmill.defaults import URL
+from twinmill_cli.lazy import CommandGroup, working
 from twinmill_cli.options import Arm, KeyFile, LcmUrl, Prefix
 from twinmill_cli.output import AsJson, deliver
+
+if working():  # not for --help
+    from rich import box
+    from rich.console import Console, Group
+    from rich.live import Live
+    from rich.table import Table
+    from rich.text import Text
+
+    from twinmill.files import plain
+    from twinmill.robots import tell
+    from twinmill.robots.fleet import RUN_PERIOD_S, Fleet, Robot
+    from twinmill.robots.key import load
 
 CLOCK_WARN_S = 0.05
 
@@ -39,6 +46,7 @@ Behavior = Annotated[str, typer.Option("--behavior", "-b", help="Select it first
 def register(app: typer.Typer) -> None:
     """Adds the commands to the application."""
     swarm = typer.Typer(
+        cls=CommandGroup,
         help="Start, stop and watch the robots on the network, or those of twin_run.",
         no_args_is_help=True,
     )

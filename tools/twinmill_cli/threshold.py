@@ -1,26 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill threshold`: the green that a robot looks for, from pictures of its own camera."""
 
+from __future__ import annotations
+
 import os
 import re
 from pathlib import Path
 from typing import Annotated
 
-import twinmill_native as native
 import typer
-from rich import box as frame
-from rich.console import Group
-from rich.table import Table
-from rich.text import Text
 
-from twinmill.files import check_new_file
-from twinmill.robots.remote import Remote
-from twinmill.threshold import pictures as source
-from twinmill.threshold.box import KEYS, Ball, Box, Fitted, find_ball, fit_box, look
-from twinmill.threshold.pictures import Picture
-from twinmill.threshold.show import draw
+from twinmill_cli.lazy import working
 from twinmill_cli.options import SshConfig
 from twinmill_cli.output import AsJson, busy, deliver
+
+if working():  # not for --help
+    import twinmill_native as native
+    from rich import box as frame
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    from twinmill.files import check_new_file
+    from twinmill.robots.remote import Remote
+    from twinmill.threshold import pictures as source
+    from twinmill.threshold.box import KEYS, Ball, Box, Fitted, find_ball, fit_box, look
+    from twinmill.threshold.pictures import Picture
+    from twinmill.threshold.show import draw
 
 DEFAULT_MIN_BLOB_PX = 300  # of the robot's program
 

@@ -1,26 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill watch`: robots and their twins side by side, while they drive or from a log."""
 
+from __future__ import annotations
+
 import shlex
 import sys
 from contextlib import nullcontext
-from importlib.metadata import version
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import track
 
-from twinmill.data.multi_log import PREFIXES
-from twinmill.data.stream import FOREVER_S, from_bus, from_log
-from twinmill.files import check_new_file, replacing
-from twinmill.model.model_file import DEFAULT_MODEL, ModelFile
-from twinmill.robots.fleet import URL
-from twinmill_cli.calibrate import open_model
+from twinmill.defaults import DEFAULT_MODEL, FOREVER_S, URL
+from twinmill_cli.lazy import working
 from twinmill_cli.options import DurationS, LcmUrl, Model
 from twinmill_cli.output import AsJson, deliver
+
+if working():  # not for --help
+    from importlib.metadata import version
+    from importlib.util import find_spec
+
+    from rich.console import Console
+    from rich.progress import track
+
+    from twinmill.data.multi_log import PREFIXES
+    from twinmill.data.stream import from_bus, from_log
+    from twinmill.files import check_new_file, replacing
+    from twinmill.model.model_file import ModelFile
+    from twinmill_cli.calibrate import open_model
 
 RERUN = "rerun-sdk==0.41.0"
 

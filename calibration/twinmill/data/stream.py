@@ -12,7 +12,6 @@ from twinmill.data.lcm_log import Events, split_events
 from twinmill.data.log import read_bytes
 
 BATCH_S = 0.1
-FOREVER_S = 1e9
 CHANNELS = ".*R[0-9][0-9]+_(TELEMETRY|POSE|DRIVE|RUN)"
 
 Message = tuple[int, str, bytes]  # when it was logged or heard (us), channel, payload

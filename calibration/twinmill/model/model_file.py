@@ -16,8 +16,6 @@ import twinmill_native as native
 from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import Estimate, catalogue_of, effect_names
 
-DEFAULT_MODEL = "turbopi.toml"
-
 
 class ModelError(ValueError):
     """A model file that cannot be read or written; the message is one sentence."""

@@ -13,9 +13,9 @@ from typing import Any
 import turbopi
 
 from twinmill.data.bus import Senders, open_bus
+from twinmill.defaults import URL
 from twinmill.robots import key as keys
 
-URL = "udpm://239.255.76.67:7667?ttl=1"
 BACKLOG_S = 0.02  # what waits is taken in for so long at once
 WINDOW_S = 2.0  # over which rates and detections are told
 RUN_PERIOD_S = 5.5  # robots say who they are every 5 s

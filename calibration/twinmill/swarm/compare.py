@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
+from twinmill.defaults import FALSE_ALARMS
 from twinmill.swarm.metrics import STEP_S, SwarmSeries, body_velocity
 
 BLOCK_S = 2.0  # metrics are means over this
-FALSE_ALARMS = 0.05  # of both tests together
 STARTED_MPS = 0.02
 # Metric: is it compared by its logarithm, within which bounds, and what is the least spread between
 # runs that matters? Without the last, one touch of two robots were infinitely strange among runs
@@ -53,11 +53,6 @@ class Judgement:
     def differs(self) -> bool:
         """Whether either test says so; false alarms: FALSE_ALARMS of both together."""
         return min(self.p_value, self.p_band) <= FALSE_ALARMS / 2
-
-
-def least_seeds() -> int:
-    """Fewer cannot tell anything at this rate of false alarms."""
-    return int(np.ceil(2 / FALSE_ALARMS)) - 1
 
 
 def judge(floor: np.ndarray, twins: np.ndarray, least: np.ndarray) -> Judgement:

@@ -10,13 +10,12 @@ import pytest
 import twinmill_native as native
 from scipy.stats import binom
 
+from twinmill.defaults import FALSE_ALARMS, least_seeds
 from twinmill.model.model_file import ModelFile
 from twinmill.swarm.compare import (
-    FALSE_ALARMS,
     blocks,
     compared,
     judge,
-    least_seeds,
     least_spread,
     plain,
     twin_values,

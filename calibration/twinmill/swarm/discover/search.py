@@ -20,15 +20,13 @@ from ribs.archives import GridArchive
 from ribs.emitters import EvolutionStrategyEmitter, GaussianEmitter
 from ribs.schedulers import Scheduler
 
+from twinmill.defaults import BATCH, PER_GENERATION
 from twinmill.model.model_file import write_whole
 from twinmill.swarm.discover.genes import GENES, Mix, decode
 from twinmill.swarm.discover.kinds import COLUMNS, MEASURES, measures
 from twinmill.swarm.request import Request
 
-BATCH = 36  # candidates of each emitter in a generation
-EMITTERS = 3
 STEP = 0.2  # first standard deviation of genes
-PER_GENERATION = BATCH * EMITTERS
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values that the library uses and that the help of its commands states. Imports nothing heavy."""
+
+import math
+
+DEFAULT_MODEL = "turbopi.toml"
+FOREVER_S = 1e9  # how long a bus is listened to where nothing else is said
+
+# LCM's default group, one hop far: the robots' bus.
+URL = "udpm://239.255.76.67:7667?ttl=1"
+
+# Chance that a swarm of the model itself is called different from it, both tests together.
+FALSE_ALARMS = 0.05
+
+# A search for behaviours: candidates of each emitter in a generation, emitters, and all candidates.
+BATCH = 36
+EMITTERS = 3
+PER_GENERATION = BATCH * EMITTERS
+
+
+def least_seeds() -> int:
+    """Fewer runs of the twin cannot tell anything at this rate of false alarms."""
+    return math.ceil(2 / FALSE_ALARMS) - 1
