@@ -10,7 +10,6 @@ import html
 import subprocess
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import cached_property
 from importlib.metadata import version
 from io import StringIO
 from pathlib import Path
@@ -24,9 +23,9 @@ from rich.console import Console, RenderableType
 
 from twinmill import report
 from twinmill.data.log import read_log
-from twinmill.data.measurement import Measurement, load_measurements
+from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.multi_log import read_everyone
-from twinmill.data.steady_table import Sheet, is_sheet
+from twinmill.data.steady_table import is_sheet
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill.diagnosis import diagnose as _diagnose
 from twinmill.diagnosis.detections.add import BitAddition, add_to_camera, is_of_camera
@@ -90,16 +89,26 @@ class Log(_Shown):
     def __init__(self, paths: Iterable[str | Path], folder: TemporaryDirectory | None = None):
         self.paths = [Path(path) for path in paths]
         self._folder = folder  # removed with the last reference to a simulated run
+        self._measurements: dict[str, Measurements] = {}  # by the model's hash
         self._logs = [read_log(path) for path in self.paths if not is_sheet(path)]
 
-    @cached_property
-    def measurements(self) -> list[Measurement | Sheet]:
+    def measurements(self, model: "Model | None" = None) -> Measurements:
         """Cleaned runs, one for each robot in each log.
 
+        Args:
+            model: tells what commands do, so that they are checked against the motion; compare,
+                fit, add and diagnose give theirs. None: they are not checked.
+
         Raises:
+            BadInputError: by what is wrong with the logs, nothing is left to judge.
             LogError: a run is shorter than 10 s.
         """
-        return load_measurements(self.paths)
+        key = model.file.hash if model else ""
+        if key not in self._measurements:
+            self._measurements[key] = load_measurements(
+                self.paths, model.file.model if model else None
+            )
+        return self._measurements[key]
 
     @property
     def robots(self) -> list[int]:
@@ -295,20 +304,20 @@ class Model(_Shown):
         """
         if effect not in catalogue():
             raise ValueError(f"{effect}: no such effect; `twinmill effects` lists them.")
-        log = _log(log)
+        measurements = _log(log).measurements(self)
         name = f"{self.file.path.stem}+{effect}.toml"
         if is_of_camera(effect):
             result, file = _made(
                 name,
                 lambda out: add_to_camera(
-                    effect, log.measurements, self.file, out, f"twinmill.add {effect}"
+                    effect, measurements, self.file, out, f"twinmill.add {effect}"
                 ),
             )
         else:
             result, file = _made(
                 name,
                 lambda out: _add.add(
-                    effect, log.measurements, self.file, out, f"twinmill.add {effect}", texts
+                    effect, measurements, self.file, out, f"twinmill.add {effect}", texts
                 ),
             )
         return Addition(result, Model(file))
@@ -546,7 +555,8 @@ def compare(log: Log | str | Path, model: Model | str | None = None) -> Comparis
         >>> list(found.table().columns)
         ['channel', 'unit', 'horizon_s', 'rms', 'floor', 'ratio']
     """
-    return Comparison(_compare.compare(_log(log).measurements, _model(model).file))
+    model = _model(model)
+    return Comparison(_compare.compare(_log(log).measurements(model), model.file))
 
 
 def fit(log: Log | str | Path, model: Model | str | None = None) -> Fit:
@@ -570,7 +580,7 @@ def fit(log: Log | str | Path, model: Model | str | None = None) -> Fit:
         ['name', 'value', 'std', 'unit', 'at_bound', 'seen']
     """
     start = _model(model)
-    measurements = _log(log).measurements
+    measurements = _log(log).measurements(start)
     result, file = _made(
         f"{start.file.path.stem}_fitted.toml",
         lambda out: _fit.fit(measurements, start.file, out, "twinmill.fit"),
@@ -603,9 +613,9 @@ def diagnose(
         >>> d.best.add_to(tm.Model.load("fitted.toml")).effects
         ['coasting']
     """
-    log = _log(log)
+    log, model = _log(log), _model(model)
     result = _diagnose.diagnose(
-        log.measurements, _model(model).file, progress or (lambda _: None), tuple(without)
+        log.measurements(model), model.file, progress or (lambda _: None), tuple(without)
     )
     return Diagnosis(result, log)
 

@@ -371,6 +371,19 @@ TEST(MujocoPlant, SaysThatItBecameUnstable)
     EXPECT_THROW(plant.Step(kControl_s), std::runtime_error);
 }
 
+TEST(MujocoPlantDeathTest, WritesNoLogFileOfItsOwn)
+{
+    const auto work = std::filesystem::temp_directory_path() / "twinmill_mujoco_log";
+    std::filesystem::create_directory(work);
+    std::filesystem::current_path(work);
+    MujocoPlant plant = MakePlant({{0, 0, 0}});
+    plant.data()->qvel[0] = std::nan("");
+    EXPECT_THROW(plant.Step(kControl_s), std::runtime_error);
+    EXPECT_EXIT(mju_error("no more memory"), testing::ExitedWithCode(EXIT_FAILURE),
+                "no more memory");
+    EXPECT_TRUE(std::filesystem::is_empty(work));
+}
+
 // A robot of which only the model's numbers are known, told velocities.
 Model Twisted(WheelKind wheels)
 {

@@ -185,21 +185,27 @@ def test_a_new_message_is_exported_with_its_fields(write_log, tmp_path, monkeypa
     """As one who adds a message to lcm_types/: a type that no code here knows."""
     (tmp_path / "heat_t.lcm").write_text(
         "package hot; struct heat_t { int64_t utime_us; int32_t robot_id; float motor_degC[2]; "
-        "int32_t n; double spot_degC[n]; string note; }"
+        "int32_t n; double spot_degC[n]; string note; byte tag[3]; place_t place; }"
     )
+    (tmp_path / "place_t.lcm").write_text("package hot; struct place_t { double x_m, y_m; }")
     made = [shutil.which("lcm-gen") or pytest.skip("no lcm-gen"), "-p", "--ppath", str(tmp_path)]
-    subprocess.run([*made, str(tmp_path / "heat_t.lcm")], check=True)
+    subprocess.run([*made, *map(str, tmp_path.glob("*.lcm"))], check=True)
     monkeypatch.syspath_prepend(str(tmp_path))
-    heat_t = importlib.import_module("hot").heat_t
+    hot = importlib.import_module("hot")
+    heat_t = hot.heat_t
     monkeypatch.setitem(recording.TYPES, heat_t._get_packed_fingerprint(), heat_t)
     events = []
     for spots in ([1.5], [2.5, 3.5]):
         heat = heat_t()
         heat.utime_us, heat.motor_degC, heat.note = T0_US, [40.0, 41.0], "a, b"
         heat.n, heat.spot_degC = len(spots), spots
+        heat.tag, heat.place = b"\n,\x00", hot.place_t()
+        heat.place.x_m = 0.25
         events.append(("R01_HEAT", heat))
     run(["export", str(write_log(*events)), "--to", "csv", "-o", str(tmp_path / "out")])
     rows = list(csv.DictReader((tmp_path / "out" / "heat.csv").open()))
     assert [row["motor_degC_1"] for row in rows] == ["41", "41"]
     assert [row["spot_degC_1"] for row in rows] == ["", "3.5"]
     assert rows[0]["note"] == "a, b"
+    assert rows[0]["tag"] == "0a2c00"  # a comma and a new line of a CSV they must not be
+    assert rows[0]["place_x_m"] == "0.25"

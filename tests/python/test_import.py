@@ -7,6 +7,7 @@ import lcm
 import numpy as np
 import pytest
 import turbopi
+import twinmill_native as native
 import typer
 from hypothesis import given
 from hypothesis import strategies as st
@@ -212,8 +213,10 @@ def test_backward_keeps_the_vendors_rounding_in_its_logs_alone():
 
 
 @given(st.integers(-100, 100), st.integers(-2000, 2000))
-def test_mixing_mirrors(speed, turn_milli):
-    left, right, _, _ = duties_from_inputs(speed, turn_milli / 1000)
+def test_mixing_is_the_firmwares_and_mirrors(speed, turn_milli):
+    duties = duties_from_inputs(speed, turn_milli / 1000)
+    assert list(duties) == native.mix(speed, turn_milli)
+    left, right, _, _ = duties
     assert duties_from_inputs(speed, -turn_milli / 1000)[:2] == (right, left)
     assert duties_from_inputs(-speed, -turn_milli / 1000)[:2] == (-left, -right)
 

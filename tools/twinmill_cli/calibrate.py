@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import shlex
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -12,31 +11,30 @@ import typer
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Force, Logs, Model, NewModel, Out
-from twinmill_cli.output import AsJson, busy, deliver
+from twinmill_cli.output import AsJson, busy
 
 if working():  # not for --help
-    from importlib.metadata import version
-
-    from rich.console import RenderableType
-
     from twinmill.diagnosis.detections.add import BitAddition, add_to_camera, is_of_camera
-    from twinmill.files import check_new_file, check_new_folder
     from twinmill.fitting.add import AddResult, add
     from twinmill.fitting.compare import Comparison, compare
     from twinmill.fitting.fit import FitResult, fit
-    from twinmill.model.model_file import ModelFile
     from twinmill.report import (
-        Provenance,
-        Section,
         added_section,
         comparison_section,
         fit_section,
         show,
-        write_report,
     )
     from twinmill.report import detections as bits
-    from twinmill_cli import inputs
     from twinmill_cli.effects import find_effect
+    from twinmill_cli.frame import (
+        check_output,
+        command_line,
+        finish,
+        load,
+        open_model,
+        provenance,
+        told,
+    )
 
 
 def register(app: typer.Typer) -> None:
@@ -44,11 +42,6 @@ def register(app: typer.Typer) -> None:
     app.command("compare")(_compare)
     app.command("fit")(_fit)
     app.command("add")(_add)
-
-
-def provenance(command: str, model: ModelFile) -> Provenance:
-    """What every output carries."""
-    return Provenance(command, f"twinmill {version('twinmill')}", model.hash)
 
 
 def _compare(
@@ -64,10 +57,10 @@ def _compare(
     """
     source = provenance(command_line("compare", logs, model), model_file := open_model(model, out))
     with busy(f"comparing with {model}"):
-        measurements = inputs.load(logs, model_file, as_json)
+        measurements = load(logs, model_file, as_json)
         result = compare(measurements, model_file)
     section = comparison_section(result)
-    data = {**result.to_json(), **inputs.told(measurements)}
+    data = {**result.to_json(), **told(measurements)}
     finish(data, show.comparison(result), source, section, as_json, out)
     return result
 
@@ -89,10 +82,10 @@ def _fit(
     )
     check_output(output, model_file, force)
     with busy(f"fitting {model}"):
-        measurements = inputs.load(logs, model_file, as_json)
+        measurements = load(logs, model_file, as_json)
         result = fit(measurements, model_file, output, source.command)
     section = fit_section(result)
-    data = {**result.to_json(), **inputs.told(measurements)}
+    data = {**result.to_json(), **told(measurements)}
     finish(data, show.fit(result), source, section, as_json, out)
     return result
 
@@ -134,55 +127,17 @@ def _add(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
     check_output(output, model_file, force)
-    measurements = inputs.load(logs, model_file, as_json)
+    measurements = load(logs, model_file, as_json)
     if is_of_camera(effect):
         with busy(f"adding {effect} to {model}"):
             seen = add_to_camera(effect, measurements, model_file, output, source.command)
         section = bits.addition_section(seen, model_file.path.name)
-        data = {**seen.to_json(), **inputs.told(measurements)}
+        data = {**seen.to_json(), **told(measurements)}
         finish(data, bits.addition(seen), source, section, as_json, out)
         return seen
     with busy(f"adding {effect} to {model}"):
         result = add(effect, measurements, model_file, output, source.command, texts)
     section = added_section(result)
-    data = {**result.to_json(), **inputs.told(measurements)}
+    data = {**result.to_json(), **told(measurements)}
     finish(data, show.added(result), source, section, as_json, out)
     return result
-
-
-def command_line(verb: str, logs: list[Path], model: str, output: Path | None = None) -> str:
-    """The command line that does this again, without what only changes where and how it is told."""
-    words = ["twinmill", *shlex.split(verb), *map(str, logs), "--model", model]
-    return shlex.join(words + (["-o", str(output)] if output else []))
-
-
-def open_model(model: str, out: Path | None) -> ModelFile:
-    """Reads the model, once it is clear that the report's folder can be written."""
-    if out:
-        check_new_folder(out)
-    return ModelFile.load(model)
-
-
-def check_output(output: Path, model_file: ModelFile, force: bool) -> None:
-    """Raises ValueError if the new model could not be written, before the long work."""
-    if output.resolve() == model_file.path.resolve():
-        raise ValueError(
-            f"{output}: is the model that is read, and models are never changed in place; "
-            "choose another name."
-        )
-    check_new_file(output, force)
-
-
-def finish(
-    data: dict,
-    text: RenderableType,
-    source: Provenance,
-    section: Section,
-    as_json: bool,
-    out: Path | None,
-) -> None:
-    """Report, then JSON or text."""
-    report = write_report(out, section.title, source, [section]) if out else None
-    deliver({**data, **source.to_json(), "report": str(report) if report else None}, text, as_json)
-    if report and not as_json:
-        typer.echo(f"Report: {report}")

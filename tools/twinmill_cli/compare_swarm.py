@@ -49,7 +49,7 @@ if working():  # not for --help
     )
     from twinmill.swarm.metrics import STEP_S, SwarmSeries, swarm_metrics
     from twinmill.swarm.sweep import parse_table
-    from twinmill_cli.calibrate import command_line, open_model, provenance
+    from twinmill_cli.frame import command_line, open_model, provenance
     from twinmill_cli.metrics import robot_ids
 
 NOTE = (

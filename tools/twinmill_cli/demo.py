@@ -31,7 +31,7 @@ from twinmill.report import (
 )
 from twinmill.report.tables import Cell, Table, main_robot, number
 from twinmill_cli import main as cli
-from twinmill_cli.calibrate import provenance
+from twinmill_cli.frame import provenance
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER, LOG = Path("demo"), "demo/robot.lcmlog"

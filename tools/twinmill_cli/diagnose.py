@@ -22,9 +22,16 @@ if working():  # not for --help
     from twinmill.diagnosis.result import Diagnosis
     from twinmill.report import diagnosis as present
     from twinmill.swarm.metrics import swarm_metrics
-    from twinmill_cli import inputs
-    from twinmill_cli.calibrate import check_output, command_line, finish, open_model, provenance
     from twinmill_cli.compare_swarm import LOOK, compare_swarm
+    from twinmill_cli.frame import (
+        check_output,
+        command_line,
+        finish,
+        load,
+        open_model,
+        provenance,
+        told,
+    )
 
 TWIN_RUNS = 50
 TABLE = 1  # telemetry_t.mode
@@ -48,14 +55,14 @@ def _diagnose(
     """
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with telling(f"diagnosing with {model}") as say:
-        measurements = inputs.load(logs, model_file, as_json)
+        measurements = load(logs, model_file, as_json)
         result = diagnose(measurements, model_file, say)
         swarm = None
         if robots_recorded(logs[0], measurements) > 1:
             say("the swarm as a whole")
             note, swarm = _judge_swarm(logs[0], result)
             result = replace(result, notes=[*result.notes, note])
-    data = {**result.to_json(), **inputs.told(measurements), "swarm": swarm}
+    data = {**result.to_json(), **told(measurements), "swarm": swarm}
     if data["next_experiment"]:  # the script comes from a command of its own
         data["next_experiment"]["command"] = command_line("next", logs, model)
     finish(data, present.terminal(result), source, present.section(result), as_json, out)
@@ -112,9 +119,9 @@ def _explain(
     )
     check_output(output, model_file, force)
     with telling(f"explaining with {model}") as say:
-        measurements = inputs.load(logs, model_file, as_json)
+        measurements = load(logs, model_file, as_json)
         result = explain(measurements, model_file, output, source.command, say)
     section = present.section(result.diagnosis)
-    data = {**result.to_json(), **inputs.told(measurements)}
+    data = {**result.to_json(), **told(measurements)}
     finish(data, present.terminal_explanation(result), source, section, as_json, out)
     return result

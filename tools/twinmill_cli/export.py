@@ -28,7 +28,7 @@ if working():  # not for --help
     from twinmill.export.tables import tables_of, write_csv, write_parquet
     from twinmill.files import check_new_folder, replacing
     from twinmill.model.outlines import Body
-    from twinmill_cli.calibrate import open_model
+    from twinmill_cli.frame import open_model
 
 
 class Format(StrEnum):

@@ -1,28 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill export-model`: a model for other simulators, and ranges of its numbers."""
 
+from __future__ import annotations
+
 import json
 import shlex
 from collections.abc import Callable
 from contextlib import ExitStack
 from enum import StrEnum
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from twinmill.export.carried import Left, RobotModel, open_robot
-from twinmill.export.mjcf import mjcf
-from twinmill.export.model_json import model_json
-from twinmill.export.ranges import as_json as ranges_json
-from twinmill.export.ranges import as_npz, as_yaml, ranges
-from twinmill.export.ros2_control import ros2_control
-from twinmill.export.sdf import sdf
-from twinmill.export.urdf import urdf
-from twinmill.files import check_new_file, plain, replacing
-from twinmill_cli.calibrate import open_model
+from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, deliver
+
+if working():  # not for --help
+    from importlib.metadata import version
+
+    from twinmill.export.carried import Left, RobotModel, open_robot
+    from twinmill.export.mjcf import mjcf
+    from twinmill.export.model_json import model_json
+    from twinmill.export.ranges import as_json as ranges_json
+    from twinmill.export.ranges import as_npz, as_yaml, ranges
+    from twinmill.export.ros2_control import ros2_control
+    from twinmill.export.sdf import sdf
+    from twinmill.export.urdf import urdf
+    from twinmill.files import check_new_file, plain, replacing
+    from twinmill_cli.frame import open_model
 
 
 class Target(StrEnum):

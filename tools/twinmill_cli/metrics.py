@@ -24,7 +24,7 @@ if working():  # not for --help
     from twinmill.swarm.classes import COLORS, WORDS
     from twinmill.swarm.live_metrics import Question
     from twinmill.swarm.metrics import SwarmSeries, swarm_metrics
-    from twinmill_cli.calibrate import command_line, open_model, provenance
+    from twinmill_cli.frame import command_line, open_model, provenance
     from twinmill_cli.metrics_screen import follow
 
 LAST_S = 10.0

@@ -25,8 +25,7 @@ if working():  # not for --help
     from twinmill.files import check_new_file
     from twinmill.model.model_file import write_whole
     from twinmill.report import next_run as present
-    from twinmill_cli import inputs
-    from twinmill_cli.calibrate import command_line, finish, open_model, provenance
+    from twinmill_cli.frame import command_line, finish, load, open_model, provenance
     from twinmill_cli.ros_script import check_new_script, ros_path, write_script
 
 
@@ -70,7 +69,7 @@ def _next(
     if script_as:
         check_new_script(script_as, ros_path(script_as, output), force)
     with telling(f"designing a run with {model}") as say:
-        measurements = inputs.load(logs, model_file, as_json)
+        measurements = load(logs, model_file, as_json)
         check(measurements, model_file, limits)
         plan = design(diagnose(measurements, model_file, say), model_file, limits, say)
     write_whole(output, csv_text(plan.rows))

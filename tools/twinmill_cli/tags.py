@@ -1,17 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill tags`: sheets to print for a ceiling camera."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from twinmill.files import replacing
-from twinmill.track.boards import Board
-from twinmill.track.detect import FLOOR, ROBOTS
-from twinmill.track.sheets import PAPERS_M, board_sheet, floor_sheet, robot_sheet, write_sheets
-from twinmill_cli.numbers import parse_numbers
+from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, busy, deliver
+
+if working():  # not for --help
+    from twinmill.files import replacing
+    from twinmill.track.boards import Board
+    from twinmill.track.detect import FLOOR, ROBOTS
+    from twinmill.track.sheets import PAPERS_M, board_sheet, floor_sheet, robot_sheet, write_sheets
+    from twinmill_cli.numbers import parse_numbers
 
 
 def register(app: typer.Typer) -> None:

@@ -1,36 +1,42 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill track` and `track-calibrate`: poses from a film of tagged robots, and its lens."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
-from rich import box as frame
-from rich.console import Console, Group
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
-from rich.text import Text
 
-from twinmill.data.bus import open_bus
-from twinmill.data.importers.plain import Columns, read_commands
-from twinmill.files import check_new_file
-from twinmill.track.align import align, shifted
-from twinmill.track.boards import Board
-from twinmill.track.camera import Camera, read_camera
-from twinmill.track.detect import ROBOTS, Detector, gather
-from twinmill.track.film import Film, LiveCamera
-from twinmill.track.floor import View, look, read_floor
-from twinmill.track.lens import Calibration, calibrate, pick_views
-from twinmill.track.live import find_view, publish
-from twinmill.track.paths import RobotPath, Tags, follow, write_poses
-from twinmill.track.quality import Quality, judge
-from twinmill_cli.numbers import parse_numbers
+from twinmill_cli.lazy import working
 from twinmill_cli.options import LcmUrl
 from twinmill_cli.output import AsJson, deliver
+
+if working():  # not for --help
+    import numpy as np
+    from rich import box as frame
+    from rich.console import Console, Group
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.table import Table
+    from rich.text import Text
+
+    from twinmill.data.bus import open_bus
+    from twinmill.data.importers.plain import Columns, read_commands
+    from twinmill.files import check_new_file
+    from twinmill.track.align import align, shifted
+    from twinmill.track.boards import Board
+    from twinmill.track.camera import Camera, read_camera
+    from twinmill.track.detect import ROBOTS, Detector, gather
+    from twinmill.track.film import Film, LiveCamera
+    from twinmill.track.floor import View, look, read_floor
+    from twinmill.track.lens import Calibration, calibrate, pick_views
+    from twinmill.track.live import find_view, publish
+    from twinmill.track.paths import RobotPath, Tags, follow, write_poses
+    from twinmill.track.quality import Quality, judge
+    from twinmill_cli.numbers import parse_numbers
 
 WHOLE = 0.98  # of the frames that a container promises; some count them wrongly by a few
 

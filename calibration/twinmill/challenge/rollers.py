@@ -6,6 +6,8 @@ radius R / sqrt(2) does that is turned by 45 degrees: a short capsule that grips
 direction and slides along its axle.
 """
 
+import sys
+
 import mujoco
 import numpy as np
 
@@ -16,6 +18,9 @@ SIDE, AHEAD, LEFT = (-1, 1, 1, -1), (1, 1, -1, -1), (1, -1, 1, -1)
 ROTOR_KGM2 = 1.5e-4
 GRIP = 0.8
 ROLLERS = 10
+
+# By itself MuJoCo also writes warnings to MUJOCO_LOG.TXT in the working directory.
+mujoco.set_mju_user_warning(lambda text: print(f"mujoco: {text}", file=sys.stderr))
 
 
 def drive_by_forces(robot: Robot, rim_mps: np.ndarray) -> np.ndarray:

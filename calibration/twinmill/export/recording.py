@@ -12,11 +12,11 @@ import turbopi
 from twinmill.data.lcm_log import split_events
 from twinmill.data.log import LogError, read_bytes
 
-# Those of the package, by what a message starts with.
+# Those of the package that are sent by themselves, by what a message starts with.
 TYPES = {
     kind._get_packed_fingerprint(): kind
     for name, kind in sorted(vars(turbopi).items())
-    if name.endswith("_t") and isinstance(kind, type)
+    if name.endswith("_t") and isinstance(kind, type) and "utime_us" in kind.__slots__
 }
 OF_ROBOT = re.compile(r"(?P<prefix>.*?)(?P<robot>R\d{2,4})_[A-Z]+")
 

@@ -29,7 +29,8 @@ def tables_of(recording: Recording, provenance: dict) -> dict[str, pa.Table]:
     """One table per type, in order of stamps; those with a channel prefix stand by themselves.
 
     Columns: t_s since the earliest stamp of the log, channel, logged_utime_us by the recorder's
-    clock, then the fields of the .lcm file, arrays spread out. Poses have theta_rad besides.
+    clock, then the fields of the .lcm file, arrays and inner messages spread out, bytes
+    in hexadecimal. Poses have theta_rad besides.
 
     Returns:
         By name, as `pose` or `twin_pose`; `provenance` is in each table's metadata.
@@ -61,6 +62,13 @@ def _table(channels: list[Channel], t0_us: int) -> pa.Table:
 
 def _columns(field: str, messages: list) -> Iterator[tuple[str, np.ndarray]]:
     values = [getattr(message, field) for message in messages]
+    if isinstance(values[0], bytes):
+        yield field, [value.hex() for value in values]
+        return
+    if hasattr(values[0], "__slots__"):  # a message within the message
+        for inner in values[0].__slots__:
+            yield from ((f"{field}_{name}", column) for name, column in _columns(inner, values))
+        return
     if not isinstance(values[0], list | tuple):
         yield field, values
         return

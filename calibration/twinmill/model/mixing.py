@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robot inputs to wheel duties, for logs that hold only inputs.
 
-The truth is fw_mix in firmware/core. Duties in percent, order front-left, front-right,
+fw_mix in firmware/core takes whole percents of speed alone; logs of other programs hold fractions.
+At whole percents both give the same (tests). Duties in percent, order front-left, front-right,
 rear-left, rear-right.
 """
 

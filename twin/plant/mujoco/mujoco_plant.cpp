@@ -21,10 +21,19 @@ int Id(const mjModel *m, mjtObj type, int robot, const char *name)
     return mj_name2id(m, type, NameInWorld(robot, name).c_str());
 }
 
-// MuJoCo's own handler writes a log file into the working directory.
 void PrintWarning(const char *text)
 {
     std::fprintf(stderr, "mujoco: %s\n", text);
+}
+
+// Warnings and errors: by itself MuJoCo also writes them to MUJOCO_LOG.TXT in the working
+// directory.
+void LogToStderrAlone()
+{
+    mju_user_warning = PrintWarning;
+    mjLogConfig config = mju_getLogConfig();
+    config.logto_file = false;
+    mju_setLogConfig(config);
 }
 
 void CheckInputs(const std::vector<Model> &models, const std::vector<Pose2> &starts,
@@ -82,7 +91,7 @@ MujocoPlant::MujocoPlant(const std::string &mjcf, const std::vector<Model> &mode
     : timestep_s_(options.timestep_s), kinematics_(Robot{}, WheelKind::kMecanum)
 {
     CheckInputs(models, starts, options);
-    mju_user_warning = PrintWarning;
+    LogToStderrAlone();
     model_.reset(CompileWorld(mjcf, models, starts, options));
     data_.reset(mj_makeData(model_.get()));
     const Robot geometry = Geometry(model_.get(), models[0]);

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What commands on logs and a model have in common: open the model, read the logs, report."""
+
+from __future__ import annotations
+
+import shlex
+from importlib.metadata import version
+from pathlib import Path
+
+import typer
+from rich.console import RenderableType
+
+from twinmill.data.measurement import BadInputError, Measurements, load_measurements
+from twinmill.files import check_new_file, check_new_folder
+from twinmill.model.model_file import ModelFile
+from twinmill.report import Provenance, Section, write_report
+from twinmill_cli.output import deliver
+
+
+def command_line(verb: str, logs: list[Path], model: str, output: Path | None = None) -> str:
+    """The command line that does this again, without what only changes where and how it is told."""
+    words = ["twinmill", *shlex.split(verb), *map(str, logs), "--model", model]
+    return shlex.join(words + (["-o", str(output)] if output else []))
+
+
+def open_model(model: str, out: Path | None) -> ModelFile:
+    """Reads the model, once it is clear that the report's folder can be written."""
+    if out:
+        check_new_folder(out)
+    return ModelFile.load(model)
+
+
+def check_output(output: Path, model_file: ModelFile, force: bool) -> None:
+    """Raises ValueError if the new model could not be written, before the long work."""
+    if output.resolve() == model_file.path.resolve():
+        raise ValueError(
+            f"{output}: is the model that is read, and models are never changed in place; "
+            "choose another name."
+        )
+    check_new_file(output, force)
+
+
+def provenance(command: str, model: ModelFile) -> Provenance:
+    """What every output carries."""
+    return Provenance(command, f"twinmill {version('twinmill')}", model.hash)
+
+
+def load(logs: list[Path], model_file: ModelFile, as_json: bool) -> Measurements:
+    """Reads logs and says on stderr what is wrong with them.
+
+    Raises:
+        BadInputError: nothing is left to judge; with --json the verdict is printed first.
+        LogError: nothing could be read.
+    """
+    try:
+        measurements = load_measurements(logs, model_file.model)
+    except BadInputError as error:
+        if as_json:
+            found = [finding.to_json() for finding in error.findings]
+            deliver({"verdict": "bad_input", "input": found}, "", as_json)
+        raise
+    mild = [str(finding) for finding in measurements.findings if not finding.fatal]
+    for sentence in [*measurements.excluded, *mild]:
+        typer.echo(f"twinmill: {sentence}", err=True)
+    return measurements
+
+
+def told(measurements: Measurements) -> dict:
+    """What JSON output carries of it."""
+    return {"input": [finding.to_json() for finding in measurements.findings]}
+
+
+def finish(
+    data: dict,
+    text: RenderableType,
+    source: Provenance,
+    section: Section,
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Report, then JSON or text."""
+    report = write_report(out, section.title, source, [section]) if out else None
+    deliver({**data, **source.to_json(), "report": str(report) if report else None}, text, as_json)
+    if report and not as_json:
+        typer.echo(f"Report: {report}")
