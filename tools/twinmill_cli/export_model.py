@@ -42,13 +42,14 @@ class Target(StrEnum):
 
 
 SUFFIX = {Target.MJCF: "xml", Target.ROS2_CONTROL: "yaml"}
-WRITERS: dict[Target, Callable[[RobotModel], tuple[str, list[Left]]]] = {
-    Target.MJCF: mjcf,
-    Target.SDF: sdf,
-    Target.URDF: urdf,
-    Target.ROS2_CONTROL: ros2_control,
-    Target.JSON: lambda robot: (json.dumps(plain(model_json(robot)), indent=1) + "\n", []),
-}
+if working():
+    WRITERS: dict[Target, Callable[[RobotModel], tuple[str, list[Left]]]] = {
+        Target.MJCF: mjcf,
+        Target.SDF: sdf,
+        Target.URDF: urdf,
+        Target.ROS2_CONTROL: ros2_control,
+        Target.JSON: lambda robot: (json.dumps(plain(model_json(robot)), indent=1) + "\n", []),
+    }
 
 
 def register(app: typer.Typer) -> None:
