@@ -63,6 +63,13 @@ def _command(
             )
         ),
     ] = None,
+    detections: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of what cameras saw: t_s (of the picture, the commands' clock), robot_id, "
+            "seen (0 or 1); optional range_m, bearing_rad."
+        ),
+    ] = None,
     io_tsv: Annotated[
         list[Path] | None, typer.Option(help=("io.tsv of a robot; repeat for several."))
     ] = None,
@@ -169,6 +176,7 @@ def _command(
             motive=motive,
             io_tsv=tuple(io_tsv or ()),
             bag=bag,
+            detections=detections,
             options=options,
         )
     except ValueError as error:
@@ -227,11 +235,20 @@ def _number(text: str) -> int:
 
 
 def _print(summary: dict) -> None:
+    columns = {
+        "robot_id": "robot",
+        "command_kind": "driven by",
+        "commands": "commands",
+        "poses": "poses",
+        "poses_valid": "of them valid",
+    }
+    if any("detections" in robot for robot in summary["robots"]):
+        columns["detections"] = "detections"
     table = Table(
         f"{summary['out']}: {summary['messages']} messages, {summary['duration_s']:.1f} s",
-        ["robot", "driven by", "commands", "poses", "of them valid"],
+        list(columns.values()),
         [
-            [Cell("-" if value is None else str(value)) for value in robot.values()]
+            [Cell("-" if robot.get(key) is None else str(robot[key])) for key in columns]
             for robot in summary["robots"]
         ],
         words=(1,),

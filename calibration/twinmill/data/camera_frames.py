@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The camera frames of one robot as its telemetry tells them."""
+"""The camera frames of one robot, as its telemetry or its detections tell them."""
 
 from dataclasses import dataclass
 
@@ -19,6 +19,7 @@ class Frames:
         raw: (K,) bool, the frame alone; all false if `has_raw` is.
         has_raw: false in logs that keep the voted bit alone.
         voted: (K,) bool, after the vote that the frame closed.
+        has_vote: false of cameras that do not vote; `voted` is then `raw`.
     """
 
     t_s: np.ndarray
@@ -26,6 +27,7 @@ class Frames:
     raw: np.ndarray
     has_raw: bool
     voted: np.ndarray
+    has_vote: bool = True
 
 
 def frames_of(robot: RobotLog) -> Frames | None:
@@ -34,6 +36,8 @@ def frames_of(robot: RobotLog) -> Frames | None:
     Args:
         robot: as read from the log.
     """
+    if len(robot.seen_t_s):
+        return Frames(robot.seen_t_s, True, robot.seen, True, robot.seen, has_vote=False)
     stamped = bool(np.isfinite(robot.frame_t_s).any())
     if not len(robot.detected) or not (stamped or robot.detected.any()):
         return None

@@ -5,7 +5,7 @@ import hashlib
 import re
 import tomllib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -19,7 +19,7 @@ __all__ = ["Log", "LogError", "RobotLog", "read_log"]
 CommandKind = Literal["duty", "wheel_speed", "twist", "none"]
 KINDS: tuple[CommandKind, ...] = ("duty", "wheel_speed", "twist")  # by drive_t.kind
 
-_READ = ("TELEMETRY", "POSE", "DRIVE", "RUN")
+_READ = ("TELEMETRY", "POSE", "DRIVE", "RUN", "DETECTION")
 _KNOWN_ELSEWHERE = re.compile(
     r".*(R\d\d_((SIGNED_)?ACK|LINK)|SWARM_(COMMAND|SIGNED)|TWIN_TRUTH_R\d\d)$"
 )
@@ -49,6 +49,8 @@ class RobotLog:
         z_m: (N,) height of the tracked body; NaN where not valid.
         valid: (N,) bool.
         same_clock: the log says that one clock stamped commands and poses.
+        seen_t_s: (K,) pictures of another maker's camera, robot's clock, ascending.
+        seen: (K,) bool, each shows another robot.
     """
 
     robot_id: int
@@ -69,6 +71,8 @@ class RobotLog:
     z_m: np.ndarray
     valid: np.ndarray
     same_clock: bool = False
+    seen_t_s: np.ndarray = field(default_factory=lambda: np.empty(0))
+    seen: np.ndarray = field(default_factory=lambda: np.empty(0, bool))
 
     @property
     def has_heading(self) -> bool:
@@ -140,6 +144,7 @@ def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = ""
             same_clock=_says_same_clock(run.config_toml),
             **_command_series(commands, t0_us, robot_id, warnings),
             **_pose_series(poses, t0_us, robot_id, warnings),
+            **_detection_series(channels[robot_id].get("DETECTION"), t0_us, robot_id, warnings),
         )
     return Log(path, sha256, t0_us, robots, warnings)
 
@@ -177,7 +182,9 @@ def _robot_channels(
             f"{count} messages on {len(unknown)} other channels were ignored "
             f"({', '.join(sorted(unknown)[:5])})."
         )
-    return {robot_id: kinds for robot_id, kinds in found.items() if set(kinds) - {"RUN"}}
+    return {
+        robot_id: kinds for robot_id, kinds in found.items() if set(kinds) - {"RUN", "DETECTION"}
+    }
 
 
 def _channel_pattern(prefix: str) -> re.Pattern:
@@ -307,6 +314,18 @@ def _command_series(
     if kind == "duty":
         command = _duty_fraction(command, robot_id, warnings)
     return series | {"command_kind": kind, "command": command}
+
+
+def _detection_series(
+    payloads: list[bytes] | None, t0_us: int, robot_id: int, warnings: list[str]
+) -> dict:
+    """The fields of RobotLog on pictures."""
+    if not payloads:
+        return {}
+    channel = f"R{robot_id:02d}_DETECTION"
+    messages = decode(payloads, turbopi.detection_t, channel)
+    messages = _in_order(messages, channel, robot_id, warnings)
+    return {"seen_t_s": _seconds(messages, t0_us), "seen": messages["seen"] != 0}
 
 
 def _drive_kind(messages: np.ndarray, robot_id: int) -> CommandKind:

@@ -64,5 +64,5 @@ def everyone_in(events: Events, path: Path, sha256: str = "") -> Cast:
 
 
 def _shifted(robot: RobotLog, by_s: float) -> RobotLog:
-    times = ("command_t_s", "frame_t_s", "pose_t_s")
+    times = ("command_t_s", "frame_t_s", "pose_t_s", "seen_t_s")
     return replace(robot, **{name: getattr(robot, name) + by_s for name in times})

@@ -181,5 +181,7 @@ def _of_robot(scene: BitScene, model: native.Model, raw: bool) -> tuple[np.ndarr
         (scene.frames.raw if raw else scene.frames.voted)[use],
         distance_m[use][row, nearest],
         np.angle(np.exp(1j * bearing)),
-        (scene.voted(frames) == scene.frames.voted)[use] if raw else np.empty(0),
+        (scene.voted(frames) == scene.frames.voted)[use]
+        if raw and scene.frames.has_vote
+        else np.empty(0),
     )

@@ -98,7 +98,7 @@ class BitScene:
         right = self.voted(frames)[pick] == self.frames.voted[pick]
         vote = np.where(right, np.log(1 - VOTE_ERROR), np.log(VOTE_ERROR))
         vote[np.arange(len(self.frames.raw))[pick] < UNSEEN_FRAMES] = 0
-        told = np.log(np.where(raw, chance, 1 - chance)) + vote
+        told = np.log(np.where(raw, chance, 1 - chance)) + vote * self.frames.has_vote
         return np.where(self.usable[pick], told, np.nan)
 
     def voted(self, frames: int) -> np.ndarray:

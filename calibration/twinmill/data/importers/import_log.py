@@ -12,9 +12,21 @@ from twinmill.data.importers.columns import Guess, explain, read_mapping
 from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
 from twinmill.data.importers.motive import read_motive
-from twinmill.data.importers.plain import KNOWN, Columns, read_commands, read_poses
+from twinmill.data.importers.plain import (
+    KNOWN,
+    Columns,
+    read_commands,
+    read_detections,
+    read_poses,
+)
 from twinmill.data.importers.ros_bag import read_bag
-from twinmill.data.importers.series import CommandSeries, PoseSeries, in_body_frame, multiply
+from twinmill.data.importers.series import (
+    CommandSeries,
+    DetectionSeries,
+    PoseSeries,
+    in_body_frame,
+    multiply,
+)
 from twinmill.data.log import Log, LogError, read_log
 from twinmill.data.measurement_table import read_table
 from twinmill.data.track import make_track
@@ -67,6 +79,7 @@ def import_log(
     motive: Path | None = None,
     io_tsv: tuple[Path, ...] = (),
     bag: Path | None = None,
+    detections: Path | None = None,
     options: ImportOptions | None = None,
 ) -> dict:
     """Makes a log from one source of poses and one of commands.
@@ -78,6 +91,7 @@ def import_log(
         motive: export of OptiTrack Motive.
         io_tsv: one per robot.
         bag: ROS bag with both, in place of all others.
+        detections: plain CSV of what cameras saw, beside any kind of command.
         options: how to read them.
 
     Returns:
@@ -114,10 +128,13 @@ def import_log(
         in_body_frame(series, by_robot.get(series.robot_id)) if series.world else series
         for series in command_series
     ]
-    sources = [path for path in (poses, motive, commands, *io_tsv) if path is not None]
+    seen = _detections(detections, options, by_robot) if detections else []
+    paths = (poses, motive, commands, *io_tsv, detections)
+    sources = [path for path in paths if path is not None]
     with replacing(out, options.force) as temporary:
-        write_log(temporary, pose_series, command_series, _provenance(sources, options))
-        warnings = [w for series in (*pose_series, *command_series) for w in series.warnings]
+        provenance = _provenance(sources, options)
+        write_log(temporary, pose_series, command_series, provenance, seen)
+        warnings = [w for series in (*pose_series, *command_series, *seen) for w in series.warnings]
         return _summary(read_log(temporary), out, warnings)
 
 
@@ -140,6 +157,27 @@ def _read_files(
         else [read_io_tsv(path, options.robot_id) for path in io_tsv]
     )
     return pose_series, command_series
+
+
+def _detections(
+    path: Path, options: ImportOptions, poses: dict[int, PoseSeries]
+) -> list[DetectionSeries]:
+    """Of robots whose poses are known, at the time of the poses."""
+    series = read_detections(path, Columns(options.rename, robot_id=options.robot_id))
+    for own in series:
+        where = f"{path.name}: robot {own.robot_id}"
+        if own.robot_id not in poses:
+            raise LogError(
+                f"{where}: has no poses; number robots alike in all files (--robot-id, --robot)."
+            )
+        pose_us = poses[own.robot_id].utime_us
+        if own.utime_us[-1] < pose_us[0] or own.utime_us[0] > pose_us[-1]:
+            raise LogError(
+                f"{where}: detections from {own.utime_us[0] / 1e6:.3f} s to "
+                f"{own.utime_us[-1] / 1e6:.3f} s do not overlap its poses; stamp them with the "
+                "clock of the commands."
+            )
+    return series
 
 
 def _columns(options: ImportOptions, kind: str) -> Columns:
@@ -250,6 +288,7 @@ def _summary(log: Log, out: Path, warnings: list[str]) -> dict:
                 "commands": len(robot.command_t_s),
                 "poses": len(robot.pose_t_s),
                 "poses_valid": int(robot.valid.sum()),
+                **({"detections": len(robot.seen)} if len(robot.seen) else {}),
             }
         )
         if len(series) == 2 and robot.valid.sum() > 1:

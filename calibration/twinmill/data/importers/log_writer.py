@@ -10,7 +10,7 @@ import lcm
 import numpy as np
 import turbopi
 
-from twinmill.data.importers.series import CommandSeries, PoseSeries
+from twinmill.data.importers.series import CommandSeries, DetectionSeries, PoseSeries
 from twinmill.data.log import KINDS
 
 CONTROL_PERIOD_US = 22_000  # a TurboPi tells its duties once per control step, new or held
@@ -19,7 +19,11 @@ Event = tuple[int, str, bytes]  # stamp, channel, encoded message
 
 
 def write_log(
-    path: Path, poses: list[PoseSeries], commands: list[CommandSeries], config_toml: str
+    path: Path,
+    poses: list[PoseSeries],
+    commands: list[CommandSeries],
+    config_toml: str,
+    detections: list[DetectionSeries] | None = None,
 ) -> None:
     """Writes a log in order of stamps.
 
@@ -28,9 +32,11 @@ def write_log(
         poses: one per robot.
         commands: one per robot; held duties are repeated every CONTROL_PERIOD_US to the last pose.
         config_toml: where all this comes from, for run_t.
+        detections: one per robot that has any.
     """
     end_us = {series.robot_id: int(series.utime_us[-1]) for series in poses}
     streams = [_pose_events(series) for series in poses]
+    streams += [_detection_events(series) for series in detections or []]
     for series in commands:
         streams.append(_run_event(series, config_toml))
         streams.append(
@@ -67,6 +73,16 @@ def _pose_events(series: PoseSeries) -> Iterator[Event]:
         message.utime_us, message.seq, message.valid = utime_us, seq, int(valid)
         message.position_m, message.orientation_wxyz = position, orientation
         yield utime_us, channel, message.encode()
+
+
+def _detection_events(series: DetectionSeries) -> Iterator[Event]:
+    channel, message = f"R{series.robot_id:02d}_DETECTION", turbopi.detection_t()
+    message.robot_id = series.robot_id
+    rows = (series.utime_us, series.seen, series.range_m, series.bearing_rad)
+    for seq, row in enumerate(zip(*(values.tolist() for values in rows), strict=True)):
+        message.utime_us, message.seq, message.seen = row[0], seq, int(row[1])
+        message.range_m, message.bearing_rad = row[2:]
+        yield message.utime_us, channel, message.encode()
 
 
 def _drive_events(series: CommandSeries) -> Iterator[Event]:

@@ -10,7 +10,12 @@ import numpy as np
 import turbopi
 
 from twinmill.data.importers.columns import Mapping, read_mapped
-from twinmill.data.importers.series import CommandSeries, PoseSeries, quaternion_from_heading
+from twinmill.data.importers.series import (
+    CommandSeries,
+    DetectionSeries,
+    PoseSeries,
+    quaternion_from_heading,
+)
 from twinmill.data.log import CommandKind, LogError
 from twinmill.data.measurement_table import Table
 from twinmill.model.mixing import duties_from_inputs
@@ -41,6 +46,9 @@ KNOWN = frozenset(
 )
 
 
+OF_DETECTIONS = frozenset({"t_s", "robot_id", "seen", "range_m", "bearing_rad"})
+
+
 @dataclass(frozen=True)
 class Columns:
     """How to read a table: as `columns.read_mapped`, and whose rows they are.
@@ -55,9 +63,9 @@ class Columns:
     flips: frozenset[str] = frozenset()
     robot_id: int | None = None
 
-    def read(self, path: Path) -> Table:
+    def read(self, path: Path, known: frozenset[str] = KNOWN) -> Table:
         """The table under our names."""
-        return read_mapped(path, KNOWN, self.mapping, self.rename, self.flips)
+        return read_mapped(path, known, self.mapping, self.rename, self.flips)
 
 
 def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:
@@ -124,6 +132,42 @@ def read_commands(path: Path, columns: Columns) -> list[CommandSeries]:
             turbopi.telemetry_t.MODE_SCRIPT,
             warnings=notes,
             world=world,
+        )
+        for number, rows, notes in _by_robot(table, ids, utime_us)
+    ]
+
+
+def read_detections(path: Path, columns: Columns) -> list[DetectionSeries]:
+    """What cameras saw, by robot.
+
+    Args:
+        path: CSV with t_s (when the picture was taken, the commands' clock), robot_id, and seen, 0
+            or 1; optional range_m and bearing_rad, empty where not known.
+        columns: how to read it.
+
+    Raises:
+        LogError: as read_table; a wrong value, with its row.
+    """
+    table = columns.read(path, OF_DETECTIONS)
+    ids, utime_us, seen = (
+        _robot_ids(table, columns.robot_id),
+        _utime_us(table),
+        table.finite("seen"),
+    )
+    table.refuse((seen != 0) & (seen != 1), "seen", seen, "must be 0 or 1")
+    more = {
+        name: table.numbers(name, True) if table.has(name) else np.full(len(ids), np.nan)
+        for name in ("range_m", "bearing_rad")
+    }
+    table.refuse(more["range_m"] < 0, "range_m", more["range_m"], "must not be negative")
+    return [
+        DetectionSeries(
+            number,
+            utime_us[rows],
+            seen[rows] > 0,
+            more["range_m"][rows],
+            more["bearing_rad"][rows],
+            notes,
         )
         for number, rows, notes in _by_robot(table, ids, utime_us)
     ]

@@ -60,6 +60,26 @@ class CommandSeries:
     world: bool = False
 
 
+@dataclass(frozen=True)
+class DetectionSeries:
+    """What one robot's camera saw.
+
+    Attributes:
+        robot_id: 0..99.
+        utime_us: (K,) int, ascending, the commands' clock.
+        seen: (K,) bool.
+        range_m, bearing_rad: (K,) NaN where not known.
+        warnings: sentences.
+    """
+
+    robot_id: int
+    utime_us: np.ndarray
+    seen: np.ndarray
+    range_m: np.ndarray
+    bearing_rad: np.ndarray
+    warnings: list[str] = field(default_factory=list)
+
+
 def in_body_frame(commands: CommandSeries, poses: PoseSeries | None) -> CommandSeries:
     """World-frame velocities turned into the body's, by the heading at the time.
 
