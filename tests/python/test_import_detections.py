@@ -33,7 +33,7 @@ def folder(tmp_path, monkeypatch):
     Robot 1 sees it while it is within its cone, by the angle turned. Its pictures come at 20 Hz.
     """
     monkeypatch.chdir(tmp_path)
-    t_s = np.arange(0, 40, 0.02)
+    t_s = np.arange(0, 40, 0.04)
     heading = np.where(t_s < 1, 0, 0.5 * (t_s - 1))
     noise = np.random.default_rng(1).normal(0, 1e-4, (2, 3, len(t_s)))
     rows = ["t_s,robot_id,x_m,y_m,theta_rad"]
