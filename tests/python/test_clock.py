@@ -63,7 +63,7 @@ def test_recordings_on_the_same_clocks_agree(data_dir):
 
 def test_motion_that_commands_do_not_explain_is_refused(steps):
     robot = steps(0.0)
-    with pytest.raises(LogError, match="robot 3: the clock offset cannot be told"):
+    with pytest.raises(LogError, match="robot 3: the clock offset is not identifiable"):
         estimate_offset(make_track(replace(robot, command=robot.command[::-1])))
 
 

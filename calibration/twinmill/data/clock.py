@@ -59,7 +59,8 @@ def estimate_offset(track: Track) -> ClockOffset:
     explained = 1 - residual / fit.total
     if explained < MIN_EXPLAINED or abs(offset_s) >= SEARCH_S - COARSE_S:
         raise LogError(
-            f"robot {track.robot_id}: the clock offset cannot be told (best {offset_s:.3f} s, "
+            f"robot {track.robot_id}: the clock offset is not identifiable from this log "
+            f"(best {offset_s:.3f} s, "
             f"where commands explain {explained:.0%} of the motion); check that commands and poses "
             f"are of the same run and within {SEARCH_S} s, or shift the poses when importing."
         )
@@ -85,7 +86,7 @@ class _Regression:
         self.t_s, self.velocity = _body_velocity(track)
         if len(self.t_s) < BLOCKS or not np.diff(track.command, axis=0).any():
             raise LogError(
-                f"robot {track.robot_id}: the clock offset cannot be told, because the "
+                f"robot {track.robot_id}: the clock offset is not identifiable, because the "
                 "commands never change while the robot is tracked; record a run in "
                 "which they do."
             )

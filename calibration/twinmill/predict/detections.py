@@ -11,7 +11,7 @@ from twinmill.data.track import Track
 from twinmill.model.parameters import CLOCK, CLOCK_RATE
 from twinmill.predict.problem import Scene
 
-BLOCK_S = 4.0  # bits of one block may hang together
+BLOCK_S = 4.0  # errors of detections within a block are correlated
 # Poses are never better known than this: markers sit off the wheels' centre, cameras off theirs.
 LEAST_M, LEAST_RAD = 0.003, 0.005
 SURE = 1e-3  # no frame is ever surer: one strange bit must not decide
