@@ -13,7 +13,7 @@ from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.fit import common_clock
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import Fitted, ModelFile, write_child
-from twinmill.model.parameters import GAINS, Estimate, base_parameters
+from twinmill.model.parameters import GAINS, LAG, Estimate, base_lag_is_told, base_parameters
 from twinmill.predict.datasets import total_score
 
 
@@ -101,14 +101,15 @@ def _polished(diagnosis: Diagnosis) -> ScoreFit:
     last = diagnosis.search.last
     state = last.state
     known = {p.name for p in state.free}
-    base = [n for n in diagnosis.base_names if n not in known]
+    held = set() if base_lag_is_told(state.model) else {LAG}
+    base = [n for n in diagnosis.base_names if n not in known | held]
     free = [*state.begun(), *base_parameters(state.model, base)]
     whole = ScoreFit(state.datasets, state.models, free).fit()
     if total_score(whole.held_scores) <= last.held_score:
         return whole
-    held = ScoreFit(state.datasets, state.models, free)
-    held.store()
-    return held
+    as_found = ScoreFit(state.datasets, state.models, free)
+    as_found.store()
+    return as_found
 
 
 def _own_values(diagnosis: Diagnosis, fit: ScoreFit) -> dict[int, list[Estimate]]:

@@ -35,6 +35,11 @@ class Finding:
     certainty: str
     why: str = ""
 
+    @property
+    def takes(self) -> str:
+        """The share in words."""
+        return "< 1 %" if self.share < 0.005 else f"{100 * self.share:.0f} %"
+
     def to_json(self) -> dict:
         """Fields of the interface."""
         parameters = [e.to_json() for e in self.parameters]

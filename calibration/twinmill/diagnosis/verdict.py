@@ -165,7 +165,7 @@ class Weighed:
 
 def _named(finding: Finding) -> str:
     """A finding in the sentence, with what it takes."""
-    takes = f"{100 * finding.share:.0f} %"
+    takes = finding.takes
     if finding.effect == REFIT:
         values = ", ".join(
             f"{e.name.split('.', 1)[1]} {e.value:.3g}" for e in finding.parameters[:3]

@@ -21,6 +21,7 @@ from twinmill.model.parameters import (
     Estimate,
     Parameter,
     all_effect_parameters,
+    base_lag_is_told,
     base_parameters,
     duty_table,
 )
@@ -73,7 +74,7 @@ def base_names(
     if len(table) > 1:
         gains = [*table, *(n for n in gains if n != BASE_GAINS[0])]
     changes = any(o.floor for o in opened) and LAG not in told
-    return [*gains, LAG] if changes else gains
+    return [*gains, LAG] if changes and base_lag_is_told(model) else gains
 
 
 def _moves(own: Opened, gain: str) -> bool:

@@ -146,6 +146,11 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
     return found
 
 
+def base_lag_is_told(model: native.Model) -> bool:
+    """Whether data can tell the base's lag: beside the effect motor_lag only their sum."""
+    return "motor_lag" not in model.effects
+
+
 def all_effect_parameters(model: native.Model) -> list[Parameter]:
     """Free quantities of all of a model's effects on motion."""
     return [

@@ -37,7 +37,7 @@ def findings(diagnosis: Diagnosis) -> Table:
         rows.append(
             [
                 Cell(f"{f.effect}{names}", "good"),
-                Cell(f"{100 * f.share:.0f} %", "", f.share),
+                Cell(f.takes, "", f.share),
                 Cell(f.certainty, certainty),
                 Cell(", ".join(_estimate(e) for e in f.parameters)),
             ]

@@ -15,7 +15,7 @@ from twinmill.report.advice import advice
 from twinmill.report.tables import Cell, Table, number, tone
 
 STYLES = {"": "", "good": "bold green", "warn": "yellow", "bad": "bold red", "dim": "dim"}
-BAR = 20  # characters
+BAR = 10  # characters
 WARNINGS = 3  # in the terminal; --json has all
 
 
