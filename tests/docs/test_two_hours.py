@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import twinmill_native as native
 
-from twinmill_cli.main import COMMANDS, Later
+from twinmill_cli.main import COMMANDS, LazyCommand
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
@@ -25,7 +25,7 @@ LONG = (" compare ", " diagnose ", " explain ", " plot ", "better.toml")
 def test_each_command_and_its_options_exist(line):
     words = shlex.split(line)[1:]
     module = {name: module for name, module, _ in COMMANDS}[words[0]]
-    command = Later(words[0], f"twinmill_cli.{module}", "").command()
+    command = LazyCommand(words[0], f"twinmill_cli.{module}", "").command()
     known = {option for p in command.params for option in p.opts}
     assert [w for w in words[1:] if w.startswith("-") and w not in known] == []
 
