@@ -170,7 +170,8 @@ def _concluded(
     after = [fitted.get(id(o.measurement), o) for o in opened]
     scenes = [r.scene.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
     noise = _noises(model_file, scenes)
-    hidden = [*_hidden(done, first.model), *unseen.items()]
+    faint = _hidden(done, first.model)
+    hidden = [*faint, *unseen.items()]
     refit = _refit(done)
     weighed = Weighed(
         before.score,
@@ -179,7 +180,7 @@ def _concluded(
         last.held_score,
         findings,
         rest,
-        [name for name, _ in hidden],
+        [name for name, _ in faint],
         noise,
         model_file.usual_score(hashes),
     )

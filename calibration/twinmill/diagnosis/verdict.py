@@ -25,7 +25,7 @@ class Weighed:
         score: of the model as given, as `compare` has it.
         first, refit, last: held-out scores: where the search started, with the base refitted, with
             what was found.
-        hidden: effects that the data cannot show.
+        hidden: effects that data of this kind could show, and these data do not.
         noises: what was said of unusual noise.
         usual: score of the model on the logs that it was fitted to.
     """
@@ -53,18 +53,17 @@ class Weighed:
             return "ambiguous" if top.group else "effect_missing"
         if self._outside or self._noise_outweighs:
             return "outside_catalogue"
-        if self.findings:
-            return "refit_enough" if self.last <= MISSING * self.known else "outside_catalogue"
-        if self._drifted and self.last <= MISSING * self.known:
-            return "refit_enough"
         if self.last > MISSING * self.known:
             return "outside_catalogue"
+        if self._stale and not self.silent:
+            return "refit_enough"
         return "cannot_tell" if self.silent or self.last > MISSING else "model_adequate"
 
     @property
-    def _drifted(self) -> bool:
-        """Gains that were let drift took the error: the base's numbers are stale."""
-        return self.score > GOOD * self.known and self.last < DRIFTED * self.score
+    def _stale(self) -> bool:
+        """The base's numbers are: a finding, or gains that were let drift took the error."""
+        drifted = self.score > GOOD * self.known and self.last < DRIFTED * self.score
+        return bool(self.findings) or drifted
 
     @property
     def silent(self) -> list[str]:
@@ -104,10 +103,12 @@ class Weighed:
         if verdict == "cannot_tell" and self.last > MISSING:
             return f"Nothing new is missing that these logs would show.{self._as_before}"
         if verdict == "cannot_tell":
-            return (
-                "Nothing is missing that these logs would show, but they cannot show "
-                f"{', '.join(self.silent)}."
+            seen = (
+                "The base model's numbers were stale, and a refit takes the error away"
+                if self._stale
+                else "Nothing is missing that these logs would show"
             )
+            return f"{seen}, but these logs cannot show {', '.join(self.silent)}."
         if verdict == "refit_enough":
             return (
                 "No effect is missing; the base model's numbers were stale, and a refit is enough."
