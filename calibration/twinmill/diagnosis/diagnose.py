@@ -165,8 +165,8 @@ def _concluded(
     start, last = done.rounds[0].before, done.last
     findings, chain = findings_of(done, first)
     rest = rest_of(known, last.fit, start.held_score, last.held_score, model_file.left_over(hashes))
-    after = [o.with_fitted(m) for o, m in zip(known, last.state.models, strict=True)]
-    fitted = {id(o.measurement): o for o in after}
+    models = zip(known, last.state.models, strict=True)
+    fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]
     scenes = [r.scene.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
     noise = _noises(model_file, scenes)

@@ -40,7 +40,7 @@ constexpr ParameterSpec kParameters[] = {
 // A robot's wheels reach a patch one by one: its edge is about as wide as the robot.
 constexpr double kEdge_m = 0.1;
 
-// (1 - tanh(u)) / 2 is 1 / (1 + exp(2 u)), which takes a third of the time.
+// (1 - tanh(u)) / 2 is 1 / (1 + exp(2 u)).
 double Factor(double x_m, double y_m, const Numbers &v)
 {
     const double dx_m = x_m - v[1], dy_m = y_m - v[2];
