@@ -15,8 +15,17 @@ from twinmill.diagnosis.findings import findings_of, lateness, ranking_of
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
 from twinmill.diagnosis.rest import rest_of
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.search import REFIT, SETTINGS, Search, Settings, State, attempt, search
-from twinmill.diagnosis.verdict import Weighed
+from twinmill.diagnosis.search import (
+    REFIT,
+    SETTINGS,
+    Search,
+    Settings,
+    State,
+    attempt,
+    instead_of_drift,
+    search,
+)
+from twinmill.diagnosis.verdict import Weighed, drifted
 from twinmill.fitting.compare import comparison
 from twinmill.fitting.fit import base_names
 from twinmill.fitting.opening import Opened, judged, open_measurements, with_own_gains
@@ -173,6 +182,7 @@ def _concluded(
     faint = _hidden(done, first.model)
     hidden = [*faint, *unseen.items()]
     refit = _refit(done)
+    usual = model_file.usual_score(hashes)
     weighed = Weighed(
         before.score,
         start.held_score,
@@ -181,8 +191,9 @@ def _concluded(
         findings,
         rest,
         [name for name, _ in faint],
+        _instead_of_drift(before.score, done, first, usual),
         noise,
-        model_file.usual_score(hashes),
+        usual,
     )
     steps = [(None, start.held_score), *chain]
     late = lateness(done, findings, all(o.same_clock for o in known if o.floor))
@@ -214,6 +225,15 @@ def _refit(done: Search) -> float:
     if trial is None and start.state.base:
         trial = attempt(start, (REFIT,))
     return min(start.held_score, trial.held_score) if trial else start.held_score
+
+
+def _instead_of_drift(score: float, done: Search, first: State, usual: float) -> list[str]:
+    """Effects that would take what drifting gains took, where nothing else was found."""
+    last = done.last.held_score
+    gains = {p.name for p in first.free} & set(BASE_GAINS)
+    if done.found or not gains or not drifted(score, last, usual if np.isfinite(usual) else 1.0):
+        return []
+    return instead_of_drift(first, done.rounds[0].before, done.settings)
 
 
 def _hidden(done: Search, model: native.Model) -> list[tuple[str, str]]:

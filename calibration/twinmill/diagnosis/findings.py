@@ -172,7 +172,9 @@ def _finding(done: Search, name: str, share: float) -> Finding:
     estimates = done.last.fit.shared_estimates()
     if name == REFIT:
         own = [e for e in estimates if e.name in done.last.state.base]
-        return Finding(REFIT, None, own, share, "sure")
+        alike = tuple(n for t in _rivals(done, REFIT) for n in t.names)
+        group = (REFIT, *alike) if alike else None
+        return Finding(REFIT, group, own, share, "group" if alike else "sure")
     instance = [n for n in effect_names(done.last.state.model) if n.split("#")[0] == name][-1]
     own = [e for e in estimates if e.name.startswith(f"{instance}.")]
     tied = [n for t in _rivals(done, name) for n in t.names]

@@ -46,6 +46,8 @@ class Settings:
         most: rounds.
         alike: canonical correlation of signatures from which two candidates are one group.
         tie: difference of the held-out cost that decides nothing within a group.
+        imitates: share of the squared score taken by other numbers of the base that an effect must
+            take to be as good an answer.
         group: most members of a group, the most alike: more is no answer.
         faint: a candidate of less expected evidence at three times its usual size is not shown.
     """
@@ -61,6 +63,7 @@ class Settings:
     most: int = 6
     alike: float = 0.95
     tie: float = 6.0
+    imitates: float = 0.95
     group: int = 4
     faint: float = 16.0
 
@@ -363,9 +366,16 @@ def screen(before: Trial) -> list[Screened]:
     return found
 
 
-def _widths(parameters: Sequence[Parameter], start: dict[str, float]) -> np.ndarray:
-    """(k,) standard deviations of the prior, in default strengths."""
-    reach = np.array([abs(start.get(p.name, p.value) - p.usual) for p in parameters])
+def _reach(name: str, parameters: Sequence[Parameter], start: dict[str, float]) -> np.ndarray:
+    """(k,) how far from neutral the usual strength is; of the base's numbers a usual error."""
+    if name == REFIT:
+        return np.array([STALE * p.std for p in parameters])
+    return np.array([start.get(p.name, p.value) - p.usual for p in parameters])
+
+
+def _widths(name: str, parameters: Sequence[Parameter], start: dict[str, float]) -> np.ndarray:
+    """(k,) standard deviations of the prior, in usual strengths."""
+    reach = np.abs(_reach(name, parameters, start))
     std = np.array([p.std for p in parameters])
     return np.maximum(std / np.maximum(reach, 1e-12), 1.0)
 
@@ -418,7 +428,7 @@ def _screened(
     agree = linear @ whole[:, 0] / max(size * reached, 1e-12)
     used = small if agree > 0.5 and 1 / 3 < size / max(reached, 1e-12) < 3 else whole
     # Columns are in default strengths, and the prior's width in these.
-    widths = np.ones(used.shape[1]) if used is whole else _widths(parameters, start)
+    widths = np.ones(used.shape[1]) if used is whole else _widths(name, parameters, start)
     gram = used.T @ used + np.diag(1 / widths**2)
     moment = used.T @ rest
     gain = float(moment @ np.linalg.solve(gram, moment))
@@ -461,6 +471,7 @@ class _Points:
 
 
 SMALL = 0.05
+STALE = 0.3  # of the prior's width: a usual error of the base's numbers
 
 
 def _points(
@@ -472,14 +483,13 @@ def _points(
         free = {p.name for p in state.free}
         parameters = base_parameters(model, [n for n in state.base if n not in free])
         origin = np.array([p.value for p in parameters])
-        reach = np.array([0.3 * p.std for p in parameters])
     else:
         model.add_effect(name)
         parameters = effect_parameters(model, effect_names(model)[-1], fresh=True)
         origin = np.array([p.usual for p in parameters])
-        reach = np.array([start.get(p.name, p.value) - p.usual for p in parameters])
         for p in parameters:
             model.set(p.name, p.usual)
+    reach = _reach(name, parameters, start)
     values = np.vstack([origin + SMALL * np.diag(reach), origin + reach])
     low, high = (np.array([getattr(p, k) for p in parameters]) for k in ("min", "max"))
     return (
@@ -559,8 +569,10 @@ def _tied(this: Round, settings: Settings) -> list[Trial]:
     """Other trials of the round that the data cannot tell from the accepted one."""
     accepted = this.accepted
     assert accepted is not None
-    if len(accepted.names) > 1 or accepted.names[0] == REFIT:
+    if len(accepted.names) > 1:
         return []
+    if accepted.names[0] == REFIT:
+        return _imitators(accepted, this.before, this.trials, settings)
     columns = {s.name: s.columns for s in this.screened}
     tied = []
     for trial in this.trials:
@@ -575,6 +587,41 @@ def _tied(this: Round, settings: Settings) -> list[Trial]:
             tied.append((same, trial))
     nearest = sorted(tied, key=lambda pair: -pair[0])[: settings.group - 1]
     return [trial for _, trial in nearest]
+
+
+def of_levels() -> list[str]:
+    """Effects of the drive that only several levels of the command tell from other gains."""
+    cards = {name: entry["identify"] for name, entry in catalogue().items()}
+    return [n for n, own in cards.items() if "levels" in own and "arcs" not in own]
+
+
+def _imitators(
+    base: Trial, before: Trial, trials: Sequence[Trial], settings: Settings
+) -> list[Trial]:
+    """Trials of one effect of the levels that do what other numbers of the base do."""
+    least = settings.imitates * (before.held_score**2 - base.held_score**2)
+    levels = of_levels()
+    alike = [
+        t
+        for t in trials
+        if len(t.names) == 1
+        and t.names[0] in levels
+        and before.held_score**2 - t.held_score**2 > least
+    ]
+    return sorted(alike, key=lambda t: t.fit.held_cost)[: settings.group - 1]
+
+
+def instead_of_drift(state: State, drifted: Trial, settings: Settings) -> list[str]:
+    """Effects that do what gains do that were let drift, if the gains are held.
+
+    Args:
+        state: where a search starts, with gains that are free.
+        drifted: the same fitted.
+        settings: numbers that decide.
+    """
+    held = fitted(replace(state, free=()))
+    trials = [attempt(held, (n,)) for n in of_levels() if n in candidates(held.state)]
+    return [t.names[0] for t in _imitators(drifted, held, trials, settings)]
 
 
 def _pruned(trial: Trial, names: list[str], settings: Settings) -> tuple[Trial, list[str]]:

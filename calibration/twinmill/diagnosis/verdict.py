@@ -8,9 +8,8 @@ import numpy as np
 
 from twinmill.diagnosis.findings import Finding
 from twinmill.diagnosis.rest import Rest
-from twinmill.diagnosis.search import REFIT
+from twinmill.diagnosis.search import REFIT, of_levels
 from twinmill.fitting.compare import GOOD, MISSING
-from twinmill.model.parameters import catalogue
 
 LEAST_SHARE = 0.1  # of the first excess: findings that take less leave the verdict to the rest
 DRIFTED = 0.85  # share of the score as given that drifting gains leave, where they were stale
@@ -26,6 +25,7 @@ class Weighed:
         first, refit, last: held-out scores: where the search started, with the base refitted, with
             what was found.
         hidden: effects that data of this kind could show, and these data do not.
+        imitators: effects that would take what drifting gains took.
         noises: what was said of unusual noise.
         usual: score of the model on the logs that it was fitted to.
     """
@@ -37,6 +37,7 @@ class Weighed:
     findings: Sequence[Finding]
     rest: Rest
     hidden: Collection[str]
+    imitators: Collection[str]
     noises: Sequence[str]
     usual: float
 
@@ -55,15 +56,25 @@ class Weighed:
             return "outside_catalogue"
         if self.last > MISSING * self.known:
             return "outside_catalogue"
-        if self._stale and not self.silent:
+        if self._stale and not self.silent and not self._instead:
             return "refit_enough"
-        return "cannot_tell" if self.silent or self.last > MISSING else "model_adequate"
+        unsure = self.silent or self._instead or self.last > MISSING
+        return "cannot_tell" if unsure else "model_adequate"
+
+    @property
+    def _instead(self) -> list[str]:
+        """Effects that would do what other numbers of the base did."""
+        return [*dict.fromkeys([*self._rivals_of_refit, *(self.imitators if self._stale else ())])]
+
+    @property
+    def _rivals_of_refit(self) -> tuple[str, ...]:
+        groups = [f.group[1:] for f in self.findings if f.effect == REFIT and f.group]
+        return groups[0] if groups else ()
 
     @property
     def _stale(self) -> bool:
         """The base's numbers are: a finding, or gains that were let drift took the error."""
-        drifted = self.score > GOOD * self.known and self.last < DRIFTED * self.score
-        return bool(self.findings) or drifted
+        return bool(self.findings) or drifted(self.score, self.last, self.known)
 
     @property
     def silent(self) -> list[str]:
@@ -71,8 +82,8 @@ class Weighed:
 
         Without them a robot that is driven at other commands may do something else altogether.
         """
-        drives = {name: catalogue()[name]["identify"] for name in self.hidden}
-        return [n for n, own in drives.items() if "levels" in own and "arcs" not in own]
+        levels = of_levels()
+        return [n for n in self.hidden if n in levels]
 
     @property
     def _outside(self) -> bool:
@@ -108,6 +119,11 @@ class Weighed:
                 if self._stale
                 else "Nothing is missing that these logs would show"
             )
+            if self._instead:
+                return (
+                    f"{seen}; so would {' or '.join(self._instead)}, and these logs cannot tell "
+                    "them apart."
+                )
             return f"{seen}, but these logs cannot show {', '.join(self.silent)}."
         if verdict == "refit_enough":
             return (
@@ -164,6 +180,17 @@ class Weighed:
         return doubts
 
 
+def drifted(score: float, last: float, known: float) -> bool:
+    """Whether gains that were let drift took the error.
+
+    Args:
+        score: of the model as given.
+        last: held out, with drifted gains and what was found.
+        known: that is no news.
+    """
+    return score > GOOD * known and last < DRIFTED * score
+
+
 def _named(finding: Finding) -> str:
     """A finding in the sentence, with what it takes."""
     takes = finding.takes
@@ -171,7 +198,8 @@ def _named(finding: Finding) -> str:
         values = ", ".join(
             f"{e.name.split('.', 1)[1]} {e.value:.3g}" for e in finding.parameters[:3]
         )
-        return f"stale numbers of the base ({values}; {takes})"
+        instead = f", or {' or '.join(finding.group[1:])} instead" if finding.group else ""
+        return f"stale numbers of the base ({values}; {takes}){instead}"
     name = finding.effect
     if finding.group:
         name = f"one of {' or '.join(finding.group)}, which these logs cannot tell apart"
