@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shlex
+from functools import partial
 from typing import Annotated
 
 import typer
@@ -59,7 +60,7 @@ def _compare(
     with busy(f"comparing with {model}"):
         measurements = load(logs, model_file, as_json)
         result = compare(measurements, model_file)
-    section = comparison_section(result)
+    section = partial(comparison_section, result)
     data = {**result.to_json(), **told(measurements)}
     finish(data, show.comparison(result), source, section, as_json, out)
     return result
@@ -84,7 +85,7 @@ def _fit(
     with busy(f"fitting {model}"):
         measurements = load(logs, model_file, as_json)
         result = fit(measurements, model_file, output, source.command)
-    section = fit_section(result)
+    section = partial(fit_section, result)
     data = {**result.to_json(), **told(measurements)}
     finish(data, show.fit(result), source, section, as_json, out)
     return result
@@ -131,13 +132,13 @@ def _add(
     if is_of_camera(effect):
         with busy(f"adding {effect} to {model}"):
             seen = add_to_camera(effect, measurements, model_file, output, source.command)
-        section = bits.addition_section(seen, model_file.path.name)
+        section = partial(bits.addition_section, seen, model_file.path.name)
         data = {**seen.to_json(), **told(measurements)}
         finish(data, bits.addition(seen), source, section, as_json, out)
         return seen
     with busy(f"adding {effect} to {model}"):
         result = add(effect, measurements, model_file, output, source.command, texts)
-    section = added_section(result)
+    section = partial(added_section, result)
     data = {**result.to_json(), **told(measurements)}
     finish(data, show.added(result), source, section, as_json, out)
     return result

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import typer
@@ -65,7 +66,8 @@ def _diagnose(
     data = {**result.to_json(), **told(measurements), "swarm": swarm}
     if data["next_experiment"]:  # the script comes from a command of its own
         data["next_experiment"]["command"] = command_line("next", logs, model)
-    finish(data, present.terminal(result), source, present.section(result), as_json, out)
+    section = partial(present.section, result)
+    finish(data, present.terminal(result), source, section, as_json, out)
     return result
 
 
@@ -121,7 +123,7 @@ def _explain(
     with telling(f"explaining with {model}") as say:
         measurements = load(logs, model_file, as_json)
         result = explain(measurements, model_file, output, source.command, say)
-    section = present.section(result.diagnosis)
+    section = partial(present.section, result.diagnosis)
     data = {**result.to_json(), **told(measurements)}
     finish(data, present.terminal_explanation(result), source, section, as_json, out)
     return result

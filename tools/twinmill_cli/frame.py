@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
@@ -74,12 +75,15 @@ def finish(
     data: dict,
     text: RenderableType,
     source: Provenance,
-    section: Section,
+    section: Callable[[], Section],
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """Report, then JSON or text."""
-    report = write_report(out, section.title, source, [section]) if out else None
+    """Report, then JSON or text; the section's pictures are drawn for a report alone."""
+    report = None
+    if out:
+        drawn = section()
+        report = write_report(out, drawn.title, source, [drawn])
     deliver({**data, **source.to_json(), "report": str(report) if report else None}, text, as_json)
     if report and not as_json:
         typer.echo(f"Report: {report}")

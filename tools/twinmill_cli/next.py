@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -79,7 +80,8 @@ def _next(
         data["script_as"] = str(ros_path(script_as, output))
         twists = TwistScript.of(model_file.model, plan.rows.t_s, plan.rows.duty, plan.rows.end_s)
         write_script(twists, script_as, Path(data["script_as"]), force, source.command)
-    finish(data, present.terminal(plan, how), source, present.section(plan, how), as_json, out)
+    section = partial(present.section, plan, how)
+    finish(data, present.terminal(plan, how), source, section, as_json, out)
     return plan
 
 

@@ -39,7 +39,9 @@ def where_it_fails(
     scene: Scene, windows: Windows, errors: np.ndarray, floor: np.ndarray
 ) -> list[Regime]:
     """Regimes with enough windows, by group; within a group the worst first."""
-    squares = np.mean((errors[:, HORIZON] / floor[HORIZON]) ** 2, axis=1)
+    over = (errors[:, HORIZON] / floor[HORIZON]) ** 2
+    judged = np.isfinite(floor[HORIZON])  # a channel without a floor was not recorded, or is still
+    squares = over[:, judged].mean(axis=1)
     known = np.isfinite(squares)
     regimes = []
     for group, name, mask in _masks(scene, windows):

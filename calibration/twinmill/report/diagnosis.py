@@ -195,8 +195,8 @@ def section(diagnosis: Diagnosis) -> Section:
         views.facts(before),
         [*_bit_figures(diagnosis), waterfall(_labelled(diagnosis)), *robot_pictures(before)],
         [*_tables(diagnosis), *_bit_steps(diagnosis), *_bit_tables(diagnosis)],
-        " ".join(lines(diagnosis)),
-        before.warnings,
+        next_step=" ".join(lines(diagnosis)),
+        warnings=before.warnings,
     )
 
 

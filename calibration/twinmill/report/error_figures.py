@@ -14,15 +14,21 @@ TONES = {"good": "#009e73", "warn": "#e69f00", "bad": "#d55e00"}
 
 
 def error_growth(models: list[tuple[str, RobotComparison]]) -> Figure:
-    """Error against horizon in each channel, over the floor's band."""
+    """Error against horizon in each channel that was recorded and moves, over the floor's band."""
     colours = [PREDICTED] if len(models) == 1 else [BEFORE, PREDICTED]
+    floors = models[-1][1].floor.rms
+    shown_channels = [
+        (c, *named) for c, named in enumerate(CHANNELS) if np.isfinite(floors[:, c]).any()
+    ]
 
     def paint(panels) -> None:
-        for c, ((channel, unit), axes) in enumerate(zip(CHANNELS, panels, strict=True)):
+        panels = np.atleast_1d(panels)
+        for (c, channel, unit), axes in zip(shown_channels, panels, strict=True):
             factor, shown = SHOWN[unit]
-            floor = models[-1][1].floor.rms[:, c] * factor
+            floor = floors[:, c] * factor
             found = [rms(robot.errors)[:, c] * factor for _, robot in models]
-            low = 0.6 * np.nanmin([floor, *found])
+            shown_errors = np.array([floor, *found])
+            low = 0.6 * np.nanmin(np.where(shown_errors > 0, shown_errors, np.nan))
             axes.fill_between(
                 HORIZONS_S, low, floor, color=FLOOR, alpha=0.25, lw=0, label="noise floor"
             )
@@ -39,7 +45,7 @@ def error_growth(models: list[tuple[str, RobotComparison]]) -> Figure:
         panels[-1].set_xlabel("predicted this many seconds ahead")
 
     return Figure(
-        draw(6.0, paint, nrows=3, sharex=True),
+        draw(2.0 * len(shown_channels), paint, nrows=len(shown_channels), sharex=True),
         "How errors grow with time",
         "The further ahead, the larger the error. Inside the green band an error cannot be told "
         "from noise: a line that runs along its edge is as good as this log can show. Each "

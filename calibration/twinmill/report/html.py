@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sections of text, tables and figures to one HTML file."""
 
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -53,6 +53,7 @@ class Section:
     facts: list[tuple[str, str]] = field(default_factory=list)
     figures: list[Figure] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
+    _: KW_ONLY
     next_step: str = ""
     commands: list[tuple[str, str]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)

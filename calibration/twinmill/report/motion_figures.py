@@ -144,7 +144,7 @@ def floor_map(robot: RobotComparison) -> Figure:
 def _stretch(robot: RobotComparison) -> np.ndarray:
     """Indices of the poses of the 20 s in which predictions miss most."""
     track, starts = robot.scene.measurement.track, robot.windows.starts
-    square = np.nan_to_num(np.sum((robot.errors / robot.floor.rms)[:, HORIZON] ** 2, axis=1))
+    square = np.nansum((robot.errors / robot.floor.rms)[:, HORIZON] ** 2, axis=1)
     total = np.concatenate([[0], np.cumsum(square)])
     t_s = track.pose_t_s[starts]
     begins = np.flatnonzero(t_s <= max(t_s[0], t_s[-1] - STRETCH_S))

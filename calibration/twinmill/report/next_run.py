@@ -57,9 +57,9 @@ def section(plan: Plan, how: How) -> Section:
         [("run", _length(plan))],
         [figures.duties(plan), figures.floor(plan), figures.margins(plan)],
         [_chances(plan), _moves(plan)],
-        how.first,
-        how.commands,
-        _hidden(plan),
+        next_step=how.first,
+        commands=how.commands,
+        warnings=_hidden(plan),
     )
 
 

@@ -28,8 +28,8 @@ def comparison_section(result: Comparison) -> Section:
             *([field_of_view(result.bits)] if result.bits else []),
         ],
         views.robot_tables(result),
-        advice(result),
-        result.warnings,
+        next_step=advice(result),
+        warnings=result.warnings,
     )
 
 
@@ -44,8 +44,8 @@ def fit_section(result: FitResult) -> Section:
         views.facts(result.after),
         _pictures(result.after, [("before", before), ("after", after)]),
         [tables.parameters(result.parameters), *views.robot_tables(result.after)],
-        advice(result.after),
-        result.after.warnings,
+        next_step=advice(result.after),
+        warnings=result.after.warnings,
     )
 
 
@@ -66,8 +66,8 @@ def added_section(result: AddResult) -> Section:
         views.facts(result.after),
         _pictures(result.after, [("before", before), ("after", after)]),
         [tables.parameters(result.parameters), *tables.held_out(result)],
-        advice(result.after),
-        result.after.warnings,
+        next_step=advice(result.after),
+        warnings=result.after.warnings,
     )
 
 
@@ -80,7 +80,11 @@ def steps_section(title: str, scores: list[tuple[str, float]], verdict: str) -> 
 def robot_pictures(result: Comparison) -> list[Figure]:
     """Where and how fast the robot went, and when the model fails."""
     robot, steady = result.main, views.sheets(result)
-    own = [] if robot in steady else [path(robot), speeds(robot), regimes(robot), floor_map(robot)]
+    own = [] if robot in steady else [path(robot), speeds(robot)]
+    if robot not in steady and robot.where:
+        own.append(regimes(robot))
+    if robot not in steady:
+        own.append(floor_map(robot))
     if steady:
         number = steady[0].scene.measurement.robot_id
         own += [steady_values(steady), regimes(steady[0], f"Steady inputs of robot {number}")]

@@ -14,6 +14,8 @@ from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
+from twinmill.report import Provenance, write_report
+from twinmill.report.sections import comparison_section
 
 OMNI3 = """
 name = "omni3"
@@ -206,3 +208,13 @@ def test_drives_in_order_of_duty_name_the_same_robot(imported, model_of):
     found = diagnose(imported("fleet_weak_left", "sorted", same_clock=True), model_of(FLEET))
     assert [r.robot_id for r in found.robots_off] == [3]
     assert found.verdict != "outside_catalogue"
+
+
+def test_a_robot_without_heading_gets_a_report_with_what_was_noted(imported, model_of, tmp_path):
+    """Poses at 4 Hz: nothing is known 0.1 s ahead, and nothing of the heading."""
+    result = compare(imported("hera_swarm", "run-108", same_clock=True), model_of(HERA))
+    assert any("heading is not recorded" in note for note in result.warnings)
+    section = comparison_section(result)
+    page = write_report(tmp_path / "r", section.title, Provenance("", "", ""), [section])
+    text = page.read_text()
+    assert "heading is not recorded" in text and "When it fails" in text
