@@ -9,7 +9,7 @@ import twinmill_native as native
 import yaml
 from scipy.stats import chi2, truncnorm
 
-from twinmill.export.ranges import Quantity, sampled
+from twinmill.model.ranges import Quantity, sampled
 from twinmill_cli.main import run
 
 COUNT = 20_000

@@ -48,10 +48,42 @@ def test_every_cell_and_seed_is_a_row(tmp_path: Path):
     data = sweep(request(), tmp_path / "s")
     read, table = read_sweep(tmp_path / "s")
     assert data["worlds"] == table.num_rows == 3 * 2 * 10
-    found = set(zip(*(table[c].to_pylist() for c in ("v_mps", "omega_degps", "seed")), strict=True))
-    assert found == {(v, w, s) for v in (0.1, 0.2, 0.3) for w in (30.0, 90.0) for s in range(1, 11)}
+    found = list(zip(*(table[c].to_pylist() for c in ("v_mps", "omega_degps")), strict=True))
+    assert found == [(v, w) for w in (30.0, 90.0) for v in (0.1, 0.2, 0.3) for _ in range(10)]
+    assert table["seed"].to_pylist() == list(range(1, 61))
     assert set(native.METRICS) | {"class", "least_diffusion", "n"} <= set(table.column_names)
     assert read == request()
+
+
+def test_no_two_cells_share_seeds_unless_they_are_asked_to(tmp_path: Path):
+    """A start that is unlucky is so in one cell alone; a seed of the table runs the same again."""
+    cells = ["theta_a=0,1e-9"]
+    sweep(request(cells), tmp_path / "apart")
+    sweep(request(cells, same_seeds=True), tmp_path / "same")
+    apart, same = (read_sweep(tmp_path / name)[1] for name in ("apart", "same"))
+    assert same["seed"].to_pylist() == 2 * list(range(1, 11))
+    radius_m = np.array(same["radius_m"]).reshape(2, 10)
+    assert radius_m[0] == pytest.approx(radius_m[1], rel=1e-5)
+    both = np.array(apart["radius_m"])
+    assert len(np.unique(both.round(6))) == 20
+    seed = apart["seed"].to_pylist()[13]
+    sweep(request(["theta_a=1e-9"], first_seed=seed, seeds=1), tmp_path / "again")
+    assert read_sweep(tmp_path / "again")[1]["radius_m"].to_pylist() == [both[13]]
+
+
+def test_a_swarm_has_settled_since_its_groups_parted():
+    """Two robots drive apart from one that stands, out of its view of 1.1 m at a known time."""
+    model = native.Model.load("paper.toml")
+    model.set("idiosyncrasy.theta_a1_std", 0)
+    model.set("idiosyncrasy.theta_a2_std", 0)
+    still, ahead = [0, 0, 0, 0], [100, 0, 100, 0]
+    poses = [[0.01, 0, 0], [0, 0, 0], [0, 0, math.pi]]
+    cell = native.Cell(model, [still, ahead, ahead], 3, poses=poses)
+    rows = native.run_worlds([cell], np.zeros(1, np.int64), np.ones(1, np.uint64), 30.0, True)
+    assert native.classify(rows) == ["separated"]
+    parted_s = 1.1 / 0.25
+    # Means over 5 s of groups that go from 1 to 3 pass 1.5 a quarter of that later; once a second.
+    assert parted_s + 1.25 - 5 - 0.1 <= rows[0, -1] <= parted_s + 1.25 - 5 + 1.1
 
 
 KILLED = """

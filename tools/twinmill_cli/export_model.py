@@ -23,11 +23,12 @@ if working():  # not for --help
     from twinmill.export.mjcf import mjcf
     from twinmill.export.model_json import model_json
     from twinmill.export.ranges import as_json as ranges_json
-    from twinmill.export.ranges import as_npz, as_yaml, ranges
+    from twinmill.export.ranges import as_npz, as_yaml
     from twinmill.export.ros2_control import ros2_control
     from twinmill.export.sdf import sdf
     from twinmill.export.urdf import urdf
     from twinmill.files import check_new_file, plain, replacing
+    from twinmill.model.ranges import ranges
     from twinmill_cli.frame import open_model
 
 
@@ -137,7 +138,7 @@ def _export_model(
 
 def _ranges(source: RobotModel, beside: Path, count: int, seed: int) -> dict[Path, str | bytes]:
     """The three files by path."""
-    found = ranges(source, count, seed)
+    found = ranges(source.file, source.model, count, seed)
     data = {"model": source.name, "model_sha256": source.file.hash, **plain(found.to_json())}
     contents = {"yaml": as_yaml(data), "json": ranges_json(data), "npz": as_npz(found)}
     return {

@@ -102,6 +102,11 @@ COMMANDS = (
         "phase",
         "Draw what becomes of the swarm over a sweep's grid, and where to experiment next.",
     ),
+    (
+        "matters",
+        "matters",
+        "Tell which effects and numbers of a model matter for what the swarm does.",
+    ),
     ("ask", "ask", "Answer one of the four design questions with a curve and a sentence."),
     (
         "claims",

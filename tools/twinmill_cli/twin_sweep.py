@@ -49,7 +49,12 @@ def _command(
     ] = None,
     n: Annotated[int | None, typer.Option("--n", help="Robots; default 6 or the mix's.")] = None,
     seeds: Annotated[int, typer.Option("--seeds", min=1, help="Runs of each cell.")] = 50,
-    first_seed: Annotated[int, typer.Option("--first-seed", min=0)] = 1,
+    first_seed: Annotated[
+        int, typer.Option("--first-seed", min=0, help="Cells take their seeds from here on.")
+    ] = 1,
+    same_seeds: Annotated[
+        bool, typer.Option("--same-seeds", help="In every cell, to see differences of cells alone.")
+    ] = False,
     duration_s: Annotated[float, typer.Option("--duration-s", min=0.1, help="Of each run.")] = 120,
     start: Annotated[str, typer.Option("--start", help="square, disc or facing-out.")] = "square",
     spread_m: Annotated[
@@ -90,6 +95,7 @@ def _command(
         spread_m=spread_m,
         target_radius_m=target_radius_m,
         full=full,
+        same_seeds=same_seeds,
     )
     data = sweep(request, out, workers, dask)
     deliver(data, _text(data), as_json)

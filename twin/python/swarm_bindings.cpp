@@ -91,7 +91,7 @@ Cell MakeCell(const Model &model, const Tables &rows, size_t ring_size, const st
     return {model, std::move(tables), ring_size, StartNamed(start), spread_m, std::move(starts)};
 }
 
-// (W, 9): the metrics, and the least diffusion.
+// (W, 10): the metrics, the least diffusion, and since when the class has held.
 Array Run(const std::vector<const Cell *> &cells, Indices cell, Seeds seeds, double duration_s,
           bool full)
 {
@@ -106,10 +106,10 @@ Array Run(const std::vector<const Cell *> &cells, Indices cell, Seeds seeds, dou
         for (const Outcome &o : RunWorlds(worlds, duration_s, full ? Path::kFull : Path::kBest))
         {
             Append(rows, o.mean);
-            rows.push_back(o.least_diffusion);
+            rows.insert(rows.end(), {o.least_diffusion, o.settled_s});
         }
     }
-    return ToNumpy(std::move(rows), {worlds.size(), kMetrics + 1});
+    return ToNumpy(std::move(rows), {worlds.size(), kMetrics + 2});
 }
 
 Array Trace(const Cell &cell, uint64_t seed, double duration_s, double every_s)
@@ -172,6 +172,10 @@ void BindSwarms(nb::module_ &m)
     for (const char *name : kMetricNames)
         names.append(name);
     m.attr("METRICS") = names;
+    nb::list outcomes(names);
+    for (const char *name : {"least_diffusion", "settled_s"})
+        outcomes.append(name);
+    m.attr("OUTCOMES") = outcomes;
     m.def("species", &Species, "text"_a, "n"_a = nb::none(), "own"_a = NamedTables(),
           "Per robot the behaviour's name and (unseen speed, turn, seen speed, turn) inputs, turn "
           "in thousandths. `own`: tables beside the firmware's.");
@@ -189,7 +193,8 @@ void BindSwarms(nb::module_ &m)
         .def_prop_ro("why_not_lean", [](const Cell &cell) { return WhyNotLean(cell.model); });
     m.def(
         "run_worlds", &Run, "cells"_a, "cell"_a, "seeds"_a, "duration_s"_a, "full"_a = false,
-        "(W, 9) METRICS over the last 10 s and the least diffusion, for worlds of cell and seed.");
+        "(W, 10) OUTCOMES of worlds of cell and seed: METRICS and their least diffusion over the last "
+        "10 s; since when the class has held, NaN of the lean kernel.");
     m.def("trace_world", &Trace, "cell"_a, "seed"_a, "duration_s"_a, "every_s"_a,
           "(T, n, 3) poses of one world, the start first.");
     m.def("measure", &MeasureAll, "pose"_a, "velocity"_a, "ring_size"_a, "range_m"_a,

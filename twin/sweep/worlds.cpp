@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <string_view>
 
 #include "fw/config.h"
 #include "swarm/bodies.h"
@@ -27,6 +28,33 @@ Swarm MakeSwarm(const World &world)
                  {.seed = world.seed});
 }
 
+// The classes that a swarm goes through.
+class History
+{
+public:
+    void Add(double t_s, const Metrics &now)
+    {
+        recent_.Add(t_s, now);
+        if (t_s < next_s_)
+            return;
+        classes_.emplace_back(t_s, Classify(recent_.Mean()));
+        next_s_ += kEvery_s;
+    }
+    double SettledIn(std::string_view last) const
+    {
+        double since_s = std::numeric_limits<double>::quiet_NaN();
+        for (auto at = classes_.rbegin(); at != classes_.rend() && at->second == last; ++at)
+            since_s = std::max(0.0, at->first - kWindow_s);
+        return since_s;
+    }
+
+private:
+    static constexpr double kWindow_s = 5, kEvery_s = 1;
+    MetricWindow recent_{kWindow_s};
+    double next_s_ = kWindow_s;
+    std::vector<std::pair<double, std::string_view>> classes_;
+};
+
 Outcome RunFull(const World &world, double duration_s)
 {
     const Cell &cell = *world.cell;
@@ -34,20 +62,25 @@ Outcome RunFull(const World &world, double duration_s)
     Swarm swarm = MakeSwarm(world);
     const StepCount count = CountSteps(swarm.PeriodS(), duration_s);
     MetricWindow window(std::numeric_limits<double>::infinity());
+    History history;
     Outcome outcome{{}, std::numeric_limits<double>::infinity()};
     std::vector<RobotState> states(cell.tables.size());
     for (int step = 0; step < count.steps; ++step)
     {
         swarm.Step();
-        if (!count.Measures(step))
+        if (!count.Samples(step))
             continue;
         for (size_t i = 0; i < states.size(); ++i)
             states[i] = swarm.State(static_cast<int>(i));
         const Metrics now = Measure(states, cell.ring_size, scale);
+        history.Add(swarm.TimeS(), now);
+        if (!count.Measures(step))
+            continue;
         window.Add(swarm.TimeS(), now);
         outcome.least_diffusion = std::min(outcome.least_diffusion, now.diffusion);
     }
     outcome.mean = window.Mean();
+    outcome.settled_s = history.SettledIn(Classify(outcome.mean));
     return outcome;
 }
 

@@ -7,7 +7,7 @@ import numpy as np
 import tomlkit
 
 from twinmill.export.carried import RobotModel
-from twinmill.export.ranges import quantities
+from twinmill.model.ranges import quantities
 
 EFFECT_KEYS = ("summary", "stage", "equation", "leaves_out", "reference")
 
@@ -18,7 +18,7 @@ def model_json(robot: RobotModel) -> dict[str, Any]:
     Names are the model file's own, each with value, unit, bounds and meaning.
     """
     document = tomlkit.parse(robot.file.text).unwrap()
-    known = {q.name: q for q in quantities(robot)}
+    known = {q.name: q for q in quantities(robot.file, robot.model)}
     numbers = {}
     for v in robot.model.values():
         q = known.get(v["name"])

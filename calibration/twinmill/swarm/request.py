@@ -25,8 +25,11 @@ class Request:
         tables: own behaviours beside the firmware's: name, inputs (unseen speed, unseen turn,
             seen speed, seen turn; turns in thousandths).
         n: robots; None: what the behaviour says, or 6.
-        first_seed, seeds: seeds of every cell.
+        first_seed, seeds: the first cell has so many seeds from the first on, the next cell the
+            next ones: what is unlucky in one cell is not so in the others.
         full: every robot its firmware and plant, also where the lean kernel would serve.
+        same_seeds: every cell has the seeds of the first, so that cells differ by their values
+            alone: for differences between cells.
     """
 
     behavior: str
@@ -43,6 +46,7 @@ class Request:
     target_radius_m: float | None = None
     tables: list[tuple[str, list[int]]] = field(default_factory=list)
     full: bool = False
+    same_seeds: bool = False
 
     def to_json(self) -> str:
         """One line, the same for the same request."""
@@ -76,6 +80,10 @@ class Request:
     def world_count(self) -> int:
         """Cells times seeds."""
         return math.prod(len(axis.values) for axis in self.axes) * self.seeds
+
+    def seed_of(self, worlds: np.ndarray) -> np.ndarray:
+        """Seeds of worlds, which are numbered seed by seed within cell by cell."""
+        return self.first_seed + (worlds % self.seeds if self.same_seeds else worlds)
 
     def species(self, n: int | None) -> tuple[list[list[int]], int]:
         """Tables of all robots, and how many of the first species make the ring.
@@ -143,7 +151,7 @@ def run_part(request: Request, worlds: range) -> dict[str, list]:
         The columns of the sweep's table.
     """
     numbers = np.array(worlds, dtype=np.int64)
-    cell_of, seeds = numbers // request.seeds, numbers % request.seeds + request.first_seed
+    cell_of, seeds = numbers // request.seeds, request.seed_of(numbers)
     points = request.points
     used = list(range(cell_of[0], cell_of[-1] + 1))
     cells = [request.cell(points[c]) for c in used]
@@ -155,7 +163,7 @@ def run_part(request: Request, worlds: range) -> dict[str, list]:
         kind = int if axis.whole else float
         columns[axis.name] = [kind(points[c][a]) for c in cell_of]
     columns["n"] = [request.robots(points[c]) for c in cell_of]
-    for k, name in enumerate([*native.METRICS, "least_diffusion"]):
+    for k, name in enumerate(native.OUTCOMES):
         columns[name] = rows[:, k].tolist()
     columns["class"] = native.classify(rows)
     lean = [not request.full and not cell.why_not_lean for cell in cells]

@@ -3,6 +3,7 @@
 
 import time
 from collections import Counter
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
@@ -70,22 +71,49 @@ def sweep(
     Returns:
         What the JSON says.
     """
-    store = Store(folder)
     check_new_folder(folder)
-    store.open(request)
-    begin_s, parts = time.monotonic(), request.parts()
-    todo = {} if store.result.exists() else {k: parts[k] for k in store.missing(len(parts))}
-    done = len(parts) - len(todo)
-    run = run_on_dask(request, todo, dask) if dask else run_here(request, todo, workers)
-    with _progress() as progress:
+    begin_s = time.monotonic()
+    with progress_bar() as progress:
         task = progress.add_task("worlds", total=request.world_count)
-        progress.advance(task, request.world_count - sum(map(len, todo.values())))
-        for number, columns in run:
-            store.keep(number, columns)
-            progress.advance(task, len(parts[number]))
+        done = run_missing(request, folder, lambda n: progress.advance(task, n), workers, dask)
+    return {
+        **_summary(request, folder, begin_s),
+        "parts": len(request.parts()),
+        "parts_kept_before": done,
+    }
+
+
+def run_missing(
+    request: Request,
+    folder: Path,
+    tell: Callable[[int], None],
+    workers: int | None = None,
+    dask: str | None = None,
+) -> int:
+    """The same without a word.
+
+    Args:
+        request: the sweep.
+        folder: of it.
+        tell: is given how many worlds are done, those that were kept before first.
+        workers: threads; None: all cores.
+        dask: address of a cluster.
+
+    Returns:
+        How many parts were kept before.
+    """
+    store = Store(folder)
+    store.open(request)
+    parts = request.parts()
+    todo = {} if store.result.exists() else {k: parts[k] for k in store.missing(len(parts))}
+    tell(request.world_count - sum(map(len, todo.values())))
+    run = run_on_dask(request, todo, dask) if dask else run_here(request, todo, workers)
+    for number, columns in run:
+        store.keep(number, columns)
+        tell(len(parts[number]))
     if not store.result.exists():
         store.finish(request, len(parts))
-    return {**_summary(request, folder, begin_s), "parts": len(parts), "parts_kept_before": done}
+    return len(parts) - len(todo)
 
 
 def _summary(request: Request, folder: Path, begin_s: float) -> dict:
@@ -108,7 +136,8 @@ def _summary(request: Request, folder: Path, begin_s: float) -> dict:
     }
 
 
-def _progress() -> Progress:
+def progress_bar() -> Progress:
+    """Work done and time left, on stderr if that is a terminal."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     return Progress(

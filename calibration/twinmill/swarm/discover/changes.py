@@ -3,10 +3,10 @@
 
 from dataclasses import replace
 
-import tomlkit
 import twinmill_native as native
 
 from twinmill.swarm.axes import QUANTITIES
+from twinmill.swarm.model_text import with_values
 from twinmill.swarm.request import Request
 
 
@@ -16,7 +16,7 @@ def with_changes(request: Request) -> Request:
     Raises:
         ValueError: an axis has several values, or is no quantity of the model file.
     """
-    model, document = request.model, tomlkit.parse(request.model_text)
+    model = request.model
     before = {row["name"]: row["value"] for row in model.values()}
     for axis in request.axes:
         quantity = QUANTITIES.get(axis.name)
@@ -26,14 +26,9 @@ def with_changes(request: Request) -> Request:
                 "sensor.range_m=0.8."
             )
         _apply(model, axis.name, axis.values[0])
-    for row in model.values():
-        if row["value"] == before[row["name"]]:
-            continue
-        section, _, key = row["name"].partition(".")
-        if section not in document and section not in ("idiosyncrasy", "noise", "robot", "sensor"):
-            raise ValueError(f"--set {row['name']}: write what an effect has into the model file.")
-        document.setdefault(section, tomlkit.table())[key] = row["value"]
-    text = tomlkit.dumps(document)
+    after = {row["name"]: row["value"] for row in model.values()}
+    changed = {name: value for name, value in after.items() if value != before[name]}
+    text = with_values(request.model_text, request.model, changed)
     native.Model.from_toml(text, request.model_name)
     return replace(request, model_text=text, axes=[])
 

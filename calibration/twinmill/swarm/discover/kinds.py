@@ -6,7 +6,7 @@ import twinmill_native as native
 
 from twinmill.swarm.classes import COLORS
 
-COLUMNS = [*native.METRICS, "least_diffusion"]
+COLUMNS = list(native.OUTCOMES)
 # Name, bounds and cells of each measure. Circliness and scatter are decimal logarithms; the last
 # cell of odd_ratio is for swarms without odd robots.
 MEASURES = {

@@ -27,14 +27,13 @@ bool SameBatch(const Cell &a, const Cell &b);
 void RunLean(const LeanWidth &width, std::span<const World> worlds, double duration_s,
              std::span<Outcome> outcomes, bool screens = true);
 
-// Steps of a run, and those that are measured: from `first_measured` every `stride`-th to the last.
+// Steps of a run. Every `stride`-th is a sample, the last one too; those from `first_measured` on
+// are what is measured at the end of the run.
 struct StepCount
 {
     int steps, first_measured, stride;
-    bool Measures(int step) const
-    {
-        return step >= first_measured && (step - first_measured) % stride == 0;
-    }
+    bool Samples(int step) const { return (step - first_measured) % stride == 0; }
+    bool Measures(int step) const { return step >= first_measured && Samples(step); }
     int Measured() const { return (steps - 1 - first_measured) / stride + 1; }
 };
 StepCount CountSteps(double period_s, double duration_s);

@@ -3,6 +3,7 @@
 #ifndef SWEEP_WORLDS_H
 #define SWEEP_WORLDS_H
 
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -39,6 +40,9 @@ struct Outcome
 {
     Metrics mean;                // over the last 10 s, every 0.1 s or a little more often
     double least_diffusion = 0;  // of the same samples
+    // Since when the swarm has been of the class that it ends in, by means over 5 s, once a second.
+    // NaN: the last 5 s are of another class than the last 10 s, or the lean kernel ran.
+    double settled_s = std::numeric_limits<double>::quiet_NaN();
 };
 
 enum class Path

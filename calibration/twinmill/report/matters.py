@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page on what matters for a swarm."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from twinmill.report import Figure, Section
+from twinmill.report.canvas import FLOOR, MEASURED, PREDICTED, draw
+from twinmill.report.tables import Cell, Table, Tone, number
+from twinmill.swarm.matters.judge import (
+    MATTERS,
+    NOTHING,
+    UNSURE,
+    Judged,
+    Matters,
+)
+from twinmill.swarm.matters.sentences import headline, next_step, sentence
+
+NOTE = (
+    "Each change is made alone, and the same random starts and robots are run before and after it. "
+    "It matters if the share of runs that reach the goal changes by the margin or more, and no "
+    "chance does that (5 % for all changes together); it does not if the 95 % interval of the "
+    "change is within the margin."
+)
+TONES: dict[str, Tone] = {MATTERS: "bad", UNSURE: "warn", NOTHING: "good"}
+COLORS = {MATTERS: PREDICTED, UNSURE: "#8a5a00", NOTHING: FLOOR}
+KINDS = {
+    "effect": "effect of the model, left out",
+    "parameter": "number of the model, at the ends of its interval",
+    "hidden": "effect that no log excludes",
+    "one_robot": "one robot apart from the others",
+    "robots": "differences of robots",
+}
+BARS = 16  # of the figure
+
+
+def section(found: Matters) -> Section:
+    """Everything on one page."""
+    share, low, high = found.before
+    request = found.request
+    counts = {v: len(found.of(v)) for v in (MATTERS, UNSURE, NOTHING)}
+    return Section(
+        title=f"What matters for {request.behavior}",
+        score=[
+            (f"of runs end '{found.goal}'", f"{100 * share:.0f} %", ""),
+            *((verdict, str(count), TONES[verdict]) for verdict, count in counts.items()),
+        ],
+        verdict=headline(found),
+        facts=[
+            ("model", request.model_name),
+            (
+                "runs",
+                f"up to {request.seeds} of {request.duration_s:g} s before and after each change, "
+                "fewer where the answer was clear before",
+            ),
+            ("robots", str(len(request.species(request.n)[0]))),
+            ("margin", f"{100 * found.margin:g} points"),
+            ("interval", f"{100 * low:.0f} to {100 * high:.0f} % of runs end '{found.goal}'"),
+            ("circliness, radius, time to form", _medians(found)),
+        ],
+        figures=[share_figure(found)],
+        tables=_tables(found),
+        next_step=next_step(found),
+    )
+
+
+def _medians(found: Matters) -> str:
+    m = found.medians
+    return (
+        f"{number(m['circliness'], 2)}, {number(m['radius_m'], 2)} m, {number(m['settled_s'], 2)} "
+        "s (medians; radius and time of runs that get there)"
+    )
+
+
+def share_figure(found: Matters) -> Figure:
+    """The share before and after each change, what moves it most first."""
+    shown = found.ranked[:BARS]
+
+    def paint(axes: Axes) -> None:
+        for y, judged in enumerate(reversed(shown)):
+            d, color = judged.worst.share, COLORS[judged.verdict]
+            span = [100 * (d.before + d.low), 100 * (d.before + d.high)]
+            axes.plot(np.clip(span, 0, 100), [y, y], color=color, lw=4, alpha=0.3)
+            axes.plot(100 * d.after, y, "o", ms=5, color=color)
+        share = 100 * found.before[0]
+        axes.axvline(share, color=MEASURED, lw=1)
+        margin = 100 * found.margin
+        axes.axvspan(share - margin, share + margin, color=MEASURED, alpha=0.06, lw=0)
+        axes.set(xlim=(-2, 102), ylim=(-0.6, len(shown) - 0.4), yticks=range(len(shown)))
+        axes.set_yticklabels([_label(judged) for judged in reversed(shown)], fontsize=7.5)
+        axes.set_xlabel(f"runs that end '{found.goal}' (%)")
+
+    return Figure(
+        draw(0.27 * len(shown) + 0.8, paint),
+        "What moves the share",
+        "Line: the model as it is, and around it the margin. Dots: after the change that moves the "
+        "share most, with the 95 % interval of the change. Red matters, brown is open, green does "
+        "not matter.",
+    )
+
+
+def _label(judged: Judged) -> str:
+    subject = judged.subject
+    if subject.kind == "effect":
+        return f"{subject.name} left out"
+    if subject.kind == "hidden":
+        return f"{subject.name}, not excluded"
+    if subject.kind == "robots":
+        return "robots all alike"
+    if subject.about == "one robot without it":
+        return f"one robot without {subject.name}"
+    what = judged.worst.change.what
+    return what if subject.kind == "parameter" else what.partition(" (")[0]
+
+
+def _tables(found: Matters) -> list[Table]:
+    made = []
+    for kind, title in KINDS.items():
+        rows = [_row(judged) for judged in found.ranked if judged.subject.kind == kind]
+        if rows:
+            columns = ["", "in words", "circliness", "radius m", "time to form s"]
+            made.append(Table(title.capitalize(), columns, rows, words=(0, 1)))
+    if found.left:
+        rows = [[Cell(name), Cell(why)] for name, why in found.left]
+        made.append(Table("Not tried", ["", "why"], rows, words=(0, 1)))
+    return made
+
+
+def _row(judged: Judged) -> list[Cell]:
+    metrics = judged.worst.metrics
+    cells = [
+        Cell(
+            f"{number(d.before, 2)} to {number(d.after, 2)}",
+            "" if d.low > 0 or d.high < 0 else "dim",
+        )
+        for d in (metrics[name] for name in ("circliness", "radius_m", "settled_s"))
+    ]
+    return [
+        Cell(judged.verdict, TONES[judged.verdict]),
+        Cell(sentence(judged)),
+        *cells,
+    ]

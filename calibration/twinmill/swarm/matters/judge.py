@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs a model and its changes with the same seeds, and judges which of them matter."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from twinmill.swarm.classes import interval, reached
+from twinmill.swarm.matters.changes import Change, Subject
+from twinmill.swarm.matters.differences import Difference, median_difference, share_difference
+from twinmill.swarm.request import Request
+from twinmill.swarm.store import read_sweep
+from twinmill.swarm.sweep import run_missing
+
+LOOKS = (0.25, 0.5, 1.0)  # shares of the seeds after which what is clear is left alone
+SURE = 0.05  # chance that anything at all is said to matter if nothing does
+MATTERS, UNSURE, NOTHING = "matters", "unsure", "does not matter"
+# What is told beside the share; the last two of runs that reach the goal.
+METRICS = ("circliness", "radius_m", "settled_s")
+OF_GOAL = ("radius_m", "settled_s")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a change does.
+
+    Attributes:
+        share: of runs that reach the goal.
+        metrics: medians of METRICS, by name.
+        sure: no chance makes this change of the share, all changes together.
+        seeds: runs before and after it.
+    """
+
+    change: Change
+    share: Difference
+    metrics: dict[str, Difference]
+    sure: bool
+    seeds: int
+
+    def to_json(self) -> dict:
+        """Plain values, without the model's text."""
+        return {
+            "what": self.change.what,
+            "values": self.change.values,
+            "share": self.share.to_json(),
+            **{name: d.to_json() for name, d in self.metrics.items()},
+            "sure": self.sure,
+            "seeds": self.seeds,
+        }
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What is asked about, with the answer.
+
+    Attributes:
+        outcomes: of its changes, in their order.
+        verdict: MATTERS, UNSURE or NOTHING.
+    """
+
+    subject: Subject
+    outcomes: list[Outcome]
+    verdict: str
+
+    @property
+    def worst(self) -> Outcome:
+        """Of the change that moves the share most."""
+        return max(self.outcomes, key=lambda o: abs(o.share.change))
+
+    @property
+    def shares(self) -> tuple[float, float]:
+        """Least and most, the model as it is included."""
+        values = [self.outcomes[0].share.before, *(o.share.after for o in self.outcomes)]
+        return min(values), max(values)
+
+
+@dataclass(frozen=True)
+class Matters:
+    """All answers, what matters most first.
+
+    Attributes:
+        request: of the model as it is.
+        goal: class that is wanted.
+        margin: change of the share that would not matter.
+        before: share that reaches the goal with its 95 % interval.
+        medians: of METRICS.
+        ranked: answers.
+        together: of all numbers drawn at once; None where the model knows no errors.
+        left: what was left out, and why.
+    """
+
+    request: Request
+    goal: str
+    margin: float
+    before: tuple[float, float, float]
+    medians: dict[str, float]
+    ranked: list[Judged]
+    together: Judged | None
+    left: list[tuple[str, str]]
+
+    def of(self, *verdicts: str, kinds: Sequence[str] = ()) -> list[Judged]:
+        """Answers of these verdicts, of these kinds or of all."""
+        return [
+            j
+            for j in self.ranked
+            if j.verdict in verdicts and (not kinds or j.subject.kind in kinds)
+        ]
+
+
+def folder_of(request: Request, folder: Path) -> Path:
+    """Where the runs of a request are kept: by what they depend on."""
+    return folder / "runs" / request.sha256[:16]
+
+
+def judge(
+    request: Request,
+    subjects: Sequence[Subject],
+    left: list[tuple[str, str]],
+    goal: str,
+    margin: float,
+    folder: Path,
+    tell: Callable[[int, int], None] = lambda done, planned: None,
+) -> Matters:
+    """Runs what is missing and judges.
+
+    A quarter of the seeds comes first, then what is open after it has the second, then the rest.
+
+    Args:
+        request: of the model as it is, without axes, by the full kernel; with the most seeds.
+        subjects: what is asked about.
+        left: what is not, and why.
+        goal: class that is wanted.
+        margin: change of the share that would not matter.
+        folder: of the runs; those that are there are kept.
+        tell: is given how many worlds are done and how many are planned.
+    """
+    bench = _Bench(request, folder, tell)
+    asked = sum(len(s.changes) for s in subjects if s.kind != "together")
+    level = 1 - SURE / max(asked, 1) / len(LOOKS)
+    judged: dict[int, Judged] = {}
+    for look, most in enumerate(LOOKS):
+        going = [
+            k
+            for k, s in enumerate(subjects)
+            if k not in judged or (judged[k].verdict == UNSURE and s.kind != "together")
+        ]
+        bench.plan(look, [subjects[k] for k in going])
+        before = bench.runs(request.model_text, look)
+        for k in going:
+            outcomes = [
+                _outcome(before, bench.runs(change.text, look), change, goal, level)
+                for change in subjects[k].changes
+            ]
+            judged[k] = Judged(subjects[k], outcomes, _verdict(outcomes, margin))
+        if most == LOOKS[-1] or not any(judged[k].verdict == UNSURE for k in going):
+            break
+    before = bench.runs(request.model_text, len(LOOKS) - 1)
+    hits = reached(before, goal)
+    order = (MATTERS, UNSURE, NOTHING)
+    ranked = sorted(
+        judged.values(), key=lambda j: (order.index(j.verdict), -abs(j.worst.share.change))
+    )
+    return Matters(
+        request,
+        goal,
+        margin,
+        (float(hits.mean()), *interval(hits.sum(), len(hits))),
+        {name: _median(_values(before, name, hits)) for name in METRICS},
+        [j for j in ranked if j.subject.kind != "together"],
+        next((j for j in ranked if j.subject.kind == "together"), None),
+        left,
+    )
+
+
+@dataclass
+class _Bench:
+    """Runs models with the same seeds, look after look."""
+
+    request: Request
+    folder: Path
+    tell: Callable[[int, int], None]
+    done: int = 0
+    planned: int = 0
+
+    def _part(self, text: str, look: int) -> Request:
+        """The seeds that a look adds."""
+        first, last = (int(share * self.request.seeds) for share in (0, *LOOKS)[look : look + 2])
+        seeds = {"first_seed": self.request.first_seed + first, "seeds": last - first}
+        return replace(self.request, model_text=text, **seeds)
+
+    def plan(self, look: int, subjects: Sequence[Subject]) -> None:
+        """Says how many runs a look adds."""
+        changes = 1 + sum(len(s.changes) for s in subjects)
+        self.planned += changes * self._part("", look).seeds
+        self.tell(self.done, self.planned)
+
+    def runs(self, text: str, look: int) -> pa.Table:
+        """Rows of all seeds up to a look."""
+        tables = []
+        for k in range(look + 1):
+            part = self._part(text, k)
+            place = folder_of(part, self.folder)
+            if not (place / "sweep.parquet").exists():
+                run_missing(part, place, self._advance)
+            tables.append(read_sweep(place)[1])
+        return pa.concat_tables([t.replace_schema_metadata() for t in tables])
+
+    def _advance(self, worlds: int) -> None:
+        self.done += worlds
+        self.planned = max(self.planned, self.done)
+        self.tell(self.done, self.planned)
+
+
+def _outcome(before: pa.Table, after: pa.Table, change: Change, goal: str, level: float) -> Outcome:
+    was, now = reached(before, goal), reached(after, goal)
+    metrics = {
+        name: median_difference(_values(before, name, was), _values(after, name, now), seed=1)
+        for name in METRICS
+    }
+    strict = share_difference(was, now, level)
+    sure = bool(strict.low > 0 or strict.high < 0)
+    return Outcome(change, share_difference(was, now), metrics, sure, len(was))
+
+
+def _values(table: pa.Table, name: str, hits: np.ndarray) -> np.ndarray:
+    """(S,) of a metric, NaN where a run has none."""
+    values = np.array(table[name].to_pylist(), dtype=float)
+    return np.where(hits, values, np.nan) if name in OF_GOAL else values
+
+
+def _median(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else float("nan")
+
+
+def _verdict(outcomes: Sequence[Outcome], margin: float) -> str:
+    """Sure and large of any change; small beyond doubt of all; or neither."""
+    if any(o.sure and abs(o.share.change) >= margin for o in outcomes):
+        return MATTERS
+    small = all(-margin <= o.share.low and o.share.high <= margin for o in outcomes)
+    return NOTHING if small else UNSURE

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What matters, in sentences."""
+
+from collections.abc import Sequence
+
+from twinmill.swarm.matters.differences import Difference
+from twinmill.swarm.matters.judge import MATTERS, NOTHING, UNSURE, Judged, Matters, Outcome
+
+VERBS = {MATTERS: "matters", UNSURE: "may matter", NOTHING: "does not matter"}
+TELLS = 0.1  # relative change of a median that is worth a word
+WORDS = {
+    "radius_m": ("radius", 1.0, " m"),
+    "settled_s": ("time to form", 1.0, " s"),
+    "circliness": ("circliness", 1.0, ""),
+}
+NAMED = 4  # of a list in a sentence
+
+
+def sentence(judged: Judged) -> str:
+    """One answer."""
+    subject, worst = judged.subject, judged.worst
+    verb = VERBS[judged.verdict]
+    low, high = judged.shares
+    before, after = percent(worst.share.before), percent(worst.share.after)
+    if subject.kind == "effect":
+        text = f"{subject.name} {verb}: {before} with it, {after} without"
+    elif subject.kind == "parameter":
+        span = f"{100 * low:.0f} to {percent(high)}"
+        text = f"{subject.name} {verb} {subject.about}: {span}"
+    elif subject.kind == "hidden":
+        even = " even" if judged.verdict == NOTHING else ""
+        text = f"{subject.name} {verb},{even} at {_inside(worst)}: {before} become {after}"
+    elif subject.kind == "robots":
+        text = f"That robots differ {verb}: {before} as they are, {after} were they alike"
+    else:
+        text = f"{_capital(worst.change.what)} {verb}: {before} become {after}"
+        if subject.about == "one robot without it":
+            text = f"One robot without {subject.name} {verb}: {before} become {after}"
+    return f"{text} ({points(worst.share)}{_besides(worst)})."
+
+
+def headline(found: Matters) -> str:
+    """The whole in one or two sentences."""
+    share, low, high = found.before
+    text = (
+        f"{percent(share)} of {found.request.seeds} runs end '{found.goal}' (95 % interval "
+        f"{100 * low:.0f} to {100 * high:.0f} %)."
+    )
+    own = found.of(MATTERS, kinds=("effect", "parameter", "robots"))
+    idle = found.of(NOTHING, kinds=("effect", "parameter", "robots"))
+    if own:
+        text += f" Of what is in the model, {_list(own)} matter{'s' if len(own) == 1 else ''} most."
+    if idle:
+        text += f" {len(idle)} of its effects and numbers do not matter."
+    if found.together:
+        least, most = found.together.shares
+        text += (
+            f" What the fits leave open, all together, gives {100 * least:.0f} to {percent(most)}."
+        )
+    return text
+
+
+def next_step(found: Matters) -> str:
+    """What to measure next, and what not to."""
+    worth = found.of(MATTERS, kinds=("parameter", "hidden"))
+    idle = found.of(NOTHING, kinds=("parameter", "hidden"))
+    text = ""
+    if worth:
+        text += f"measure {_list(worth)}: there lies what the log leaves open and the swarm feels. "
+    if idle:
+        text += f"Not worth another run for this: {_list(idle)}. "
+    unsure = found.of(UNSURE)
+    if unsure:
+        text += (
+            f"{len(unsure)} answers are open after {found.request.seeds} runs; --seeds "
+            f"{4 * found.request.seeds} halves their intervals."
+        )
+    return text.strip()
+
+
+def percent(share: float) -> str:
+    """A share for people."""
+    return f"{100 * share:.0f} %"
+
+
+def points(difference: Difference) -> str:
+    """A change of a share with its interval."""
+    low, high = 100 * difference.low, 100 * difference.high
+    return f"{100 * difference.change:+.0f} points, 95 % interval {low:+.0f} to {high:+.0f}"
+
+
+def _inside(worst: Outcome) -> str:
+    """`factor 0.8` of `view_range (factor 0.8)`."""
+    return worst.change.what.partition("(")[2].rstrip(")")
+
+
+def _besides(worst: Outcome) -> str:
+    """Other numbers that move beyond doubt and by much."""
+    told = []
+    for name, (word, scale, unit) in WORDS.items():
+        d = worst.metrics[name]
+        moved = d.low > 0 or d.high < 0
+        if moved and abs(d.change) > TELLS * abs(d.before):
+            told.append(f"{word} {d.before * scale:.2g} to {d.after * scale:.2g}{unit}")
+    return f"; {', '.join(told)}" if told else ""
+
+
+def _list(judged: Sequence[Judged]) -> str:
+    names = list(dict.fromkeys(j.subject.name for j in judged))
+    shown = names[:NAMED]
+    rest = len(names) - len(shown)
+    more = [f"{rest} more"] if rest else []
+    parts = [*shown, *more]
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def to_json(found: Matters) -> dict:
+    """The interface's object."""
+    share, low, high = found.before
+    request = found.request
+    return {
+        "behavior": request.behavior,
+        "goal": found.goal,
+        "n": len(request.species(request.n)[0]),
+        "seeds": request.seeds,
+        "duration_s": request.duration_s,
+        "margin": found.margin,
+        "share": share,
+        "low": low,
+        "high": high,
+        **found.medians,
+        "sentence": headline(found),
+        "next": next_step(found),
+        "ranking": [_judged_json(judged) for judged in found.ranked],
+        "together": _judged_json(found.together) if found.together else None,
+        "left_out": [{"name": name, "why": why} for name, why in found.left],
+    }
+
+
+def _judged_json(judged: Judged) -> dict:
+    subject = judged.subject
+    return {
+        "name": subject.name,
+        "kind": subject.kind,
+        "about": subject.about,
+        "verdict": judged.verdict,
+        "sentence": sentence(judged) if subject.kind != "together" else None,
+        "change": judged.worst.share.change,
+        "changes": [outcome.to_json() for outcome in judged.outcomes],
+    }

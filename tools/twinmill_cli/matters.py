@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill matters`: which effect and which number of a model the swarm feels."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated
+
+import typer
+
+from twinmill.defaults import DEFAULT_MODEL
+from twinmill_cli.lazy import working
+from twinmill_cli.options import Model, Out
+from twinmill_cli.output import AsJson, deliver, telling
+
+if working():  # not for --help
+    import hashlib
+    import json
+
+    from rich.console import Group, RenderableType
+    from rich.text import Text
+
+    from twinmill.diagnosis.diagnose import diagnose
+    from twinmill.files import check_new_folder
+    from twinmill.model.model_file import ModelFile, write_whole
+    from twinmill.report import matters as present
+    from twinmill.report import write_report
+    from twinmill.swarm.classes import check_goal, goal_of
+    from twinmill.swarm.matters.changes import subjects
+    from twinmill.swarm.matters.hidden import Hidden, hidden_effects, unseen_effects
+    from twinmill.swarm.matters.judge import MATTERS, NOTHING, UNSURE, Matters, judge
+    from twinmill.swarm.matters.sentences import headline, next_step, sentence, to_json
+    from twinmill.swarm.sweep import make_request, progress_bar
+    from twinmill_cli.frame import load, provenance
+
+SHOWN = 12  # sentences in the terminal
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the application."""
+    app.command("matters")(_matters)
+
+
+def _matters(
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="LOG", show_default=False, help="Logs that the model was fitted to"),
+    ] = None,
+    model: Model = DEFAULT_MODEL,
+    behavior: Annotated[
+        str, typer.Option("--behavior", help="One for all, or milling:5,self_centering:1.")
+    ] = "milling",
+    n: Annotated[int | None, typer.Option("--n", help="Robots; default 6 or the mix's.")] = None,
+    goal: Annotated[
+        str | None, typer.Option("--goal", help="Class that is wanted; default: the behaviour's.")
+    ] = None,
+    seeds: Annotated[int, typer.Option("--seeds", min=40, help="Most runs of each change.")] = 400,
+    first_seed: Annotated[int, typer.Option("--first-seed", min=0)] = 1,
+    duration_s: Annotated[float, typer.Option("--duration-s", min=10, help="Of each run.")] = 120,
+    start: Annotated[str, typer.Option("--start", help="square, disc or facing-out.")] = "square",
+    spread_m: Annotated[
+        float, typer.Option("--spread-m", min=0.01, help="Side of the square, diameter of the disc")
+    ] = 1.2,
+    margin: Annotated[
+        float, typer.Option("--margin", min=0.001, max=0.5, help="Change that would not matter.")
+    ] = 0.1,
+    draws: Annotated[
+        int, typer.Option("--draws", min=0, help="Models drawn from what the fits leave open.")
+    ] = 20,
+    only: Annotated[
+        list[str] | None, typer.Option("--only", help="An effect or number; else all are tried.")
+    ] = None,
+    as_json: AsJson = False,
+    out: Out = None,
+) -> Matters:
+    """Tell which effects and numbers of a model matter for what the swarm does.
+
+    Each is changed alone: an effect is left out, a number goes to both ends of
+    its interval, and what the logs do not exclude is put in. The same seeds
+    run before and after. Stopped half way, the same command with --out goes on.
+
+    Example: twinmill matters run.lcmlog --model explained.toml --out matters
+    """
+    if out:
+        check_new_folder(out)
+    request = make_request(
+        behavior,
+        model,
+        [],
+        n=n,
+        seeds=seeds,
+        first_seed=first_seed,
+        duration_s=duration_s,
+        start=start,
+        spread_m=spread_m,
+        full=True,
+    )
+    wanted = check_goal(goal) if goal else goal_of(request)
+    model_file = ModelFile.load(model)
+    source = provenance(_command_line(locals()), model_file)
+    with TemporaryDirectory(prefix="twinmill.") as scratch:
+        folder = out or Path(scratch)
+        hidden = _hidden(logs or [], model_file, folder, as_json)
+        asked, left = subjects(model_file, hidden, draws, first_seed, only or [])
+        with progress_bar() as progress:
+            task = progress.add_task("runs", total=None)
+            found = judge(
+                request,
+                asked,
+                left,
+                wanted,
+                margin,
+                folder,
+                lambda done, planned: progress.update(task, completed=done, total=planned),
+            )
+    section = present.section(found) if out else None
+    report = write_report(out, section.title, source, [section], present.NOTE) if out else None
+    data = {**to_json(found), **source.to_json(), "report": str(report) if report else None}
+    deliver(data, _terminal(found, report), as_json)
+    return found
+
+
+def _hidden(logs: list[Path], model_file: ModelFile, folder: Path, as_json: bool) -> list[Hidden]:
+    """What the logs do not exclude, kept in the folder: the diagnosis takes a minute."""
+    if not logs:
+        return unseen_effects(model_file.model)
+    kept = folder / "hidden.json"
+    hashes = [hashlib.sha256(log.read_bytes()).hexdigest() for log in logs]
+    key = {"model": model_file.hash, "logs": hashes}
+    if kept.exists() and (known := json.loads(kept.read_text()))["of"] == key:
+        return [Hidden(**one) for one in known["hidden"]]
+    with telling("looking for what the logs do not exclude") as say:
+        diagnosis = diagnose(load(logs, model_file, as_json), model_file, say)
+    if diagnosis.found:
+        typer.echo(
+            f"twinmill: these logs show that {model_file.path} lacks {', '.join(diagnosis.found)}; "
+            "twinmill explain adds it. What follows is of the model as it is.",
+            err=True,
+        )
+    found = hidden_effects(diagnosis)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(kept, json.dumps({"of": key, "hidden": [one.to_json() for one in found]}, indent=1))
+    return found
+
+
+def _command_line(given: dict) -> str:
+    """The command that does this again."""
+    words = ["twinmill", "matters", *map(str, given["logs"] or [])]
+    for name in ("model", "behavior", "goal", "n"):
+        words += [f"--{name}", str(given[name])] if given[name] is not None else []
+    for name in ("seeds", "first_seed", "duration_s", "spread_m", "margin", "draws"):
+        words += [f"--{name.replace('_', '-')}", f"{given[name]:g}"]
+    words += ["--start", given["start"]]
+    words += [word for name in given["only"] or [] for word in ("--only", name)]
+    return shlex.join(words)
+
+
+def _terminal(found: Matters, report: Path | None) -> RenderableType:
+    styles = {MATTERS: "bold red", UNSURE: "yellow", NOTHING: ""}
+    lines = [Text(headline(found)), Text()]
+    lines += [Text(sentence(j), styles[j.verdict]) for j in found.ranked[:SHOWN]]
+    if more := len(found.ranked) - SHOWN:
+        lines.append(Text(f"... and {more} more; --json and --out have all.", "dim"))
+    lines += [Text(), Text(f"Next: {next_step(found)}")] if next_step(found) else []
+    return Group(*lines, *([Text(f"Report: {report}")] if report else []))
