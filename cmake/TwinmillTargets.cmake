@@ -57,10 +57,11 @@ function(twinmill_harden target)
     if(CMAKE_SYSTEM_PROCESSOR STREQUAL "aarch64")
         # Whole-program optimisation, for size. No Pi's processor knows branch protection.
         set_target_properties(${target} PROPERTIES INTERPROCEDURAL_OPTIMIZATION ON)
+        target_compile_options(${target} PRIVATE -mno-outline-atomics)
     endif()
     get_target_property(type ${target} TYPE)
     if(type STREQUAL "EXECUTABLE")
         target_link_options(${target} PRIVATE
-            -pie -Wl,-z,relro,-z,now,-z,noexecstack,--gc-sections,--as-needed)
+            -pie -Wl,-z,relro,-z,now,-z,noexecstack,--gc-sections,--as-needed,--no-eh-frame-hdr)
     endif()
 endfunction()

@@ -123,7 +123,7 @@ static bool start_thread(struct reporter *reporter)
 static void release(struct reporter *reporter)
 {
     telemetry_close(&reporter->telemetry);
-    io_tsv_close(&reporter->io_tsv);
+    whole_file_close(&reporter->io_tsv);
     (void)close(reporter->loop_fd);
     (void)close(reporter->thread_fd);
 }
@@ -139,7 +139,7 @@ enum fw_err reporter_start(struct reporter *reporter, const struct app_config *c
     }
     reporter->loop_fd = fds[0];
     reporter->thread_fd = fds[1];
-    reporter->io_tsv = (struct io_tsv){.fd = -1};
+    reporter->io_tsv = (struct whole_file){.fd = -1};
     telemetry_init(&reporter->telemetry, config, key, session);
     bool ok = true;
     if (config->io_tsv[0] != '\0')

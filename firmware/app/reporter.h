@@ -22,7 +22,7 @@ struct reporter
     // Another robot of this number was heard, and said.
     bool is_double;
     // Its descriptor is -1 if there is no such log.
-    struct io_tsv io_tsv;
+    struct whole_file io_tsv;
 };
 
 // Starts the thread, and the radio's. @param config lives as long as the reporter.

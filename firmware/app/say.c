@@ -69,8 +69,9 @@ bool say_never_wait(void)
     {
         return false;
     }
-    // Who reads no more is no reason to die.
+    // Who reads no more is no reason to die, nor is a file that may not grow.
     (void)signal(SIGPIPE, SIG_IGN);
+    (void)signal(SIGXFSZ, SIG_IGN);
     const pid_t pid = fork();
     if (pid == 0)
     {

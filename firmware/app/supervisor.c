@@ -15,6 +15,7 @@
 #include "devices.h"
 #include "guard.h"
 #include "instance.h"
+#include "lcm_log.h"
 #include "notify.h"
 #include "priority.h"
 #include "say.h"
@@ -361,6 +362,7 @@ static bool drive_once(struct crew *crew, int *code)
         say("no process can be started: %s", strerror(errno));
         return false;
     }
+    lcm_log_keep(crew->options->config.lcm_url);
     const char *why = watch_driver(crew);
     // Nothing comes before this: a dead driver's last duties are still on the wheels.
     const bool stopped = put_to_rest(crew);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "telemetry.h"
 
+#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -11,11 +12,13 @@
 #include <turbopi_signed_ack_t.h>
 #include <turbopi_telemetry_t.h>
 
+#include "say.h"
+
 #define CONNECT_PERIOD_US 2000000
 #define RUN_PERIOD_US 5000000
 #define LINK_PERIOD_US 100000
-// More than any signed message takes.
-#define SIGNED_BYTES_MAX 256
+// More than any message takes but run_t.
+#define MESSAGE_MAX_BYTES 256
 
 struct channel
 {
@@ -33,29 +36,63 @@ static struct channel channel_of(const struct telemetry *telemetry, const char *
 void telemetry_init(struct telemetry *telemetry, const struct app_config *config,
                     const struct seal_key *key, int64_t session)
 {
-    *telemetry = (struct telemetry){.config = config, .key = *key, .session = session};
+    *telemetry =
+        (struct telemetry){.config = config, .key = *key, .session = session, .log.file.fd = -1};
 }
 
 bool telemetry_has_lost_log(const struct telemetry *telemetry)
 {
-    const bool is_file = strncmp(telemetry->config->lcm_url, "file:", 5) == 0;
-    return is_file && telemetry->unsent_count > 0;
+    return lcm_log_is_meant(telemetry->config->lcm_url) &&
+           telemetry->unsent_count + telemetry->log.file.lost_count > 0;
+}
+
+static bool is_connected(const struct telemetry *telemetry)
+{
+    return telemetry->lcm != NULL || telemetry->log.file.fd >= 0;
+}
+
+static void begin_log(struct telemetry *telemetry)
+{
+    const char *url = telemetry->config->lcm_url;
+    if (!lcm_log_open(&telemetry->log, url) && telemetry->next_create_us == 0)
+    {
+        say("lcm_url: '%s': %s: rows are lost; a log is file://PATH?mode=w, or mode=a to go on",
+            url, strerror(errno));
+    }
 }
 
 void telemetry_connect(struct telemetry *telemetry, int64_t now_us)
 {
-    if (telemetry->lcm != NULL || telemetry->config->lcm_url[0] == '\0' ||
-        now_us < telemetry->next_create_us)
+    const char *url = telemetry->config->lcm_url;
+    if (is_connected(telemetry) || url[0] == '\0' || now_us < telemetry->next_create_us)
     {
         return;
     }
-    telemetry->lcm = lcm_create(telemetry->config->lcm_url);
+    if (lcm_log_is_meant(url))
+    {
+        begin_log(telemetry);
+    }
+    else
+    {
+        telemetry->lcm = lcm_create(url);
+    }
     telemetry->next_create_us = now_us + CONNECT_PERIOD_US;
 }
 
-static void count(struct telemetry *telemetry, int status)
+static void send_bytes(struct telemetry *telemetry, int64_t utime_us, const char *suffix,
+                       const uint8_t *bytes, int size)
 {
-    telemetry->unsent_count += status != 0;
+    const struct channel channel = channel_of(telemetry, suffix);
+    if (size > 0 && telemetry->log.file.fd >= 0)
+    {
+        lcm_log_add(&telemetry->log, utime_us, channel.name, bytes, (uint32_t)size);
+    }
+    else
+    {
+        const bool taken = size > 0 && telemetry->lcm != NULL &&
+                           lcm_publish(telemetry->lcm, channel.name, bytes, (unsigned)size) == 0;
+        telemetry->unsent_count += !taken;
+    }
 }
 
 // What no message has a field for stands in comments above the configuration.
@@ -89,8 +126,9 @@ static void publish_run(struct telemetry *telemetry, const struct link_report *r
         .behavior = behavior,
         .config_toml = text,
     };
-    count(telemetry,
-          turbopi_run_t_publish(telemetry->lcm, channel_of(telemetry, "RUN").name, &run));
+    uint8_t bytes[LCM_LOG_MAX_BYTES];
+    send_bytes(telemetry, report->utime_us, "RUN", bytes,
+               turbopi_run_t_encode(bytes, 0, sizeof bytes, &run));
 }
 
 static void publish_step(struct telemetry *telemetry, const struct link_report *report)
@@ -113,27 +151,25 @@ static void publish_step(struct telemetry *telemetry, const struct link_report *
         .status_flags = report->status_flags,
     };
     memcpy(message.wheel_duty_pct, out->wheel_duty_pct, sizeof message.wheel_duty_pct);
-    count(telemetry, turbopi_telemetry_t_publish(
-                         telemetry->lcm, channel_of(telemetry, "TELEMETRY").name, &message));
+    uint8_t bytes[MESSAGE_MAX_BYTES];
+    send_bytes(telemetry, report->utime_us, "TELEMETRY", bytes,
+               turbopi_telemetry_t_encode(bytes, 0, sizeof bytes, &message));
 }
 
 // Signs a message that ends in its tag, and sends it.
-static void publish_signed(struct telemetry *telemetry, const char *suffix, uint8_t *bytes,
-                           int size)
+static void send_signed(struct telemetry *telemetry, int64_t utime_us, const char *suffix,
+                        uint8_t *bytes, int size)
 {
-    if (size <= 0)
+    if (size > 0)
     {
-        ++telemetry->unsent_count;
-        return;
+        seal_sign(&telemetry->key, bytes, (size_t)size);
     }
-    seal_sign(&telemetry->key, bytes, (size_t)size);
-    count(telemetry,
-          lcm_publish(telemetry->lcm, channel_of(telemetry, suffix).name, bytes, (unsigned)size));
+    send_bytes(telemetry, utime_us, suffix, bytes, size);
 }
 
 static void publish_link(struct telemetry *telemetry, const struct link_report *report)
 {
-    uint8_t bytes[SIGNED_BYTES_MAX];
+    uint8_t bytes[MESSAGE_MAX_BYTES];
     const turbopi_link_t message = {
         .utime_us = report->utime_us,
         .robot_id = telemetry->config->robot_id,
@@ -146,14 +182,14 @@ static void publish_link(struct telemetry *telemetry, const struct link_report *
         .link_timeout_ms = report->link_timeout_ms,
         .status_flags = report->status_flags,
     };
-    publish_signed(telemetry, "LINK", bytes,
-                   turbopi_link_t_encode(bytes, 0, sizeof bytes, &message));
+    send_signed(telemetry, report->utime_us, "LINK", bytes,
+                turbopi_link_t_encode(bytes, 0, sizeof bytes, &message));
 }
 
 static void publish_signed_ack(struct telemetry *telemetry, const struct link_ack *ack,
                                char *reason)
 {
-    uint8_t bytes[SIGNED_BYTES_MAX];
+    uint8_t bytes[MESSAGE_MAX_BYTES];
     const turbopi_signed_ack_t message = {
         .utime_us = ack->utime_us,
         .robot_id = telemetry->config->robot_id,
@@ -166,13 +202,13 @@ static void publish_signed_ack(struct telemetry *telemetry, const struct link_ac
         .stands = ack->stands,
         .reason = reason,
     };
-    publish_signed(telemetry, "SIGNED_ACK", bytes,
-                   turbopi_signed_ack_t_encode(bytes, 0, sizeof bytes, &message));
+    send_signed(telemetry, ack->utime_us, "SIGNED_ACK", bytes,
+                turbopi_signed_ack_t_encode(bytes, 0, sizeof bytes, &message));
 }
 
 void telemetry_publish(struct telemetry *telemetry, const struct link_report *report)
 {
-    if (telemetry->lcm == NULL)
+    if (!is_connected(telemetry))
     {
         ++telemetry->unsent_count;
         return;
@@ -202,10 +238,11 @@ void telemetry_publish_ack(struct telemetry *telemetry, const struct link_ack *a
         .accepted = ack->accepted,
         .reason = reason,
     };
-    if (telemetry->lcm != NULL)
+    if (is_connected(telemetry))
     {
-        count(telemetry,
-              turbopi_ack_t_publish(telemetry->lcm, channel_of(telemetry, "ACK").name, &message));
+        uint8_t bytes[MESSAGE_MAX_BYTES];
+        send_bytes(telemetry, ack->utime_us, "ACK", bytes,
+                   turbopi_ack_t_encode(bytes, 0, sizeof bytes, &message));
         publish_signed_ack(telemetry, ack, reason);
     }
 }
@@ -217,4 +254,5 @@ void telemetry_close(struct telemetry *telemetry)
         lcm_destroy(telemetry->lcm);
         telemetry->lcm = NULL;
     }
+    whole_file_close(&telemetry->log.file);
 }

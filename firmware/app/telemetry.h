@@ -7,6 +7,7 @@
 #include <lcm/lcm.h>
 
 #include "config.h"
+#include "lcm_log.h"
 #include "link.h"
 #include "radio/seal.h"
 
@@ -15,10 +16,11 @@ struct telemetry
     const struct app_config *config;
     struct seal_key key;
     int64_t session;
-    // NULL while there is no network.
+    // NULL while there is no network, or where a log takes its place.
     lcm_t *lcm;
+    struct lcm_log log;
     int64_t next_create_us, next_run_us, next_link_us;
-    // Messages that LCM did not take.
+    // Messages that neither took.
     uint32_t unsent_count;
 };
 

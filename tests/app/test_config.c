@@ -154,17 +154,17 @@ static void test_any_bytes_are_read_or_refused(void)
 
 static char log_path[] = "/tmp/test_config.XXXXXX";
 
-static void open_log(struct io_tsv *log)
+static void open_log(struct whole_file *log)
 {
     strcpy(log_path, "/tmp/test_config.XXXXXX");
     const int fd = mkstemp(log_path);
     TEST_ASSERT_TRUE(fd >= 0 && close(fd) == 0 && io_tsv_open(log, log_path, 10));
 }
 
-static const char *close_log(struct io_tsv *log)
+static const char *close_log(struct whole_file *log)
 {
     static char text[4096];
-    io_tsv_close(log);
+    whole_file_close(log);
     FILE *file = fopen(log_path, "r");
     text[fread(text, 1, sizeof text - 1, file)] = '\0';
     fclose(file);
@@ -176,7 +176,7 @@ static const char *close_log(struct io_tsv *log)
 static void test_io_tsv_speaks_the_authors_language(void)
 {
     struct link_report report = {.utime_us = 1700000000123456};
-    struct io_tsv log;
+    struct whole_file log;
     report.out.detected_raw = 1;
     report.out.speed_input_pct = 100;
     report.out.turn_input_milli = 500;
@@ -197,7 +197,7 @@ static void test_io_tsv_speaks_the_authors_language(void)
 static void test_io_tsv_loses_whole_rows_and_counts_them(void)
 {
     struct link_report report = {.utime_us = 1700000000123456};
-    struct io_tsv log;
+    struct whole_file log;
     struct rlimit limit, none;
     signal(SIGXFSZ, SIG_IGN);
     TEST_ASSERT_EQUAL(0, getrlimit(RLIMIT_FSIZE, &none));

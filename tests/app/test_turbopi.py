@@ -3,6 +3,7 @@
 
 import json
 import os
+import resource
 import shlex
 import signal
 import socket
@@ -256,6 +257,57 @@ def test_log_that_cannot_be_written_is_told(tmp_path, log):
     )
     assert done.returncode == 4
     assert "rows of a log are lost" in done.stderr
+
+
+LOGS = [("--io-tsv", "{}"), ("--lcm-url", "file://{}?mode=w")]
+
+
+@pytest.mark.parametrize("option", LOGS, ids=["io.tsv", "LCM log"])
+def test_full_disk_takes_whole_rows_and_is_told(tmp_path, option):
+    """A file that may not grow stands for the disk: it takes a part of what is written, too."""
+    frames, log, limit_bytes = tmp_path / "frames.yuyv", tmp_path / "log", 10_000
+    frames.write_bytes(GREEN * 300)
+    size = ("--set", f"width_px={WIDTH_PX}", "--set", f"height_px={HEIGHT_PX}")
+    done = subprocess.run(
+        [
+            *(*TURBOPI, "--config", "/dev/null", "--start", "--camera", f"stub:{frames}"),
+            *("--board", "stub", "--set", "panel=none", "--set", "rate_Hz=100", "--lcm-url", ""),
+            *(*size, *(word.format(log) for word in option)),
+        ],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes)),
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 4, done.stderr
+    assert "rows are lost from here on" in done.stderr and "killed" not in done.stderr
+    assert limit_bytes - 7_000 < log.stat().st_size <= limit_bytes
+    if option[0] == "--io-tsv":
+        assert log.read_bytes().endswith(b")]\n")
+    else:
+        events = list(lcm.EventLog(str(log), "r"))
+        # LCM's own reader takes every byte of it.
+        assert sum(28 + len(e.channel) + len(e.data) for e in events) == log.stat().st_size
+        assert [e.eventnum for e in events] == list(range(len(events)))
+
+
+def test_log_outlives_the_driver(tmp_path):
+    """All that a driver said that was killed is kept, and the next one goes on in the same log."""
+    log = tmp_path / "log"
+    options = ("--lcm-url", f"file://{log}?mode=w", "--set", "restart_ms=100")
+
+    def said():
+        events = list(lcm.EventLog(str(log), "r")) if log.exists() else []
+        return [e.eventnum for e in events if e.channel == "R00_TELEMETRY"]
+
+    with Robot(TURBOPI, tmp_path, "--start", *options) as robot:
+        assert wait_until(lambda: len(said()) > 20)
+        driver, before = robot.children()[0], len(said())
+        os.kill(driver, signal.SIGKILL)
+        assert wait_until(lambda: robot.children() not in ([], [driver]))
+        assert wait_until(lambda: len(said()) > before + 20)
+        # Each counts from 0.
+        assert wait_until(lambda: sum(number <= 1 for number in said()) == 2)
 
 
 def test_systemd_is_told(tmp_path):

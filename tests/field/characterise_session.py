@@ -8,6 +8,7 @@ happened as JSON.
 import json
 import os
 import pty
+import resource
 import signal
 import subprocess
 import sys
@@ -79,6 +80,11 @@ def say_poses(lost: threading.Event) -> None:
         time.sleep(0.05)
 
 
+def fill_disk(_, process: subprocess.Popen) -> None:
+    """No file of the command's may grow: its newest events are in memory, and lost."""
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (6000, 6000))
+
+
 def what_was_logged(log: Path, act_s: float) -> dict:
     events = [(e.timestamp, e.channel, e.data) for e in lcm.EventLog(str(log), "r")]
     telemetry = [turbopi.telemetry_t.decode(d) for _, c, d in events if c == "R03_TELEMETRY"]
@@ -103,6 +109,7 @@ def main(folder: Path) -> dict:
         result["ctrl_c"] = characterise(
             folder, "ctrl_c", "long.csv", lambda _, process: process.send_signal(signal.SIGINT)
         )
+        result["full_disk"] = characterise(folder, "full_disk", "long.csv", fill_disk)
 
     with twin(folder, "--pose-rate-hz", "0.1"):
         lost = threading.Event()

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from rig import KERNEL, SUITE, CannotRun, Rig, prepare, prepare_system
+from rig import KERNEL, SUITE, SYSTEM_LIMIT_S, CannotRun, Rig, prepare, prepare_system
 
 
 def boot(image: Callable[[], Path], name: str, **options) -> Iterator[Rig]:
@@ -28,3 +28,11 @@ def rig():
 @pytest.fixture(scope="session")
 def system():
     yield from boot(prepare_system, f"system.{SUITE}", memory_mb=1024)
+
+
+@pytest.fixture(scope="session")
+def installed(system):
+    """The package installed, as a user does it."""
+    system.systemctl("is-system-running", "--wait")
+    assert system.run("/usr/bin/dpkg", "-i", "/turbopi.deb", limit_s=SYSTEM_LIMIT_S).code == 0
+    return system

@@ -20,7 +20,9 @@ ROOT = HERE.parents[1]
 BUILD = ROOT / "build/hil"
 KERNEL = os.environ.get("HIL_KERNEL", "linux-image-arm64")
 SUITE = os.environ.get("HIL_SUITE", "bookworm")
-SETUP_LIMIT_S, BOOT_LIMIT_S, CALL_LIMIT_S = 600, 180, 60
+SETUP_LIMIT_S, BOOT_LIMIT_S, CALL_LIMIT_S = 600, 300, 60
+# An emulated systemd has much to do, and the machine may be busy.
+SYSTEM_LIMIT_S = 300
 CANNOT = 77  # exit code of a script that says why it cannot
 
 HEADER = struct.Struct("<B3xI")
@@ -271,6 +273,20 @@ class Rig:
         pid = self.start(*command)
         self.wait(lambda: pid in self.ends, limit_s, str(command[0]))
         return self.ends[pid]
+
+    def number(self, command: str) -> int:
+        """Runs a line of shell that prints a number."""
+        assert (
+            self.run("/bin/sh", "-c", f"{command} > /tmp/number", limit_s=SYSTEM_LIMIT_S).code == 0
+        ), command
+        number, _ = self.words("n", "/tmp/number")
+        return number
+
+    def systemctl(self, *words: object) -> End:
+        """Has systemd do something, which must succeed."""
+        end = self.run("/bin/systemctl", *words, limit_s=SYSTEM_LIMIT_S)
+        assert end.code == 0, words
+        return end
 
     def kill(self, pid: int, signal_number: int) -> float:
         """Sends a signal. Returns when (guest, s)."""

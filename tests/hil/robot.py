@@ -99,6 +99,19 @@ class Watched:
             end = len(self.telemetry()) + 10
             self.show_until(lambda end=end: len(self.telemetry()) >= end)
 
+    def driver(self) -> int:
+        """Returns the pid of the process that drives: the program's child."""
+        return self._child("turbopi")
+
+    def guard(self) -> int:
+        """Returns the pid of the child that watches with the program."""
+        return self._child("wheelguard")
+
+    def _child(self, name: str) -> int:
+        pid, _ = self.rig.words("d", self.pid, name)
+        assert pid > 0, name
+        return pid
+
 
 class Robot(Watched):
     """The running program; as a context it is ended at the end, and the motors are at zero."""
@@ -130,15 +143,20 @@ class Robot(Watched):
         self.rig.wait(lambda: self.pid in self.rig.ends, what="the program's end")
         return self.rig.ends[self.pid]
 
-    def driver(self) -> int:
-        """Returns the pid of the process that drives: the program's child."""
-        return self._child("turbopi")
 
-    def guard(self) -> int:
-        """Returns the pid of the child that watches with the program."""
-        return self._child("wheelguard")
+SERVICE, CONFIG = "twinmill-robot.service", "/etc/turbopi/turbopi.conf"
 
-    def _child(self, name: str) -> int:
-        pid, _ = self.rig.words("d", self.pid, name)
-        assert pid > 0, name
-        return pid
+
+class Service(Watched):
+    """The same program as systemd runs it, driving since its button was pressed."""
+
+    def __init__(self, rig: Rig, *arguments: str):
+        super().__init__(rig)
+        options = [word for word in (*SETTINGS, *arguments) if "=" in word and "://" not in word]
+        result, _ = rig.words("w", CONFIG, "\n".join(options) + "\n")
+        assert result == 0
+        rig.systemctl("reset-failed", SERVICE)
+        rig.systemctl("restart", SERVICE)
+        self.pid = rig.number(f"systemctl show -P MainPID {SERVICE}")
+        self.show_until(lambda: any(t.frame_utime_us for t in self.telemetry()), 120)
+        self.press()

@@ -1,19 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of faults in firmware/README.md: how long after each the wheels stand.
 
-The program is that of the Debian package, started by hand. Times are the guest kernel's, from the
-fault to the zero that stays. The camera's frames go on, or would not be missed for ten seconds, so
-that it is nothing but the row's fault that stops the wheels.
+The program is that of the Debian package, started by hand or, where HIL_START says "service", by
+systemd. Times are the guest kernel's, from the fault to the zero that stays. The camera's frames go
+on, or would not be missed for ten seconds, so that it is nothing but the row's fault that stops the
+wheels.
 """
 
 import itertools
+import os
 import signal
 import time
 
 import pytest
 import turbopi
-from rig import BUILD, ZERO
-from robot import LEFT, PROGRAM, SETTINGS, Robot
+from rig import BUILD, SUITE, SYSTEM_LIMIT_S, ZERO
+from robot import LEFT, PROGRAM, SERVICE, SETTINGS, Robot, Service
+
+BY_SERVICE = os.environ.get("HIL_START") == "service"
+by_hand = pytest.mark.skipif(BY_SERVICE, reason="systemd does this in another way")
+by_service = pytest.mark.skipif(not BY_SERVICE, reason="the program was started by hand")
 
 # What the program promises while it or its guard lives. The emulator may be slow: SLACK_S.
 LIMIT_S, SLACK_S = 0.5, 1.0
@@ -54,45 +60,69 @@ def table():
     yield rows
     text = "| fault | wheels stand after |\n|---|---|\n"
     text += "".join(f"| {fault} | {after} |\n" for fault, after in rows)
-    (BUILD / "faults_by_hand.md").write_text(text)
+    (BUILD / f"faults_by_{'service' if BY_SERVICE else 'hand'}.{SUITE}.md").write_text(text)
     print("\n" + text)
 
 
+@pytest.fixture(scope="module")
+def guest(request):
+    """What the program runs in; where that is systemd, with the library that makes calls fail."""
+    if not BY_SERVICE:
+        return request.getfixturevalue("rig")
+    system = request.getfixturevalue("installed")
+    folder = f"/run/systemd/system/{SERVICE}.d"
+    system.run("/bin/mkdir", "-p", folder)
+    lines = ("[Service]", f"Environment={PRELOAD[0]}", "PrivateTmp=no", "ReadWritePaths=/tmp")
+    system.words("w", f"{folder}/failcalls.conf", "\n".join(lines) + "\n")
+    system.systemctl("daemon-reload")
+    return system
+
+
+def start(guest, *arguments, environment=(), heard=True):
+    """A robot that was told to drive."""
+    if BY_SERVICE:
+        return Service(guest, *arguments)
+    return Robot(guest, "--start", *arguments, environment=environment, heard=heard)
+
+
 @pytest.fixture
-def drive(rig):
+def drive(guest):
     """Makes a robot that turns left and does not miss a frame for ten seconds."""
     robots = []
 
     def make(*arguments, **options):
-        settings = ("--start", "--set", "frame_timeout_ms=10000", *WATCHDOG, *arguments)
-        robot = Robot(rig, *settings, **options)
+        patience = ("--set", "frame_timeout_ms=10000", *WATCHDOG)
+        robot = start(guest, *patience, *arguments, **options)
         robots.append(robot)
         robot.drive_until(LEFT)
         # Whoever watches is up.
-        rig.wait(lambda: rig.words("d", robot.pid, "wheelguard")[0] > 0, what="the guard")
+        guest.wait(lambda: guest.words("d", robot.pid, "wheelguard")[0] > 0, what="the guard")
         return robot
 
     yield make
-    rig.words("w", CONTROL, "")
-    rig.mend()
+    guest.words("w", CONTROL, "")
+    guest.mend()
     for robot in robots:
-        end_all(rig, robot)
-    assert rig.duties[-1].wire == ZERO
+        end_all(guest, robot)
+    assert guest.duties[-1].wire == ZERO
 
 
-def end_all(rig, robot):
+def end_all(guest, robot):
     """Ends what is left of a robot, and its wheels."""
-    if robot.pid not in rig.ends:
-        rig.words("k", robot.pid, int(signal.SIGCONT))
-        rig.words("k", robot.pid, int(signal.SIGTERM))
+    if BY_SERVICE:
+        guest.systemctl("stop", SERVICE)
+        return
+    if robot.pid not in guest.ends:
+        guest.words("k", robot.pid, int(signal.SIGCONT))
+        guest.words("k", robot.pid, int(signal.SIGTERM))
         robot.wait_for_end()
-    rig.run(PROGRAM, *SETTINGS, "--stop")
+    guest.run(PROGRAM, *SETTINGS, "--stop")
 
 
 def stands_after(robot, fault_s, *, frames=False):
     """Waits for four zeros that stay a second. Returns how long after the fault they came."""
-    rig = robot.rig
-    pump = robot.show_until if frames else rig.wait
+    guest = robot.rig
+    pump = robot.show_until if frames else guest.wait
     pump(lambda: robot.wire() == ZERO)
     end_s = time.monotonic() + 1.0
     pump(lambda: time.monotonic() > end_s)
@@ -100,19 +130,19 @@ def stands_after(robot, fault_s, *, frames=False):
     return robot.stopped_s(fault_s) - fault_s
 
 
-def fail(rig, function, request, path, error, pid=0):
+def fail(guest, function, request, path, error, pid=0):
     """Makes calls fail from now on."""
-    rig.words("n", FIRST)
-    rig.words("w", CONTROL, f"{function} {request} {path} {error} {pid}")
+    guest.words("n", FIRST)
+    guest.words("w", CONTROL, f"{function} {request} {path} {error} {pid}")
 
 
-def failed_s(rig):
+def failed_s(guest):
     """When the first of them did (guest, s)."""
     t_ns = -1
     end_s = time.monotonic() + 30
     while t_ns < 0 and time.monotonic() < end_s:
-        rig.pump(0.05)
-        t_ns, _ = rig.words("n", FIRST)
+        guest.pump(0.05)
+        t_ns, _ = guest.words("n", FIRST)
     assert t_ns > 0
     return t_ns / 1e9
 
@@ -145,81 +175,82 @@ def test_signals(drive, table, number):
     note(table, f"{names.get(number.name, number.name)} to the program", after_s)
 
 
-def test_call_that_nothing_ends(rig, drive, table):
+def test_call_that_nothing_ends(guest, drive, table):
     """The driver hangs for five seconds in the kernel, where SIGKILL does not reach it."""
     robot = drive("--set", "restart_ms=-1")
-    _, fault_s = rig.call("b", b"H" + bytes([50]))
+    _, fault_s = guest.call("b", b"H" + bytes([50]))
     note(table, "driver hangs in a call that cannot be killed", stands_after(robot, fault_s))
-    robot.wait_for_end()
 
 
+@by_hand
 @pytest.mark.parametrize("fault", ["driver killed", "driver stopped (SIGSTOP)", "camera frozen"])
-def test_messages_that_nobody_reads(rig, drive, table, fault):
+def test_messages_that_nobody_reads(guest, drive, table, fault):
     timeout = ("--set", "frame_timeout_ms=200") if fault == "camera frozen" else ()
     robot = drive("--set", "restart_ms=60000", *timeout, heard=False)
     if fault == "camera frozen":
         fault_s = robot.show(robot.view)
     else:
         number = signal.SIGKILL if "killed" in fault else signal.SIGSTOP
-        fault_s = rig.kill(robot.driver(), number)
+        fault_s = guest.kill(robot.driver(), number)
     note(table, f"{fault}, stderr full and unread", stands_after(robot, fault_s))
 
 
 @pytest.mark.parametrize("call", CALLS)
-def test_call_fails(rig, drive, table, call):
+def test_call_fails(guest, drive, table, call):
     robot = drive(environment=PRELOAD)
-    fail(rig, *CALLS[call])
+    fail(guest, *CALLS[call])
     robot.show_until(lambda: robot.wire() == ZERO)
-    note(table, f"{call} fails", stands_after(robot, failed_s(rig), frames=True))
-    rig.words("w", CONTROL, "")
+    note(table, f"{call} fails", stands_after(robot, failed_s(guest), frames=True))
+    guest.words("w", CONTROL, "")
     robot.drive_until(LEFT)
 
 
-def test_only_the_driver_cannot_reach_the_board(rig, drive, table):
+def test_only_the_driver_cannot_reach_the_board(guest, drive, table):
     robot = drive(*PATIENT, environment=PRELOAD)
-    fail(rig, "write", 0, I2C, EREMOTEIO, robot.driver())
+    fail(guest, "write", 0, I2C, EREMOTEIO, robot.driver())
     robot.show_until(lambda: robot.wire() == ZERO)
-    fault_s = failed_s(rig)
+    fault_s = failed_s(guest)
     note(
         table, "motor board: write fails, in the driver", stands_after(robot, fault_s, frames=True)
     )
 
 
 @pytest.mark.parametrize("call", OPENING)
-def test_camera_cannot_be_opened_again(rig, drive, table, call):
+def test_camera_cannot_be_opened_again(guest, drive, table, call):
     robot = drive(environment=PRELOAD)
-    fail(rig, *CALLS["camera: VIDIOC_DQBUF"])
+    fail(guest, *CALLS["camera: VIDIOC_DQBUF"])
     robot.show_until(lambda: robot.wire() == ZERO)
-    fault_s = failed_s(rig)
-    fail(rig, *OPENING[call])
+    fault_s = failed_s(guest)
+    fail(guest, *OPENING[call])
     note(table, f"camera lost, then {call} fails", stands_after(robot, fault_s, frames=True))
-    rig.words("w", CONTROL, "")
+    guest.words("w", CONTROL, "")
     robot.drive_until(LEFT)
 
 
-def test_write_that_is_torn(rig, drive, table):
+@by_hand
+def test_write_that_is_torn(guest, drive, table):
     """The second wheel's register refuses: the first has its duty already."""
     robot = drive("--set", "restart_ms=-1")
-    rig.kill(robot.pid, signal.SIGTERM)
+    guest.kill(robot.pid, signal.SIGTERM)
     robot.wait_for_end()
-    torn = Robot(rig, "--start", "--set", "frame_timeout_ms=10000", *PATIENT)
-    _, fault_s = rig.call("b", b"B" + bytes([SECOND_WHEEL]))
+    torn = Robot(guest, "--start", "--set", "frame_timeout_ms=10000", *PATIENT)
+    _, fault_s = guest.call("b", b"B" + bytes([SECOND_WHEEL]))
     torn.show_until(lambda: torn.has(UNCONFIRMED))
     assert torn.telemetry()[-1].mode == torn.telemetry()[-1].MODE_FAULT
-    rig.mend()
-    end_all(rig, torn)
+    guest.mend()
+    end_all(guest, torn)
     table.append(("one wheel's register refuses", "never starts, and says so"))
     assert {d.wire for d in torn.since(fault_s)} <= {ZERO}
 
 
-def test_board_refuses_everything(rig, drive, table):
+def test_board_refuses_everything(guest, drive, table):
     """What no program can mend; it says so, and the first that the board hears is a stop."""
     robot = drive(*PATIENT)
-    rig.board(b"N", ALL)
+    guest.board(b"N", ALL)
     robot.show_until(lambda: robot.has(UNCONFIRMED))
     said = robot.telemetry()[-1]
     assert said.mode == said.MODE_FAULT and tuple(map(abs, said.wheel_duty_pct)) != ZERO
-    _, answers_s = rig.call("b", b"N" + bytes([BOARD_ANSWERS]))
+    _, answers_s = guest.call("b", b"N" + bytes([BOARD_ANSWERS]))
     # After the stop it drives on.
     robot.show_until(lambda: ZERO in [d.wire for d in robot.since(answers_s)])
     after_s = min(d.t_s for d in robot.since(answers_s) if d.wire == ZERO) - answers_s
@@ -227,20 +258,43 @@ def test_board_refuses_everything(rig, drive, table):
     assert after_s < LIMIT_S + SLACK_S
 
 
-def test_all_three_are_killed(rig, drive, table):
+@by_hand
+def test_all_three_are_killed(guest, drive, table):
     robot = drive(*PATIENT)
     for pid in (robot.guard(), robot.pid, robot.driver()):
-        rig.kill(pid, signal.SIGSTOP)
+        guest.kill(pid, signal.SIGSTOP)
     for pid in (robot.guard(), robot.driver(), robot.pid):
-        rig.kill(pid, signal.SIGKILL)
+        guest.kill(pid, signal.SIGKILL)
     robot.wait_for_end()
     assert robot.wire() == LEFT
-    rig.words("w", "/tmp/garbage.conf", "speed = much\n= =\n[\n")
-    pid = rig.start(PROGRAM, "--config", "/tmp/garbage.conf", "--stop")
-    begin_s = rig.duties[-1].t_s
-    rig.wait(lambda: robot.wire() == ZERO)
-    rig.wait(lambda: pid in rig.ends)
+    guest.words("w", "/tmp/garbage.conf", "speed = much\n= =\n[\n")
+    pid = guest.start(PROGRAM, "--config", "/tmp/garbage.conf", "--stop")
+    begin_s = guest.duties[-1].t_s
+    guest.wait(lambda: robot.wire() == ZERO)
+    guest.wait(lambda: pid in guest.ends)
     stop_s = min(d.t_s for d in robot.since(begin_s) if d.wire == ZERO)
-    took_s = rig.ends[pid].t_s - stop_s
-    assert rig.ends[pid].code == 0, took_s
+    took_s = guest.ends[pid].t_s - stop_s
+    assert guest.ends[pid].code == 0, took_s
     table.append(("all three killed", "only `turbopi --stop` or systemd, see below"))
+
+
+@by_service
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_all_three_of_the_service(guest, drive, table, number):
+    """Nobody of the program is left: systemd's own doing, which has no limit of ours."""
+    robot = drive(*PATIENT)
+    pids = robot.guard(), robot.driver(), robot.pid
+    fault_s = min(guest.kill(pid, number) for pid in pids)
+    guest.wait(lambda: robot.wire() == ZERO, SYSTEM_LIMIT_S)
+    what = "killed" if number == signal.SIGKILL else "stopped (SIGSTOP)"
+    table.append((f"all three {what}", f"{stands_after(robot, fault_s):.2f} s"))
+
+
+@by_service
+@pytest.mark.parametrize("ending", ["stop", "restart"])
+def test_service_ends(guest, drive, table, ending):
+    robot = drive()
+    pid, begin_s = guest.words("x", "/bin/systemctl", ending, SERVICE)
+    guest.wait(lambda: pid in guest.ends, SYSTEM_LIMIT_S)
+    after_s = stands_after(robot, begin_s)
+    table.append((f"`systemctl {ending}`, its own start included", f"{after_s:.2f} s"))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import gzip
 import json
+import resource
 from pathlib import Path
 
 import lcm
@@ -49,6 +50,23 @@ def imported(put, tmp_path):
         return read_log(tmp_path / "o.lcmlog").robots[4]
 
     return make
+
+
+@pytest.mark.parametrize("missing_bytes", [1, 5000], ids=["last byte", "most"])
+def test_full_disk_leaves_no_log(put, tmp_path, missing_bytes):
+    """The newest events are in LCM's memory, and it closes a log without a word."""
+    sources, out = (put("p.csv", POSES), put("c.csv.gz", COMMANDS)), tmp_path / "o.lcmlog"
+    import_log(*sources, out)
+    limit_bytes = out.stat().st_size - missing_bytes
+    out.unlink()
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, before[1]))
+    try:
+        with pytest.raises(ValueError, match=r"o\.lcmlog: cannot be written \((File too|No space)"):
+            import_log(*sources, out)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.csv.gz", "p.csv"]
 
 
 def test_poses_come_back_as_written(imported):

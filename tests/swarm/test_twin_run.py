@@ -3,6 +3,7 @@
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import time
@@ -165,6 +166,29 @@ def test_mistakes_end_in_one_sentence_and_no_file(tmp_path, arguments, code, wor
     assert words in result.stderr
     assert result.stderr.count("\n") == 1
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("where", [("--log", "{}"), ("--lcm-url", "file://{}?mode=w")], ids=str)
+def test_a_full_disk_ends_in_one_sentence_and_no_file(tmp_path, where):
+    """A file that may not grow stands for the disk."""
+    log, limit_bytes = tmp_path / "a.lcmlog", 30_000
+    command = [TWIN_RUN, "--plant", "planar", "--n", "9", "--duration-s", "5"]
+    done = subprocess.run(
+        [*command, *(word.format(log) for word in where)],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes)),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 1 and "writing failed" in done.stderr
+    assert done.stderr.count("\n") == 1 and os.listdir(tmp_path) == []
+
+
+def test_a_bus_may_be_a_log(tmp_path):
+    log, other = tmp_path / "a.lcmlog", tmp_path / "b.lcmlog"
+    run("--n", 2, "--duration-s", 1, "--log", log, "--lcm-url", f"file://{other}?mode=w")
+    assert other.read_bytes() == log.read_bytes() != b""
 
 
 def test_a_device_is_not_replaced_by_a_log(tmp_path):

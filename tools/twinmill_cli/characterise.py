@@ -111,9 +111,13 @@ def _characterise(
     name = Path(script).name
     if host:
         copy_script(Remote(host, ssh_config), Path(script), name)
-    run = Run(Fleet(lcm_url, channel_prefix, key=load(key)), robot, channel_prefix, arm)
+    fleet = Fleet(lcm_url, channel_prefix, key=load(key))
     with Recorder(out) as recorder, any_key() as pressed:
-        why = run.drive(recorder, name, end_s, countdown_s, pressed)
+        why = Run(fleet, recorder, robot, channel_prefix, arm).drive(
+            name, end_s, countdown_s, pressed
+        )
+    if recorder.failed and not why:
+        why = f"played to its end, but the end of the log is lost: {recorder.failed}"
     ended = why or "played to its end"
     data = {"log": str(out), "events": recorder.events, "ok": not why, "ended": ended}
     deliver(data, f"{ended}\n{out}: {recorder.events} messages", as_json)
@@ -186,6 +190,7 @@ class Run:
     """One robot that plays a script while all it says is logged."""
 
     fleet: Fleet
+    recorder: Recorder
     robot_id: int
     channel_prefix: str
     arm: bool = False  # though it was stopped
@@ -193,7 +198,6 @@ class Run:
 
     def drive(
         self,
-        recorder: Recorder,
         script: str,
         end_s: float | None,
         countdown_s: float,
@@ -207,7 +211,7 @@ class Run:
         Raises:
             ValueError: the robot is not there, or refuses.
         """
-        self._listen_to(recorder)
+        self._listen()
         tell.find(self.fleet, {self.robot_id})
         self._check_ready()
         warn_of_clocks(self.fleet, {self.robot_id})
@@ -231,11 +235,11 @@ class Run:
             why += "; NO STOP WAS CONFIRMED: SWITCH THE ROBOT OFF BY HAND"
         return why
 
-    def _listen_to(self, recorder: Recorder) -> None:
+    def _listen(self) -> None:
         prefix = f"{self.channel_prefix}R{self.robot_id:02d}_"
 
         def on_message(channel: str, data: bytes) -> None:
-            recorder.add(channel, data)
+            self.recorder.add(channel, data)
             with suppress(ValueError, struct.error):  # half a message, or another program's
                 if channel == f"{prefix}POSE" and turbopi.pose_t.decode(data).valid:
                     self.pose_s = time.monotonic()
@@ -301,6 +305,8 @@ class Run:
     def _why_stop(self, pressed: Callable[[], bool]) -> str:
         if pressed():
             return "a key was pressed"
+        if self.recorder.failed:
+            return f"the log cannot be written: {self.recorder.failed}"
         now_s = time.monotonic()
         heard_s = {"telemetry": self.fleet.robots[self.robot_id].heard_s, "pose": self.pose_s}
         if now_s - min(heard_s.values()) <= LOST_S:

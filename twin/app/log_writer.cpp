@@ -16,7 +16,7 @@ namespace
 const std::string &Replaceable(const std::string &path)
 {
     if (std::filesystem::exists(path) && !std::filesystem::is_regular_file(path))
-        throw std::runtime_error("--log " + path + ": is no ordinary file; choose another name");
+        throw std::runtime_error("log " + path + ": is no ordinary file; choose another name");
     return path;
 }
 
@@ -38,7 +38,7 @@ LogWriter::~LogWriter()
 
 void LogWriter::Fail(const char *what) const
 {
-    throw std::runtime_error("--log " + path_ + ": " + what + ": " + std::strerror(errno));
+    throw std::runtime_error("log " + path_ + ": " + what + ": " + std::strerror(errno));
 }
 
 void LogWriter::Write(int64_t utime_us, const std::string &channel, std::vector<uint8_t> &bytes)

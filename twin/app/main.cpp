@@ -13,6 +13,7 @@ int main(int argc, char **argv)
         const twin::Options options = twin::ParseOptions(argc, argv);
         std::signal(SIGINT, [](int) { twin::RequestStop(); });
         std::signal(SIGTERM, [](int) { twin::RequestStop(); });
+        std::signal(SIGXFSZ, SIG_IGN);  // a log that may not grow is an error like a full disk
         twin::Run(options);
         return 0;
     }

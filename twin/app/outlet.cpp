@@ -2,12 +2,24 @@
 #include "outlet.h"
 
 #include <stdexcept>
+#include <string_view>
 
 namespace twin
 {
+namespace
+{
+
+constexpr std::string_view kFile = "file://", kModeWrite = "?mode=w";
+
+}  // namespace
 
 void Outlet::OpenBus(const std::string &url)
 {
+    if (url.starts_with(kFile))
+    {
+        OpenRecording(url);
+        return;
+    }
     constexpr const char *kOwnMachine = "udpm://239.255.76.67:7667?ttl=0";
     const std::string where = url.empty() ? kOwnMachine : url;
     auto bus = std::make_unique<lcm::LCM>(where);
@@ -17,18 +29,29 @@ void Outlet::OpenBus(const std::string &url)
     bus_url_ = where;
 }
 
+// liblcm's own writer is silent where the disk is full.
+void Outlet::OpenRecording(const std::string &url)
+{
+    if (!url.ends_with(kModeWrite))
+        throw std::runtime_error("--lcm-url " + url + ": a log is file://PATH?mode=w");
+    const size_t length = url.size() - kFile.size() - kModeWrite.size();
+    recording_ = std::make_unique<LogWriter>(url.substr(kFile.size(), length));
+}
+
 void Outlet::SendBytes(int64_t utime_us, const std::string &channel)
 {
     if (bus_)
         bus_->publish(channel, bytes_.data(), static_cast<unsigned>(bytes_.size()));
-    if (log_)
-        log_->Write(utime_us, channel, bytes_);
+    for (const auto *log : {&recording_, &log_})
+        if (*log)
+            (*log)->Write(utime_us, channel, bytes_);
 }
 
 void Outlet::Finish()
 {
-    if (log_)
-        log_->Finish();
+    for (const auto *log : {&recording_, &log_})
+        if (*log)
+            (*log)->Finish();
 }
 
 }  // namespace twin

@@ -17,8 +17,8 @@ namespace twin
 class Outlet
 {
 public:
-    // Opens a bus; an empty `url` is LCM's default on this machine alone. Throws std::runtime_error
-    // in one sentence if messages cannot be sent there.
+    // Opens a bus; an empty `url` is LCM's default on this machine alone, and one of a file is a
+    // second log. Throws std::runtime_error in one sentence if messages cannot be sent there.
     void OpenBus(const std::string &url);
     // As LogWriter's constructor.
     void OpenLog(const std::string &path) { log_ = std::make_unique<LogWriter>(path); }
@@ -47,11 +47,12 @@ public:
     }
 
 private:
+    void OpenRecording(const std::string &url);
     void SendBytes(int64_t utime_us, const std::string &channel);
 
     std::unique_ptr<lcm::LCM> bus_;  // only sends: its receiver believes what packets claim
     std::string bus_url_;
-    std::unique_ptr<LogWriter> log_;
+    std::unique_ptr<LogWriter> recording_, log_;
     std::vector<uint8_t> bytes_;
 };
 

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import lcm
 import numpy as np
 import turbopi
 
@@ -13,6 +12,7 @@ from twinmill.challenge.drives import Leg, sampled
 from twinmill.challenge.physics import STEP_S, Hidden, Signals, slow
 from twinmill.challenge.robots import Robot
 from twinmill.challenge.rollers import drive_by_forces
+from twinmill.data.log_file import log_file
 
 EPOCH_US = 1_700_000_000_000_000
 ROBOT_ID = 1
@@ -98,10 +98,9 @@ def write_log(plan: Plan, motion: Motion, path: Path) -> None:
     pose += random.standard_normal(pose.shape) * sigma
     events = [_command_event(robot, motion, k) for k in range(len(motion.tick_s))]
     events += [_pose_event(k, t, pose[k]) for k, t in enumerate(pose_s + robot.offset_s)]
-    log = lcm.EventLog(str(path), "w", overwrite=True)
-    for utime_us, channel, message in sorted(events, key=lambda event: event[0]):
-        log.write_event(utime_us, channel, message.encode())
-    log.close()
+    with log_file(path) as log:
+        for utime_us, channel, message in sorted(events, key=lambda event: event[0]):
+            log.write_event(utime_us, channel, message.encode())
 
 
 def _commanded(robot: Robot, axes: np.ndarray) -> np.ndarray:

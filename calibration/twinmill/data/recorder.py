@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keeps what is heard on a bus as an LCM log."""
 
+import errno
+import os
 import time
+from bisect import bisect_right
 from pathlib import Path
 from types import TracebackType
 
@@ -9,7 +12,11 @@ import lcm
 
 
 class Recorder:
-    """A log that stands under its name only once it is closed: written beside it, then renamed."""
+    """A log that stands under its name only once it is closed: written beside it, then renamed.
+
+    Attributes:
+        failed: why no more are, such as "No space left on device"; empty if all are.
+    """
 
     def __init__(self, path: Path):
         """Opens the log.
@@ -20,7 +27,13 @@ class Recorder:
         self._path = path
         self._partial = path.with_name(path.name + ".partial")
         self._log = lcm.EventLog(str(self._partial), "w", overwrite=True)
-        self.events = 0
+        self._ends_bytes = [0]  # of whole events
+        self.failed = ""
+
+    @property
+    def events(self) -> int:
+        """How many are kept."""
+        return len(self._ends_bytes) - 1
 
     def __enter__(self) -> "Recorder":
         return self
@@ -29,11 +42,29 @@ class Recorder:
         """What was heard is kept, unless a ValueError says that nothing was begun."""
         self._log.close()
         if kind is None or not issubclass(kind, ValueError):
+            self._keep_whole_events()
             self._partial.rename(self._path)
         else:
             self._partial.unlink()
 
     def add(self, channel: str, data: bytes) -> None:
-        """Keeps one message, stamped by this machine's clock."""
-        self._log.write_event(time.time_ns() // 1000, channel, data)
-        self.events += 1
+        """Keeps one message, stamped by this machine's clock.
+
+        Never raises: who records what a robot says has to go on and stop it.
+        """
+        if self.failed:
+            return
+        try:
+            self._log.write_event(time.time_ns() // 1000, channel, data)
+        except OSError as error:
+            self.failed = error.strerror
+            return
+        self._ends_bytes.append(self._log.tell())
+
+    def _keep_whole_events(self) -> None:
+        # The newest were in memory, and LCM closes a log without a word where they do not fit.
+        kept = bisect_right(self._ends_bytes, self._partial.stat().st_size)
+        if kept < len(self._ends_bytes):
+            self.failed = self.failed or os.strerror(errno.ENOSPC)
+        del self._ends_bytes[kept:]
+        os.truncate(self._partial, self._ends_bytes[-1])

@@ -92,6 +92,15 @@ ssize_t write(int fd, const void *bytes, size_t count)
     return fails_at("write", 0, fd) ? -1 : syscall(SYS_write, fd, bytes, count);
 }
 
+// What read() and open() become where the compiler checks their arguments.
+ssize_t __read_chk(int fd, void *bytes, size_t count, size_t size);
+int __open_2(const char *path, int flags);
+
+ssize_t __read_chk(int fd, void *bytes, size_t count, size_t size)
+{
+    return read(fd, bytes, count < size ? count : size);
+}
+
 int open(const char *path, int flags, ...)
 {
     va_list arguments;
@@ -99,6 +108,11 @@ int open(const char *path, int flags, ...)
     const int mode = va_arg(arguments, int);
     va_end(arguments);
     return fails("open", 0, path) ? -1 : (int)syscall(SYS_openat, AT_FDCWD, path, flags, mode);
+}
+
+int __open_2(const char *path, int flags)
+{
+    return open(path, flags, 0);
 }
 
 void *mmap(void *address, size_t length, int protection, int flags, int fd, off_t offset)

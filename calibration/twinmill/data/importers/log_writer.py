@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 
-import lcm
 import numpy as np
 import turbopi
 
 from twinmill.data.importers.series import CommandSeries, DetectionSeries, PoseSeries
 from twinmill.data.log import KINDS
+from twinmill.data.log_file import log_file
 
 CONTROL_PERIOD_US = 22_000  # a TurboPi tells its duties once per control step, new or held
 
@@ -44,12 +44,9 @@ def write_log(
             if series.kind == "duty" and not np.any(series.value % 1)  # a board's own, in percent
             else _drive_events(series)
         )
-    log = lcm.EventLog(str(path), "w", overwrite=True)
-    try:
+    with log_file(path) as log:
         for event in heapq.merge(*streams, key=lambda event: event[0]):
             log.write_event(*event)
-    finally:
-        log.close()
 
 
 def _run_event(series: CommandSeries, config_toml: str) -> Iterator[Event]:

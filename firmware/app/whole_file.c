@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "whole_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "say.h"
+
+bool whole_file_open(struct whole_file *file, const char *name, const char *path, bool anew)
+{
+    const int flags = O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | (anew ? O_TRUNC : 0);
+    *file = (struct whole_file){.name = name, .fd = open(path, flags, 0644)};
+    return file->fd >= 0;
+}
+
+// The whole piece or nothing of it. @return false and errno on failure.
+static bool add_whole(int fd, const void *bytes, size_t length)
+{
+    const off_t end = lseek(fd, 0, SEEK_END);
+    const ssize_t done = write(fd, bytes, length);
+    if (done == (ssize_t)length)
+    {
+        return true;
+    }
+    const int error = done < 0 ? errno : ENOSPC;
+    if (done > 0 && end >= 0)
+    {
+        (void)!ftruncate(fd, end);
+    }
+    errno = error;
+    return false;
+}
+
+void whole_file_add(struct whole_file *file, const void *bytes, size_t length)
+{
+    const bool taken = add_whole(file->fd, bytes, length);
+    if (!taken && !file->is_failing)
+    {
+        say("%s: %s: rows are lost from here on", file->name, strerror(errno));
+    }
+    if (taken && file->is_failing)
+    {
+        say("%s: works again; %" PRIu32 " rows are lost", file->name, file->lost_count);
+    }
+    file->lost_count += !taken;
+    file->is_failing = !taken;
+}
+
+void whole_file_close(struct whole_file *file)
+{
+    if (file->fd >= 0)
+    {
+        (void)close(file->fd);
+        file->fd = -1;
+    }
+}
