@@ -15,6 +15,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.track import command_at
+from twinmill.diagnosis.moments import Moment, moments_of
 from twinmill.fitting.floor import body_velocity_at
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.response import Response
@@ -32,6 +33,7 @@ TYPICAL = (0.01, 0.01, 0.05)  # m/s, m/s, rad/s: what a term of full size may ad
 NO_NAMES = {"dvx", "dvy", "domega", "V"}  # rates and voltage: not at hand in a body's formula
 CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
 CHANGE = "change of the command"
+MOMENTS = "single moments"
 LEFT_OVER = 0.02  # share of a term's norm that must survive the projection
 
 
@@ -77,6 +79,7 @@ class Rest:
         takes: share of what is left that the formula takes on left-out parts.
         left_over: fall of the cost per independent error by every group that brings any.
         old: groups that help no more than they did on other logs.
+        moments: events that neither commands nor findings explain.
     """
 
     share: float
@@ -87,6 +90,7 @@ class Rest:
     takes: float = 0.0
     left_over: Mapping[str, float] | None = None
     old: tuple[str, ...] = ()
+    moments: tuple[Moment, ...] = ()
 
     @property
     def formula(self) -> str | None:
@@ -124,7 +128,9 @@ def rest_of(
         return Rest(share, False, [])
     firm = _firm(logs, fit)
     found = _dependences(logs, fit, known)
-    return replace(found, share=share, firm=firm)
+    moments = moments_of([own for _, own in logs], [fit.models[i] for i, _ in logs])
+    depends_on = [*found.depends_on, *([MOMENTS] if moments else [])]
+    return replace(found, share=share, firm=firm, depends_on=depends_on, moments=tuple(moments))
 
 
 def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:

@@ -100,6 +100,7 @@ class Diagnosis:
                 "firm": rest.firm,
                 "depends_on": rest.depends_on,
                 "formula": rest.formula,
+                "moments": [m.to_json() for m in rest.moments],
             },
             "late": self.late.to_json() if self.late else None,
             "input": [],

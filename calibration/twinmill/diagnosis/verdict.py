@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinmill.diagnosis import moments
 from twinmill.diagnosis.findings import Finding
-from twinmill.diagnosis.rest import Rest
+from twinmill.diagnosis.rest import MOMENTS, Rest
 from twinmill.diagnosis.search import REFIT, of_levels
 from twinmill.fitting.compare import GOOD, MISSING
 
-LEAST_SHARE = 0.1  # of the first excess: findings that take less leave the verdict to the rest
 DRIFTED = 0.85  # share of the score as given that drifting gains leave, where they were stale
 WORSE = 1.5  # score over the usual one, beyond which it is a finding
 
@@ -52,10 +52,10 @@ class Weighed:
         if self.effects and not self._noise_outweighs:
             top = self.effects[0]
             return "ambiguous" if top.group else "effect_missing"
-        if self._outside or self._noise_outweighs:
+        if self._outside or self.rest.moments or (self.effects and self._noise_outweighs):
             return "outside_catalogue"
-        if self.last > MISSING * self.known:
-            return "outside_catalogue"
+        if self._left_in_the_dark:
+            return "cannot_tell"
         if self._stale and not self.silent and not self._instead:
             return "refit_enough"
         unsure = self.silent or self._instead or self.last > MISSING
@@ -87,11 +87,15 @@ class Weighed:
 
     @property
     def _outside(self) -> bool:
-        """Something predictable is left that no effect takes."""
+        """Something is left that no effect takes: it depends on something, or it is much."""
         if self.last <= GOOD * self.known:
             return False
-        predictable = self.rest.firm and self.rest.share > LEAST_SHARE
-        return predictable or bool(self.rest.depends_on) or self.last > WORSE * self.known
+        return bool(self._continuous) or self.last > WORSE * self.known
+
+    @property
+    def _left_in_the_dark(self) -> bool:
+        """More is left than is usual, and nothing tells what it is."""
+        return self.last > MISSING * self.known
 
     @property
     def known(self) -> float:
@@ -111,6 +115,11 @@ class Weighed:
         verdict = self.verdict
         if verdict == "model_adequate":
             return f"Nothing is missing that these logs would show.{self._as_before}"
+        if verdict == "cannot_tell" and self._left_in_the_dark:
+            return (
+                f"The model misses by more than the noise (score {self.last:.2f}), and these logs "
+                "do not tell why: no effect and no formula that was tried takes it."
+            )
         if verdict == "cannot_tell" and self.last > MISSING:
             return f"Nothing new is missing that these logs would show.{self._as_before}"
         if verdict == "cannot_tell":
@@ -146,26 +155,35 @@ class Weighed:
     @property
     def _left(self) -> str:
         """What is left, where it is more than the noise."""
+        events = f" {moments.sentence(self.rest.moments)}" if self.rest.moments else ""
         if self.last <= GOOD or self.rest.share < 0.02:
-            return ""
-        on = self.rest.depends_on
+            return events
+        on = self._continuous
         depends = f", and depends on {' and '.join(on)}" if on else ""
         return (
             f" Something else is left: {100 * self.rest.share:.0f} % of the squared error above "
-            f"the noise{depends}; no effect of the catalogue takes it."
+            f"the noise{depends}; no effect of the catalogue takes it.{events}"
         )
 
     @property
+    def _continuous(self) -> list[str]:
+        """What the rest depends on all the time."""
+        return [on for on in self.rest.depends_on if on != MOMENTS]
+
+    @property
     def _outside_sentence(self) -> str:
+        events = moments.sentence(self.rest.moments) if self.rest.moments else ""
+        if events and not self._outside:
+            return f"Nothing is missing that acts all the time. {events}"
         if self.noises and not self.rest.depends_on:
             return "Something random disturbs the motion that no effect of the catalogue describes."
-        on = " and ".join(self.rest.depends_on)
+        on = " and ".join(self._continuous)
         depends = f"it depends on {on}" if on else "no formula that was tried describes it"
         names = " and ".join(f.effect for f in self.findings)
         also = (
             f" {names} explain{'s' if len(self.findings) == 1 else ''} part of it." if names else ""
         )
-        return f"Something outside the catalogue is there; {depends}.{also}"
+        return f"Something outside the catalogue is there; {depends}.{also} {events}".rstrip()
 
     @property
     def notes(self) -> list[str]:

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Moments at which a robot did what neither its commands nor what was found explain.
+
+The noise floor leaves out windows in which the smooth response misses by far, so that a push or a
+drop-out does not hide what is there all the time. Where the final model misses these, too, they are
+events: told one by one, since no effect that acts all the time is like that.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.fitting.floor import BUMP
+from twinmill.fitting.opening import Opened
+from twinmill.predict.datasets import displacement
+from twinmill.predict.windows import HORIZONS_S
+
+SEVERAL = 3  # of one log: fewer are an accident
+APART_S = 1.0  # between the starts of windows of two moments
+HORIZON = HORIZONS_S.index(0.5)
+LESS, MORE = 0.9, 1.1  # of the predicted way
+ARM_M = 0.1  # a turn counts as the way of a point so far from the middle
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One event.
+
+    Attributes:
+        log: its name.
+        robot_id: of the robot.
+        t_s: capture's clock, about a quarter of a second before it.
+        way: share of the predicted way that was gone in half a second.
+    """
+
+    log: str
+    robot_id: int
+    t_s: float
+    way: float
+
+    def to_json(self) -> dict:
+        """Fields of JSON output."""
+        return vars(self)
+
+
+def moments_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> list[Moment]:
+    """Events of all logs that have several, in the order of time.
+
+    Args:
+        opened: measurements over their floors; tables have no moments.
+        models: with what was found, one for each.
+    """
+    found = []
+    for own, model in zip(opened, models, strict=True):
+        if own.floor is not None and not own.floor.keep.all():
+            found += _of_log(own, model)
+    return found
+
+
+def _of_log(own: Opened, model: native.Model) -> list[Moment]:
+    data = own.data
+    judged = np.isfinite(data.floor)
+    square = np.ma.masked_invalid(data.errors(model)[:, judged] / data.floor[judged]) ** 2
+    square = square.mean(axis=1).filled(np.nan)
+    missed = np.flatnonzero(~own.floor.keep & (square > BUMP * np.nanmedian(square)))
+    if not len(missed):
+        return []
+    clusters = np.split(missed, 1 + np.flatnonzero(np.diff(data.start_s[missed]) > APART_S))
+    if len(clusters) < SEVERAL:
+        return []
+    predicted = displacement(data.measurement, data.windows, model)
+    way = _way(data.measured[:, HORIZON], predicted[:, HORIZON])
+    track = data.measurement.track
+    return [
+        Moment(
+            data.measurement.log_name,
+            track.robot_id,
+            float(data.start_s[cluster[-1]]),
+            float(np.nanmedian(way[cluster])),
+        )
+        for cluster in clusters
+    ]
+
+
+def _way(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
+    """(W,) measured way along the predicted one, over that, of (W, 3) displacements."""
+    m, p = (np.nan_to_num(d) * (1, 1, ARM_M) for d in (measured, predicted))
+    return np.sum(m * p, axis=1) / np.maximum(np.sum(p * p, axis=1), 1e-12)
+
+
+def sentence(moments: Sequence[Moment]) -> str:
+    """What happened, for people."""
+    listed = ", ".join(f"{m.t_s:.1f}" for m in moments[:3])
+    more = f" s and {len(moments) - 3} more" if len(moments) > 3 else " s"
+    way = float(np.median([m.way for m in moments]))
+    what = "it did something else"
+    if way < LESS:
+        what = (
+            f"it went {100 * max(way, 0):.0f} % of the predicted way in half a second, as where a "
+            "motor or the supply drops out, or wheels slip or are held"
+        )
+    elif way > MORE:
+        what = "it went further, as where it is pushed or a command was not recorded"
+    return f"At {len(moments)} moments ({listed}{more}) the robot did not follow its commands: {what}."
