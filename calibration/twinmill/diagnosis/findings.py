@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Findings of a diagnosis: what each effect takes away, how sure it is, and its rivals."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twinmill.diagnosis.constancy import Change, changes_of
 from twinmill.diagnosis.search import REFIT, Round, Search, State, Trial, fitted, grown, without
 from twinmill.model.parameters import LAG, Estimate, catalogue_of, effect_names
 from twinmill.predict.datasets import Trajectory
@@ -110,10 +111,11 @@ def findings_of(done: Search, first: State) -> tuple[list[Finding], list[tuple[s
     errors = [_squared(t) for t in chain]
     # Where the floor itself holds a part of what was found, the final error stands for it.
     excess = max(errors[0] - min(errors[-1], 1.0), 1e-9)
+    changes = changes_of(done.last)
     found = []
     for k, name in enumerate(names):
         share = float(np.clip((errors[k] - errors[k + 1]) / excess, 0.0, 1.0))
-        found.append(_finding(done, name, share))
+        found.append(_finding(done, name, share, changes))
     return found, [(n, t.held_score) for n, t in zip(names, chain[1:], strict=True)]
 
 
@@ -168,7 +170,7 @@ def _rivals(done: Search, name: str) -> list[Trial]:
     return [t for t in _round_of(done, name).tied if not set(t.names) & set(done.found)]
 
 
-def _finding(done: Search, name: str, share: float) -> Finding:
+def _finding(done: Search, name: str, share: float, changes: Mapping[str, Change]) -> Finding:
     estimates = done.last.fit.shared_estimates()
     if name == REFIT:
         own = [e for e in estimates if e.name in done.last.state.base]
@@ -180,6 +182,8 @@ def _finding(done: Search, name: str, share: float) -> Finding:
     tied = [n for t in _rivals(done, name) for n in t.names]
     group = (name, *tied) if tied else None
     doubt = _doubt(catalogue_of(done.last.state.model)[name], own)
+    if not doubt and instance in changes:
+        doubt = changes[instance].why
     certainty = "doubtful" if doubt else "group" if group else "sure"
     return Finding(name, group, own, share, certainty, doubt)
 

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a parameter that was found is one number, or changes with speed, turning, duty or time.
+
+An effect that stands in for other physics fits each kind of drive with another strength. Each
+parameter gets a companion that is proportional to it and to what the robot was doing; a score test
+asks whether that companion is zero (parameter constancy: Nyblom 1989; Zeileis and Hornik 2007).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinmill.data.track import command_at
+from twinmill.diagnosis.search import Trial
+from twinmill.model.parameters import effect_names
+from twinmill.predict.datasets import Trajectory
+from twinmill.predict.windows import HORIZONS_S
+
+HORIZON = HORIZONS_S.index(0.5)
+EVIDENCE = 9.0  # least fall of the cost that the companion would bring
+BLOCKS_T = 3.0  # and over blocks its mean is so many standard errors from zero
+RELATIVE = 0.15  # least change of the parameter per standard deviation of what it changes with
+
+
+@dataclass(frozen=True)
+class Change:
+    """A parameter that is not one number.
+
+    Attributes:
+        parameter: its name.
+        on: what it changes with.
+        relative: change per standard deviation of that, over the parameter's distance from neutral.
+        evidence: fall of the cost.
+    """
+
+    parameter: str
+    on: str
+    relative: float
+    evidence: float
+
+    @property
+    def why(self) -> str:
+        """For people."""
+        way = "grows" if self.relative > 0 else "falls"
+        return (
+            f"{self.parameter} {way} with {self.on} (by {100 * abs(self.relative):.0f} % for a "
+            "usual difference): the same physics in another form, or another effect"
+        )
+
+
+def changes_of(trial: Trial) -> dict[str, Change]:
+    """The strongest change of each effect's instance that is not one number; logs alone tell."""
+    fit = trial.fit
+    logs = [i for i, d in enumerate(fit.datasets) if isinstance(d, Trajectory)]
+    instances = set(effect_names(trial.state.model))
+    sizes = [
+        c
+        for c, u in enumerate(fit.unknowns)
+        if u.parameter.name.split(".")[0] in instances and u.parameter.role == "size"
+    ]
+    if not logs or not sizes:
+        return {}
+    left, columns, blocks = _whitened(trial, logs)
+    basis = np.linalg.qr(np.vstack([columns, np.diag(1 / fit.std)]))[0]
+    doing = [_doing(fit.datasets[i]) for i in logs]
+    found: dict[str, Change] = {}
+    for on in [name for name in doing[0] if all(name in d for d in doing)]:
+        values = np.concatenate(
+            [np.repeat(d[on], fit.datasets[i].measured[0].size) for d, i in zip(doing, logs, strict=True)]
+        )
+        for c in sizes:
+            change = _change(trial, c, on, values, left, columns, blocks, basis)
+            instance = fit.unknowns[c].parameter.name.split(".")[0]
+            if change and change.evidence > getattr(found.get(instance), "evidence", 0.0):
+                found[instance] = change
+    return found
+
+
+def _whitened(trial: Trial, logs: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows (R,), slopes (R, P) and blocks (R,) of all logs, weighted as the cost weighs them."""
+    fit = trial.fit
+    rows, slopes = fit.state
+    left, columns, blocks, first = [], [], [], 0
+    for i in logs:
+        weight = np.sqrt(fit.weight(i, rows[i]))
+        whole = np.zeros((len(rows[i]), len(fit.x)))
+        whole[:, fit.columns[i]] = weight[:, None] * slopes[i]
+        left.append(weight * rows[i])
+        columns.append(whole)
+        blocks.append(fit.datasets[i].block + first)
+        first = blocks[-1].max() + 1
+    return np.concatenate(left), np.concatenate(columns), np.concatenate(blocks)
+
+
+def _doing(data: Trajectory) -> dict[str, np.ndarray]:
+    """(W,) of each thing that a parameter may change with."""
+    moved = np.nan_to_num(data.measured[:, HORIZON]) / HORIZONS_S[HORIZON]
+    found = {
+        "speed": np.hypot(moved[:, 0], moved[:, 1]),
+        "turning": np.abs(moved[:, 2]),
+        "time": data.start_s - data.start_s[0],
+    }
+    track = data.measurement.track
+    if track.command_kind == "duty":
+        middle_s = data.start_s + HORIZONS_S[HORIZON] / 2
+        found["duty"] = np.abs(command_at(middle_s, track.command_t_s, track.command)).max(axis=1)
+    return found
+
+
+def _change(
+    trial: Trial,
+    c: int,
+    on: str,
+    values: np.ndarray,
+    left: np.ndarray,
+    columns: np.ndarray,
+    blocks: np.ndarray,
+    basis: np.ndarray,
+) -> Change | None:
+    """The score test of one parameter's companion; None if the parameter is one number."""
+    fit, own = trial.fit, columns[:, c]
+    information = own**2 / max(float(own @ own), 1e-300)
+    away = values - information @ values
+    spread = float(np.sqrt(information @ away**2))
+    parameter = fit.unknowns[c].parameter
+    size = abs(fit.x[c] - parameter.usual)
+    if spread < 1e-9 or size < 1e-9:
+        return None
+    companion = np.concatenate([own * away / spread, np.zeros(len(fit.x))])
+    companion -= basis @ (basis.T @ companion)
+    energy = float(companion @ companion) + 1e-12
+    products = companion[: len(left)] * left
+    total = float(products.sum())
+    by_block = np.bincount(blocks, products)
+    error = float(np.sqrt(np.sum((by_block - by_block.mean()) ** 2))) + 1e-12
+    change = Change(parameter.name, on, -total / energy / size, total**2 / energy)
+    proven = change.evidence >= EVIDENCE and abs(total) >= BLOCKS_T * error
+    return change if proven and abs(change.relative) >= RELATIVE else None
