@@ -66,7 +66,10 @@ def changes_of(trial: Trial) -> dict[str, Change]:
     found: dict[str, Change] = {}
     for on in [name for name in doing[0] if all(name in d for d in doing)]:
         values = np.concatenate(
-            [np.repeat(d[on], fit.datasets[i].measured[0].size) for d, i in zip(doing, logs, strict=True)]
+            [
+                np.repeat(d[on], fit.datasets[i].measured[0].size)
+                for d, i in zip(doing, logs, strict=True)
+            ]
         )
         for c in sizes:
             change = _change(trial, c, on, values, left, columns, blocks, basis)

@@ -103,4 +103,5 @@ def sentence(moments: Sequence[Moment]) -> str:
         )
     elif way > MORE:
         what = "it went further, as where it is pushed or a command was not recorded"
-    return f"At {len(moments)} moments ({listed}{more}) the robot did not follow its commands: {what}."
+    at = f"At {len(moments)} moments ({listed}{more})"
+    return f"{at} the robot did not follow its commands: {what}."

@@ -268,6 +268,64 @@ def test_dead_zone_and_curve_are_both_found_in_a_log(tanh_robot, measure, model_
     assert found.steps[-1][1] < 0.4 * found.steps[0][1]
 
 
+FAILS_S, FOR_S = (8.0, 15.0, 22.0, 31.0), 0.4
+
+
+def test_moments_without_power_are_told_one_by_one(tanh_robot, measure, fitted):
+    """The wheels get no power for 0.4 s, four times; nothing else is new."""
+
+    class Failing(tanh_robot):
+        def wheels_mps(self, duty):
+            at_s = np.arange(len(duty)) * EULER_S - 0.5  # the script begins after half a second
+            off = np.any([(at_s > t) & (at_s < t + FOR_S) for t in FAILS_S], axis=0)
+            return super().wheels_mps(np.where(off[:, None], 0.0, duty))
+
+    straight = np.full(((40 * 48), 4), 75)
+    straight[::480] = 50  # something changes
+    turns = np.where((np.arange(len(straight)) // 96 % 2)[:, None], (75, 25, 75, 25), straight)
+    found = diagnose([measure(Failing(), 21, script_pct=turns)], fitted)
+    assert found.verdict == "outside_catalogue" and found.found == []
+    at_s = [m.t_s - 0.5 for m in found.rest.moments]
+    assert at_s == pytest.approx(FAILS_S, abs=0.5)
+    assert all(m.way < 0.9 for m in found.rest.moments)
+    assert "4 moments" in found.sentence
+
+
+@pytest.mark.parametrize(("from_s", "certainty"), [(0.0, "sure"), (20.0, "doubtful")])
+def test_a_weakness_that_comes_later_is_no_sure_weakness(
+    tanh_robot, measure, fitted, from_s, certainty
+):
+    """Two wheels lose 12 %: all the time, or from the middle of the log on."""
+
+    class Weak(tanh_robot):
+        def wheels_mps(self, duty):
+            later = np.arange(len(duty)) * EULER_S > from_s
+            weaker = np.where(later[:, None], (0.88, 1, 0.88, 1), 1.0)
+            return super().wheels_mps(duty) * weaker
+
+    found = diagnose([measure(Weak(), 22, 40.0)], fitted)
+    weak = next(f for f in found.findings if f.effect == "wheel_gain")
+    assert weak.certainty == certainty
+    assert ("time" in weak.why) == (certainty == "doubtful")
+
+
+def test_where_two_levels_are_driven_a_dead_zone_may_be_behind_stale_gains(
+    tanh_robot, measure, fitted
+):
+    """Milling knows two levels of the duty: other gains do what a dead zone does."""
+
+    class Sticky(tanh_robot):
+        def speed_mps(self, duty):
+            return super().speed_mps(np.sign(duty) * np.maximum(np.abs(duty) - 0.04, 0))
+
+    random = np.random.default_rng(3)
+    sides = np.array([(75, 100, 75, 100), (100, 75, 100, 75)])
+    script_pct = np.repeat(sides[random.integers(2, size=160)], 12, axis=0)
+    found = diagnose([measure(Sticky(), 23, script_pct=script_pct)], fitted)
+    assert found.verdict in ("cannot_tell", "ambiguous")
+    assert "dead_zone" in found.sentence
+
+
 ROBOTS, RANGE_M, HALF_CONE_RAD, LOOK_EVERY = 4, 1.5, 0.6, 12  # a new bit every quarter second
 SIDES = np.array([(0.25, 1.0, 0.25, 1.0), (1.0, 0.25, 1.0, 0.25)])  # sees nobody, somebody
 
