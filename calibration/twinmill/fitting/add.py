@@ -1,12 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Adds an effect to a model: fitted together with the base, judged on data it was not fitted to."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
 from twinmill.data.measurement import Measurement
 from twinmill.fitting.compare import Comparison, comparison
-from twinmill.fitting.fit import base_names, common_clock, fitted, noise_of, with_estimates
+from twinmill.fitting.fit import (
+    base_names,
+    common_clock,
+    fitted,
+    noise_of,
+    with_estimates,
+    without_held,
+)
 from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import judged, open_measurements
 from twinmill.model.model_file import Fitted, ModelFile, write_child
@@ -62,6 +70,7 @@ def add(
     out: Path,
     command: str,
     texts: dict[str, str] | None = None,
+    held: Collection[str] = (),
 ) -> AddResult:
     """Adds an effect and writes the new model.
 
@@ -72,10 +81,11 @@ def add(
         out: the new model file.
         command: recorded in it.
         texts: the effect's formula and the like, by name.
+        held: names of quantities that keep their values.
 
     Raises:
         ValueError: no such effect, it is made for another drive, or a text makes no sense.
-        ModelError: the new file cannot be written.
+        ModelError: the new file cannot be written, or `held` names what is not fitted.
     """
     richer = model_file.model.copy()
     richer.add_effect(effect, texts or {})
@@ -84,7 +94,7 @@ def add(
     logs = {m.log_name: m.log_sha256 for m in measurements}
     told = model_file.told_by_others(logs.values())
     base = base_parameters(model_file.model, base_names(model_file.model, judged(opened), told))
-    old = [*base, *all_effect_parameters(model_file.model)]
+    old = without_held([*base, *all_effect_parameters(model_file.model)], held)
     fresh = effect_parameters(richer, name, fresh=True)
     grown = [o.with_model(richer) for o in opened]
     moved, found = fitted(grown, [*old, *fresh], fresh=len(fresh))

@@ -10,9 +10,10 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.fitting.compare import Comparison, comparison
+from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import Opened, judged, open_measurements
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.model.model_file import Fitted, ModelFile, write_child
+from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child
 from twinmill.model.parameters import (
     BASE_GAINS,
     CLOCK,
@@ -36,6 +37,7 @@ class FitResult:
 
     Attributes:
         before, after: comparisons over the same floors.
+        heldout: errors on parts of the data that were not fitted to.
         parameters: estimates.
         clock: offset that all logs share, or None.
         path: of the new model.
@@ -43,6 +45,7 @@ class FitResult:
 
     before: Comparison
     after: Comparison
+    heldout: HeldOut
     parameters: list[Estimate]
     clock: Estimate | None
     path: Path
@@ -53,9 +56,25 @@ class FitResult:
             "model": str(self.path),
             "score_before": self.before.score,
             "score_after": self.after.score,
+            "heldout_after": self.heldout.score,
             "parameters": [e.to_json() for e in self.parameters],
             "time_offset_s": self.clock.value if self.clock else None,
         }
+
+
+def without_held(free: Sequence[Parameter], held: Collection[str]) -> list[Parameter]:
+    """The quantities but for those that keep their values.
+
+    Raises:
+        ModelError: one that is to be held is not among them.
+    """
+    names = [p.name for p in free]
+    for name in held:
+        if name not in names:
+            raise ModelError(
+                f"{name}: is not fitted, so it is held anyway; {', '.join(names)} are."
+            )
+    return [p for p in free if p.name not in held]
 
 
 def base_names(
@@ -109,20 +128,29 @@ def fitted(
 
 
 def fit(
-    measurements: Sequence[Measurement], model_file: ModelFile, out: Path, command: str
+    measurements: Sequence[Measurement],
+    model_file: ModelFile,
+    out: Path,
+    command: str,
+    held: Collection[str] = (),
 ) -> FitResult:
     """Fits all free quantities of the model to all measurements and writes the new model.
 
+    Args:
+        measurements: what it is fitted to.
+        model_file: the model.
+        out: the new model file.
+        command: recorded in it.
+        held: names of quantities that keep their values.
+
     Raises:
         LogError: no measurement can be judged.
-        ModelError: the new file cannot be written.
+        ModelError: the new file cannot be written, or `held` names what is not fitted.
     """
     opened = open_measurements(measurements, model_file)
     model = model_file.model
-    free = [
-        *base_parameters(model, base_names(model, judged(opened))),
-        *all_effect_parameters(model),
-    ]
+    base = base_parameters(model, base_names(model, judged(opened)))
+    free = without_held([*base, *all_effect_parameters(model)], held)
     moved, found = fitted(opened, free)
     before, after = comparison(model_file, opened), comparison(model_file, moved)
     estimates = found.shared_estimates()
@@ -142,7 +170,8 @@ def fit(
         out,
         command,
     )
-    return FitResult(before, after, estimates, clock.get(CLOCK), Path(out))
+    heldout = HeldOut.of(found)
+    return FitResult(before, after, heldout, estimates, clock.get(CLOCK), Path(out))
 
 
 def noise_of(after: Comparison):

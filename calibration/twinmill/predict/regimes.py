@@ -44,7 +44,7 @@ def where_it_fails(
     squares = over[:, judged].mean(axis=1)
     known = np.isfinite(squares)
     regimes = []
-    for group, name, mask in _masks(scene, windows):
+    for group, name, mask in regime_masks(scene, windows):
         inside = mask & known
         if np.count_nonzero(inside) >= FEWEST:
             regimes.append(
@@ -60,8 +60,8 @@ def where_it_fails(
     return sorted(regimes, key=lambda r: (order[r.group], -r.ratio))
 
 
-def _masks(scene: Scene, windows: Windows) -> Iterator[tuple[str, str, np.ndarray]]:
-    """(group, regime, (W,) bool)."""
+def regime_masks(scene: Scene, windows: Windows) -> Iterator[tuple[str, str, np.ndarray]]:
+    """(group, regime, (W,) bool): windows that lie in each regime."""
     track, starts = scene.measurement.track, windows.starts
     t_s = track.pose_t_s[starts] - scene.model.get("clock.offset_s")
     yield from _by_change(track, t_s)
