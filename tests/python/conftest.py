@@ -129,7 +129,7 @@ class CoastingRobot:
     """A log that the twin's planar plant made, and the two models of it.
 
     Attributes:
-        log: 120 s of steps and turns, none driven twice, each followed by a stop.
+        log: steps and turns, none driven twice, each followed by a stop.
         model: the model as it was driven, but without its effect.
         true_model: with it: coasting at `deceleration_mps2`.
     """
@@ -142,18 +142,29 @@ class CoastingRobot:
 
 @pytest.fixture(scope="session")
 def coasting_robot(tmp_path_factory, model_text) -> CoastingRobot:
-    """A robot with noise that rolls on after each stop; the user's model knows all but that."""
-    folder = tmp_path_factory.mktemp("coasting")
+    """120 s of a robot with noise that rolls on after each stop; its model knows all but that."""
+    return _coasting(tmp_path_factory.mktemp("coasting"), model_text, 120, 0.01)
+
+
+@pytest.fixture(scope="session")
+def brief_coasting_robot(tmp_path_factory, model_text) -> CoastingRobot:
+    """The same for 45 s with fewer poses, where numbers need not be sharp."""
+    return _coasting(tmp_path_factory.mktemp("brief"), model_text, 45, 0.025)
+
+
+def _coasting(
+    folder: Path, model_text: Callable[..., str], duration_s: float, period_s: float
+) -> CoastingRobot:
     effect = '[[effect]]\nname = "coasting"\ndeceleration_mps2 = 0.7\n'
     known = model_text("coaster") + NOISE
     (folder / "model.toml").write_text(known)
     (folder / "true.toml").write_text(known + effect)
-    command_t_s = np.arange(0, 120, 0.022)
+    command_t_s = np.arange(0, duration_s, 0.022)
     legs = np.random.default_rng(1).choice([-1, -0.8, -0.6, 0.6, 0.8, 1], (80, 2))
     legs[::2] = 0
     left, right = legs[(command_t_s // 1.5).astype(int)].T
     command = np.ascontiguousarray(np.column_stack([left, right, left, right]))
-    pose_t_s = np.arange(0.1, 119.9, 0.01)
+    pose_t_s = np.arange(0.1, duration_s - 0.1, period_s)
     played = native.Track(
         command_t_s,
         command,

@@ -11,7 +11,7 @@ import typer
 
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import Force, Logs, Model, NewModel, Out
+from twinmill_cli.options import Force, Hold, Logs, Model, NewModel, Out
 from twinmill_cli.output import AsJson, busy
 
 if working():  # not for --help
@@ -31,6 +31,7 @@ if working():  # not for --help
         check_output,
         command_line,
         finish,
+        holding,
         load,
         open_model,
         provenance,
@@ -70,6 +71,7 @@ def _fit(
     logs: Logs,
     output: NewModel,
     model: Model = DEFAULT_MODEL,
+    hold: Hold = None,
     force: Force = False,
     as_json: AsJson = False,
     out: Out = None,
@@ -78,13 +80,15 @@ def _fit(
 
     Example: twinmill fit run.lcmlog --model turbopi.toml -o fitted.toml
     """
+    held = hold or []
+    verb = shlex.join(["fit", *holding(held)])
     source = provenance(
-        command_line("fit", logs, model, output), model_file := open_model(model, out)
+        command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
     check_output(output, model_file, force)
     with busy(f"fitting {model}"):
         measurements = load(logs, model_file, as_json)
-        result = fit(measurements, model_file, output, source.command)
+        result = fit(measurements, model_file, output, source.command, held)
     section = partial(fit_section, result)
     data = {**result.to_json(), **told(measurements)}
     finish(data, show.fit(result), source, section, as_json, out)
@@ -108,6 +112,7 @@ def _add(
     formula: Annotated[
         str | None, typer.Option("--formula", help="Of an equation: what is added, of p0 to p3.")
     ] = None,
+    hold: Hold = None,
     as_json: AsJson = False,
     out: Out = None,
 ) -> AddResult | BitAddition:
@@ -121,15 +126,17 @@ def _add(
     if extra := [name for name in texts if name not in known]:
         option = f"--{extra[0].replace('_', '-')}"
         raise ValueError(f"{option}: {effect} has none; it is for `twinmill add equation`.")
-    verb = f"add {effect}" + "".join(
-        f" --{name.replace('_', '-')} {shlex.quote(text)}" for name, text in texts.items()
-    )
+    held = hold or []
+    given = [w for name, text in texts.items() for w in (f"--{name.replace('_', '-')}", text)]
+    verb = shlex.join(["add", effect, *given, *holding(held)])
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
     check_output(output, model_file, force)
     measurements = load(logs, model_file, as_json)
     if is_of_camera(effect):
+        if held:
+            raise ValueError(f"--hold: {effect} is of the camera; nothing else is fitted with it.")
         with busy(f"adding {effect} to {model}"):
             seen = add_to_camera(effect, measurements, model_file, output, source.command)
         section = partial(bits.addition_section, seen, model_file.path.name)
@@ -137,7 +144,7 @@ def _add(
         finish(data, bits.addition(seen), source, section, as_json, out)
         return seen
     with busy(f"adding {effect} to {model}"):
-        result = add(effect, measurements, model_file, output, source.command, texts)
+        result = add(effect, measurements, model_file, output, source.command, texts, held)
     section = partial(added_section, result)
     data = {**result.to_json(), **told(measurements)}
     finish(data, show.added(result), source, section, as_json, out)

@@ -24,6 +24,11 @@ def command_line(verb: str, logs: list[Path], model: str, output: Path | None = 
     return shlex.join(words + (["-o", str(output)] if output else []))
 
 
+def holding(names: list[str]) -> list[str]:
+    """Words of a command line that hold these quantities."""
+    return [word for name in names for word in ("--hold", name)]
+
+
 def open_model(model: str, out: Path | None) -> ModelFile:
     """Reads the model, once it is clear that the report's folder can be written."""
     if out:

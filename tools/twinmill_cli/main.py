@@ -35,6 +35,11 @@ COMMANDS = (
         "Show robots and their twins (channels TWIN_...) side by side in the viewer Rerun.",
     ),
     (
+        "open",
+        "open_workbench",
+        "See where a model fails, turn its knobs, name and add what is missing, in the browser.",
+    ),
+    (
         "compare",
         "calibrate",
         "Tell how well a model predicts logs, against the log's own noise, and where it fails.",
@@ -48,6 +53,11 @@ COMMANDS = (
         "add",
         "calibrate",
         "Add an effect to a model, fit it with all the rest, and judge it on data not fitted to.",
+    ),
+    (
+        "set",
+        "set_values",
+        "Set numbers of a model by hand; writes a new model file and leaves the old one.",
     ),
     (
         "diagnose",

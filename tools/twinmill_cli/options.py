@@ -49,6 +49,12 @@ NewModel = Annotated[
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace M2 if it exists.")]
+Hold = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME", show_default=False, help="A quantity that keeps its value; may be repeated."
+    ),
+]
 KeyFile = Annotated[
     Path | None,
     typer.Option(

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The workbench without its screen: the session, its worker, its state file, and what has changed.
+
+A screen asks `changes` a few times a second and draws anew what has another number than before.
+"""
+
+import asyncio
+import json
+from collections import Counter
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from twinmill.files import plain
+from twinmill.workbench.drawing import commands, measured_path, pack
+from twinmill.workbench.session import Session
+from twinmill.workbench.state_file import StateFile
+from twinmill.workbench.worker import Done, Work, Worker
+
+STAGES = (("measure", "cleaning"), ("judge", "finding the noise floor of"))
+COMMAND_WORDS = {
+    "duty": (("FL", "FR", "RL", "RR"), "%"),
+    "wheel_speed": (("FL", "FR", "RL", "RR"), "rad/s"),
+    "twist": (("vx", "vy", "turn"), "m/s, rad/s"),
+}
+# Colours of Okabe and Ito (2008), told apart by colour-blind readers.
+COLORS = ("#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7d8c94")
+
+
+class Bench:
+    """Session, worker and state.
+
+    Args:
+        session: whose logs are read; `open` does the rest.
+        state: where the session is kept.
+
+    Attributes:
+        changes: counts by what has changed: `robots`, `model`, `prediction`, `score`, `work`,
+            `progress`, `findings`.
+        opening: what is being opened, in words; empty when all is there.
+        failure: what went wrong last.
+        view: what the screen shows: cursor, stretch, robot, tab.
+    """
+
+    def __init__(self, session: Session, state: StateFile) -> None:
+        self.session, self.state = session, state
+        self.worker = Worker(session.paths)
+        self.changes: Counter[str] = Counter(robots=1)
+        self.opening, self.failure = "starting", ""
+        self.view: dict[str, Any] = state.read("view", {})
+        self._waiting: Work | None = None
+        self._written = ""
+        session.restore(state.read("session", {}))
+
+    # -- opening --------------------------------------------------------------------------------
+
+    async def open(self) -> None:
+        """Cleans and judges the logs, each step in a thread.
+
+        Raises:
+            LogError: nothing in them can be judged.
+        """
+        names = ", ".join(p.name for p in self.session.paths)
+        for stage, words in STAGES:
+            self.opening = f"{words} {names}"
+            self.changed("work")
+            await asyncio.to_thread(getattr(self.session, stage))
+        self.opening = ""
+        self.changed("work", "robots", "model", "score", "findings")
+        self.worker.start(self.session.work("read"))
+
+    def changed(self, *what: str) -> None:
+        """Notes what a screen must draw anew."""
+        self.changes.update(what)
+
+    # -- what the screen does -------------------------------------------------------------------
+
+    @property
+    def picked(self) -> int:
+        """Robot that is shown."""
+        return min(self.view.get("robot", 0), max(len(self.session.robots) - 1, 0))
+
+    def drag(self, name: str, value: float) -> None:
+        """A hand is on a knob."""
+        self.session.drag(name, value)
+        self.changed("score", "prediction")
+
+    async def act(self, act: Callable[..., None], *arguments: Any) -> None:
+        """Does what moves the session to another model."""
+        await asyncio.to_thread(act, *arguments)
+        self.changed("model", "score", "prediction")
+
+    # -- long work ------------------------------------------------------------------------------
+
+    @property
+    def doing(self) -> Work | None:
+        """The work that the user waits for."""
+        work = self._waiting or self.worker.work
+        return work if work and work.kind in ("fit", "add", "diagnose") else None
+
+    @property
+    def progress(self) -> str:
+        """Of it, in words."""
+        if self._waiting:
+            return "waiting for the logs"
+        return f"{self.worker.words} · {self.worker.for_s:.0f} s"
+
+    def start(self, kind: str, effect: str = "") -> None:
+        """A fit, an addition or a diagnosis of the model where the tree stands."""
+        self.failure = ""
+        self._waiting = self.session.work(kind, effect)
+        self.changed("work")
+        self._next()
+
+    def cancel(self) -> None:
+        """Stops it."""
+        self._waiting = None
+        self.worker.cancel()
+        self.changed("work")
+
+    def tick(self) -> None:
+        """To be called a few times a second."""
+        if done := self.worker.poll():
+            self._take(done)
+        self._next()
+        if self.doing:
+            self.changed("progress")
+        self._write()
+
+    def _take(self, done: Done) -> None:
+        if done.failure:
+            self.failure = done.failure
+        elif done.work.kind != "read":
+            self.session.take(done)
+        news = {"diagnose": ["findings"], "compare": ["score"], "read": []}
+        self.changed("work", *news.get(done.work.kind, ["model", "score", "prediction"]))
+
+    def _next(self) -> None:
+        """What waits; else the exact score of a model that a hand made."""
+        if self.worker.busy or not self.session.robots:
+            return
+        if self._waiting:
+            self.worker.start(self._waiting)
+            self._waiting = None
+            return
+        score = self.session.tree.scores.get(self.session.tree.current.number)
+        if score and not score.exact and not self.failure:
+            self.worker.start(self.session.work("compare"))
+
+    # -- state ----------------------------------------------------------------------------------
+
+    def _write(self) -> None:
+        data = plain({"view": self.view, "session": self.session.to_json()})
+        text = json.dumps(data, allow_nan=False)
+        if text != self._written:
+            self.state.write(text)
+            self._written = text
+
+    def close(self) -> None:
+        """Ends the worker; keeps the state."""
+        self._write()
+        self.worker.cancel()
+
+    # -- arrays for the browser -----------------------------------------------------------------
+
+    def log_bytes(self, place: int) -> bytes:
+        """Paths of all robots of one log."""
+        log = self.session.logs[place]
+        measured = {m.label: k for k, m in enumerate(self.session.measurements)}
+        arrays, robots = {}, []
+        for k, robot in enumerate(log.robots.values()):
+            name = f"R{robot.robot_id:02d}"
+            label = f"{log.path.name} {name}"
+            arrays[f"path{k}"] = measured_path(robot)["path"]
+            robots.append(
+                {
+                    "name": name,
+                    "label": label,
+                    "index": measured.get(label, -1),
+                    "color": COLORS[k % len(COLORS)],
+                    "heading": robot.has_heading,
+                    "radius_m": self.session.given.model.get("robot.body_radius_m"),
+                }
+            )
+        ends = [float(a[-1, 0]) for a in arrays.values() if len(a)]
+        return pack(arrays, robots=robots, end_s=max(ends, default=1.0))
+
+    def robot_bytes(self, index: int) -> bytes:
+        """Speeds, commands and band of one robot."""
+        view, raw = self.session.robots[index], self.session.raw(index)
+        names, unit = COMMAND_WORDS.get(raw.command_kind, ((), ""))
+        arrays = {**view.measured(), **commands(raw)}
+        clock_s = self.session.clock_s(index)
+        return pack(arrays, command_names=names, command_unit=unit, clock_s=clock_s)
+
+    def prediction_bytes(self, index: int) -> bytes:
+        """What the model shown says of one robot, with its score."""
+        begin = perf_counter()
+        arrays = self.session.predicted(index)
+        score = self.session.score(index)
+        return pack(
+            arrays,
+            step_s=self.session.robots[index].step_s,
+            revision=self.changes["prediction"],
+            score=None if np.isnan(score) else score,
+            compute_ms=1000 * (perf_counter() - begin),
+        )
+
+    def log_of(self, index: int) -> int:
+        """Place of the log that a robot is in."""
+        if not self.session.measurements:
+            return 0
+        sha256 = self.session.measurements[index].log_sha256
+        return next(k for k, log in enumerate(self.session.logs) if log.sha256 == sha256)

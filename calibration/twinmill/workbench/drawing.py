@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the browser draws, as arrays: thinned to what an eye can tell, packed as 32-bit numbers."""
+
+import json
+import struct
+from collections.abc import Mapping
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.log import RobotLog
+from twinmill.data.track import Track, local_line
+from twinmill.fitting.opening import Opened
+from twinmill.predict.datasets import displacement
+from twinmill.predict.problem import Scene
+from twinmill.predict.regimes import regime_masks
+from twinmill.predict.residual import StepGrid, body_velocity, rotate
+from twinmill.predict.windows import HORIZONS_S, Windows, difference
+
+PATH_S = 0.05  # between points of a path
+SPEED_S = 0.04  # between points of a speed
+STEP_S = 0.1  # between points of a prediction, and between their starts
+AHEAD = 20  # points of a prediction: 2 s
+SPEED_HALF_S = 0.06  # half width of the line that tells a measured speed
+SHORT, LONG = HORIZONS_S.index(0.5), HORIZONS_S.index(2.0)
+WITHIN_95 = 1.96  # standard deviations
+
+Arrays = dict[str, np.ndarray]
+
+
+def pack(arrays: Mapping[str, np.ndarray], **facts: object) -> bytes:
+    """Facts as JSON and arrays behind it.
+
+    Layout: uint32 length of the JSON, the JSON padded to 4 bytes, then each array as float32. The
+    JSON's `arrays` has the shape of each, in their order.
+    """
+    flat = {name: np.ascontiguousarray(a, "<f4") for name, a in arrays.items()}
+    head = json.dumps({**facts, "arrays": {name: a.shape for name, a in flat.items()}}).encode()
+    head += b" " * (-len(head) % 4)
+    return struct.pack("<I", len(head)) + head + b"".join(a.tobytes() for a in flat.values())
+
+
+def measured_path(robot: RobotLog) -> Arrays:
+    """(T, 4) t_s, x_m, y_m, theta_rad of a robot as it was recorded; NaN where it was lost."""
+    if not len(robot.pose_t_s):
+        return {"path": np.empty((0, 4))}
+    period_s = float(np.median(np.diff(robot.pose_t_s))) if len(robot.pose_t_s) > 1 else PATH_S
+    every = max(1, round(PATH_S / period_s))
+    pose = robot.pose if robot.has_heading else np.nan_to_num(robot.pose)
+    pose = np.where(robot.valid[:, None], pose, np.nan)
+    return {"path": np.column_stack([robot.pose_t_s, pose])[::every]}
+
+
+def commands(robot: RobotLog) -> Arrays:
+    """(M, 1 + C) robot's clock and commands, where they change and at the end."""
+    width = 3 if robot.command_kind == "twist" else 4
+    if not len(robot.command_t_s):
+        return {"commands": np.empty((0, 1 + width))}
+    rows = np.column_stack([robot.command_t_s, robot.command[:, :width]])
+    if robot.command_kind == "duty":
+        rows[:, 1:] *= 100
+    change = np.any(np.diff(rows[:, 1:], axis=0) != 0, axis=1)
+    kept = np.concatenate([[True], change])
+    kept[-1] = True
+    return {"commands": rows[kept]}
+
+
+def measured_speed(track: Track) -> Arrays:
+    """(T, 4) t_s, forward and left in m/s, turn in rad/s, from the poses."""
+    half_s = max(SPEED_HALF_S, 1.5 * track.timing.pose_period_s)
+    slopes = [
+        local_line(track.pose_t_s, track.pose[:, k], track.segment, half_s)[1] for k in range(3)
+    ]
+    forward, left = rotate(slopes[0], slopes[1], -track.heading_smooth)
+    every = max(1, round(SPEED_S / track.timing.pose_period_s))
+    return {"speed": np.column_stack([track.pose_t_s, forward, left, slopes[2]])[::every]}
+
+
+class RobotView:
+    """One robot in one log as it is drawn: what does not depend on the model is found once.
+
+    Args:
+        opened: the measurement with floor and clock.
+    """
+
+    def __init__(self, opened: Opened) -> None:
+        self.opened = opened
+        self.track = opened.measurement.track
+        self.grid = StepGrid.of(opened.measurement)
+        self.windows = Windows.of(self.track)
+        self._measured = displacement(opened.measurement, self.windows, None)
+        self._starts, self._ends = _everywhere(self.track)
+
+    @property
+    def floor(self) -> np.ndarray:
+        """(H, 3) errors that count as one; NaN without a floor."""
+        return self.opened.floor.rms
+
+    def errors(self, model: native.Model) -> np.ndarray:
+        """(W, H, 3) measured less predicted; NaN where it is not judged."""
+        predicted = displacement(self.opened.measurement, self.windows, model)
+        errors = difference(self._measured, predicted)
+        return np.where(self.opened.floor.keep[:, None, None], errors, np.nan)
+
+    def scene(self, model: native.Model) -> Scene:
+        """Measurement and model, without the noise, which no drawing needs."""
+        return Scene(self.opened.measurement, model, self.grid, not self.opened.same_clock)
+
+    def moments(self, model: native.Model) -> dict[tuple[str, str], np.ndarray]:
+        """(W,) bool by group and regime: windows that lie in it."""
+        masks = regime_masks(self.scene(model), self.windows)
+        return {(group, name): mask for group, name, mask in masks}
+
+    def measured(self) -> Arrays:
+        """What the log alone tells: speeds, and the band that a right model keeps to.
+
+        band: (5, 4) horizon_s, forward and left in m, heading in rad: 95 % of the errors of a right
+        model are within it.
+        """
+        band = np.column_stack([HORIZONS_S, WITHIN_95 * self.floor])
+        return {**measured_speed(self.track), "band": band}
+
+    def predicted(self, model: native.Model) -> Arrays:
+        """What the model says.
+
+        starts: (S, 4) t_s and pose from which a prediction starts; ahead: (S, AHEAD, 3) poses
+        after each step, NaN where the track ends; predicted_speed: (T, 4) as the measured one;
+        errors: (W, 5) t_s, then position in m and heading in rad, 0.5 s and 2 s ahead.
+        """
+        played = self.opened.measurement.played
+        ahead = native.windows(model, played, self._starts, self._ends)
+        ahead[self._ends < 0] = np.nan
+        starts = np.column_stack([self.track.pose_t_s[self._starts], self.track.pose[self._starts]])
+        velocity = body_velocity(self.opened.measurement, self.grid, model)
+        every = max(1, round(SPEED_S / self.grid.period_s))
+        errors = self.errors(model)
+        start_s = self.track.pose_t_s[self.windows.starts]
+        far = [f(errors[:, h]) for h in (SHORT, LONG) for f in (_position_m, _heading_rad)]
+        return {
+            "starts": starts,
+            "ahead": ahead,
+            "predicted_speed": np.column_stack([self.grid.t_s, velocity])[::every],
+            "errors": np.column_stack([start_s, *far]),
+        }
+
+    @property
+    def step_s(self) -> float:
+        """Between points of a prediction."""
+        return _stride(self.track) * self.track.timing.pose_period_s
+
+
+def _stride(track: Track) -> int:
+    return max(1, round(STEP_S / track.timing.pose_period_s))
+
+
+def _everywhere(track: Track) -> tuple[np.ndarray, np.ndarray]:
+    """Starts all along the track, and the poses that follow each at even steps."""
+    stride = _stride(track)
+    starts = np.flatnonzero(track.segment >= 0)[::stride].astype(np.int64)
+    ends = starts[:, None] + stride * np.arange(1, AHEAD + 1)
+    inside = ends < len(track.pose_t_s)
+    ends = np.where(inside, ends, 0)
+    ends[~inside | (track.segment[ends] != track.segment[starts][:, None])] = -1
+    ends[np.cumsum(ends < 0, axis=1) > 0] = -1
+    return starts, ends.astype(np.int64)
+
+
+def _position_m(errors: np.ndarray) -> np.ndarray:
+    return np.hypot(errors[:, 0], errors[:, 1])
+
+
+def _heading_rad(errors: np.ndarray) -> np.ndarray:
+    return errors[:, 2]

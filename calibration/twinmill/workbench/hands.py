@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a panel may ask of the page that it is on."""
+
+from typing import Protocol
+
+from twinmill.workbench.bench import Bench
+
+
+class Hands(Protocol):
+    """The page.
+
+    Attributes:
+        bench: what all pages show.
+    """
+
+    bench: Bench
+
+    def drag(self, name: str, value: float) -> None:
+        """A knob is being turned: predictions and score follow at once."""
+
+    async def keep(self) -> None:
+        """A knob was let go."""
+
+    async def go(self, number: int) -> None:
+        """To a model tried before."""
+
+    def javascript(self, code: str) -> None:
+        """Runs in this page's browser."""

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The panel of what is missing: the diagnosis, its findings, and a button to add each."""
+
+import html
+
+from nicegui import ui
+
+from twinmill.model.parameters import catalogue
+from twinmill.workbench.hands import Hands
+from twinmill.workbench.words import estimate, scored, tone
+
+REFIT = "refit"
+OTHERS = 8  # effects of the ranking that are shown beside the findings
+
+
+class MissingPanel:
+    """Draws the last diagnosis."""
+
+    def __init__(self, page: Hands) -> None:
+        self.page, self.bench = page, page.bench
+        with ui.element("div").classes("buttons"):
+            self.button = ui.button("Diagnose", on_click=lambda: self.bench.start("diagnose"))
+            self.button.props('dense unelevated no-caps padding="2px 16px" data-testid="diagnose"')
+            self.cancel = ui.button("Cancel", on_click=self.bench.cancel)
+            self.cancel.props('dense outline no-caps padding="2px 12px" data-testid="cancel"')
+            self.progress = ui.label().classes("soft").style("flex: 1")
+        self.bar = ui.linear_progress(show_value=False).props("indeterminate color=blue-9")
+        self.body = ui.element("div").classes("stack").props('data-testid="findings"')
+        self.draw()
+
+    def draw_progress(self) -> None:
+        """What is being done."""
+        doing = self.bench.doing
+        self.button.set_visibility(doing is None)
+        self.button.set_enabled(bool(self.bench.session.robots))
+        self.cancel.set_visibility(doing is not None)
+        self.bar.set_visibility(doing is not None)
+        self.progress.set_text(self.bench.progress if doing else "")
+
+    def draw(self) -> None:
+        """All of it."""
+        self.draw_progress()
+        self.body.clear()
+        found = self.bench.session.diagnosis
+        with self.body:
+            if self.bench.failure:
+                _card("wrong", html.escape(self.bench.failure))
+            for note in self.bench.session.notes:
+                _card("wrong", html.escape(note))
+            if found is None:
+                ui.label(
+                    "Diagnose tries every effect of the catalogue, fits each on a part of the logs "
+                    "and judges it on the rest."
+                ).classes("soft")
+                return
+            self._said(found)
+            for finding in found["findings"]:
+                self._finding(finding)
+            self._rest(found)
+            self._others(found)
+
+    def _said(self, found: dict) -> None:
+        tree = self.bench.session.tree
+        of = tree.file_name(found["of"])
+        stale = "" if found["of"] == tree.current.number else f" This was said of {of}."
+        _card(
+            "said",
+            f'<b>{html.escape(found["sentence"])}</b><div class="soft">{html.escape(stale)}</div>',
+        )
+
+    def _finding(self, finding: dict) -> None:
+        effect, share = finding["effect"], finding["share"]
+        sure = finding["certainty"] == "sure"
+        with ui.element("div").classes("card").props(f'data-testid="finding-{effect}"'):
+            with ui.element("div").classes("head"):
+                name = "the base's numbers are stale" if effect == REFIT else effect
+                ui.html(f"<b>{html.escape(name)}</b>", sanitize=False).style("flex: 1")
+                ui.label(finding["certainty"]).classes(f"chip {'good' if sure else 'warn'}")
+                self._add(effect)
+            if effect != REFIT:
+                _told(effect)
+            words = "less than 1 %" if share < 0.005 else f"{100 * share:.0f} %"
+            ui.html(
+                f'<div class=share><i style="width:{100 * share:.1f}%"></i></div>'
+                f"takes away {words} of the error",
+                sanitize=False,
+            )
+            if finding["group"]:
+                rivals = finding["group"][1:]
+                ui.label("These logs cannot tell it from:").classes("soft").style("margin-top: 6px")
+                for rival in rivals:
+                    with ui.element("div").classes("row"):
+                        ui.label(rival).style("flex: 1")
+                        self._add(rival)
+            if finding["why"]:
+                ui.label(finding["why"]).classes("warn")
+            estimates = "; ".join(estimate(p) for p in finding["parameters"])
+            ui.label(estimates).classes("soft")
+
+    def _add(self, effect: str) -> None:
+        """The button that takes an effect in."""
+        verb, words = ("fit", "Refit") if effect == REFIT else ("add", "Add")
+        button = ui.button(
+            words, on_click=lambda: self.bench.start(verb, "" if effect == REFIT else effect)
+        )
+        button.props(f'dense outline no-caps padding="0 12px" data-testid="add-{effect}"')
+        button.set_enabled(self.bench.doing is None)
+
+    def _rest(self, found: dict) -> None:
+        rest = found["rest"]
+        if found["findings"]:
+            on = ", ".join(rest["depends_on"])
+            words = f"Left over: {100 * rest['share']:.0f} %"
+            words += f", depends on {on}." if on else "."
+            ui.label(words + ("" if rest["firm"] else " It may be noise.")).classes("soft")
+        for off in found["robots_off"]:
+            if sentence := off.get("sentence"):
+                _card("wrong", html.escape(sentence))
+        for note in found["notes"]:
+            ui.label(note).classes("soft").style("margin-top: 6px")
+
+    def _others(self, found: dict) -> None:
+        """What else was tried, best first."""
+        named = {n for f in found["findings"] for n in (f["group"] or [f["effect"]])}
+        others = [r for r in found["ranking"] if r["effect"] not in named][:OTHERS]
+        if not others:
+            return
+        with ui.expansion(f"Also tried ({len(others)})").props("dense").style("width: 100%"):
+            for r in others:
+                with ui.element("div").classes("row"):
+                    ui.label(r["effect"]).style("flex: 1")
+                    ui.label(f"held out {scored(r['score_heldout'])}").classes(
+                        tone(r["score_heldout"])
+                    )
+                    self._add(r["effect"])
+
+
+def _told(effect: str) -> None:
+    """What the catalogue says of an effect."""
+    entry = catalogue().get(effect)
+    if entry:
+        ui.label(entry["summary"])
+        ui.label(entry["equation"]).classes("eq")
+
+
+def _card(kind: str, words: str) -> None:
+    ui.html(words, sanitize=False).classes(f"card {kind}")

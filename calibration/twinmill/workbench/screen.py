@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page: a bar, the stage with floor and series, and panels at the side. It only draws."""
+
+import json
+from collections import Counter
+
+from nicegui import context, ui
+
+from twinmill.workbench.bench import Bench
+from twinmill.workbench.fails_panel import FailsPanel
+from twinmill.workbench.knobs_panel import KnobsPanel
+from twinmill.workbench.missing_panel import MissingPanel
+from twinmill.workbench.models_panel import ModelsPanel
+from twinmill.workbench.words import scored, tone
+
+REFRESH_S = 0.15
+HEAD = """
+<link rel="stylesheet" href="/look/workbench.css">
+<link rel="modulepreload" href="/look/stage.js">
+"""
+STAGE = """
+<div class="sheet"><canvas id="floor"></canvas><div class="key">
+<span style="color:#3c3c3c99"><i></i>measured</span>
+<span style="color:#d55e00"><i></i>predicted</span>
+<span style="color:#009e73"><i></i>95 % band of a right model</span></div></div>
+<div class="sheet"><canvas id="series"></canvas></div>
+<div class="sheet" id="transport">
+<button id="play" title="Play or pause (space)">play_arrow</button>
+<button id="rate" title="Speed of playing"></button>
+<input id="scrubber" type="range" min="0" max="10" step="0.01" value="0" aria-label="Time">
+<span id="clock">0.00 s</span><button id="marks" title="Forget these marks"></button>
+<span class="soft">predict</span>
+<button data-ahead="0.5" title="Predictions of half a second">0.5 s</button>
+<button data-ahead="2" title="Predictions of two seconds">2 s</button></div>
+"""
+TABS = {
+    "knobs": "Knobs",
+    "missing": "What is missing",
+    "fails": "Where it fails",
+    "models": "Models",
+}
+
+
+class Screen:
+    """One page in one browser."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench = bench
+        self._seen: Counter[str] = Counter()
+        self._shown: tuple | None = None
+
+    async def build(self) -> None:
+        """Makes all elements, then keeps them up to date."""
+        ui.add_head_html(HEAD)
+        self._bar()
+        with ui.element("div").props("id=main"):
+            ui.html(STAGE, sanitize=False).props("id=stage")
+            with ui.element("div").props("id=side"):
+                self._panels()
+        ui.on("undo", lambda: self._act(self.bench.session.undo))
+        ui.on("redo", lambda: self._act(self.bench.session.redo))
+        ui.on("pick", lambda event: self._pick(event.args))
+        self.client = context.client
+        await self.client.connected()
+        view = json.dumps(self.bench.view)
+        options = f'{{token: "{self.bench.state.token}", view: {view}}}'
+        await ui.run_javascript(f"(await import('/look/stage.js')).start({options})", timeout=20)
+        await self._refresh()
+        ui.timer(REFRESH_S, self._refresh)
+
+    # -- what it is made of ---------------------------------------------------------------------
+
+    def _bar(self) -> None:
+        with ui.element("div").props("id=bar"):
+            ui.html(
+                '<span class="name"><img src="/look/icon.svg" alt="">Twinmill</span>',
+                sanitize=False,
+            )
+            names = [path.name for path in self.bench.session.paths]
+            self.log = ui.select(
+                dict(enumerate(names)), value=0, on_change=lambda e: self._pick_log(e.value)
+            ).props("dense options-dense borderless")
+            self.log.set_visibility(len(names) > 1)
+            self.robot = ui.select({}, on_change=lambda e: self._pick(e.value))
+            self.robot.props('dense options-dense outlined data-testid="robot"')
+            self.status = ui.label().classes("space").props('data-testid="status"')
+            with ui.element("div").classes("score"):
+                ui.html("<small>score</small>", sanitize=False)
+                self.score = ui.label().props('data-testid="score"')
+                ui.tooltip(
+                    "Error over the noise of the log, all robots: 1.0 is as good as the log can "
+                    "tell, above 1.3 something is missing."
+                )
+            self.undo = ui.button(icon="undo", on_click=lambda: self._act(self.bench.session.undo))
+            self.redo = ui.button(icon="redo", on_click=lambda: self._act(self.bench.session.redo))
+            self.undo.props('flat dense round data-testid="undo"').tooltip("Undo (z)")
+            self.redo.props('flat dense round data-testid="redo"').tooltip("Redo (y)")
+
+    def _panels(self) -> None:
+        chosen = self.bench.view.get("tab", "knobs")
+        with ui.tabs(on_change=lambda e: self.bench.view.update(tab=e.value)) as tabs:
+            tabs.props("dense no-caps inline-label align=justify")
+            for key, label in TABS.items():
+                ui.tab(key, label=label).props(f'data-testid="tab-{key}"')
+        with ui.tab_panels(tabs, value=chosen).props("animated=false keep-alive"):
+            with ui.tab_panel("knobs"):
+                self.knobs = KnobsPanel(self)
+            with ui.tab_panel("missing"):
+                self.missing = MissingPanel(self)
+            with ui.tab_panel("fails"):
+                self.fails = FailsPanel(self)
+            with ui.tab_panel("models"):
+                self.models = ModelsPanel(self)
+
+    # -- what the user does ---------------------------------------------------------------------
+
+    async def _act(self, act, *arguments) -> None:
+        await self.bench.act(act, *arguments)
+        await self._refresh()
+
+    def drag(self, name: str, value: float) -> None:
+        """A knob is being turned: predictions and score follow at once."""
+        self.bench.drag(name, value)
+        self._seen["prediction"] = self.bench.changes["prediction"]
+        self.javascript("twinmill.predict()")
+        self._draw_score()
+
+    async def keep(self) -> None:
+        """A knob was let go."""
+        await self._act(self.bench.session.keep)
+
+    async def go(self, number: int) -> None:
+        """To a model tried before."""
+        await self._act(self.bench.session.go, number)
+
+    def _pick(self, index: int | None) -> None:
+        if index is not None and index != self.bench.picked:
+            self.bench.view["robot"] = int(index)
+            self.bench.changed("robots")
+
+    def _pick_log(self, place: int) -> None:
+        robots = range(len(self.bench.session.robots))
+        first = next((k for k in robots if self.bench.log_of(k) == place), None)
+        if self.bench.log_of(self.bench.picked) != place:
+            self._pick(first)
+
+    def javascript(self, code: str) -> None:
+        """Runs in this page's browser."""
+        self.client.run_javascript(code)
+
+    # -- keeping up -----------------------------------------------------------------------------
+
+    async def _refresh(self) -> None:
+        """Draws what has changed since."""
+        changes = self.bench.changes
+        new = {key for key, count in changes.items() if count != self._seen[key]}
+        self._seen = Counter(changes)
+        if "robots" in new:
+            self._draw_robots()
+        if "prediction" in new and "robots" not in new:
+            self.javascript("twinmill.predict()")
+        if new & {"work", "progress"}:
+            self._draw_status()
+        if new & {"score", "model", "robots"}:
+            self._draw_score()
+        if new & {"model", "robots"}:
+            self.knobs.draw()
+        if new & {"model", "score", "work"}:
+            self.models.draw()
+        if new & {"findings", "model", "work"}:
+            self.missing.draw()
+        elif "progress" in new:
+            self.missing.draw_progress()
+        if new & {"prediction", "robots", "model"}:
+            self.fails.draw()
+
+    def _draw_robots(self) -> None:
+        session, picked = self.bench.session, self.bench.picked
+        several = len(session.paths) > 1
+        labels = [m.label if several else m.label[-3:] for m in session.measurements]
+        self.robot.set_options(dict(enumerate(labels)) if session.robots else {})
+        self.robot.set_value(picked if session.robots else None)
+        self.robot.set_visibility(len(session.robots) > 1)
+        place = self.bench.log_of(picked)
+        self.log.set_value(place)
+        code = ""
+        if self._shown is None or self._shown[:2] != (place, bool(session.robots)):
+            code += f"await twinmill.showLog({place});"
+        self._shown = (place, bool(session.robots), picked)
+        if session.robots:
+            label = json.dumps(session.measurements[picked].label)
+            code += f"await twinmill.pick({label}, {picked});"
+        self.javascript(f"(async () => {{ {code} }})()")
+
+    def _draw_status(self) -> None:
+        bench = self.bench
+        words = bench.failure or (f"{bench.opening} …" if bench.opening else "")
+        if bench.doing:
+            verb = {"fit": "Fitting", "add": "Adding", "diagnose": "Diagnosing"}[bench.doing.kind]
+            words = f"{verb} {bench.doing.effect}: {bench.progress}"
+        self.status.set_text(
+            words or bench.session.tree.file_name(bench.session.tree.current.number)
+        )
+        self.status.classes(replace="space bad" if bench.failure else "space")
+
+    def _draw_score(self) -> None:
+        session = self.bench.session
+        shown, exact = None, True
+        if session.robots and session.dragging:
+            shown, exact = session.score(self.bench.picked), False
+        elif known := session.tree.scores.get(session.tree.current.number):
+            shown, exact = known.fitted, known.exact
+        self.score.set_text(f"{'' if exact else '≈ '}{scored(shown)}")
+        self.score.classes(replace=tone(shown)).style("font-size: 19px; font-weight: 700")
+        self.undo.set_enabled(session.tree.can_undo)
+        self.redo.set_enabled(session.tree.can_redo)
+        self._draw_status()

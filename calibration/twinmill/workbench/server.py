@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Serves the workbench to browsers of this machine alone; its address holds a secret."""
+
+import asyncio
+import json
+import secrets
+import socket
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+
+from fastapi import Request
+from nicegui import app, ui
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.responses import PlainTextResponse, Response
+
+from twinmill.workbench.bench import Bench
+from twinmill.workbench.screen import Screen
+
+HOST = "127.0.0.1"
+STATIC = Path(__file__).parent / "static"
+TICK_S = 0.1
+TOLD_S = 1.0  # for a page to say why the server ends
+
+
+def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> None:
+    """Serves until Ctrl-C.
+
+    Args:
+        bench: what is shown.
+        port: 0 takes any that is free.
+        show: opens the user's browser.
+        say: told the address.
+
+    Raises:
+        ValueError: the port is taken, or the logs cannot be judged.
+    """
+    port = _free_port(port)
+    url = f"http://{HOST}:{port}/?token={bench.state.token}"
+    app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
+    app.add_static_files("/look", STATIC, max_cache_age=0)
+    _add_data(bench)
+    _add_page(bench)
+
+    async def begin() -> None:
+        say(url)
+        if show:
+            webbrowser.open(url)
+        tasks.append(asyncio.create_task(opened()))
+
+    async def opened() -> None:
+        try:
+            await bench.open()
+        except (ValueError, OSError) as error:
+            failed.append(error)
+            bench.failure = " ".join(str(error).split())
+            bench.changed("work")
+            await asyncio.sleep(TOLD_S)
+            app.shutdown()
+
+    tasks: list[asyncio.Task] = []
+    failed: list[Exception] = []
+    app.on_startup(begin)
+    app.timer(TICK_S, bench.tick)
+    app.on_shutdown(bench.close)
+    ui.run(
+        host=HOST,
+        port=port,
+        title="Twinmill",
+        favicon=STATIC / "icon.svg",
+        show=False,
+        reload=False,
+        tailwind=False,
+        show_welcome_message=False,
+        reconnect_timeout=10,
+    )
+    if failed:
+        raise failed[0]
+
+
+def _free_port(port: int) -> int:
+    """The port, or a free one for 0."""
+    with socket.socket() as tried:
+        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            tried.bind((HOST, port))
+        except OSError as error:
+            raise ValueError(
+                f"--port {port}: cannot be used ({error.strerror}); choose another, or leave it "
+                "out."
+            ) from error
+        return tried.getsockname()[1]
+
+
+def _add_page(bench: Bench) -> None:
+    @ui.page("/")
+    async def page(token: str = "") -> Response | None:
+        if not _right(bench, token):
+            return _refused()
+        await Screen(bench).build()
+        return None
+
+
+def _add_data(bench: Bench) -> None:
+    """Arrays for the browser, and what it tells of its view."""
+
+    def answer(token: str, make: Callable[..., bytes], *arguments: int) -> Response:
+        if not _right(bench, token):
+            return _refused()
+        try:
+            content = make(*arguments)
+        except IndexError:
+            return PlainTextResponse("There is no such log or robot.", status_code=404)
+        return Response(content, media_type="application/octet-stream")
+
+    @app.get("/data/log")
+    def log(log: int, token: str = "") -> Response:
+        return answer(token, bench.log_bytes, log)
+
+    @app.get("/data/robot")
+    def robot(index: int, token: str = "") -> Response:
+        return answer(token, bench.robot_bytes, index)
+
+    @app.get("/data/prediction")
+    def prediction(index: int, token: str = "") -> Response:
+        return answer(token, bench.prediction_bytes, index)
+
+    @app.post("/data/view")
+    async def view(request: Request, token: str = "") -> Response:
+        if not _right(bench, token):
+            return _refused()
+        known = ("t", "span", "ahead_s", "rate")
+        told = json.loads(await request.body())
+        bench.view.update({k: told[k] for k in known if k in told})
+        return Response(status_code=204)
+
+
+def _right(bench: Bench, token: str) -> bool:
+    return secrets.compare_digest(token.encode(), bench.state.token.encode())
+
+
+def _refused() -> Response:
+    return PlainTextResponse(
+        "The address lacks the session's token; take the whole address that twinmill printed.",
+        status_code=403,
+    )

@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A session at the workbench without any screen: logs, models tried, predictions, scores, findings.
+
+Opened in three stages, each slower than the one before: `read` gives the paths, `measure` what can
+be predicted, `judge` floors and scores.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.log import Log, RobotLog, read_log
+from twinmill.data.measurement import Measurements, load_measurements
+from twinmill.data.steady_table import is_sheet
+from twinmill.files import replacing
+from twinmill.fitting.opening import Opened, open_measurements
+from twinmill.model.model_file import ModelError, ModelFile
+from twinmill.model.parameters import CLOCK
+from twinmill.predict.datasets import total_score
+from twinmill.predict.regimes import HORIZON, Regime, where_it_fails
+from twinmill.workbench.drawing import Arrays, RobotView
+from twinmill.workbench.knobs import Knob, knobs
+from twinmill.workbench.tree import Score, Tree
+from twinmill.workbench.worker import Done, Work
+
+
+class Session:
+    """One model, at first as given, and all logs given.
+
+    Args:
+        logs: LCM logs.
+        model: name of the model file, here or among the installed models.
+
+    Attributes:
+        robots: views of the robots that can be predicted, in the order of `measurements`; empty
+            until the logs are judged.
+        held: names that a fit leaves alone.
+        diagnosis: as `diagnose --json` gives it, and of which model; None before.
+
+    Raises:
+        ModelError: no such model.
+    """
+
+    def __init__(self, logs: Sequence[Path], model: str) -> None:
+        for path in logs:
+            if is_sheet(path):
+                raise ModelError(
+                    f"{path}: is a steady-state table; the workbench shows logs. "
+                    "`twinmill compare` reads it."
+                )
+        self.paths = list(logs)
+        self.given = ModelFile.load(model)
+        self.tree = Tree(self.given, model)
+        self.logs: list[Log] = []
+        self.measurements = Measurements([], [], [])
+        self.robots: list[RobotView] = []
+        self.held: set[str] = set()
+        self.diagnosis: dict | None = None
+        self._dragged: dict[str, float] = {}
+        self._loaded: tuple[object, ModelFile] = (None, self.given)
+
+    # -- opening --------------------------------------------------------------------------------
+
+    def read(self) -> None:
+        """Reads the logs.
+
+        Raises:
+            LogError: one cannot be read.
+        """
+        self.logs = [read_log(path) for path in self.paths]
+
+    def measure(self) -> None:
+        """Cleans the robots' runs.
+
+        Raises:
+            LogError: no run can be judged.
+        """
+        self.measurements = load_measurements(self.paths, self.given.model)
+
+    def judge(self) -> None:
+        """Finds clocks and noise floors."""
+        opened = open_measurements(self.measurements, self.given)
+        self.robots = [RobotView(o) for o in opened]
+        exact = self.tree.current.number == 0
+        self._score_now(exact=exact)
+        if not exact:
+            self.tree.scores.setdefault(0, Score(self._total(opened), exact=True))
+
+    def raw(self, index: int) -> RobotLog:
+        """What was recorded of a robot that is predicted."""
+        of = self.measurements[index]
+        log = next(log for log in self.logs if log.sha256 == of.log_sha256)
+        return log.robots[of.track.robot_id]
+
+    @property
+    def notes(self) -> list[str]:
+        """What is wrong with the input, and what was left out."""
+        mild = [str(f) for f in self.measurements.findings if not f.fatal]
+        return [*self.measurements.excluded, *mild]
+
+    # -- the model shown ------------------------------------------------------------------------
+
+    @property
+    def model_file(self) -> ModelFile:
+        """Where the tree stands."""
+        number = self.tree.current.number
+        if self._loaded[0] != number:
+            self._loaded = (number, self.tree.model_file(number))
+        return self._loaded[1]
+
+    @property
+    def model(self) -> native.Model:
+        """The model shown: where the tree stands, and what a hand drags away from it."""
+        if not self._dragged:
+            return self.model_file.model
+        model = self.model_file.model.copy()
+        for name, value in self._dragged.items():
+            model.set(name, value)
+        return model
+
+    @property
+    def dragging(self) -> bool:
+        """Whether a hand holds a knob."""
+        return bool(self._dragged)
+
+    def knobs(self) -> list[Knob]:
+        """Of the model where the tree stands."""
+        tried = self.tree.current
+        told = self.tree.model_file(tried.parent) if tried.values else self.model_file
+        return knobs(self.model_file, told, [r.opened for r in self.robots if r.opened.data])
+
+    def drag(self, name: str, value: float) -> None:
+        """Moves a quantity, to be seen and not yet to be kept.
+
+        Raises:
+            ModelError: it has no such quantity, or the value is outside its bounds.
+        """
+        bounds = {v["name"]: v for v in self.model_file.model.values()}.get(name)
+        if bounds is None:
+            raise ModelError(f"{name}: is no quantity of this model.")
+        if not bounds["min"] <= value <= bounds["max"]:
+            raise ModelError(
+                f"{name} = {value:g}: must be within {bounds['min']:g} to {bounds['max']:g}."
+            )
+        self._dragged[name] = value
+
+    def keep(self) -> None:
+        """Makes what was dragged a model of its own."""
+        values = {n: v for n, v in self._dragged.items() if v != self.model_file.model.get(n)}
+        self._dragged = {}
+        if values:
+            self.tree.set(values)
+            self._score_now()
+
+    def set(self, name: str, value: float) -> None:
+        """Both at once."""
+        self.drag(name, value)
+        self.keep()
+
+    def undo(self) -> None:
+        """To the model before."""
+        self._dragged = {}
+        self.tree.undo()
+
+    def redo(self) -> None:
+        """Takes an undo back."""
+        self._dragged = {}
+        self.tree.redo()
+
+    def go(self, number: int) -> None:
+        """To any model tried."""
+        self._dragged = {}
+        self.tree.go(number)
+
+    def save(self, path: Path) -> list[str]:
+        """Writes the model file where the tree stands, whole or not at all.
+
+        Returns:
+            The commands that write the same file.
+
+        Raises:
+            ModelError: it is the model as given, is there already, or cannot be written.
+        """
+        if self.tree.current.number == 0:
+            raise ModelError(f"{self.tree.name}: is the model as given; there is nothing to save.")
+        commands, text = self.tree.written(self.tree.current.number, str(path))
+        with replacing(path, force=False) as temporary:
+            temporary.write_text(text)
+        return commands
+
+    # -- predictions and scores -----------------------------------------------------------------
+
+    def own_model(self, index: int, model: native.Model | None = None) -> native.Model:
+        """The model shown as it is of one robot, on its clock."""
+        return self.robots[index].opened.with_model(model or self.model).model
+
+    def clock_s(self, index: int) -> float:
+        """Capture's clock less the robot's."""
+        return self.robots[index].opened.model.get(CLOCK)
+
+    def predicted(self, index: int) -> Arrays:
+        """As `RobotView.predicted`, of the model shown."""
+        return self.robots[index].predicted(self.own_model(index))
+
+    def score(self, index: int) -> float:
+        """Of one robot with the model shown, on the clock of the model as given; NaN without."""
+        own = self.robots[index].opened
+        return float("nan") if own.data is None else own.data.score(self.own_model(index))
+
+    def regimes(self, index: int) -> list[Regime]:
+        """Where the model shown fails one robot; none without a floor."""
+        view, model = self.robots[index], self.own_model(index)
+        if view.opened.data is None:
+            return []
+        return where_it_fails(view.scene(model), view.windows, view.errors(model), view.floor)
+
+    def moments(self, index: int, group: str, regime: str) -> tuple[np.ndarray, float]:
+        """(K,) s, starts of the predictions in a regime, and that of the worst."""
+        view, model = self.robots[index], self.own_model(index)
+        inside = view.moments(model)[group, regime]
+        squares = np.mean((view.errors(model)[:, HORIZON] / view.floor[HORIZON]) ** 2, axis=1)
+        t_s = view.track.pose_t_s[view.windows.starts]
+        worst = np.argmax(np.where(inside & np.isfinite(squares), squares, -1.0))
+        return t_s[inside], float(t_s[worst])
+
+    def _total(self, opened: Sequence[Opened]) -> float:
+        known = [s for s in (o.score for o in opened) if np.isfinite(s)]
+        return total_score(known) if known else float("nan")
+
+    def _score_now(self, exact: bool = False) -> None:
+        """Of all robots where the tree stands, unless it is known."""
+        if not self.robots or self.tree.current.number in self.tree.scores:
+            return
+        total = self._total([r.opened.with_model(self.model) for r in self.robots])
+        fitted_here = self.model_file.fitted_on([m.log_sha256 for m in self.measurements])
+        heldout = None if fitted_here or self.tree.current.values else total
+        self.tree.scores[self.tree.current.number] = Score(total, heldout, exact)
+
+    # -- long work ------------------------------------------------------------------------------
+
+    def work(self, kind: str, effect: str = "") -> Work:
+        """What a worker is told to do with the model where the tree stands."""
+        number = self.tree.current.number
+        if kind in ("read", "diagnose", "compare"):
+            return Work(kind, self.tree.file_name(number), self.tree.tried[number].text, of=number)
+        names = {k.name for k in self.knobs() if k.fitted}
+        held = tuple(sorted(self.held & names))
+        holds = [word for name in held for word in ("--hold", name)]
+        words = (kind, *([effect] if effect else []), *holds, *map(str, self.paths))
+        command = self.tree.command_to_come(number, words)
+        name, text = self.tree.file_name(number), self.tree.tried[number].text
+        return Work(kind, name, text, command, effect, held, number, words)
+
+    def take(self, done: Done) -> None:
+        """Takes in what a worker did."""
+        work, result = done.work, done.result
+        if work.kind == "diagnose":
+            self.diagnosis = {**result, "of": work.of}
+        elif work.kind == "compare":
+            before = self.tree.scores.get(work.of)
+            heldout = before.heldout if before else None
+            self.tree.scores[work.of] = Score(result["score"], heldout, True)
+        else:
+            self._grow(work, result, done.text)
+
+    def _grow(self, work: Work, result: Mapping, text: str) -> None:
+        label = f"+ {work.effect}" if work.effect else "fitted"
+        made = self.tree.add(work.of, work.words, label, text)
+        self._dragged = {}
+        score = result.get("score_after")
+        if score is not None:
+            self.tree.scores[made.number] = Score(score, result.get("heldout_after"), True)
+
+    # -- state ----------------------------------------------------------------------------------
+
+    def to_json(self) -> dict:
+        """What must not be lost: models, what is held, findings."""
+        return {
+            "tree": self.tree.to_json(),
+            "held": sorted(self.held),
+            "diagnosis": self.diagnosis,
+            "model_sha256": self.given.hash,
+        }
+
+    def restore(self, data: Mapping) -> None:
+        """What `to_json` gave, of the same model."""
+        if data.get("model_sha256") == self.given.hash:
+            self.tree.restore(data["tree"])
+            self.held = set(data["held"])
+            self.diagnosis = data["diagnosis"]

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The file that a session survives in: a reload, a stopped server, a machine switched off."""
+
+import hashlib
+import json
+import os
+import secrets
+from pathlib import Path
+from typing import Any
+
+from twinmill.files import replacing
+
+
+def state_path(logs: list[Path], model: str) -> Path:
+    """Where a session of these logs and this model is kept, unless the user says."""
+    key = "\n".join([*(str(p.resolve()) for p in logs), model])
+    home = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local/share")
+    digest = hashlib.sha256(key.encode()).hexdigest()[:12]
+    return home / "twinmill" / "workbench" / f"{logs[0].stem}-{digest}.json"
+
+
+class StateFile:
+    """One JSON file, whole or not at all, for its owner alone.
+
+    Args:
+        path: of the file; its folder is made.
+
+    Raises:
+        ValueError: it holds something else, or cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._data = json.loads(path.read_text()) if path.exists() else {}
+        except OSError as error:
+            raise ValueError(
+                f"{path}: cannot be used ({error.strerror}); name another file with --state."
+            ) from error
+        except ValueError as error:
+            raise ValueError(
+                f"{path}: holds no session of the workbench; name another file with --state, or "
+                "remove it."
+            ) from error
+        if not isinstance(self._data, dict):
+            raise ValueError(f"{path}: holds no session of the workbench; remove it.")
+        self._data.setdefault("token", secrets.token_urlsafe(16))
+
+    @property
+    def token(self) -> str:
+        """Secret of the session's address; the same after the server was stopped."""
+        return self._data["token"]
+
+    def read(self, key: str, default: Any) -> Any:
+        """One entry as it was when the file was opened."""
+        return self._data.get(key, default)
+
+    def write(self, text: str) -> None:
+        """All entries anew, from a JSON object."""
+        with replacing(self.path, force=True) as temporary:
+            temporary.write_text(json.dumps({"token": self.token, **json.loads(text)}))
+        self.path.chmod(0o600)

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: Apache-2.0
+// Speeds, commands and errors over one time axis, with the cursor that all views share.
+
+import {
+  CURSOR, FLOOR, GRID, MARK, MEASURED, PREDICTED, SMALL, Sheet, WHEELS, WORDS, ticks, worded,
+} from "./look.js";
+import { rowAt } from "./packed.js";
+
+const LEFT_PX = 46;
+const RIGHT_PX = 10;
+const FOOT_PX = 18;
+const HEAD_PX = 17;
+const DEGREES = 180 / Math.PI;
+
+/** Rows of a robot: each a quantity with its lines (array, column, factor). */
+export function rowsOf(robot, prediction, band, ahead_s) {
+  const { speed, commands } = robot.arrays;
+  const pair = (column, factor) => {
+    const lines = [{ of: speed, column, factor, color: MEASURED, width: 2.2, alpha: 0.5, name: "measured" }];
+    if (prediction) {
+      const of = prediction.arrays.predicted_speed;
+      lines.push({ of, column, factor, color: PREDICTED, width: 1.3, alpha: 1, name: "predicted" });
+    }
+    return lines;
+  };
+  const names = robot.command_names;
+  const rows = [
+    { title: "forward", unit: "m/s", least: 0.1, lines: pair(1, 1) },
+    { title: "left", unit: "m/s", least: 0.1, lines: pair(2, 1) },
+    { title: "turn", unit: "°/s", least: 10, lines: pair(3, DEGREES) },
+    {
+      title: "commands",
+      unit: robot.command_unit,
+      least: 0.1,
+      lines: names.map((name, k) => (
+        { of: commands, column: k + 1, factor: 1, color: WHEELS[k], width: 1.5, alpha: 0.85, name, held: true, shift: robot.clock_s }
+      )),
+    },
+  ];
+  if (prediction) {
+    const far = ahead_s > 1 ? 3 : 1;
+    const of = prediction.arrays.errors;
+    const [forward, left, heading] = band;
+    rows.push({
+      title: `position error, ${ahead_s} s ahead`, unit: "mm", least: 1,
+      lines: [{ of, column: far, factor: 1000, color: PREDICTED, width: 1.3, alpha: 1, name: "error", dots: true }],
+      limits: [1000 * Math.hypot(forward, left)], from: 0,
+    });
+    rows.push({
+      title: `heading error, ${ahead_s} s ahead`, unit: "°", least: 0.5,
+      lines: [{ of, column: far + 1, factor: DEGREES, color: PREDICTED, width: 1.3, alpha: 1, name: "error", dots: true }],
+      limits: [heading * DEGREES, -heading * DEGREES],
+    });
+  }
+  return rows;
+}
+
+export class Series {
+  constructor(canvas, stage) {
+    this.sheet = new Sheet(canvas);
+    this.stage = stage;
+    this.rows = [];
+    this._listen(canvas);
+  }
+
+  x(t) {
+    const [a, b] = this.stage.span;
+    return LEFT_PX + ((t - a) / (b - a)) * (this.sheet.width - LEFT_PX - RIGHT_PX);
+  }
+
+  t(x) {
+    const [a, b] = this.stage.span;
+    return a + ((x - LEFT_PX) / (this.sheet.width - LEFT_PX - RIGHT_PX)) * (b - a);
+  }
+
+  // -- what stays -------------------------------------------------------------------------------
+
+  drawStill() {
+    this.sheet.fit();
+    if (!this.sheet.width) return;
+    const g = this.sheet.base();
+    const height = (this.sheet.height - FOOT_PX) / Math.max(this.rows.length, 1);
+    this.rows.forEach((row, i) => {
+      row.top = i * height + HEAD_PX;
+      row.foot = (i + 1) * height - 5;
+      this._scale(row);
+      this._frame(g, row);
+      g.save();
+      g.beginPath();
+      g.rect(LEFT_PX, row.top - 1, this.sheet.width - LEFT_PX - RIGHT_PX, row.foot - row.top + 2);
+      g.clip();
+      this._marks(g, row);
+      this._limits(g, row);
+      for (const line of row.lines) this._line(g, row, line);
+      g.restore();
+    });
+    this._times(g);
+  }
+
+  /** From what is seen, with a little room; a few wild values do not flatten the rest. */
+  _scale(row) {
+    const [a, b] = this.stage.span;
+    const seen = [];
+    for (const { of, column, factor, shift = 0 } of row.lines) {
+      const first = Math.max(rowAt(of, a - shift), 0);
+      const last = rowAt(of, b - shift);
+      const every = Math.max(1, Math.floor((last - first) / 2000));
+      for (let k = first; k <= last; k += every) {
+        const v = of.data[k * of.width + column] * factor;
+        if (!Number.isNaN(v)) seen.push(v);
+      }
+    }
+    seen.sort((x, y) => x - y);
+    let low = seen[Math.floor(0.002 * seen.length)] ?? 0;
+    let high = seen[Math.ceil(0.998 * seen.length) - 1] ?? 1;
+    for (const limit of row.limits ?? []) {
+      if (Number.isNaN(limit)) continue;
+      low = Math.min(low, limit);
+      high = Math.max(high, limit);
+    }
+    if (row.from !== undefined) low = row.from;
+    const lacking = row.least - (high - low);
+    if (lacking > 0) {
+      high += lacking / 2;
+      low -= row.from === undefined ? lacking / 2 : 0;
+    }
+    const room = 0.06 * (high - low);
+    row.high = high + room;
+    row.low = row.from === undefined ? low - room : low;
+  }
+
+  _y(row, v) {
+    return row.foot - ((v - row.low) / (row.high - row.low)) * (row.foot - row.top);
+  }
+
+  _frame(g, row) {
+    const marks = ticks(row.low, row.high, Math.max(3, (row.foot - row.top) / 24));
+    g.font = SMALL;
+    g.lineWidth = 1;
+    g.textAlign = "right";
+    g.textBaseline = "middle";
+    for (const v of marks.at) {
+      const y = Math.round(this._y(row, v)) + 0.5;
+      g.strokeStyle = Math.abs(v) < 1e-9 ? "#c3cdd2" : GRID;
+      g.beginPath();
+      g.moveTo(LEFT_PX, y);
+      g.lineTo(this.sheet.width - RIGHT_PX, y);
+      g.stroke();
+      g.fillStyle = WORDS;
+      g.fillText(worded(v, marks.step), LEFT_PX - 5, y);
+    }
+    g.textAlign = "left";
+    g.textBaseline = "bottom";
+    g.fillStyle = "#26343b";
+    g.font = `600 ${SMALL}`;
+    g.fillText(row.title, LEFT_PX, row.top - 3);
+    const wide = g.measureText(row.title).width;
+    g.font = SMALL;
+    g.fillStyle = WORDS;
+    g.fillText(row.unit, LEFT_PX + wide + 6, row.top - 3);
+    row.words_px = LEFT_PX + wide + g.measureText(row.unit).width + 20;
+  }
+
+  _times(g) {
+    const [a, b] = this.stage.span;
+    const marks = ticks(a, b, this.sheet.width / 80);
+    g.font = SMALL;
+    g.fillStyle = WORDS;
+    g.textBaseline = "bottom";
+    g.textAlign = "center";
+    for (const t of marks.at) g.fillText(`${worded(t, marks.step)} s`, this.x(t), this.sheet.height - 2);
+  }
+
+  _marks(g, row) {
+    g.fillStyle = MARK;
+    g.globalAlpha = 0.3;
+    for (const t of this.stage.marks) {
+      g.fillRect(this.x(t), row.top, Math.max(this.x(t + 0.5) - this.x(t), 1.5), row.foot - row.top);
+    }
+    g.globalAlpha = 1;
+  }
+
+  /** What 95 % of the errors of a right model keep to. */
+  _limits(g, row) {
+    const limits = (row.limits ?? []).filter((v) => !Number.isNaN(v));
+    if (!limits.length) return;
+    const low = limits.length > 1 ? Math.min(...limits) : row.low;
+    const [y0, y1] = [this._y(row, Math.max(...limits)), this._y(row, low)];
+    g.fillStyle = FLOOR;
+    g.globalAlpha = 0.16;
+    g.fillRect(LEFT_PX, y0, this.sheet.width, y1 - y0);
+    g.globalAlpha = 1;
+  }
+
+  _line(g, row, { of, column, factor, color, width, alpha, held, shift = 0 }) {
+    const [a, b] = this.stage.span;
+    const first = Math.max(rowAt(of, a - shift) - 1, 0);
+    const last = Math.min(rowAt(of, b - shift) + 1, of.rows - 1);
+    g.globalAlpha = alpha;
+    g.strokeStyle = color;
+    g.lineWidth = width;
+    g.lineJoin = "round";
+    g.beginPath();
+    let broken = true;
+    let before = 0;
+    for (let k = first; k <= last; k++) {
+      const v = of.data[k * of.width + column] * factor;
+      if (Number.isNaN(v)) {
+        broken = true;
+        continue;
+      }
+      const [x, y] = [this.x(of.data[k * of.width] + shift), this._y(row, v)];
+      if (broken) g.moveTo(x, y);
+      else {
+        if (held) g.lineTo(x, before);
+        g.lineTo(x, y);
+      }
+      before = y;
+      broken = false;
+    }
+    g.stroke();
+    g.globalAlpha = 1;
+  }
+
+  // -- what moves -------------------------------------------------------------------------------
+
+  draw() {
+    if (!this.sheet.width) return;
+    const g = this.sheet.top();
+    const { t } = this.stage;
+    const x = this.x(t);
+    if (x >= LEFT_PX && x <= this.sheet.width - RIGHT_PX) {
+      const ahead = Math.min(this.x(t + this.stage.ahead_s), this.sheet.width - RIGHT_PX);
+      g.fillStyle = CURSOR;
+      g.globalAlpha = 0.07;
+      g.fillRect(x, 0, ahead - x, this.sheet.height - FOOT_PX);
+      g.globalAlpha = 1;
+      g.fillRect(x - 0.75, 0, 1.5, this.sheet.height - FOOT_PX);
+    }
+    g.font = SMALL;
+    g.textBaseline = "bottom";
+    for (const row of this.rows) this._read(g, row, t);
+  }
+
+  /** Values at the cursor, beside the row's title. */
+  _read(g, row, t) {
+    let at = row.words_px;
+    for (const { of, column, factor, color, name, shift = 0 } of row.lines) {
+      const k = rowAt(of, t - shift);
+      const v = k < 0 ? NaN : of.data[k * of.width + column] * factor;
+      const words = `${name} ${Number.isNaN(v) ? "–" : worded(v, row.least / 10)}`;
+      g.fillStyle = color;
+      g.textAlign = "left";
+      g.fillText(words, at, row.top - 3);
+      at += g.measureText(words).width + 12;
+    }
+  }
+
+  // -- hands ------------------------------------------------------------------------------------
+
+  _listen(canvas) {
+    let held = null;
+    canvas.addEventListener("pointerdown", (e) => {
+      held = { x: e.offsetX, span: [...this.stage.span], pan: e.shiftKey || e.button === 1 };
+      canvas.setPointerCapture(e.pointerId);
+      if (!held.pan) this.stage.seek(this.t(e.offsetX));
+    });
+    canvas.addEventListener("pointermove", (e) => {
+      if (!held) return;
+      if (!held.pan) return this.stage.seek(this.t(e.offsetX));
+      const [a, b] = held.span;
+      const dt = ((e.offsetX - held.x) / (this.sheet.width - LEFT_PX - RIGHT_PX)) * (b - a);
+      this.stage.look(a - dt, b - dt);
+    });
+    canvas.addEventListener("pointerup", () => {
+      held = null;
+    });
+    canvas.addEventListener("dblclick", () => this.stage.look(0, this.stage.end_s));
+    canvas.addEventListener("wheel", (e) => {
+      e.preventDefault();
+      const [a, b] = this.stage.span;
+      if (Math.abs(e.deltaX) > Math.abs(e.deltaY)) {
+        const dt = (e.deltaX / this.sheet.width) * (b - a);
+        return this.stage.look(a + dt, b + dt);
+      }
+      const factor = Math.exp(e.deltaY / 400);
+      const t = this.t(e.offsetX);
+      this.stage.look(t - (t - a) * factor, t + (b - t) * factor);
+    }, { passive: false });
+  }
+}

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers and their tones as the panels say them."""
+
+import math
+
+from twinmill.fitting.compare import GOOD, MISSING
+from twinmill.report.tables import number
+
+
+def scored(score: float | None) -> str:
+    """A score, or a dash."""
+    return number(score)
+
+
+def tone(score: float | None) -> str:
+    """CSS class of a score."""
+    if score is None or not math.isfinite(score):
+        return "soft"
+    return "good" if score <= GOOD else "warn" if score <= MISSING else "bad"
+
+
+def estimate(entry: dict) -> str:
+    """A parameter as --json gives it: `deceleration 0.7 ± 0.02 m/s²`."""
+    name = entry["name"].split(".", 1)[-1]
+    unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
+    spread = f" ± {entry['std']:.1g}" if entry["std"] is not None else ""
+    return f"{name} {entry['value']:.3g}{spread}{unit}"

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Long work in a process of its own: fits and diagnoses as the commands do them; can be stopped.
+
+The process keeps the logs that it read. To cancel is to end it; the next work starts another.
+"""
+
+import multiprocessing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import monotonic
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Work:
+    """What is to be done.
+
+    Attributes:
+        kind: read, compare, fit, add or diagnose; each reads the logs if that was not done.
+        model, text: name and text of the model file.
+        command: recorded in the file that is made.
+        effect: that is added.
+        held: names that a fit leaves alone.
+        of: number of the model in the tree.
+        words: of the command, without models.
+    """
+
+    kind: str
+    model: str
+    text: str
+    command: str = ""
+    effect: str = ""
+    held: tuple[str, ...] = ()
+    of: int = 0
+    words: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Done:
+    """What came of it: `result` as the command's --json, `text` of the new model; or `failure`."""
+
+    work: Work
+    result: Mapping[str, Any]
+    text: str = ""
+    failure: str = ""
+
+
+class Worker:
+    """Does one work at a time.
+
+    Args:
+        logs: what all work is about.
+    """
+
+    def __init__(self, logs: list[Path]) -> None:
+        self._logs = logs
+        self._process: multiprocessing.process.BaseProcess | None = None
+        self._pipe: Connection | None = None
+        self.work: Work | None = None
+        self.words = ""
+        self._since_s = 0.0
+
+    @property
+    def busy(self) -> bool:
+        """Whether there is work under way."""
+        return self.work is not None
+
+    @property
+    def for_s(self) -> float:
+        """How long it has been."""
+        return monotonic() - self._since_s if self.busy else 0.0
+
+    def start(self, work: Work) -> None:
+        """Begins; what is under way is cancelled."""
+        if self.busy:
+            self.cancel()
+        if self._process is None or not self._process.is_alive():
+            context = multiprocessing.get_context("spawn")
+            self._pipe, other = context.Pipe()
+            self._process = context.Process(target=_serve, args=(other, self._logs), daemon=True)
+            self._process.start()
+            other.close()
+        self.work, self.words, self._since_s = work, "reading the logs", monotonic()
+        self._pipe.send(work)
+
+    def poll(self) -> Done | None:
+        """What is done by now; None while it goes on."""
+        if not self.busy:
+            return None
+        try:
+            while self._pipe.poll():
+                message = self._pipe.recv()
+                if isinstance(message, Done):
+                    self.work = None
+                    return message
+                self.words = message
+        except (EOFError, OSError):
+            work, self.work = self.work, None
+            return Done(work, {}, failure="The work ended without an answer; try again.")
+        return None
+
+    def cancel(self) -> None:
+        """Ends the process, and what it does."""
+        self.work = None
+        if self._process is not None:
+            self._process.terminate()
+            self._process.join()
+            self._pipe.close()
+            self._process = None
+
+
+def _serve(pipe: Connection, logs: list[Path]) -> None:
+    """Until the other end is closed."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the server's
+    measurements: dict = {}
+    while True:
+        try:
+            work = pipe.recv()
+        except EOFError:
+            return
+        try:
+            pipe.send(perform(work, logs, measurements, pipe.send))
+        except (ValueError, OSError) as error:
+            pipe.send(Done(work, {}, failure=" ".join(str(error).split())))
+
+
+def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None]) -> Done:
+    """One work, by the same functions as the commands.
+
+    Args:
+        work: what is to be done.
+        logs: what it is about.
+        known: what was read before; filled where that was not done.
+        say: told in words what is being done.
+
+    Raises:
+        ValueError: it cannot be done, in one sentence.
+    """
+    import twinmill_native as native
+
+    from twinmill.data.measurement import load_measurements
+    from twinmill.diagnosis.detections.add import add_to_camera, is_of_camera
+    from twinmill.diagnosis.diagnose import diagnose
+    from twinmill.files import plain
+    from twinmill.fitting.add import add
+    from twinmill.fitting.compare import compare
+    from twinmill.fitting.fit import fit
+    from twinmill.model.model_file import ModelFile
+
+    model = native.Model.from_toml(work.text, work.model)
+    model_file = ModelFile(Path(work.model), work.text, model)
+    if "all" not in known:
+        known["all"] = load_measurements(logs, model)
+    measurements = known["all"]
+    if work.kind == "read":
+        return Done(work, {})
+    if work.kind == "diagnose":
+        return Done(work, plain(diagnose(measurements, model_file, say).to_json()))
+    if work.kind == "compare":
+        say("comparing")
+        return Done(work, plain(compare(measurements, model_file).to_json()))
+    with TemporaryDirectory(prefix="twinmill-") as folder:
+        out = Path(folder) / "made.toml"
+        say(f"adding {work.effect}" if work.effect else "fitting")
+        if work.kind == "add" and is_of_camera(work.effect):
+            result = add_to_camera(work.effect, measurements, model_file, out, work.command)
+        elif work.kind == "add":
+            result = add(work.effect, measurements, model_file, out, work.command, held=work.held)
+        else:
+            result = fit(measurements, model_file, out, work.command, held=work.held)
+        return Done(work, plain(result.to_json()), out.read_text())

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The session without a screen says what the commands say, and makes the same files."""
+
+import os
+import shlex
+import shutil
+
+import numpy as np
+import pytest
+
+from twinmill.data.log import LogError
+from twinmill.model.model_file import ModelError
+from twinmill.workbench.session import Session
+from twinmill.workbench.worker import perform
+from twinmill_cli import main as cli
+
+
+@pytest.fixture(scope="module")
+def opened(brief_coasting_robot, tmp_path_factory):
+    """A session in a folder with log and model; tests leave it where the model as given stands."""
+    folder, before = tmp_path_factory.mktemp("session"), os.getcwd()
+    shutil.copy(brief_coasting_robot.log, folder / "run.lcmlog")
+    shutil.copy(brief_coasting_robot.model, folder / "model.toml")
+    os.chdir(folder)
+    session = Session([type(folder)("run.lcmlog")], "model.toml")
+    session.read()
+    session.measure()
+    session.judge()
+    yield session
+    os.chdir(before)
+
+
+@pytest.fixture(scope="module")
+def compared(opened):
+    return cli.run(["compare", "run.lcmlog", "--model", "model.toml"])
+
+
+@pytest.fixture
+def session(opened):
+    yield opened
+    opened.go(0)
+
+
+def test_the_score_is_that_of_compare(session, compared):
+    assert session.tree.scores[0].fitted == pytest.approx(compared.score, rel=1e-9)
+    assert session.score(0) == pytest.approx(compared.score, rel=1e-9)
+
+
+def test_regimes_are_those_of_compare_and_their_moments_lie_in_the_log(session, compared):
+    mine, theirs = session.regimes(0), compared.main.where
+    assert [(r.group, r.regime, r.windows) for r in mine] == [
+        (r.group, r.regime, r.windows) for r in theirs
+    ]
+    assert [r.ratio for r in mine] == pytest.approx([r.ratio for r in theirs], rel=1e-9)
+    times, worst = session.moments(0, mine[0].group, mine[0].regime)
+    assert worst in times
+    assert len(times) >= mine[0].windows
+
+
+def test_predictions_follow_a_knob_and_come_back(session):
+    before = session.predicted(0)["ahead"]
+    session.drag("base.forward_gain", 1.2)
+    turned = session.predicted(0)["ahead"]
+    assert np.nanmax(np.abs(turned - before)) > 0.05  # 20 % of 0.36 m/s for two seconds
+    session.keep()
+    assert session.tree.scores[session.tree.current.number].fitted > session.tree.scores[0].fitted
+    session.undo()
+    np.testing.assert_array_equal(session.predicted(0)["ahead"], before)
+
+
+def test_errors_drawn_are_measured_less_predicted(session, compared):
+    drawn = session.predicted(0)["errors"]
+    rows = compared.main.errors[:, 2]  # half a second ahead
+    np.testing.assert_allclose(drawn[:, 1], np.hypot(rows[:, 0], rows[:, 1]), rtol=1e-6)
+    np.testing.assert_allclose(drawn[:, 2], rows[:, 2], rtol=1e-6)
+
+
+def test_a_saved_model_is_the_file_that_the_commands_write(session, tmp_path):
+    session.set("base.yaw_gain", 0.97)
+    session.held = {"base.sideways_gain"}
+    done = perform(session.work("add", "coasting"), session.paths, {}, print)
+    session.take(done)
+    scores = session.tree.scores[session.tree.current.number]
+    assert scores.fitted < 1.15 < session.tree.scores[0].fitted  # as good as the log can tell
+    commands = session.save(type(tmp_path)("mine.toml"))
+    mine = (session.paths[0].resolve().parent / "mine.toml").read_bytes()
+    os.remove("mine.toml")
+    results = [cli.run(shlex.split(command)[1:]) for command in commands]
+    assert mine == (session.paths[0].resolve().parent / "mine.toml").read_bytes()
+    assert scores.fitted == pytest.approx(results[-1].after.score, rel=1e-9)
+    assert scores.heldout == pytest.approx(results[-1].heldout_after.score, rel=1e-9)
+
+
+def test_a_session_goes_on_where_it_was_left(session):
+    session.set("base.motor_lag_s", 0.08)
+    other = Session(session.paths, "model.toml")
+    other.restore(session.to_json())
+    assert other.model_file.text == session.model_file.text
+    assert other.tree.can_undo
+
+
+def test_the_model_as_given_is_not_saved_again(session):
+    with pytest.raises(ModelError, match="as given"):
+        session.save(type(session.paths[0])("copy.toml"))
+
+
+def test_a_log_that_is_not_there_is_one_sentence(session):
+    with pytest.raises(LogError, match="cannot be read"):
+        Session([type(session.paths[0])("none.lcmlog")], "model.toml").read()
