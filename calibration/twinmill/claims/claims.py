@@ -8,8 +8,9 @@ import numpy as np
 from scipy.stats import mannwhitneyu
 
 from twinmill.claims import figures
+from twinmill.claims.published import Points
 from twinmill.claims.rows import Claim, Row, length, mean, median, share
-from twinmill.claims.swarms import KINDS, Runs, run
+from twinmill.claims.swarms import KINDS, ROUND, Runs, run
 
 V_MPS = (0.10, 0.15, 0.20, 0.25, 0.30, 0.35)
 RING_RANGE = 2.534  # mean range of six standard normal numbers (Tippett 1925)
@@ -23,6 +24,11 @@ MILLING = {
     ("disc", 0.04): (0.978, 1000, 1.06),
     ("robot", 0.0): (0.967, 1000, 0.363),
     ("robot", 0.04): (0.897, 1000, 0.359),
+}
+# The published equations and nothing else: exact arcs or not, and the reference with its seeds.
+EQUATIONS = {
+    "Euler, as published": (False, 0.929, 1000),
+    "exact arcs": (True, 0.83, 100),
 }
 DIFFUSING = {  # kind, spread: share with delta > 1 at 30, 60 and 120 s
     ("point", 0.0): (0.98, 1.0, 1.0),
@@ -73,6 +79,13 @@ def milling(seeds: int) -> Claim:
             rows.append(length(f"radius: {_kind(kind, spread)}", radii_m, radius_m))
         if spread:
             rings[kind] = runs
+    steps = {}
+    for step, (exact, percent, reference_seeds) in EQUATIONS.items():
+        hits = Points(exact=exact).run(seeds, seed=1).circliness < ROUND
+        what = f"mill: point, {step}, in NumPy"
+        steps[step] = share(what, hits, percent, reference_seeds)
+    rows += steps.values()
+    euler, arcs = (_percent(row) for row in steps.values())
     best = next(row for row in rows if row.by == {"kind": "disc", "spread": 0.04})
     return Claim(
         "milling",
@@ -80,7 +93,9 @@ def milling(seeds: int) -> Claim:
         "Six robots with speed 0.25 m/s, turning at 45 deg/s to one side for nothing seen and to "
         "the other for seen, end on one circle: circliness below 0.2.",
         f"{_percent(best)} of runs, if any part of the neighbour's body is seen. If only its "
-        "centre counts, as the text has it, the circle holds just as long as all robots are alike.",
+        "centre counts, as the text has it, the circle holds just as long as all robots are alike, "
+        f"and the step of the simulation is an effect of its own: {euler} by forward Euler, as "
+        f"published, and {arcs} along exact arcs.",
         rows,
         [figures.shares(rows), figures.paths({f"{k}, spread 0.04": r for k, r in rings.items()})],
     )
