@@ -113,6 +113,16 @@ COMMANDS = (
         "Draw what becomes of the swarm over a sweep's grid, and where to experiment next.",
     ),
     (
+        "predict-floor",
+        "predict_floor",
+        "Choose a sweep's cells that tell most, plan their runs, and seal what is predicted.",
+    ),
+    (
+        "score-floor",
+        "score_floor",
+        "Unseal a prediction and score it by what came of the runs.",
+    ),
+    (
         "matters",
         "matters",
         "Tell which effects and numbers of a model matter for what the swarm does.",

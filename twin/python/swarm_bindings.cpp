@@ -168,13 +168,15 @@ std::vector<std::string> ClassifyAll(Matrix rows)
 
 void BindSwarms(nb::module_ &m)
 {
-    nb::list names;
+    nb::list names, outcomes;
     for (const char *name : kMetricNames)
+    {
         names.append(name);
-    m.attr("METRICS") = names;
-    nb::list outcomes(names);
+        outcomes.append(name);
+    }
     for (const char *name : {"least_diffusion", "settled_s"})
         outcomes.append(name);
+    m.attr("METRICS") = names;
     m.attr("OUTCOMES") = outcomes;
     m.def("species", &Species, "text"_a, "n"_a = nb::none(), "own"_a = NamedTables(),
           "Per robot the behaviour's name and (unseen speed, turn, seen speed, turn) inputs, turn "

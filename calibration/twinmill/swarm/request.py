@@ -108,10 +108,21 @@ class Request:
         Raises:
             ValueError: a value is out of bounds.
         """
-        model, at = self.model, dict(zip((a.name for a in self.axes), point, strict=True))
+        at = self._at(point)
+        tables, ring = self.species(int(at["n"]) if "n" in at else self.n)
+        spread_m = at.get("spread_m", self.spread_m)
+        return native.Cell(self.cell_model(point), tables, ring, self.start, spread_m)
+
+    def cell_model(self, point: tuple[float, ...]) -> native.Model:
+        """The model at these axis values.
+
+        Raises:
+            ValueError: a value is out of bounds.
+        """
+        model, at = self.model, self._at(point)
         if self.target_radius_m is not None:
             model.set("sensor.target_radius_m", self.target_radius_m)
-        tables, ring = self.species(int(at["n"]) if "n" in at else self.n)
+        tables, _ = self.species(int(at["n"]) if "n" in at else self.n)
         omega_degps = at.get("omega_degps")
         omega = None if omega_degps is None else math.radians(omega_degps)
         set_speeds(model, tables[0], at.get("v_mps"), omega)
@@ -120,11 +131,14 @@ class Request:
                 model.set(name, value)
             elif setter := QUANTITIES[name].set:
                 setter(model, value)
-        return native.Cell(model, tables, ring, self.start, at.get("spread_m", self.spread_m))
+        return model
+
+    def _at(self, point: tuple[float, ...]) -> dict[str, float]:
+        return dict(zip((a.name for a in self.axes), point, strict=True))
 
     def robots(self, point: tuple[float, ...]) -> int:
         """How many there are in a cell."""
-        at = dict(zip((a.name for a in self.axes), point, strict=True))
+        at = self._at(point)
         return len(self.species(int(at["n"]) if "n" in at else self.n)[0])
 
     def steps(self, model: native.Model) -> float:

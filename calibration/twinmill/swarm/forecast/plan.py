@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The laboratory's plan, and the sealed file of probabilities that goes with it."""
+
+import csv
+import gzip
+import hashlib
+import io
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.log import read_log
+from twinmill.model.model_file import write_whole
+from twinmill.swarm.forecast.draws import OUTCOMES, Forecast
+from twinmill.swarm.metrics import swarm_metrics
+from twinmill.swarm.request import Request
+
+SEALED, PLAN, FORM, STARTS, MODEL = (
+    "probabilities.sealed",
+    "plan.md",
+    "outcomes.csv",
+    "starts.csv",
+    "model.toml",
+)
+DIGITS = 6
+CLASSES = """\
+| class | mean over the last 10 s |
+|---|---|
+| milling | circliness below 0.2, turning together (rotation beyond 0.9), bodies apart |
+| jammed | circliness below 0.2, but not so |
+| ellipsoidal | circliness 0.2 to 1 |
+| cluster | circliness above 1, all in one group (closer than the view range) |
+| separated | circliness above 1, several groups |
+"""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is predicted, of which runs.
+
+    Attributes:
+        request: of the sweep.
+        cells: numbers of the chosen cells in the sweep.
+        expected: of the chosen cells.
+        bits: information of the outcomes of all cells up to each.
+        repeats: runs of each cell.
+        order: (R,) place in `cells` of each run, as they are to be made.
+        seed: of the order and the starts.
+    """
+
+    request: Request
+    cells: list[int]
+    expected: Forecast
+    bits: list[float]
+    repeats: int
+    order: list[int]
+    seed: int
+
+    @property
+    def names(self) -> list[str]:
+        """Of the axes."""
+        return [axis.name for axis in self.request.axes]
+
+    def to_bytes(self) -> bytes:
+        """The sealed file: the same plan gives the same bytes."""
+        data = {
+            "request": json.loads(self.request.to_json()),
+            "cells": self.cells,
+            "outcomes": OUTCOMES,
+            "points": self.expected.points.tolist(),
+            "swept": self.expected.swept.round(DIGITS).tolist(),
+            "draws": self.expected.draws.round(DIGITS).tolist(),
+            "bits": self.bits,
+            "repeats": self.repeats,
+            "order": self.order,
+            "seed": self.seed,
+        }
+        text = json.dumps(data, sort_keys=True, allow_nan=False)
+        return gzip.compress(text.encode(), mtime=0)
+
+    @classmethod
+    def from_bytes(cls, sealed: bytes) -> "Plan":
+        """The inverse.
+
+        Raises:
+            ValueError: it is no sealed file, as the end of a sentence.
+        """
+        try:
+            data = json.loads(gzip.decompress(sealed))
+            points, swept, draws = (np.array(data[k]) for k in ("points", "swept", "draws"))
+            request = Request.from_json(json.dumps(data["request"]))
+        except (OSError, EOFError, ValueError, KeyError) as error:
+            raise ValueError("is no file of sealed probabilities, or not a whole one.") from error
+        rest = {k: data[k] for k in ("cells", "bits", "repeats", "order", "seed")}
+        return cls(request=request, expected=Forecast(points, swept, draws), **rest)
+
+
+def in_random_order(cells: int, repeats: int, seed: int) -> list[int]:
+    """Cells of all runs: what drifts from run to run falls on all cells alike."""
+    return np.random.default_rng(seed).permutation(np.repeat(np.arange(cells), repeats)).tolist()
+
+
+def write_plan(plan: Plan, folder: Path) -> str:
+    """Writes all files of a plan.
+
+    Returns:
+        SHA-256 of the sealed one.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    sealed = plan.to_bytes()
+    digest = hashlib.sha256(sealed).hexdigest()
+    fresh = folder / f"{SEALED}.tmp"
+    fresh.write_bytes(sealed)
+    os.replace(fresh, folder / SEALED)
+    write_whole(folder / MODEL, plan.request.model_text)
+    write_whole(folder / STARTS, _starts(plan))
+    write_whole(folder / FORM, _form(plan))
+    write_whole(folder / PLAN, _text(plan, digest, folder))
+    return digest
+
+
+def read_plan(folder: Path, digest: str | None) -> tuple[Plan, str]:
+    """The plan, if its sealed file is the one that was sealed.
+
+    Args:
+        folder: of the plan.
+        digest: SHA-256 as it was published; None: as plan.md has it.
+
+    Returns:
+        The plan and the hash of its file.
+
+    Raises:
+        ValueError: it is another, or none.
+    """
+    path = folder / SEALED
+    if not path.exists():
+        raise ValueError(f"{folder}: holds no {SEALED}; make a plan with twinmill predict-floor.")
+    sealed = path.read_bytes()
+    found = hashlib.sha256(sealed).hexdigest()
+    text = (folder / PLAN).read_text() if (folder / PLAN).exists() else ""
+    if (digest or found) != found or (digest is None and found not in text):
+        said = f"{digest}" if digest else f"the one in {folder / PLAN}"
+        raise ValueError(
+            f"{path}: its SHA-256 is {found}, not {said}: the probabilities were changed after "
+            "they were sealed, or belong to another plan; nothing is scored."
+        )
+    try:
+        return Plan.from_bytes(sealed), found
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+
+
+def read_outcomes(path: Path, plan: Plan) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Outcomes of runs, as classes or as logs.
+
+    Returns:
+        (R,) cells, (R,) places in OUTCOMES, and numbers of runs that have no outcome.
+
+    Raises:
+        ValueError: in one sentence, with the line.
+    """
+    with open(path, newline="", encoding="utf-8-sig") as file:
+        reader = csv.DictReader(file)
+        names = set(reader.fieldnames or [])
+        if "run" not in names or not names & {"class", "log"}:
+            raise ValueError(
+                f"{path}: has no column 'run', or neither 'class' nor 'log'; fill in {FORM}."
+            )
+        seen: dict[int, int] = {}
+        for row in reader:
+            try:
+                number = _run_number(row["run"], plan, seen)
+                if (ended := _outcome(row, path, plan, plan.order[number - 1])) is not None:
+                    seen[number] = ended
+            except ValueError as error:
+                raise ValueError(f"{path}, line {reader.line_num}: {error}") from None
+    if not seen:
+        raise ValueError(f"{path}: no run has a class or a log.")
+    missing = [k for k in range(1, len(plan.order) + 1) if k not in seen]
+    numbers = sorted(seen)
+    cells = np.array([plan.order[k - 1] for k in numbers])
+    return cells, np.array([seen[k] for k in numbers]), missing
+
+
+def _run_number(text: str | None, plan: Plan, seen: dict[int, int]) -> int:
+    most = len(plan.order)
+    if not (text or "").strip().isdigit() or not 1 <= int(text or "") <= most:
+        raise ValueError(f"run '{text}' is none of the plan's, 1 to {most}.")
+    if int(text or "") in seen:
+        raise ValueError(f"run {text} is there twice.")
+    return int(text or "")
+
+
+def _outcome(row: dict, path: Path, plan: Plan, cell: int) -> int | None:
+    name, log = (row.get("class") or "").strip(), (row.get("log") or "").strip()
+    if log and not name:
+        point = plan.expected.points[cell]
+        model = plan.request.cell_model(tuple(point))
+        scale = model.get("sensor.range_m"), model.get("robot.body_radius_m")
+        name = swarm_metrics(read_log(path.parent / log), *scale).final
+    if not name:
+        return None
+    if name not in OUTCOMES:
+        raise ValueError(f"'{name}' is no class; the classes are {', '.join(OUTCOMES)}.")
+    return OUTCOMES.index(name)
+
+
+def _form(plan: Plan) -> str:
+    """To be filled in."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["run", *plan.names, "class", "log", "note"])
+    for number, cell in enumerate(plan.order, 1):
+        point = [f"{value:g}" for value in plan.expected.points[cell]]
+        writer.writerow([number, *point, "", "", ""])
+    return text.getvalue()
+
+
+def _starts(plan: Plan) -> str:
+    """Where each robot is put in each run: drawn as the sweep draws them."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["run", "robot", "x_m", "y_m", "heading_deg"])
+    for number, cell in enumerate(plan.order, 1):
+        swarm = plan.request.cell(tuple(plan.expected.points[cell]))
+        poses = native.trace_world(swarm, plan.seed + number, swarm.period_s, 1.0)[0]
+        for robot, (x_m, y_m, theta_rad) in enumerate(poses):
+            degrees = np.degrees(theta_rad)
+            writer.writerow([number, robot, f"{x_m:.3f}", f"{y_m:.3f}", f"{degrees:.0f}"])
+    return text.getvalue()
+
+
+def _text(plan: Plan, digest: str, folder: Path) -> str:
+    """plan.md."""
+    request = plan.request
+    runs = "\n".join(
+        f"| {number} | {' | '.join(f'{v:g}' for v in plan.expected.points[cell])} |"
+        for number, cell in enumerate(plan.order, 1)
+    )
+    labels = " | ".join(axis.label for axis in request.axes)
+    return f"""\
+# Plan of {len(plan.order)} runs
+
+What {request.behavior} does in {len(plan.cells)} cells of a sweep was predicted before any of these
+runs: the probability of each class, in `{SEALED}`. Its SHA-256 is
+
+    {digest}
+
+Publish that line first, where it keeps a date: in a repository, or by mail to somebody. Do not open
+the file before all runs are made. Nothing in this plan says what is expected.
+
+## Runs
+
+In this order, which is random, so that the battery, the floor and the day fall on all cells alike.
+
+| run | {labels} |
+|---|{"---|" * len(plan.names)}
+{runs}
+
+- **Start**: put each robot as `{STARTS}` says, to 5 cm and 10 degrees: x, y in m from the middle of
+  the arena, heading in degrees counter-clockwise from x. They were drawn as the sweep draws its own
+  ({request.start}, {request.spread_m:g} m).
+- **Go**: all robots at one instant, {_go(request.behavior)}, {request.duration_s:g} s long.
+- **Record**: poses of all robots by motion capture, 20 a second or more, from before the start to
+  the end; battery voltage before the run; in `note` whatever was unusual.
+- **Again**: a run in which a robot fails, is touched by a person, or is lost by motion capture for
+  more than a second in the last 10 s is made again from the same start. Say so in `note`. No other
+  run is made again or left out.
+
+## The class of a run
+
+`score-floor` tells it from the log, with the view range of the run's cell:
+
+{CLASSES}
+## Afterwards
+
+Write into `{FORM}` for each run its class, or the path of its log. Then:
+
+    twinmill score-floor {folder} {folder / FORM} --sha256 {digest}
+"""
+
+
+def _go(behavior: str) -> str:
+    if ":" in behavior:
+        return f"robots and tables as `{behavior}` has them"
+    return f"`twinmill swarm start --behavior {behavior}`"
