@@ -29,7 +29,7 @@ from twinmill.report import (
     tables,
     write_report,
 )
-from twinmill.report.tables import Cell, Table, main_robot, number
+from twinmill.report.tables import Cell, Table, number
 from twinmill_cli import main as cli
 from twinmill_cli.frame import provenance
 
@@ -131,7 +131,7 @@ def _calibrate() -> tuple[list[Step], list[Section]]:
     model = "demo/fitted.toml"
     fitted = _twinmill("fit", LOG, "--model", NOMINAL, "-o", model)
     sections = [comparison_section(compared), fit_section(fitted)]
-    steps = [Step("data sheet", fitted.before.score, rms(main_robot(compared).errors))]
+    steps = [Step("data sheet", fitted.before.score, rms(compared.worst.errors))]
     for effect in CANDIDATES:
         _say(f"Add {effect.replace('_', ' ')}")
         richer = f"demo/{effect}.toml"

@@ -212,7 +212,7 @@ def _concluded(
         scenes=scenes,
         steps=steps,
         notes=[*time_base_notes(scenes), *geometry_notes(last.state.model), *noise, *weighed.notes],
-        next_experiment=_next(weighed.verdict, findings, hidden),
+        next_experiment=_next(findings, faint, _shown(done, faint), weighed.verdict),
         robots_off=tuple(off),
         base_names=tuple(base_names(first.model, known, model_file.told_by_others(hashes))),
     )
@@ -249,6 +249,12 @@ def _hidden(done: Search, model: native.Model) -> list[tuple[str, str]]:
     return hidden
 
 
+def _shown(done: Search, hidden: Sequence[tuple[str, str]]) -> list[str]:
+    """Effects that would be seen if they were there."""
+    names = {name for name, _ in hidden} | {REFIT}
+    return [s.name for s in done.rounds[-1].screened if s.name not in names]
+
+
 def _noises(model_file: ModelFile, scenes: Sequence[Scene | SteadyScene]) -> list[str]:
     """A note for each log whose drive noise is far above what another log told."""
     usual = model_file.model.get("noise.drive_mps")
@@ -267,7 +273,34 @@ def _noises(model_file: ModelFile, scenes: Sequence[Scene | SteadyScene]) -> lis
     return notes
 
 
-def _next(verdict: str, findings, hidden: list[tuple[str, str]]) -> dict | None:
+# What shows an effect, by the words of its card's `identify`.
+DRIVES = {
+    "straight": "straight on",
+    "strafe": "sideways",
+    "diagonal": "diagonally",
+    "spin": "turns on the spot",
+    "arcs": "arcs of several speeds and radii",
+    "levels": "at five or more duties",
+    "steps": "from rest",
+    "stops": "stops from several speeds",
+    "reversals": "forward straight to back without a pause",
+    "headings": "along four headings",
+    "places": "all over the floor",
+    "long": "for two minutes or more",
+}
+
+
+def _drives(hidden: list[tuple[str, str]], seen: Sequence[str]) -> str:
+    """Drives that the hidden effects ask for and no effect that these data show does."""
+    cards = catalogue()
+    asked = {t for name, _ in hidden for t in cards[name]["identify"]}
+    had = {t for name in seen for t in cards[name]["identify"]}
+    return ", ".join(words for t, words in DRIVES.items() if t in asked - had)
+
+
+def _next(
+    findings, hidden: list[tuple[str, str]], seen: Sequence[str], verdict: str
+) -> dict | None:
     """What to drive next, in words; the script itself is designed by `twinmill next`."""
     tied = next((f.group for f in findings if f.group), None)
     if verdict == "ambiguous" and tied:
@@ -278,10 +311,12 @@ def _next(verdict: str, findings, hidden: list[tuple[str, str]]) -> dict | None:
             "more duties, from rest and through zero, on clocks tied by a calibration log",
         }
     if hidden:
+        drives = _drives(hidden, seen)
+        names = ", ".join(name for name, _ in hidden)
+        ask = f"drive {drives}" if drives else "`twinmill effects NAME` says what shows one"
         return {
             "script": None,
             "separates": [name for name, _ in hidden],
-            "why": "these effects leave no trace in this log: drive sideways as well, and at five "
-            "or more duties on all axes",
+            "why": f"{names} leave{'s' if len(hidden) == 1 else ''} no trace in this log: {ask}",
         }
     return None

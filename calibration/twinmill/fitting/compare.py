@@ -108,6 +108,14 @@ class Comparison:
         return max(self.robots, key=lambda r: r.size)
 
     @property
+    def worst(self) -> RobotComparison | SteadyComparison:
+        """The robot that the model misses most; tables stand for all their robots."""
+        if isinstance(self.main, SteadyComparison):
+            return self.main
+        logs = [r for r in self.robots if not isinstance(r, SteadyComparison)]
+        return max(logs, key=lambda r: (np.nan_to_num(r.score, nan=-1.0), r.size))
+
+    @property
     def verdict(self) -> str:
         """What the score means, in a sentence."""
         if not np.isfinite(self.score):

@@ -2,7 +2,7 @@
 """What to do after a comparison, in a sentence."""
 
 from twinmill.fitting.compare import GOOD, SUSPECT, Comparison
-from twinmill.report.tables import main_robot, number
+from twinmill.report.tables import number
 from twinmill.steady.compare import SteadyComparison
 
 # By what the robot was doing: what is wrong, and effects that act there.
@@ -24,7 +24,7 @@ def advice(comparison: Comparison) -> str:
         return "compare with a log that the model was not fitted on."
     if comparison.score <= GOOD:
         return "nothing to add for this log; compare with one of another day, floor or battery."
-    robot = main_robot(comparison)
+    robot = comparison.worst
     if isinstance(robot, SteadyComparison):
         return _steady_advice(robot)
     phases = [r for r in robot.where if r.group == "phase"]

@@ -134,12 +134,15 @@ def lines(diagnosis: Diagnosis) -> list[str]:
             )
     if diagnosis.late and (late := _late(diagnosis)):
         told.append(late)
-    if diagnosis.next_experiment:
-        told.append(
-            f"Next run: {diagnosis.next_experiment['why']}; `twinmill next`, given the same logs "
-            "and model, writes the script."
-        )
     return told
+
+
+def next_run(diagnosis: Diagnosis) -> str:
+    """The next step in one sentence; empty if the logs leave nothing open."""
+    if not diagnosis.next_experiment:
+        return ""
+    why = diagnosis.next_experiment["why"]
+    return f"{why}; `twinmill next`, given the same logs and model, writes the script."
 
 
 def _late(diagnosis: Diagnosis) -> str:
@@ -168,6 +171,8 @@ def terminal(diagnosis: Diagnosis) -> RenderableType:
     ]
     parts += [show.table(t) for t in (*_tables(diagnosis), *_bit_steps(diagnosis))]
     parts += [Text(line) for line in lines(diagnosis)]
+    if step := next_run(diagnosis):
+        parts.append(Text(f"Next run: {step}"))
     return Group(*parts)
 
 
@@ -195,7 +200,8 @@ def section(diagnosis: Diagnosis) -> Section:
         views.facts(before),
         [*_bit_figures(diagnosis), waterfall(_labelled(diagnosis)), *robot_pictures(before)],
         [*_tables(diagnosis), *_bit_steps(diagnosis), *_bit_tables(diagnosis)],
-        next_step=" ".join(lines(diagnosis)),
+        next_step=next_run(diagnosis),
+        notes=lines(diagnosis),
         warnings=before.warnings,
     )
 

@@ -44,6 +44,7 @@ class Section:
         figures, tables: in their order.
         next_step: a sentence.
         commands: where or when, and the command line to type there; below next_step.
+        notes: sentences on the result, below the verdict.
         warnings: sentences.
     """
 
@@ -56,6 +57,7 @@ class Section:
     _: KW_ONLY
     next_step: str = ""
     commands: list[tuple[str, str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results of calibration to sections of a report."""
 
+from dataclasses import replace
+
 from twinmill.fitting.add import AddResult
-from twinmill.fitting.compare import Comparison
+from twinmill.fitting.compare import Comparison, RobotComparison
 from twinmill.fitting.fit import FitResult
 from twinmill.report import tables, views
 from twinmill.report.advice import advice
@@ -16,7 +18,7 @@ from twinmill.report.tables import number, tone
 
 def comparison_section(result: Comparison) -> Section:
     """Of one comparison."""
-    robot = tables.main_robot(result)
+    robot = result.worst
     title = f"{result.model_name} against {robot.scene.measurement.log_name}"
     return Section(
         title,
@@ -35,7 +37,7 @@ def comparison_section(result: Comparison) -> Section:
 
 def fit_section(result: FitResult) -> Section:
     """Of one fit: the same pictures of the fitted model, beside the old one's errors."""
-    before, after = tables.main_robot(result.before), tables.main_robot(result.after)
+    before, after = _same_robot(result)
     title = f"{result.before.model_name} fitted to {after.scene.measurement.log_name}"
     return Section(
         title,
@@ -51,7 +53,7 @@ def fit_section(result: FitResult) -> Section:
 
 def added_section(result: AddResult) -> Section:
     """Of one added effect."""
-    before, after = tables.main_robot(result.before), tables.main_robot(result.after)
+    before, after = _same_robot(result)
     scores = [
         _score("before", result.before.score),
         _score("after", result.after.score),
@@ -77,14 +79,21 @@ def steps_section(title: str, scores: list[tuple[str, float]], verdict: str) -> 
     return Section(title, ends, verdict, figures=[waterfall(scores)], tables=[tables.steps(scores)])
 
 
+def _same_robot(result: FitResult | AddResult) -> tuple[RobotComparison, RobotComparison]:
+    """The robot that the new model misses most, with the old model and with the new one."""
+    pairs = zip(result.before.robots, result.after.robots, strict=True)
+    return next(pair for pair in pairs if pair[1] is result.after.worst)
+
+
 def robot_pictures(result: Comparison) -> list[Figure]:
-    """Where and how fast the robot went, and when the model fails."""
-    robot, steady = result.main, views.sheets(result)
-    own = [] if robot in steady else [path(robot), speeds(robot)]
-    if robot not in steady and robot.where:
-        own.append(regimes(robot))
+    """Where and how fast the robot that is missed most went, and when the model fails."""
+    robot, steady = result.worst, views.sheets(result)
+    own = []
     if robot not in steady:
+        own = [path(robot), speeds(robot), *([regimes(robot)] if robot.where else [])]
         own.append(floor_map(robot))
+    if len(result.robots) > 1:
+        own = [replace(f, title=f"{f.title}: {robot.scene.measurement.label}") for f in own]
     if steady:
         number = steady[0].scene.measurement.robot_id
         own += [steady_values(steady), regimes(steady[0], f"Steady inputs of robot {number}")]
@@ -93,7 +102,7 @@ def robot_pictures(result: Comparison) -> list[Figure]:
 
 def _pictures(result: Comparison, models: list[tuple]) -> list[Figure]:
     """The same, with errors over time if there is a log."""
-    growth = [] if result.main in views.sheets(result) else [error_growth(models)]
+    growth = [] if result.worst in views.sheets(result) else [error_growth(models)]
     return robot_pictures(result) + growth
 
 

@@ -67,14 +67,9 @@ def tone(score: float) -> Tone:
     return "good" if score <= GOOD else "warn" if score <= MISSING else "bad"
 
 
-def main_robot(comparison: Comparison) -> RobotComparison:
-    """The robot with most windows speaks for the errors, as in the JSON."""
-    return comparison.main
-
-
 def facts(comparison: Comparison) -> list[tuple[str, str]]:
     """What was compared with what: label and text."""
-    robot = main_robot(comparison)
+    robot = comparison.worst
     measurement, noise = robot.scene.measurement, robot.scene.noise
     track = measurement.track
     recorded = datetime.fromtimestamp(measurement.recorded_utime_us / 1e6, UTC)
@@ -84,7 +79,7 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
         (
             "log",
             f"{measurement.log_name}, robot {track.robot_id}"
-            + (f" (and {others} more)" if others else ""),
+            + (f", which the model misses most (and {others} more)" if others else ""),
         ),
         (
             "recorded",

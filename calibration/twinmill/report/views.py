@@ -16,16 +16,16 @@ def sheets(comparison: Comparison) -> list[SteadyComparison]:
 
 def facts(comparison: Comparison) -> list[tuple[str, str]]:
     """What was compared with what: label and text."""
-    if isinstance(comparison.main, SteadyComparison):
+    if isinstance(comparison.worst, SteadyComparison):
         return present.facts(sheets(comparison), comparison.model_name)
     return tables.facts(comparison)
 
 
 def robot_tables(comparison: Comparison) -> list[Table]:
-    """Errors and where they come: of the log that speaks for all, then of all tables."""
+    """Errors and where they come: of the robot that is missed most, then of all tables."""
     made = []
-    if not isinstance(comparison.main, SteadyComparison):
-        made += [tables.errors(comparison.main), tables.where(comparison.main)]
+    if not isinstance(comparison.worst, SteadyComparison):
+        made += [tables.errors(comparison.worst), tables.where(comparison.worst)]
     if steady := sheets(comparison):
         made += [present.errors(steady), present.cells(steady)]
     if comparison.bits:
