@@ -30,10 +30,12 @@ AGAIN = 2.0  # times what the model left in other logs already: no news
 FIRM_T = 3.0
 STILL = (0.002, 0.002, 0.01)  # m/s, m/s, rad/s: below it an axis does not move; wheels differ
 TYPICAL = (0.01, 0.01, 0.05)  # m/s, m/s, rad/s: what a term of full size may add
-NO_NAMES = {"dvx", "dvy", "domega", "V"}  # rates and voltage: not at hand in a body's formula
+# Rates, voltage, history: not at hand in a body's formula.
+NO_NAMES = {"dvx", "dvy", "domega", "V", "after_reversal"}
 CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
 CHANGE = "change of the command"
 MOMENTS = "single moments"
+REVERSAL_S = 0.15  # how long a reversal is felt
 LEFT_OVER = 0.02  # share of a term's norm that must survive the projection
 
 
@@ -383,6 +385,10 @@ def _named_terms(
         (CHANGE, "abs(domega)"): np.abs(change[2]),
     }
     speeds = (("vx", vx), ("vy", vy), ("omega", turn))
+    for name, values in speeds:
+        term = _after_reversal(values, t_s)
+        if term.any():
+            terms["reversals", f"after_reversal({name})"] = term
     if np.ptp(theta) > 0.1:
         for n in (1, 2, 3):
             for name, wave in (("cos", np.cos(n * theta)), ("sin", np.sin(n * theta))):
@@ -406,3 +412,14 @@ def _rate(values: np.ndarray, step_s: np.ndarray) -> np.ndarray:
     """Rate of change; zero where a stretch begins."""
     rate = np.diff(values, prepend=values[0]) / np.where(step_s > 0, step_s, np.inf)
     return rate
+
+
+def _after_reversal(speed: np.ndarray, t_s: np.ndarray) -> np.ndarray:
+    """Direction of a motion that was turned round, fading with the time since; 0 before any."""
+    place = np.arange(len(speed))
+    last = np.maximum.accumulate(np.where(speed != 0, place, 0))
+    sign = np.sign(speed[last])
+    turned = np.concatenate([[False], (sign[1:] * sign[:-1]) < 0])
+    since_s = t_s - t_s[np.maximum.accumulate(np.where(turned, place, 0))]
+    begun = np.cumsum(turned) > 0
+    return np.where(begun, sign * np.exp(-since_s / REVERSAL_S), 0.0)
