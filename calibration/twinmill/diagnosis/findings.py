@@ -13,6 +13,7 @@ from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
 HORIZON = HORIZONS_S.index(0.5)
+MISSES = 1.5  # score of a final model whose errors are not noise
 BEYOND = 3.0  # usual sizes: a larger value is doubtful
 DELAY, CLOCK_OFF, MOTOR_LAG = "input_delay", "clock_offset", "motor_lag"
 
@@ -166,8 +167,24 @@ def _round_of(done: Search, name: str) -> Round:
 
 
 def _rivals(done: Search, name: str) -> list[Trial]:
-    """Trials that the data could not tell from this effect's, unless they were found besides."""
-    return [t for t in _round_of(done, name).tied if not set(t.names) & set(done.found)]
+    """Trials that the data could not tell from this effect's, unless they were found besides.
+
+    Where even the final model misses by far, its errors are no noise, and a few percent between two
+    effects decide nothing.
+    """
+    this = _round_of(done, name)
+    rivals = list(this.tied)
+    if done.last.held_score > MISSES and len(this.accepted.names) == 1 and name != REFIT:
+        fall = this.before.held_score**2 - this.accepted.held_score**2
+        rivals += [
+            t
+            for t in this.trials
+            if not any(t is r for r in (*this.tied, this.accepted))
+            and len(t.names) == 1
+            and t.names != (REFIT,)
+            and this.before.held_score**2 - t.held_score**2 > done.settings.imitates * fall
+        ]
+    return [t for t in rivals if not set(t.names) & set(done.found)][: done.settings.group - 1]
 
 
 def _finding(done: Search, name: str, share: float, changes: Mapping[str, Change]) -> Finding:

@@ -104,11 +104,14 @@ def fit_noise(errors: list[np.ndarray], moving: np.ndarray, grid: StepGrid) -> N
         moving: (S,) bool: the disturbance acts only then.
         grid: of the steps.
 
-    The median over stretches of 2 s keeps passing physics (a start, a stop) out of the noise.
+    The median over stretches of 2 s keeps passing physics (a start, a stop) out of the noise. Poses
+    that are too few for the shortest stretch tell no noise: it is the least.
     """
     chunk = CHUNK
     while (pieces := _pieces(grid, moving, chunk)) is None:
         chunk //= 2
+    if not len(pieces):
+        return Noise(*(ChannelNoise(*least, LEAST_MEMORY_S) for least in LEAST))
     bins = _bins(chunk)
     power = np.mean([_median_power(np.nan_to_num(e), pieces, bins) for e in errors], axis=0)
     return Noise(
@@ -130,7 +133,7 @@ def _pieces(grid: StepGrid, moving: np.ndarray, chunk: int) -> np.ndarray | None
     starts = [at for at in everywhere if moving[at : at + chunk].mean() > 0.9]
     if len(starts) < FEWEST_CHUNKS and chunk > CHUNK // 8:
         return None
-    return np.array(starts or everywhere)
+    return np.array(starts or everywhere, dtype=int)
 
 
 def _bins(chunk: int) -> np.ndarray:
