@@ -13,7 +13,7 @@
 // @return how many, or -1 and errno.
 static ssize_t read_file(const char *path, char *text, size_t size)
 {
-    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd < 0)
     {
         return -1;

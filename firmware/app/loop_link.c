@@ -81,11 +81,15 @@ static bool stands(const struct loop *loop)
     return !loop->may_move && loop->lost[LOOP_BOARD] == FW_OK;
 }
 
-// A program that dies after a stop must not come back and drive. Without the folder, as where the
-// program is run by hand, only this run knows of the stop.
+// A driver or a program that dies after a stop must not come back and drive. Without the folder, as
+// where the program is run by hand, only its own processes know of the stop.
 static void keep_latch(struct loop *loop)
 {
     struct loop_link *state = &loop->operator_link;
+    if (loop->watch != NULL)
+    {
+        loop->watch->latched = loop->inbox.latched;
+    }
     if (state->stopped_file[0] == '\0' || state->stopped_file_is_there == loop->inbox.latched)
     {
         return;

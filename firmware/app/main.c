@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The robot's program: reads its options, wires its parts, and lets them run.
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "devices.h"
 #include "loop.h"
@@ -106,6 +108,7 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
         loop.wake_fd = stop_fd;
         loop.watch = watch;
         loop.may_move = watch->may_move;
+        loop.inbox.latched = loop.inbox.latched || watch->latched;
         if (options->config.autostart && !loop.inbox.latched)
         {
             loop_start(&loop);
@@ -132,9 +135,20 @@ static int print_config(const struct app_config *config)
     return fputs(text, stdout) == EOF;
 }
 
+// Else the board could be opened as number 2, and get the messages.
+static void take_standard_files(void)
+{
+    int fd;
+    while ((fd = open("/dev/null", O_RDWR)) >= 0 && fd <= STDERR_FILENO)
+    {
+    }
+    (void)close(fd);
+}
+
 int main(int argc, char **argv)
 {
     static struct options options;
+    take_standard_files();
     options.command_line = argv[0];
     options.command_line_bytes = (size_t)(argv[argc - 1] + strlen(argv[argc - 1]) - argv[0]);
     switch (parse_options(argc, argv, &options))

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "stopper.h"
 
+#include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
@@ -24,7 +25,8 @@ bool stopper_stop(struct stopper *stopper)
     return told == FW_OK && confirmed == FW_OK;
 }
 
-// Dead, though its parent may not have taken notice.
+// Dead, though its parent may not have taken notice. Who cannot be looked at, as where no more
+// files can be opened, may live.
 static bool is_gone(pid_t pid)
 {
     char path[64], line[256] = "";
@@ -32,7 +34,7 @@ static bool is_gone(pid_t pid)
     const int fd = pid > 0 ? open(path, O_RDONLY | O_CLOEXEC) : -1;
     if (fd < 0)
     {
-        return true;
+        return pid <= 0 || errno == ENOENT || errno == ESRCH;
     }
     (void)!read(fd, line, sizeof line - 1);
     (void)close(fd);

@@ -27,6 +27,8 @@ struct watch
     _Atomic bool may_move;
     // The driver wants the wheels to stand and cannot make them: whoever can helps.
     _Atomic bool needs_help;
+    // A command has stopped the robot: who drives next waits to be armed.
+    _Atomic bool latched;
 };
 
 // @return memory that children share, or NULL.

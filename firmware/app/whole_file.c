@@ -11,7 +11,8 @@
 
 bool whole_file_open(struct whole_file *file, const char *name, const char *path, bool anew)
 {
-    const int flags = O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | (anew ? O_TRUNC : 0);
+    // Of a pipe: it waits neither for a reader nor for room.
+    const int flags = O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK | (anew ? O_TRUNC : 0);
     *file = (struct whole_file){.name = name, .fd = open(path, flags, 0644)};
     return file->fd >= 0;
 }

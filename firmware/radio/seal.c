@@ -44,7 +44,7 @@ static bool parse(const char *text, struct seal_key *key)
 bool seal_load(const char *path, struct seal_key *key, char error[SEAL_ERROR_MAX])
 {
     *key = (struct seal_key){0};
-    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd < 0)
     {
         return fail(error, path, strerror(errno));

@@ -143,6 +143,33 @@ def test_unread_messages_do_not_keep_a_dead_driver_from_being_stopped(unheard, n
     assert wait_until(lambda: unheard.children() not in ([], [driver]))
 
 
+@pytest.mark.parametrize("closed", ["2>&-", "0<&- 2>&-", "0<&- 1>&- 2>&-"])
+def test_messages_go_to_no_device_that_was_opened_as_number_2(tmp_path, closed):
+    """Started without the three files of a terminal, it would give their numbers to devices."""
+    program = ["sh", "-c", f'exec "$@" {closed}', "sh", *TURBOPI]
+    with Robot(program, tmp_path, "--start") as robot:
+        assert robot.wait_for(LEFT) and wait_until(robot.guards)
+        for pid in (robot.process.pid, *robot.children(), *robot.guards()):
+            targets = [os.readlink(f"/proc/{pid}/fd/{number}") for number in range(3)]
+            assert targets[2].startswith("pipe:"), targets  # to who passes messages on
+            assert not any(target.startswith("socket:") for target in targets), targets
+
+
+@pytest.mark.parametrize("reader", [True, False], ids=["full", "without a reader"])
+def test_log_that_is_a_pipe_keeps_nobody_waiting(tmp_path, reader):
+    os.mkfifo(tmp_path / "pipe")
+    pipe = os.open(tmp_path / "pipe", os.O_RDWR | os.O_NONBLOCK) if reader else -1
+    with contextlib.suppress(BlockingIOError):
+        while reader:
+            os.write(pipe, b"x" * 4096)
+    with Robot(TURBOPI, tmp_path, "--start", "--io-tsv", str(tmp_path / "pipe")) as robot:
+        if reader:
+            assert robot.wait_for(LEFT)
+            robot.process.terminate()
+        code, said = robot.end()
+    assert "io_tsv" in said and code == (4 if reader else 2)
+
+
 def test_unread_messages_do_not_keep_it_from_ending(unheard):
     unheard.process.terminate()
     assert unheard.process.wait(timeout=10) == 0

@@ -8,6 +8,8 @@ JSON. The attacker hears everything, says anything, and has no key.
 import json
 import os
 import shlex
+import signal
+import subprocess
 import sys
 import threading
 import time
@@ -250,6 +252,40 @@ def restarted(program: list[str], folder: Path, heard: dict, key: bytes) -> dict
         }
 
 
+def latched_without_a_folder(program: list[str], folder: Path, key: bytes) -> dict:
+    """By hand there is no /run/turbopi: a stop must hold though its driver is killed."""
+    (folder / "latched").mkdir()
+    options = ["--lcm-url", URL, *robot_options(folder, ID), "--set", "run_dir=/nowhere"]
+    options += ["--start", "--set", "restart_ms=100"]
+    with Robot(program, folder / "latched", *options) as robot:
+        drove = robot.wait_for(LEFT)
+        fleet = Fleet(URL, key=key)
+        (answer,) = tell.stop(fleet, {ID})
+        stopped_s, driver = time.monotonic(), robot.children()[0]
+        os.kill(driver, signal.SIGKILL)
+        fleet.listen(10, lambda: robot.children() not in ([], [driver]))
+        fleet.listen(WATCH_S)
+        moved = any(t > stopped_s and duties != ZERO for t, duties in robot.rows())
+        return {"drove": drove, "stands": answer.stands, "moved_after": moved}
+
+
+def start_that_cannot_be_told(robot: Robot, key_file: Path, key: bytes) -> dict:
+    """The operator's disk is full below the words of his command: robots that drive are stopped."""
+    code = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
+    command = ["swarm", "start", "--untethered", "--arm", "--key", str(key_file)]
+    begin_s = time.monotonic()
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", code, *command],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+        )
+    drove = any(t > begin_s and duties != ZERO for t, duties in robot.rows())
+    return {"code": done.returncode, "drove": drove, "stands": robot.duties() == ZERO}
+
+
 def double(program: list[str], folder: Path, key: bytes) -> dict:
     """Two robots of one number."""
     robots = []
@@ -295,7 +331,7 @@ def lost_operator(robot: Robot, key: bytes) -> dict:
 
 def main(folder: Path) -> dict:
     program = shlex.split(os.environ["TURBOPI"])
-    _, key = operator_key(folder)
+    key_file, key = operator_key(folder)
     options = ["--lcm-url", URL, *robot_options(folder, ID)]
     (folder / "robot").mkdir()
     result = {}
@@ -307,6 +343,8 @@ def main(folder: Path) -> dict:
         result["flood_of_nonsense"] = flood_of_nonsense(robot, key)
         result["forged_stands"] = forged_stands(robot, heard, key)
         result["lost_operator"] = lost_operator(robot, key)
+        result["start_that_cannot_be_told"] = start_that_cannot_be_told(robot, key_file, key)
+    result["latched"] = latched_without_a_folder(program, folder, key)
     result["restarted"] = restarted(program, folder, heard, key)
     result["double"] = double(program, folder, key)
     return result

@@ -40,6 +40,14 @@ def test_start_of_an_earlier_run_of_the_program_is_refused(session):
     assert session["restarted"] == {"armed": True, "moves": False}
 
 
+def test_stop_holds_though_the_driver_dies_where_nothing_can_be_written(session):
+    assert session["latched"] == {"drove": True, "stands": True, "moved_after": False}
+
+
+def test_robots_stop_if_the_command_that_started_them_fails(session):
+    assert session["start_that_cannot_be_told"] == {"code": 1, "drove": True, "stands": True}
+
+
 def test_one_stop_beats_a_flood_of_starts(session):
     assert session["flood_of_starts"] == {"drove": True, "stands": True, "moved_after": False}
 

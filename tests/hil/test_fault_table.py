@@ -68,14 +68,17 @@ def table():
 def guest(request):
     """What the program runs in; where that is systemd, with the library that makes calls fail."""
     if not BY_SERVICE:
-        return request.getfixturevalue("rig")
+        yield request.getfixturevalue("rig")
+        return
     system = request.getfixturevalue("installed")
     folder = f"/run/systemd/system/{SERVICE}.d"
     system.run("/bin/mkdir", "-p", folder)
     lines = ("[Service]", f"Environment={PRELOAD[0]}", "PrivateTmp=no", "ReadWritePaths=/tmp")
     system.words("w", f"{folder}/failcalls.conf", "\n".join(lines) + "\n")
     system.systemctl("daemon-reload")
-    return system
+    yield system
+    system.run("/bin/rm", "-r", folder)
+    system.systemctl("daemon-reload")
 
 
 def start(guest, *arguments, environment=(), heard=True):

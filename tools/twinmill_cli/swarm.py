@@ -119,13 +119,14 @@ def _start(
     timeout_ms = 0 if untethered else round(1e3 * link_timeout_s) if link_timeout_s else -1
     with ended_by_signals():
         begun = tell.start(fleet, asked, behavior, in_s, partial, link_timeout_ms=timeout_ms)
-        ok = all(a.accepted and a.signed and a.mode != "stopped" for a in begun.answers)
-        data = {"start_utime_us": begun.utime_us, "called_off": begun.called_off}
-        words = _start_words(begun, ok, untethered)
-        code = _finish("start", begun.answers, ok, words, data, as_json)
-        if begun.called_off or untethered:
-            return code
-        return max(code, _hold(fleet, asked, as_json))
+        with stopped_if_it_fails(fleet, asked):
+            ok = all(a.accepted and a.signed and a.mode != "stopped" for a in begun.answers)
+            data = {"start_utime_us": begun.utime_us, "called_off": begun.called_off}
+            words = _start_words(begun, ok, untethered)
+            code = _finish("start", begun.answers, ok, words, data, as_json)
+            if begun.called_off or untethered:
+                return code
+            return max(code, _hold(fleet, asked))
 
 
 def _start_words(begun: tell.Start, ok: bool, untethered: bool) -> str:
@@ -139,37 +140,47 @@ def _start_words(begun: tell.Start, ok: bool, untethered: bool) -> str:
     return f"{words} {'They drive on by themselves.' if untethered else 'Ctrl-C stops them.'}"
 
 
-def _hold(fleet: Fleet, robots: set[int], as_json: bool) -> int:
+@contextmanager
+def stopped_if_it_fails(fleet: Fleet, robots: set[int]) -> Iterator[None]:
+    """Whatever ends the command once robots drive, a full disk below its output too, stops them."""
+    try:
+        yield
+    except BaseException as error:
+        given = tell.stop(fleet, robots)
+        print(f"twinmill: {_stop_words(given, 10)}", file=sys.stderr)
+        if not isinstance(error, KeyboardInterrupt):
+            raise
+        raise typer.Exit(0 if _all_stand(given) else 1) from error
+
+
+def _hold(fleet: Fleet, robots: set[int]) -> int:
     """Robots hear that somebody is there, until Ctrl-C or until all stand by themselves."""
     held = [fleet.robots[i] for i in sorted(robots) if i in fleet.robots]
     console = Console(stderr=True)
-    try:
-        with (
-            Live(console=console, refresh_per_second=4)
-            if console.is_terminal
-            else nullcontext(None) as live
-        ):
-            while not all(robot.mode == "stopped" for robot in held):
-                fleet.listen(0.25)
-                if live:
-                    live.update(status_table(held))
-        words = "All stand: stopped by another command, by their button, or a script is over."
-        print(f"twinmill: {words}", file=sys.stderr)
-        return 0
-    except KeyboardInterrupt:
-        given = tell.stop(fleet, robots)
-        print(f"twinmill: {_stop_words(given, 10)}", file=sys.stderr)
-        return 0 if _all_stand(given) else 1
+    with (
+        Live(console=console, refresh_per_second=4)
+        if console.is_terminal
+        else nullcontext(None) as live
+    ):
+        while not all(robot.mode == "stopped" for robot in held):
+            fleet.listen(0.25)
+            if live:
+                live.update(status_table(held))
+    words = "All stand: stopped by another command, by their button, or a script is over."
+    print(f"twinmill: {words}", file=sys.stderr)
+    return 0
 
 
 @contextmanager
 def ended_by_signals() -> Iterator[None]:
-    """SIGTERM ends as Ctrl-C does: robots are stopped. What kills, they notice by themselves."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    """SIGTERM and a lost terminal end as Ctrl-C does. What kills, robots notice by themselves."""
+    numbers = (signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, signal.default_int_handler) for number in numbers]
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
 
 
 def _arm(
