@@ -5,14 +5,19 @@ import os
 import subprocess
 import tomllib
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from twinmill.model.model_file import ModelFile
 from twinmill.swarm.behaviors import find_table
-from twinmill.swarm.discover.genes import decode
+from twinmill.swarm.discover.entries import Entry, confirm
+from twinmill.swarm.discover.genes import Mix, decode
 from twinmill.swarm.discover.kinds import COLUMNS, MEASURES, kinds, measures
+from twinmill.swarm.discover.search import Hunt
+from twinmill.swarm.sweep import make_request
 from twinmill_cli.main import run
 
 BODIES = ["--set", "robot.body_radius_m=0.1", "--set", "target_radius_m=0.1"]
@@ -37,9 +42,52 @@ def test_it_finds_what_is_published_without_being_told(archive):
 def test_fresh_seeds_confirm_the_best(archive):
     _, found = archive
     for kind in ("milling", "diffusion", "bull's-eye", "aggregation"):
-        best = max(e.share for e in found if e.kind == kind and e.confirmed)
+        best = max(e.share for e in found if e.kind == kind and e.name)
         print(kind, best)
         assert best >= 0.7
+
+
+def test_no_name_is_offered_that_does_not_hold_when_it_is_run_again(archive):
+    """By runs of other seeds than the search and the confirmation had, as a user would make them.
+
+    At 10 runs of a fair coin more than half come up in 38 %, so that of names that held in most of
+    them nearly all hold in more than a third of 60.
+    """
+    folder, found = archive
+    offered = [entry for entry in found if entry.name]
+    back = [entry for entry in found if not entry.name]
+    assert offered and back and all(entry.confirmed == 10 for entry in found)
+    request = make_request(
+        "milling", str(folder / "model.toml"), [], n=6, seeds=8, duration_s=120, start="square"
+    )
+    hunt = Hunt(request, 6, 1)
+    held = {}
+    for name, group in (("offered", offered[:12]), ("taken back", back[:12])):
+        again = [replace(entry) for entry in group]
+        confirm(replace(hunt, request=replace(request, first_seed=9000)), again, 0.24, 60)
+        held[name] = np.array([entry.share for entry in again])
+    print(held)
+    assert np.mean(held["offered"] > 1 / 3) > 0.8
+    assert held["offered"].mean() > held["taken back"].mean() + 0.2
+
+
+def test_a_name_that_the_model_is_not_sure_of_is_taken_back(tmp_path):
+    """The published mill; from a cone of 75 degrees on it breaks (the reference: none of 100)."""
+    text = ModelFile.load("paper.toml").text
+    text = text.replace("target_radius_m = 0 ", "target_radius_m = 0.1 ")
+    told = {}
+    for std in (0.01, 0.8):
+        effect = f'[[effect]]\nname = "view_angle"\nfactor = 1.0\n[effect.std]\nfactor = {std}\n'
+        (tmp_path / "m.toml").write_text(text + effect)
+        request = make_request(
+            "milling", str(tmp_path / "m.toml"), [], n=6, seeds=8, duration_s=60, start="square"
+        )
+        mill = Mix([100, -500, 100, 500], [0, 0, 0, 0], 6, 0)
+        entry = Entry("", "milling", mill, 1.0, [0.0] * 5, 1.0)
+        confirm(Hunt(request, 6, 1), [entry], 0.24, 40)
+        assert entry.share > 0.8
+        told[std] = entry.drawn
+    assert told[0.01] > 0.8 > told[0.8] + 0.15
 
 
 def test_the_same_search_gives_the_same_bytes_and_goes_on_where_it_was(archive, tmp_path):
@@ -77,14 +125,15 @@ def test_every_cell_is_kept_once_and_every_table_is_the_robots(archive):
     place = np.floor((at - bounds[:, 0]) / (bounds[:, 1] - bounds[:, 0]) * cells + 1e-6)
     assert len({tuple(row) for row in np.minimum(place, cells - 1)}) == len(found)
     tables = tomllib.loads((folder / "behaviors.toml").read_text())
-    assert len(tables) == sum(1 + (entry.mix.odd_count > 0) for entry in found)
+    offered = [entry for entry in found if entry.name]
+    assert len(tables) == sum(1 + (entry.mix.odd_count > 0) for entry in offered)
     assert pq.read_table(folder / "archive.parquet").num_rows == len(found)
 
 
 @pytest.mark.skipif(not os.environ.get("TWIN_RUN"), reason="TWIN_RUN does not name the program")
 def test_an_entry_runs_by_name_and_does_what_it_is_called(archive, tmp_path):
     folder, found = archive
-    mill = next(e for e in found if e.kind == "milling" and e.share > 0.9)
+    mill = next(e for e in found if e.name and e.kind == "milling" and e.share > 0.9)
     words = [
         *mill.command.split()[1:],
         "--duration-s",
@@ -103,7 +152,8 @@ def test_an_entry_runs_by_name_and_does_what_it_is_called(archive, tmp_path):
 def test_a_robot_takes_the_table_by_name(archive, monkeypatch):
     folder, found = archive
     monkeypatch.chdir(folder)
-    assert find_table(found[0].name).count(",") == 3
+    named = next(entry.name for entry in found if entry.name)
+    assert find_table(named).count(",") == 3
     assert find_table("milling") == ""
 
 

@@ -31,10 +31,10 @@ if working():  # not for --help
     from twinmill.report import Provenance, write_report
     from twinmill.report.discover import section
     from twinmill.swarm.discover.changes import with_changes
-    from twinmill.swarm.discover.entries import Entry, confirm, entries, write_entries
+    from twinmill.swarm.discover.entries import Entry, confirm, entries, offer, write_entries
     from twinmill.swarm.discover.kinds import KIND_COLORS
     from twinmill.swarm.discover.search import Hunt, search
-    from twinmill.swarm.sweep import make_request
+    from twinmill.swarm.sweep import make_request, progress_bar
 
 NOTE = (
     "A search by quality and diversity: of each sort of swarm it keeps the one that does the same "
@@ -66,7 +66,7 @@ def _discover(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the search.")] = 1,
     show: Annotated[int, typer.Option("--show", min=1, help="Pictures of each kind.")] = 6,
     confirm_runs: Annotated[
-        int, typer.Option("--confirm", min=1, help="Fresh runs of those that are shown.")
+        int, typer.Option("--confirm", min=1, help="Fresh runs of each, and with models drawn.")
     ] = 50,
     as_json: AsJson = False,
 ) -> list[Entry]:
@@ -84,18 +84,33 @@ def _discover(
     hunt = Hunt(with_changes(request), n, seed)
     with _progress(generations) as tell:
         elites = search(hunt, out, generations, tell)
-    with busy("running the best again and drawing"):
-        found, start_m2 = entries(hunt, elites)
-        shown = _best(found, show)
-        confirm(hunt, shown, start_m2, confirm_runs)
+    found, start_m2 = entries(hunt, elites)
+    with progress_bar() as progress:
+        task = progress.add_task("running all again, seeds and models fresh", total=None)
+        confirm(
+            hunt,
+            found,
+            start_m2,
+            confirm_runs,
+            lambda done, planned: progress.update(task, completed=done, total=planned),
+        )
+    with busy("drawing"):
+        offered = offer(found)
+        if not offered:
+            raise ValueError(
+                f"none of {len(found)} behaviours held when it was run again; search longer "
+                "(--generations), or judge each by more runs (--seeds)."
+            )
+        shown = _best(offered, show)
         write_entries(out, hunt, found)
         tried = generations * PER_GENERATION
-        page = section(hunt, found, shown, tried, elites.cells)
+        page = section(hunt, found, offered, shown, tried, elites.cells)
         source = _source(hunt, model, change or [], generations, out)
         report = write_report(out, page.title, source, [page], NOTE)
     data = {
         "tried": tried,
         "kept": len(found),
+        "offered": len(offered),
         "cells": elites.cells,
         "sha256": hunt.sha256,
         "entries": [entry.to_json() for entry in found],

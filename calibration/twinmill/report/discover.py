@@ -18,19 +18,30 @@ from twinmill.swarm.discover.search import Hunt
 ACROSS = 3
 
 
-def section(hunt: Hunt, found: list[Entry], shown: list[Entry], tried: int, cells: int) -> Section:
+def section(
+    hunt: Hunt,
+    found: list[Entry],
+    offered: list[Entry],
+    shown: list[Entry],
+    tried: int,
+    cells: int,
+) -> Section:
     """The whole page."""
-    present = [kind for kind in KIND_COLORS if any(entry.kind == kind for entry in found)]
-    count = {kind: sum(entry.kind == kind for entry in found) for kind in present}
+    present = [kind for kind in KIND_COLORS if any(entry.kind == kind for entry in offered)]
+    count = {kind: sum(entry.kind == kind for entry in offered) for kind in present}
     listed = ", ".join(f"{kind} {count[kind]}" for kind in present)
+    twins = ", and so in twins drawn from the model's errors" if shown[0].drawn is not None else ""
     return Section(
         title="Behaviours that were found",
         score=[
-            ("behaviours kept", str(len(found)), ""),
+            ("behaviours offered", str(len(offered)), ""),
+            ("that differ, in all", str(len(found)), ""),
             ("of cells", str(cells), ""),
             ("swarms tried", str(tried), ""),
         ],
-        verdict=f"Of {tried} swarms, {len(found)} that differ: {listed}.",
+        verdict=f"Of {tried} swarms, {len(found)} differ. {len(offered)} were what they are called "
+        f"in most of {shown[0].confirmed} fresh runs{twins}, and are offered: {listed}. The names "
+        f"of the other {len(found) - len(offered)} were taken back.",
         facts=[
             ("model", hunt.request.model_name),
             ("robots", str(hunt.n)),
@@ -39,7 +50,7 @@ def section(hunt: Hunt, found: list[Entry], shown: list[Entry], tried: int, cell
             ("put one on a robot", f"twinmill flash robot03.local --behavior {shown[0].name}"),
         ],
         figures=[
-            _map(found, present),
+            _map(offered, present),
             *[_gallery(hunt, k, [e for e in shown if e.kind == k]) for k in present],
         ],
         tables=[_table(shown)],
@@ -59,7 +70,7 @@ def _map(found: list[Entry], present: list[str]) -> Figure:
 
     return Figure(
         draw(4.4, paint),
-        "All that was kept",
+        "All that are offered",
         "Each dot is the most repeatable swarm of its cell; cells also differ in rotation, groups "
         "and where odd robots are.",
     )
@@ -100,6 +111,7 @@ def _table(shown: list[Entry]) -> Table:
             Cell(entry.name),
             Cell(entry.kind),
             Cell(f"{100 * entry.share:.0f}"),
+            Cell("-" if entry.drawn is None else f"{100 * entry.drawn:.0f}"),
             Cell(number(entry.alike, 2)),
             *(Cell(number(value, 2)) for value in entry.measures),
             Cell(entry.mix.behavior(entry.name)),
@@ -109,9 +121,10 @@ def _table(shown: list[Entry]) -> Table:
     runs = shown[0].confirmed
     return Table(
         "The most repeatable of each kind",
-        ["name", "kind", "% of its kind", "alike", *MEASURES, "behaviour"],
+        ["name", "kind", "% of its kind", "% in twins drawn", "alike", *MEASURES, "behaviour"],
         rows,
-        f"The share is of {runs} runs with fresh seeds. Alike: 1 is the same whatever the seed. "
+        f"Shares are of {runs} runs with fresh seeds, and of as many in twins drawn from the "
+        "model's errors, if it knows them. Alike: 1 is the same whatever the seed. "
         "Circliness and scatter are powers of 10. The last column goes after --behavior.",
-        words=(0, 1, 4 + len(MEASURES)),
+        words=(0, 1, 5 + len(MEASURES)),
     )

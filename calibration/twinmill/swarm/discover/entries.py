@@ -2,7 +2,8 @@
 """Elites as named behaviours, and the files that hold them."""
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,10 @@ from twinmill.swarm.behaviors import NAME
 from twinmill.swarm.discover.genes import Mix, decode, table_text
 from twinmill.swarm.discover.kinds import KIND_COLORS, MEASURES, kinds
 from twinmill.swarm.discover.search import Elites, Hunt
+from twinmill.swarm.forecast.draws import drawn_models, knows_errors
 
 MODEL = "model.toml"
+DRAWS = 10  # models drawn from the uncertainty
 SLUGS = {"bull's-eye": "bullseye"}
 
 
@@ -25,12 +28,13 @@ class Entry:
     """One elite.
 
     Attributes:
-        name: of its table; the odd robots' has `_odd` after it.
-        kind: what most of its runs are called.
+        name: of its table; the odd robots' has `_odd` after it. Empty: it is not offered.
+        kind: what most of the runs that chose it are called.
         alike: 1 is the same whatever the seed.
         measures: in the order of MEASURES.
-        share: of the runs that are of its kind; of fresh seeds once it is confirmed.
-        confirmed: fresh runs that stand behind the share; 0: those that chose it.
+        share: of fresh runs that are of its kind.
+        drawn: the same of runs with models drawn from the uncertainty; None: the model knows none.
+        confirmed: fresh runs behind each share; 0: it was not run again.
     """
 
     name: str
@@ -39,7 +43,13 @@ class Entry:
     alike: float
     measures: list[float]
     share: float
+    drawn: float | None = None
     confirmed: int = 0
+
+    @property
+    def holds(self) -> bool:
+        """Whether most runs are of its kind, again and in all twins that the model leaves open."""
+        return min(self.share, 1.0 if self.drawn is None else self.drawn) > 0.5
 
     @property
     def command(self) -> str:
@@ -58,7 +68,9 @@ class Entry:
             "odd_table": table_text(self.mix.odd) if self.mix.odd_count else "",
             "alike": self.alike,
             "share": self.share,
+            "share_drawn": self.drawn,
             "confirmed_runs": self.confirmed,
+            "offered": bool(self.name),
             **dict(zip(MEASURES, self.measures, strict=True)),
         }
 
@@ -69,7 +81,7 @@ def _start_scatter_m2(hunt: Hunt) -> float:
 
 
 def entries(hunt: Hunt, elites: Elites) -> tuple[list[Entry], float]:
-    """All elites, by kind and then the most repeatable first; and the start's mean scatter."""
+    """All elites, without names; and the start's mean scatter."""
     start_m2, range_m = _start_scatter_m2(hunt), hunt.request.model.get("sensor.range_m")
     found = []
     for genes, alike, at, rows in zip(
@@ -78,23 +90,70 @@ def entries(hunt: Hunt, elites: Elites) -> tuple[list[Entry], float]:
         kind, count = Counter(kinds(rows, start_m2, range_m)).most_common(1)[0]
         share = count / len(rows)
         found.append(Entry("", kind, decode(genes, hunt.n), float(alike), at.tolist(), share))
-    order = list(KIND_COLORS)
-    found.sort(key=lambda entry: (order.index(entry.kind), -entry.share, -entry.alike))
-    numbers: Counter = Counter()
-    for entry in found:
-        numbers[entry.kind] += 1
-        entry.name = f"{SLUGS.get(entry.kind, entry.kind)}_{numbers[entry.kind]}"
     return found, start_m2
 
 
-def confirm(hunt: Hunt, chosen: list[Entry], start_m2: float, runs: int) -> None:
-    """Runs entries with seeds that the search has not seen, which sets their shares right."""
+def confirm(
+    hunt: Hunt,
+    found: list[Entry],
+    start_m2: float,
+    runs: int,
+    tell: Callable[[int, int], None] = lambda done, planned: None,
+) -> None:
+    """Runs entries again with seeds that the search has not seen, and in twins drawn.
+
+    The search keeps the luckiest of many, so that its own runs flatter what it finds: what counts
+    is runs that had no part in it.
+
+    Args:
+        hunt: what was searched.
+        found: entries, whose shares are set.
+        start_m2: mean scatter of the start.
+        runs: of each, with fresh seeds, and again with models drawn, if the model knows its errors.
+        tell: is given how many of all passes are done.
+    """
     first = hunt.request.first_seed + hunt.request.seeds
-    rows = hunt.run([entry.mix for entry in chosen], range(first, first + runs))
+    mixes = [entry.mix for entry in found]
+    draws = min(DRAWS, runs) if knows_errors(hunt.request) else 0
+    shares = _shares(hunt, found, hunt.run(mixes, range(first, first + runs)), start_m2)
+    tell(1, 1 + draws)
+    for entry, share in zip(found, shares, strict=True):
+        entry.share, entry.confirmed = float(share), runs
+    parts = []
+    for k, text in enumerate(drawn_models(hunt.request, draws, hunt.seed) if draws else []):
+        twin = replace(hunt, request=replace(hunt.request, model_text=text))
+        seeds = range(first + runs * (k + 1), first + runs * (k + 1) + -(-runs // draws))
+        parts.append(_shares(hunt, found, twin.run(mixes, seeds), start_m2))
+        tell(2 + k, 1 + draws)
+    for entry, share in zip(found, np.mean(parts, axis=0) if parts else [], strict=bool(parts)):
+        entry.drawn = float(share)
+
+
+def _shares(hunt: Hunt, found: list[Entry], rows: np.ndarray, start_m2: float) -> np.ndarray:
+    """(E,) of each entry's runs that are of its kind."""
     range_m = hunt.request.model.get("sensor.range_m")
-    for entry, part in zip(chosen, rows, strict=True):
-        entry.share = kinds(part, start_m2, range_m).count(entry.kind) / runs
-        entry.confirmed = runs
+    ended = [kinds(part, start_m2, range_m) for part in rows]
+    return np.array(
+        [names.count(e.kind) / len(names) for e, names in zip(found, ended, strict=True)]
+    )
+
+
+def offer(found: list[Entry]) -> list[Entry]:
+    """Names those that hold; by kind, the surest first.
+
+    Returns:
+        Them alone. What does not hold keeps no name.
+    """
+    order = list(KIND_COLORS)
+    offered = [entry for entry in found if entry.holds]
+    offered.sort(
+        key=lambda e: (order.index(e.kind), -min(e.share, e.share if e.drawn is None else e.drawn))
+    )
+    numbers: Counter = Counter()
+    for entry in offered:
+        numbers[entry.kind] += 1
+        entry.name = f"{SLUGS.get(entry.kind, entry.kind)}_{numbers[entry.kind]}"
+    return offered
 
 
 def write_entries(folder: Path, hunt: Hunt, found: list[Entry]) -> None:
@@ -105,6 +164,6 @@ def write_entries(folder: Path, hunt: Hunt, found: list[Entry]) -> None:
     pq.write_table(pa.Table.from_pylist(rows), fresh, compression="zstd")
     fresh.replace(folder / "archive.parquet")
     lines = ["# Found by twinmill discover: speed and turn for nothing seen, then for seen."]
-    for entry in found:
+    for entry in filter(lambda entry: entry.name, found):
         lines += [f'{name} = "{table_text(row)}"' for name, row in entry.mix.tables(entry.name)]
     write_whole(folder / NAME, "\n".join(lines) + "\n")

@@ -90,7 +90,7 @@ def forecast(
         tell(done, planned)
 
     counts = []
-    for k, text in enumerate(_texts(request, count, seed)):
+    for k, text in enumerate(drawn_models(request, count, seed)):
         first = request.first_seed + request.world_count + k * len(points) * seeds
         asked = replace(request, model_text=text, seeds=seeds, first_seed=first)
         place = folder / asked.sha256[:16]
@@ -103,8 +103,12 @@ def _file(request: Request) -> ModelFile:
     return ModelFile(Path(request.model_name), request.model_text, request.model)
 
 
-def _texts(request: Request, count: int, seed: int) -> list[str]:
-    """Model files, the numbers in them drawn."""
+def drawn_models(request: Request, count: int, seed: int) -> list[str]:
+    """Texts of model files like the request's, their numbers drawn from its uncertainty.
+
+    Raises:
+        ValueError: it says nothing of the errors of its numbers, or hardly any draw is in bounds.
+    """
     file = _file(request)
     known = ranges(file, file.model, count, seed)
     kept = [(i, q.name) for i, q in enumerate(known.quantities) if q.source != "robots"]
