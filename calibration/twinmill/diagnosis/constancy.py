@@ -12,7 +12,7 @@ import numpy as np
 
 from twinmill.data.track import command_at
 from twinmill.diagnosis.search import Trial
-from twinmill.model.parameters import effect_names
+from twinmill.model.parameters import Parameter, effect_names
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
@@ -29,7 +29,7 @@ class Change:
     Attributes:
         parameter: its name.
         on: what it changes with.
-        relative: change per standard deviation of that, over the parameter's distance from neutral.
+        relative: change per standard deviation of that, over the effect's distance from neutral.
         evidence: fall of the cost.
     """
 
@@ -126,7 +126,7 @@ def _change(
     away = values - information @ values
     spread = float(np.sqrt(information @ away**2))
     parameter = fit.unknowns[c].parameter
-    size = abs(fit.x[c] - parameter.usual)
+    size = _size(trial, parameter)
     if spread < 1e-9 or size < 1e-9:
         return None
     companion = np.concatenate([own * away / spread, np.zeros(len(fit.x))])
@@ -139,3 +139,13 @@ def _change(
     change = Change(parameter.name, on, -total / energy / size, total**2 / energy)
     proven = change.evidence >= EVIDENCE and abs(total) >= BLOCKS_T * error
     return change if proven and abs(change.relative) >= RELATIVE else None
+
+
+def _size(trial: Trial, parameter: Parameter) -> float:
+    """Distance from neutral of the effect's largest parameter of this unit."""
+    instance, away = parameter.name.split(".")[0], []
+    for u, value in zip(trial.fit.unknowns, trial.fit.x, strict=True):
+        p = u.parameter
+        if p.name.split(".")[0] == instance and (p.role, p.unit) == ("size", parameter.unit):
+            away.append(abs(value - p.usual))
+    return max(away)

@@ -218,3 +218,12 @@ def test_a_robot_without_heading_gets_a_report_with_what_was_noted(imported, mod
     page = write_report(tmp_path / "r", section.title, Provenance("", "", ""), [section])
     text = page.read_text()
     assert "heading is not recorded" in text and "When it fails" in text
+
+
+def test_the_model_that_comes_along_names_the_weak_robot_too(imported):
+    """Its table has duties that nobody drove: columns without any effect."""
+    found = diagnose(
+        imported("fleet_weak_left", "sorted", same_clock=True), ModelFile.load("turbopi.toml")
+    )
+    assert [r.robot_id for r in found.robots_off] == [3]
+    assert "left wheels 8 % weak" in found.sentence
