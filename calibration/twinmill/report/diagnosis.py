@@ -118,6 +118,25 @@ def robots_off(diagnosis: Diagnosis) -> Table:
     )
 
 
+def moments(diagnosis: Diagnosis) -> Table:
+    """Events that neither commands nor findings explain."""
+    rows = [
+        [
+            Cell(f"{m.log} R{m.robot_id:02d}"),
+            Cell(f"{m.t_s:.1f}"),
+            Cell(f"{100 * m.way:.0f} %"),
+        ]
+        for m in diagnosis.rest.moments
+    ]
+    return Table(
+        "Single moments",
+        ["log", "time\ns", "of the\nway"],
+        rows,
+        "At these a robot went only a part of the way predicted for the next half second, or more.",
+        words=(0,),
+    )
+
+
 def lines(diagnosis: Diagnosis) -> list[str]:
     """What the tables do not say."""
     told = list(diagnosis.notes)
@@ -210,6 +229,7 @@ def _tables(diagnosis: Diagnosis) -> list[Table]:
     made = (
         findings(diagnosis),
         robots_off(diagnosis),
+        moments(diagnosis),
         ranking(diagnosis),
         unseen(diagnosis),
     )
