@@ -57,5 +57,8 @@ def _open(
     session.read()
     bench = Bench(session, StateFile(state or state_path(logs, model)))
     serve(
-        bench, port, not no_browser, lambda url: typer.echo(f"Workbench: {url}  (Ctrl-C ends it)")
+        bench,
+        port,
+        not no_browser,
+        lambda url: print(f"Workbench: {url}  (Ctrl-C ends it)", flush=True),
     )

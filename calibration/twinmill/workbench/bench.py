@@ -38,7 +38,7 @@ class Bench:
 
     Attributes:
         changes: counts by what has changed: `robots`, `model`, `prediction`, `score`, `work`,
-            `progress`, `findings`.
+            `findings`.
         opening: what is being opened, in words; empty when all is there.
         failure: what went wrong last.
         view: what the screen shows: cursor, stretch, robot, tab.
@@ -51,7 +51,7 @@ class Bench:
         self.opening, self.failure = "starting", ""
         self.view: dict[str, Any] = state.read("view", {})
         self._waiting: Work | None = None
-        self._written = ""
+        self._written: tuple = ()
         session.restore(state.read("session", {}))
 
     # -- opening --------------------------------------------------------------------------------
@@ -90,6 +90,7 @@ class Bench:
     async def act(self, act: Callable[..., None], *arguments: Any) -> None:
         """Does what moves the session to another model."""
         await asyncio.to_thread(act, *arguments)
+        await asyncio.to_thread(self.session.own_scores)
         self.changed("model", "score", "prediction")
 
     # -- long work ------------------------------------------------------------------------------
@@ -125,8 +126,6 @@ class Bench:
         if done := self.worker.poll():
             self._take(done)
         self._next()
-        if self.doing:
-            self.changed("progress")
         self._write()
 
     def _take(self, done: Done) -> None:
@@ -152,11 +151,11 @@ class Bench:
     # -- state ----------------------------------------------------------------------------------
 
     def _write(self) -> None:
-        data = plain({"view": self.view, "session": self.session.to_json()})
-        text = json.dumps(data, allow_nan=False)
-        if text != self._written:
-            self.state.write(text)
-            self._written = text
+        now = (sum(self.changes.values()), json.dumps(self.view), sorted(self.session.held))
+        if now != self._written:
+            data = plain({"view": self.view, "session": self.session.to_json()})
+            self.state.write(json.dumps(data, allow_nan=False))
+            self._written = now
 
     def close(self) -> None:
         """Ends the worker; keeps the state."""

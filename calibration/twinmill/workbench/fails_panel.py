@@ -67,6 +67,7 @@ def _chart(regimes: list[Regime]) -> dict:
         "xAxis": {
             "type": "log",
             "min": low,
+            "startValue": low,
             "name": "error over noise (share of all error)",
             "nameLocation": "middle",
             "nameGap": 22,

@@ -157,9 +157,11 @@ class Screen:
         self._seen = Counter(changes)
         if "robots" in new:
             self._draw_robots()
+        elif new & {"model"}:
+            self._name_robots()
         if "prediction" in new and "robots" not in new:
             self.javascript("twinmill.predict()")
-        if new & {"work", "progress"}:
+        if "work" in new or self.bench.doing:
             self._draw_status()
         if new & {"score", "model", "robots"}:
             self._draw_score()
@@ -169,17 +171,14 @@ class Screen:
             self.models.draw()
         if new & {"findings", "model", "work"}:
             self.missing.draw()
-        elif "progress" in new:
+        elif self.bench.doing:
             self.missing.draw_progress()
         if new & {"prediction", "robots", "model"}:
             self.fails.draw()
 
     def _draw_robots(self) -> None:
         session, picked = self.bench.session, self.bench.picked
-        several = len(session.paths) > 1
-        labels = [m.label if several else m.label[-3:] for m in session.measurements]
-        self.robot.set_options(dict(enumerate(labels)) if session.robots else {})
-        self.robot.set_value(picked if session.robots else None)
+        self._name_robots()
         self.robot.set_visibility(len(session.robots) > 1)
         place = self.bench.log_of(picked)
         self.log.set_value(place)
@@ -191,6 +190,15 @@ class Screen:
             label = json.dumps(session.measurements[picked].label)
             code += f"await twinmill.pick({label}, {picked});"
         self.javascript(f"(async () => {{ {code} }})()")
+
+    def _name_robots(self) -> None:
+        """Each with its score."""
+        session, picked = self.bench.session, self.bench.picked
+        several = len(session.paths) > 1
+        names = [m.label if several else m.label[-3:] for m in session.measurements]
+        scores = session.own_scores() if session.robots else []
+        labels = [f"{n} · {scored(s)}" for n, s in zip(names, scores, strict=False)]
+        self.robot.set_options(dict(enumerate(labels)), value=picked if labels else None)
 
     def _draw_status(self) -> None:
         bench = self.bench
@@ -205,13 +213,15 @@ class Screen:
 
     def _draw_score(self) -> None:
         session = self.bench.session
-        shown, exact = None, True
+        known = session.tree.scores.get(session.tree.current.number)
         if session.robots and session.dragging:
-            shown, exact = session.score(self.bench.picked), False
-        elif known := session.tree.scores.get(session.tree.current.number):
-            shown, exact = known.fitted, known.exact
-        self.score.set_text(f"{'' if exact else '≈ '}{scored(shown)}")
-        self.score.classes(replace=tone(shown)).style("font-size: 19px; font-weight: 700")
+            self._say_score(session.score(self.bench.picked), False)
+        elif known:
+            self._say_score(known.fitted, known.exact)
         self.undo.set_enabled(session.tree.can_undo)
         self.redo.set_enabled(session.tree.can_redo)
         self._draw_status()
+
+    def _say_score(self, score: float, exact: bool) -> None:
+        self.score.set_text(f"{'' if exact else '≈ '}{scored(score)}")
+        self.score.classes(replace=tone(score))

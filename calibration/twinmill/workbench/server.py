@@ -7,6 +7,7 @@ import secrets
 import socket
 import webbrowser
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from fastapi import Request
@@ -20,6 +21,7 @@ from twinmill.workbench.screen import Screen
 HOST = "127.0.0.1"
 STATIC = Path(__file__).parent / "static"
 TICK_S = 0.1
+LISTEN_S = 0.02  # between looks whether the server listens
 TOLD_S = 1.0  # for a page to say why the server ends
 
 
@@ -43,10 +45,14 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
     _add_page(bench)
 
     async def begin() -> None:
+        tasks.append(asyncio.create_task(announced()))
+        tasks.append(asyncio.create_task(opened()))
+
+    async def announced() -> None:
+        await _listening(port)
         say(url)
         if show:
             webbrowser.open(url)
-        tasks.append(asyncio.create_task(opened()))
 
     async def opened() -> None:
         try:
@@ -63,17 +69,18 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
     app.on_startup(begin)
     app.timer(TICK_S, bench.tick)
     app.on_shutdown(bench.close)
-    ui.run(
-        host=HOST,
-        port=port,
-        title="Twinmill",
-        favicon=STATIC / "icon.svg",
-        show=False,
-        reload=False,
-        tailwind=False,
-        show_welcome_message=False,
-        reconnect_timeout=10,
-    )
+    with suppress(KeyboardInterrupt):  # the way to end it
+        ui.run(
+            host=HOST,
+            port=port,
+            title="Twinmill",
+            favicon=STATIC / "icon.svg",
+            show=False,
+            reload=False,
+            tailwind=False,
+            show_welcome_message=False,
+            reconnect_timeout=10,
+        )
     if failed:
         raise failed[0]
 
@@ -90,6 +97,16 @@ def _free_port(port: int) -> int:
                 "out."
             ) from error
         return tried.getsockname()[1]
+
+
+async def _listening(port: int) -> None:
+    """Until the server answers."""
+    while True:
+        with suppress(OSError):
+            _, writer = await asyncio.open_connection(HOST, port)
+            writer.close()
+            return
+        await asyncio.sleep(LISTEN_S)
 
 
 def _add_page(bench: Bench) -> None:

@@ -15,7 +15,7 @@ from twinmill.data.log import Log, RobotLog, read_log
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.steady_table import is_sheet
 from twinmill.files import replacing
-from twinmill.fitting.opening import Opened, open_measurements
+from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.model.parameters import CLOCK
 from twinmill.predict.datasets import total_score
@@ -59,6 +59,7 @@ class Session:
         self.held: set[str] = set()
         self.diagnosis: dict | None = None
         self._dragged: dict[str, float] = {}
+        self._own_scores: dict[int, list[float]] = {}
         self._loaded: tuple[object, ModelFile] = (None, self.given)
 
     # -- opening --------------------------------------------------------------------------------
@@ -83,10 +84,7 @@ class Session:
         """Finds clocks and noise floors."""
         opened = open_measurements(self.measurements, self.given)
         self.robots = [RobotView(o) for o in opened]
-        exact = self.tree.current.number == 0
-        self._score_now(exact=exact)
-        if not exact:
-            self.tree.scores.setdefault(0, Score(self._total(opened), exact=True))
+        self._score_now(exact=self.tree.current.number == 0)
 
     def raw(self, index: int) -> RobotLog:
         """What was recorded of a robot that is predicted."""
@@ -209,6 +207,14 @@ class Session:
         own = self.robots[index].opened
         return float("nan") if own.data is None else own.data.score(self.own_model(index))
 
+    def own_scores(self) -> list[float]:
+        """Of each robot where the tree stands; NaN without a floor."""
+        number = self.tree.current.number
+        if number not in self._own_scores:
+            opened = [r.opened.with_model(self.model_file.model) for r in self.robots]
+            self._own_scores[number] = [o.score for o in opened]
+        return self._own_scores[number]
+
     def regimes(self, index: int) -> list[Regime]:
         """Where the model shown fails one robot; none without a floor."""
         view, model = self.robots[index], self.own_model(index)
@@ -225,15 +231,12 @@ class Session:
         worst = np.argmax(np.where(inside & np.isfinite(squares), squares, -1.0))
         return t_s[inside], float(t_s[worst])
 
-    def _total(self, opened: Sequence[Opened]) -> float:
-        known = [s for s in (o.score for o in opened) if np.isfinite(s)]
-        return total_score(known) if known else float("nan")
-
     def _score_now(self, exact: bool = False) -> None:
         """Of all robots where the tree stands, unless it is known."""
         if not self.robots or self.tree.current.number in self.tree.scores:
             return
-        total = self._total([r.opened.with_model(self.model) for r in self.robots])
+        known = [s for s in self.own_scores() if np.isfinite(s)]
+        total = total_score(known) if known else float("nan")
         fitted_here = self.model_file.fitted_on([m.log_sha256 for m in self.measurements])
         heldout = None if fitted_here or self.tree.current.values else total
         self.tree.scores[self.tree.current.number] = Score(total, heldout, exact)

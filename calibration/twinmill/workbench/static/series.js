@@ -7,7 +7,7 @@ import {
 import { rowAt } from "./packed.js";
 
 const LEFT_PX = 46;
-const RIGHT_PX = 10;
+const RIGHT_PX = 16;
 const FOOT_PX = 18;
 const HEAD_PX = 17;
 const DEGREES = 180 / Math.PI;
