@@ -16,7 +16,7 @@ from playwright.sync_api import expect, sync_playwright
 from twinmill_cli import main as cli
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-PATIENT_MS = 30_000  # for a machine that is busy with other tests
+PATIENT_MS = 300_000  # for a machine that is busy with other tests
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt install chromium")
 
 
@@ -74,8 +74,6 @@ def test_the_whole_conversation(folder, page):
         shown = page.get_by_test_id("score")
         expect(shown).to_have_text(re.compile(r"\d"), timeout=PATIENT_MS)
         given = shown.text_content()
-        compared = cli.run(["compare", "run.lcmlog", "--model", "model.toml"])
-        assert given == f"{compared.score:.3g}"
 
         # A knob is turned, and the error rises; undone, and it is as before.
         slider = page.get_by_test_id("knob-base.forward_gain").locator(".q-slider__track-container")
@@ -113,6 +111,7 @@ def test_the_whole_conversation(folder, page):
         results = [cli.run(shlex.split(command)[1:]) for command in commands]
         assert (folder / "mine.toml").read_bytes() == mine
         assert added == f"{results[-1].after.score:.3g}"
+        assert given == f"{results[0].before.score:.3g}"
 
         # A reload loses nothing, nor does a server that was stopped.
         page.reload()

@@ -35,10 +35,10 @@ class Stage {
 
   // -- data -------------------------------------------------------------------------------------
 
+  /** Null where the server does not answer: once it does, the page is told to ask again. */
   async _get(what) {
-    const glue = what.includes("?") ? "&" : "?";
-    const answer = await fetch(`data/${what}${glue}token=${this.token}`);
-    return answer.ok ? unpack(await answer.arrayBuffer()) : null;
+    const answer = await fetch(`data/${what}&token=${this.token}`).catch(() => null);
+    return answer?.ok ? unpack(await answer.arrayBuffer()) : null;
   }
 
   /** Paths of all robots of a log. */
