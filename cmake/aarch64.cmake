@@ -16,6 +16,11 @@ if(NOT IS_DIRECTORY "${TWINMILL_SYSROOT}")
             "scripts/make_sysroot")
 endif()
 set(CMAKE_SYSROOT "${TWINMILL_SYSROOT}")
+# The compiler looks at its own headers and libraries for arm64, where they are installed
+# (libc6-dev-arm64-cross), before those of a sysroot: of another release, the two do not fit together.
+set(CMAKE_C_FLAGS_INIT "-isystem ${TWINMILL_SYSROOT}/usr/include/aarch64-linux-gnu \
+-isystem ${TWINMILL_SYSROOT}/usr/include -B${TWINMILL_SYSROOT}/usr/lib/aarch64-linux-gnu/")
+set(CMAKE_EXE_LINKER_FLAGS_INIT "-L${TWINMILL_SYSROOT}/usr/lib/aarch64-linux-gnu")
 set(CMAKE_FIND_ROOT_PATH "${TWINMILL_SYSROOT}")
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot's program under a real kernel: it drives by what it sees and as a person says."""
 
+import statistics
+
 from rig import BATTERY_REGISTER, PACK_MV, ZERO
-from robot import GREEN, LEFT, RED, RIGHT, SIGNS, Robot
+from robot import FRAME_PERIOD_S, GREEN, LEFT, RED, RIGHT, SIGNS, Robot
 
 # BCM lines of the vendor's board.
 DETECTED_LINE, RUNNING_LINE, BUZZER_LINE = 16, 26, 6
@@ -61,3 +63,20 @@ def test_empty_battery_stops_for_good_and_sounds(rig):
         rig.mend()
         robot.press()
         assert robot.wire() == ZERO
+
+
+def test_duties_follow_a_frame_within_the_time_of_one(rig):
+    """From the frame's first byte into the driver to the fourth wheel's register, guest's clock."""
+    patience = ("--set", "frame_timeout_ms=10000", "--set", "vote_frames=1")
+    with Robot(rig, "--start", *patience) as robot:
+        robot.drive_until(LEFT)
+        delays_s = []
+        for i in range(200):
+            view, wire = ((RED, RIGHT), (GREEN, LEFT))[i % 2]
+            shown_s = robot.show(view)
+            rig.wait(lambda wire=wire: robot.wire() == wire)
+            delays_s.append(rig.duties[-1].t_s - shown_s)
+    delays_ms = sorted(1e3 * delay_s for delay_s in delays_s)
+    median_ms, rare_ms = statistics.median(delays_ms), delays_ms[int(0.99 * len(delays_ms))]
+    print(f"\nhil: frame to last motor byte: median {median_ms:.1f} ms, 99 %: {rare_ms:.1f} ms")
+    assert median_ms < 1e3 * FRAME_PERIOD_S
