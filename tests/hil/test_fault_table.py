@@ -18,7 +18,7 @@ from rig import BUILD, SUITE, SYSTEM_LIMIT_S, ZERO
 from robot import LEFT, PROGRAM, SERVICE, SETTINGS, Robot, Service
 
 BY_SERVICE = os.environ.get("HIL_START") == "service"
-by_hand = pytest.mark.skipif(BY_SERVICE, reason="systemd does this in another way")
+by_hand = pytest.mark.skipif(BY_SERVICE, reason="needs the program's own environment or stderr")
 by_service = pytest.mark.skipif(not BY_SERVICE, reason="the program was started by hand")
 
 # What the program promises while it or its guard lives. The emulator may be slow: SLACK_S.
@@ -66,19 +66,8 @@ def table():
 
 @pytest.fixture(scope="module")
 def guest(request):
-    """What the program runs in; where that is systemd, with the library that makes calls fail."""
-    if not BY_SERVICE:
-        yield request.getfixturevalue("rig")
-        return
-    system = request.getfixturevalue("installed")
-    folder = f"/run/systemd/system/{SERVICE}.d"
-    system.run("/bin/mkdir", "-p", folder)
-    lines = ("[Service]", f"Environment={PRELOAD[0]}", "PrivateTmp=no", "ReadWritePaths=/tmp")
-    system.words("w", f"{folder}/failcalls.conf", "\n".join(lines) + "\n")
-    system.systemctl("daemon-reload")
-    yield system
-    system.run("/bin/rm", "-r", folder)
-    system.systemctl("daemon-reload")
+    """What the program runs in."""
+    return request.getfixturevalue("installed" if BY_SERVICE else "rig")
 
 
 def start(guest, *arguments, environment=(), heard=True):
@@ -198,6 +187,7 @@ def test_messages_that_nobody_reads(guest, drive, table, fault):
     note(table, f"{fault}, stderr full and unread", stands_after(robot, fault_s))
 
 
+@by_hand
 @pytest.mark.parametrize("call", CALLS)
 def test_call_fails(guest, drive, table, call):
     robot = drive(environment=PRELOAD)
@@ -208,6 +198,7 @@ def test_call_fails(guest, drive, table, call):
     robot.drive_until(LEFT)
 
 
+@by_hand
 def test_only_the_driver_cannot_reach_the_board(guest, drive, table):
     robot = drive(*PATIENT, environment=PRELOAD)
     fail(guest, "write", 0, I2C, EREMOTEIO, robot.driver())
@@ -218,6 +209,7 @@ def test_only_the_driver_cannot_reach_the_board(guest, drive, table):
     )
 
 
+@by_hand
 @pytest.mark.parametrize("call", OPENING)
 def test_camera_cannot_be_opened_again(guest, drive, table, call):
     robot = drive(environment=PRELOAD)
