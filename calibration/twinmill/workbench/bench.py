@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from twinmill.diagnosis.detections.add import is_of_camera
 from twinmill.files import plain
 from twinmill.workbench.drawing import commands, measured_path, pack
 from twinmill.workbench.session import Session
@@ -108,18 +109,24 @@ class Bench:
             return "waiting for the logs"
         return f"{self.worker.words} · {self.worker.for_s:.0f} s"
 
-    def start(self, kind: str, effect: str = "") -> None:
+    async def start(self, kind: str, effect: str = "") -> None:
         """A fit, an addition or a diagnosis of the model where the tree stands."""
         self.failure = ""
-        self._waiting = self.session.work(kind, effect)
+        self._waiting = work = self.session.work(kind, effect)
         self.changed("work")
         self._next()
+        if kind != "diagnose" and not (effect and is_of_camera(effect)):
+            await asyncio.to_thread(self.session.foresee, effect)
+            if self.doing is not work:  # done or cancelled before
+                self.session.forget()
+            self.changed("score", "prediction")
 
     def cancel(self) -> None:
         """Stops it."""
         self._waiting = None
         self.worker.cancel()
-        self.changed("work")
+        self.session.forget()
+        self.changed("work", "score", "prediction")
 
     def tick(self) -> None:
         """To be called a few times a second."""
@@ -131,6 +138,7 @@ class Bench:
     def _take(self, done: Done) -> None:
         if done.failure:
             self.failure = done.failure
+            self.session.forget()
         elif done.work.kind != "read":
             self.session.take(done)
         news = {"diagnose": ["findings"], "compare": ["score"], "read": []}

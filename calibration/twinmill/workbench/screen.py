@@ -214,7 +214,7 @@ class Screen:
     def _draw_score(self) -> None:
         session = self.bench.session
         known = session.tree.scores.get(session.tree.current.number)
-        if session.robots and session.dragging:
+        if session.robots and session.is_passing:
             self._say_score(session.score(self.bench.picked), False)
         elif known:
             self._say_score(known.fitted, known.exact)

@@ -5,6 +5,7 @@ import asyncio
 import json
 import secrets
 import socket
+import sys
 import webbrowser
 from collections.abc import Callable
 from contextlib import suppress
@@ -21,6 +22,7 @@ from twinmill.workbench.screen import Screen
 HOST = "127.0.0.1"
 STATIC = Path(__file__).parent / "static"
 TICK_S = 0.1
+SWITCH_S = 5e-4  # threads hand over so often: pages do not wait for the work of others
 LISTEN_S = 0.02  # between looks whether the server listens
 TOLD_S = 1.0  # for a page to say why the server ends
 
@@ -37,6 +39,7 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
     Raises:
         ValueError: the port is taken, or the logs cannot be judged.
     """
+    sys.setswitchinterval(SWITCH_S)
     port = _free_port(port)
     url = f"http://{HOST}:{port}/?token={bench.state.token}"
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])

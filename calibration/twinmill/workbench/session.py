@@ -15,9 +15,18 @@ from twinmill.data.log import Log, RobotLog, read_log
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.steady_table import is_sheet
 from twinmill.files import replacing
+from twinmill.fitting.fit import base_names
 from twinmill.fitting.opening import open_measurements
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelError, ModelFile
-from twinmill.model.parameters import CLOCK
+from twinmill.model.parameters import (
+    CLOCK,
+    Parameter,
+    all_effect_parameters,
+    base_parameters,
+    effect_names,
+    effect_parameters,
+)
 from twinmill.predict.datasets import total_score
 from twinmill.predict.regimes import HORIZON, Regime, where_it_fails
 from twinmill.workbench.drawing import Arrays, RobotView
@@ -59,6 +68,7 @@ class Session:
         self.held: set[str] = set()
         self.diagnosis: dict | None = None
         self._dragged: dict[str, float] = {}
+        self._foreseen: native.Model | None = None
         self._own_scores: dict[int, list[float]] = {}
         self._loaded: tuple[object, ModelFile] = (None, self.given)
 
@@ -110,18 +120,19 @@ class Session:
 
     @property
     def model(self) -> native.Model:
-        """The model shown: where the tree stands, and what a hand drags away from it."""
+        """The model shown: where the tree stands or a fit will come to, as a hand drags it."""
+        shown = self._foreseen or self.model_file.model
         if not self._dragged:
-            return self.model_file.model
-        model = self.model_file.model.copy()
+            return shown
+        model = shown.copy()
         for name, value in self._dragged.items():
             model.set(name, value)
         return model
 
     @property
-    def dragging(self) -> bool:
-        """Whether a hand holds a knob."""
-        return bool(self._dragged)
+    def is_passing(self) -> bool:
+        """Whether the model shown is not in the tree: a hand holds a knob, or a fit goes on."""
+        return bool(self._dragged) or self._foreseen is not None
 
     def knobs(self) -> list[Knob]:
         """Of the model where the tree stands."""
@@ -147,10 +158,40 @@ class Session:
     def keep(self) -> None:
         """Makes what was dragged a model of its own."""
         values = {n: v for n, v in self._dragged.items() if v != self.model_file.model.get(n)}
-        self._dragged = {}
+        self.forget()
         if values:
             self.tree.set(values)
             self._score_now()
+
+    def forget(self) -> None:
+        """Shows the model where the tree stands."""
+        self._dragged, self._foreseen = {}, None
+
+    def foresee(self, effect: str) -> None:
+        """Shows about what a fit, or the addition of an effect, will come to.
+
+        Two steps of the fit to the robots that are judged; the worker's answer takes its place.
+        """
+        model = self.model_file.model.copy()
+        free = [p for p in self._free(model) if p.name not in self.held]
+        fresh = []
+        if effect:
+            model.add_effect(effect, {})
+            fresh = effect_parameters(model, effect_names(model)[-1], fresh=True)
+        known = [r.opened.with_model(model) for r in self.robots if r.opened.data is not None]
+        fit = ScoreFit([o.data for o in known], [o.model for o in known], [*free, *fresh])
+        if fresh:
+            fit.begin_at_best(len(fresh))
+        fit.fit(rounds=2)
+        for p in fit.shared_values:
+            model.set(p.name, p.value)
+        self._foreseen = model
+
+    def _free(self, model: native.Model) -> list[Parameter]:
+        """What a fit of these logs moves."""
+        opened = [r.opened for r in self.robots if r.opened.data is not None]
+        base = base_parameters(model, base_names(model, opened))
+        return [*base, *all_effect_parameters(model)]
 
     def set(self, name: str, value: float) -> None:
         """Both at once."""
@@ -159,17 +200,17 @@ class Session:
 
     def undo(self) -> None:
         """To the model before."""
-        self._dragged = {}
+        self.forget()
         self.tree.undo()
 
     def redo(self) -> None:
         """Takes an undo back."""
-        self._dragged = {}
+        self.forget()
         self.tree.redo()
 
     def go(self, number: int) -> None:
         """To any model tried."""
-        self._dragged = {}
+        self.forget()
         self.tree.go(number)
 
     def save(self, path: Path) -> list[str]:
@@ -271,7 +312,7 @@ class Session:
     def _grow(self, work: Work, result: Mapping, text: str) -> None:
         label = f"+ {work.effect}" if work.effect else "fitted"
         made = self.tree.add(work.of, work.words, label, text)
-        self._dragged = {}
+        self.forget()
         score = result.get("score_after")
         if score is not None:
             self.tree.scores[made.number] = Score(score, result.get("heldout_after"), True)

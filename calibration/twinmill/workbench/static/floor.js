@@ -21,15 +21,21 @@ export class Floor {
 
   show(robots) {
     this.robots = robots;
-    this.bounds = this._bounds();
+    this.frame(...this.stage.span);
     this.zoom = 1;
     this.centre = null;
   }
 
-  _bounds() {
+  /** What is driven in a stretch of time fills the sheet. */
+  frame(from_s, to_s) {
+    this.bounds = this._bounds(from_s, to_s);
+  }
+
+  _bounds(from_s, to_s) {
     let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
     for (const { path } of this.robots) {
-      for (let k = 0; k < path.rows; k++) {
+      const last = rowAt(path, to_s);
+      for (let k = Math.max(rowAt(path, from_s), 0); k <= last; k++) {
         const x = path.data[4 * k + 1];
         const y = path.data[4 * k + 2];
         if (Number.isNaN(x)) continue;

@@ -130,6 +130,7 @@ class Stage {
     const length = Math.min(Math.max(b - a, SHORTEST_S), this.end_s);
     const from = Math.min(Math.max(a, 0), this.end_s - length);
     this.span = [from, from + length];
+    this.floor.frame(...this.span);
     this.redraw();
     this._remember();
   }
