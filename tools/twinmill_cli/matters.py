@@ -19,7 +19,9 @@ if working():  # not for --help
     import hashlib
     import json
 
+    import pyarrow as pa
     from rich.console import Group, RenderableType
+    from rich.progress import Progress
     from rich.text import Text
 
     from twinmill.diagnosis.diagnose import diagnose
@@ -30,9 +32,13 @@ if working():  # not for --help
     from twinmill.swarm.classes import check_goal, goal_of
     from twinmill.swarm.matters.changes import subjects
     from twinmill.swarm.matters.hidden import Hidden, hidden_effects, unseen_effects
-    from twinmill.swarm.matters.judge import MATTERS, NOTHING, UNSURE, Matters, judge
+    from twinmill.swarm.matters.judge import MATTERS, NOTHING, UNSURE, Matters, folder_of, judge
+    from twinmill.swarm.matters.maps import map_requests
     from twinmill.swarm.matters.sentences import headline, next_step, sentence, to_json
-    from twinmill.swarm.sweep import make_request, progress_bar
+    from twinmill.swarm.phase import phase_of
+    from twinmill.swarm.request import Request
+    from twinmill.swarm.store import read_sweep
+    from twinmill.swarm.sweep import make_request, progress_bar, run_missing
     from twinmill_cli.frame import load, provenance
 
 SHOWN = 12  # sentences in the terminal
@@ -69,6 +75,13 @@ def _matters(
     draws: Annotated[
         int, typer.Option("--draws", min=0, help="Models drawn from what the fits leave open.")
     ] = 20,
+    x: Annotated[
+        str, typer.Option("--x", help="Axis of the phase diagrams, as of twin_sweep.")
+    ] = "n=4:8:5",
+    y: Annotated[str, typer.Option("--y", help="The other axis.")] = "range_m=0.8:1.4:4",
+    map_seeds: Annotated[
+        int, typer.Option("--map-seeds", min=0, help="Runs of each of their cells; 0: none.")
+    ] = 12,
     only: Annotated[
         list[str] | None, typer.Option("--only", help="An effect or number; else all are tried.")
     ] = None,
@@ -97,6 +110,7 @@ def _matters(
         spread_m=spread_m,
         full=True,
     )
+    axes = make_request(behavior, model, [x, y], n=n, start=start, spread_m=spread_m).axes
     wanted = check_goal(goal) if goal else goal_of(request)
     model_file = ModelFile.load(model)
     source = provenance(_command_line(locals()), model_file)
@@ -115,7 +129,12 @@ def _matters(
                 folder,
                 lambda done, planned: progress.update(task, completed=done, total=planned),
             )
-    section = present.section(found) if out else None
+            asked_maps = map_requests(found, axes, map_seeds) if out else {}
+            maps = {
+                name: phase_of(asked, _table(asked, folder, progress), wanted)
+                for name, asked in asked_maps.items()
+            }
+    section = present.section(found, maps) if out else None
     report = write_report(out, section.title, source, [section], present.NOTE) if out else None
     data = {**to_json(found), **source.to_json(), "report": str(report) if report else None}
     deliver(data, _terminal(found, report), as_json)
@@ -145,14 +164,23 @@ def _hidden(logs: list[Path], model_file: ModelFile, folder: Path, as_json: bool
     return found
 
 
+def _table(request: Request, folder: Path, progress: Progress) -> pa.Table:
+    """Rows of a sweep, with a bar of its own."""
+    place = folder_of(request, folder)
+    task = progress.add_task("phase diagrams", total=request.world_count)
+    run_missing(request, place, lambda worlds: progress.advance(task, worlds))
+    progress.remove_task(task)
+    return read_sweep(place)[1]
+
+
 def _command_line(given: dict) -> str:
     """The command that does this again."""
     words = ["twinmill", "matters", *map(str, given["logs"] or [])]
     for name in ("model", "behavior", "goal", "n"):
         words += [f"--{name}", str(given[name])] if given[name] is not None else []
-    for name in ("seeds", "first_seed", "duration_s", "spread_m", "margin", "draws"):
+    for name in ("seeds", "first_seed", "duration_s", "spread_m", "margin", "draws", "map_seeds"):
         words += [f"--{name.replace('_', '-')}", f"{given[name]:g}"]
-    words += ["--start", given["start"]]
+    words += ["--start", given["start"], "--x", given["x"], "--y", given["y"]]
     words += [word for name in given["only"] or [] for word in ("--only", name)]
     return shlex.join(words)
 

@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page on what matters for a swarm."""
 
+from dataclasses import replace
+
 import numpy as np
+import twinmill_native as native
 from matplotlib.axes import Axes
 
 from twinmill.report import Figure, Section
 from twinmill.report.canvas import FLOOR, MEASURED, PREDICTED, draw
+from twinmill.report.phase_figures import TRACE_EVERY_S, TRACE_S, maps_figure, paint_paths
 from twinmill.report.tables import Cell, Table, Tone, number
-from twinmill.swarm.matters.judge import (
-    MATTERS,
-    NOTHING,
-    UNSURE,
-    Judged,
-    Matters,
-)
-from twinmill.swarm.matters.sentences import headline, next_step, sentence
+from twinmill.swarm.matters.judge import MATTERS, NOTHING, UNSURE, Judged, Matters
+from twinmill.swarm.matters.sentences import headline, label, next_step, sentence
+from twinmill.swarm.phase import Phase
 
 NOTE = (
     "Each change is made alone, and the same random starts and robots are run before and after it. "
@@ -32,10 +31,16 @@ KINDS = {
     "robots": "differences of robots",
 }
 BARS = 16  # of the figure
+PAIRS = 3  # of runs shown before and after
 
 
-def section(found: Matters) -> Section:
-    """Everything on one page."""
+def section(found: Matters, maps: dict[str, Phase]) -> Section:
+    """Everything on one page.
+
+    Args:
+        found: the answers.
+        maps: phase diagrams, of the model as it is first; may be none.
+    """
     share, low, high = found.before
     request = found.request
     counts = {v: len(found.of(v)) for v in (MATTERS, UNSURE, NOTHING)}
@@ -58,7 +63,7 @@ def section(found: Matters) -> Section:
             ("interval", f"{100 * low:.0f} to {100 * high:.0f} % of runs end '{found.goal}'"),
             ("circliness, radius, time to form", _medians(found)),
         ],
-        figures=[share_figure(found)],
+        figures=[share_figure(found), *_turned_figure(found), *_maps_figure(maps)],
         tables=_tables(found),
         next_step=next_step(found),
     )
@@ -87,7 +92,7 @@ def share_figure(found: Matters) -> Figure:
         margin = 100 * found.margin
         axes.axvspan(share - margin, share + margin, color=MEASURED, alpha=0.06, lw=0)
         axes.set(xlim=(-2, 102), ylim=(-0.6, len(shown) - 0.4), yticks=range(len(shown)))
-        axes.set_yticklabels([_label(judged) for judged in reversed(shown)], fontsize=7.5)
+        axes.set_yticklabels([label(judged) for judged in reversed(shown)], fontsize=7.5)
         axes.set_xlabel(f"runs that end '{found.goal}' (%)")
 
     return Figure(
@@ -99,18 +104,48 @@ def share_figure(found: Matters) -> Figure:
     )
 
 
-def _label(judged: Judged) -> str:
-    subject = judged.subject
-    if subject.kind == "effect":
-        return f"{subject.name} left out"
-    if subject.kind == "hidden":
-        return f"{subject.name}, not excluded"
-    if subject.kind == "robots":
-        return "robots all alike"
-    if subject.about == "one robot without it":
-        return f"one robot without {subject.name}"
-    what = judged.worst.change.what
-    return what if subject.kind == "parameter" else what.partition(" (")[0]
+def _turned_figure(found: Matters) -> list[Figure]:
+    """One run before and after each of the changes that matter most."""
+    picked = [j for j in found.of(MATTERS, UNSURE) if j.worst.turned is not None][:PAIRS]
+    if not picked:
+        return []
+
+    def paint(panels) -> None:
+        for pair, judged in zip(panels.T, picked, strict=True):
+            outcome = judged.worst
+            for axes, text in zip(
+                pair, (found.request.model_text, outcome.change.text), strict=True
+            ):
+                cell = replace(found.request, model_text=text).cell(())
+                length_s = found.request.duration_s
+                trace = native.trace_world(cell, outcome.turned, length_s, TRACE_EVERY_S)
+                paint_paths(axes, trace[-int(TRACE_S / TRACE_EVERY_S) :], FLOOR)
+            pair[0].set_title(f"{label(judged)}\nbefore", fontsize=7.5)
+            pair[1].set_title("after", fontsize=7.5)
+
+    return [
+        Figure(
+            draw(3.9, paint, nrows=2, ncols=len(picked), squeeze=False),
+            "One run before and after",
+            f"The last {TRACE_S:.0f} s of a run with the same seed, that the change turns; dots "
+            "are the robots at the end, the bar is 1 m.",
+        )
+    ]
+
+
+def _maps_figure(maps: dict[str, Phase]) -> list[Figure]:
+    if not maps:
+        return []
+    phase = next(iter(maps.values()))
+    return [
+        maps_figure(
+            maps,
+            "Phase diagram before and after",
+            f"The most frequent class of {phase.seeds} runs in each cell, and its share in "
+            "percent. Hatched: no class has more than half of the runs beyond doubt (95 %). The first "
+            "is of the model as it is, the others after one change each.",
+        )
+    ]
 
 
 def _tables(found: Matters) -> list[Table]:

@@ -17,6 +17,7 @@ from twinmill.swarm.phase import CLASSES, Phase
 TRACE_S, TRACE_EVERY_S = 8.0, 0.1
 MOST_NUMBERS = 150  # cells beyond which numbers in them cannot be read
 DARK = "#222222"
+MAPS_ACROSS = 2
 
 
 def _edges(values: tuple[float, ...]) -> np.ndarray:
@@ -76,20 +77,7 @@ def map_figure(
     cells, x, y = _grid(phase, at)
 
     def paint(axes: Axes) -> None:
-        for r, row in enumerate(cells):
-            for c, cell in enumerate(row):
-                _paint_cell(axes, phase, cell, (x[c], y[r]), (x[c + 1] - x[c], y[r + 1] - y[r]))
-                if cells.size <= MOST_NUMBERS:
-                    axes.text(
-                        (x[c] + x[c + 1]) / 2,
-                        (y[r] + y[r + 1]) / 2,
-                        f"{100 * phase.share[cell].max():.0f}",
-                        ha="center",
-                        va="center",
-                        fontsize=7,
-                        color=DARK,
-                    )
-        axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+        _paint_cells(axes, phase, (cells, x, y))
         _mark(axes, phase, cells, runs, worth)
         _label(axes, phase)
         seen = {CLASSES.index(run.observed) for run in runs if run.observed in CLASSES}
@@ -112,6 +100,51 @@ def map_figure(
         "the paler, the less sure. Hatched: no class has more than half of the runs beyond doubt "
         f"(95 %).{marks}{slice_words(phase, at)}",
     )
+
+
+def maps_figure(phases: dict[str, Phase], title: str, caption: str) -> Figure:
+    """Maps of the same cells side by side, under their names."""
+    first = next(iter(phases.values()))
+    cells, x, y = _grid(first, {})
+    rows = -(-len(phases) // MAPS_ACROSS)
+
+    def paint(panels) -> None:
+        for axes in panels.flat[len(phases) :]:
+            axes.set_axis_off()
+        for axes, (name, phase) in zip(panels.flat, phases.items(), strict=False):
+            _paint_cells(axes, phase, (cells, x, y))
+            _label(axes, phase)
+            axes.set_title(name, fontsize=8)
+        shown = sorted({k for phase in phases.values() for k in phase.mode[cells.flat].tolist()})
+        panels.flat[0].figure.legend(
+            handles=[Patch(color=COLORS[CLASSES[k]], label=CLASSES[k]) for k in shown],
+            loc="outside upper left",
+            ncols=5,
+            columnspacing=1.2,
+            handlelength=1.2,
+        )
+
+    height = 2.3 * rows + 0.4
+    return Figure(draw(height, paint, nrows=rows, ncols=MAPS_ACROSS, squeeze=False), title, caption)
+
+
+def _paint_cells(axes: Axes, phase: Phase, grid: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+    """Classes and their shares."""
+    cells, x, y = grid
+    for r, row in enumerate(cells):
+        for c, cell in enumerate(row):
+            _paint_cell(axes, phase, cell, (x[c], y[r]), (x[c + 1] - x[c], y[r + 1] - y[r]))
+            if cells.size <= MOST_NUMBERS:
+                axes.text(
+                    (x[c] + x[c + 1]) / 2,
+                    (y[r] + y[r + 1]) / 2,
+                    f"{100 * phase.share[cell].max():.0f}",
+                    ha="center",
+                    va="center",
+                    fontsize=7,
+                    color=DARK,
+                )
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
 
 
 def _paint_cell(

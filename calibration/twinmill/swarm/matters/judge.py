@@ -32,6 +32,7 @@ class Outcome:
         metrics: medians of METRICS, by name.
         sure: no chance makes this change of the share, all changes together.
         seeds: runs before and after it.
+        turned: seed of a run that the change turns, as most that it turns; None: it turns none.
     """
 
     change: Change
@@ -39,6 +40,7 @@ class Outcome:
     metrics: dict[str, Difference]
     sure: bool
     seeds: int
+    turned: int | None
 
     def to_json(self) -> dict:
         """Plain values, without the model's text."""
@@ -222,7 +224,10 @@ def _outcome(before: pa.Table, after: pa.Table, change: Change, goal: str, level
     }
     strict = share_difference(was, now, level)
     sure = bool(strict.low > 0 or strict.high < 0)
-    return Outcome(change, share_difference(was, now), metrics, sure, len(was))
+    plain = share_difference(was, now)
+    turned = np.flatnonzero(was & ~now if plain.change <= 0 else ~was & now)
+    seed = before["seed"].to_pylist()[turned[0]] if len(turned) else None
+    return Outcome(change, plain, metrics, sure, len(was), seed)
 
 
 def _values(table: pa.Table, name: str, hits: np.ndarray) -> np.ndarray:

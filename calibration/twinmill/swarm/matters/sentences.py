@@ -39,6 +39,21 @@ def sentence(judged: Judged) -> str:
     return f"{text} ({points(worst.share)}{_besides(worst)})."
 
 
+def label(judged: Judged) -> str:
+    """What was changed, in few words."""
+    subject = judged.subject
+    if subject.kind == "effect":
+        return f"{subject.name} left out"
+    if subject.kind == "hidden":
+        return f"{subject.name}, not excluded"
+    if subject.kind == "robots":
+        return "robots all alike"
+    if subject.about == "one robot without it":
+        return f"one robot without {subject.name}"
+    what = judged.worst.change.what
+    return what if subject.kind == "parameter" else what.partition(" (")[0]
+
+
 def headline(found: Matters) -> str:
     """The whole in one or two sentences."""
     share, low, high = found.before
