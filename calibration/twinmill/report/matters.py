@@ -142,8 +142,8 @@ def _maps_figure(maps: dict[str, Phase]) -> list[Figure]:
             maps,
             "Phase diagram before and after",
             f"The most frequent class of {phase.seeds} runs in each cell, and its share in "
-            "percent. Hatched: no class has more than half of the runs beyond doubt (95 %). The first "
-            "is of the model as it is, the others after one change each.",
+            "percent. Hatched: no class has more than half of the runs beyond doubt (95 %). The "
+            "first is of the model as it is, the others after one change each.",
         )
     ]
 

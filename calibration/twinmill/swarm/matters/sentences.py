@@ -36,7 +36,7 @@ def sentence(judged: Judged) -> str:
         text = f"{_capital(worst.change.what)} {verb}: {before} become {after}"
         if subject.about == "one robot without it":
             text = f"One robot without {subject.name} {verb}: {before} become {after}"
-    return f"{text} ({points(worst.share)}{_besides(worst)})."
+    return f"{text} ({points(worst.share)}, {worst.seeds} runs{_besides(worst)})."
 
 
 def label(judged: Judged) -> str:
