@@ -161,6 +161,7 @@ def test_the_command_tells_the_same_twice_and_goes_on_where_it_was(
     Path("m.toml").write_text(text)
     words = "matters --model m.toml --seeds 40 --duration-s 10 --n 2 --draws 2 --json"
     words += " --only view_angle --only base.forward_gain --only vote --only together"
+    words += " --map-seeds 2 --x n=2:3:2 --y range_m=0.8,1.2"
     told = []
     for out in ("a", "a", "b"):
         run([*words.split(), "--out", out])

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -114,7 +116,7 @@ def _matters(
     wanted = check_goal(goal) if goal else goal_of(request)
     model_file = ModelFile.load(model)
     source = provenance(_command_line(locals()), model_file)
-    with TemporaryDirectory(prefix="twinmill.") as scratch:
+    with TemporaryDirectory(prefix="twinmill.") as scratch, _stoppable(out):
         folder = out or Path(scratch)
         hidden = _hidden(logs or [], model_file, folder, as_json)
         asked, left = subjects(model_file, hidden, draws, first_seed, only or [])
@@ -139,6 +141,21 @@ def _matters(
     data = {**to_json(found), **source.to_json(), "report": str(report) if report else None}
     deliver(data, _terminal(found, report), as_json)
     return found
+
+
+@contextmanager
+def _stoppable(out: Path | None) -> Iterator[None]:
+    """Says on Ctrl-C what is kept."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        kept = (
+            f"what is done is kept in {out}, and the same command goes on from there"
+            if out
+            else "with --out DIR what is done is kept"
+        )
+        typer.echo(f"twinmill: stopped; {kept}.", err=True)
+        raise
 
 
 def _hidden(logs: list[Path], model_file: ModelFile, folder: Path, as_json: bool) -> list[Hidden]:

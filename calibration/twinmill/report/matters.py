@@ -11,7 +11,7 @@ from twinmill.report import Figure, Section
 from twinmill.report.canvas import FLOOR, MEASURED, PREDICTED, draw
 from twinmill.report.phase_figures import TRACE_EVERY_S, TRACE_S, maps_figure, paint_paths
 from twinmill.report.tables import Cell, Table, Tone, number
-from twinmill.swarm.matters.judge import MATTERS, NOTHING, UNSURE, Judged, Matters
+from twinmill.swarm.matters.judge import MATTERS, METRICS, NOTHING, UNSURE, Judged, Matters
 from twinmill.swarm.matters.sentences import headline, label, next_step, sentence
 from twinmill.swarm.phase import Phase
 
@@ -30,7 +30,18 @@ KINDS = {
     "one_robot": "one robot apart from the others",
     "robots": "differences of robots",
 }
+COLUMNS = [
+    "",
+    "change",
+    "share\n%",
+    "95 % of\nchange",
+    "runs",
+    "circliness",
+    "radius\nm",
+    "to form\ns",
+]
 BARS = 16  # of the figure
+TOLD = 12  # sentences
 PAIRS = 3  # of runs shown before and after
 
 
@@ -62,6 +73,7 @@ def section(found: Matters, maps: dict[str, Phase]) -> Section:
             ("margin", f"{100 * found.margin:g} points"),
             ("interval", f"{100 * low:.0f} to {100 * high:.0f} % of runs end '{found.goal}'"),
             ("circliness, radius, time to form", _medians(found)),
+            *((judged.verdict, sentence(judged)) for judged in found.ranked[:TOLD]),
         ],
         figures=[share_figure(found), *_turned_figure(found), *_maps_figure(maps)],
         tables=_tables(found),
@@ -153,8 +165,7 @@ def _tables(found: Matters) -> list[Table]:
     for kind, title in KINDS.items():
         rows = [_row(judged) for judged in found.ranked if judged.subject.kind == kind]
         if rows:
-            columns = ["", "in words", "circliness", "radius m", "time to form s"]
-            made.append(Table(title.capitalize(), columns, rows, words=(0, 1)))
+            made.append(Table(title.capitalize(), COLUMNS, rows, words=(0, 1)))
     if found.left:
         rows = [[Cell(name), Cell(why)] for name, why in found.left]
         made.append(Table("Not tried", ["", "why"], rows, words=(0, 1)))
@@ -162,16 +173,19 @@ def _tables(found: Matters) -> list[Table]:
 
 
 def _row(judged: Judged) -> list[Cell]:
-    metrics = judged.worst.metrics
-    cells = [
-        Cell(
-            f"{number(d.before, 2)} to {number(d.after, 2)}",
-            "" if d.low > 0 or d.high < 0 else "dim",
-        )
-        for d in (metrics[name] for name in ("circliness", "radius_m", "settled_s"))
-    ]
+    """The change that moves the share most; medians that do not move beyond doubt are pale."""
+    worst = judged.worst
+    share = worst.share
+    cells = []
+    for name in METRICS:
+        d = worst.metrics[name]
+        tone: Tone = "" if d.low > 0 or d.high < 0 else "dim"
+        cells.append(Cell(f"{number(d.before, 2)} to {number(d.after, 2)}", tone))
     return [
         Cell(judged.verdict, TONES[judged.verdict]),
-        Cell(sentence(judged)),
+        Cell(label(judged)),
+        Cell(f"{100 * share.before:.0f} to {100 * share.after:.0f}"),
+        Cell(f"{100 * share.low:+.0f} to {100 * share.high:+.0f}", "dim"),
+        Cell(str(worst.seeds)),
         *cells,
     ]
