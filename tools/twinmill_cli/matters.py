@@ -15,7 +15,7 @@ import typer
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Model, Out
-from twinmill_cli.output import AsJson, deliver, telling
+from twinmill_cli.output import AsJson, busy, deliver, telling
 
 if working():  # not for --help
     import hashlib
@@ -119,7 +119,8 @@ def _matters(
     with TemporaryDirectory(prefix="twinmill.") as scratch, _stoppable(out):
         folder = out or Path(scratch)
         hidden = _hidden(logs or [], model_file, folder, as_json)
-        asked, left = subjects(model_file, hidden, draws, first_seed, only or [])
+        with busy("writing the changed models"):
+            asked, left = subjects(model_file, hidden, draws, first_seed, only or [])
         with progress_bar() as progress:
             task = progress.add_task("runs", total=None)
             found = judge(
