@@ -55,7 +55,7 @@ def _open(
     """
     session = Session(logs, model)
     session.read()
-    bench = Bench(session, StateFile(state or state_path(logs, model)))
+    bench = Bench(session, StateFile(state or state_path(logs[0].stem, session.key)))
     serve(
         bench,
         port,

@@ -58,7 +58,7 @@ class _Row:
     def __init__(self, knob: Knob, panel: KnobsPanel) -> None:
         self.name, self.panel = knob.name, panel
         with ui.element("div").classes("knob").props(f'data-testid="knob-{knob.name}"'):
-            with ui.element("div").classes("row"):
+            with ui.element("div").classes("line"):
                 if knob.fitted:
                     self.icon = ui.icon("lock_open").on("click", lambda: panel.toggle(knob.name))
                     self.lock(knob.name in panel.bench.session.held)

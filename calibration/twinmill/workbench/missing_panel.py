@@ -71,7 +71,7 @@ class MissingPanel:
     def _finding(self, finding: dict) -> None:
         effect, share = finding["effect"], finding["share"]
         sure = finding["certainty"] == "sure"
-        with ui.element("div").classes("card").props(f'data-testid="finding-{effect}"'):
+        with ui.element("div").classes("note").props(f'data-testid="finding-{effect}"'):
             with ui.element("div").classes("head"):
                 name = "the base's numbers are stale" if effect == REFIT else effect
                 ui.html(f"<b>{html.escape(name)}</b>", sanitize=False).style("flex: 1")
@@ -89,7 +89,7 @@ class MissingPanel:
                 rivals = finding["group"][1:]
                 ui.label("These logs cannot tell it from:").classes("soft").style("margin-top: 6px")
                 for rival in rivals:
-                    with ui.element("div").classes("row"):
+                    with ui.element("div").classes("line"):
                         ui.label(rival).style("flex: 1")
                         self._add(rival)
             if finding["why"]:
@@ -127,7 +127,7 @@ class MissingPanel:
             return
         with ui.expansion(f"Also tried ({len(others)})").props("dense").style("width: 100%"):
             for r in others:
-                with ui.element("div").classes("row"):
+                with ui.element("div").classes("line"):
                     ui.label(r["effect"]).style("flex: 1")
                     ui.label(f"held out {scored(r['score_heldout'])}").classes(
                         tone(r["score_heldout"])
@@ -144,4 +144,4 @@ def _told(effect: str) -> None:
 
 
 def _card(kind: str, words: str) -> None:
-    ui.html(words, sanitize=False).classes(f"card {kind}")
+    ui.html(words, sanitize=False).classes(f"note {kind}")

@@ -5,6 +5,7 @@ Opened in three stages, each slower than the one before: `read` gives the paths,
 be predicted, `judge` floors and scores.
 """
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -325,12 +326,28 @@ class Session:
             "tree": self.tree.to_json(),
             "held": sorted(self.held),
             "diagnosis": self.diagnosis,
-            "model_sha256": self.given.hash,
+            "key": self.key,
         }
 
+    @property
+    def key(self) -> str:
+        """Hash of the logs that were read, and of the model as given."""
+        words = " ".join([*(log.sha256 for log in self.logs), self.given.hash])
+        return hashlib.sha256(words.encode()).hexdigest()
+
     def restore(self, data: Mapping) -> None:
-        """What `to_json` gave, of the same model."""
-        if data.get("model_sha256") == self.given.hash:
-            self.tree.restore(data["tree"])
-            self.held = set(data["held"])
-            self.diagnosis = data["diagnosis"]
+        """What `to_json` gave, of the same logs and model; nothing is done without data.
+
+        Raises:
+            ModelError: it is of others.
+        """
+        if not data:
+            return
+        if data.get("key") != self.key:
+            raise ModelError(
+                "The session that is kept there is of other logs or another model; name another "
+                "file with --state."
+            )
+        self.tree.restore(data["tree"])
+        self.held = set(data["held"])
+        self.diagnosis = data["diagnosis"]

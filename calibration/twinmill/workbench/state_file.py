@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The file that a session survives in: a reload, a stopped server, a machine switched off."""
 
-import hashlib
 import json
 import os
 import secrets
@@ -11,12 +10,10 @@ from typing import Any
 from twinmill.files import replacing
 
 
-def state_path(logs: list[Path], model: str) -> Path:
-    """Where a session of these logs and this model is kept, unless the user says."""
-    key = "\n".join([*(str(p.resolve()) for p in logs), model])
+def state_path(name: str, key: str) -> Path:
+    """Where a session is kept unless the user says: by the name of its log and its key."""
     home = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local/share")
-    digest = hashlib.sha256(key.encode()).hexdigest()[:12]
-    return home / "twinmill" / "workbench" / f"{logs[0].stem}-{digest}.json"
+    return home / "twinmill" / "workbench" / f"{name}-{key[:12]}.json"
 
 
 class StateFile:

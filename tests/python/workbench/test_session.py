@@ -94,9 +94,17 @@ def test_a_saved_model_is_the_file_that_the_commands_write(session, tmp_path):
 def test_a_session_goes_on_where_it_was_left(session):
     session.set("base.motor_lag_s", 0.08)
     other = Session(session.paths, "model.toml")
+    other.read()
     other.restore(session.to_json())
     assert other.model_file.text == session.model_file.text
     assert other.tree.can_undo
+
+
+def test_a_session_of_another_model_is_not_taken_for_this_one(session):
+    other = Session(session.paths, "turbopi.toml")
+    other.read()
+    with pytest.raises(ModelError, match="another model"):
+        other.restore(session.to_json())
 
 
 def test_the_model_as_given_is_not_saved_again(session):
