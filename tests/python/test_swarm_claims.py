@@ -25,8 +25,7 @@ def test_a_published_claim_holds(name):
     assert claim.count[0] >= claim.count[1] - len(claims.KNOWN_MORE)
     judged = [row for row in claim.rows if row.rule.endswith("deviations") and not row.known]
     off = [float(row.rule.split()[0]) for row in judged] or [0.0]
-    # Squares of standard deviations sum up to chi squared: of few numbers one in a thousand exceeds
-    # 1.5 by chance alone.
+    # Squares of standard deviations sum up to chi squared; one page in a thousand exceeds this.
     most = max(1.5, np.sqrt(chi2.ppf(0.999, len(off)) / len(off)))
     assert np.sqrt(np.mean(np.square(off))) < most
     assert all("<svg" in figure.svg for figure in claim.figures)

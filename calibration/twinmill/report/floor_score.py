@@ -39,9 +39,15 @@ def sentences(found: Score, missing: list[int]) -> list[str]:
     for rival in found.rivals:
         gain = rival.gain
         better = (
-            "better than" if gain.low > 0 else "worse than" if gain.high < 0 else "not told from"
+            "better than"
+            if gain.low > 0
+            else "worse than"
+            if gain.high < 0
+            else "neither better nor worse beyond doubt than"
         )
-        lines.append(f"It is {better} {rival.name}: {_words(gain, sign=True)} nats a run.")
+        lines.append(
+            f"The sealed prediction is {better} {rival.name}: {_words(gain, sign=True)} nats a run."
+        )
     lines += found.misses
     if missing:
         lines.append(

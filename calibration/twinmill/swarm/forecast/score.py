@@ -90,7 +90,7 @@ def score(
     even = np.full(share.shape, 1 / share.shape[1])
     for name, other in (
         ("the sweep's cell, without uncertainty", expected.swept),
-        ("base rate of the sweep", base),
+        ("the base rate of the sweep", base),
         ("all classes alike", even),
     ):
         theirs = np.log(other[cell, seen])
