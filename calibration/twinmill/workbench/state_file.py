@@ -29,7 +29,7 @@ class StateFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             self._data = json.loads(path.read_text()) if path.exists() else {}
         except OSError as error:
             raise ValueError(
