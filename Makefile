@@ -33,9 +33,8 @@ bench: build
 	    $(PYTHON) -m pip install --quiet --no-deps --target .deps/bench \
 	    --requirement benchmarks/requirements.txt && cp benchmarks/requirements.txt .deps/bench; }
 	@cmake --build build --target bench bench_plant bench_sweep >/dev/null
-	@OPENBLAS_NUM_THREADS=1 PYTHONPATH=.deps/bench $(PYTHON) benchmarks/run.py
-	@build/bin/bench_sweep
-	@build/bin/bench_plant
+	@status=0; OPENBLAS_NUM_THREADS=1 PYTHONPATH=.deps/bench $(PYTHON) benchmarks/run.py || status=1; \
+	    build/bin/bench_sweep || status=1; build/bin/bench_plant || status=1; exit $$status
 
 format: build
 	@scripts/lint --fix

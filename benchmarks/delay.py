@@ -31,7 +31,8 @@ def measure(build: Path) -> Iterator[Ratio]:
     period_us = np.full(len(delays_us), PERIOD_US)
     yield paired("frame to duty : period", delays_us, period_us, "us", at_most=1)
     rare_us = float(np.percentile(delays_us, 99))
-    yield single("99 % of them : period", rare_us, PERIOD_US, "us", at_most=1)
+    # No goal: what else the machine does decides it.
+    yield single("99 % of them : period", rare_us, PERIOD_US, "us")
 
 
 def _delays_us(sent_us: np.ndarray, rows: np.ndarray) -> np.ndarray:
