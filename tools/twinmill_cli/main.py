@@ -115,12 +115,12 @@ COMMANDS = (
     (
         "predict-floor",
         "predict_floor",
-        "Choose a sweep's cells that tell most, plan their runs, and seal what is predicted.",
+        "Choose the cells of a sweep that tell most, plan their runs, and seal what is predicted.",
     ),
     (
         "score-floor",
         "score_floor",
-        "Unseal a prediction and score it by what came of the runs.",
+        "Unseal a prediction and score it by what came of the runs, against simpler predictions.",
     ),
     (
         "matters",
