@@ -26,6 +26,7 @@ if working():  # not for --help
     from rich.progress import Progress
     from rich.text import Text
 
+    from twinmill.data.log import read_bytes
     from twinmill.diagnosis.diagnose import diagnose
     from twinmill.files import check_new_folder
     from twinmill.model.model_file import ModelFile, write_whole
@@ -164,7 +165,7 @@ def _hidden(logs: list[Path], model_file: ModelFile, folder: Path, as_json: bool
     if not logs:
         return unseen_effects(model_file.model)
     kept = folder / "hidden.json"
-    hashes = [hashlib.sha256(log.read_bytes()).hexdigest() for log in logs]
+    hashes = [hashlib.sha256(read_bytes(log)).hexdigest() for log in logs]
     key = {"model": model_file.hash, "logs": hashes}
     if kept.exists() and (known := json.loads(kept.read_text()))["of"] == key:
         return [Hidden(**one) for one in known["hidden"]]
