@@ -147,6 +147,12 @@ def test_an_effect_of_physics_is_no_mistake(robot):
     assert _findings([replace(robot, command=weak)]) == []
 
 
+@pytest.mark.parametrize("drive", ["twist", "wheel_speed"])
+def test_a_model_that_is_driven_otherwise_is_named(robot, drive):
+    (found,) = _findings([robot], drive)
+    assert found.fatal and "commands are duties" in found.what and drive in found.evidence
+
+
 def test_units_are_told_from_speeds(robot):
     _one([_with_pose(robot, *(1000 * robot.pose[:, :2]).T)], "in mm", "x_mm")
     _one([_with_pose(robot, theta=np.degrees(robot.pose[:, 2]))], "degrees", "theta_deg")

@@ -12,7 +12,7 @@ from twinmill.data.checks.commands import Subject, check_commands, check_drift
 from twinmill.data.checks.exchange import check_exchange
 from twinmill.data.checks.finding import InputFinding
 from twinmill.data.checks.geometry import body_by_command
-from twinmill.data.checks.series import check_length, check_poses, check_track
+from twinmill.data.checks.series import check_drive, check_length, check_poses, check_track
 from twinmill.data.track import Track
 
 __all__ = ["InputFinding", "check_poses", "check_tracks"]
@@ -30,7 +30,8 @@ def check_tracks(
     found = check_length(tracks)
     by_log: dict[str, list] = {}
     for label, track in tracks:
-        own = check_track(track, label)
+        own = check_drive(track, model, label) if model else []
+        own += check_track(track, label)
         found += own
         body = body_by_command(model, track.command_kind)
         if body is None or any(f.fatal for f in own):
