@@ -86,7 +86,8 @@ def test_lcm_logger_hears_what_twin_run_logs_and_lcm_logplayer_says_it_again(tmp
             f"--log {own} --lcm-url '{bus}'"
         )
     with logging_to(again) as second:
-        second.append(f"lcm-logplayer --speed=4 {heard}")
+        # Slowly: a socket holds some 300 messages, and a busy machine lets the logger wait.
+        second.append(f"lcm-logplayer --speed=0.5 {heard}")
     in_one_network([*first, *second])
     said = events(own)
     # 3 robots: telemetry, link, pose, run, truth
