@@ -22,14 +22,6 @@ if working():  # not for --help
 
     import numpy as np
     import twinmill_native as native
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
 
     from twinmill.data.log import Log, read_log
     from twinmill.report import Figure, Section, write_report
@@ -48,7 +40,7 @@ if working():  # not for --help
         twin_values,
     )
     from twinmill.swarm.metrics import STEP_S, SwarmSeries, swarm_metrics
-    from twinmill.swarm.sweep import parse_table
+    from twinmill.swarm.sweep import parse_table, progress_bar
     from twinmill_cli.frame import command_line, open_model, provenance
     from twinmill_cli.metrics import robot_ids
 
@@ -221,16 +213,7 @@ def _table(name: str, robot: int) -> list[int]:
 
 @contextmanager
 def _progress(total: int) -> Iterator:
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    with Progress(
-        *columns,
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    ) as progress:
+    with progress_bar() as progress:
         task = progress.add_task("twin runs", total=total)
         yield lambda: progress.advance(task)
 

@@ -18,15 +18,6 @@ from twinmill_cli.output import AsJson, busy, deliver
 if working():  # not for --help
     import hashlib
 
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
     from twinmill.files import check_new_folder
     from twinmill.report import Provenance, write_report
     from twinmill.report.discover import section
@@ -148,17 +139,7 @@ def _source(hunt: Hunt, model: str, change: list[str], generations: int, out: Pa
 
 @contextmanager
 def _progress(generations: int) -> Iterator:
-    console = Console(stderr=True)
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    ) as progress:
+    with progress_bar() as progress:
         task = progress.add_task("swarms", total=generations * PER_GENERATION)
         yield lambda tried, kept: progress.update(
             task, completed=tried, description=f"swarms tried, {kept} kept"

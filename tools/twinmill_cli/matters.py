@@ -14,7 +14,7 @@ import typer
 
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import Model, Out
+from twinmill_cli.options import Model, Out, SpreadM, Start
 from twinmill_cli.output import AsJson, busy, deliver, telling
 
 if working():  # not for --help
@@ -68,10 +68,8 @@ def _matters(
     seeds: Annotated[int, typer.Option("--seeds", min=40, help="Most runs of each change.")] = 400,
     first_seed: Annotated[int, typer.Option("--first-seed", min=0)] = 1,
     duration_s: Annotated[float, typer.Option("--duration-s", min=10, help="Of each run.")] = 120,
-    start: Annotated[str, typer.Option("--start", help="square, disc or facing-out.")] = "square",
-    spread_m: Annotated[
-        float, typer.Option("--spread-m", min=0.01, help="Side of the square, diameter of the disc")
-    ] = 1.2,
+    start: Start = "square",
+    spread_m: SpreadM = 1.2,
     margin: Annotated[
         float, typer.Option("--margin", min=0.001, max=0.5, help="Change that would not matter.")
     ] = 0.1,

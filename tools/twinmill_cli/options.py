@@ -34,6 +34,10 @@ Model = Annotated[
         "--model", "-m", metavar="M", help="Model file, here or among the installed models."
     ),
 ]
+Start = Annotated[str, typer.Option("--start", help="square, disc or facing-out.")]
+SpreadM = Annotated[
+    float, typer.Option("--spread-m", min=0.01, help="Side of the square, diameter of the disc")
+]
 Out = Annotated[
     Path | None,
     typer.Option(

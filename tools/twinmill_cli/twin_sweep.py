@@ -9,6 +9,7 @@ import typer
 
 from twinmill.swarm.axes import ALIASES, QUANTITIES
 from twinmill.swarm.sweep import make_request, sweep
+from twinmill_cli.options import SpreadM, Start
 from twinmill_cli.output import AsJson, deliver
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
@@ -56,10 +57,8 @@ def _command(
         bool, typer.Option("--same-seeds", help="In every cell, to see differences of cells alone.")
     ] = False,
     duration_s: Annotated[float, typer.Option("--duration-s", min=0.1, help="Of each run.")] = 120,
-    start: Annotated[str, typer.Option("--start", help="square, disc or facing-out.")] = "square",
-    spread_m: Annotated[
-        float, typer.Option("--spread-m", min=0.01, help="Side of the square, diameter of the disc")
-    ] = 1.2,
+    start: Start = "square",
+    spread_m: SpreadM = 1.2,
     target_radius_m: Annotated[
         float | None,
         typer.Option("--target-radius-m", help="Of the disc that is seen; default: the model's."),

@@ -60,7 +60,7 @@ def changes_of(trial: Trial) -> dict[str, Change]:
     ]
     if not logs or not sizes:
         return {}
-    left, columns, blocks = _whitened(trial, logs)
+    left, columns, blocks = fit.whitened(logs)
     basis = np.linalg.qr(np.vstack([columns, np.diag(1 / fit.std)]))[0]
     doing = [_doing(fit.datasets[i]) for i in logs]
     found: dict[str, Change] = {}
@@ -77,22 +77,6 @@ def changes_of(trial: Trial) -> dict[str, Change]:
             if change and change.evidence > getattr(found.get(instance), "evidence", 0.0):
                 found[instance] = change
     return found
-
-
-def _whitened(trial: Trial, logs: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows (R,), slopes (R, P) and blocks (R,) of all logs, weighted as the cost weighs them."""
-    fit = trial.fit
-    rows, slopes = fit.state
-    left, columns, blocks, first = [], [], [], 0
-    for i in logs:
-        weight = np.sqrt(fit.weight(i, rows[i]))
-        whole = np.zeros((len(rows[i]), len(fit.x)))
-        whole[:, fit.columns[i]] = weight[:, None] * slopes[i]
-        left.append(weight * rows[i])
-        columns.append(whole)
-        blocks.append(fit.datasets[i].block + first)
-        first = blocks[-1].max() + 1
-    return np.concatenate(left), np.concatenate(columns), np.concatenate(blocks)
 
 
 def _doing(data: Trajectory) -> dict[str, np.ndarray]:

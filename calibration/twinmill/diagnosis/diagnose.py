@@ -4,7 +4,6 @@
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
-import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
@@ -81,7 +80,6 @@ def diagnose(
     known = with_own_gains(judged(opened))
     first = first_state(known, model_file, {*excluded, *unseen})
     usual = model_file.usual_score([o.measurement.log_sha256 for o in known])
-    usual = usual if np.isfinite(usual) else 1.0
     done = search(first, progress, settings, usual)
     progress("looking for robots that differ")
     off = outliers(known, done, progress)
@@ -231,7 +229,7 @@ def _instead_of_drift(score: float, done: Search, first: State, usual: float) ->
     """Effects that would take what drifting gains took, where nothing else was found."""
     last = done.last.held_score
     gains = {p.name for p in first.free} & set(BASE_GAINS)
-    if done.found or not gains or not drifted(score, last, usual if np.isfinite(usual) else 1.0):
+    if done.found or not gains or not drifted(score, last, usual):
         return []
     return instead_of_drift(first, done.rounds[0].before, done.settings)
 

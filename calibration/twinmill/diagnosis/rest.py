@@ -153,20 +153,15 @@ def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:
 
 
 def _dependences(logs: list[tuple[int, Opened]], fit: ScoreFit, known: Mapping[str, float]) -> Rest:
-    rows, slopes = fit.state
+    rows, _ = fit.state
     terms, sizes = _terms_of(logs, fit)
-    left, columns, blocks, frees = [], [], [], []
-    base = 0
-    for place, (i, own) in enumerate(logs):
-        weight = np.sqrt(fit.weight(i, rows[i]))
-        left.append(weight * rows[i])
-        columns.append(weight[:, None] * _columns(own, fit.models[i], terms[place], sizes))
-        free = np.zeros((len(rows[i]), len(fit.x)))
-        free[:, fit.columns[i]] = weight[:, None] * slopes[i]
-        frees.append(free)
-        blocks.append(own.data.block + base)
-        base += own.data.block.max() + 1
-    left, columns, free = np.concatenate(left), np.concatenate(columns), np.concatenate(frees)
+    left, free, blocks = fit.whitened([i for i, _ in logs])
+    columns = np.concatenate(
+        [
+            np.sqrt(fit.weight(i, rows[i]))[:, None] * _columns(own, fit.models[i], values, sizes)
+            for (i, own), values in zip(logs, terms, strict=True)
+        ]
+    )
     named = [Term(g, CHANNELS[a], f, s) for (g, f), s in sizes.items() for a in range(3)]
     before = np.linalg.norm(columns, axis=0)
     if free.shape[1]:
@@ -175,7 +170,7 @@ def _dependences(logs: list[tuple[int, Opened]], fit: ScoreFit, known: Mapping[s
     keep = np.linalg.norm(columns, axis=0) > LEFT_OVER * np.maximum(before, 1e-12)
     keep &= before > 1e-9
     named = [t for t, k in zip(named, keep, strict=True) if k]
-    products = _Products(columns[:, keep], left, np.concatenate(blocks))
+    products = _Products(columns[:, keep], left, blocks)
     return _verdict(named, products, float(left @ left), known)
 
 

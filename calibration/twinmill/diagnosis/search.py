@@ -348,13 +348,9 @@ def candidates(state: State) -> list[str]:
 def screen(before: Trial) -> list[Screened]:
     """Every candidate's expected worth, by its signature over what is free."""
     fit, state = before.fit, before.state
-    rows, slopes = fit.state
+    rows, _ = fit.state
     weights = [np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)]
-    left = np.concatenate([w * r for w, r in zip(weights, rows, strict=True)])
-    columns = np.zeros((len(left), len(fit.x)))
-    edges = np.cumsum([0, *(len(r) for r in rows)])
-    for i, (w, j) in enumerate(zip(weights, slopes, strict=True)):
-        columns[edges[i] : edges[i + 1], fit.columns[i]] = w[:, None] * j
+    left, columns, _ = fit.whitened(range(len(rows)))
     free = np.vstack([columns, np.diag(1 / fit.std)]) if len(fit.x) else np.zeros((len(left), 0))
     padded = np.concatenate([left, (fit.usual - fit.x) / fit.std * -1]) if len(fit.x) else left
     basis = np.linalg.qr(free)[0] if len(fit.x) else free
@@ -529,12 +525,10 @@ def _promising(screened: list[Screened], settings: Settings) -> list[Screened]:
 def _pairs(before: Trial, screened: list[Screened], settings: Settings) -> list[tuple[str, str]]:
     """Pairs by what they explain together beyond the better one alone."""
     fit = before.fit
-    rows, _ = fit.state
     top = sorted(screened, key=lambda s: -s.gain)[:10]
     if before.held_score < 1.0:
         return []
-    weights = [np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)]
-    left = np.concatenate([w * r for w, r in zip(weights, rows, strict=True)])
+    left, *_ = fit.whitened(range(len(fit.datasets)))
     worth = {}
     for a, b in combinations(top, 2):
         both = np.hstack([a.columns, b.columns])[: len(left)]

@@ -4,8 +4,6 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from twinmill.diagnosis import moments
 from twinmill.diagnosis.findings import Finding
 from twinmill.diagnosis.rest import MOMENTS, Rest
@@ -27,7 +25,7 @@ class Weighed:
         hidden: effects that data of this kind could show, and these data do not.
         imitators: effects that would take what drifting gains took.
         noises: what was said of unusual noise.
-        usual: score of the model on the logs that it was fitted to.
+        known: score that is no news: that of the model on the logs that it was fitted to.
     """
 
     score: float
@@ -39,7 +37,7 @@ class Weighed:
     hidden: Collection[str]
     imitators: Collection[str]
     noises: Sequence[str]
-    usual: float
+    known: float
 
     @property
     def effects(self) -> list[Finding]:
@@ -96,11 +94,6 @@ class Weighed:
     def _left_in_the_dark(self) -> bool:
         """More is left than is usual, and nothing tells what it is."""
         return self.last > MISSING * self.known
-
-    @property
-    def known(self) -> float:
-        """Score that is no news: that of the model on the logs it was fitted to."""
-        return self.usual if np.isfinite(self.usual) else 1.0
 
     @property
     def _noise_outweighs(self) -> bool:

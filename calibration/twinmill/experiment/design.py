@@ -132,7 +132,6 @@ def design(
     logs = [o for o in diagnosis.opened if o.floor]
     hashes = [o.measurement.log_sha256 for o in logs]
     usual = model_file.usual_score(hashes)
-    usual = usual if np.isfinite(usual) else 1.0
     moves = family(limits.max_duty)
     say("playing the moves in the twin")
     names = base_names(model_file.model, logs, model_file.told_by_others(hashes))

@@ -206,6 +206,20 @@ class ScoreFit:
         share = np.where(judged > 0, judged / max(judged.sum(), 1e-12), 1.0)
         return (n / square / share)[self.scales[i]]
 
+    def whitened(self, members: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows (R,), slopes (R, P) and blocks (R,) of some data sets, weighted as the cost is."""
+        rows, slopes = self.state
+        left, columns, blocks, first = [], [], [], 0
+        for i in members:
+            weight = np.sqrt(self.weight(i, rows[i]))
+            whole = np.zeros((len(rows[i]), len(self.x)))
+            whole[:, self.columns[i]] = weight[:, None] * slopes[i]
+            left.append(weight * rows[i])
+            columns.append(whole)
+            blocks.append(self.datasets[i].block + first)
+            first = blocks[-1].max() + 1
+        return np.concatenate(left), np.concatenate(columns), np.concatenate(blocks)
+
     # -- fit ------------------------------------------------------------------------------------
 
     def _without_part(self, part: int, begin: np.ndarray) -> np.ndarray:

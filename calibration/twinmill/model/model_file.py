@@ -68,13 +68,13 @@ class ModelFile:
         return bool(set(base.get("fitted_on", [])) & set(log_sha256))
 
     def usual_score(self, log_sha256: Collection[str]) -> float:
-        """Score that the model reached on the other logs it was fitted to; infinite without any.
+        """Score that the model reached on the other logs it was fitted to; 1 without any.
 
         No less than 1: on its own log a fit can look better than it is.
         """
         score = tomlkit.parse(self.text).get("fit", {}).get("score_after")
         if score is None or not self.told_by_others(log_sha256):
-            return math.inf
+            return 1.0
         return max(1.0, float(score))
 
     def left_over(self, log_sha256: Collection[str]) -> dict[str, float]:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands against poses of one robot: signs, columns, axes, units, drift of the clocks."""
+"""Commands against poses of one robot: kind, signs, columns, axes, units, drift of the clocks."""
 
 from dataclasses import dataclass
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.data.checks.alternatives import (
     Explained,
@@ -15,6 +16,7 @@ from twinmill.data.checks.finding import InputFinding
 from twinmill.data.checks.geometry import columns_in_use
 from twinmill.data.checks.motion import Motion
 from twinmill.data.checks.words import described
+from twinmill.data.log import KINDS
 from twinmill.data.track import Track
 
 GOOD = 0.03  # share of the motion left unexplained at which no mistake is looked for
@@ -25,6 +27,7 @@ ALIKE, ALIKE_LEFT = 1.3, 0.003  # times and beside what the best leaves: as good
 UNRELATED = 0.85  # share left at which commands and poses have nothing to do with each other
 LEAST_MPS = 0.01  # RMS speed below which nothing is said of a robot that hardly moves
 FEWEST_BLOCKS = 8
+DRIVEN_BY = {"duty": "duties", "wheel_speed": "wheel speeds", "twist": "velocities of the body"}
 UNITS = (  # measured over commanded speed, and what it says
     ((300.0, 3000.0), "the positions are in millimetres", "name the columns x_mm and y_mm"),
     ((30.0, 300.0), "the positions are in centimetres", "name the columns x_cm and y_cm"),
@@ -55,6 +58,24 @@ class Subject:
     def finding(self, what: str, evidence: str, remedy: str, fatal: bool = True) -> InputFinding:
         """Of this robot."""
         return InputFinding(what, evidence, remedy, fatal, self.label, self.track.robot_id)
+
+
+def check_drive(track: Track, model: native.Model, label: str) -> list[InputFinding]:
+    """A finding where the commands are of another kind than the model is driven by."""
+    told = track.command_kind
+    if told not in KINDS or model.drive not in KINDS or told == model.drive:
+        return []
+    return [
+        InputFinding(
+            f"the commands are {DRIVEN_BY[told]}, and the model is driven by "
+            f"{DRIVEN_BY[model.drive]}",
+            f'the log says {told}, the model drive = "{model.drive}"',
+            "take a model of this robot, or import the commands that the model is driven by",
+            True,
+            label,
+            track.robot_id,
+        )
+    ]
 
 
 def check_commands(subject: Subject) -> tuple[list[InputFinding], Search | None, Explained | None]:

@@ -2,10 +2,9 @@
 """What the poses alone show: axes, units, headings that are none, how much there is."""
 
 import numpy as np
-import twinmill_native as native
 
 from twinmill.data.checks.finding import InputFinding
-from twinmill.data.log import KINDS, RobotLog
+from twinmill.data.log import RobotLog
 from twinmill.data.track import Track
 
 FASTEST_MPS = 25.0  # half a second of it at least: no robot in a laboratory
@@ -16,24 +15,6 @@ LOST_SHARE = 0.2
 SLOW_S = 0.15
 SHORT_S = 13.0
 STILL_RAD = 1e-6
-WORDS = {"duty": "duties", "wheel_speed": "wheel speeds", "twist": "velocities of the body"}
-
-
-def check_drive(track: Track, model: native.Model, label: str) -> list[InputFinding]:
-    """A finding where the commands are of another kind than the model is driven by."""
-    told = track.command_kind
-    if told not in KINDS or model.drive not in KINDS or told == model.drive:
-        return []
-    return [
-        InputFinding(
-            f"the commands are {WORDS[told]}, and the model is driven by {WORDS[model.drive]}",
-            f'the log says {told}, the model drive = "{model.drive}"',
-            "take a model of this robot, or import the commands that the model is driven by",
-            True,
-            label,
-            track.robot_id,
-        )
-    ]
 
 
 def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
