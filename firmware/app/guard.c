@@ -66,12 +66,24 @@ static void act(struct guard *guard)
             say("guard: the driving process hung or was left alone: the wheels are stopped");
         }
         guard->complained = false;
-        stopper_close(&guard->stopper);
     }
     else if (!guard->complained && watch_silent_ms(guard->watch, WATCH_DRIVER) > 1000)
     {
         say("guard: motor board: does not confirm a stop: THE WHEELS MAY TURN: switch the robot off");
         guard->complained = true;
+    }
+}
+
+// A board that is lost can come back under its name only when nobody holds what it was.
+static void keep_board(struct guard *guard)
+{
+    if (guard->watch->needs_help)
+    {
+        stopper_close(&guard->stopper);
+    }
+    else
+    {
+        stopper_hold(&guard->stopper);
     }
 }
 
@@ -106,6 +118,10 @@ _Noreturn void guard_run(const struct options *options, struct watch *watch, pid
         if (must_act(&guard, orphan_for_ms))
         {
             act(&guard);
+        }
+        else
+        {
+            keep_board(&guard);
         }
         (void)poll(NULL, 0, TICK_MS);
     }

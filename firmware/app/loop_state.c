@@ -60,6 +60,11 @@ enum fw_err loop_drive(struct loop *loop, const int8_t wheel_duty_pct[FW_WHEEL_C
     {
         memcpy(loop->wheel_duty_pct, wheel_duty_pct, sizeof loop->wheel_duty_pct);
     }
+    else
+    {
+        // At once: this process may be the only one that cannot.
+        set_may_move(loop, true, true);
+    }
     return err;
 }
 

@@ -98,7 +98,7 @@ static enum outcome stop_if_there(const struct app_config *config)
     {
         return OUTCOME_NOTHING;
     }
-    stopper->is_open = true;
+    stopper->is_made = true;
     const int64_t end_us = watch_now_us() + PATIENCE_MS * 1000;
     enum fw_err err = hal_battery_read(&stopper->devices.battery, &pack_mV);
     while (err == FW_ERR_TIMEOUT && watch_now_us() < end_us)

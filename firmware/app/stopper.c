@@ -8,19 +8,32 @@
 #include <string.h>
 #include <unistd.h>
 
-bool stopper_stop(struct stopper *stopper)
+// @return false if the configuration leaves open which board it is, and none answers.
+static bool make(struct stopper *stopper)
 {
     char error[CONFIG_ERROR_MAX];
-    if (!stopper->is_open)
+    stopper->is_made =
+        stopper->is_made || devices_make_board(stopper->config, stopper->dry_run, &stopper->drivers,
+                                               &stopper->devices, error);
+    return stopper->is_made;
+}
+
+void stopper_hold(struct stopper *stopper)
+{
+    if (make(stopper))
     {
-        stopper->is_open = devices_make_board(stopper->config, stopper->dry_run, &stopper->drivers,
-                                              &stopper->devices, error);
+        // Else the stop tries again.
+        (void)hal_motors_open(&stopper->devices.motors);
     }
+}
+
+bool stopper_stop(struct stopper *stopper)
+{
+    const bool made = make(stopper);
     // Asked even if the stop was refused: of a board that is only heard, the line has to be read.
-    const enum fw_err told =
-        stopper->is_open ? hal_motors_stop(&stopper->devices.motors) : FW_ERR_NO_DEVICE;
+    const enum fw_err told = made ? hal_motors_stop(&stopper->devices.motors) : FW_ERR_NO_DEVICE;
     const enum fw_err confirmed =
-        stopper->is_open ? hal_motors_confirm(&stopper->devices.motors) : FW_ERR_NO_DEVICE;
+        made ? hal_motors_confirm(&stopper->devices.motors) : FW_ERR_NO_DEVICE;
     stopper->was_told = told == FW_OK;
     return told == FW_OK && confirmed == FW_OK;
 }
@@ -29,12 +42,16 @@ bool stopper_stop(struct stopper *stopper)
 // files can be opened, may live.
 static bool is_gone(pid_t pid)
 {
+    if (pid <= 0 || (kill(pid, 0) != 0 && errno == ESRCH))
+    {
+        return true;
+    }
     char path[64], line[256] = "";
     (void)snprintf(path, sizeof path, "/proc/%d/stat", (int)pid);
-    const int fd = pid > 0 ? open(path, O_RDONLY | O_CLOEXEC) : -1;
+    const int fd = open(path, O_RDONLY | O_CLOEXEC);
     if (fd < 0)
     {
-        return pid <= 0 || errno == ENOENT || errno == ESRCH;
+        return errno == ENOENT || errno == ESRCH;
     }
     (void)!read(fd, line, sizeof line - 1);
     (void)close(fd);
@@ -61,9 +78,9 @@ bool stopper_end_driver(struct stopper *stopper, struct watch *watch)
 
 void stopper_close(struct stopper *stopper)
 {
-    if (stopper->is_open)
+    if (stopper->is_made)
     {
         hal_motors_close(&stopper->devices.motors);
-        stopper->is_open = false;
+        stopper->is_made = false;
     }
 }

@@ -16,12 +16,15 @@ struct stopper
 {
     const struct app_config *config;
     bool dry_run;
-    bool is_open;
+    bool is_made;
     // The board took the last stop, whether it has confirmed it or not.
     bool was_told;
     struct board_drivers drivers;
     struct loop_devices devices;
 };
+
+// Opens the board, if it is there: a stop then needs no file that could not be opened.
+void stopper_hold(struct stopper *stopper);
 
 // Tells the board zero once. @return true if it has confirmed it.
 bool stopper_stop(struct stopper *stopper);

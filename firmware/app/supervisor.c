@@ -87,6 +87,7 @@ int supervisor_asked_to_end(int stop_fd)
 // In the child: dies with its parent, after having stopped the wheels.
 static _Noreturn void become_driver(struct crew *crew, pid_t parent)
 {
+    stopper_close(&crew->stopper);
     (void)prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (getppid() != parent)
     {
@@ -129,6 +130,7 @@ static void keep_guard(struct crew *crew)
     crew->guard = fork();
     if (crew->guard == 0)
     {
+        stopper_close(&crew->stopper);
         guard_run(crew->options, crew->watch, parent);
     }
 }
@@ -157,6 +159,10 @@ static void tick(struct crew *crew)
 {
     watch_beat(crew->watch, WATCH_SUPERVISOR);
     keep_guard(crew);
+    if (!crew->watch->needs_help)
+    {
+        stopper_hold(&crew->stopper);
+    }
     if (watch_now_us() - crew->notified_us > NOTIFY_PERIOD_US)
     {
         notify("WATCHDOG=1");
@@ -188,11 +194,7 @@ static const char *must_end(const struct crew *crew)
 static void help_driver(struct crew *crew)
 {
     const int64_t now_us = watch_now_us();
-    if (!crew->watch->needs_help)
-    {
-        stopper_close(&crew->stopper);
-    }
-    else if (now_us >= crew->help_us)
+    if (crew->watch->needs_help && now_us >= crew->help_us)
     {
         (void)stopper_stop(&crew->stopper);
         crew->help_us = now_us + HELP_PERIOD_US;
@@ -207,7 +209,8 @@ static const char *watch_driver(struct crew *crew)
     while (crew->driver > 0 && why == NULL)
     {
         tick(crew);
-        if (crew->asked_by != 0 && !told)
+        // Number 0 would be everybody in this process group.
+        if (crew->asked_by != 0 && !told && crew->driver > 0)
         {
             (void)kill(crew->driver, SIGTERM);
             told = true;
@@ -247,7 +250,6 @@ static bool put_to_rest(struct crew *crew)
             break;
         }
     } while (!stopped || crew->driver > 0);
-    stopper_close(&crew->stopper);
     return stopped;
 }
 

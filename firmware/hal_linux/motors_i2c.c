@@ -21,8 +21,9 @@ static void close_bus(void *device)
     }
 }
 
-static enum fw_err open_bus(struct motors_i2c *board)
+static enum fw_err open_bus(void *device)
 {
+    struct motors_i2c *board = device;
     if (board->fd >= 0)
     {
         return FW_OK;
@@ -168,7 +169,7 @@ static enum fw_err confirm(void *device)
 struct hal_motors motors_i2c_make(struct motors_i2c *board, const struct motors_i2c_config *config,
                                   const struct hal_clock *clock, const struct hal_sys *sys)
 {
-    static const struct hal_motors_ops ops = {write_duties, stop, confirm, close_bus};
+    static const struct hal_motors_ops ops = {open_bus, write_duties, stop, confirm, close_bus};
     *board = (struct motors_i2c){.config = *config, .clock = *clock, .sys = sys, .fd = -1};
     return (struct hal_motors){.device = board, .ops = &ops};
 }

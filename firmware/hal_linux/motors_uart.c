@@ -33,8 +33,9 @@ static void close_line(void *device)
     }
 }
 
-static enum fw_err open_line(struct motors_uart *board)
+static enum fw_err open_line(void *device)
 {
+    struct motors_uart *board = device;
     if (board->fd >= 0)
     {
         return FW_OK;
@@ -216,7 +217,7 @@ struct hal_motors motors_uart_make(struct motors_uart *board,
                                    const struct motors_uart_config *config,
                                    const struct hal_clock *clock)
 {
-    static const struct hal_motors_ops ops = {write_duties, stop, confirm, close_line};
+    static const struct hal_motors_ops ops = {open_line, write_duties, stop, confirm, close_line};
     *board = (struct motors_uart){.config = *config, .clock = *clock, .fd = -1};
     return (struct hal_motors){.device = board, .ops = &ops};
 }

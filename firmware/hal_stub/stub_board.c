@@ -9,17 +9,35 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-// One line in one write, so that several processes may record into one file.
-static enum fw_err record(const struct stub_board *board)
+static void close_board(void *device)
 {
-    if (board->record_path == NULL)
+    struct stub_board *board = device;
+    if (board->is_open)
     {
-        return FW_OK;
+        (void)close(board->fd);
+        board->is_open = false;
     }
-    const int fd = open(board->record_path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-    if (fd < 0)
+}
+
+// The record is opened once, as a device is.
+static enum fw_err open_board(void *device)
+{
+    struct stub_board *board = device;
+    if (board->record_path != NULL && !board->is_open)
     {
-        return FW_ERR_NO_DEVICE;
+        board->fd = open(board->record_path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+        board->is_open = board->fd >= 0;
+    }
+    return board->record_path == NULL || board->is_open ? FW_OK : FW_ERR_NO_DEVICE;
+}
+
+// One line in one write, so that several processes may record into one file.
+static enum fw_err record(struct stub_board *board)
+{
+    const enum fw_err opened = open_board(board);
+    if (opened != FW_OK || !board->is_open)
+    {
+        return opened;
     }
     const int8_t *duty_pct = board->wheel_duty_pct;
     char line[64];
@@ -27,9 +45,12 @@ static enum fw_err record(const struct stub_board *board)
         snprintf(line, sizeof line, "%" PRId64 ",%d,%d,%d,%d\n",
                  hal_clock_monotonic_us(&board->clock), duty_pct[FW_FRONT_LEFT],
                  duty_pct[FW_FRONT_RIGHT], duty_pct[FW_REAR_LEFT], duty_pct[FW_REAR_RIGHT]);
-    const enum fw_err err = write(fd, line, (size_t)length) == length ? FW_OK : FW_ERR_IO;
-    (void)close(fd);
-    return err;
+    if (write(board->fd, line, (size_t)length) != length)
+    {
+        close_board(board);
+        return FW_ERR_IO;
+    }
+    return FW_OK;
 }
 
 // The camera may not be connected yet, or no more: then nobody waits for an answer.
@@ -91,11 +112,6 @@ static enum fw_err confirm(void *device)
     return memcmp(board->wheel_duty_pct, zero_pct, sizeof zero_pct) == 0 ? FW_OK : FW_ERR_NOT_ZERO;
 }
 
-static void close_board(void *device)
-{
-    (void)device;
-}
-
 static enum fw_err read_battery(void *device, int32_t *pack_mV)
 {
     const struct stub_board *board = device;
@@ -109,7 +125,7 @@ static enum fw_err read_battery(void *device, int32_t *pack_mV)
 
 struct hal_motors stub_board_motors(struct stub_board *board)
 {
-    static const struct hal_motors_ops ops = {write_duties, stop, confirm, close_board};
+    static const struct hal_motors_ops ops = {open_board, write_duties, stop, confirm, close_board};
     return (struct hal_motors){.device = board, .ops = &ops};
 }
 

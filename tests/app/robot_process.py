@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot's program as a process: its camera is a socket, its motor board a file."""
 
+import fcntl
 import os
 import signal
 import socket
@@ -26,6 +27,18 @@ def wait_until(condition, timeout_s=10.0):
             return True
         time.sleep(0.01)
     return False
+
+
+def full_pipe():
+    """A pipe that takes no byte more."""
+    read_end, write_end = os.pipe()
+    fcntl.fcntl(write_end, fcntl.F_SETFL, os.O_NONBLOCK)
+    try:
+        while True:
+            os.write(write_end, b"x" * 4096)
+    except BlockingIOError:
+        fcntl.fcntl(write_end, fcntl.F_SETFL, 0)
+    return read_end, write_end
 
 
 class Camera:

@@ -52,6 +52,12 @@ static enum fw_err confirm(void *device)
     return hal_motors_confirm(&board.inner);
 }
 
+static enum fw_err open_board(void *device)
+{
+    (void)device;
+    return FW_OK;
+}
+
 static void close_board(void *device)
 {
     (void)device;
@@ -65,7 +71,7 @@ static void all_beat(void)
 
 void setUp(void)
 {
-    static const struct hal_motors_ops ops = {write_duties, stop, confirm, close_board};
+    static const struct hal_motors_ops ops = {open_board, write_duties, stop, confirm, close_board};
     robot_make();
     memset(&board, 0, sizeof board);
     board.inner = robot.devices.motors;

@@ -5,10 +5,10 @@ Each fault has a limit from the moment it happens to the zero that the board kee
 """
 
 import contextlib
-import fcntl
 import itertools
 import os
 import pty
+import resource
 import shlex
 import signal
 import socket
@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 
 import pytest
-from robot_process import LEFT, ZERO, Robot, wait_until
+from robot_process import LEFT, ZERO, Robot, full_pipe, wait_until
 
 TURBOPI = shlex.split(os.environ.get("TURBOPI", ""))
 pytestmark = pytest.mark.skipif(not TURBOPI, reason="TURBOPI does not name the program")
@@ -76,6 +76,42 @@ def test_whoever_is_left_stops_the_wheels(driving, roles, number):
     assert stands_for_good(driving, begin_s) < LIMIT_S + SLACK_S
 
 
+@pytest.mark.parametrize("killed", [("driver",), ("driver", "parent"), ("driver", "guard")])
+def test_a_stop_needs_no_file_that_cannot_be_opened(driving, killed):
+    """As where the kernel has no more of them: whoever may have to stop the board has it open."""
+    pids = processes(driving)
+    for pid in pids.values():
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (3, 3))
+    begin_s = time.monotonic()
+    for role in killed:
+        os.kill(pids[role], signal.SIGKILL)
+    assert stands_for_good(driving, begin_s) < LIMIT_S + SLACK_S
+
+
+def has_ended(pid):
+    """It is gone, or is there only until its parent takes notice."""
+    stat = Path(f"/proc/{pid}/stat")
+    return not stat.exists() or ") Z " in stat.read_text()
+
+
+def test_a_driver_that_has_ended_first_leaves_the_others_of_the_terminal_alone(tmp_path):
+    """Asked to end, the parent finds the driver dead: it asks nobody else."""
+    beside = f'(sleep 60 2>/dev/null & echo $! >{tmp_path}/beside); exec "$@"'
+    program = ["setsid", "sh", "-c", beside, "sh", *TURBOPI]
+    with Robot(program, tmp_path, "--start") as robot:
+        assert robot.wait_for(LEFT)
+        parent, driver = robot.process.pid, robot.children()[0]
+        os.kill(parent, signal.SIGSTOP)
+        os.kill(driver, signal.SIGKILL)
+        assert wait_until(lambda: has_ended(driver))
+        os.kill(parent, signal.SIGTERM)
+        os.kill(parent, signal.SIGCONT)
+        code, _ = robot.end()
+    beside = int((tmp_path / "beside").read_text())
+    assert code == 0 and robot.duties() == ZERO and not has_ended(beside)
+    os.kill(beside, signal.SIGKILL)
+
+
 def test_killall_leaves_the_guard(driving):
     pids = processes(driving)
     names = {role: Path(f"/proc/{pid}/comm").read_text() for role, pid in pids.items()}
@@ -98,18 +134,6 @@ def test_keys_of_a_terminal_leave_no_wheel_turning(driving, number):
     assert code == 0
     assert stands_for_good(driving, begin_s) < LIMIT_S + SLACK_S
     assert ("not suspended" in said) == (number in (signal.SIGTSTP, signal.SIGQUIT))
-
-
-def full_pipe():
-    """A pipe that takes no byte more."""
-    read_end, write_end = os.pipe()
-    fcntl.fcntl(write_end, fcntl.F_SETFL, os.O_NONBLOCK)
-    try:
-        while True:
-            os.write(write_end, b"x" * 4096)
-    except BlockingIOError:
-        fcntl.fcntl(write_end, fcntl.F_SETFL, 0)
-    return read_end, write_end
 
 
 @pytest.fixture

@@ -16,13 +16,14 @@ from pathlib import Path
 
 from keyring import operator_key, robot_options
 from lossy import DeafBus, LossyBus
-from robot_process import ZERO, Robot
+from robot_process import ZERO, Robot, full_pipe
 
 from twinmill.robots import tell
 from twinmill.robots.fleet import URL, Fleet
 
 IDS = {1, 2, 3}
 KEY = b""  # the operator's, from main()
+STOP = "import sys; from twinmill_cli.main import run; sys.exit(run(sys.argv[1:]))"
 ROUNDS = 2
 AHEAD_S = 1.0
 PROTOCOL = {  # verb, behaviour, start after now in us, age of the command in us
@@ -127,6 +128,22 @@ def behaviors(fleet: Fleet) -> list:
     return [r.run and r.run.behavior for r in fleet.robots.values()]
 
 
+def unheard_round(robots: dict) -> list:
+    """`twinmill swarm stop` whose key is no key and whose messages nobody reads."""
+    fleet = Fleet(URL, key=KEY)
+    tell.arm(fleet, IDS)
+    tell.start(fleet, IDS, "diffusing_v2", 0.5, partial=False, link_timeout_ms=0)
+    moved = [robot.duties() for robot in robots.values()]
+    read_end, write_end = full_pipe()
+    command = [sys.executable, "-c", STOP, "swarm", "stop", "--key", "/dev/null"]
+    with subprocess.Popen(command, stdout=write_end, stderr=write_end) as process:
+        stood = [robot.wait_for(ZERO, 30) for robot in robots.values()]
+        process.kill()
+    os.close(read_end)
+    os.close(write_end)
+    return [moved, stood]
+
+
 def twin_round() -> dict:
     """A twin of two, which know the table, is commanded as robots are."""
     result = {"twin_answers": answers_to_bad_commands("TWIN_", 1)}
@@ -158,6 +175,7 @@ def main(folder: Path) -> dict:
         result["deaf"] = deaf_round(robots)
         result["one_robot"] = one_robot_round(robots)
         result["own_table"] = own_table_round()
+        result["unheard"] = unheard_round(robots)
         result["robot_answers"] = answers_to_bad_commands("", 1)
     twin = f"{os.environ['TWIN_RUN']} --plant planar --n 2 --wait --channel-prefix TWIN_"
     twin += f" --behaviors {tables} --key {key_file}"

@@ -55,6 +55,12 @@ def test_one_robot_can_be_told_alone(session):
 
 
 @needs_programs
+def test_a_stop_is_said_though_nobody_reads_what_the_command_says(session):
+    moved, stood = session["unheard"]
+    assert STILL not in moved and stood == [True] * 3
+
+
+@needs_programs
 def test_tables_of_ones_own_are_started_by_name_where_they_are_known(session):
     own = session["own_table"]
     assert own["refused"] == {"3": "no behaviour 'ahead'"} and own["called_off"]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import sys
 import time
@@ -226,19 +227,40 @@ def _stop(
 
     Example: twinmill swarm stop
     """
-    fleet = Fleet(lcm_url, channel_prefix, key=_key_to_stop_by(key))
-    given = tell.stop(fleet, parse_robots(robots), timeout_s, host or ())
+    asked = parse_robots(robots)
+    operator_key, fault = _key_if_there(key)
+    with saying_nothing():
+        fleet = Fleet(lcm_url, channel_prefix, key=operator_key)
+        given = tell.stop(fleet, asked, timeout_s, host or ())
+    _tell_fault(fault)
     words = _stop_words(given, timeout_s)
     return _finish("stop", given, _all_stand(given), words, {}, as_json)
 
 
-def _key_to_stop_by(path: Path | None) -> bytes | None:
-    """Without a key a stop is said all the same, and nobody's answer is believed."""
+@contextmanager
+def saying_nothing() -> Iterator[None]:
+    """No library's message keeps a stop waiting, as on a full pipe or after Ctrl-S."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
     try:
-        return load(path)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def _key_if_there(path: Path | None) -> tuple[bytes | None, str]:
+    """The key, or why there is none: then a stop is said all the same, and nobody is believed."""
+    try:
+        return load(path), ""
     except (ValueError, OSError) as error:
-        print(f"twinmill: {error}", file=sys.stderr)
-        return None
+        return None, str(error)
+
+
+def _tell_fault(fault: str) -> None:
+    if fault:
+        print(f"twinmill: {fault}", file=sys.stderr)
 
 
 def _all_stand(given: list[tell.Answer]) -> bool:
@@ -343,7 +365,9 @@ def _status(
 
     Example: twinmill swarm status
     """
-    fleet = Fleet(lcm_url, channel_prefix, key=_key_to_stop_by(key))
+    operator_key, fault = _key_if_there(key)
+    _tell_fault(fault)
+    fleet = Fleet(lcm_url, channel_prefix, key=operator_key)
     if once or as_json or not sys.stdout.isatty():
         fleet.listen(1.0)
         fleet.listen(RUN_PERIOD_S - 1, lambda: all(r.run for r in fleet.robots.values()))

@@ -14,6 +14,7 @@ extern "C" {
 
 struct hal_motors_ops
 {
+    enum fw_err (*open)(void *device);
     enum fw_err (*write)(void *device, const int8_t wheel_duty_pct[FW_WHEEL_COUNT]);
     enum fw_err (*stop)(void *device);
     enum fw_err (*confirm)(void *device);
@@ -25,6 +26,13 @@ struct hal_motors
     void *device;
     const struct hal_motors_ops *ops;
 };
+
+// Takes the bus, as every other call does by itself: who has it can stop the wheels though no file
+// can be opened any more. @return FW_OK, or as hal_motors_write().
+static inline enum fw_err hal_motors_open(const struct hal_motors *motors)
+{
+    return motors->ops->open(motors->device);
+}
 
 // Hands four duties to the board; the driver applies the sign of each channel.
 // @param wheel_duty_pct order of fw_wheel, [-100, 100], positive drives the robot forward.

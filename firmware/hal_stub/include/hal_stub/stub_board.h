@@ -3,6 +3,8 @@
 #ifndef HAL_STUB_STUB_BOARD_H
 #define HAL_STUB_STUB_BOARD_H
 
+#include <stdbool.h>
+
 #include "hal/battery.h"
 #include "hal/clock.h"
 #include "hal/motors.h"
@@ -20,6 +22,9 @@ struct stub_board
     // frames it has given out so far (little endian), then fl,fr,rl,rr in percent. A program that
     // sends frames thus knows which of them decided. NULL: not sent.
     const struct stub_camera *answers_to;
+    // The record's file, if it is open.
+    bool is_open;
+    int fd;
     // As on the real board: what was written last stays.
     int8_t wheel_duty_pct[FW_WHEEL_COUNT];
     // Calls that succeeded, and calls of stop that were tried.
