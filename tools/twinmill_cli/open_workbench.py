@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -14,8 +13,6 @@ from twinmill_cli.lazy import working
 from twinmill_cli.options import Logs, Model
 
 if working():  # not for --help
-    # Many small matrices: threads of the linear algebra would only wait for each other.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from twinmill.workbench.bench import Bench
     from twinmill.workbench.server import serve
     from twinmill.workbench.session import Session

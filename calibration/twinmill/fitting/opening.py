@@ -11,7 +11,7 @@ from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import Sheet
 from twinmill.fitting.floor import NoiseFloor, noise_floor
-from twinmill.fitting.score_fit import ScoreFit
+from twinmill.fitting.score_fit import ROUNDS, ScoreFit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import CLOCK, CLOCK_RATE, GAINS, Parameter, base_parameters
 from twinmill.predict.datasets import Trajectory
@@ -51,6 +51,26 @@ class Opened:
         if isinstance(self.data, SteadyScene):
             return self.data.with_model(self.model)
         return Scene.on_clock(self.measurement, self.model, clock_free=not self.same_clock)
+
+    def aligned(
+        self, model: native.Model, offset_s: float | None = None, rounds: int = ROUNDS
+    ) -> "Opened":
+        """The same with another model, on the clock with which that predicts best.
+
+        One clock for commands and poses is kept, and that of a measurement without a floor.
+
+        Args:
+            model: of all robots.
+            offset_s: where the search begins; by default where the floor was found.
+            rounds: of the search.
+        """
+        if self.same_clock or self.data is None:
+            return self.with_model(model)
+        own = model.for_robot(self.measurement.track.robot_id)
+        own.set(CLOCK, self.floor.offset_s if offset_s is None else offset_s)
+        data = replace(self.data, own=_clock(own))
+        fit = ScoreFit([data], [own], []).fit(rounds)
+        return replace(self, data=data, model=fit.models[0])
 
     def with_fitted(self, model: native.Model) -> "Opened":
         """The same with a model of its own robot, its clock included."""
@@ -98,10 +118,7 @@ def _open(measurement: Measurement | Sheet, model_file: ModelFile) -> Opened:
     data = data.over(floor.rms, floor.keep)
     if told or declared:
         return Opened(measurement, data, model, floor, True)
-    model.set(CLOCK, floor.offset_s)
-    data = replace(data, own=_clock(model))
-    aligned = ScoreFit([data], [model], []).fit()
-    return Opened(measurement, data, aligned.models[0], floor, False)
+    return Opened(measurement, data, model, floor, False).aligned(model)
 
 
 def _clock(model: native.Model) -> tuple[Parameter, ...]:

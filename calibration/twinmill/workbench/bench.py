@@ -11,10 +11,10 @@ from collections.abc import Callable
 from time import perf_counter
 from typing import Any
 
-import numpy as np
 
 from twinmill.diagnosis.detections.add import is_of_camera
 from twinmill.files import plain
+from twinmill.model.parameters import CLOCK
 from twinmill.workbench.drawing import commands, measured_path, pack
 from twinmill.workbench.session import Session
 from twinmill.workbench.state_file import StateFile
@@ -91,8 +91,7 @@ class Bench:
     async def act(self, act: Callable[..., None], *arguments: Any) -> None:
         """Does what moves the session to another model."""
         await asyncio.to_thread(act, *arguments)
-        await asyncio.to_thread(self.session.own_scores)
-        self.changed("model", "score", "prediction")
+        await self._settled()
 
     # -- long work ------------------------------------------------------------------------------
 
@@ -116,10 +115,10 @@ class Bench:
         self.changed("work")
         self._next()
         if kind != "diagnose" and not (effect and is_of_camera(effect)):
-            await asyncio.to_thread(self.session.foresee, effect)
-            if self.doing is not work:  # done or cancelled before
-                self.session.forget()
-            self.changed("score", "prediction")
+            foreseen = await asyncio.to_thread(self.session.foresee, effect, self.picked)
+            if self.doing is work:  # not done or cancelled before
+                self.session.show(foreseen)
+                self.changed("score", "prediction")
 
     def cancel(self) -> None:
         """Stops it."""
@@ -128,21 +127,31 @@ class Bench:
         self.session.forget()
         self.changed("work", "score", "prediction")
 
-    def tick(self) -> None:
+    async def tick(self) -> None:
         """To be called a few times a second."""
         if done := self.worker.poll():
-            self._take(done)
+            await self._take(done)
         self._next()
         self._write()
 
-    def _take(self, done: Done) -> None:
+    async def _take(self, done: Done) -> None:
         if done.failure:
             self.failure = done.failure
             self.session.forget()
+            self.changed("work", "score", "prediction")
+        elif done.work.kind in ("fit", "add"):
+            self.session.take(done)
+            await self._settled()
         elif done.work.kind != "read":
             self.session.take(done)
-        news = {"diagnose": ["findings"], "compare": ["score"], "read": []}
-        self.changed("work", *news.get(done.work.kind, ["model", "score", "prediction"]))
+            self.changed("work", "score", "findings")
+
+    async def _settled(self) -> None:
+        """The session stands at another model: its prediction first, then what takes longer."""
+        self.changed("prediction")
+        await asyncio.to_thread(self.session.score_now)
+        await asyncio.to_thread(self.session.own_scores)
+        self.changed("work", "model", "score")
 
     def _next(self) -> None:
         """What waits; else the exact score of a model that a hand made."""
@@ -199,19 +208,17 @@ class Bench:
         view, raw = self.session.robots[index], self.session.raw(index)
         names, unit = COMMAND_WORDS.get(raw.command_kind, ((), ""))
         arrays = {**view.measured(), **commands(raw)}
-        clock_s = self.session.clock_s(index)
-        return pack(arrays, command_names=names, command_unit=unit, clock_s=clock_s)
+        return pack(arrays, command_names=names, command_unit=unit)
 
     def prediction_bytes(self, index: int) -> bytes:
         """What the model shown says of one robot, with its score."""
         begin = perf_counter()
         arrays = self.session.predicted(index)
-        score = self.session.score(index)
         return pack(
             arrays,
             step_s=self.session.robots[index].step_s,
             revision=self.changes["prediction"],
-            score=None if np.isnan(score) else score,
+            clock_s=self.session.shown(index).model.get(CLOCK),
             compute_ms=1000 * (perf_counter() - begin),
         )
 

@@ -215,7 +215,7 @@ class Screen:
         session = self.bench.session
         known = session.tree.scores.get(session.tree.current.number)
         if session.robots and session.is_passing:
-            self._say_score(session.score(self.bench.picked), False)
+            self._say_score(session.passing_score(self.bench.picked), False)
         elif known:
             self._say_score(known.fitted, known.exact)
         self.undo.set_enabled(session.tree.can_undo)

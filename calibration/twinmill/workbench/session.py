@@ -7,6 +7,7 @@ be predicted, `judge` floors and scores.
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.steady_table import is_sheet
 from twinmill.files import replacing
 from twinmill.fitting.fit import base_names
-from twinmill.fitting.opening import open_measurements
+from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.model.parameters import (
@@ -34,6 +35,11 @@ from twinmill.workbench.drawing import Arrays, RobotView
 from twinmill.workbench.knobs import Knob, knobs
 from twinmill.workbench.tree import Score, Tree
 from twinmill.workbench.worker import Done, Work
+
+
+FORESEEN_ROUNDS = 2  # of the fit that gives a first answer
+FORESEEN_WINDOWS = 1500  # of the robots that it is about
+DRAGGED_ROUNDS = 1  # of the search for the clock while a knob is turned
 
 
 class Session:
@@ -68,10 +74,11 @@ class Session:
         self.robots: list[RobotView] = []
         self.held: set[str] = set()
         self.diagnosis: dict | None = None
+        self._files = {0: self.given}
         self._dragged: dict[str, float] = {}
-        self._foreseen: native.Model | None = None
-        self._own_scores: dict[int, list[float]] = {}
-        self._loaded: tuple[object, ModelFile] = (None, self.given)
+        self._foreseen: dict[int, Opened] = {}
+        self._passing: dict[int, Opened] = {}
+        self._settled: dict[tuple[int, int], Opened] = {}
 
     # -- opening --------------------------------------------------------------------------------
 
@@ -95,7 +102,7 @@ class Session:
         """Finds clocks and noise floors."""
         opened = open_measurements(self.measurements, self.given)
         self.robots = [RobotView(o) for o in opened]
-        self._score_now(exact=self.tree.current.number == 0)
+        self.score_now(exact=self.tree.current.number == 0)
 
     def raw(self, index: int) -> RobotLog:
         """What was recorded of a robot that is predicted."""
@@ -114,21 +121,12 @@ class Session:
     @property
     def model_file(self) -> ModelFile:
         """Where the tree stands."""
-        number = self.tree.current.number
-        if self._loaded[0] != number:
-            self._loaded = (number, self.tree.model_file(number))
-        return self._loaded[1]
+        return self._file(self.tree.current.number)
 
-    @property
-    def model(self) -> native.Model:
-        """The model shown: where the tree stands or a fit will come to, as a hand drags it."""
-        shown = self._foreseen or self.model_file.model
-        if not self._dragged:
-            return shown
-        model = shown.copy()
-        for name, value in self._dragged.items():
-            model.set(name, value)
-        return model
+    def _file(self, number: int) -> ModelFile:
+        if number not in self._files:
+            self._files[number] = self.tree.model_file(number)
+        return self._files[number]
 
     @property
     def is_passing(self) -> bool:
@@ -154,7 +152,9 @@ class Session:
             raise ModelError(
                 f"{name} = {value:g}: must be within {bounds['min']:g} to {bounds['max']:g}."
             )
+        self._foreseen = {}
         self._dragged[name] = value
+        self._passing = {}
 
     def keep(self) -> None:
         """Makes what was dragged a model of its own."""
@@ -162,31 +162,51 @@ class Session:
         self.forget()
         if values:
             self.tree.set(values)
-            self._score_now()
 
     def forget(self) -> None:
         """Shows the model where the tree stands."""
-        self._dragged, self._foreseen = {}, None
+        self._dragged, self._passing, self._foreseen = {}, {}, {}
 
-    def foresee(self, effect: str) -> None:
-        """Shows about what a fit, or the addition of an effect, will come to.
+    def show(self, foreseen: dict[int, Opened]) -> None:
+        """Shows what `foresee` gave until something else is shown."""
+        self.forget()
+        self._foreseen = foreseen
 
-        Two steps of the fit to the robots that are judged; the worker's answer takes its place.
+    def foresee(self, effect: str, index: int) -> dict[int, Opened]:
+        """About what a fit, or the addition of an effect, will come to: all robots by index.
+
+        A few steps of the fit to as many robots as an answer at once can be about; `index` is one.
         """
-        model = self.model_file.model.copy()
+        number = self.tree.current.number
+        model = self._file(number).model.copy()
         free = [p for p in self._free(model) if p.name not in self.held]
         fresh = []
         if effect:
             model.add_effect(effect, {})
             fresh = effect_parameters(model, effect_names(model)[-1], fresh=True)
-        known = [r.opened.with_model(model) for r in self.robots if r.opened.data is not None]
-        fit = ScoreFit([o.data for o in known], [o.model for o in known], [*free, *fresh])
+        members = self._foremost(index)
+        known = [_from_here(self.settled(number, k)) for k in members]
+        models = [o.with_model(model).model for o in known]
+        fit = ScoreFit([o.data for o in known], models, [*free, *fresh])
         if fresh:
             fit.begin_at_best(len(fresh))
-        fit.fit(rounds=2)
+        fit.fit(rounds=FORESEEN_ROUNDS)
         for p in fit.shared_values:
             model.set(p.name, p.value)
-        self._foreseen = model
+        fitted = {k: o.with_fitted(m) for k, o, m in zip(members, known, fit.models, strict=True)}
+        others = set(range(len(self.robots))) - set(members)
+        return fitted | {k: self.settled(number, k).with_model(model) for k in others}
+
+    def _foremost(self, index: int) -> list[int]:
+        """One robot, and of the others as many as an answer at once can be about."""
+        order = [index, *(k for k in range(len(self.robots)) if k != index)]
+        members, windows = [], 0
+        for k in order:
+            data = self.robots[k].opened.data
+            windows += len(self.robots[k].windows.starts) if data is not None else 0
+            if data is not None and (not members or windows <= FORESEEN_WINDOWS):
+                members.append(k)
+        return members
 
     def _free(self, model: native.Model) -> list[Parameter]:
         """What a fit of these logs moves."""
@@ -232,48 +252,59 @@ class Session:
 
     # -- predictions and scores -----------------------------------------------------------------
 
-    def own_model(self, index: int, model: native.Model | None = None) -> native.Model:
-        """The model shown as it is of one robot, on its clock."""
-        return self.robots[index].opened.with_model(model or self.model).model
+    def settled(self, number: int, index: int) -> Opened:
+        """One robot with a model of the tree, on the clock that suits it best."""
+        opened = self.robots[index].opened
+        if number == 0:
+            return opened
+        if (number, index) not in self._settled:
+            self._settled[number, index] = opened.aligned(self._file(number).model)
+        return self._settled[number, index]
 
-    def clock_s(self, index: int) -> float:
-        """Capture's clock less the robot's."""
-        return self.robots[index].opened.model.get(CLOCK)
+    def shown(self, index: int) -> Opened:
+        """One robot with the model shown: in the tree, to come, or under a hand."""
+        if self._foreseen:
+            return self._foreseen[index]
+        settled = self.settled(self.tree.current.number, index)
+        if not self._dragged:
+            return settled
+        if index not in self._passing:
+            model = self.model_file.model.copy()
+            for name, value in self._dragged.items():
+                model.set(name, value)
+            self._passing[index] = settled.aligned(model, settled.model.get(CLOCK), DRAGGED_ROUNDS)
+        return self._passing[index]
 
     def predicted(self, index: int) -> Arrays:
         """As `RobotView.predicted`, of the model shown."""
-        return self.robots[index].predicted(self.own_model(index))
+        return self.robots[index].predicted(self.shown(index).model)
 
-    def score(self, index: int) -> float:
-        """Of one robot with the model shown, on the clock of the model as given; NaN without."""
-        own = self.robots[index].opened
-        return float("nan") if own.data is None else own.data.score(self.own_model(index))
+    def passing_score(self, index: int) -> float:
+        """About that of the model shown, from as many robots as can be asked at once."""
+        return total_score([self.shown(k).score for k in self._foremost(index)])
 
     def own_scores(self) -> list[float]:
         """Of each robot where the tree stands; NaN without a floor."""
         number = self.tree.current.number
-        if number not in self._own_scores:
-            opened = [r.opened.with_model(self.model_file.model) for r in self.robots]
-            self._own_scores[number] = [o.score for o in opened]
-        return self._own_scores[number]
+        return [self.settled(number, k).score for k in range(len(self.robots))]
 
     def regimes(self, index: int) -> list[Regime]:
         """Where the model shown fails one robot; none without a floor."""
-        view, model = self.robots[index], self.own_model(index)
+        view, model = self.robots[index], self.shown(index).model
         if view.opened.data is None:
             return []
         return where_it_fails(view.scene(model), view.windows, view.errors(model), view.floor)
 
     def moments(self, index: int, group: str, regime: str) -> tuple[np.ndarray, float]:
         """(K,) s, starts of the predictions in a regime, and that of the worst."""
-        view, model = self.robots[index], self.own_model(index)
+        view, model = self.robots[index], self.shown(index).model
         inside = view.moments(model)[group, regime]
         squares = np.mean((view.errors(model)[:, HORIZON] / view.floor[HORIZON]) ** 2, axis=1)
         t_s = view.track.pose_t_s[view.windows.starts]
         worst = np.argmax(np.where(inside & np.isfinite(squares), squares, -1.0))
         return t_s[inside], float(t_s[worst])
 
-    def _score_now(self, exact: bool = False) -> None:
+    def score_now(self, exact: bool = False) -> None:
         """Of all robots where the tree stands, unless it is known."""
         if not self.robots or self.tree.current.number in self.tree.scores:
             return
@@ -351,3 +382,9 @@ class Session:
         self.tree.restore(data["tree"])
         self.held = set(data["held"])
         self.diagnosis = data["diagnosis"]
+
+
+def _from_here(opened: Opened) -> Opened:
+    """The same, whose clock a fit looks for from where it is."""
+    own = tuple(p.at(opened.model.get(p.name)) for p in opened.data.own)
+    return replace(opened, data=replace(opened.data, own=own))

@@ -43,7 +43,7 @@ def session(opened):
 
 def test_the_score_is_that_of_compare(session, compared):
     assert session.tree.scores[0].fitted == pytest.approx(compared.score, rel=1e-9)
-    assert session.score(0) == pytest.approx(compared.score, rel=1e-9)
+    assert session.shown(0).score == pytest.approx(compared.score, rel=1e-9)
 
 
 def test_regimes_are_those_of_compare_and_their_moments_lie_in_the_log(session, compared):
@@ -63,6 +63,7 @@ def test_predictions_follow_a_knob_and_come_back(session):
     turned = session.predicted(0)["ahead"]
     assert np.nanmax(np.abs(turned - before)) > 0.05  # 20 % of 0.36 m/s for two seconds
     session.keep()
+    session.score_now()
     assert session.tree.scores[session.tree.current.number].fitted > session.tree.scores[0].fitted
     session.undo()
     np.testing.assert_array_equal(session.predicted(0)["ahead"], before)
@@ -89,6 +90,22 @@ def test_a_saved_model_is_the_file_that_the_commands_write(session, tmp_path):
     assert mine == (session.paths[0].resolve().parent / "mine.toml").read_bytes()
     assert scores.fitted == pytest.approx(results[-1].after.score, rel=1e-9)
     assert scores.heldout == pytest.approx(results[-1].heldout_after.score, rel=1e-9)
+
+
+def test_views_show_a_model_on_the_clock_that_compare_finds_for_it(session):
+    """A slower motor is late, and so are clocks found with a faster one: 90 ms are seen."""
+    session.set("base.motor_lag_s", 0.15)
+    session.save(type(session.paths[0])("slow.toml"))
+    compared = cli.run(["compare", "run.lcmlog", "--model", "slow.toml"])
+    assert session.shown(0).score == pytest.approx(compared.score, rel=1e-3)
+    on_the_clock_before = session.robots[0].opened.with_model(session.model_file.model).score
+    assert session.shown(0).score < 0.9 * on_the_clock_before
+
+
+def test_the_first_answer_of_an_addition_is_near_the_full_one(session):
+    foreseen = session.foresee("coasting", 0)
+    done = perform(session.work("add", "coasting"), session.paths, {}, print)
+    assert foreseen[0].score == pytest.approx(done.result["score_after"], rel=0.05)
 
 
 def test_a_session_goes_on_where_it_was_left(session):

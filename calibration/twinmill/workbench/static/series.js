@@ -33,7 +33,7 @@ export function rowsOf(robot, prediction, band, ahead_s) {
       unit: robot.command_unit,
       least: 0.1,
       lines: names.map((name, k) => (
-        { of: commands, column: k + 1, factor: 1, color: WHEELS[k], width: 1.5, alpha: 0.85, name, held: true, shift: robot.clock_s }
+        { of: commands, column: k + 1, factor: 1, color: WHEELS[k], width: 1.5, alpha: 0.85, name, held: true, shift: prediction?.clock_s ?? 0 }
       )),
     },
   ];
