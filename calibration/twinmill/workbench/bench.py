@@ -11,7 +11,6 @@ from collections.abc import Callable
 from time import perf_counter
 from typing import Any
 
-
 from twinmill.diagnosis.detections.add import is_of_camera
 from twinmill.files import plain
 from twinmill.model.parameters import CLOCK

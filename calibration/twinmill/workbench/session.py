@@ -36,7 +36,6 @@ from twinmill.workbench.knobs import Knob, knobs
 from twinmill.workbench.tree import Score, Tree
 from twinmill.workbench.worker import Done, Work
 
-
 FORESEEN_ROUNDS = 2  # of the fit that gives a first answer
 FORESEEN_WINDOWS = 1500  # of the robots that it is about
 DRAGGED_ROUNDS = 1  # of the search for the clock while a knob is turned
