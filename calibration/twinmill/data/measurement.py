@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is compared with a model: the cleaned runs of each robot in each log."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -107,13 +108,13 @@ class BadInputError(LogError):
         self.findings = findings
 
 
-def load_measurements(paths: list[Path], model: native.Model | None = None) -> Measurements:
+def load_measurements(paths: Sequence[Path | Log], model: native.Model | None = None) -> Measurements:
     """Reads logs and cleans every robot in them; reads steady-state tables (.csv).
 
     A robot or a log that cannot be judged is left out, with the reason, if another can.
 
     Args:
-        paths: logs and tables.
+        paths: logs and tables; logs that were read already, too.
         model: tells what the wheels do, so that commands can be checked against the motion.
 
     Raises:
@@ -125,10 +126,10 @@ def load_measurements(paths: list[Path], model: native.Model | None = None) -> M
     findings: list[InputFinding] = []
     for path in paths:
         try:
-            if is_sheet(path):
+            if isinstance(path, Path) and is_sheet(path):
                 judged += read_sheets(path)
                 continue
-            log = read_log(path)
+            log = path if isinstance(path, Log) else read_log(path)
         except LogError as error:
             excluded.append(error)
             continue

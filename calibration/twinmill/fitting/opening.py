@@ -98,8 +98,7 @@ def open_measurements(
 
     """
     opened = [_open(m, model_file) for m in measurements]
-    opened = [_on_clock_of_others(o, opened) for o in opened]
-    return opened
+    return [on_clock_of_others(o, opened) for o in opened]
 
 
 def _open(measurement: Measurement | Sheet, model_file: ModelFile) -> Opened:
@@ -131,7 +130,8 @@ def _clock(model: native.Model) -> tuple[Parameter, ...]:
     )
 
 
-def _on_clock_of_others(own: Opened, opened: list[Opened]) -> Opened:
+def on_clock_of_others(own: Opened, opened: Sequence[Opened]) -> Opened:
+    """One that does not tell its clock, on that of the others in its log; the rest as they are."""
     if own.data is not None or own.same_clock:
         return own
     log = own.measurement.log_sha256

@@ -19,7 +19,6 @@ from twinmill.workbench.session import Session
 from twinmill.workbench.state_file import StateFile
 from twinmill.workbench.worker import Done, Work, Worker
 
-STAGES = (("measure", "cleaning"), ("judge", "finding the noise floor of"))
 COMMAND_WORDS = {
     "duty": (("FL", "FR", "RL", "RR"), "%"),
     "wheel_speed": (("FL", "FR", "RL", "RR"), "rad/s"),
@@ -37,8 +36,8 @@ class Bench:
         state: where the session is kept.
 
     Attributes:
-        changes: counts by what has changed: `robots`, `model`, `prediction`, `score`, `work`,
-            `findings`.
+        changes: counts by what has changed: `robots`, `names`, `model`, `prediction`, `score`,
+            `work`, `findings`, `beside`.
         opening: what is being opened, in words; empty when all is there.
         failure: what went wrong last.
         view: what the screen shows: cursor, stretch, robot, tab.
@@ -57,18 +56,25 @@ class Bench:
     # -- opening --------------------------------------------------------------------------------
 
     async def open(self) -> None:
-        """Cleans and judges the logs, each step in a thread.
+        """Cleans the logs and judges the robots, that which is looked at first; in a thread.
 
         Raises:
             LogError: nothing in them can be judged.
         """
-        names = ", ".join(p.name for p in self.session.paths)
-        for stage, words in STAGES:
-            self.opening = f"{words} {names}"
+        self.opening = f"cleaning {', '.join(p.name for p in self.session.paths)}"
+        self.changed("work")
+        await asyncio.to_thread(self.session.measure)
+        while left := self.session.unjudged:
+            index = self.picked if self.picked in left else left[0]
+            label = self.session.measurements[index].label
+            self.opening = f"finding the noise floor of {label} ({len(left)} to go)"
             self.changed("work")
-            await asyncio.to_thread(getattr(self.session, stage))
+            await asyncio.to_thread(self.session.judge, index)
+            self.changed("names")
+            if index == self.picked:
+                self.changed("robots", "model", "findings")
         self.opening = ""
-        self.changed("work", "robots", "model", "score", "findings")
+        self.changed("work", "model", "score")
         self.worker.start(self.session.work("read"))
 
     def changed(self, *what: str) -> None:
@@ -80,7 +86,12 @@ class Bench:
     @property
     def picked(self) -> int:
         """Robot that is shown."""
-        return min(self.view.get("robot", 0), max(len(self.session.robots) - 1, 0))
+        return min(self.view.get("robot", 0), max(len(self.session.measurements) - 1, 0))
+
+    @property
+    def ready(self) -> bool:
+        """Whether the robot that is shown was judged."""
+        return self.picked in self.session.robots
 
     def drag(self, name: str, value: float) -> None:
         """A hand is on a knob."""
@@ -112,19 +123,33 @@ class Bench:
         self.failure = ""
         self._waiting = work = self.session.work(kind, effect)
         self.changed("work")
-        self._next()
         if kind != "diagnose" and not (effect and is_of_camera(effect)):
             foreseen = await asyncio.to_thread(self.session.foresee, effect, self.picked)
             if self.doing is work:  # not done or cancelled before
                 self.session.show(foreseen)
-                self.changed("score", "prediction")
+                self.changed("score", "prediction", "beside")
+        self._next()
+
+    async def try_beside(self, effect: str) -> None:
+        """Draws beside the model what an effect would change; once more takes it away."""
+        beside = self.session.beside
+        if beside and beside.label == f"with {effect}":
+            return self.leave_beside()
+        await asyncio.to_thread(self.session.try_beside, effect, self.picked)
+        self.changed("prediction", "beside")
+
+    def leave_beside(self) -> None:
+        """Only the model itself is drawn."""
+        self.session.beside = None
+        self.changed("prediction", "beside")
 
     def cancel(self) -> None:
         """Stops it."""
         self._waiting = None
         self.worker.cancel()
         self.session.forget()
-        self.changed("work", "score", "prediction")
+        self.session.beside = None
+        self.changed("work", "score", "prediction", "beside")
 
     async def tick(self) -> None:
         """To be called a few times a second."""
@@ -135,9 +160,8 @@ class Bench:
 
     async def _take(self, done: Done) -> None:
         if done.failure:
+            self.cancel()
             self.failure = done.failure
-            self.session.forget()
-            self.changed("work", "score", "prediction")
         elif done.work.kind in ("fit", "add"):
             self.session.take(done)
             await self._settled()
@@ -147,14 +171,14 @@ class Bench:
 
     async def _settled(self) -> None:
         """The session stands at another model: its prediction first, then what takes longer."""
-        self.changed("prediction")
+        self.changed("prediction", "beside")
         await asyncio.to_thread(self.session.score_now)
         await asyncio.to_thread(self.session.own_scores)
         self.changed("work", "model", "score")
 
     def _next(self) -> None:
         """What waits; else the exact score of a model that a hand made."""
-        if self.worker.busy or not self.session.robots:
+        if self.worker.busy or self.session.unjudged:
             return
         if self._waiting:
             self.worker.start(self._waiting)
@@ -183,7 +207,6 @@ class Bench:
     def log_bytes(self, place: int) -> bytes:
         """Paths of all robots of one log."""
         log = self.session.logs[place]
-        measured = {m.label: k for k, m in enumerate(self.session.measurements)}
         arrays, robots = {}, []
         for k, robot in enumerate(log.robots.values()):
             name = f"R{robot.robot_id:02d}"
@@ -193,7 +216,6 @@ class Bench:
                 {
                     "name": name,
                     "label": label,
-                    "index": measured.get(label, -1),
                     "color": COLORS[k % len(COLORS)],
                     "heading": robot.has_heading,
                     "radius_m": self.session.given.model.get("robot.body_radius_m"),
@@ -212,9 +234,11 @@ class Bench:
     def prediction_bytes(self, index: int) -> bytes:
         """What the model shown says of one robot, with its score."""
         begin = perf_counter()
-        arrays = self.session.predicted(index)
+        arrays = self.session.predicted(index) | self.session.predicted_beside(index)
+        beside = self.session.beside
         return pack(
             arrays,
+            beside=beside.label if beside else "",
             step_s=self.session.robots[index].step_s,
             revision=self.changes["prediction"],
             clock_s=self.session.shown(index).model.get(CLOCK),
@@ -224,6 +248,6 @@ class Bench:
     def log_of(self, index: int) -> int:
         """Place of the log that a robot is in."""
         if not self.session.measurements:
-            return 0
+            return self.view.get("log", 0)
         sha256 = self.session.measurements[index].log_sha256
         return next(k for k, log in enumerate(self.session.logs) if log.sha256 == sha256)

@@ -31,7 +31,7 @@ class FailsPanel:
     def draw(self) -> None:
         """The picked robot's."""
         session = self.bench.session
-        if not session.robots:
+        if not self.bench.ready:
             return
         self._regimes = session.regimes(self.bench.picked)[::-1]
         self.chart.options.clear()

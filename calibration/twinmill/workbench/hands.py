@@ -18,6 +18,12 @@ class Hands(Protocol):
     def drag(self, name: str, value: float) -> None:
         """A knob is being turned: predictions and score follow at once."""
 
+    async def start(self, kind: str, effect: str = "") -> None:
+        """A fit, an addition or a diagnosis."""
+
+    async def try_beside(self, effect: str) -> None:
+        """Draws what an effect would change beside the model; once more takes it away."""
+
     async def keep(self) -> None:
         """A knob was let go."""
 

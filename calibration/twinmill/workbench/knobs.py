@@ -19,6 +19,7 @@ from twinmill.model.parameters import (
 )
 
 WITHIN_95 = 1.96
+TABLE = "base.wheel_speed_mps."
 HAND = 500  # steps of a knob from end to end
 BASE_WORDS = {
     "base.forward_gain": "speed forward over the table's",
@@ -96,16 +97,14 @@ def knobs(model_file: ModelFile, told: ModelFile, opened: Sequence[Opened]) -> l
 
 
 def _worded(knob: Knob, words: str) -> Knob:
-    return Knob(**{**vars(knob), "words": words})
+    label = words if knob.name.startswith(TABLE) else knob.label
+    return Knob(**{**vars(knob), "words": words, "label": label})
 
 
 def _table_words(model_file: ModelFile) -> dict[str, str]:
     """Which duty each speed of the table stands for."""
     duties = tomlkit.parse(model_file.text).get("base", {}).get("duty_pct", [])
-    return {
-        f"base.wheel_speed_mps.{i}": f"speed of the rim at {duty:g} % duty"
-        for i, duty in enumerate(duties)
-    }
+    return {f"{TABLE}{i}": f"rim speed at {duty:g} %" for i, duty in enumerate(duties)}
 
 
 def _knob(
@@ -118,7 +117,7 @@ def _knob(
         reach = max(0.1, 1.5 * spread)
     middle = [p.value, *(interval or ())] if group == "base" else [p.value, p.usual]
     low, high = max(p.min, min(middle) - reach), min(p.max, max(middle) + reach)
-    label = p.name.split(".", 1)[1].replace("wheel_speed_mps.", "wheel_speed ")
+    label = p.name.split(".", 1)[1]
     return Knob(
         p.name, p.unit, group, label, "", p.value, low, high, p.min, p.max, interval, fitted
     )

@@ -16,7 +16,7 @@ class KnobsPanel:
         self.page, self.bench = page, page.bench
         self._rows: dict[str, _Row] = {}
         with ui.element("div").classes("buttons"):
-            self.fit = ui.button("Fit", on_click=lambda: self.bench.start("fit"))
+            self.fit = ui.button("Fit", on_click=lambda: page.start("fit"))
             self.fit.props('dense unelevated no-caps padding="2px 16px" data-testid="fit"')
             self.fit.tooltip("Fits all quantities that are free to the logs, as `twinmill fit`")
             ui.label("Locked ones are held.").classes("soft")
@@ -24,7 +24,7 @@ class KnobsPanel:
 
     def draw(self) -> None:
         """New rows only where the quantities are others; else new values."""
-        knobs = self.bench.session.knobs() if self.bench.session.robots else []
+        knobs = self.bench.session.knobs() if self.bench.ready else []
         self.fit.set_enabled(bool(knobs))
         if [k.name for k in knobs] == list(self._rows):
             for knob in knobs:

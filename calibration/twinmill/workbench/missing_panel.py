@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The panel of what is missing: the diagnosis, its findings, and a button to add each."""
+"""The panel of what is missing: the diagnosis, its findings, and buttons to try and to add each."""
 
 import html
 
 from nicegui import ui
 
+from twinmill.diagnosis.detections.add import is_of_camera
 from twinmill.model.parameters import catalogue
 from twinmill.workbench.hands import Hands
-from twinmill.workbench.words import estimate, scored, tone
+from twinmill.workbench.words import estimate, scored, tone, typeset
 
 REFIT = "refit"
 OTHERS = 8  # effects of the ranking that are shown beside the findings
@@ -18,33 +19,53 @@ class MissingPanel:
 
     def __init__(self, page: Hands) -> None:
         self.page, self.bench = page, page.bench
+        self._adding: list[ui.button] = []
+        self._trying: dict[str, list[ui.button]] = {}
         with ui.element("div").classes("buttons"):
-            self.button = ui.button("Diagnose", on_click=lambda: self.bench.start("diagnose"))
+            self.button = ui.button("Diagnose", on_click=lambda: page.start("diagnose"))
             self.button.props('dense unelevated no-caps padding="2px 16px" data-testid="diagnose"')
             self.cancel = ui.button("Cancel", on_click=self.bench.cancel)
             self.cancel.props('dense outline no-caps padding="2px 12px" data-testid="cancel"')
             self.progress = ui.label().classes("soft").style("flex: 1")
         self.bar = ui.linear_progress(show_value=False).props("indeterminate color=blue-9")
+        self.failure = ui.label().classes("note wrong").props('data-testid="failure"')
+        self.beside = ui.label().classes("note").props('data-testid="beside"')
         self.body = ui.element("div").classes("stack").props('data-testid="findings"')
-        self.draw()
+        self.draw_progress()
+        self.draw_beside()
 
     def draw_progress(self) -> None:
-        """What is being done."""
-        doing = self.bench.doing
+        """What is being done, or why it was not."""
+        doing, ready = self.bench.doing, self.bench.ready
         self.button.set_visibility(doing is None)
-        self.button.set_enabled(bool(self.bench.session.robots))
+        self.button.set_enabled(ready)
         self.cancel.set_visibility(doing is not None)
         self.bar.set_visibility(doing is not None)
         self.progress.set_text(self.bench.progress if doing else "")
+        self.failure.set_text(self.bench.failure)
+        self.failure.set_visibility(bool(self.bench.failure))
+        for button in self._adding:
+            button.set_enabled(ready and doing is None)
+
+    def draw_beside(self) -> None:
+        """What an effect that is tried would change, in one sentence."""
+        beside = self.bench.session.beside
+        for effect, buttons in self._trying.items():
+            on = beside is not None and beside.label == f"with {effect}"
+            for button in buttons:
+                button.set_text("Hide" if on else "Show")
+        self.beside.set_visibility(beside is not None and beside.label.startswith("with "))
+        if self.beside.visible:
+            score = scored(self.bench.session.score_beside(self.bench.picked))
+            self.beside.set_text(f"Drawn in blue: {beside.label}, score ≈ {score}. Not added yet.")
 
     def draw(self) -> None:
         """All of it."""
-        self.draw_progress()
         self.body.clear()
+        self._adding.clear()
+        self._trying.clear()
         found = self.bench.session.diagnosis
         with self.body:
-            if self.bench.failure:
-                _card("wrong", html.escape(self.bench.failure))
             for note in self.bench.session.notes:
                 _card("wrong", html.escape(note))
             if found is None:
@@ -58,6 +79,8 @@ class MissingPanel:
                 self._finding(finding)
             self._rest(found)
             self._others(found)
+        self.draw_progress()
+        self.draw_beside()
 
     def _said(self, found: dict) -> None:
         tree = self.bench.session.tree
@@ -76,7 +99,7 @@ class MissingPanel:
                 name = "the base's numbers are stale" if effect == REFIT else effect
                 ui.html(f"<b>{html.escape(name)}</b>", sanitize=False).style("flex: 1")
                 ui.label(finding["certainty"]).classes(f"chip {'good' if sure else 'warn'}")
-                self._add(effect)
+                self._buttons(effect)
             if effect != REFIT:
                 _told(effect)
             words = "less than 1 %" if share < 0.005 else f"{100 * share:.0f} %"
@@ -85,26 +108,33 @@ class MissingPanel:
                 f"takes away {words} of the error",
                 sanitize=False,
             )
-            if finding["group"]:
-                rivals = finding["group"][1:]
-                ui.label("These logs cannot tell it from:").classes("soft").style("margin-top: 6px")
-                for rival in rivals:
-                    with ui.element("div").classes("line"):
-                        ui.label(rival).style("flex: 1")
-                        self._add(rival)
-            if finding["why"]:
-                ui.label(finding["why"]).classes("warn")
             estimates = "; ".join(estimate(p) for p in finding["parameters"])
             ui.label(estimates).classes("soft")
+            if finding["group"]:
+                self._rivals(finding["group"][1:])
+            if finding["why"]:
+                ui.label(finding["why"]).classes("warn")
 
-    def _add(self, effect: str) -> None:
-        """The button that takes an effect in."""
+    def _rivals(self, rivals: list[str]) -> None:
+        """What these logs cannot tell a finding from."""
+        ui.label("These logs cannot tell it from:").classes("soft").style("margin-top: 6px")
+        for rival in rivals:
+            with ui.element("div").classes("line"):
+                ui.label(rival).style("flex: 1")
+                self._buttons(rival)
+
+    def _buttons(self, effect: str) -> None:
+        """To see what an effect would change, and to take it in."""
         verb, words = ("fit", "Refit") if effect == REFIT else ("add", "Add")
-        button = ui.button(
-            words, on_click=lambda: self.bench.start(verb, "" if effect == REFIT else effect)
-        )
+        of = "" if effect == REFIT else effect
+        if not is_of_camera(of):
+            button = ui.button("Show", on_click=lambda: self.page.try_beside(of))
+            button.props(f'dense flat no-caps padding="0 8px" data-testid="show-{effect}"')
+            button.tooltip("Draws what it would change, before it is taken")
+            self._trying.setdefault(of, []).append(button)
+        button = ui.button(words, on_click=lambda: self.page.start(verb, of))
         button.props(f'dense outline no-caps padding="0 12px" data-testid="add-{effect}"')
-        button.set_enabled(self.bench.doing is None)
+        self._adding.append(button)
 
     def _rest(self, found: dict) -> None:
         rest = found["rest"]
@@ -132,7 +162,7 @@ class MissingPanel:
                     ui.label(f"held out {scored(r['score_heldout'])}").classes(
                         tone(r["score_heldout"])
                     )
-                    self._add(r["effect"])
+                    self._buttons(r["effect"])
 
 
 def _told(effect: str) -> None:
@@ -140,7 +170,7 @@ def _told(effect: str) -> None:
     entry = catalogue().get(effect)
     if entry:
         ui.label(entry["summary"])
-        ui.label(entry["equation"]).classes("eq")
+        ui.html(typeset(entry["equation"]), sanitize=False).classes("eq")
 
 
 def _card(kind: str, words: str) -> None:

@@ -19,10 +19,11 @@ HEAD = """
 <link rel="modulepreload" href="/look/stage.js">
 """
 STAGE = """
-<div class="sheet"><canvas id="floor"></canvas><div class="key">
+<div id="stage"><div class="sheet"><canvas id="floor"></canvas><div class="key">
 <span style="color:#3c3c3c99"><i></i>measured</span>
 <span style="color:#d55e00"><i></i>predicted</span>
-<span style="color:#009e73"><i></i>95 % band of a right model</span></div></div>
+<span style="color:#009e73"><i></i>95 % band of a right model</span>
+<button id="beside" title="Draw the model alone"></button></div></div>
 <div class="sheet"><canvas id="series"></canvas></div>
 <div class="sheet" id="transport">
 <button id="play" title="Play or pause (space)">play_arrow</button>
@@ -31,13 +32,20 @@ STAGE = """
 <span id="clock">0.00 s</span><button id="marks" title="Forget these marks"></button>
 <span class="soft">predict</span>
 <button data-ahead="0.5" title="Predictions of half a second">0.5 s</button>
-<button data-ahead="2" title="Predictions of two seconds">2 s</button></div>
+<button data-ahead="2" title="Predictions of two seconds">2 s</button></div></div>
+<script type="module">import { start } from "/look/stage.js"; start(OPTIONS);</script>
 """
 TABS = {
     "knobs": "Knobs",
     "missing": "What is missing",
     "fails": "Where it fails",
     "models": "Models",
+}
+DRAWS = {  # what a panel shows
+    "knobs": {"model", "robots"},
+    "missing": {"findings", "model"},
+    "fails": {"prediction", "robots", "model"},
+    "models": {"model", "score", "work"},
 }
 
 
@@ -47,24 +55,24 @@ class Screen:
     def __init__(self, bench: Bench) -> None:
         self.bench = bench
         self._seen: Counter[str] = Counter()
-        self._shown: tuple | None = None
+        self._stale: set[str] = set()
 
     async def build(self) -> None:
         """Makes all elements, then keeps them up to date."""
+        place = self.bench.log_of(self.bench.picked)
+        options = {"token": self.bench.state.token, "view": self.bench.view, "log": place}
         ui.add_head_html(HEAD)
+        ui.add_body_html(STAGE.replace("OPTIONS", json.dumps(options)))
         self._bar()
-        with ui.element("div").props("id=main"):
-            ui.html(STAGE, sanitize=False).props("id=stage")
-            with ui.element("div").props("id=side"):
-                self._panels()
+        with ui.element("div").props("id=side"):
+            self._panels()
         ui.on("undo", lambda: self._act(self.bench.session.undo))
         ui.on("redo", lambda: self._act(self.bench.session.redo))
-        ui.on("pick", lambda event: self._pick(event.args))
+        ui.on("pick", lambda event: self._pick_label(event.args))
+        ui.on("leave", self.bench.leave_beside)
         self.client = context.client
         await self.client.connected()
-        view = json.dumps(self.bench.view)
-        options = f'{{token: "{self.bench.state.token}", view: {view}}}'
-        await ui.run_javascript(f"(await import('/look/stage.js')).start({options})", timeout=20)
+        self._stale = set(TABS)
         await self._refresh()
         ui.timer(REFRESH_S, self._refresh)
 
@@ -97,8 +105,8 @@ class Screen:
             self.redo.props('flat dense round data-testid="redo"').tooltip("Redo (y)")
 
     def _panels(self) -> None:
-        chosen = self.bench.view.get("tab", "knobs")
-        with ui.tabs(on_change=lambda e: self.bench.view.update(tab=e.value)) as tabs:
+        chosen = self._tab
+        with ui.tabs(on_change=lambda e: self._turn_to(e.value)) as tabs:
             tabs.props("dense no-caps inline-label align=justify")
             for key, label in TABS.items():
                 ui.tab(key, label=label).props(f'data-testid="tab-{key}"')
@@ -125,6 +133,16 @@ class Screen:
         self.javascript("twinmill.predict()")
         self._draw_score()
 
+    async def start(self, kind: str, effect: str = "") -> None:
+        """A fit, an addition or a diagnosis."""
+        await self.bench.start(kind, effect)
+        await self._refresh()
+
+    async def try_beside(self, effect: str) -> None:
+        """Draws what an effect would change."""
+        await self.bench.try_beside(effect)
+        await self._refresh()
+
     async def keep(self) -> None:
         """A knob was let go."""
         await self._act(self.bench.session.keep)
@@ -138,8 +156,12 @@ class Screen:
             self.bench.view["robot"] = int(index)
             self.bench.changed("robots")
 
+    def _pick_label(self, label: str) -> None:
+        labels = [m.label for m in self.bench.session.measurements]
+        self._pick(labels.index(label) if label in labels else None)
+
     def _pick_log(self, place: int) -> None:
-        robots = range(len(self.bench.session.robots))
+        robots = range(len(self.bench.session.measurements))
         first = next((k for k in robots if self.bench.log_of(k) == place), None)
         if self.bench.log_of(self.bench.picked) != place:
             self._pick(first)
@@ -157,7 +179,7 @@ class Screen:
         self._seen = Counter(changes)
         if "robots" in new:
             self._draw_robots()
-        elif new & {"model"}:
+        elif new & {"model", "names"}:
             self._name_robots()
         if "prediction" in new and "robots" not in new:
             self.javascript("twinmill.predict()")
@@ -165,39 +187,45 @@ class Screen:
             self._draw_status()
         if new & {"score", "model", "robots"}:
             self._draw_score()
-        if new & {"model", "robots"}:
-            self.knobs.draw()
-        if new & {"model", "score", "work"}:
-            self.models.draw()
-        if new & {"findings", "model", "work"}:
-            self.missing.draw()
-        elif self.bench.doing:
+        self._stale |= {tab for tab, what in DRAWS.items() if new & what}
+        self._draw_tab()
+        if "work" in new or self.bench.doing:
             self.missing.draw_progress()
-        if new & {"prediction", "robots", "model"}:
-            self.fails.draw()
+        if "beside" in new:
+            self.missing.draw_beside()
+
+    @property
+    def _tab(self) -> str:
+        return self.bench.view.get("tab", "knobs")
+
+    def _turn_to(self, tab: str) -> None:
+        self.bench.view["tab"] = tab
+        self._draw_tab()
+
+    def _draw_tab(self) -> None:
+        """The panel that is seen; the others once they are."""
+        if self._tab in self._stale:
+            self._stale.remove(self._tab)
+            getattr(self, self._tab).draw()
 
     def _draw_robots(self) -> None:
         session, picked = self.bench.session, self.bench.picked
         self._name_robots()
-        self.robot.set_visibility(len(session.robots) > 1)
+        self.robot.set_visibility(len(session.measurements) > 1)
         place = self.bench.log_of(picked)
         self.log.set_value(place)
-        code = ""
-        if self._shown is None or self._shown[:2] != (place, bool(session.robots)):
-            code += f"await twinmill.showLog({place});"
-        self._shown = (place, bool(session.robots), picked)
-        if session.robots:
-            label = json.dumps(session.measurements[picked].label)
-            code += f"await twinmill.pick({label}, {picked});"
-        self.javascript(f"(async () => {{ {code} }})()")
+        if not self.bench.ready:
+            return
+        label = json.dumps(session.measurements[picked].label)
+        self.javascript(f"twinmill.showLog({place}).then(() => twinmill.pick({label}, {picked}))")
 
     def _name_robots(self) -> None:
         """Each with its score."""
         session, picked = self.bench.session, self.bench.picked
         several = len(session.paths) > 1
         names = [m.label if several else m.label[-3:] for m in session.measurements]
-        scores = session.own_scores() if session.robots else []
-        labels = [f"{n} · {scored(s)}" for n, s in zip(names, scores, strict=False)]
+        scores = session.own_scores()
+        labels = [f"{n} · {scored(scores[k])}" if k in scores else n for k, n in enumerate(names)]
         self.robot.set_options(dict(enumerate(labels)), value=picked if labels else None)
 
     def _draw_status(self) -> None:
@@ -205,7 +233,7 @@ class Screen:
         words = bench.failure or (f"{bench.opening} …" if bench.opening else "")
         if bench.doing:
             verb = {"fit": "Fitting", "add": "Adding", "diagnose": "Diagnosing"}[bench.doing.kind]
-            words = f"{verb} {bench.doing.effect}: {bench.progress}"
+            words = f"{verb} {bench.doing.effect}".strip() + f": {bench.progress}"
         self.status.set_text(
             words or bench.session.tree.file_name(bench.session.tree.current.number)
         )
@@ -214,7 +242,7 @@ class Screen:
     def _draw_score(self) -> None:
         session = self.bench.session
         known = session.tree.scores.get(session.tree.current.number)
-        if session.robots and session.is_passing:
+        if self.bench.ready and session.is_passing:
             self._say_score(session.passing_score(self.bench.picked), False)
         elif known:
             self._say_score(known.fitted, known.exact)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A session at the workbench without any screen: logs, models tried, predictions, scores, findings.
 
-Opened in three stages, each slower than the one before: `read` gives the paths, `measure` what can
-be predicted, `judge` floors and scores.
+Opened in stages, each slower than the one before: `read` gives the paths, `measure` what can be
+predicted, `judge` the floor and the clock of one robot at a time.
 """
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.steady_table import is_sheet
 from twinmill.files import replacing
 from twinmill.fitting.fit import base_names
-from twinmill.fitting.opening import Opened, open_measurements
+from twinmill.fitting.opening import Opened, on_clock_of_others, open_measurements
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.model.parameters import (
@@ -41,6 +41,19 @@ FORESEEN_WINDOWS = 1500  # of the robots that it is about
 DRAGGED_ROUNDS = 1  # of the search for the clock while a knob is turned
 
 
+@dataclass(frozen=True)
+class Beside:
+    """Another model that is drawn beside the one shown.
+
+    Attributes:
+        label: for people.
+        opened: each robot with it, by index.
+    """
+
+    label: str
+    opened: Mapping[int, Opened]
+
+
 class Session:
     """One model, at first as given, and all logs given.
 
@@ -49,10 +62,10 @@ class Session:
         model: name of the model file, here or among the installed models.
 
     Attributes:
-        robots: views of the robots that can be predicted, in the order of `measurements`; empty
-            until the logs are judged.
+        robots: views of the robots that were judged, by place in `measurements`.
         held: names that a fit leaves alone.
         diagnosis: as `diagnose --json` gives it, and of which model; None before.
+        beside: another model that is drawn beside the one shown, or None.
 
     Raises:
         ModelError: no such model.
@@ -70,9 +83,10 @@ class Session:
         self.tree = Tree(self.given, model)
         self.logs: list[Log] = []
         self.measurements = Measurements([], [], [])
-        self.robots: list[RobotView] = []
+        self.robots: dict[int, RobotView] = {}
         self.held: set[str] = set()
         self.diagnosis: dict | None = None
+        self.beside: Beside | None = None
         self._files = {0: self.given}
         self._dragged: dict[str, float] = {}
         self._foreseen: dict[int, Opened] = {}
@@ -95,12 +109,24 @@ class Session:
         Raises:
             LogError: no run can be judged.
         """
-        self.measurements = load_measurements(self.paths, self.given.model)
+        self.measurements = load_measurements(self.logs, self.given.model)
 
-    def judge(self) -> None:
-        """Finds clocks and noise floors."""
-        opened = open_measurements(self.measurements, self.given)
-        self.robots = [RobotView(o) for o in opened]
+    @property
+    def unjudged(self) -> list[int]:
+        """Places in `measurements` of those that `judge` has not seen."""
+        return [k for k in range(len(self.measurements)) if k not in self.robots]
+
+    def judge(self, index: int) -> None:
+        """Finds clock and noise floor of one robot; after the last, the score of all."""
+        (opened,) = open_measurements([self.measurements[index]], self.given)
+        self.robots = {**self.robots, index: RobotView(opened)}
+        if self.unjudged:
+            return
+        all_opened = [view.opened for view in self.robots.values()]
+        for k, view in self.robots.items():
+            on_clock = on_clock_of_others(view.opened, all_opened)
+            if on_clock is not view.opened:
+                self.robots[k] = RobotView(on_clock)
         self.score_now(exact=self.tree.current.number == 0)
 
     def raw(self, index: int) -> RobotLog:
@@ -130,13 +156,13 @@ class Session:
     @property
     def is_passing(self) -> bool:
         """Whether the model shown is not in the tree: a hand holds a knob, or a fit goes on."""
-        return bool(self._dragged) or self._foreseen is not None
+        return bool(self._dragged or self._foreseen)
 
     def knobs(self) -> list[Knob]:
         """Of the model where the tree stands."""
         tried = self.tree.current
         told = self.tree.model_file(tried.parent) if tried.values else self.model_file
-        return knobs(self.model_file, told, [r.opened for r in self.robots if r.opened.data])
+        return knobs(self.model_file, told, self._judged)
 
     def drag(self, name: str, value: float) -> None:
         """Moves a quantity, to be seen and not yet to be kept.
@@ -151,7 +177,7 @@ class Session:
             raise ModelError(
                 f"{name} = {value:g}: must be within {bounds['min']:g} to {bounds['max']:g}."
             )
-        self._foreseen = {}
+        self._foreseen, self.beside = {}, None
         self._dragged[name] = value
         self._passing = {}
 
@@ -166,10 +192,18 @@ class Session:
         """Shows the model where the tree stands."""
         self._dragged, self._passing, self._foreseen = {}, {}, {}
 
+    def try_beside(self, effect: str, index: int) -> None:
+        """Draws what an effect would change beside the model where the tree stands."""
+        self.beside = Beside(f"with {effect}", self.foresee(effect, index))
+
     def show(self, foreseen: dict[int, Opened]) -> None:
-        """Shows what `foresee` gave until something else is shown."""
+        """Shows what `foresee` gave until something else is shown, beside the model as it is."""
         self.forget()
         self._foreseen = foreseen
+        self.beside = self._before(self.tree.current.number)
+
+    def _before(self, number: int) -> Beside:
+        return Beside("before", {k: self.settled(number, k) for k in self.robots})
 
     def foresee(self, effect: str, index: int) -> dict[int, Opened]:
         """About what a fit, or the addition of an effect, will come to: all robots by index.
@@ -193,12 +227,12 @@ class Session:
         for p in fit.shared_values:
             model.set(p.name, p.value)
         fitted = {k: o.with_fitted(m) for k, o, m in zip(members, known, fit.models, strict=True)}
-        others = set(range(len(self.robots))) - set(members)
+        others = set(self.robots) - set(members)
         return fitted | {k: self.settled(number, k).with_model(model) for k in others}
 
     def _foremost(self, index: int) -> list[int]:
         """One robot, and of the others as many as an answer at once can be about."""
-        order = [index, *(k for k in range(len(self.robots)) if k != index)]
+        order = [index, *(k for k in self.robots if k != index)]
         members, windows = [], 0
         for k in order:
             data = self.robots[k].opened.data
@@ -207,10 +241,15 @@ class Session:
                 members.append(k)
         return members
 
+    @property
+    def _judged(self) -> list[Opened]:
+        """Those that have a floor."""
+        opened = [view.opened for view in self.robots.values()]
+        return [o for o in opened if o.data is not None]
+
     def _free(self, model: native.Model) -> list[Parameter]:
         """What a fit of these logs moves."""
-        opened = [r.opened for r in self.robots if r.opened.data is not None]
-        base = base_parameters(model, base_names(model, opened))
+        base = base_parameters(model, base_names(model, self._judged))
         return [*base, *all_effect_parameters(model)]
 
     def set(self, name: str, value: float) -> None:
@@ -221,16 +260,19 @@ class Session:
     def undo(self) -> None:
         """To the model before."""
         self.forget()
+        self.beside = None
         self.tree.undo()
 
     def redo(self) -> None:
         """Takes an undo back."""
         self.forget()
+        self.beside = None
         self.tree.redo()
 
     def go(self, number: int) -> None:
         """To any model tried."""
         self.forget()
+        self.beside = None
         self.tree.go(number)
 
     def save(self, path: Path) -> list[str]:
@@ -282,10 +324,21 @@ class Session:
         """About that of the model shown, from as many robots as can be asked at once."""
         return total_score([self.shown(k).score for k in self._foremost(index)])
 
-    def own_scores(self) -> list[float]:
+    def score_beside(self, index: int) -> float:
+        """The same of the model beside."""
+        return total_score([self.beside.opened[k].score for k in self._foremost(index)])
+
+    def predicted_beside(self, index: int) -> Arrays:
+        """The same of the model beside, each name with `_beside`; empty without one."""
+        if self.beside is None:
+            return {}
+        arrays = self.robots[index].predicted(self.beside.opened[index].model)
+        return {f"{name}_beside": a for name, a in arrays.items() if name != "starts"}
+
+    def own_scores(self) -> dict[int, float]:
         """Of each robot where the tree stands; NaN without a floor."""
         number = self.tree.current.number
-        return [self.settled(number, k).score for k in range(len(self.robots))]
+        return {k: self.settled(number, k).score for k in self.robots}
 
     def regimes(self, index: int) -> list[Regime]:
         """Where the model shown fails one robot; none without a floor."""
@@ -305,9 +358,9 @@ class Session:
 
     def score_now(self, exact: bool = False) -> None:
         """Of all robots where the tree stands, unless it is known."""
-        if not self.robots or self.tree.current.number in self.tree.scores:
+        if self.unjudged or self.tree.current.number in self.tree.scores:
             return
-        known = [s for s in self.own_scores() if np.isfinite(s)]
+        known = [s for s in self.own_scores().values() if np.isfinite(s)]
         total = total_score(known) if known else float("nan")
         fitted_here = self.model_file.fitted_on([m.log_sha256 for m in self.measurements])
         heldout = None if fitted_here or self.tree.current.values else total
@@ -344,6 +397,7 @@ class Session:
         label = f"+ {work.effect}" if work.effect else "fitted"
         made = self.tree.add(work.of, work.words, label, text)
         self.forget()
+        self.beside = self._before(work.of)
         score = result.get("score_after")
         if score is not None:
             self.tree.scores[made.number] = Score(score, result.get("heldout_after"), True)

@@ -25,7 +25,7 @@ def opened(brief_coasting_robot, tmp_path_factory):
     session = Session([type(folder)("run.lcmlog")], "model.toml")
     session.read()
     session.measure()
-    session.judge()
+    session.judge(0)
     yield session
     os.chdir(before)
 

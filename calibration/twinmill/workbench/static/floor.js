@@ -149,21 +149,29 @@ export class Floor {
     const { starts } = prediction.arrays;
     const [a, b] = this.stage.span;
     let next = -Infinity;
-    g.strokeStyle = PREDICTED;
-    g.lineWidth = 1.4;
-    g.beginPath();
+    const kept = [];
     for (let k = 0; k < starts.rows; k++) {
       const t = starts.data[4 * k];
       if (t < next - 1e-4 || t < a || t > b) continue;
       next = t + this.stage.ahead_s;
-      this._ahead(g, k, prediction);
+      kept.push(k);
     }
+    if (prediction.beside) this._lines(g, kept, prediction, prediction.arrays.ahead_beside, BEFORE, 1.2);
+    this._lines(g, kept, prediction, prediction.arrays.ahead, PREDICTED, 1.4);
+  }
+
+  _lines(g, kept, prediction, ahead, color, width) {
+    g.strokeStyle = color;
+    g.lineWidth = width;
+    g.lineJoin = "round";
+    g.beginPath();
+    for (const k of kept) this._ahead(g, k, prediction, ahead);
     g.stroke();
   }
 
   /** One prediction as a line on the current path. */
-  _ahead(g, k, prediction) {
-    const { starts, ahead } = prediction.arrays;
+  _ahead(g, k, prediction, ahead) {
+    const { starts } = prediction.arrays;
     const steps = Math.round(this.stage.ahead_s / prediction.step_s);
     g.moveTo(this._x(starts.data[4 * k + 1]), this._y(starts.data[4 * k + 2]));
     for (let i = 0; i < steps; i++) {
@@ -218,12 +226,9 @@ export class Floor {
     }
     g.fill();
     g.globalAlpha = 1;
-    g.strokeStyle = PREDICTED;
-    g.lineWidth = 3;
     g.lineCap = "round";
-    g.beginPath();
-    this._ahead(g, k, prediction);
-    g.stroke();
+    if (prediction.beside) this._lines(g, [k], prediction, prediction.arrays.ahead_beside, BEFORE, 2.5);
+    this._lines(g, [k], prediction, ahead, PREDICTED, 3);
     const last = this._lastOf(k, steps, ahead);
     if (last) {
       g.beginPath();

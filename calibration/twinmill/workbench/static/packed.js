@@ -30,12 +30,12 @@ export function rowAt({ data, rows, width }, t) {
 
 /** Values of the array at t, between two rows; null where it is not known. */
 export function valuesAt(array, t, reach = 0.3) {
-  const k = rowAt(array, t);
-  if (k < 0) return null;
   const { data, rows, width } = array;
+  const k = rows && t < data[0] && data[0] - t <= reach ? 0 : rowAt(array, t);
+  if (k < 0) return null;
   const here = data.subarray(k * width, (k + 1) * width);
   if (t - here[0] > reach || Number.isNaN(here[1])) return null;
-  if (k + 1 >= rows) return here;
+  if (k + 1 >= rows || t <= here[0]) return here;
   const next = data.subarray((k + 1) * width, (k + 2) * width);
   if (Number.isNaN(next[1])) return here;
   const share = (t - here[0]) / Math.max(next[0] - here[0], 1e-9);

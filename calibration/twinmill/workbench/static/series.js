@@ -2,7 +2,7 @@
 // Speeds, commands and errors over one time axis, with the cursor that all views share.
 
 import {
-  CURSOR, FLOOR, GRID, MARK, MEASURED, PREDICTED, SMALL, Sheet, WHEELS, WORDS, ticks, worded,
+  BEFORE, CURSOR, FLOOR, GRID, MARK, MEASURED, PREDICTED, SMALL, Sheet, WHEELS, WORDS, ticks, worded,
 } from "./look.js";
 import { rowAt } from "./packed.js";
 
@@ -15,8 +15,12 @@ const DEGREES = 180 / Math.PI;
 /** Rows of a robot: each a quantity with its lines (array, column, factor). */
 export function rowsOf(robot, prediction, band, ahead_s) {
   const { speed, commands } = robot.arrays;
-  const pair = (column, factor) => {
+  const speeds = (column, factor) => {
     const lines = [{ of: speed, column, factor, color: MEASURED, width: 2.2, alpha: 0.5, name: "measured" }];
+    if (prediction?.beside) {
+      const of = prediction.arrays.predicted_speed_beside;
+      lines.push({ of, column, factor, color: BEFORE, width: 1.1, alpha: 0.9, name: prediction.beside });
+    }
     if (prediction) {
       const of = prediction.arrays.predicted_speed;
       lines.push({ of, column, factor, color: PREDICTED, width: 1.3, alpha: 1, name: "predicted" });
@@ -25,9 +29,9 @@ export function rowsOf(robot, prediction, band, ahead_s) {
   };
   const names = robot.command_names;
   const rows = [
-    { title: "forward", unit: "m/s", least: 0.1, lines: pair(1, 1) },
-    { title: "left", unit: "m/s", least: 0.1, lines: pair(2, 1) },
-    { title: "turn", unit: "°/s", least: 10, lines: pair(3, DEGREES) },
+    { title: "forward", unit: "m/s", least: 0.1, lines: speeds(1, 1) },
+    { title: "left", unit: "m/s", least: 0.1, lines: speeds(2, 1) },
+    { title: "turn", unit: "°/s", least: 10, lines: speeds(3, DEGREES) },
     {
       title: "commands",
       unit: robot.command_unit,
@@ -41,14 +45,21 @@ export function rowsOf(robot, prediction, band, ahead_s) {
     const far = ahead_s > 1 ? 3 : 1;
     const of = prediction.arrays.errors;
     const [forward, left, heading] = band;
+    const errors = (column, factor) => {
+      const line = { column, factor, alpha: 1, width: 1.3 };
+      const lines = [{ ...line, of, color: PREDICTED, name: "error" }];
+      const beside = prediction.arrays.errors_beside;
+      if (beside) lines.unshift({ ...line, of: beside, color: BEFORE, name: prediction.beside });
+      return lines;
+    };
     rows.push({
       title: `position error, ${ahead_s} s ahead`, unit: "mm", least: 1,
-      lines: [{ of, column: far, factor: 1000, color: PREDICTED, width: 1.3, alpha: 1, name: "error", dots: true }],
+      lines: errors(far, 1000),
       limits: [1000 * Math.hypot(forward, left)], from: 0,
     });
     rows.push({
       title: `heading error, ${ahead_s} s ahead`, unit: "°", least: 0.5,
-      lines: [{ of, column: far + 1, factor: DEGREES, color: PREDICTED, width: 1.3, alpha: 1, name: "error", dots: true }],
+      lines: errors(far + 1, DEGREES),
       limits: [heading * DEGREES, -heading * DEGREES],
     });
   }

@@ -10,7 +10,7 @@ const SAVE_MS = 400;
 const STEP_S = 0.1;
 
 class Stage {
-  constructor({ token, view }) {
+  constructor({ token, view, log }) {
     this.token = token;
     this.t = view.t ?? 0;
     this.ahead_s = view.ahead_s ?? 2;
@@ -31,6 +31,7 @@ class Stage {
     new ResizeObserver(() => this.redraw()).observe(document.querySelector("#stage"));
     this._frame = this._frame.bind(this);
     requestAnimationFrame(this._frame);
+    this.showLog(log);
   }
 
   // -- data -------------------------------------------------------------------------------------
@@ -41,8 +42,15 @@ class Stage {
     return answer?.ok ? unpack(await answer.arrayBuffer()) : null;
   }
 
-  /** Paths of all robots of a log. */
+  /** Paths of all robots of a log; nothing where they are shown. */
   async showLog(log) {
+    if (log === this._log) return this._shown;
+    this._log = log;
+    this._shown = this._showLog(log);
+    return this._shown;
+  }
+
+  async _showLog(log) {
     const found = await this._get(`log?log=${log}`);
     if (!found) return;
     this.end_s = found.end_s;
@@ -89,6 +97,8 @@ class Stage {
   _predicted(found) {
     this.prediction = found;
     document.body.dataset.predicted = found.revision;
+    document.body.dataset.beside = found.beside;
+    document.querySelector("#beside").textContent = found.beside ? `${found.beside} ✕` : "";
     document.body.dataset.predictedMs = found.compute_ms;
     this._renew();
   }
@@ -173,7 +183,7 @@ class Stage {
 
   /** Another robot is wanted: the server knows what goes with it. */
   ask(robot) {
-    if (robot.index >= 0) window.emitEvent("pick", robot.index);
+    window.emitEvent("pick", robot.label);
   }
 
   // -- drawing ----------------------------------------------------------------------------------
@@ -210,6 +220,7 @@ class Stage {
     this._clock = document.querySelector("#clock");
     this._scrubber.addEventListener("input", () => this.seek(Number(this._scrubber.value)));
     document.querySelector("#play").addEventListener("click", () => this.play());
+    document.querySelector("#beside").addEventListener("click", () => window.emitEvent("leave", {}));
     document.querySelector("#marks").addEventListener("click", () => this.mark([], 0, ""));
     for (const button of document.querySelectorAll("[data-ahead]")) {
       button.addEventListener("click", () => this.setAhead(Number(button.dataset.ahead)));
