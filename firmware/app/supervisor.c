@@ -411,8 +411,8 @@ int supervise(struct options *options, driver_fn *drive)
     notify("WATCHDOG=1");
     if (settle(&crew, &code))
     {
-        wait_for_guard(&crew);
         (void)put_to_rest(&crew);
+        wait_for_guard(&crew);
         warn_of_vendor(options);
         while (crew.asked_by == 0 && drive_once(&crew, &code))
         {

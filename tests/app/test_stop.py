@@ -133,6 +133,7 @@ def test_keys_of_a_terminal_leave_no_wheel_turning(driving, number):
     code, said = driving.end()
     assert code == 0
     assert stands_for_good(driving, begin_s) < LIMIT_S + SLACK_S
+    assert "guard" not in said  # nothing hung, at the start as little as later
     assert ("not suspended" in said) == (number in (signal.SIGTSTP, signal.SIGQUIT))
 
 
