@@ -99,7 +99,7 @@ _Noreturn void guard_run(const struct options *options, struct watch *watch, pid
     sigfillset(&all);
     (void)sigprocmask(SIG_BLOCK, &all, NULL);
     (void)setsid();
-    priority_take();
+    priority_take(PRIORITY_WATCHES);
     struct guard guard = {
         .watch = watch,
         .stopper = {.config = &options->config, .dry_run = options->dry_run},

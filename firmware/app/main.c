@@ -89,7 +89,7 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
     struct loop_devices devices = {0};
     struct link link;
     char error[CONFIG_ERROR_MAX];
-    priority_take();
+    priority_take(PRIORITY_DRIVES);
     if (!devices_make(&options->config, options->dry_run, &devices, error))
     {
         say("%s", error);

@@ -11,7 +11,7 @@ static rlim_t limit_of(__rlimit_resource_t resource)
     return getrlimit(resource, &limit) == 0 ? limit.rlim_cur : 0;
 }
 
-void priority_take(void)
+void priority_take(enum priority_rank rank)
 {
     // Under a limit the next mapping would fail, the camera's for one.
     if (limit_of(RLIMIT_MEMLOCK) == RLIM_INFINITY)
@@ -21,7 +21,8 @@ void priority_take(void)
     const rlim_t highest = limit_of(RLIMIT_RTPRIO);
     if (highest > 0 && highest <= (rlim_t)sched_get_priority_max(SCHED_FIFO))
     {
-        const struct sched_param parameters = {.sched_priority = (int)highest};
+        const int wanted = (int)highest - (int)rank;
+        const struct sched_param parameters = {.sched_priority = wanted > 1 ? wanted : 1};
         (void)sched_setscheduler(0, SCHED_FIFO, &parameters);
     }
 }

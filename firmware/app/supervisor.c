@@ -400,7 +400,7 @@ int supervise(struct options *options, driver_fn *drive)
     };
     crew.signal_fd = block_signals();
     crew.watch = watch_make();
-    priority_take();
+    priority_take(PRIORITY_WATCHES);
     int code = 1;
     if (crew.signal_fd < 0 || crew.watch == NULL || !say_never_wait())
     {

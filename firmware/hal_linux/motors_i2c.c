@@ -10,6 +10,7 @@
 #define REGISTER_MOTOR 0x1F
 // The kernel's wait for a stuck bus, in units of 10 ms; its own default is a second.
 #define BUS_TIMEOUT_10MS 2
+#define RETRY_PAUSE_US 500
 
 static void close_bus(void *device)
 {
@@ -55,16 +56,18 @@ static enum fw_err send_once(struct motors_i2c *board, const uint8_t *bytes, siz
     return err != FW_OK ? err : result_of(board->sys->write(board->fd, bytes, count), count);
 }
 
-// Tries until deadline_us, at least once. After the last failure the bus is closed, so that the
-// next call opens whatever is there then.
+// Tries until deadline_us, at least once, with pauses in which others run: those who watch this
+// process, on a computer that has no second processor free. After the last failure the bus is
+// closed, so that the next call opens whatever is there then.
 static enum fw_err send_until(struct motors_i2c *board, const uint8_t *bytes, size_t count,
                               int64_t deadline_us)
 {
-    enum fw_err err;
-    do
+    enum fw_err err = send_once(board, bytes, count);
+    while (err != FW_OK && board->fd >= 0 && hal_clock_monotonic_us(&board->clock) < deadline_us)
     {
+        hal_clock_wait(&board->clock, NULL, 0, RETRY_PAUSE_US);
         err = send_once(board, bytes, count);
-    } while (err != FW_OK && board->fd >= 0 && hal_clock_monotonic_us(&board->clock) < deadline_us);
+    }
     if (err != FW_OK)
     {
         close_bus(board);
@@ -82,7 +85,8 @@ static uint8_t wire_duty(const struct motors_i2c *board, int wheel, int8_t duty_
     return (uint8_t)(board->config.sign[wheel] * duty_pct);
 }
 
-// All four wheels share one deadline: a call lasts no longer than retry_us and one transfer more.
+// All four wheels share one deadline: a call lasts no longer than retry_us, a pause and one
+// transfer.
 static enum fw_err write_duties(void *device, const int8_t wheel_duty_pct[FW_WHEEL_COUNT])
 {
     struct motors_i2c *board = device;

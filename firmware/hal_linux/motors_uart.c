@@ -19,6 +19,7 @@
 #define HEARD_US 2000000
 #define PROBE_US 1500000
 #define RECEIVE_TURNS 64
+#define RETRY_PAUSE_US 500
 
 static void close_line(void *device)
 {
@@ -80,6 +81,10 @@ static enum fw_err send_frame(struct motors_uart *board, const uint8_t *frame, s
         else if (hal_clock_monotonic_us(&board->clock) >= deadline_us)
         {
             err = FW_ERR_TIMEOUT;
+        }
+        else
+        {
+            hal_clock_wait(&board->clock, NULL, 0, RETRY_PAUSE_US);
         }
     }
     if (err != FW_OK)

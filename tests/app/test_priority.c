@@ -33,7 +33,7 @@ static long locked_kb(void)
 }
 
 // In a process of its own. @return 0, or the number of what was not as expected.
-static int take_under(rlim_t memlock, rlim_t rtprio)
+static int take_under(rlim_t memlock, rlim_t rtprio, enum priority_rank rank, int expected)
 {
     const pid_t child = fork();
     if (child == 0)
@@ -48,12 +48,12 @@ static int take_under(rlim_t memlock, rlim_t rtprio)
         {
             _exit(77);
         }
-        priority_take();
+        priority_take(rank);
         struct sched_param now = {0};
         (void)sched_getparam(0, &now);
         _exit((locked_kb() > 0) != (memlock == RLIM_INFINITY)                    ? 1
               : sched_getscheduler(0) != (rtprio > 0 ? SCHED_FIFO : SCHED_OTHER) ? 2
-              : now.sched_priority != (int)rtprio                                ? 3
+              : now.sched_priority != expected                                   ? 3
                                                                                  : 0);
     }
     int status = -1;
@@ -67,18 +67,26 @@ static int take_under(rlim_t memlock, rlim_t rtprio)
 
 static void test_limits_of_the_service_are_used(void)
 {
-    TEST_ASSERT_EQUAL(0, take_under(RLIM_INFINITY, 10));
+    TEST_ASSERT_EQUAL(0, take_under(RLIM_INFINITY, 10, PRIORITY_WATCHES, 10));
+}
+
+// In real time a process that never pauses leaves nothing to others of its own priority.
+static void test_watchers_go_before_whom_they_watch(void)
+{
+    TEST_ASSERT_EQUAL(0, take_under(RLIM_INFINITY, 10, PRIORITY_DRIVES, 9));
+    TEST_ASSERT_EQUAL(0, take_under(RLIM_INFINITY, 1, PRIORITY_DRIVES, 1));
 }
 
 static void test_limits_of_a_shell_leave_all_as_it_was(void)
 {
-    TEST_ASSERT_EQUAL(0, take_under(8 << 20, 0));
+    TEST_ASSERT_EQUAL(0, take_under(8 << 20, 0, PRIORITY_WATCHES, 0));
 }
 
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_limits_of_the_service_are_used);
+    RUN_TEST(test_watchers_go_before_whom_they_watch);
     RUN_TEST(test_limits_of_a_shell_leave_all_as_it_was);
     return UNITY_END();
 }

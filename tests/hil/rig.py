@@ -29,6 +29,7 @@ HEADER = struct.Struct("<B3xI")
 ANSWER = struct.Struct("<qQ")
 EVENT = struct.Struct("<Q3B21s")
 END = struct.Struct("<iiQ")
+STANDSTILL = struct.Struct("<QQ")
 LCM_HEADER = struct.Struct(">4sI")
 
 # The vendor's board: registers of the four duties, and of the pack's voltage.
@@ -39,6 +40,10 @@ ZERO = (0, 0, 0, 0)
 BUTTON_LINE = 13
 PRESSED, RELEASED = 0, 1
 NONE_REFUSED = 255
+
+
+class StoodStill(Exception):
+    """The machine did other work meanwhile: what was measured is not the program's."""
 
 
 class CannotRun(Exception):
@@ -103,6 +108,8 @@ class Rig:
         telemetry: what the program published.
         ends: processes that ended, by pid.
         console: the guest's console, kept after the end.
+        standstills: for how long (guest, s) nothing ran in the guest since the newest robot began.
+        service_environment: what the service has besides its unit's own.
     """
 
     def __init__(self, image: Path, name: str, *, memory_mb: int = 256):
@@ -111,6 +118,8 @@ class Rig:
         self.levels: list[Level] = []
         self.telemetry: list = []
         self.ends: dict[int, End] = {}
+        self.standstills: list[float] = []
+        self.service_environment: tuple[str, ...] = ()
         self._answers: list[tuple[int, int]] = []
         self._ready = False
         self._inbox = bytearray()
@@ -200,6 +209,8 @@ class Rig:
             self._take_event(*EVENT.unpack(payload))
         elif kind == "t":
             self._take_packet(payload)
+        elif kind == "s":
+            self.standstills.append(STANDSTILL.unpack(payload)[1] / 1e9)
         elif kind == "e":
             pid, status, t_ns = END.unpack(payload)
             self.ends[pid] = End(t_ns / 1e9, os.waitstatus_to_exitcode(status))

@@ -41,6 +41,7 @@ class Watched:
         self.rig = rig
         self.view = GREEN
         rig.mend()
+        rig.standstills.clear()
         if camera == LOOPBACK:
             self._open_loopback(size_px)
         self.first = len(rig.duties)
@@ -123,11 +124,13 @@ class Robot(Watched):
         camera: str = LOOPBACK,
         environment: tuple[str, ...] = (),
         heard: bool = True,
+        fault: Callable[[], object] = lambda: None,
         **watching,
     ):
         super().__init__(rig, camera, **watching)
         command = (*environment, PROGRAM, *SETTINGS, "--camera", camera, *arguments)
         self.pid = rig.start(*command, heard=heard)
+        fault()
 
     def __enter__(self):
         return self
@@ -145,18 +148,41 @@ class Robot(Watched):
 
 
 SERVICE, CONFIG = "twinmill-robot.service", "/etc/turbopi/turbopi.conf"
+# For the calls that are made to fail; in all else the unit is as shipped.
+DROP_IN = f"/run/systemd/system/{SERVICE}.d"
+
+
+def give_environment(rig: Rig, environment: tuple[str, ...]):
+    """Adds words NAME=VALUE to the service's environment; none: leaves the unit as it was."""
+    if environment == rig.service_environment:
+        return
+    rig.service_environment = environment
+    lines = "".join(f"Environment={pair}\\n" for pair in environment)
+    text = f"[Service]\\n{lines}ReadWritePaths=/var/failcalls\\n"
+    give = f"mkdir -p {DROP_IN} && printf '{text}' >{DROP_IN}/hil.conf"
+    end = rig.run("/bin/sh", "-c", give if environment else f"rm -r {DROP_IN}")
+    assert end.code == 0
+    rig.systemctl("daemon-reload")
 
 
 class Service(Watched):
     """The same program as systemd runs it, driving since its button was pressed."""
 
-    def __init__(self, rig: Rig, *arguments: str):
+    def __init__(
+        self,
+        rig: Rig,
+        *arguments: str,
+        environment: tuple[str, ...] = (),
+        fault: Callable[[], object] = lambda: None,
+    ):
         super().__init__(rig)
         options = [word for word in (*SETTINGS, *arguments) if "=" in word and "://" not in word]
         result, _ = rig.words("w", CONFIG, "\n".join(options) + "\n")
         assert result == 0
+        give_environment(rig, environment)
         rig.systemctl("reset-failed", SERVICE)
         rig.systemctl("restart", SERVICE)
         self.pid = rig.number(f"systemctl show -P MainPID {SERVICE}")
         self.show_until(lambda: any(t.frame_utime_us for t in self.telemetry()), 120)
+        fault()
         self.press()

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Preloaded into the robot's program: makes one kind of call into the kernel fail, for as long as
-// /tmp/failcalls says so. That file holds one line: function, ioctl number (0: any), how the
-// device's path begins, errno, and the pid that is meant (0: all), as in
-// "ioctl 3227014673 /dev/video 5 0".
+// Preloaded into the robot's program: makes calls into the kernel fail, for as long as
+// /var/failcalls/which says so. That file holds a line for each: function, ioctl number (0: any),
+// how the device's path begins (munmap, which has none: -), errno, and the pid that is meant (0:
+// all), as in "ioctl 3227014673 /dev/video 5 0". The folder is everybody's, and none that a service
+// has its own of, as of /tmp.
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -15,8 +16,8 @@
 #include <time.h>
 #include <unistd.h>
 
-#define CONTROL "/tmp/failcalls"
-#define FIRST "/tmp/failcalls.first"
+#define CONTROL "/var/failcalls/which"
+#define FIRST "/var/failcalls/first"
 
 // The call itself, past the functions below.
 static size_t read_raw(const char *path, char *text, size_t size)
@@ -44,18 +45,30 @@ static void note_time(void)
     }
 }
 
+static bool names(const char *line, const char *function, unsigned long request, const char *path,
+                  int *error)
+{
+    char wanted[16], prefix[64];
+    unsigned long number;
+    int pid;
+    return sscanf(line, "%15s %lu %63s %d %d", wanted, &number, prefix, error, &pid) == 5 &&
+           strcmp(function, wanted) == 0 && (number == 0 || number == request) &&
+           strncmp(path, prefix, strlen(prefix)) == 0 && (pid == 0 || pid == (int)getpid());
+}
+
 // @return true, and errno, if this call is to fail.
 static bool fails(const char *function, unsigned long request, const char *path)
 {
-    char line[160], wanted[16], prefix[64];
-    unsigned long number;
-    int error, pid;
+    char text[512];
+    int error = 0;
     const int kept = errno;
-    const bool is_meant =
-        read_raw(CONTROL, line, sizeof line) > 0 &&
-        sscanf(line, "%15s %lu %63s %d %d", wanted, &number, prefix, &error, &pid) == 5 &&
-        strcmp(function, wanted) == 0 && (number == 0 || number == request) &&
-        strncmp(path, prefix, strlen(prefix)) == 0 && (pid == 0 || pid == (int)getpid());
+    bool is_meant = false;
+    (void)read_raw(CONTROL, text, sizeof text);
+    for (const char *line = text; line != NULL && !is_meant; line = strchr(line, '\n'))
+    {
+        line += *line == '\n';
+        is_meant = names(line, function, request, path, &error);
+    }
     if (is_meant)
     {
         note_time();
@@ -113,6 +126,21 @@ int open(const char *path, int flags, ...)
 int __open_2(const char *path, int flags)
 {
     return open(path, flags, 0);
+}
+
+// Nothing is open after a close that failed, as in Linux.
+int close(int fd)
+{
+    const bool failed = fails_at("close", 0, fd);
+    const int error = errno;
+    const int result = (int)syscall(SYS_close, fd);
+    errno = failed ? error : errno;
+    return failed ? -1 : result;
+}
+
+int munmap(void *address, size_t length)
+{
+    return fails("munmap", 0, "-") ? -1 : (int)syscall(SYS_munmap, address, length);
 }
 
 void *mmap(void *address, size_t length, int protection, int flags, int fd, off_t offset)
