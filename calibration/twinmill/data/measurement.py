@@ -108,7 +108,9 @@ class BadInputError(LogError):
         self.findings = findings
 
 
-def load_measurements(paths: Sequence[Path | Log], model: native.Model | None = None) -> Measurements:
+def load_measurements(
+    paths: Sequence[Path | Log], model: native.Model | None = None
+) -> Measurements:
     """Reads logs and cleans every robot in them; reads steady-state tables (.csv).
 
     A robot or a log that cannot be judged is left out, with the reason, if another can.
