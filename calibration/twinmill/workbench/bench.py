@@ -14,11 +14,12 @@ from typing import Any
 from twinmill.diagnosis.detections.add import is_of_camera
 from twinmill.files import plain
 from twinmill.model.parameters import CLOCK
-from twinmill.workbench.drawing import commands, measured_path, pack
+from twinmill.workbench.drawing import commands, measured_path, pack, seen
 from twinmill.workbench.session import Session
 from twinmill.workbench.state_file import StateFile
 from twinmill.workbench.worker import Done, Work, Worker
 
+AWAITED = ("fit", "add", "diagnose", "next", "swarm")  # work that the user waits for
 COMMAND_WORDS = {
     "duty": (("FL", "FR", "RL", "RR"), "%"),
     "wheel_speed": (("FL", "FR", "RL", "RR"), "rad/s"),
@@ -37,7 +38,7 @@ class Bench:
 
     Attributes:
         changes: counts by what has changed: `robots`, `names`, `model`, `prediction`, `score`,
-            `work`, `findings`, `beside`.
+            `work`, `findings`, `plan`, `swarm`, `beside`.
         opening: what is being opened, in words; empty when all is there.
         failure: what went wrong last.
         view: what the screen shows: cursor, stretch, robot, tab.
@@ -109,7 +110,7 @@ class Bench:
     def doing(self) -> Work | None:
         """The work that the user waits for."""
         work = self._waiting or self.worker.work
-        return work if work and work.kind in ("fit", "add", "diagnose") else None
+        return work if work and work.kind in AWAITED else None
 
     @property
     def progress(self) -> str:
@@ -118,12 +119,12 @@ class Bench:
             return "waiting for the logs"
         return f"{self.worker.words} · {self.worker.for_s:.0f} s"
 
-    async def start(self, kind: str, effect: str = "") -> None:
-        """A fit, an addition or a diagnosis of the model where the tree stands."""
+    async def start(self, kind: str, effect: str = "", options: dict | None = None) -> None:
+        """Work of `AWAITED` on the model where the tree stands."""
         self.failure = ""
-        self._waiting = work = self.session.work(kind, effect)
+        self._waiting = work = self.session.work(kind, effect, options)
         self.changed("work")
-        if kind != "diagnose" and not (effect and is_of_camera(effect)):
+        if kind in ("fit", "add") and not (effect and is_of_camera(effect)):
             foreseen = await asyncio.to_thread(self.session.foresee, effect, self.picked)
             if self.doing is work:  # not done or cancelled before
                 self.session.show(foreseen)
@@ -167,7 +168,7 @@ class Bench:
             await self._settled()
         elif done.work.kind != "read":
             self.session.take(done)
-            self.changed("work", "score", "findings")
+            self.changed("work", "score", "findings", "plan", "swarm")
 
     async def _settled(self) -> None:
         """The session stands at another model: its prediction first, then what takes longer."""
@@ -228,8 +229,10 @@ class Bench:
         """Speeds, commands and band of one robot."""
         view, raw = self.session.robots[index], self.session.raw(index)
         names, unit = COMMAND_WORDS.get(raw.command_kind, ((), ""))
-        arrays = {**view.measured(), **commands(raw)}
-        return pack(arrays, command_names=names, command_unit=unit)
+        arrays = {**view.measured(), **commands(raw), **seen(raw)}
+        sight = self.session.given.model.sight()
+        cone = {key: sight[key] for key in ("range_m", "cone_rad", "pan_rad")}
+        return pack(arrays, command_names=names, command_unit=unit, cone=cone)
 
     def prediction_bytes(self, index: int) -> bytes:
         """What the model shown says of one robot, with its score."""
@@ -244,6 +247,18 @@ class Bench:
             clock_s=self.session.shown(index).model.get(CLOCK),
             compute_ms=1000 * (perf_counter() - begin),
         )
+
+    def swarm_bytes(self) -> bytes:
+        """Poses of the twin's swarms."""
+        if self.session.swarm is None:
+            raise LookupError("no swarm")
+        swarms = self.session.swarm["swarms"]
+        poses = {
+            f"pose{k}": s["pose"].reshape(len(s["pose"]), -1) for k, s in enumerate(swarms.values())
+        }
+        t_s = next(iter(swarms.values()))["t_s"]
+        radius_m = self.session.given.model.get("robot.body_radius_m")
+        return pack(poses, labels=[*swarms], step_s=float(t_s[1] - t_s[0]), radius_m=radius_m)
 
     def log_of(self, index: int) -> int:
         """Place of the log that a robot is in."""

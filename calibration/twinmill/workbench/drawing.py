@@ -65,6 +65,18 @@ def commands(robot: RobotLog) -> Arrays:
     return {"commands": rows[kept]}
 
 
+def seen(robot: RobotLog) -> Arrays:
+    """(K, 2) robot's clock and whether its camera saw another robot, where that changes."""
+    t_s, bit = robot.seen_t_s, robot.seen
+    if not len(t_s) and len(robot.detected):
+        t_s, bit = robot.command_t_s, robot.detected > 0
+    if not len(t_s):
+        return {"seen": np.empty((0, 2))}
+    kept = np.concatenate([[True], np.diff(bit.astype(int)) != 0])
+    kept[-1] = True
+    return {"seen": np.column_stack([t_s, bit])[kept]}
+
+
 def measured_speed(track: Track) -> Arrays:
     """(T, 4) t_s, forward and left in m/s, turn in rad/s, from the poses."""
     half_s = max(SPEED_HALF_S, 1.5 * track.timing.pose_period_s)

@@ -18,8 +18,11 @@ class Hands(Protocol):
     def drag(self, name: str, value: float) -> None:
         """A knob is being turned: predictions and score follow at once."""
 
-    async def start(self, kind: str, effect: str = "") -> None:
-        """A fit, an addition or a diagnosis."""
+    async def start(self, kind: str, effect: str = "", options: dict | None = None) -> None:
+        """A fit, an addition, a diagnosis, a next run or a swarm."""
+
+    async def design(self) -> None:
+        """Designs the run that parts what cannot be parted, in its panel."""
 
     async def try_beside(self, effect: str) -> None:
         """Draws what an effect would change beside the model; once more takes it away."""

@@ -122,6 +122,9 @@ class MissingPanel:
             with ui.element("div").classes("line"):
                 ui.label(rival).style("flex: 1")
                 self._buttons(rival)
+        button = ui.button("Design the drive that parts them", on_click=self.page.design)
+        button.props('dense flat no-caps padding="0 8px" data-testid="part-them"')
+        self._adding.append(button)
 
     def _buttons(self, effect: str) -> None:
         """To see what an effect would change, and to take it in."""

@@ -11,9 +11,19 @@ from twinmill.workbench.fails_panel import FailsPanel
 from twinmill.workbench.knobs_panel import KnobsPanel
 from twinmill.workbench.missing_panel import MissingPanel
 from twinmill.workbench.models_panel import ModelsPanel
+from twinmill.workbench.next_panel import NextPanel
+from twinmill.workbench.swarm_panel import SwarmPanel
 from twinmill.workbench.words import scored, tone
 
 REFRESH_S = 0.15
+HINTS = {
+    "knobs": "Every quantity of the model, with its interval",
+    "missing": "What is missing in the model",
+    "fails": "Where it fails: error over noise by what the robot was doing",
+    "models": "All models tried, with their scores; save one",
+    "next": "What to drive next",
+    "swarm": "What a swarm would do with the model now",
+}
 HEAD = """
 <link rel="stylesheet" href="/look/workbench.css">
 <link rel="modulepreload" href="/look/stage.js">
@@ -37,15 +47,26 @@ STAGE = """
 """
 TABS = {
     "knobs": "Knobs",
-    "missing": "What is missing",
-    "fails": "Where it fails",
+    "missing": "Missing",
+    "fails": "Fails",
     "models": "Models",
+    "next": "Next",
+    "swarm": "Swarm",
+}
+VERBS = {
+    "fit": "Fitting",
+    "add": "Adding",
+    "diagnose": "Diagnosing",
+    "next": "Designing a run",
+    "swarm": "Running the twin",
 }
 DRAWS = {  # what a panel shows
     "knobs": {"model", "robots"},
     "missing": {"findings", "model"},
     "fails": {"prediction", "robots", "model"},
     "models": {"model", "score", "work"},
+    "next": {"plan"},
+    "swarm": {"swarm"},
 }
 
 
@@ -106,11 +127,11 @@ class Screen:
 
     def _panels(self) -> None:
         chosen = self._tab
-        with ui.tabs(on_change=lambda e: self._turn_to(e.value)) as tabs:
-            tabs.props("dense no-caps inline-label align=justify")
+        with ui.tabs(on_change=lambda e: self._turn_to(e.value)) as self.tabs:
+            self.tabs.props("dense no-caps inline-label align=justify")
             for key, label in TABS.items():
-                ui.tab(key, label=label).props(f'data-testid="tab-{key}"')
-        with ui.tab_panels(tabs, value=chosen).props("animated=false keep-alive"):
+                ui.tab(key, label=label).props(f'data-testid="tab-{key}"').tooltip(HINTS[key])
+        with ui.tab_panels(self.tabs, value=chosen).props("animated=false keep-alive"):
             with ui.tab_panel("knobs"):
                 self.knobs = KnobsPanel(self)
             with ui.tab_panel("missing"):
@@ -119,6 +140,10 @@ class Screen:
                 self.fails = FailsPanel(self)
             with ui.tab_panel("models"):
                 self.models = ModelsPanel(self)
+            with ui.tab_panel("next"):
+                self.next = NextPanel(self)
+            with ui.tab_panel("swarm"):
+                self.swarm = SwarmPanel(self)
 
     # -- what the user does ---------------------------------------------------------------------
 
@@ -133,10 +158,15 @@ class Screen:
         self.javascript("twinmill.predict()")
         self._draw_score()
 
-    async def start(self, kind: str, effect: str = "") -> None:
-        """A fit, an addition or a diagnosis."""
-        await self.bench.start(kind, effect)
+    async def start(self, kind: str, effect: str = "", options: dict | None = None) -> None:
+        """A fit, an addition, a diagnosis, a next run or a swarm."""
+        await self.bench.start(kind, effect, options)
         await self._refresh()
+
+    async def design(self) -> None:
+        """Designs the run that parts what cannot be parted, in its panel."""
+        self.tabs.set_value("next")
+        await self.next.design()
 
     async def try_beside(self, effect: str) -> None:
         """Draws what an effect would change."""
@@ -185,12 +215,13 @@ class Screen:
             self.javascript("twinmill.predict()")
         if "work" in new or self.bench.doing:
             self._draw_status()
-        if new & {"score", "model", "robots"}:
+        if new & {"score", "model", "robots", "names"}:
             self._draw_score()
         self._stale |= {tab for tab, what in DRAWS.items() if new & what}
         self._draw_tab()
         if "work" in new or self.bench.doing:
-            self.missing.draw_progress()
+            for panel in (self.missing, self.next, self.swarm):
+                panel.draw_progress()
         if "beside" in new:
             self.missing.draw_beside()
 
@@ -220,19 +251,21 @@ class Screen:
         self.javascript(f"twinmill.showLog({place}).then(() => twinmill.pick({label}, {picked}))")
 
     def _name_robots(self) -> None:
-        """Each with its score."""
+        """Those of the log that is shown, each with its score."""
         session, picked = self.bench.session, self.bench.picked
-        several = len(session.paths) > 1
-        names = [m.label if several else m.label[-3:] for m in session.measurements]
-        scores = session.own_scores()
-        labels = [f"{n} · {scored(scores[k])}" if k in scores else n for k, n in enumerate(names)]
-        self.robot.set_options(dict(enumerate(labels)), value=picked if labels else None)
+        scores, place = session.own_scores(), self.bench.log_of(picked)
+        names = {
+            k: m.label[-3:] + (f" · {scored(scores[k])}" if k in scores else "")
+            for k, m in enumerate(session.measurements)
+            if self.bench.log_of(k) == place
+        }
+        self.robot.set_options(names, value=picked if names else None)
 
     def _draw_status(self) -> None:
         bench = self.bench
         words = bench.failure or (f"{bench.opening} …" if bench.opening else "")
         if bench.doing:
-            verb = {"fit": "Fitting", "add": "Adding", "diagnose": "Diagnosing"}[bench.doing.kind]
+            verb = VERBS[bench.doing.kind]
             words = f"{verb} {bench.doing.effect}".strip() + f": {bench.progress}"
         self.status.set_text(
             words or bench.session.tree.file_name(bench.session.tree.current.number)
@@ -246,6 +279,8 @@ class Screen:
             self._say_score(session.passing_score(self.bench.picked), False)
         elif known:
             self._say_score(known.fitted, known.exact)
+        elif self.bench.ready:
+            self._say_score(session.passing_score(self.bench.picked), False)
         self.undo.set_enabled(session.tree.can_undo)
         self.redo.set_enabled(session.tree.can_redo)
         self._draw_status()

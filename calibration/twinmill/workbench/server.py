@@ -129,8 +129,8 @@ def _add_data(bench: Bench) -> None:
             return _refused()
         try:
             content = make(*arguments)
-        except IndexError:
-            return PlainTextResponse("There is no such log or robot.", status_code=404)
+        except LookupError:
+            return PlainTextResponse("There is no such log, robot or swarm.", status_code=404)
         return Response(content, media_type="application/octet-stream")
 
     @app.get("/data/log")
@@ -144,6 +144,10 @@ def _add_data(bench: Bench) -> None:
     @app.get("/data/prediction")
     def prediction(index: int, token: str = "") -> Response:
         return answer(token, bench.prediction_bytes, index)
+
+    @app.get("/data/swarm")
+    def swarm(token: str = "") -> Response:
+        return answer(token, bench.swarm_bytes)
 
     @app.post("/data/view")
     async def view(request: Request, token: str = "") -> Response:

@@ -6,6 +6,7 @@ predicted, `judge` the floor and the clock of one robot at a time.
 """
 
 import hashlib
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,6 +34,8 @@ from twinmill.predict.datasets import total_score
 from twinmill.predict.regimes import HORIZON, Regime, where_it_fails
 from twinmill.workbench.drawing import Arrays, RobotView
 from twinmill.workbench.knobs import Knob, knobs
+from twinmill.workbench.next_run import next_command, then_commands
+from twinmill.workbench.swarm import swarm_commands
 from twinmill.workbench.tree import Score, Tree
 from twinmill.workbench.worker import Done, Work
 
@@ -65,6 +68,8 @@ class Session:
         robots: views of the robots that were judged, by place in `measurements`.
         held: names that a fit leaves alone.
         diagnosis: as `diagnose --json` gives it, and of which model; None before.
+        plan: the next run, as the worker told it, or None.
+        swarm: what the twin's swarms did, or None.
         beside: another model that is drawn beside the one shown, or None.
 
     Raises:
@@ -86,6 +91,8 @@ class Session:
         self.robots: dict[int, RobotView] = {}
         self.held: set[str] = set()
         self.diagnosis: dict | None = None
+        self.plan: dict | None = None
+        self.swarm: dict | None = None
         self.beside: Beside | None = None
         self._files = {0: self.given}
         self._dragged: dict[str, float] = {}
@@ -368,9 +375,12 @@ class Session:
 
     # -- long work ------------------------------------------------------------------------------
 
-    def work(self, kind: str, effect: str = "") -> Work:
+    def work(self, kind: str, effect: str = "", options: Mapping | None = None) -> Work:
         """What a worker is told to do with the model where the tree stands."""
         number = self.tree.current.number
+        if kind in ("next", "swarm"):
+            name, text = self.tree.file_name(number), self.tree.tried[number].text
+            return Work(kind, name, text, of=number, options=options, given=self.given.text)
         if kind in ("read", "diagnose", "compare"):
             return Work(kind, self.tree.file_name(number), self.tree.tried[number].text, of=number)
         names = {k.name for k in self.knobs() if k.fitted}
@@ -386,12 +396,24 @@ class Session:
         work, result = done.work, done.result
         if work.kind == "diagnose":
             self.diagnosis = {**result, "of": work.of}
+        elif work.kind == "next":
+            self.plan = dict(result) | {"commands": self._next_commands(work, result)}
+        elif work.kind == "swarm":
+            chain = self.tree.written(work.of, work.model)[0]
+            commands = [*chain, *swarm_commands(work.model, work.options)]
+            self.swarm = {**result, "commands": commands}
         elif work.kind == "compare":
             before = self.tree.scores.get(work.of)
             heldout = before.heldout if before else None
             self.tree.scores[work.of] = Score(result["score"], heldout, True)
         else:
             self._grow(work, result, done.text)
+
+    def _next_commands(self, work: Work, plan: Mapping) -> list[str]:
+        """That design the same run, play it and judge it; first those that make the model."""
+        chain = self.tree.written(work.of, work.model)[0]
+        own = shlex.join(next_command(self.paths, work.model, work.options))
+        return [*chain, own, *then_commands(self.paths, work.model, plan)]
 
     def _grow(self, work: Work, result: Mapping, text: str) -> None:
         label = f"+ {work.effect}" if work.effect else "fitted"
@@ -410,6 +432,7 @@ class Session:
             "tree": self.tree.to_json(),
             "held": sorted(self.held),
             "diagnosis": self.diagnosis,
+            "plan": self.plan,
             "key": self.key,
         }
 
@@ -435,6 +458,7 @@ class Session:
         self.tree.restore(data["tree"])
         self.held = set(data["held"])
         self.diagnosis = data["diagnosis"]
+        self.plan = data.get("plan")
 
 
 def _from_here(opened: Opened) -> Opened:

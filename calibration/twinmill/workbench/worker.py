@@ -6,12 +6,14 @@ The process keeps the logs that it read. To cancel is to end it; the next work s
 
 import multiprocessing
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import Any
+
+PATH_S = 0.1  # between points of a path that is drawn
 
 
 @dataclass(frozen=True)
@@ -19,13 +21,16 @@ class Work:
     """What is to be done.
 
     Attributes:
-        kind: read, compare, fit, add or diagnose; each reads the logs if that was not done.
+        kind: read, compare, fit, add, diagnose, next or swarm; most read the logs if that was
+            not done.
         model, text: name and text of the model file.
         command: recorded in the file that is made.
         effect: that is added.
         held: names that a fit leaves alone.
         of: number of the model in the tree.
         words: of the command, without models.
+        options: of a next run or a swarm.
+        given: text of the model as given, for a swarm beside that of the model.
     """
 
     kind: str
@@ -36,6 +41,8 @@ class Work:
     held: tuple[str, ...] = ()
     of: int = 0
     words: tuple[str, ...] = ()
+    options: Mapping[str, Any] = field(default_factory=dict)
+    given: str = ""
 
 
 @dataclass(frozen=True)
@@ -141,11 +148,19 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     Raises:
         ValueError: it cannot be done, in one sentence.
     """
+    if work.kind == "swarm":
+        from twinmill.workbench.swarm import run_swarms
+
+        texts = {"as given": work.given}
+        if work.text != work.given:
+            texts["now"] = work.text
+        return Done(work, {"swarms": run_swarms(texts, work.options, say)})
     import twinmill_native as native
 
     from twinmill.data.measurement import load_measurements
     from twinmill.diagnosis.detections.add import add_to_camera, is_of_camera
     from twinmill.diagnosis.diagnose import diagnose
+    from twinmill.experiment.design import check, design
     from twinmill.files import plain
     from twinmill.fitting.add import add
     from twinmill.fitting.compare import compare
@@ -159,8 +174,16 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     measurements = known["all"]
     if work.kind == "read":
         return Done(work, {})
+    if work.kind in ("diagnose", "next") and known.get("text") != work.text:
+        if work.kind == "next":
+            check(measurements, model_file, _limits(work.options))
+        known["diagnosis"] = diagnose(measurements, model_file, say)
+        known["text"] = work.text
     if work.kind == "diagnose":
-        return Done(work, plain(diagnose(measurements, model_file, say).to_json()))
+        return Done(work, plain(known["diagnosis"].to_json()))
+    if work.kind == "next":
+        plan = design(known["diagnosis"], model_file, _limits(work.options), say)
+        return Done(work, plain(_told(plan)))
     if work.kind == "compare":
         say("comparing")
         return Done(work, plain(compare(measurements, model_file).to_json()))
@@ -174,3 +197,28 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
         else:
             result = fit(measurements, model_file, out, work.command, held=work.held)
         return Done(work, plain(result.to_json()), out.read_text())
+
+
+def _limits(options: Mapping[str, Any]) -> Any:
+    from twinmill.experiment.design import Limits
+
+    floor_m = (options["along_m"], options["across_m"])
+    return Limits(options["duration_s"], floor_m, options["duty_pct"] / 100)
+
+
+def _told(plan: Any) -> dict:
+    """A planned run as --json tells it, with its script and its way over the floor."""
+    import numpy as np
+
+    from twinmill.experiment.script_file import csv_text
+
+    every = max(1, round(PATH_S / float(np.median(np.diff(plan.pose_t_s)))))
+    return {
+        **plan.to_json(),
+        "script": csv_text(plan.rows),
+        "end_s": plan.rows.end_s,
+        "floor_m": plan.limits.floor_m,
+        "paths": np.round(plan.paths[:, ::every, :2], 3),
+        "robot_id": plan.robot_id,
+        "cap_pct": round(100 * float(np.abs(plan.rows.duty).max())),
+    }

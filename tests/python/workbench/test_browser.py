@@ -17,7 +17,9 @@ import pytest
 from playwright.sync_api import expect, sync_playwright
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
+from twinmill.programs import find_program
 from twinmill.report.tables import number
+from twinmill.workbench.swarm import EVERY
 from twinmill_cli import main as cli
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -117,13 +119,17 @@ def test_the_whole_conversation(turbopi, page):
         turn_a_knob_and_back(page, given)
         find_where_it_fails(page)
         missed_mm = drawn_mm(page)
-        name_and_add_coasting(page)
+        name_coasting(page)
+        plan_the_next_run(page)
+        add_coasting(page)
         expect(shown).not_to_contain_text("≈")
         assert drawn_mm(page) < 0.6 * missed_mm
         added = save_and_repeat(page, given)
+        run_the_twin(page)
 
         # A reload loses nothing, nor does a server that was stopped.
         page.reload()
+        page.get_by_test_id("tab-models").click()
         expect(page.get_by_test_id("model-2")).to_have_class(re.compile("now"))
     with workbench() as url:
         page.goto(url)
@@ -154,8 +160,8 @@ def find_where_it_fails(page) -> None:
     page.wait_for_function("twinmill.marks.length > 0 && twinmill.t > 0")
 
 
-def name_and_add_coasting(page) -> None:
-    """Diagnosed, after a change of mind; seen beside the model; then taken."""
+def name_coasting(page) -> None:
+    """Diagnosed, after a change of mind; and seen beside the model."""
     page.get_by_test_id("tab-missing").click()
     page.get_by_test_id("diagnose").click()
     page.get_by_test_id("cancel").click()
@@ -166,9 +172,41 @@ def name_and_add_coasting(page) -> None:
     page.wait_for_function("document.body.dataset.beside === 'with coasting'")
     page.locator("#beside").click()
     page.wait_for_function("document.body.dataset.beside === ''")
+
+
+def add_coasting(page) -> None:
+    page.get_by_test_id("tab-missing").click()
     page.get_by_test_id("add-coasting").click()
     page.get_by_test_id("tab-models").click()
     page.get_by_test_id("model-2").wait_for()
+
+
+def plan_the_next_run(page) -> None:
+    """The script that is saved is the command's."""
+    page.get_by_test_id("tab-next").click()
+    page.get_by_test_id("design").and_(page.locator(":enabled")).click()
+    page.get_by_test_id("plan-floor").locator("canvas").wait_for()
+    page.get_by_test_id("script-as").fill("mine.csv")
+    page.get_by_test_id("save-script").click()
+    page.get_by_text("Written: mine.csv").wait_for()
+    commands = page.get_by_test_id("next-commands").text_content().strip().splitlines()
+    cli.run(shlex.split(commands[0])[1:])
+    assert Path("mine.csv").read_bytes() == Path("script.csv").read_bytes()
+
+
+def run_the_twin(page) -> None:
+    """What the swarm does with the model now is what `twin_run` and `metrics` say."""
+    page.get_by_test_id("tab-swarm").click()
+    page.get_by_test_id("run-twin").and_(page.locator(":enabled")).click()
+    expect(page.get_by_test_id("swarm-table")).to_contain_text("milling")
+    commands = page.get_by_test_id("swarm-commands").text_content().strip().splitlines()
+    for command in commands[:-2]:
+        cli.run(shlex.split(command)[1:])
+    words = shlex.split(commands[-2])
+    subprocess.run([str(find_program(words[0])), *words[1:]], check=True, capture_output=True)
+    series = cli.run(shlex.split(commands[-1])[1:])
+    drawn = page.evaluate("Array.from(twinmill.swarm.arrays.pose1.data.slice(-24))")
+    np.testing.assert_allclose(np.reshape(drawn, (8, 3)), series.pose[::EVERY][-1], atol=1e-5)
 
 
 def save_and_repeat(page, given: str) -> str:

@@ -200,6 +200,7 @@ export class Floor {
       this._line(g, robot.path, color, robot === picked ? 3 : 2, 0.8, first, rowAt(robot.path, t));
     }
     if (picked && this.stage.prediction) this._now(g);
+    if (picked?.arrays?.seen.rows) this._sight(g, picked, t);
     for (const robot of this.robots) this._robot(g, robot, t, robot === picked);
   }
 
@@ -254,6 +255,29 @@ export class Floor {
       if (!Number.isNaN(ahead.data[at])) return [ahead.data[at], ahead.data[at + 1], i + 1];
     }
     return null;
+  }
+
+  /** What the picked robot's camera covers, filled while it sees another robot. */
+  _sight(g, robot, t) {
+    const pose = valuesAt(robot.path, t);
+    const k = rowAt(robot.arrays.seen, t - (this.stage.prediction?.clock_s ?? 0));
+    if (!pose || k < 0) return;
+    const [, x, y, heading] = pose;
+    const [half, middle] = [robot.cone.cone_rad / 2, heading + robot.cone.pan_rad];
+    g.save();
+    g.beginPath();
+    g.moveTo(this._x(x), this._y(y));
+    g.arc(
+      this._x(x), this._y(y), robot.cone.range_m * this.scale, -middle - half, -middle + half,
+    );
+    g.closePath();
+    g.globalAlpha = 0.12;
+    g.fillStyle = FLOOR;
+    if (robot.arrays.seen.data[2 * k + 1]) g.fill();
+    g.globalAlpha = 0.5;
+    g.strokeStyle = FLOOR;
+    g.stroke();
+    g.restore();
   }
 
   _robot(g, robot, t, picked) {

@@ -41,6 +41,15 @@ export function rowsOf(robot, prediction, band, ahead_s) {
       )),
     },
   ];
+  if (robot.arrays.seen.rows) {
+    rows.push({
+      title: "camera", unit: "1: sees another robot", least: 1, from: 0,
+      lines: [{
+        of: robot.arrays.seen, column: 1, factor: 1, color: FLOOR, width: 1.5, alpha: 1, name: "bit",
+        held: true, shift: prediction?.clock_s ?? 0,
+      }],
+    });
+  }
   if (prediction) {
     const far = ahead_s > 1 ? 3 : 1;
     const of = prediction.arrays.errors;

@@ -4,6 +4,7 @@
 import { Floor } from "./floor.js";
 import { unpack } from "./packed.js";
 import { Series, rowsOf } from "./series.js";
+import { Swarm } from "./swarm.js";
 
 const SHORTEST_S = 0.5; // stretch that can be looked at
 const SAVE_MS = 400;
@@ -101,6 +102,13 @@ class Stage {
     document.querySelector("#beside").textContent = found.beside ? `${found.beside} ✕` : "";
     document.body.dataset.predictedMs = found.compute_ms;
     this._renew();
+  }
+
+  /** What the twin's swarms did. */
+  async showSwarm() {
+    this.swarm = await this._get("swarm?");
+    this._swarmView?.end();
+    this._swarmView = this.swarm && new Swarm(document.querySelector("#swarm"), this.swarm);
   }
 
   _renew() {

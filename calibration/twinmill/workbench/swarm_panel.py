@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The panel of the swarm: the twin with the model as given and with the model now, side by side."""
+
+import html
+
+from nicegui import ui
+
+from twinmill.workbench.hands import Hands
+from twinmill.workbench.swarm import STARTS
+from twinmill.workbench.words import scored
+
+SHOWN = ("circliness", "radius_m", "rotation", "groups", "contacts")
+
+
+class SwarmPanel:
+    """Runs the twin and shows what its swarms do."""
+
+    def __init__(self, page: Hands) -> None:
+        self.page, self.bench = page, page.bench
+        asked = self.bench.view.get("swarm", {})
+        ui.label("What a swarm would do: the same starts with both models.").classes("soft")
+        with ui.element("div").classes("buttons"):
+            self.n = ui.number("robots", value=asked.get("n", 8), min=2, max=100, precision=0)
+            self.n.props('dense outlined data-testid="swarm-n"').style("width: 78px")
+            self.duration_s = ui.number("time (s)", value=asked.get("duration_s", 60), min=10)
+            self.duration_s.props("dense outlined").style("width: 78px")
+            self.behavior = ui.input("behaviour", value=asked.get("behavior", "milling_cmaes"))
+            self.behavior.props("dense outlined").style("flex: 1; min-width: 130px")
+        with ui.element("div").classes("buttons"):
+            self.button = ui.button("Run the twin", on_click=self.run)
+            self.button.props('dense unelevated no-caps padding="2px 16px" data-testid="run-twin"')
+            self.cancel = ui.button("Cancel", on_click=self.bench.cancel)
+            self.cancel.props('dense outline no-caps padding="2px 12px"')
+            self.progress = ui.label().classes("soft").style("flex: 1")
+        self.failure = ui.label().classes("note wrong")
+        ui.html('<canvas id="swarm"></canvas>', sanitize=False).classes("sheet swarm")
+        self.body = ui.element("div").classes("stack").props('data-testid="swarm-table"')
+        self.draw_progress()
+
+    async def run(self) -> None:
+        """Starts the twin."""
+        if None in (self.n.value, self.duration_s.value) or not self.behavior.value:
+            ui.notify("Give robots, time and behaviour.", type="warning")
+            return
+        asked = {
+            "n": int(self.n.value),
+            "duration_s": self.duration_s.value,
+            "behavior": self.behavior.value,
+        }
+        self.bench.view["swarm"] = asked
+        await self.page.start("swarm", options=asked)
+
+    def draw_progress(self) -> None:
+        """What is being done, or why it was not."""
+        doing = self.bench.doing
+        self.button.set_visibility(doing is None)
+        self.cancel.set_visibility(doing is not None)
+        self.progress.set_text(self.bench.progress if doing else "")
+        self.failure.set_text(self.bench.failure)
+        self.failure.set_visibility(bool(self.bench.failure))
+
+    def draw(self) -> None:
+        """What came of the last run."""
+        self.draw_progress()
+        self.body.clear()
+        swarm = self.bench.session.swarm
+        if swarm is None:
+            return
+        labels = list(swarm["swarms"])
+        with self.body:
+            head = "".join(f"<div>{html.escape(label)}</div>" for label in labels)
+            ui.html(f"<div></div>{head}", sanitize=False).classes("model head")
+            kinds = sorted({k for s in swarm["swarms"].values() for k in s["classes"]})
+            for kind in kinds:
+                counts = [s["classes"].get(kind, 0) for s in swarm["swarms"].values()]
+                self._row(kind, [f"{count} of {STARTS}" for count in counts])
+            for name in SHOWN:
+                values = [s["metrics"][name] for s in swarm["swarms"].values()]
+                self._row(name, [scored(value) for value in values])
+            ui.label(f"Classes and means of the last 10 s, over {STARTS} starts.").classes("soft")
+            text = html.escape("\n".join(swarm["commands"]))
+            ui.label("The first start from a terminal:").classes("soft")
+            ui.html(f'<pre class="command">{text}</pre>', sanitize=False).props(
+                'data-testid="swarm-commands"'
+            )
+        self.page.javascript("twinmill.showSwarm()")
+
+    def _row(self, name: str, values: list[str]) -> None:
+        cells = "".join(f"<div>{value}</div>" for value in values)
+        ui.html(f"<div>{name}</div>{cells}", sanitize=False).classes("model still")
