@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the robot's program and the diagnosis against named alternatives: `make bench`.
+"""Measures the robot's program, the diagnosis and the workbench against named alternatives: `make bench`.
 
 Every figure is a ratio of two things measured in turn in the same minute, so that a busy machine
 makes both slower; its spread is the 10th and 90th percentile of the pairs.
@@ -18,6 +18,7 @@ import delay
 import diagnosis
 import footprint
 import typer
+import workbench
 from ratio import Ratio
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -35,6 +36,7 @@ class Part(StrEnum):
     FOOTPRINT = "footprint"
     ARM64 = "arm64"
     DIAGNOSIS = "diagnosis"
+    WORKBENCH = "workbench"
 
 
 def main(
@@ -45,13 +47,14 @@ def main(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print how the robot's program compares. Exit code 1 if a goal is missed."""
+    """Print how these compare. Exit code 1 if a goal is missed."""
     parts: dict[Part, Callable[[], Iterable[Ratio]]] = {
         Part.DECISION: lambda: decision.measure(build),
         Part.DELAY: lambda: delay.measure(build),
         Part.FOOTPRINT: lambda: footprint.measure(build, arm64_program),
         Part.ARM64: arm64.measure,
         Part.DIAGNOSIS: lambda: diagnosis.measure(build),
+        Part.WORKBENCH: lambda: workbench.measure(build),
     }
     ratios: list[Ratio] = []
     for part in only or list(Part):
