@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the robot's program, the diagnosis and the workbench against named alternatives: `make bench`.
+"""Measures the robot's program, the diagnosis and the workbench against named alternatives.
 
-Every figure is a ratio of two things measured in turn in the same minute, so that a busy machine
-makes both slower; its spread is the 10th and 90th percentile of the pairs.
+`make bench`. Every figure is a ratio of two things measured in turn in the same minute, so that a
+busy machine makes both slower; its spread is the 10th and 90th percentile of the pairs.
 """
 
 import sys

@@ -42,6 +42,7 @@ class Bench:
         opening: what is being opened, in words; empty when all is there.
         failure: what went wrong last.
         view: what the screen shows: cursor, stretch, robot, tab.
+        told: a page has said why nothing can be opened.
     """
 
     def __init__(self, session: Session, state: StateFile) -> None:
@@ -52,6 +53,8 @@ class Bench:
         self.view: dict[str, Any] = state.read("view", {})
         self._waiting: Work | None = None
         self._written: tuple = ()
+        self._reads = False
+        self.told = asyncio.Event()
         session.restore(state.read("session", {}))
 
     # -- opening --------------------------------------------------------------------------------
@@ -74,9 +77,11 @@ class Bench:
             self.changed("names")
             if index == self.picked:
                 self.changed("robots", "model", "findings")
+            if not self._reads:
+                self._reads = True
+                self.worker.start(self.session.work("read"))
         self.opening = ""
         self.changed("work", "model", "score")
-        self.worker.start(self.session.work("read"))
 
     def changed(self, *what: str) -> None:
         """Notes what a screen must draw anew."""
@@ -179,14 +184,14 @@ class Bench:
 
     def _next(self) -> None:
         """What waits; else the exact score of a model that a hand made."""
-        if self.worker.busy or self.session.unjudged:
+        if self.worker.busy:
             return
         if self._waiting:
             self.worker.start(self._waiting)
             self._waiting = None
             return
         score = self.session.tree.scores.get(self.session.tree.current.number)
-        if score and not score.exact and not self.failure:
+        if score and not (score.exact or self.failure or self.session.unjudged):
             self.worker.start(self.session.work("compare"))
 
     # -- state ----------------------------------------------------------------------------------

@@ -68,7 +68,7 @@ def commands(robot: RobotLog) -> Arrays:
 def seen(robot: RobotLog) -> Arrays:
     """(K, 2) robot's clock and whether its camera saw another robot, where that changes."""
     t_s, bit = robot.seen_t_s, robot.seen
-    if not len(t_s) and len(robot.detected):
+    if not len(t_s) and np.isfinite(robot.frame_t_s).any():
         t_s, bit = robot.command_t_s, robot.detected > 0
     if not len(t_s):
         return {"seen": np.empty((0, 2))}

@@ -24,8 +24,6 @@ class MissingPanel:
         with ui.element("div").classes("buttons"):
             self.button = ui.button("Diagnose", on_click=lambda: page.start("diagnose"))
             self.button.props('dense unelevated no-caps padding="2px 16px" data-testid="diagnose"')
-            self.cancel = ui.button("Cancel", on_click=self.bench.cancel)
-            self.cancel.props('dense outline no-caps padding="2px 12px" data-testid="cancel"')
             self.progress = ui.label().classes("soft").style("flex: 1")
         self.bar = ui.linear_progress(show_value=False).props("indeterminate color=blue-9")
         self.failure = ui.label().classes("note wrong").props('data-testid="failure"')
@@ -39,7 +37,6 @@ class MissingPanel:
         doing, ready = self.bench.doing, self.bench.ready
         self.button.set_visibility(doing is None)
         self.button.set_enabled(ready)
-        self.cancel.set_visibility(doing is not None)
         self.bar.set_visibility(doing is not None)
         self.progress.set_text(self.bench.progress if doing else "")
         self.failure.set_text(self.bench.failure)

@@ -30,8 +30,6 @@ class NextPanel:
         with ui.element("div").classes("buttons"):
             self.button = ui.button("Design", on_click=self.design)
             self.button.props('dense unelevated no-caps padding="2px 16px" data-testid="design"')
-            self.cancel = ui.button("Cancel", on_click=self.bench.cancel)
-            self.cancel.props('dense outline no-caps padding="2px 12px"')
             self.progress = ui.label().classes("soft").style("flex: 1")
         self.failure = ui.label().classes("note wrong")
         self.body = ui.element("div").classes("stack").props('data-testid="plan"')
@@ -56,7 +54,6 @@ class NextPanel:
         doing = self.bench.doing
         self.button.set_visibility(doing is None)
         self.button.set_enabled(self.bench.ready)
-        self.cancel.set_visibility(doing is not None)
         self.progress.set_text(self.bench.progress if doing else "")
         self.failure.set_text(self.bench.failure)
         self.failure.set_visibility(bool(self.bench.failure))

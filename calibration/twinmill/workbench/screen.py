@@ -113,6 +113,8 @@ class Screen:
             self.robot = ui.select({}, on_change=lambda e: self._pick(e.value))
             self.robot.props('dense options-dense outlined data-testid="robot"')
             self.status = ui.label().classes("space").props('data-testid="status"')
+            self.cancel = ui.button("Cancel", on_click=self.bench.cancel)
+            self.cancel.props('dense outline no-caps padding="2px 12px" data-testid="cancel"')
             with ui.element("div").classes("score"):
                 ui.html("<small>score</small>", sanitize=False)
                 self.score = ui.label().props('data-testid="score"')
@@ -213,6 +215,9 @@ class Screen:
             self._name_robots()
         if "prediction" in new and "robots" not in new:
             self.javascript("twinmill.predict()")
+        if self.bench.failure and self.bench.opening and not self.bench.told.is_set():
+            self.javascript(f"twinmill.fail({json.dumps(self.bench.failure)})")
+            self.bench.told.set()
         if "work" in new or self.bench.doing:
             self._draw_status()
         if new & {"score", "model", "robots", "names"}:
@@ -271,6 +276,7 @@ class Screen:
             words or bench.session.tree.file_name(bench.session.tree.current.number)
         )
         self.status.classes(replace="space bad" if bench.failure else "space")
+        self.cancel.set_visibility(bench.doing is not None)
 
     def _draw_score(self) -> None:
         session = self.bench.session

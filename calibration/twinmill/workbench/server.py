@@ -24,7 +24,8 @@ STATIC = Path(__file__).parent / "static"
 TICK_S = 0.1
 SWITCH_S = 5e-4  # threads hand over so often: pages do not wait for the work of others
 LISTEN_S = 0.02  # between looks whether the server listens
-TOLD_S = 1.0  # for a page to say why the server ends
+TOLD_S = 5.0  # for a page to say why the server ends
+SENT_S = 0.5  # for what it says to be on its way
 
 
 def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> None:
@@ -64,7 +65,9 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
             failed.append(error)
             bench.failure = " ".join(str(error).split())
             bench.changed("work")
-            await asyncio.sleep(TOLD_S)
+            with suppress(TimeoutError):
+                await asyncio.wait_for(bench.told.wait(), TOLD_S)
+                await asyncio.sleep(SENT_S)
             app.shutdown()
 
     tasks: list[asyncio.Task] = []

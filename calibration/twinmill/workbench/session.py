@@ -311,7 +311,7 @@ class Session:
 
     def shown(self, index: int) -> Opened:
         """One robot with the model shown: in the tree, to come, or under a hand."""
-        if self._foreseen:
+        if index in self._foreseen:
             return self._foreseen[index]
         settled = self.settled(self.tree.current.number, index)
         if not self._dragged:
@@ -333,11 +333,12 @@ class Session:
 
     def score_beside(self, index: int) -> float:
         """The same of the model beside."""
-        return total_score([self.beside.opened[k].score for k in self._foremost(index)])
+        known = self.beside.opened
+        return total_score([known[k].score for k in self._foremost(index) if k in known])
 
     def predicted_beside(self, index: int) -> Arrays:
         """The same of the model beside, each name with `_beside`; empty without one."""
-        if self.beside is None:
+        if self.beside is None or index not in self.beside.opened:
             return {}
         arrays = self.robots[index].predicted(self.beside.opened[index].model)
         return {f"{name}_beside": a for name, a in arrays.items() if name != "starts"}

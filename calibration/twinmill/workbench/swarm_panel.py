@@ -29,8 +29,6 @@ class SwarmPanel:
         with ui.element("div").classes("buttons"):
             self.button = ui.button("Run the twin", on_click=self.run)
             self.button.props('dense unelevated no-caps padding="2px 16px" data-testid="run-twin"')
-            self.cancel = ui.button("Cancel", on_click=self.bench.cancel)
-            self.cancel.props('dense outline no-caps padding="2px 12px"')
             self.progress = ui.label().classes("soft").style("flex: 1")
         self.failure = ui.label().classes("note wrong")
         ui.html('<canvas id="swarm"></canvas>', sanitize=False).classes("sheet swarm")
@@ -54,7 +52,6 @@ class SwarmPanel:
         """What is being done, or why it was not."""
         doing = self.bench.doing
         self.button.set_visibility(doing is None)
-        self.cancel.set_visibility(doing is not None)
         self.progress.set_text(self.bench.progress if doing else "")
         self.failure.set_text(self.bench.failure)
         self.failure.set_visibility(bool(self.bench.failure))

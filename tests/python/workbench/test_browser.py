@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -52,7 +53,7 @@ def page(browser):
 
 
 @contextmanager
-def workbench(*arguments):
+def workbench(*arguments, ends_with=0):
     """The command as a user starts it; its address."""
     command = [sys.executable, "-m", "twinmill_cli.main", "open", "run.lcmlog", "--no-browser"]
     command += ["--state", "state.json", *arguments]
@@ -63,9 +64,10 @@ def workbench(*arguments):
         words = server.stdout.readline()
         yield re.search(r"http\S+", words)[0]
     finally:
-        server.send_signal(signal.SIGINT)
+        if ends_with == 0:
+            server.send_signal(signal.SIGINT)
         server.stdout.close()
-        assert server.wait(60) == 0
+        assert server.wait(60) == ends_with
 
 
 def is_predicted(page) -> None:
@@ -93,22 +95,34 @@ def drawn_mm(page) -> float:
 
 
 @pytest.fixture
-def turbopi(data_dir, tmp_path, monkeypatch) -> Path:
-    """A part of the real robot's recording, in the working directory."""
+def import_turbopi(data_dir, tmp_path, monkeypatch) -> Callable[[float], None]:
+    """Makes a log of a part of the real robot's recording, in the working directory."""
     folder = data_dir / "turbopi_optitrack_straight"
     if not folder.is_dir():
         pytest.skip(f"no recordings at {folder}")
     for name in ("poses", "commands"):
         table = pd.read_csv(folder / f"{name}.csv", dtype=str)
         table[table.t_s.astype(float) < LONG_S].to_csv(tmp_path / f"{name}.csv", index=False)
-    options = ImportOptions(heading_offset_rad=np.pi)
     tables = tmp_path / "poses.csv", tmp_path / "commands.csv"
-    import_log(*tables, tmp_path / "run.lcmlog", options=options)
     monkeypatch.chdir(tmp_path)
-    return tmp_path
+
+    def make(heading_offset_rad: float) -> None:
+        options = ImportOptions(heading_offset_rad=heading_offset_rad)
+        import_log(*tables, tmp_path / "run.lcmlog", options=options)
+
+    return make
 
 
-def test_the_whole_conversation(turbopi, page):
+def test_why_a_log_cannot_be_opened_is_said_in_the_page(import_turbopi, page):
+    """As recorded, the tracked body looks backwards."""
+    import_turbopi(0.0)
+    with workbench(ends_with=1) as url:
+        page.goto(url)
+        expect(page.locator("#failed")).to_contain_text("--heading-offset-deg=-180")
+
+
+def test_the_whole_conversation(import_turbopi, page):
+    import_turbopi(np.pi)
     with workbench() as url:
         assert page.request.get(url.split("?")[0]).status == 403
         assert page.request.get(f"{url.split('?')[0]}data/log?log=0&token=wrong").status == 403

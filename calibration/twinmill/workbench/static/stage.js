@@ -104,6 +104,15 @@ class Stage {
     this._renew();
   }
 
+  /** Why nothing can be opened; it stays when the server has gone. */
+  fail(words) {
+    const card = document.createElement("div");
+    card.id = "failed";
+    card.setAttribute("role", "alert");
+    card.textContent = words;
+    document.body.append(card);
+  }
+
   /** What the twin's swarms did. */
   async showSwarm() {
     this.swarm = await this._get("swarm?");
