@@ -88,6 +88,25 @@ def test_a_stop_needs_no_file_that_cannot_be_opened(driving, killed):
     assert stands_for_good(driving, begin_s) < LIMIT_S + SLACK_S
 
 
+def holds(pid, path):
+    """It has this file open."""
+    opened = []
+    for fd in Path(f"/proc/{pid}/fd").iterdir():
+        with contextlib.suppress(FileNotFoundError):  # closed meanwhile
+            opened.append(os.readlink(fd))
+    return str(path) in opened
+
+
+def test_a_driver_that_cannot_write_is_helped_and_a_lost_board_let_go(driving):
+    """What was unplugged gets its name back only when nobody has it open any more."""
+    pids = processes(driving)
+    assert wait_until(lambda: all(holds(pid, driving.record) for pid in pids.values()))
+    begin_s = time.monotonic()
+    resource.prlimit(pids["driver"], resource.RLIMIT_FSIZE, (0, 0))
+    assert stands_for_good(driving, begin_s) < LIMIT_S + SLACK_S
+    assert wait_until(lambda: not holds(pids["guard"], driving.record))
+
+
 def has_ended(pid):
     """It is gone, or is there only until its parent takes notice."""
     stat = Path(f"/proc/{pid}/stat")
