@@ -12,6 +12,7 @@ from twinmill.diagnosis.detections.merge import with_bits
 from twinmill.diagnosis.encoders import geometry_notes, time_base_notes
 from twinmill.diagnosis.findings import findings_of, lateness, ranking_of
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
+from twinmill.diagnosis.resolution import resolutions
 from twinmill.diagnosis.rest import rest_of
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.search import (
@@ -212,8 +213,14 @@ def _concluded(
         notes=[*time_base_notes(scenes), *geometry_notes(last.state.model), *noise, *weighed.notes],
         next_experiment=_next(findings, faint, _shown(done, faint), weighed.verdict),
         robots_off=tuple(off),
+        robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
         base_names=tuple(base_names(first.model, known, model_file.told_by_others(hashes))),
     )
+
+
+def _with_found(own: Opened, fitted: dict[int, Opened], model: native.Model) -> Opened:
+    """As it was fitted, or one that was left out with the model of the others."""
+    return fitted.get(id(own.measurement)) or own.aligned(model)
 
 
 def _refit(done: Search) -> float:

@@ -8,6 +8,7 @@ import twinmill_native as native
 
 from twinmill.diagnosis.findings import Finding, Late, Ranked
 from twinmill.diagnosis.outliers import Outlier
+from twinmill.diagnosis.resolution import Resolution
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import REFIT, Search
 from twinmill.fitting.compare import Comparison
@@ -43,6 +44,7 @@ class Diagnosis:
             first is the model without them.
         bit_estimates: of all effects of the camera, with what was found.
         camera: effects of the camera that were found.
+        robots: how small a difference of each robot would have been seen.
         base_names: quantities of the base that these measurements move.
     """
 
@@ -68,6 +70,7 @@ class Diagnosis:
     bit_estimates: tuple[Estimate, ...] = ()
     camera: tuple[str, ...] = ()
     base_names: tuple[str, ...] = ()
+    robots: tuple[Resolution, ...] = ()
 
     @property
     def motion(self) -> list[str]:
@@ -122,6 +125,7 @@ class Diagnosis:
                 for r in self.before.robots
                 if getattr(r.scene.measurement, "time_base", None)
             ],
+            "robots": [r.to_json() for r in self.robots],
             "robots_off": [r.to_json() for r in self.robots_off],
             "bits": self.bits.to_json() if self.bits else None,
             "bits_after": self.bits_after.to_json() if self.bits_after else None,

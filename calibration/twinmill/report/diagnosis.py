@@ -95,6 +95,32 @@ def unseen(diagnosis: Diagnosis) -> Table:
     return Table("What this log cannot show", ["effect", "why"], rows, words=(0, 1))
 
 
+def each_robot(diagnosis: Diagnosis) -> Table:
+    """What is said of each robot, and what its logs would have shown of it."""
+    off = {o.robot_id: _said_of(o.sentence) for o in diagnosis.robots_off}
+    rows = [
+        [
+            Cell(f"R{r.robot_id:02d}", "bad" if r.robot_id in off else ""),
+            Cell(off.get(r.robot_id, "as all" if len(diagnosis.robots) > 1 else "alone")),
+            *(Cell("-" if d is None else f"{100 * d:.1f} %") for d in (r.speed, r.turn)),
+        ]
+        for r in diagnosis.robots
+    ]
+    return Table(
+        "Each robot",
+        ["robot", "it is", "would show\nin speed", "in turning"],
+        rows,
+        "Would show: the smallest difference from the model that these logs would have put beyond "
+        "doubt; a smaller one is not excluded.",
+        words=(1,),
+    )
+
+
+def _said_of(sentence: str) -> str:
+    """Of a robot, without its name before and the full stop behind."""
+    return (sentence.partition(": ")[2] or sentence).rstrip(".")
+
+
 def robots_off(diagnosis: Diagnosis) -> Table:
     """Robots that differ from the others."""
     rows = [
@@ -228,6 +254,7 @@ def section(diagnosis: Diagnosis) -> Section:
 def _tables(diagnosis: Diagnosis) -> list[Table]:
     made = (
         findings(diagnosis),
+        each_robot(diagnosis),
         robots_off(diagnosis),
         moments(diagnosis),
         ranking(diagnosis),

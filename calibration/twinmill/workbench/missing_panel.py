@@ -146,8 +146,23 @@ class MissingPanel:
         for off in found["robots_off"]:
             if sentence := off.get("sentence"):
                 _card("wrong", html.escape(sentence))
+        self._would_show(found.get("robots", []))
         for note in found["notes"]:
             ui.label(note).classes("soft").style("margin-top: 6px")
+
+    def _would_show(self, robots: list[dict]) -> None:
+        """The smallest difference of each robot that these logs would have put beyond doubt."""
+        if not robots:
+            return
+        with ui.expansion("What these logs would show").props("dense").style("width: 100%"):
+            rows = [("robot", "speed", "turning")]
+            rows += [
+                (f"R{r['robot_id']:02d}", *map(_share, (r["speed"], r["turn"]))) for r in robots
+            ]
+            for k, row in enumerate(rows):
+                cells = "".join(f"<div>{cell}</div>" for cell in row)
+                ui.html(cells, sanitize=False).classes("model head" if k == 0 else "model still")
+            ui.label("The smallest difference from the model beyond doubt.").classes("soft")
 
     def _others(self, found: dict) -> None:
         """What else was tried, best first."""
@@ -171,6 +186,10 @@ def _told(effect: str) -> None:
     if entry:
         ui.label(entry["summary"])
         ui.html(typeset(entry["equation"]), sanitize=False).classes("eq")
+
+
+def _share(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.1f} %"
 
 
 def _card(kind: str, words: str) -> None:

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How small a difference of one robot from its model its logs would have shown."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+
+from twinmill.fitting.opening import Opened
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.model.parameters import GAINS, base_parameters
+
+SURE = 4.0  # standard deviations: as much evidence as the search asks for
+WIDE_STD = 0.15  # of the gains, in question
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """Of one robot in all its logs.
+
+    Attributes:
+        robot_id: whose.
+        speed, turn: smallest differences of its speed and of its rate of turn from the model's that
+            would have been beyond doubt, as shares; None where its drive does not tell.
+    """
+
+    robot_id: int
+    speed: float | None
+    turn: float | None
+
+    def to_json(self) -> dict:
+        """All fields."""
+        return asdict(self)
+
+
+def resolutions(opened: Sequence[Opened]) -> list[Resolution]:
+    """Of each robot that logs tell of, by its number.
+
+    Args:
+        opened: logs and tables, with the model that is asked about.
+    """
+    logs = [o for o in opened if o.floor and o.data is not None]
+    ids = sorted({o.measurement.track.robot_id for o in logs})
+    return [_of_robot([o for o in logs if o.measurement.track.robot_id == i]) for i in ids]
+
+
+def _of_robot(logs: Sequence[Opened]) -> Resolution:
+    """By the spread that a fit of both gains would have, beside the clock of each log."""
+    models = [o.model.copy() for o in logs]
+    for model in models:
+        for name in GAINS:
+            model.set(name, 1.0)
+    free = [replace(p, usual=1.0, std=WIDE_STD) for p in base_parameters(models[0], GAINS)]
+    data = [replace(o.data, own=_clock(o)) for o in logs]
+    estimates = {e.name: e for e in ScoreFit(data, models, free).fit().estimates}
+    speed, turn = (SURE * estimates[n].std if estimates[n].seen else None for n in GAINS)
+    return Resolution(logs[0].measurement.track.robot_id, speed, turn)
+
+
+def _clock(own: Opened) -> tuple:
+    """What its log leaves free beside the gains, begun where it is."""
+    return tuple(p.at(own.model.get(p.name)) for p in own.data.own if p.name not in GAINS)
