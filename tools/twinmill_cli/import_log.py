@@ -20,6 +20,7 @@ if working():  # not for --help
     from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
     from twinmill.data.importers.ros_bag import Topic, guess_pairs, list_topics
     from twinmill.data.log import LogError
+    from twinmill.data.measurement_table import Table as TableFile
     from twinmill.files import replacing
     from twinmill.report import show
     from twinmill.report.tables import Cell, Table
@@ -89,7 +90,9 @@ def _command(
     robot: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME=ID", help="Number of a Motive rigid body; else digits in its name."
+            metavar="NAME=ID",
+            help="Number of a robot by its name: a Motive rigid body, a word in the column "
+            "robot_id or in a bag's topics; else digits in it.",
         ),
     ] = None,
     robot_id: Annotated[int | None, typer.Option(help="For files of one robot.")] = None,
@@ -203,13 +206,16 @@ def _list(bag: Path, topics: list[Topic], as_json: bool) -> None:
     typer.echo(f"Try: {line}" if line else "No pair of poses and commands is seen; name them.")
 
 
-def _explain(guesses: dict[str, list[Guess]], out: Path, force: bool) -> None:
+def _explain(explained: dict[str, tuple[TableFile, list[Guess]]], out: Path, force: bool) -> None:
     """What each column was taken for, on the terminal and as a mapping file."""
-    if not guesses:
+    if not explained:
         raise LogError("--explain-columns: give the tables with --poses and --commands.")
+    guesses = {kind: columns for kind, (_, columns) in explained.items()}
     with replacing(out, force) as temporary:
         temporary.write_text(to_toml(guesses), encoding="utf-8")
-    for kind, columns in guesses.items():
+    for kind, (read, columns) in explained.items():
+        for note in read.notes:
+            typer.echo(note)
         rows = [[g.column, ", ".join(g.targets) or "-", g.why] for g in columns]
         table = Table(
             kind,

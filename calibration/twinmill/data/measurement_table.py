@@ -5,10 +5,12 @@ import csv
 import difflib
 import gzip
 import io
+import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import TextIO
 
@@ -17,6 +19,15 @@ import rich.progress
 from rich.console import Console
 
 from twinmill.data.log import LogError
+from twinmill.data.units import UNITS, split_unit
+
+DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
+DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
+DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d")
+TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d")
+DAY_S = 86_400
+FLAGS = {"true": 1.0, "yes": 1.0, "false": 0.0, "no": 0.0}
+FEWEST_ROWS = 10  # from which on a last cell that is shorter than all above it was cut
 
 
 @contextmanager
@@ -54,6 +65,7 @@ class Table:
     line: list[int]
     known: frozenset[str]  # columns that have a meaning: never proposed for renaming
     factor: dict[str, float] = field(default_factory=dict)  # of columns in another unit
+    notes: list[str] = field(default_factory=list)  # sentences on how the file was read
 
     def under(self, sources: dict, flips: frozenset[str]) -> "Table":
         """The same cells under other names and in other units; columns that nobody names stay."""
@@ -84,6 +96,23 @@ class Table:
         """Columns without a meaning."""
         return [name for name in self.header if name not in self.known]
 
+    def where(self, kept: np.ndarray) -> "Table":
+        """Some of the rows, (rows,) bool."""
+        index = np.flatnonzero(kept).tolist()
+        rows, line = [self.rows[k] for k in index], [self.line[k] for k in index]
+        return replace(self, rows=rows, line=line)
+
+    def cells(self, column: str) -> list[str]:
+        """(rows,) texts of a column.
+
+        Raises:
+            LogError: it is missing.
+        """
+        if column not in self.header:
+            raise self.missing(column)
+        place = self.header.index(column)
+        return [row[place].strip() for row in self.rows]
+
     def numbers(self, column: str, empty_is_nan: bool = False) -> np.ndarray:
         """(rows,) floats of a column.
 
@@ -94,16 +123,13 @@ class Table:
         Raises:
             LogError: the column is missing, or a cell is no number (its row is named).
         """
-        if column not in self.header:
-            raise self.missing(column)
-        place = self.header.index(column)
-        cells = [row[place].strip() for row in self.rows]
+        cells = self.cells(column)
         if empty_is_nan:
             cells = [cell or "nan" for cell in cells]
         try:
             return np.array([float(cell) for cell in cells]) * self.factor.get(column, 1.0)
         except ValueError:
-            bad = next(k for k, cell in enumerate(cells) if not _is_number(cell))
+            bad = next(k for k, cell in enumerate(cells) if not is_number(cell))
             raise LogError(
                 f"{self.name}: row {self.line[bad]}: {column} is '{cells[bad]}', not a "
                 "number; correct or remove the row."
@@ -114,6 +140,42 @@ class Table:
         values = self.numbers(column)
         self.refuse(~np.isfinite(values), column, values, "must be a finite number")
         return values
+
+    def flags(self, column: str) -> np.ndarray:
+        """(rows,) 0 or 1 of a column of numbers, or of true and false, yes and no."""
+        cells = [cell.lower() for cell in self.cells(column)]
+        if set(cells) <= set(FLAGS):
+            return np.array([FLAGS[cell] for cell in cells])
+        return self.finite(column)
+
+    def is_dated(self, column: str) -> bool:
+        """Whether a column holds dates with times, or times of day."""
+        first = self.cells(column)[0]
+        return bool(DATE.match(first) or TIME_OF_DAY.match(first))
+
+    def seconds(self, column: str) -> np.ndarray:
+        """(rows,) s of a column of numbers, dates or times of day.
+
+        Dates are ISO 8601, UTC if they name no zone; times of day go on over midnight.
+        """
+        if not self.is_dated(column):
+            return self.finite(column)
+        import pandas as pd  # slow to import
+
+        cells = self.cells(column)
+        if DATE.match(cells[0]):
+            stamps = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True, errors="coerce")
+            spans = stamps - pd.Timestamp(0, tz="UTC")
+        else:
+            spans = pd.to_timedelta(pd.Series(cells), errors="coerce")
+        if spans.isna().any():
+            bad = int(spans.isna().to_numpy().argmax())
+            raise LogError(
+                f"{self.name}: row {self.line[bad]}: {column} is '{cells[bad]}', no time like the "
+                "rows before; correct or remove the row."
+            )
+        seconds = (spans // pd.Timedelta(microseconds=1)).to_numpy(float) / 1e6
+        return seconds if DATE.match(cells[0]) else np.unwrap(seconds, period=DAY_S)
 
     def refuse(self, bad: np.ndarray, column: str, values: np.ndarray, why: str) -> None:
         """Raises LogError on the first row that is bad, with its value and why."""
@@ -131,44 +193,135 @@ class Table:
             return LogError(f"{self.name}: column {column} is missing; add it.")
         return LogError(
             f"{self.name}: column {column} is missing (nearest is '{near[0]}'); rename "
-            f"it in the file or with --rename {near[0]}={column}."
+            f"it in the file or with --rename '{near[0]}={_in_unit_of(near[0], column)}'."
         )
 
 
-def read_table(path: Path, rename: dict[str, str], known: frozenset[str]) -> Table:
-    """Reads a CSV file with one header row.
+def _in_unit_of(name: str, column: str) -> str:
+    """Our column, in the unit that the name has, if that is one of the same quantity."""
+    (_, unit), (stem, own) = split_unit(name), split_unit(column)
+    same = unit and own and UNITS[unit][0] == UNITS[own][0]
+    return f"{stem}_{unit}" if same else column
+
+
+def read_header(path: Path) -> list[str]:
+    """Names of the columns of a table.
+
+    Raises:
+        LogError: unreadable.
+    """
+    with open_text(path) as text:
+        lines, _, delimiter = _begin(text)
+        return _names(next(csv.reader(lines, delimiter=delimiter, skipinitialspace=True), []))
+
+
+def read_table(path: Path, known: frozenset[str]) -> Table:
+    """Reads a table with one header row: comma-separated, or by another of DELIMITERS.
+
+    Lines that begin with # are comments. A last row that was cut is left out.
 
     Args:
         path: of the file, `.gz` too.
-        rename: column in the file to column as we name it.
         known: all columns that have a meaning.
 
     Raises:
         LogError: unreadable, empty or ragged.
     """
+    notes = []
     with open_text(path) as text:
-        reader = csv.reader(text)
-        header = [rename.get(cell.strip(), cell.strip()) for cell in next(reader, [])]
+        lines, before, delimiter = _begin(text)
+        last = [""]
+        reader = csv.reader(_remembered(lines, last), delimiter=delimiter, skipinitialspace=True)
+        header = _names(next(reader, []))
         rows, line = [], []
         for row in reader:
-            if not any(cell.strip() for cell in row):
+            if not any(cell.strip() for cell in row) or row[0].lstrip().startswith("#"):
                 continue
+            if len(row) < len(header) and not last[0].endswith(("\n", "\r")):
+                notes.append(_cut(path.name, before + reader.line_num))
+                break
             if len(row) != len(header):
                 raise LogError(
-                    f"{path.name}: row {reader.line_num}: has {len(row)} cells, but the "
+                    f"{path.name}: row {before + reader.line_num}: has {len(row)} cells, but the "
                     f"header has {len(header)}; correct or remove the row."
                 )
             rows.append(row)
-            line.append(reader.line_num)
+            line.append(before + reader.line_num)
+    if rows and not last[0].endswith(("\n", "\r")) and _ends_short(rows):
+        notes.append(_cut(path.name, line.pop()))
+        rows.pop()
     if not rows:
         raise LogError(
             f"{path.name}: has no rows of numbers, so there is nothing to import; check "
             "that the export worked."
         )
-    return Table(path.name, header, rows, line, known)
+    comma = delimiter != "," and _has_decimal_commas(rows)
+    if comma:
+        rows = [
+            [c.replace(",", ".") if DECIMAL_COMMA.fullmatch(c) else c for c in row] for row in rows
+        ]
+    if delimiter != ",":
+        more = ", and numbers have decimal commas" if comma else ""
+        notes.append(f"{path.name}: cells are separated by {DELIMITERS[delimiter]}{more}.")
+    return Table(path.name, header, rows, line, known, notes=notes)
 
 
-def _is_number(cell: str) -> bool:
+def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str]:
+    """Lines from the header on, how many stand before it, and the delimiter.
+
+    The header may be the last comment before rows of numbers, as NumPy's `savetxt` writes it.
+    """
+    lines, before, comment = iter(text), 0, ""
+    for line in lines:
+        if not line.strip() or line.lstrip().startswith("#"):
+            before, comment = before + 1, line.lstrip("\ufeff #")
+            continue
+        if comment.strip():
+            delimiter = _delimiter(comment)
+            cells = line.strip().split(None if delimiter == " " else delimiter)
+            if len(comment.split(None if delimiter == " " else delimiter)) == len(cells) and all(
+                is_number(cell) for cell in cells
+            ):
+                return chain([comment, line], lines), before - 1, delimiter
+        return chain([line], lines), before, _delimiter(line)
+    return iter(()), before, ","
+
+
+def _delimiter(header: str) -> str:
+    """What stands between the names most often; spaces where nothing else does."""
+    best = max(",;\t|", key=header.count)
+    return best if best in header else " " if " " in header.strip() else ","
+
+
+def _names(header: list[str]) -> list[str]:
+    return [cell.strip() for cell in header]
+
+
+def _remembered(lines: Iterator[str], last: list[str]) -> Iterator[str]:
+    """The same lines; `last[0]` is the newest."""
+    for line in lines:
+        last[0] = line
+        yield line
+
+
+def _has_decimal_commas(rows: list[list[str]]) -> bool:
+    """Whether commas in cells are decimal points: some are, and no cell has a point as well."""
+    commas = any(DECIMAL_COMMA.fullmatch(cell) for row in rows for cell in row)
+    return commas and not any(is_number(cell) and "." in cell for row in rows for cell in row)
+
+
+def _ends_short(rows: list[list[str]]) -> bool:
+    """Whether the last cell of all is shorter than any above it."""
+    above = [len(row[-1].strip()) for row in rows[:-1]]
+    return len(above) >= FEWEST_ROWS and len(rows[-1][-1].strip()) < min(above)
+
+
+def _cut(name: str, line: int) -> str:
+    return f"{name}: ends in the middle of row {line}: it was cut there; what is before is read."
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell can be read as a number."""
     try:
         float(cell)
     except ValueError:

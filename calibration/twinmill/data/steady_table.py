@@ -87,7 +87,7 @@ def read_sheets(path: Path) -> list[Sheet]:
         LogError: no such table, or a wrong cell, with its row.
     """
     path = Path(path)
-    table = read_table(path, {}, frozenset(COLUMNS))
+    table = read_table(path, frozenset(COLUMNS))
     missing = [name for name in COLUMNS if not table.has(name)]
     if missing:
         raise LogError(

@@ -55,6 +55,8 @@ class Track:
         has_heading: false where the heading was not recorded: it is NaN in `pose`, and nothing
             about it can be judged.
         same_clock: the log says that one clock stamped commands and poses.
+        astray_rad: by which a robot that is driven straight moves to the left of its heading, where
+            that is no bias; else 0.
     """
 
     robot_id: int
@@ -71,6 +73,7 @@ class Track:
     notes: list[str]
     has_heading: bool = True
     same_clock: bool = False
+    astray_rad: float = 0.0
 
 
 def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.0) -> Track:
@@ -96,11 +99,17 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
     usable = _trackable(robot, notes)
     segment = find_segments(robot, usable, (usual_mps, usual_radps), notes)
     pose = _continuous(robot.pose, segment)
-    rest = _rest(robot)
+    rest, astray_rad = _rest(robot), 0.0
     _note_frozen(robot, notes)
     if robot.has_heading:
         heading_smooth, _ = local_line(robot.pose_t_s, pose[:, 2], segment, SMOOTH_S)
-        _note_astray(robot, pose, segment, notes)
+        astray_rad = _astray_rad(robot, pose, segment)
+        if astray_rad:
+            notes.append(
+                f"driven straight, the robot moves {np.degrees(astray_rad):.0f} degrees to the "
+                "left of its heading; turn the poses by that (`twinmill import "
+                f"--heading-offset-deg {np.degrees(astray_rad):.0f}`)."
+            )
     else:
         heading_smooth = np.where(segment < 0, np.nan, 0.0)
         notes.append("the heading is not recorded: only the position is judged.")
@@ -119,6 +128,7 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
         notes,
         robot.has_heading,
         robot.same_clock,
+        astray_rad,
     )
 
 
@@ -256,8 +266,8 @@ def _note_frozen(robot: RobotLog, notes: list[str]) -> None:
             )
 
 
-def _note_astray(robot: RobotLog, pose: np.ndarray, segment: np.ndarray, notes: list[str]) -> None:
-    """Motion that points elsewhere than the heading although the robot is driven straight."""
+def _astray_rad(robot: RobotLog, pose: np.ndarray, segment: np.ndarray) -> float:
+    """As in Track: motion that points elsewhere than the heading of a robot driven straight."""
     half = max(1, round(0.25 / float(np.median(np.diff(robot.pose_t_s)))))
     middle = np.arange(half, len(pose) - half)
     whole = (segment[middle - half] >= 0) & (segment[middle - half] == segment[middle + half])
@@ -274,17 +284,12 @@ def _note_astray(robot: RobotLog, pose: np.ndarray, segment: np.ndarray, notes: 
     )
     steady = (forward != 0).all(axis=1) & (np.ptp(np.sign(forward), axis=1) == 0)
     if np.count_nonzero(steady) < half:
-        return
+        return 0.0
     step = (pose[last, :2] - pose[first, :2])[steady] * np.sign(forward[steady, :1])
     angle = np.arctan2(step[:, 1], step[:, 0]) - pose[middle[steady], 2]
     weight = np.hypot(step[:, 0], step[:, 1])
-    astray = float(np.angle(np.sum(weight * np.exp(1j * angle))))
-    if abs(astray) > ASTRAY_RAD:
-        notes.append(
-            f"driven straight, the robot moves {np.degrees(astray):.0f} degrees to the "
-            "left of its heading; turn the poses by that (`twinmill import "
-            f"--heading-offset-deg {np.degrees(astray):.0f}`)."
-        )
+    astray_rad = float(np.angle(np.sum(weight * np.exp(1j * angle))))
+    return astray_rad if abs(astray_rad) > ASTRAY_RAD else 0.0
 
 
 def _straight(command: np.ndarray, kind: CommandKind) -> np.ndarray:

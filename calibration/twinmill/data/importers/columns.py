@@ -7,7 +7,7 @@ never guessed silently: `explain` says what it looks like, a mapping file keeps 
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,22 +15,8 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from twinmill.data.log import LogError
-from twinmill.data.measurement_table import Table, read_table
-
-UNITS = {  # unit in a name: that of ours, and the factor
-    "mm": ("m", 1e-3),
-    "cm": ("m", 1e-2),
-    "deg": ("rad", math.pi / 180),
-    "mmps": ("mps", 1e-3),
-    "cmps": ("mps", 1e-2),
-    "degps": ("radps", math.pi / 180),
-    "rpm": ("radps", math.pi / 30),
-    "ms": ("s", 1e-3),
-    "us": ("s", 1e-6),
-    "ns": ("s", 1e-9),
-    "unit": ("pct", 100.0),  # duties of -1 to 1
-    "pwm": ("pct", 100 / 255),  # duties of -255 to 255
-}
+from twinmill.data.measurement_table import Table, read_header, read_table
+from twinmill.data.units import UNITS, plain_name, split_unit
 
 
 @dataclass(frozen=True)
@@ -55,6 +41,8 @@ class Guess:
         factor: to our unit.
         why: in words, with the values that speak for it.
         sure: its name says so; else a person must.
+        note: what an import is to say about it.
+        rival: the column before it that holds the same quantity.
     """
 
     column: str
@@ -62,17 +50,30 @@ class Guess:
     factor: float
     why: str
     sure: bool
+    note: str = ""
+    rival: str = ""
 
 
-def by_name(column: str, known: frozenset[str]) -> tuple[str, float] | None:
-    """Our column and the factor, where a name with a unit says it all."""
+def by_name(column: str, known: frozenset[str]) -> tuple[tuple[str, ...], float] | None:
+    """Our columns and the factor, where a name with a unit says it all.
+
+    The factor is NaN where a number is needed that no table has: the radius of the wheels.
+    """
     if column in known:
-        return column, 1.0
-    stem, _, unit = column.rpartition("_")
-    if unit in UNITS:
-        ours, factor = UNITS[unit]
-        if f"{stem}_{ours}" in known:
-            return f"{stem}_{ours}", factor
+        return (column,), 1.0
+    stem, unit = split_unit(column)
+    ours, factor = UNITS.get(unit, ("", 1.0))
+    if f"{stem}_{ours}" in known:
+        return (f"{stem}_{ours}",), factor
+    if stem in WHEELS and ours in ("radps", "mps"):
+        targets = tuple(f"w{k}_radps" for k in WHEELS[stem])
+        factor = factor if ours == "radps" else math.nan
+        return (targets, factor) if known.issuperset(targets) else None
+    targets = USUAL[stem][0] if stem in USUAL else ()
+    by_unit = ours and all(target.endswith(f"_{ours}") for target in targets)
+    unitless = not unit and stem in ALWAYS
+    if targets and known.issuperset(targets) and (by_unit or unitless):
+        return targets, factor
     return None
 
 
@@ -126,19 +127,20 @@ def _plain(values: np.ndarray) -> tuple[float, str]:
 
 
 LEFT, RIGHT = ("fl_pct", "rl_pct"), ("fr_pct", "rr_pct")
+ROBOT = ("robot", "agent", "robotid", "robot_name", "name")
+ALWAYS = frozenset((*ROBOT, "qw", "qx", "qy", "qz"))  # need no unit
+WHEELS = {"left": (1, 3), "right": (2, 4), "fl": (1,), "fr": (2,), "rl": (3,), "rr": (4,)}
 # Usual names without a unit: what they mean, and how their values tell the unit.
 USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]]]] = {
-    **dict.fromkeys(("t", "time", "timestamp", "stamp", "time_s", "secs"), (("t_s",), _time)),
-    **dict.fromkeys(("robot", "id", "agent", "robotid"), (("robot_id",), _plain)),
+    **dict.fromkeys(("t", "time", "timestamp", "stamp", "secs"), (("t_s",), _time)),
+    **dict.fromkeys((*ROBOT, "id"), (("robot_id",), _plain)),
     **dict.fromkeys(("x", "pos_x", "position_x", "px"), (("x_m",), _length)),
     **dict.fromkeys(("y", "pos_y", "position_y", "py"), (("y_m",), _length)),
     **dict.fromkeys(("z", "pos_z", "position_z", "pz", "height"), (("z_m",), _length)),
     **dict.fromkeys(("theta", "yaw", "heading", "psi", "phi"), (("theta_rad",), _angle)),
-    **dict.fromkeys(("v", "vx", "linear_x", "speed", "v_mps"), (("vx_mps",), _speed)),
+    **dict.fromkeys(("v", "vx", "linear_x", "speed"), (("vx_mps",), _speed)),
     **dict.fromkeys(("vy", "linear_y"), (("vy_mps",), _speed)),
-    **dict.fromkeys(
-        ("w", "omega", "angular_z", "wz", "yaw_rate", "w_radps"), (("omega_radps",), _turn)
-    ),
+    **dict.fromkeys(("w", "omega", "angular_z", "wz", "yaw_rate"), (("omega_radps",), _turn)),
     **dict.fromkeys(("left", "pwm_left", "pwm_l", "u_l", "duty_left"), (LEFT, _duty)),
     **dict.fromkeys(("right", "pwm_right", "pwm_r", "u_r", "duty_right"), (RIGHT, _duty)),
     **{
@@ -150,27 +152,91 @@ USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]
 }
 
 
-def explain(table: Table, known: frozenset[str]) -> list[Guess]:
-    """What each column looks like, in the order of the file."""
-    guesses = []
+def explain(
+    table: Table, known: frozenset[str], rename: dict[str, str] | None = None
+) -> list[Guess]:
+    """What each column looks like, in the order of the file.
+
+    Args:
+        table: as it was read.
+        known: our columns that this kind of table has.
+        rename: column in the file to ours, as a person decided.
+    """
+    guesses: list[Guess] = []
+    holder: dict[str, str] = {}  # column that is each of ours
     for column in table.header:
-        if found := by_name(column, known):
-            target, factor = found
-            why = "by its name" if factor == 1 else f"by its name, times {factor:.6g}"
-            guesses.append(Guess(column, (target,), factor, why, True))
-            continue
-        usual = USUAL.get(column.strip().lower().replace(".", "_").replace(" ", "_"))
-        values = _numbers(table, column) if usual else np.empty(0)
-        if usual is None or not len(values):
-            guesses.append(Guess(column, (), 1.0, "not known: left out", True))
-            continue
-        targets, unit_of = usual
-        factor, why = unit_of(values)
-        guesses.append(Guess(column, targets, factor, why, False))
-    targets = {t for guess in guesses for t in guess.targets}
-    if "vx_mps" in targets and "omega_radps" in targets and "vy_mps" not in targets:
+        guess = _guess(table, column, known, (rename or {}).get(column))
+        taken = [target for target in guess.targets if target in holder]
+        if taken:
+            why = f"left out: {taken[0]} is column '{holder[taken[0]]}' already"
+            guess = replace(guess, targets=(), why=why, sure=True, rival=holder[taken[0]])
+        holder |= dict.fromkeys(guess.targets, column)
+        guesses.append(guess)
+    if "vx_mps" in holder and "omega_radps" in holder and "vy_mps" not in holder:
         guesses.append(Guess("", ("vy_mps",), 0.0, "no sideways speed: 0", False))
     return guesses
+
+
+def _guess(table: Table, column: str, known: frozenset[str], new: str | None) -> Guess:
+    """What one column looks like, under the new name that a person gave it."""
+    name = new or column
+    if found := by_name(name, known):
+        targets, factor = found
+        if math.isnan(factor):
+            return Guess(column, targets, factor, f"of the rim; {RADIUS}", False)
+        note = ""
+        if new:
+            factor, note = _renamed(table.name, column, new, factor)
+        why = "by its name" if factor == 1 else f"by its name, times {factor:.6g}"
+        return Guess(column, targets, factor, why, True, note)
+    usual = USUAL.get(plain_name(name))
+    if usual and usual[0] == ("t_s",) and table.is_dated(column):
+        return Guess(column, usual[0], 1.0, "holds dates or times of day", True)
+    values = _numbers(table, column) if usual and known.issuperset(usual[0]) else np.empty(0)
+    if not len(values):
+        return Guess(column, (), 1.0, "not known: left out", True)
+    targets, unit_of = usual
+    factor, why = unit_of(values)
+    return Guess(column, targets, factor, why, False)
+
+
+RADIUS = "the factor is 1 / the wheel's radius in m"
+
+
+def _renamed(table: str, column: str, new: str, factor: float) -> tuple[float, str]:
+    """Factor of a column under its new name, and what to say: a unit in its old name stays true.
+
+    A new name in our unit says what the column is; one in another unit says what it holds.
+    """
+    old_unit, new_unit = split_unit(column)[1], split_unit(new)[1]
+    if not old_unit or old_unit == new_unit or not new_unit:
+        return factor, ""
+    (ours, old_factor), (new_ours, _) = UNITS[old_unit], UNITS[new_unit]
+    if ours != new_ours:
+        raise LogError(
+            f"--rename {column}={new}: {old_unit} is no unit of what {new} holds; name the right "
+            "column, or say what it is in a --mapping file."
+        )
+    if new_unit == new_ours:
+        return old_factor, f"{table}: {column} is in {old_unit} by its name: converted to {new}."
+    return factor, f"{table}: {column} is read in {new_unit}, whatever its name says."
+
+
+def check_renames(rename: dict[str, str], tables: list[Path], known: frozenset[str]) -> None:
+    """Raises LogError where an old name is in no table, or a new one has no meaning."""
+    headers = {path.name: read_header(path) for path in tables} if rename else {}
+    for old, new in rename.items():
+        if not any(old in header for header in headers.values()):
+            names = "; ".join(f"{name} has {', '.join(h)}" for name, h in headers.items())
+            raise LogError(
+                f"--rename {old}={new}: no table has a column '{old}'"
+                f"{f' ({names})' if names else ''}; correct the name."
+            )
+        if not by_name(new, known) and plain_name(new) not in USUAL:
+            raise LogError(
+                f"--rename {old}={new}: {new} is none of our columns; they are "
+                f"{', '.join(sorted(known))}."
+            )
 
 
 def _numbers(table: Table, column: str) -> np.ndarray:
@@ -223,6 +289,10 @@ def read_mapping(path: Path, kind: str, known: frozenset[str]) -> Mapping:
     for target, entry in section.items():
         keys = set(entry) if isinstance(entry, dict) else set()
         numbers = [entry[k] for k in keys & {"factor", "value"}]
+        if any(isinstance(n, float) and math.isnan(n) for n in numbers):
+            raise LogError(
+                f"{path}: [{kind}] {target}: has no factor yet; {RADIUS}: write it there."
+            )
         good = keys in ({"column"}, {"column", "factor"}, {"value"})
         if target not in known or not good or not all(_is_real(n) for n in numbers):
             raise LogError(
@@ -250,27 +320,25 @@ def read_mapped(
 
     Args:
         path: CSV, `.gz` too.
-        known: all columns that have a meaning.
+        known: our columns that this kind of table has.
         mapping: what a person decided; None: names that say all, and `rename`.
         rename: column in the file to ours, which may have another unit (`yaw=theta_deg`).
         flips: our columns that are to change their sign.
 
     Raises:
-        LogError: as read_table; a column of the mapping is not there, or one looks like ours and
-            has no unit.
+        LogError: as read_table; a column of the mapping is not there, one looks like ours and
+            has no unit, or two hold one quantity.
     """
-    table = read_table(path, rename, known)
+    table = read_table(path, known)
     if mapping is None:
-        guesses = explain(table, known)
-        unsure = [g for g in guesses if not g.sure and g.column]
-        if unsure:
-            g = unsure[0]
-            raise LogError(
-                f"{table.name}: column '{g.column}' has no unit ({g.why}); say what it is with "
-                f"--rename {g.column}={g.targets[0]} (or _mm, _deg, _ms ...), or let "
-                "--explain-columns FILE write down all columns and give that to --mapping."
-            )
-        mapping = mapping_of(guesses)
+        guesses = explain(table, known, rename)
+        for guess in guesses:
+            if guess.rival:
+                raise _rivals(table.name, guess)
+            if not guess.sure and guess.column:
+                raise _unsure(table.name, guess)
+        notes = [guess.note for guess in guesses if guess.note]
+        table, mapping = replace(table, notes=table.notes + notes), mapping_of(guesses)
     gone = [s.column for s in mapping.values() if s.column and s.column not in table.header]
     if gone:
         raise LogError(
@@ -278,3 +346,33 @@ def read_mapped(
             f"{', '.join(table.header)}; correct the mapping."
         )
     return table.under(mapping, flips)
+
+
+def _rivals(table: str, guess: Guess) -> LogError:
+    if guess.rival == guess.column:
+        return LogError(
+            f"{table}: two columns are called '{guess.column}'; take one of them out of the file."
+        )
+    return LogError(
+        f"{table}: columns '{guess.rival}' and '{guess.column}' hold one quantity; take one out of "
+        "the file, or choose with a --mapping file (--explain-columns writes one)."
+    )
+
+
+def _unsure(table: str, guess: Guess) -> LogError:
+    target = guess.targets[0]
+    if math.isnan(guess.factor):
+        return LogError(
+            f"{table}: column '{guess.column}' is a speed of the wheel's rim, and we take rad/s; "
+            f"let --explain-columns FILE write down all columns, write the factor there "
+            f"({RADIUS}), and give that to --mapping."
+        )
+    if len(guess.targets) > 1:  # both wheels of a side
+        target = "left_pct" if guess.targets == LEFT else "right_pct"
+    doubt = "has no unit" if split_unit(target)[1] else f"may be {target}"
+    more = " (or _mm, _deg, _ms, _pwm ...)" if split_unit(target)[1] else ""
+    return LogError(
+        f"{table}: column '{guess.column}' {doubt} ({guess.why}); say what it is with "
+        f"--rename {guess.column}={target}{more}, or let --explain-columns FILE write down all "
+        "columns and give that to --mapping."
+    )

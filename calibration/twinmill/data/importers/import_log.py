@@ -8,12 +8,16 @@ from pathlib import Path
 import numpy as np
 import tomlkit
 
-from twinmill.data.importers.columns import Guess, explain, read_mapping
+from twinmill.data.checks import check_poses, check_tracks
+from twinmill.data.importers.columns import Guess, check_renames, explain, read_mapping
 from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
 from twinmill.data.importers.motive import read_motive
 from twinmill.data.importers.plain import (
     KNOWN,
+    OF_COMMANDS,
+    OF_DETECTIONS,
+    OF_POSES,
     Columns,
     read_commands,
     read_detections,
@@ -27,8 +31,8 @@ from twinmill.data.importers.series import (
     in_body_frame,
     multiply,
 )
-from twinmill.data.log import Log, LogError, read_log
-from twinmill.data.measurement_table import read_table
+from twinmill.data.log import Log, LogError, RobotLog, read_log
+from twinmill.data.measurement_table import Table, read_table
 from twinmill.data.track import make_track
 from twinmill.files import replacing
 
@@ -41,7 +45,8 @@ class ImportOptions:
 
     Attributes:
         robot_id: whose the rows are, for files that do not say.
-        robots: robot_id by name of a Motive rigid body.
+        robots: robot_id by name: of a Motive rigid body, in a table's column robot_id, or as a word
+            in a bag's topics.
         rename: column in a plain CSV file to column as we name it, or with another unit.
         mapping: file that says which column is what, in place of `rename`.
         flips: our columns that are to change their sign.
@@ -114,6 +119,10 @@ def import_log(
             f"--robot-id {options.robot_id}: must be in 0..99 and fits one robot; "
             "number several by their folders' names."
         )
+    tables = [path for path in (poses, commands) if path and not options.mapping]
+    check_renames(
+        options.rename, tables + ([detections] if detections else []), KNOWN | OF_DETECTIONS
+    )
     if bag:
         topics = list(options.pose_topics), list(options.command_topics)
         pose_series, command_series = read_bag(
@@ -121,6 +130,7 @@ def import_log(
         )
     else:
         pose_series, command_series = _read_files(poses, commands, motive, io_tsv, options)
+    _check_names(options, [series.robot_id for series in (*pose_series, *command_series)])
     pose_series = [_moved(series, options) for series in pose_series]
     _check_times(pose_series, command_series)
     by_robot = {series.robot_id: series for series in pose_series}
@@ -163,7 +173,9 @@ def _detections(
     path: Path, options: ImportOptions, poses: dict[int, PoseSeries]
 ) -> list[DetectionSeries]:
     """Of robots whose poses are known, at the time of the poses."""
-    series = read_detections(path, Columns(options.rename, robot_id=options.robot_id))
+    series = read_detections(
+        path, Columns(options.rename, robot_id=options.robot_id, robots=options.robots)
+    )
     for own in series:
         where = f"{path.name}: robot {own.robot_id}"
         if own.robot_id not in poses:
@@ -187,15 +199,25 @@ def _columns(options: ImportOptions, kind: str) -> Columns:
             f"--flip {min(unknown)}: is none of our columns; they are {', '.join(sorted(KNOWN))}."
         )
     mapping = read_mapping(options.mapping, kind, KNOWN) if options.mapping else None
-    return Columns(options.rename, mapping, options.flips, options.robot_id)
+    return Columns(options.rename, mapping, options.flips, options.robot_id, options.robots)
 
 
-def explain_columns(poses: Path | None, commands: Path | None) -> dict[str, list[Guess]]:
-    """What the columns of both tables look like, by `poses` and `commands`."""
-    tables = {"poses": poses, "commands": commands}
-    return {
-        kind: explain(read_table(path, {}, KNOWN), KNOWN) for kind, path in tables.items() if path
-    }
+def explain_columns(
+    poses: Path | None, commands: Path | None
+) -> dict[str, tuple[Table, list[Guess]]]:
+    """Both tables and what their columns look like, by `poses` and `commands`."""
+    given = (("poses", poses, OF_POSES), ("commands", commands, OF_COMMANDS))
+    tables = {kind: (read_table(path, known), known) for kind, path, known in given if path}
+    return {kind: (table, explain(table, known)) for kind, (table, known) in tables.items()}
+
+
+def _check_names(options: ImportOptions, ids: list[int]) -> None:
+    """Raises LogError where --robot names a robot that nothing in the files is of."""
+    for name, number in options.robots.items():
+        if number not in ids:
+            raise LogError(
+                f"--robot {name}={number}: no robot in the files has that name; correct it."
+            )
 
 
 def _moved(series: PoseSeries, options: ImportOptions) -> PoseSeries:
@@ -230,7 +252,8 @@ def _check_times(poses: list[PoseSeries], commands: list[CommandSeries]) -> None
     if not pairs:
         raise LogError(
             f"poses are of robots {[p.robot_id for p in poses]}, commands of {ids}: no "
-            "robot has both; number them alike (--robot NAME=ID, --robot-id)."
+            f"robot has both; number them alike, for example with --robot {ids[0]}="
+            f"{poses[0].robot_id}."
         )
     for p, c in pairs:
         first_s, last_s = p.utime_us[[0, -1]] / 1e6
@@ -292,7 +315,7 @@ def _summary(log: Log, out: Path, warnings: list[str]) -> dict:
             }
         )
         if len(series) == 2 and robot.valid.sum() > 1:
-            warnings += [f"robot {robot.robot_id}: {note}" for note in make_track(robot).notes]
+            warnings += _judged(robot)
     return {
         "out": str(out),
         "robots": robots,
@@ -300,3 +323,17 @@ def _summary(log: Log, out: Path, warnings: list[str]) -> dict:
         "duration_s": end_s,
         "warnings": warnings,
     }
+
+
+def _judged(robot: RobotLog) -> list[str]:
+    """What was cut; or the mistake of the poses, from which cuts and a turned heading follow.
+
+    A heading that seems turned may be in degrees: `diagnose` checks that, and so does this.
+    """
+    found = check_poses(robot, "")
+    if not found:
+        track = make_track(robot)
+        found = [f for f in check_tracks([("", track)]) if f.fatal] if track.astray_rad else []
+    if not found:
+        return [f"robot {robot.robot_id}: {note}" for note in track.notes]
+    return [f"robot {f.robot_id}: {f.what}: {f.evidence}; {f.remedy}." for f in found]

@@ -3,7 +3,7 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,36 +17,25 @@ from twinmill.data.importers.series import (
     quaternion_from_heading,
 )
 from twinmill.data.log import CommandKind, LogError
-from twinmill.data.measurement_table import Table
+from twinmill.data.measurement_table import Table, is_number
 from twinmill.model.mixing import duties_from_inputs
 
 HEADING_LIKE = re.compile(r"theta|yaw|heading|psi|orient|angle|rot|^q_?[wxyz0-3]$", re.IGNORECASE)
 QUATERNION = ("qw", "qx", "qy", "qz")
 WORLD = ("vx_world_mps", "vy_world_mps")
 INPUTS = ("speed_input", "turn_input")
+WRAP_DEG = 20  # more than a robot turns from row to row
 VALUES: dict[CommandKind, tuple[str, ...]] = {
     "duty": ("fl_pct", "fr_pct", "rl_pct", "rr_pct"),
     "wheel_speed": ("w1_radps", "w2_radps", "w3_radps", "w4_radps"),
     "twist": ("vx_mps", "vy_mps", "omega_radps"),
 }
-KNOWN = frozenset(
-    {
-        "t_s",
-        "robot_id",
-        "x_m",
-        "y_m",
-        "z_m",
-        "theta_rad",
-        "valid",
-        *QUATERNION,
-        *INPUTS,
-        *WORLD,
-        *(name for names in VALUES.values() for name in names),
-    }
+OF_POSES = frozenset({"t_s", "robot_id", "x_m", "y_m", "z_m", "theta_rad", "valid", *QUATERNION})
+OF_COMMANDS = frozenset(
+    {"t_s", "robot_id", *INPUTS, *WORLD, *(name for names in VALUES.values() for name in names)}
 )
-
-
 OF_DETECTIONS = frozenset({"t_s", "robot_id", "seen", "range_m", "bearing_rad"})
+KNOWN = OF_POSES | OF_COMMANDS
 
 
 @dataclass(frozen=True)
@@ -55,15 +44,17 @@ class Columns:
 
     Attributes:
         rename, mapping, flips: as there.
-        robot_id: of all rows, for files without that column.
+        robot_id: of all rows, for files without that column, or with one name in it.
+        robots: robot_id by what stands in that column.
     """
 
     rename: dict[str, str] = field(default_factory=dict)
     mapping: Mapping | None = None
     flips: frozenset[str] = frozenset()
     robot_id: int | None = None
+    robots: dict[str, int] = field(default_factory=dict)
 
-    def read(self, path: Path, known: frozenset[str] = KNOWN) -> Table:
+    def read(self, path: Path, known: frozenset[str]) -> Table:
         """The table under our names."""
         return read_mapped(path, known, self.mapping, self.rename, self.flips)
 
@@ -79,8 +70,8 @@ def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:
     Raises:
         LogError: as read_table; a wrong value, with its row.
     """
-    table = columns.read(path)
-    ids, utime_us = _robot_ids(table, columns.robot_id), _utime_us(table)
+    table = columns.read(path, OF_POSES)
+    (ids, notes), utime_us = _robot_ids(table, columns), _utime_us(table)
     height = table.numbers("z_m", True) if table.has("z_m") else np.zeros(len(ids))
     position = np.column_stack([table.numbers("x_m", True), table.numbers("y_m", True), height])
     orientation = _orientation(table)
@@ -88,11 +79,13 @@ def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:
     if np.isfinite(orientation).any():
         valid &= np.isfinite(orientation).all(axis=1)
     if table.has("valid"):
-        valid &= table.finite("valid") != 0
+        valid &= table.flags("valid") != 0
+    if table.has("theta_rad"):
+        _refuse_degrees(table, ids)
     position[~valid] = orientation[~valid] = np.nan
     return [
         PoseSeries(number, utime_us[rows], position[rows], orientation[rows], valid[rows], notes)
-        for number, rows, notes in _by_robot(table, ids, utime_us)
+        for number, rows, notes in _by_robot(table, ids, utime_us, notes)
     ]
 
 
@@ -101,15 +94,17 @@ def read_commands(path: Path, columns: Columns) -> list[CommandSeries]:
 
     Args:
         path: CSV with t_s, robot_id and one group of VALUES, INPUTS or WORLD (inputs may stand
-            beside duties, omega_radps beside WORLD); each row is held until the next.
+            beside duties, omega_radps beside WORLD); each row is held until the next, and over rows
+            with an empty cell.
         columns: how to read it.
 
     Raises:
         LogError: as read_table; a wrong value, with its row.
     """
-    table = columns.read(path)
-    ids, utime_us = _robot_ids(table, columns.robot_id), _utime_us(table)
+    table = columns.read(path, OF_COMMANDS)
     kind, world = _kind(table), table.has(*WORLD)
+    table = _complete(table, kind)
+    (ids, notes), utime_us = _robot_ids(table, columns), _utime_us(table)
     inputs = (
         np.column_stack([_input(table, name) for name in INPUTS])
         if kind == "duty" and table.has(*INPUTS)
@@ -133,7 +128,7 @@ def read_commands(path: Path, columns: Columns) -> list[CommandSeries]:
             warnings=notes,
             world=world,
         )
-        for number, rows, notes in _by_robot(table, ids, utime_us)
+        for number, rows, notes in _by_robot(table, ids, utime_us, notes)
     ]
 
 
@@ -149,17 +144,23 @@ def read_detections(path: Path, columns: Columns) -> list[DetectionSeries]:
         LogError: as read_table; a wrong value, with its row.
     """
     table = columns.read(path, OF_DETECTIONS)
-    ids, utime_us, seen = (
-        _robot_ids(table, columns.robot_id),
-        _utime_us(table),
-        table.finite("seen"),
-    )
+    (ids, notes), utime_us = _robot_ids(table, columns), _utime_us(table)
+    seen = table.flags("seen")
     table.refuse((seen != 0) & (seen != 1), "seen", seen, "must be 0 or 1")
     more = {
         name: table.numbers(name, True) if table.has(name) else np.full(len(ids), np.nan)
         for name in ("range_m", "bearing_rad")
     }
     table.refuse(more["range_m"] < 0, "range_m", more["range_m"], "must not be negative")
+    for name, values in more.items():
+        idle = (seen == 0) & np.isfinite(values)
+        if idle.any():
+            notes = [
+                *notes,
+                f"{table.name}: {np.count_nonzero(idle)} rows give {name} though seen is 0 (the "
+                f"first is row {table.line[int(idle.argmax())]}); it is left out there.",
+            ]
+            values[idle] = np.nan
     return [
         DetectionSeries(
             number,
@@ -169,7 +170,7 @@ def read_detections(path: Path, columns: Columns) -> list[DetectionSeries]:
             more["bearing_rad"][rows],
             notes,
         )
-        for number, rows, notes in _by_robot(table, ids, utime_us)
+        for number, rows, notes in _by_robot(table, ids, utime_us, notes)
     ]
 
 
@@ -196,22 +197,45 @@ def _kind(table: Table) -> CommandKind:
     raise table.missing(next(name for name in group if not table.has(name)))
 
 
+def _columns_of(table: Table, kind: CommandKind) -> tuple[str, ...]:
+    """Columns that hold the commands; those of the duties are not there beside inputs alone."""
+    if table.has(*WORLD):
+        return (*WORLD, *(["omega_radps"] if table.has("omega_radps") else []))
+    return VALUES[kind] if table.has(*VALUES[kind]) else INPUTS
+
+
+def _complete(table: Table, kind: CommandKind) -> Table:
+    """Without the rows that have an empty cell: the command before is held over them."""
+    needed = [table.cells(name) for name in _columns_of(table, kind)]
+    whole = np.array([all(cells) for cells in zip(*needed, strict=True)])
+    if whole.all() or not whole.any():
+        return table
+    note = (
+        f"{table.name}: {np.count_nonzero(~whole)} rows have an empty cell (the first is row "
+        f"{table.line[int((~whole).argmax())]}); left out: the command before is held."
+    )
+    return replace(table.where(whole), notes=[*table.notes, note])
+
+
 def _values(table: Table, kind: CommandKind, inputs: np.ndarray) -> np.ndarray:
     """(rows, 4) as in CommandSeries."""
-    columns = VALUES[kind]
-    if table.has(*WORLD):
-        columns = (*WORLD, *(["omega_radps"] if table.has("omega_radps") else []))
-    elif not table.has(*columns):
+    columns = _columns_of(table, kind)
+    if columns == INPUTS:
         return np.array([duties_from_inputs(*row) for row in inputs], float)
     value = np.zeros((len(table.rows), 4))
     for k, name in enumerate(columns):
         value[:, k] = table.finite(name)
         if kind == "duty":
-            table.refuse(np.abs(value[:, k]) > 100, name, value[:, k], "must lie in -100..100")
-            if table.factor.get(name, 1.0) in (1.0, -1.0):
-                table.refuse(
-                    value[:, k] % 1 != 0, name, value[:, k], "the motor board takes whole percent"
-                )
+            pwm = f"must lie in -100..100 (PWM of 255 is called {name[:2]}_pwm)"
+            table.refuse(np.abs(value[:, k]) > 100, name, value[:, k], pwm)
+    top = np.abs(value).max()
+    converted = any(abs(table.factor.get(name, 1.0)) != 1 for name in columns)
+    if kind == "duty" and not converted and top <= 1 and np.any(value % 1):
+        raise LogError(
+            f"{table.name}: duties go to {top:g} at most, which is no percent but a share of full "
+            f"duty; name the columns {columns[0][:2]}_unit ... in the file, or with --rename "
+            f"{columns[0]}={columns[0][:2]}_unit ..."
+        )
     return value
 
 
@@ -229,29 +253,78 @@ def _orientation(table: Table) -> np.ndarray:
     return quaternion / np.where(norm > 0, norm, np.nan)[:, None]
 
 
-def _robot_ids(table: Table, robot_id: int | None) -> np.ndarray:
-    if robot_id is not None and not table.has("robot_id"):
-        return np.full(len(table.rows), robot_id)
+def _refuse_degrees(table: Table, ids: np.ndarray) -> None:
+    """Raises LogError where headings named radians jump by 360 as they pass the half turn."""
+    theta = table.numbers("theta_rad", True)
+    for number in np.unique(ids):
+        own = theta[(ids == number) & np.isfinite(theta)]
+        jumps = np.abs(np.abs(np.diff(own)) - 360) < WRAP_DEG
+        if jumps.any() and np.abs(own).max() < 361:
+            top = np.abs(own).max()
+            raise LogError(
+                f"{table.name}: robot {number}: theta_rad goes to {top:.0f} and jumps "
+                "by 360 where the robot turns round: it is in degrees; name it theta_deg, in the "
+                "file or with --rename theta_rad=theta_deg."
+            )
+
+
+def _robot_ids(table: Table, columns: Columns) -> tuple[np.ndarray, list[str]]:
+    """(rows,) robot_id, and what was done with names that are no numbers."""
     if not table.has("robot_id"):
+        if columns.robot_id is None:
+            raise LogError(
+                f"{table.name}: column robot_id is missing; add it, or give --robot-id for "
+                "a file of one robot."
+            )
+        return np.full(len(table.rows), columns.robot_id), []
+    cells = table.cells("robot_id")
+    if "" in cells:
         raise LogError(
-            f"{table.name}: column robot_id is missing; add it, or give --robot-id for "
-            "a file of one robot."
+            f"{table.name}: row {table.line[cells.index('')]}: robot_id is empty; fill it."
         )
-    ids = table.finite("robot_id")
+    numbers, notes = _numbered(table.name, sorted(set(cells)), columns)
+    ids = np.array([numbers[cell] for cell in cells])
     table.refuse(
         (ids % 1 != 0) | (ids < 0) | (ids > 99), "robot_id", ids, "must be a whole number in 0..99"
     )
-    return ids.astype(int)
+    return ids.astype(int), notes
+
+
+def _numbered(table: str, names: list[str], columns: Columns) -> tuple[dict[str, float], list[str]]:
+    """Number of each name: as given, as it stands there, or the last digits in it."""
+    numbers: dict[str, float] = {}
+    words = [name for name in names if name not in columns.robots and not is_number(name)]
+    for name in names:
+        digits = re.findall(r"\d+", name)
+        if name in columns.robots:
+            numbers[name] = columns.robots[name]
+        elif name not in words:
+            numbers[name] = float(name)
+        elif len(names) == 1 and columns.robot_id is not None:
+            numbers[name] = columns.robot_id
+        elif digits:
+            numbers[name] = int(digits[-1])
+    if len(numbers) < len(names) or (words and len(set(numbers.values())) < len(names)):
+        offer = " ".join(f"--robot '{name}={k}'" for k, name in enumerate(words, 1))
+        raise LogError(
+            f"{table}: robot_id is {', '.join(repr(name) for name in words[:5])}, which gives no "
+            f"number of its own to each robot; number them, for example with {offer}."
+        )
+    return numbers, [f"{table}: '{name}' is robot {numbers[name]:.0f}." for name in words]
 
 
 def _utime_us(table: Table) -> np.ndarray:
-    return np.round(table.finite("t_s") * 1e6).astype(np.int64)
+    return np.round(table.seconds("t_s") * 1e6).astype(np.int64)
 
 
 def _by_robot(
-    table: Table, ids: np.ndarray, utime_us: np.ndarray
+    table: Table, ids: np.ndarray, utime_us: np.ndarray, said: list[str]
 ) -> Iterator[tuple[int, np.ndarray, list[str]]]:
-    """Each robot, its rows in order of time, each stamp once (the last row), and what was done."""
+    """Each robot, its rows in order of time, each stamp once (the last row), and what was done.
+
+    The first robot tells what was done with the whole table, too.
+    """
+    said = [*table.notes, *said]
     for number in np.unique(ids).tolist():
         rows = np.flatnonzero(ids == number)
         stamps = utime_us[rows]
@@ -263,4 +336,5 @@ def _by_robot(
         if not last.all():
             double = np.count_nonzero(~last)
             notes.append(f"{where}{double} rows repeat a stamp; the last of each was kept.")
-        yield number, rows[last], notes
+        yield number, rows[last], said + notes
+        said = []

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Units in the names of columns: `theta_deg`, `X [mm]`, `Time (s)`."""
+
+import math
+import re
+
+OURS = ("m", "rad", "s", "mps", "radps", "pct")
+UNITS = {  # unit in a name: that of ours, and the factor
+    **{unit: (unit, 1.0) for unit in OURS},
+    "mm": ("m", 1e-3),
+    "cm": ("m", 1e-2),
+    "deg": ("rad", math.pi / 180),
+    "mmps": ("mps", 1e-3),
+    "cmps": ("mps", 1e-2),
+    "degps": ("radps", math.pi / 180),
+    "rpm": ("radps", math.pi / 30),
+    "ms": ("s", 1e-3),
+    "us": ("s", 1e-6),
+    "ns": ("s", 1e-9),
+    "unit": ("pct", 100.0),  # duties of -1 to 1
+    "pwm": ("pct", 100 / 255),  # duties of -255 to 255
+}
+SYMBOLS = {  # as people write them in brackets, beside those above
+    **dict.fromkeys(("sec", "secs", "seconds"), "s"),
+    **dict.fromkeys(("\u00b5s", "\u03bcs"), "us"),  # the micro sign and the Greek letter
+    **dict.fromkeys(("\u00b0", "degrees", "degree", "grad"), "deg"),
+    **dict.fromkeys(("radians", "radian"), "rad"),
+    **dict.fromkeys(("meters", "metres"), "m"),
+    **dict.fromkeys(("\u00b0/s", "deg/s"), "degps"),
+    **{"%": "pct", "m/s": "mps", "cm/s": "cmps", "mm/s": "mmps", "rad/s": "radps"},
+}
+BRACKETED = re.compile(r"(.*?)[\s_]*[\[(]\s*([^\])]*?)\s*[\])]\s*")
+
+
+def plain_name(column: str) -> str:
+    """A name in small letters, with underscores for spaces and dots."""
+    return re.sub(r"[\s.]+", "_", column.strip().lower())
+
+
+def split_unit(column: str) -> tuple[str, str]:
+    """The name without its unit, and the unit as in UNITS; empty if it has none."""
+    if found := BRACKETED.fullmatch(column):
+        unit = found[2].lower()
+        unit = SYMBOLS.get(unit, unit)
+        return plain_name(found[1]), unit if unit in UNITS else ""
+    stem, _, unit = plain_name(column).rpartition("_")
+    return (stem, unit) if stem and unit in UNITS else (plain_name(column), "")
