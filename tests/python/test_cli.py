@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import hashlib
 import json
+import os
 import subprocess
 import sys
 from importlib.metadata import version
@@ -246,10 +247,23 @@ def test_no_help_imports_what_only_work_needs():
         "print(json.dumps([found, [*sys.modules]]))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "--force" in done.stdout and "<bool>" not in done.stdout  # flags take no value
     by_help, loaded = json.loads(done.stdout.splitlines()[-1])
     assert "typer" in loaded
     for words, modules in by_help.items():
         assert not set(modules) & {*HEAVY, "twinmill_native", "twinmill.model"}, words
+
+
+@pytest.mark.parametrize(
+    ("typed", "completed"), [("twinmill diag", "diagnose"), ("twinmill diagnose --mod", "--model")]
+)
+def test_the_tabulator_completes_commands_and_options(typed, completed):
+    """As the shell asks for it: its line, and which of its words."""
+    words = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}
+    asked = {**os.environ, "_TWINMILL_COMPLETE": "complete_bash", **words}
+    program = [sys.executable, "-c", "from twinmill_cli.main import main; main()"]
+    done = subprocess.run(program, env=asked, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == [completed]
 
 
 def test_a_command_works_after_its_help_was_shown(twinmill):

@@ -6,6 +6,8 @@ and its module imports that below `if working():`.
 """
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
@@ -18,6 +20,17 @@ _working = True
 def working() -> bool:
     """Whether a command's module is imported to work, and not to show its help alone."""
     return _working
+
+
+_display_type = TyperOption.display_type_rich
+
+
+def _type_shown(option: TyperOption, ctx: typer.Context) -> str | None:
+    """Typer's, but nothing of a flag: it writes `<bool>`, and nobody is to type one."""
+    return None if option.is_flag else _display_type(option, ctx=ctx)
+
+
+TyperOption.display_type_rich = _type_shown
 
 
 class CommandGroup(TyperGroup):
@@ -56,26 +69,36 @@ class LazyCommand(TyperCommand):
     def make_context(
         self, info_name: str | None, args: list[str], *rest: Any, **options: Any
     ) -> typer.Context:
-        """That of the subcommand, which is then what runs."""
+        """That of the subcommand, which is then what runs; for completion it only parses."""
         if {"-h", "--help"} & set(args):
             self._show_help(info_name, args, *rest, **options)
+        if options.get("resilient_parsing"):
+            with _looking():
+                return self.command().make_context(info_name, args, *rest, **options)
         return self.command().make_context(info_name, args, *rest, **options)
 
     def _show_help(
         self, info_name: str | None, args: list[str], *rest: Any, **options: Any
     ) -> None:
         """Leaves with typer.Exit, unless --help is no option here but the value of one."""
-        global _working
-        known = set(sys.modules)
-        _working = False
-        try:
+        with _looking():
             command = self.command()
             context = command.make_context(info_name, [*args], *rest, **options)
             if isinstance(command, TyperGroup):
                 name, subcommand, others = command.resolve_command(context, [*args])
                 subcommand.make_context(name, others, parent=context)
-        finally:
-            _working = True
-            for name in set(sys.modules) - known:
-                if name.startswith("twinmill_cli."):
-                    del sys.modules[name]
+
+
+@contextmanager
+def _looking() -> Iterator[None]:
+    """Meanwhile commands are imported without what they need to work; later they are anew."""
+    global _working
+    known = set(sys.modules)
+    _working = False
+    try:
+        yield
+    finally:
+        _working = True
+        for name in set(sys.modules) - known:
+            if name.startswith("twinmill_cli."):
+                del sys.modules[name]

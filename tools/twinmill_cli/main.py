@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command `twinmill`: all subcommands, and one sentence on what went wrong."""
 
+import os
 import sys
 from typing import Annotated, Any
 
@@ -160,9 +161,15 @@ class Commands(CommandGroup):
             self.add_command(LazyCommand(name, f"twinmill_cli.{module}", summary))
 
 
+def _completes() -> bool:
+    """Whether this is about the shell's completion, which takes long to import."""
+    words = {"--install-completion", "--show-completion"}
+    return "_TWINMILL_COMPLETE" in os.environ or bool(words & set(sys.argv[1:]))
+
+
 app = typer.Typer(
     cls=Commands,
-    add_completion=False,
+    add_completion=_completes(),
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -186,6 +193,8 @@ def _options(
     """Compare a robot's log with its model, and make the model as good as the log can tell.
 
     Lengths in m, angles in rad, times in s; what is printed for people says mm and degrees.
+
+    `twinmill --install-completion` lets the shell complete commands and options.
 
     Exit codes: 0 done, 1 failed (one sentence on stderr), 2 wrong command line.
     """
