@@ -23,7 +23,9 @@ ALL = 255  # transfers, until told otherwise
 @pytest.fixture
 def driving(rig):
     """A robot that turns left and is not started again when it dies."""
-    with Robot(rig, "--start", "--set", "restart_ms=-1") as robot:
+    # The emulator may take as long as all tries together to come to the second.
+    patience = ("--set", "restart_ms=-1", "--set", "board_retry_ms=100")
+    with Robot(rig, "--start", *patience) as robot:
         robot.drive_until(LEFT)
         yield robot
 
