@@ -26,7 +26,7 @@ def measure(build: Path, arm64_program: Path | None) -> Iterator[Ratio]:
     for program in arm64:
         yield _file(program.parents[1].name, program, ARM64_STRIP, at_most=1)
     if not arm64:
-        yield skipped("stripped, arm64 : 100000 bytes", "not built: give --arm64-program")
+        yield skipped("stripped, arm64 : 100 kB", "not built: give --arm64-program")
     yield from _memory(build / "bin/turbopi")
 
 
@@ -34,10 +34,10 @@ def _file(name: str, program: Path, strip: str, **goal: float) -> Ratio:
     with tempfile.TemporaryDirectory() as folder:
         stripped = Path(folder) / "turbopi"
         if shutil.which(strip) is None:
-            return skipped(f"stripped, {name} : 100000 bytes", f"no {strip}")
+            return skipped(f"stripped, {name} : 100 kB", f"no {strip}")
         subprocess.run([strip, "-o", stripped, program], check=True)
         size = stripped.stat().st_size
-    return single(f"stripped, {name} : 100000 bytes", size, FILE_BYTES, "B", **goal)
+    return single(f"stripped, {name} : 100 kB", size, FILE_BYTES, "B", **goal)
 
 
 def _memory(program: Path) -> Iterator[Ratio]:

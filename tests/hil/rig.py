@@ -42,13 +42,6 @@ PRESSED, RELEASED = 0, 1
 NONE_REFUSED = 255
 
 
-# The journal goes to the console, too, which is kept.
-BOOT = (
-    *("console=ttyAMA0", "panic=-1", "quiet", "mitigations=off"),
-    *("systemd.journald.forward_to_console=1", "systemd.journald.max_level_console=info"),
-)
-
-
 class StoodStill(Exception):
     """The machine did other work meanwhile: what was measured is not the program's."""
 
@@ -157,7 +150,7 @@ class Rig:
                 *command,
                 *("-chardev", f"socket,id=port,path={port},server=on,wait=off"),
                 *("-serial", f"file:{self.console}", "-kernel", kernel, "-initrd", image),
-                *("-append", " ".join(BOOT)),
+                *("-append", "console=ttyAMA0 panic=-1 quiet mitigations=off"),
             ],
             stdin=subprocess.DEVNULL,
         )

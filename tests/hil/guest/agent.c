@@ -27,7 +27,7 @@
 // The guest looks at its clock so often, and says when it could not for so long: whoever emulates
 // it had other work.
 #define LOOK_MS 10
-#define STOOD_STILL_NS 100000000
+#define STOOD_STILL_NS 30000000
 
 static int port, board, bus, dead_children;
 
