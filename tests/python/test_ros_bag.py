@@ -3,17 +3,19 @@
 
 import json
 import math
+import shlex
 import struct
 
 import numpy as np
 import pytest
+from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
-from twinmill.data.importers.ros_bag import _rows, guess_pairs, list_topics
+from twinmill.data.importers.ros_bag import _rows, guess_pairs, list_topics, numbering
 from twinmill.data.log import LogError, read_log
 from twinmill_cli.main import app
 
@@ -101,6 +103,281 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(tmp_path):
     with pytest.raises(LogError, match=r"no topic /r03/odom; it has /r03/cmd_vel, /r03/pose"):
         import_log(None, None, tmp_path / "o.lcmlog", bag=bag, options=options)
     assert not (tmp_path / "o.lcmlog").exists()
+
+
+def _written(path, *topics):
+    """An MCAP file of the package mcap, with messages packed by hand as CDR (OMG DDS-XTypes).
+
+    Each topic: its name, type, definition, and rows of (time of receipt in s, payload).
+    """
+    with path.open("wb") as stream:
+        writer = McapWriter(stream, chunk_size=2000, compression=CompressionType.NONE)
+        writer.start(profile="ros2", library="test")
+        for topic, kind, definition, rows in topics:
+            schema = writer.register_schema(kind, "ros2msg", definition.encode())
+            channel = writer.register_channel(topic, "cdr", schema)
+            for t_s, payload in rows:
+                t_ns = round(t_s * 1e9)
+                writer.add_message(channel, t_ns, b"\x00\x01\x00\x00" + payload, t_ns)
+        writer.finish()
+    return path
+
+
+HEADER = (
+    "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n" + "=" * 80 + "\n"
+    "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+)
+VECTOR = "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
+TURN = "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
+LINE = "=" * 80 + "\n"
+POSE_TYPE = (
+    "std_msgs/Header header\ngeometry_msgs/Pose pose\n"
+    + LINE
+    + HEADER
+    + LINE
+    + "MSG: geometry_msgs/Pose\ngeometry_msgs/Point position\n"
+    "geometry_msgs/Quaternion orientation\n"
+    + LINE
+    + "MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n"
+    + LINE
+    + TURN
+)
+TWIST_TYPE = "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n" + LINE + VECTOR
+TF_TYPE = (
+    "geometry_msgs/TransformStamped[] transforms\n"
+    + LINE
+    + "MSG: geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\n"
+    "geometry_msgs/Transform transform\n"
+    + LINE
+    + HEADER
+    + LINE
+    + "MSG: geometry_msgs/Transform\ngeometry_msgs/Vector3 translation\n"
+    "geometry_msgs/Quaternion rotation\n" + LINE + VECTOR + LINE + TURN
+)
+DUTY_TYPE = (
+    "std_msgs/MultiArrayLayout layout\nfloat64[] data\n"
+    + LINE
+    + "MSG: std_msgs/MultiArrayLayout\nstd_msgs/MultiArrayDimension[] dim\nuint32 data_offset\n"
+    + LINE
+    + "MSG: std_msgs/MultiArrayDimension\nstring label\nuint32 size\nuint32 stride\n"
+)
+JOINTS_TYPE = (
+    "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\n"
+    "float64[] effort\n" + LINE + HEADER
+)
+STEERED_TYPE = (
+    "float32 steering_angle\nfloat32 steering_angle_velocity\nfloat32 speed\n"
+    "float32 acceleration\nfloat32 jerk\n"
+)
+
+
+def _aligned(data, size):
+    return data + bytes(-len(data) % size)
+
+
+def _text(data, text):
+    return _aligned(data, 4) + struct.pack("<I", len(text) + 1) + text.encode() + b"\0"
+
+
+def _stamp(t_s):
+    return struct.pack("<iI", int(t_s), round((t_s % 1) * 1e9))
+
+
+def _header(t_s):
+    return _text(_stamp(t_s), "world")
+
+
+def _floats(data, values):
+    return _aligned(data + struct.pack("<I", len(values)), 8) + struct.pack(
+        f"<{len(values)}d", *values
+    )
+
+
+def _pose(t_s, x, angle=0.0):
+    return _aligned(_header(t_s), 8) + struct.pack(
+        "<7d", x, 0, 0, 0, 0, math.sin(angle / 2), math.cos(angle / 2)
+    )
+
+
+def _transforms(t_s, *transforms):
+    data = struct.pack("<I", len(transforms))
+    for parent, child, x, y, angle in transforms:
+        data = _text(_text(data + _stamp(t_s), parent), child)
+        turn = (0, 0, math.sin(angle / 2), math.cos(angle / 2))
+        data = _aligned(data, 8) + struct.pack("<7d", x, y, 0, *turn)
+    return data
+
+
+TIMES_S = [0.1 * k for k in range(60)]
+
+
+def _poses(topic="/pose", stamp_of=lambda k, t_s: START_S + t_s):
+    rows = [(START_S + t, _pose(stamp_of(k, t), 0.1 * t)) for k, t in enumerate(TIMES_S)]
+    return topic, "geometry_msgs/msg/PoseStamped", POSE_TYPE, rows
+
+
+def _twists(topic="/cmd_vel"):
+    rows = [(START_S + t, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0)) for t in TIMES_S]
+    return topic, "geometry_msgs/msg/Twist", TWIST_TYPE, rows
+
+
+def _duties(values):
+    data = _floats(struct.pack("<II", 0, 0), values)
+    rows = [(START_S + t, data) for t in TIMES_S]
+    return "/r1/duty", "std_msgs/msg/Float64MultiArray", DUTY_TYPE, rows
+
+
+def _import(bag, *pairs, **options):
+    out = bag.parent / "o.lcmlog"
+    out.unlink(missing_ok=True)
+    poses, commands = zip(*(pairs or [("/pose", "/cmd_vel")]), strict=True)
+    options = ImportOptions(pose_topics=poses, command_topics=commands, **options)
+    summary = import_log(None, None, out, bag=bag, options=options)
+    return read_log(out).robots, " ".join(summary["warnings"])
+
+
+def _printed(bag):
+    """Runs the command that the list of a bag prints; the robots of the log."""
+    result = CliRunner().invoke(app, ["import", "--bag", str(bag), "--json"])
+    assert result.exit_code == 0, result.output
+    words = shlex.split(json.loads(result.output)["command"])
+    out = bag.parent / f"{bag.stem}.lcmlog"
+    result = CliRunner().invoke(app, [*words[1:-1], str(out)])
+    assert result.exit_code == 0, result.output
+    return read_log(out).robots
+
+
+def test_the_printed_command_runs_as_printed(tmp_path):
+    bag = _written(tmp_path / "root.mcap", _poses(), _twists())
+    assert list(_printed(bag)) == [1]
+    names = [
+        part for n in ("alice", "bob") for part in (_poses(f"/{n}/pose"), _twists(f"/{n}/cmd"))
+    ]
+    assert sorted(_printed(_written(tmp_path / "names.mcap", *names))) == [1, 2]
+    pairs = [("/r2/pose", "/r2/cmd"), ("/bob/pose", "/bob/cmd"), ("/r1/pose", "/r1/cmd")]
+    assert numbering(pairs) == ["--robot", "bob=3"]
+
+
+def test_a_robot_has_the_number_of_its_name(tmp_path):
+    names = [
+        part for n in ("alice", "bob") for part in (_poses(f"/{n}/pose"), _twists(f"/{n}/cmd"))
+    ]
+    bag = _written(tmp_path / "names.mcap", *names)
+    pairs = [(f"/{n}/pose", f"/{n}/cmd") for n in ("alice", "bob")]
+    with pytest.raises(LogError, match="--robot alice=1"):
+        _import(bag, *pairs)
+    assert sorted(_import(bag, *pairs, robots={"alice": 4, "bob": 9})[0]) == [4, 9]
+
+
+def test_a_clock_that_is_set_back_is_refused_with_the_remedy(tmp_path):
+    jump = _poses(stamp_of=lambda k, t: START_S + t - (5 if k >= 30 else 0))
+    bag = _written(tmp_path / "jump.mcap", jump, _twists())
+    with pytest.raises(LogError, match=r"go back by 4\.900 s at message 31: .*--receive-stamps"):
+        _import(bag, robot_id=1)
+    robots, _ = _import(bag, robot_id=1, receive_stamps=True)
+    np.testing.assert_allclose(robots[1].pose_t_s, TIMES_S, atol=2e-6)
+
+
+def test_messages_that_are_exchanged_are_sorted_and_that_is_said(tmp_path):
+    swapped = _poses(stamp_of=lambda k, t: START_S + TIMES_S[k ^ 1 if k < 20 else k])
+    robots, warnings = _import(_written(tmp_path / "x.mcap", swapped, _twists()), robot_id=1)
+    assert len(robots[1].pose_t_s) == 60
+    assert "/pose: 10 messages are earlier than the one before; sorted." in warnings
+
+
+def test_a_clock_that_began_at_zero_is_refused_with_the_remedy(tmp_path):
+    bag = _written(tmp_path / "sim.mcap", _poses(stamp_of=lambda k, t: t), _twists())
+    with pytest.raises(LogError, match=r"do not overlap; .*--receive-stamps"):
+        _import(bag, robot_id=1)
+    robots, _ = _import(bag, robot_id=1, receive_stamps=True)
+    np.testing.assert_allclose(robots[1].pose_t_s, TIMES_S, atol=2e-6)
+
+
+def test_a_frame_of_tf_is_placed_in_the_root_of_its_tree(tmp_path):
+    """From map to odom: 1 m along x, a quarter turn to the left; so x in odom is y in map."""
+    rows = [(START_S - 1, _transforms(START_S - 1, ("map", "odom", 1, 0, math.pi / 2)))]
+    rows += [
+        (START_S + t, _transforms(START_S + t, ("odom", "base_link", 0.1 * t, 0.5, 0.2)))
+        for t in TIMES_S
+    ]
+    tree = ("/tf", "tf2_msgs/msg/TFMessage", TF_TYPE, rows)
+    bag = _written(tmp_path / "tf.mcap", tree, _twists())
+    robot = _printed(bag)[1]
+    np.testing.assert_allclose(robot.pose[:, 0], 0.5, atol=1e-9)
+    np.testing.assert_allclose(robot.pose[:, 1], [0.1 * t for t in TIMES_S], atol=1e-9)
+    np.testing.assert_allclose(robot.pose[:, 2], math.pi / 2 + 0.2, atol=1e-9)
+    with pytest.raises(LogError, match=r"name one as /tf:FRAME"):
+        _import(bag, ("/tf", "/cmd_vel"), robot_id=1)
+
+
+def test_steering_angles_need_the_wheelbase(tmp_path):
+    payload = struct.pack("<5f", 0.25, 0, 0.5, 0, 0)
+    rows = [(START_S + t, payload) for t in TIMES_S]
+    steered = ("/r1/drive", "ackermann_msgs/msg/AckermannDrive", STEERED_TYPE, rows)
+    bag = _written(tmp_path / "car.mcap", _poses("/r1/pose"), steered)
+    with pytest.raises(LogError, match="--wheelbase-m"):
+        _import(bag, ("/r1/pose", "/r1/drive"))
+    robots, _ = _import(bag, ("/r1/pose", "/r1/drive"), wheelbase_m=0.3)
+    np.testing.assert_allclose(robots[1].command[0], [0.5, 0, 0.5 * math.tan(0.25) / 0.3, 0])
+
+
+@pytest.mark.parametrize(
+    ("values", "full", "expected"),
+    [
+        ([0.5, -1, 0.5, -1], None, [0.5, -1, 0.5, -1]),
+        ([50, 20, 50, 20], None, [0.5, 0.2, 0.5, 0.2]),
+        ([204, -51], None, [0.8, -0.2, 0.8, -0.2]),
+        ([50, 20], 200.0, [0.25, 0.1, 0.25, 0.1]),
+        ([500, 1000], 1000.0, [0.5, 1, 0.5, 1]),
+        ([500, 1000], None, None),
+    ],
+)
+def test_what_full_duty_is_in_a_bag(tmp_path, values, full, expected):
+    bag = _written(tmp_path / "d.mcap", _poses("/r1/pose"), _duties(values))
+    pair = ("/r1/pose", "/r1/duty")
+    if expected is None:
+        with pytest.raises(LogError, match=r"/r1/duty: duties go to 1000.*--full-duty"):
+            _import(bag, pair)
+        return
+    robots, warnings = _import(bag, pair, full_duty=full)
+    np.testing.assert_allclose(robots[1].command[-1], expected, atol=1e-7)
+    assert ("is taken for full duty" in warnings) == (full is None and values[0] != 50)
+
+
+def test_wheels_are_taken_by_the_names_of_their_joints(tmp_path):
+    names = ["rear_right_wheel", "rear_left_wheel", "front_right_wheel", "front_left_wheel"]
+    data = _aligned(_header(START_S), 4) + struct.pack("<I", 4)
+    for name in names:
+        data = _text(data, name)
+    data = _aligned(data, 4) + struct.pack("<I", 0)
+    data = _floats(data, [4.0, 3.0, 2.0, 1.0])
+    rows = [(START_S + t, data + struct.pack("<I", 0)) for t in TIMES_S]
+    joints = ("/r1/wheels", "sensor_msgs/msg/JointState", JOINTS_TYPE, rows)
+    bag = _written(tmp_path / "j.mcap", _poses("/r1/pose"), joints)
+    robots, _ = _import(bag, ("/r1/pose", "/r1/wheels"), receive_stamps=True)
+    np.testing.assert_allclose(robots[1].command[-1], [1, 2, 3, 4])
+
+
+def test_a_bag_that_was_cut_off_is_read_to_there_and_that_is_said(tmp_path):
+    whole = _written(tmp_path / "whole.mcap", _poses(), _twists()).read_bytes()
+    bag = tmp_path / "cut.mcap"
+    bag.write_bytes(whole[: len(whole) * 6 // 10])
+    assert [t.name for t in list_topics(bag)] == ["/cmd_vel", "/pose"]
+    robots, warnings = _import(bag, robot_id=1)
+    assert "cut.mcap: was cut off; what is before the break is read." in warnings
+    assert len(robots[1].pose_t_s) == 60 and 0 < len(robots[1].command_t_s) < 60
+
+
+def test_a_bag_without_its_metadata_is_read_and_an_empty_one_is_an_error(tmp_path):
+    bag = _bag(tmp_path / "bag", StoragePlugin.SQLITE3)
+    (bag / "metadata.yaml").unlink()
+    robots, warnings = _import(bag, ("/r03/pose", "/r03/cmd_vel"))
+    assert len(robots[3].pose_t_s) == 200 and "has no metadata.yaml" in warnings
+    with pytest.raises(LogError, match="has no messages"):
+        list_topics(_written(tmp_path / "empty.mcap"))
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(LogError, match=r"without metadata\.yaml and with 0 files"):
+        list_topics(tmp_path / "folder")
 
 
 def test_a_bag_of_another_writer_is_read(tmp_path):

@@ -18,7 +18,8 @@ if working():  # not for --help
 
     from twinmill.data.importers.columns import Guess, to_toml
     from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
-    from twinmill.data.importers.ros_bag import Topic, guess_pairs, list_topics
+    from twinmill.data.importers.ros_bag import Topic, guess_pairs, list_topics, numbering
+    from twinmill.data.importers.ros_messages import STEERED
     from twinmill.data.log import LogError
     from twinmill.data.measurement_table import Table as TableFile
     from twinmill.files import replacing
@@ -79,7 +80,11 @@ def _command(
         typer.Option(help="ROS bag (rosbag1, rosbag2); without --pose and --command it is listed."),
     ] = None,
     pose: Annotated[
-        list[str] | None, typer.Option(metavar="TOPIC", help="Poses of a robot in the bag.")
+        list[str] | None,
+        typer.Option(
+            metavar="TOPIC",
+            help="Poses of a robot in the bag; a frame of tf is /tf:FRAME, as in /tf:base_link.",
+        ),
     ] = None,
     command: Annotated[
         list[str] | None, typer.Option(metavar="TOPIC", help="Commands of that robot.")
@@ -87,6 +92,16 @@ def _command(
     receive_stamps: Annotated[
         bool, typer.Option("--receive-stamps", help="Times of receipt, not of the headers.")
     ] = False,
+    wheelbase_m: Annotated[
+        float | None, typer.Option(help="Distance of the axles, for AckermannDrive in a bag.")
+    ] = None,
+    full_duty: Annotated[
+        float | None,
+        typer.Option(
+            help="Number that is full duty in a bag's duties; else the least of 1, 100, 255 that "
+            "all lie within."
+        ),
+    ] = None,
     robot: Annotated[
         list[str] | None,
         typer.Option(
@@ -160,6 +175,8 @@ def _command(
             pose_topics=tuple(pose or []),
             command_topics=tuple(command or []),
             receive_stamps=receive_stamps,
+            wheelbase_m=wheelbase_m,
+            full_duty=full_duty,
             robot_id=robot_id,
             rename=dict(_pair(text, "--rename OLD=NEW") for text in rename or []),
             robots={
@@ -193,17 +210,30 @@ def _command(
 
 def _list(bag: Path, topics: list[Topic], as_json: bool) -> None:
     """What a bag holds, and the command that imports what seems to belong together."""
-    words = ["twinmill", "import", "--bag", str(bag)]
-    for pose, command in guess_pairs(topics):
+    words, pairs = ["twinmill", "import", "--bag", str(bag)], guess_pairs(topics)
+    for pose, command in pairs:
         words += ["--pose", pose, "--command", command]
-    line = shlex.join([*words, "-o", f"{bag.stem}.lcmlog"]) if len(words) > 4 else None
+    steered = {t.name for t in topics if t.kind in STEERED} & {command for _, command in pairs}
+    words += numbering(pairs) + (["--wheelbase-m", "METRES"] if steered else [])
+    line = shlex.join([*words, "-o", f"{bag.stem}.lcmlog"]) if pairs else None
     if as_json:
         typer.echo(json.dumps({"topics": [vars(t) for t in topics], "command": line}))
         return
     rows = [[Cell(text) for text in (t.name, t.kind, str(t.count), t.role or "-")] for t in topics]
     table = Table(str(bag), ["topic", "type", "messages", "could be"], rows, words=(0, 1, 3))
     Console().print(show.table(table))
-    typer.echo(f"Try: {line}" if line else "No pair of poses and commands is seen; name them.")
+    typer.echo(f"Try: {line}" if line else _unpaired(topics))
+
+
+def _unpaired(topics: list[Topic]) -> str:
+    """What a bag lacks from which no pair can be guessed."""
+    roles = {topic.role for topic in topics}
+    lacking = [
+        word for role, word in (("pose", "poses"), ("command", "commands")) if role not in roles
+    ]
+    if lacking:
+        return f"It has no {' and no '.join(lacking)} that can be read; record them, too."
+    return "Which poses and commands belong together is not clear; name them (--pose, --command)."
 
 
 def _explain(explained: dict[str, tuple[TableFile, list[Guess]]], out: Path, force: bool) -> None:

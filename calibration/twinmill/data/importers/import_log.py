@@ -23,7 +23,7 @@ from twinmill.data.importers.plain import (
     read_detections,
     read_poses,
 )
-from twinmill.data.importers.ros_bag import read_bag
+from twinmill.data.importers.ros_bag import BagOptions, read_bag
 from twinmill.data.importers.series import (
     CommandSeries,
     DetectionSeries,
@@ -57,6 +57,8 @@ class ImportOptions:
         same_clock: one clock stamped poses and commands: no offset is estimated.
         pose_topics, command_topics: of a ROS bag, one of each for each robot.
         receive_stamps: of a ROS bag, take the times of receipt, not those in the headers.
+        wheelbase_m: of a ROS bag with steering angles.
+        full_duty: of a ROS bag with duties, the number that stands for full duty.
         force: replace an output that exists.
     """
 
@@ -73,6 +75,8 @@ class ImportOptions:
     pose_topics: tuple[str, ...] = ()
     command_topics: tuple[str, ...] = ()
     receive_stamps: bool = False
+    wheelbase_m: float | None = None
+    full_duty: float | None = None
     force: bool = False
 
 
@@ -125,14 +129,20 @@ def import_log(
     )
     if bag:
         topics = list(options.pose_topics), list(options.command_topics)
-        pose_series, command_series = read_bag(
-            bag, *topics, options.robot_id, options.receive_stamps
+        how = BagOptions(
+            options.robot_id,
+            options.robots,
+            options.receive_stamps,
+            options.wheelbase_m,
+            options.full_duty,
         )
+        pose_series, command_series = read_bag(bag, *topics, how)
     else:
         pose_series, command_series = _read_files(poses, commands, motive, io_tsv, options)
     _check_names(options, [series.robot_id for series in (*pose_series, *command_series)])
     pose_series = [_moved(series, options) for series in pose_series]
-    _check_times(pose_series, command_series)
+    shift = not bag or options.receive_stamps
+    _check_times(pose_series, command_series, shift)
     by_robot = {series.robot_id: series for series in pose_series}
     command_series = [
         in_body_frame(series, by_robot.get(series.robot_id)) if series.world else series
@@ -240,8 +250,11 @@ def _on_our_clock(utime_us: np.ndarray, options: ImportOptions) -> np.ndarray:
     return utime_us[0] + np.round(since_us).astype(np.int64) + round(options.pose_shift_s * 1e6)
 
 
-def _check_times(poses: list[PoseSeries], commands: list[CommandSeries]) -> None:
-    """Raises LogError unless some robot has both, at the same time, without absurd holds."""
+def _check_times(poses: list[PoseSeries], commands: list[CommandSeries], shift: bool) -> None:
+    """Raises LogError unless some robot has both, at the same time, without absurd holds.
+
+    The remedy is a shift of the poses, or the times at which a bag's messages were received.
+    """
     ids = [series.robot_id for series in commands]
     if len(set(ids)) < len(ids):
         raise LogError(
@@ -258,11 +271,16 @@ def _check_times(poses: list[PoseSeries], commands: list[CommandSeries]) -> None
     for p, c in pairs:
         first_s, last_s = p.utime_us[[0, -1]] / 1e6
         start_s, end_s = c.utime_us[[0, -1]] / 1e6
-        if last_s < start_s or (not c.repeat and first_s > end_s):
+        if last_s < start_s or (not (c.repeat and shift) and first_s > end_s):
+            remedy = (
+                "shift the poses, for example so that both start together: --pose-shift-s "
+                f"{start_s - first_s:.3f}"
+                if shift
+                else "take the times of receipt of both: --receive-stamps"
+            )
             raise LogError(
                 f"robot {p.robot_id}: poses from {first_s:.3f} to {last_s:.3f} s and commands from "
-                f"{start_s:.3f} to {end_s:.3f} s do not overlap; shift the poses, for example so "
-                f"that both start together: --pose-shift-s {start_s - first_s:.3f}."
+                f"{start_s:.3f} to {end_s:.3f} s do not overlap; {remedy}."
             )
         hold_s = np.diff(np.append(c.utime_us / 1e6, max(last_s, end_s))).max()
         if c.repeat and hold_s > LONGEST_HOLD_S:
@@ -288,6 +306,8 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
                 "pose_clock_ppm": options.pose_clock_ppm,
                 "pose_topics": list(options.pose_topics),
                 "command_topics": list(options.command_topics),
+                "wheelbase_m": options.wheelbase_m or 0.0,
+                "full_duty": options.full_duty or 0.0,
                 "mapping": options.mapping.read_text() if options.mapping else "",
                 "flips": sorted(options.flips),
                 "heading_offset_rad": options.heading_offset_rad,

@@ -5,57 +5,41 @@ Messages are read one by one, so that a bag of any size takes the memory of its 
 """
 
 import re
-from collections.abc import Callable
+from collections import Counter
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import turbopi
 
+from twinmill.data.importers.ros_cut import is_cut, write_whole
+from twinmill.data.importers.ros_frames import Frames
+from twinmill.data.importers.ros_messages import (
+    COMMANDS,
+    DEFINITIONS,
+    POSES,
+    STEERED,
+    TF,
+    Row,
+    role_of,
+    transform_row,
+)
 from twinmill.data.importers.series import CommandSeries, PoseSeries
-from twinmill.data.log import CommandKind, LogError
+from twinmill.data.log import LogError
 
-Row = tuple[float, ...]
-
-
-def _pose(pose: Any) -> Row:
-    p, q = pose.position, pose.orientation
-    return p.x, p.y, p.z, q.w, q.x, q.y, q.z
-
-
-def _transform(transform: Any) -> Row:
-    p, q = transform.translation, transform.rotation
-    return p.x, p.y, p.z, q.w, q.x, q.y, q.z
-
-
-def _twist(twist: Any) -> Row:
-    return twist.linear.x, twist.linear.y, twist.angular.z, 0.0
-
-
-def _duties(message: Any) -> Row:
-    return tuple(float(v) for v in message.data)
-
-
-POSES: dict[str, Callable[[Any], Row]] = {
-    "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
-    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
-    "nav_msgs/msg/Odometry": lambda m: _pose(m.pose.pose),
-    "geometry_msgs/msg/TransformStamped": lambda m: _transform(m.transform),
-}
-COMMANDS: dict[str, tuple[CommandKind, Callable[[Any], Row]]] = {
-    "geometry_msgs/msg/Twist": ("twist", _twist),
-    "geometry_msgs/msg/TwistStamped": ("twist", lambda m: _twist(m.twist)),
-    "sensor_msgs/msg/JointState": ("wheel_speed", lambda m: tuple(map(float, m.velocity))),
-    "std_msgs/msg/Float64MultiArray": ("duty", _duties),
-}
 WIDTH = 4  # wheels; velocity commands have a zero in the last place
+LOOKED_AT = 5000  # messages of tf, to see which frames there are
+STEP_BACK_S = 1.0  # messages are never exchanged by that much: a clock was set
+CLOCK_FROM_ZERO_S = 60.0  # the least stamp of a clock that began at 0, which is no missing stamp
+FULL_DUTIES = (1.0, 100.0, 255.0)
 
 
 @dataclass(frozen=True)
 class Topic:
-    """One topic of a bag: `role` is `pose`, `command` or empty."""
+    """One topic of a bag, or a frame of tf as `/tf:frame`: `role` is `pose`, `command` or empty."""
 
     name: str
     kind: str
@@ -63,76 +47,139 @@ class Topic:
     role: str
 
     @property
-    def namespace(self) -> str:
-        """All but the last word."""
-        return self.name.rpartition("/")[0]
+    def robot(self) -> str:
+        """The word that tells the robot: the last but one of the name; empty if there is none."""
+        words = _words(self.name.partition(":")[2] or self.name)
+        return words[-2] if len(words) > 1 else ""
+
+
+@dataclass(frozen=True)
+class BagOptions:
+    """How to read a bag.
+
+    Attributes:
+        robot_id: of the only robot.
+        robots: robot_id by a word in the topics; others have the last number in their topics.
+        receive: take the times of receipt, not those in the headers.
+        wheelbase_m: turns steering angles into turns of the body.
+        full_duty: the number that stands for full duty; None: the least of FULL_DUTIES that does.
+    """
+
+    robot_id: int | None = None
+    robots: dict[str, int] = field(default_factory=dict)
+    receive: bool = False
+    wheelbase_m: float | None = None
+    full_duty: float | None = None
 
 
 def list_topics(path: Path) -> list[Topic]:
     """What is in a bag.
 
     Raises:
-        LogError: it is no bag, or broken.
+        LogError: it is no bag, broken, or empty.
     """
     with _open(path) as reader:
-        return [
-            Topic(c.topic, c.msgtype, c.msgcount, _role(c.msgtype))
-            for c in sorted(reader.connections, key=lambda c: c.topic)
-        ]
-
-
-def _role(kind: str) -> str:
-    return "pose" if kind in POSES else "command" if kind in COMMANDS else ""
+        kinds = {c.topic: c.msgtype for c in reader.connections}
+        counts = {name: topic.msgcount for name, topic in reader.topics.items()}
+        moving = [c for c in reader.connections if c.msgtype == TF and "static" not in c.topic]
+        frames: Counter[str] = Counter()
+        for connection, _, raw in islice(reader.messages(moving), LOOKED_AT if moving else 0):
+            for transform in reader.deserialize(raw, TF).transforms:
+                frames[f"{connection.topic}:{transform.child_frame_id.lstrip('/')}"] += 1
+    if not sum(counts.values()):
+        raise LogError(f"{path}: has no messages; check that the recorder was subscribed.")
+    topics = [Topic(name, kind, counts[name], role_of(kind)) for name, kind in kinds.items()]
+    topics += [Topic(name, TF, count, "pose") for name, count in frames.items()]
+    return sorted(topics, key=lambda t: t.name)
 
 
 def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
-    """Pose and command topic of each robot: of one namespace; the one with most messages."""
+    """Pose and command topic of each robot: of one name; the one with most messages."""
     pairs = []
-    for namespace in sorted({t.namespace for t in topics if t.role == "command"}):
-        commands = [t for t in topics if t.role == "command" and t.namespace == namespace]
-        poses = [t for t in topics if t.role == "pose" and t.namespace == namespace]
-        if not poses and namespace == "":
-            poses = [t for t in topics if t.role == "pose"]
+    all_commands = [t for t in topics if t.role == "command"]
+    robots = sorted({t.robot for t in all_commands})
+    for robot in robots:
+        commands = [t for t in all_commands if t.robot == robot]
+        poses = [t for t in topics if t.role == "pose" and (t.robot == robot or len(robots) == 1)]
         if poses:
-            best = [max(group, key=lambda t: t.count).name for group in (poses, commands)]
-            pairs.append((best[0], best[1]))
+            best = max(poses, key=lambda t: (t.robot == robot, *_likely(t)))
+            pairs.append((best.name, max(commands, key=lambda t: t.count).name))
     return pairs
 
 
+def _likely(topic: Topic) -> tuple[bool, bool, int]:
+    """Topics of their own before frames, frames of a base before wheels, then the most messages."""
+    return topic.kind != TF, "base" in topic.name, topic.count
+
+
+def numbering(pairs: list[tuple[str, str]]) -> list[str]:
+    """Options that number the robots whose topics have no number."""
+    open_pairs = [pair for pair in pairs if _told(*pair, {}) is None]
+    if open_pairs and len(pairs) == 1:
+        return ["--robot-id", "1"]
+    taken = {_told(*pair, {}) for pair in pairs}
+    free = (k for k in range(1, 100) if k not in taken)
+    return [
+        word
+        for _, command in open_pairs
+        for word in ("--robot", f"{_name_in(command)}={next(free)}")
+    ]
+
+
+def _words(name: str) -> list[str]:
+    return [word for word in re.split("[/:]", name) if word]
+
+
+def _name_in(command: str) -> str:
+    words = _words(command)
+    return words[-2] if len(words) > 1 else words[-1]
+
+
+def _told(pose: str, command: str, robots: dict[str, int]) -> int | None:
+    """Number of a robot by a name in its topics, or the last digits in them."""
+    named = [robots[word] for word in _words(command) + _words(pose) if word in robots]
+    digits = re.findall(r"\d+", command) or re.findall(r"\d+", pose)
+    number = named[0] if named else int(digits[-1]) if digits else 100
+    return number if number < 100 else None
+
+
 def read_bag(
-    path: Path, poses: list[str], commands: list[str], robot_id: int | None, receive: bool
+    path: Path, poses: list[str], commands: list[str], options: BagOptions
 ) -> tuple[list[PoseSeries], list[CommandSeries]]:
     """Series of each robot.
 
     Args:
         path: file or folder of the bag.
-        poses: topics, one for each robot.
+        poses: topics, one for each robot; a frame of tf is `/tf:frame`.
         commands: topics, in the same order of robots.
-        robot_id: of the only robot; None: by the last number in its topics.
-        receive: take the times of receipt, not those in the headers.
+        options: how to read it.
 
     Raises:
         LogError: unreadable, a topic that is not there or holds nothing that is known.
     """
     if len(poses) != len(commands) or not poses:
         raise LogError("--pose and --command: give one of each for each robot, in the same order.")
-    numbers = [_number(p, c, robot_id, len(poses)) for p, c in zip(poses, commands, strict=True)]
-    rows = _rows(path, [*poses, *commands], receive)
-    pose_series = [_poses(n, *rows[t]) for n, t in zip(numbers, poses, strict=True)]
-    command_series = [_commands(n, *rows[t]) for n, t in zip(numbers, commands, strict=True)]
+    pairs = list(zip(poses, commands, strict=True))
+    numbers = [_number(pair, options, len(pairs)) for pair in pairs]
+    rows = _rows(path, [*poses, *commands], options.receive)
+    pose_series = [_poses(n, t, *rows[t]) for n, t in zip(numbers, poses, strict=True)]
+    command_series = [
+        _commands(n, t, *rows[t], options) for n, t in zip(numbers, commands, strict=True)
+    ]
     return pose_series, command_series
 
 
-def _number(pose: str, command: str, robot_id: int | None, robots: int) -> int:
-    if robot_id is not None and robots == 1:
-        return robot_id
-    digits = re.findall(r"\d+", command) or re.findall(r"\d+", pose)
-    if not digits or int(digits[-1]) > 99:
+def _number(pair: tuple[str, str], options: BagOptions, robots: int) -> int:
+    if options.robot_id is not None and robots == 1:
+        return options.robot_id
+    number = _told(*pair, options.robots)
+    if number is None:
+        remedy = "--robot-id 1" if robots == 1 else f"--robot {_name_in(pair[1])}=1"
         raise LogError(
-            f"{command}: has no number in 0..99 that tells the robot; give --robot-id, one robot "
-            "at a time."
+            f"{pair[1]}: has no number in 0..99 that tells the robot; number it, for example with "
+            f"{remedy}."
         )
-    return int(digits[-1])
+    return number
 
 
 @contextmanager
@@ -142,80 +189,230 @@ def _open(path: Path):
     from rosbags.rosbag1 import ReaderError as Error1
     from rosbags.rosbag2 import ReaderError as Error2
     from rosbags.serde import SerdeError
-    from rosbags.typesys import Stores, get_typestore
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for kind, text in DEFINITIONS.items():
+        store.register(get_types_from_msg(text, kind))
     try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            yield reader
+        with TemporaryDirectory() as folder:
+            storage = _storage(path)
+            if is_cut(storage):
+                write_whole(storage, Path(folder) / "whole.mcap")
+                storage = Path(folder) / "whole.mcap"
+            with AnyReader([storage], default_typestore=store) as reader:
+                yield reader
     except (
         *(AnyReaderError, Error1, Error2, SerdeError, OSError, KeyError, AssertionError),
         *(AttributeError, IndexError, UnicodeDecodeError),
     ) as error:
+        reason = " ".join(str(error).split())
         raise LogError(
-            f"{path}: cannot be read as a ROS bag ({error}); name the .bag or .mcap file, or the "
-            "folder with metadata.yaml."
+            f"{path}: cannot be read as a ROS bag ({reason}); {_remedy(path)}."
         ) from error
+
+
+def _storage(path: Path) -> Path:
+    """The file in a folder whose metadata were not written, since the recorder was stopped hard."""
+    if not path.is_dir() or (path / "metadata.yaml").exists():
+        return path
+    files = [f for f in sorted(path.iterdir()) if f.suffix in (".mcap", ".db3")]
+    if len(files) == 1:
+        return files[0]
+    raise LogError(
+        f"{path}: is a folder without metadata.yaml and with {len(files)} files .mcap or .db3; "
+        "name one of them, or write it with `ros2 bag reindex`."
+    )
+
+
+def _remedy(path: Path) -> str:
+    """What to do about a bag that cannot be read."""
+    mend = {
+        ".bag": f"if it was cut off, mend it with `rosbag reindex {path.name}`",
+        ".mcap": f"if it was cut off, mend it with `mcap recover {path.name} -o whole.mcap`",
+        ".db3": f"if it was cut off, mend it with `sqlite3 {path.name} .recover`",
+    }
+    if path.is_dir():
+        return "if it was cut off, mend it with `ros2 bag reindex`, or name the file in it"
+    if path.exists() and path.suffix in mend:
+        return mend[path.suffix]
+    return "name the .bag or .mcap file, or the folder with metadata.yaml"
+
+
+@dataclass
+class _Messages:
+    """Of one topic, as they come."""
+
+    kind: str
+    header_ns: list[int] = field(default_factory=list)
+    received_ns: list[int] = field(default_factory=list)
+    values: list[Row] = field(default_factory=list)
+    root: str = ""  # of the tree, for a frame of tf
+    lost: int = 0  # the bag says that it has more
+
+    def add(self, stamp: object, received_ns: int, value: Row) -> None:
+        self.header_ns.append(stamp.sec * 10**9 + stamp.nanosec if stamp else 0)
+        self.received_ns.append(received_ns)
+        self.values.append(value)
 
 
 def _rows(
     path: Path, topics: list[str], receive: bool
 ) -> dict[str, tuple[str, np.ndarray, list[Row], list[str]]]:
     """By topic: type, (N,) stamps in us, values, remarks."""
-    stamps: dict[str, list[int]] = {topic: [] for topic in topics}
-    late: dict[str, list[float]] = {topic: [] for topic in topics}
-    values: dict[str, list[Row]] = {topic: [] for topic in topics}
-    kinds: dict[str, str] = {}
+    found = _read(path, topics)
+    rows, of_bag = {}, _of_bag(path)
+    for topic, messages in found.items():
+        stamps_ns, kept, notes = _stamps(topic, messages, receive)
+        notes, of_bag = [*of_bag, *notes], []
+        if messages.lost:
+            notes.append(
+                f"{topic}: {messages.lost} of {len(messages.values) + messages.lost} messages "
+                "cannot be read: the bag is damaged."
+            )
+        if messages.root:
+            notes.append(f"{topic}: its place in the frame {messages.root} is taken.")
+        values = [messages.values[k] for k in np.flatnonzero(kept)]
+        rows[topic] = messages.kind, stamps_ns[kept] // 1000, values, notes
+    return rows
+
+
+def _of_bag(path: Path) -> list[str]:
+    """What is to be said of a bag whose recorder was stopped hard."""
+    storage = _storage(path)
+    notes = []
+    if storage != path:
+        notes.append(f"{path.name}: has no metadata.yaml; its only file is read as it is.")
+    if is_cut(storage):
+        notes.append(f"{storage.name}: was cut off; what is before the break is read.")
+    return notes
+
+
+def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
+    """Messages of each topic that is wanted, and of each frame of tf."""
+    found: dict[str, _Messages] = {}
+    frames, with_frames = Frames(), any(":" in topic for topic in topics)
     with _open(path) as reader:
-        chosen = [c for c in reader.connections if c.topic in topics]
-        kinds = {c.topic: c.msgtype for c in chosen}
-        if missing := [topic for topic in topics if topic not in kinds]:
-            names = ", ".join(sorted({c.topic for c in reader.connections}))
-            raise LogError(f"{path.name}: has no topic {missing[0]}; it has {names}.")
-        for connection, received_ns, raw in reader.messages(connections=chosen):
-            topic, kind = connection.topic, connection.msgtype
-            value_of = POSES.get(kind) or (COMMANDS[kind][1] if kind in COMMANDS else None)
-            if value_of is None:
+        kinds = {c.topic: c.msgtype for c in reader.connections}
+        names = [topic.partition(":")[0] for topic in topics]
+        if missing := [name for name in names if name not in kinds]:
+            raise LogError(
+                f"{path.name}: has no topic {missing[0]}; it has {', '.join(sorted(kinds))}."
+            )
+        for topic, name in zip(topics, names, strict=True):
+            kind = kinds[name]
+            if kind == TF and topic == name:
+                raise LogError(
+                    f"{path.name}: {name} holds many frames; name one as {name}:FRAME "
+                    "(`twinmill import --bag` alone lists them)."
+                )
+            if not role_of(kind) and kind != TF:
                 raise LogError(f"{path.name}: {topic} holds {kind}, which is not read here.")
-            message = reader.deserialize(raw, kind)
+            found[topic] = _Messages(kind)
+        chosen = [
+            c for c in reader.connections if c.topic in names or (with_frames and c.msgtype == TF)
+        ]
+        for connection, received_ns, raw in reader.messages(connections=chosen):
+            message, name = reader.deserialize(raw, connection.msgtype), connection.topic
+            if connection.msgtype == TF:
+                _put(frames, message, name, received_ns, found)
+                continue
+            kind = connection.msgtype
+            value_of = POSES.get(kind) or COMMANDS[kind][1]
             stamp = getattr(getattr(message, "header", None), "stamp", None)
-            header_ns = stamp.sec * 10**9 + stamp.nanosec if stamp else 0
-            if header_ns:
-                late[topic].append((received_ns - header_ns) * 1e-9)
-            stamps[topic].append((header_ns if header_ns and not receive else received_ns) // 1000)
-            values[topic].append(value_of(message))
-    return {
-        topic: (
-            kinds[topic],
-            np.array(stamps[topic], np.int64),
-            values[topic],
-            [_stamps_in_words(topic, late[topic], receive)],
+            found[name].add(stamp, received_ns, value_of(message))
+        for name in set(names) & set(found):
+            found[name].lost = reader.topics[name].msgcount - len(found[name].values)
+    for topic, messages in found.items():
+        if not messages.values:
+            raise LogError(f"{path.name}: {topic} holds nothing; choose another.")
+    return found
+
+
+def _put(
+    frames: Frames, message: object, name: str, received_ns: int, found: dict[str, _Messages]
+) -> None:
+    """Adds a message of tf to the tree, and the places of the frames that are wanted."""
+    for transform in message.transforms:
+        frame, parent = (
+            text.lstrip("/") for text in (transform.child_frame_id, transform.header.frame_id)
         )
-        for topic in topics
-    }
+        frames.put(frame, parent, transform_row(transform.transform))
+        messages = found.get(f"{name}:{frame}")
+        if messages is None:
+            continue
+        root, row = frames.place(frame)
+        if root != messages.root:  # what came before the tree was whole is of another frame
+            messages.root = root
+            for rows in (messages.header_ns, messages.received_ns, messages.values):
+                rows.clear()
+        messages.add(transform.header.stamp, received_ns, row)
 
 
-def _stamps_in_words(topic: str, late_s: list[float], receive: bool) -> str:
-    if not late_s:
-        return f"{topic}: has no header stamps; the times of receipt are taken."
-    taken = "times of receipt" if receive else "header stamps"
-    return (
-        f"{topic}: the {taken} are taken; messages were received "
-        f"{1000 * float(np.median(late_s)):.1f} ms after their header stamps (median)."
+def _stamps(
+    topic: str, messages: _Messages, receive: bool
+) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """(N,) ns, (N,) bool which to keep, remarks.
+
+    Raises:
+        LogError: the clock of the headers was set while it recorded.
+    """
+    header, received = (
+        np.array(rows, np.int64) for rows in (messages.header_ns, messages.received_ns)
     )
+    stamped = header > 0
+    everything = np.full(len(header), True)
+    if not stamped.any():
+        note = f"{topic}: has no header stamps; the times of receipt are taken."
+        return received, everything, [note]
+    late_ms = float(np.median((received - header)[stamped])) * 1e-6
+    taken = "times of receipt" if receive else "header stamps"
+    notes = [
+        f"{topic}: the {taken} are taken; messages were received {late_ms:.1f} ms after their "
+        "header stamps (median)."
+    ]
+    if receive:
+        return received, everything, notes
+    kept = everything
+    if not stamped.all() and header[stamped].min() > CLOCK_FROM_ZERO_S * 1e9:
+        kept = stamped
+        notes.append(f"{topic}: {np.count_nonzero(~stamped)} messages have no stamp; left out.")
+    steps_s = np.diff(header[kept]) * 1e-9
+    back = steps_s < 0
+    if back.any() and -steps_s.min() > STEP_BACK_S:
+        raise LogError(
+            f"{topic}: the header stamps go back by {-steps_s.min():.3f} s at message "
+            f"{int(steps_s.argmin()) + 2}: a clock was set while it recorded; take the times of "
+            "receipt with --receive-stamps."
+        )
+    if back.any():
+        notes.append(
+            f"{topic}: {np.count_nonzero(back)} messages are earlier than the one before; sorted."
+        )
+    return header, kept, notes
 
 
-def _ordered(utime_us: np.ndarray) -> np.ndarray:
-    """Rows in order of time, the last of each stamp."""
+def _ordered(topic: str, utime_us: np.ndarray, notes: list[str]) -> tuple[np.ndarray, list[str]]:
+    """Rows in order of time, the last of each stamp; remarks."""
     rows = np.argsort(utime_us, kind="stable")
-    return rows[np.append(np.diff(utime_us[rows]) > 0, True)]
+    last = np.append(np.diff(utime_us[rows]) > 0, True)
+    if not last.all():
+        double = np.count_nonzero(~last)
+        notes = [*notes, f"{topic}: {double} messages repeat a stamp; the last of each was kept."]
+    return rows[last], notes
 
 
 def _poses(
-    robot_id: int, kind: str, utime_us: np.ndarray, values: list[Row], notes: list[str]
+    robot_id: int,
+    topic: str,
+    kind: str,
+    utime_us: np.ndarray,
+    values: list[Row],
+    notes: list[str],
 ) -> PoseSeries:
-    if kind not in POSES or not values:
-        raise LogError(f"--pose: robot {robot_id}: the topic holds {kind}, which is no pose.")
-    rows = _ordered(utime_us)
+    if kind not in POSES and kind != TF:
+        raise LogError(f"--pose: {topic} holds {kind}, which is no pose.")
+    rows, notes = _ordered(topic, utime_us, notes)
     value = np.array(values)[rows]
     norm = np.linalg.norm(value[:, 3:], axis=1)
     valid = np.isfinite(value).all(axis=1) & (np.abs(norm - 1) < 0.05)
@@ -225,31 +422,39 @@ def _poses(
 
 
 def _commands(
-    robot_id: int, kind: str, utime_us: np.ndarray, values: list[Row], notes: list[str]
+    robot_id: int,
+    topic: str,
+    kind: str,
+    utime_us: np.ndarray,
+    values: list[Row],
+    notes: list[str],
+    options: BagOptions,
 ) -> CommandSeries:
-    if kind not in COMMANDS or not values:
-        raise LogError(f"--command: robot {robot_id}: the topic holds {kind}, which is no command.")
-    widths = {len(v) for v in values}
-    if len(widths) > 1 or not widths <= {2, 3, WIDTH}:
+    if kind not in COMMANDS:
+        raise LogError(f"--command: {topic} holds {kind}, which is no command.")
+    widths = sorted({len(v) for v in values})
+    if len(widths) > 1 or widths[0] not in (2, 3, WIDTH):
         raise LogError(
-            f"--command: robot {robot_id}: {kind} has {max(widths)} numbers a message, but a robot "
-            "here has two to four wheels; choose another topic."
+            f"--command: {topic} has {' or '.join(map(str, widths))} numbers a message, but a "
+            "robot here has two to four wheels, and each message tells all; choose another topic."
         )
-    rows = _ordered(utime_us)
+    rows, notes = _ordered(topic, utime_us, notes)
     value = np.array(values, float)[rows]
-    if value.shape[1] == 2:  # left, right
+    if not np.isfinite(value).all():
+        raise LogError(
+            f"--command: {topic} holds numbers that are not finite; correct the program that "
+            "recorded them."
+        )
+    command_kind = COMMANDS[kind][0]
+    if kind in STEERED:
+        value = _velocities(topic, value, options.wheelbase_m)
+    elif value.shape[1] == 2:  # left, right
         value = value[:, [0, 1, 0, 1]]
     elif value.shape[1] == 3:
         value = np.column_stack([value, np.zeros(len(value))])
-    command_kind = COMMANDS[kind][0]
-    if not np.isfinite(value).all() or (command_kind == "duty" and np.abs(value).max() > 100):
-        raise LogError(
-            f"--command: robot {robot_id}: holds numbers that are not finite, or duties beyond "
-            "-100..100 percent; correct the program that recorded them."
-        )
-    if command_kind == "duty" and np.abs(value).max() <= 1:
-        value = value * 100
-        notes = [*notes, "duties go to 1 at most: taken for shares of full duty."]
+    if command_kind == "duty":
+        value, more = _percent(topic, value, options.full_duty)
+        notes = notes + more
     unknown = np.full((len(rows), 2), np.nan)
     return CommandSeries(
         robot_id,
@@ -262,3 +467,33 @@ def _commands(
         turbopi.telemetry_t.MODE_SCRIPT,
         notes,
     )
+
+
+def _velocities(topic: str, steered: np.ndarray, wheelbase_m: float | None) -> np.ndarray:
+    """(M, 4) velocities of the body: omega = v tan(steering) / wheelbase (Rajamani 2012, ch. 2)."""
+    if wheelbase_m is None or not wheelbase_m > 0:
+        raise LogError(
+            f"{topic}: tells steering angles; give the distance of the axles, --wheelbase-m METRES."
+        )
+    speed, steering = steered.T
+    zero = np.zeros_like(speed)
+    return np.column_stack([speed, zero, speed * np.tan(steering) / wheelbase_m, zero])
+
+
+def _percent(topic: str, value: np.ndarray, full: float | None) -> tuple[np.ndarray, list[str]]:
+    """Duties in percent, and what was taken for full duty."""
+    top = float(np.abs(value).max())
+    given, notes = full is not None, []
+    if full is None:
+        full = next((f for f in FULL_DUTIES if top <= f), FULL_DUTIES[-1]) if top else 100.0
+    if not full > 0 or top > full:
+        raise LogError(
+            f"--command: {topic}: duties go to {top:g}, beyond {full:g} for full duty; say which "
+            "number is full duty with --full-duty."
+        )
+    if full != 100 and not given:
+        notes = [
+            f"{topic}: duties go to {top:g}: {full:g} is taken for full duty; else give "
+            "--full-duty."
+        ]
+    return value * (100 / full), notes

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What ROS messages of each type say: a pose, a command of a robot, or places of frames (tf)."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+from twinmill.data.log import CommandKind
+
+Row = tuple[float, ...]
+TF = "tf2_msgs/msg/TFMessage"
+STEERED = ("ackermann_msgs/msg/AckermannDrive", "ackermann_msgs/msg/AckermannDriveStamped")
+DEFINITIONS = {  # of types that the library does not bring; older bags hold none
+    STEERED[0]: "float32 steering_angle\nfloat32 steering_angle_velocity\nfloat32 speed\n"
+    "float32 acceleration\nfloat32 jerk\n",
+    STEERED[1]: "std_msgs/Header header\nackermann_msgs/AckermannDrive drive\n",
+}
+
+
+def _pose(pose: Any) -> Row:
+    p, q = pose.position, pose.orientation
+    return p.x, p.y, p.z, q.w, q.x, q.y, q.z
+
+
+def transform_row(transform: Any) -> Row:
+    """x, y, z in m, then the quaternion, w first."""
+    p, q = transform.translation, transform.rotation
+    return p.x, p.y, p.z, q.w, q.x, q.y, q.z
+
+
+def _twist(twist: Any) -> Row:
+    return twist.linear.x, twist.linear.y, twist.angular.z, 0.0
+
+
+def _steered(drive: Any) -> Row:
+    """Speed, steering angle: velocities follow with the wheelbase."""
+    return drive.speed, drive.steering_angle
+
+
+def _duties(message: Any) -> Row:
+    return tuple(float(v) for v in message.data)
+
+
+def _wheel_speeds(message: Any) -> Row:
+    """In our order where all joints' names tell the wheel, else as they stand."""
+    speeds = tuple(map(float, message.velocity))
+    places = [_wheel(name) for name in message.name]
+    if len(places) != len(speeds):
+        return speeds
+    if len(places) == 2:
+        places = [place and (1, place[1]) for place in places]
+    if not all(place and all(place) for place in places) or len(set(places)) < len(places):
+        return speeds
+    order = sorted(range(len(places)), key=lambda k: places[k])
+    return tuple(speeds[k] for k in order)
+
+
+def _wheel(name: str) -> tuple[int, int] | None:
+    """Front 1 or rear 2, left 1 or right 2; 0 where the name does not say."""
+    words = set(re.findall(r"[a-z]+", name.lower()))
+    front = bool(words & {"front", "fl", "fr", "lf", "rf"})
+    rear = bool(words & {"rear", "back", "rl", "rr", "bl", "br"})
+    left = bool(words & {"left", "l", "fl", "rl", "bl", "lf"})
+    right = bool(words & {"right", "r", "fr", "rr", "br", "rf"})
+    if (front and rear) or left == right:
+        return None
+    return 1 if front else 2 if rear else 0, 1 if left else 2
+
+
+POSES: dict[str, Callable[[Any], Row]] = {
+    "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
+    "nav_msgs/msg/Odometry": lambda m: _pose(m.pose.pose),
+    "geometry_msgs/msg/TransformStamped": lambda m: transform_row(m.transform),
+}
+COMMANDS: dict[str, tuple[CommandKind, Callable[[Any], Row]]] = {
+    "geometry_msgs/msg/Twist": ("twist", _twist),
+    "geometry_msgs/msg/TwistStamped": ("twist", lambda m: _twist(m.twist)),
+    STEERED[0]: ("twist", _steered),
+    STEERED[1]: ("twist", lambda m: _steered(m.drive)),
+    "sensor_msgs/msg/JointState": ("wheel_speed", _wheel_speeds),
+    **{
+        f"std_msgs/msg/{number}MultiArray": ("duty", _duties)
+        for number in ("Float64", "Float32", "Int16", "Int32")
+    },
+}
+
+
+def role_of(kind: str) -> str:
+    """`pose`, `command` or empty, by the type of a message."""
+    return "pose" if kind in POSES else "command" if kind in COMMANDS else ""
