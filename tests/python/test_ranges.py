@@ -89,6 +89,28 @@ def test_three_files_say_the_same_and_every_sample_is_a_valid_model(model):
             sampled_model.set(name, value)  # refuses what is out of bounds
 
 
+def test_a_quantity_that_its_bound_truncates_is_named_with_what_its_samples_are(model, capsys):
+    """0.005 +- 0.01 above 0: mean and std of the half that is left, by scipy."""
+    text = (model / "m.toml").read_text().replace("motor_lag_s = 0.005", "motor_lag_s = 0.01")
+    lag = next(line for line in text.splitlines() if line.startswith("motor_lag_s"))
+    (model / "near.toml").write_text(text.replace(lag, "motor_lag_s = 0.005", 1))
+    run(["export-model", "near.toml", "--ranges", "--samples", "4000", "--json"])
+    (said,) = json.loads(capsys.readouterr().out)["warnings"]
+    whole = truncnorm(-0.5, np.inf, loc=0.005, scale=0.01)
+    assert said.startswith("base.motor_lag_s = 0.005 ± 0.01 is truncated: 31 % ")
+    mean, std = (float(said.split(f" {k} ")[1].split()[0].rstrip(",")) for k in ("mean", "std"))
+    error = whole.std() / np.sqrt(4000)
+    assert (mean, std) == pytest.approx((whole.mean(), whole.std()), abs=4 * error)
+    found = json.loads((model / "near_ranges.json").read_text())
+    assert found["truncated"] == ["base.motor_lag_s"]
+    assert np.load(model / "near_ranges.npz")["truncated"].tolist() == ["base.motor_lag_s"]
+
+
+def test_what_no_bound_touches_is_not_called_truncated(model, capsys):
+    run(["export-model", "m.toml", "--ranges", "--json"])
+    assert json.loads(capsys.readouterr().out)["warnings"] == []
+
+
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not(model):
     for out, seed in (("a", 1), ("b", 1), ("c", 2)):
         run(["export-model", "m.toml", "--ranges", "--out", f"{out}.x", "--seed", str(seed)])

@@ -28,7 +28,7 @@ if working():  # not for --help
     from twinmill.export.sdf import sdf
     from twinmill.export.urdf import urdf
     from twinmill.files import check_new_file, plain, replacing
-    from twinmill.model.ranges import ranges
+    from twinmill.model.ranges import Ranges, ranges
     from twinmill_cli.frame import open_model
 
 
@@ -112,6 +112,7 @@ def _export_model(
     stem = Path(model).stem
     texts: dict[Path, str | bytes] = {}
     left: list[Left] = []
+    notes: list[str] = []
     if to is not None:
         text, left = WRITERS[to](source)
         default = Path(
@@ -120,10 +121,13 @@ def _export_model(
         texts[out or default] = text
     if with_ranges:
         beside = out.with_suffix("") if out else Path(stem)
-        texts |= _ranges(source, beside, samples, seed)
+        found = ranges(source.file, source.model, samples, seed)
+        texts |= _range_files(source, found, beside)
+        notes = _truncated(found)
     _write(texts, force)
     data = {
         "files": [str(path) for path in texts],
+        "warnings": notes,
         "not_carried": [item.to_json() for item in left],
         "command": shlex.join(["twinmill", "export-model", model, *(["--to", to] if to else [])]),
         "version": f"twinmill {version('twinmill')}",
@@ -132,19 +136,33 @@ def _export_model(
     lines = [f"Written: {', '.join(data['files'])}"]
     if left:
         lines += ["Not carried:", *(f"  {item.sentence()}" for item in left)]
+    lines += [f"! {note}" for note in notes]
     deliver(data, "\n".join(lines), as_json)
     return data
 
 
-def _ranges(source: RobotModel, beside: Path, count: int, seed: int) -> dict[Path, str | bytes]:
+def _range_files(source: RobotModel, found: Ranges, beside: Path) -> dict[Path, str | bytes]:
     """The three files by path."""
-    found = ranges(source.file, source.model, count, seed)
     data = {"model": source.name, "model_sha256": source.file.hash, **plain(found.to_json())}
     contents = {"yaml": as_yaml(data), "json": ranges_json(data), "npz": as_npz(found)}
     return {
         beside.with_name(f"{beside.name}_ranges.{suffix}"): content
         for suffix, content in contents.items()
     }
+
+
+def _truncated(found: Ranges) -> list[str]:
+    """A sentence for each quantity whose samples are no whole normal."""
+    names = [q.name for q in found.quantities]
+    told = []
+    for q in found.truncated:
+        drawn = found.samples[:, names.index(q.name)]
+        told.append(
+            f"{q.name} = {q.value:g} ± {q.std:g} is truncated: {100 * q.outside:.2g} % of its "
+            f"normal lie outside {q.min:g} to {q.max:g}. The samples have mean {drawn.mean():.3g} "
+            f"and std {drawn.std():.3g}, and what is correlated with it shifts, too."
+        )
+    return told
 
 
 def _write(texts: dict[Path, str | bytes], force: bool) -> None:

@@ -22,7 +22,7 @@ def as_json(data: dict[str, Any]) -> str:
 
 
 def as_npz(found: Ranges) -> bytes:
-    """Arrays `names`, `units`, `value`, `std`, `low`, `high`, `covariance`, `samples`."""
+    """Arrays by the names of the JSON's fields; `truncated` holds names."""
     stream = io.BytesIO()
     intervals = np.array([q.interval for q in found.quantities])
     np.savez(
@@ -35,5 +35,6 @@ def as_npz(found: Ranges) -> bytes:
         high=intervals[:, 1],
         covariance=found.covariance,
         samples=found.samples,
+        truncated=np.array([q.name for q in found.truncated], str),
     )
     return stream.getvalue()

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 import tomlkit
 import twinmill_native as native
+from scipy.stats import norm
 
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names
 
 NORMAL_95 = 1.96
+CUT = 0.005  # of a normal outside its bounds; less changes its mean by 1.5 % of its std, or less
 ROUNDS = 200  # of samples drawn anew because they were out of bounds
 SPREAD = {"theta_a1": "idiosyncrasy.theta_a1_std", "theta_a2": "idiosyncrasy.theta_a2_std"}
 
@@ -42,6 +44,12 @@ class Quantity:
         half = NORMAL_95 * self.std
         return max(self.min, self.value - half), min(self.max, self.value + half)
 
+    @property
+    def outside(self) -> float:
+        """Share of its normal that lies out of bounds."""
+        ends = norm(self.value, self.std)
+        return float(ends.cdf(self.min) + ends.sf(self.max))
+
     def to_json(self) -> dict:
         """Its fields and interval."""
         low, high = self.interval
@@ -54,7 +62,7 @@ class Ranges:
 
     Attributes:
         quantities: P of them.
-        covariance: (P, P).
+        covariance: (P, P), of the normal before bounds cut it off.
         samples: (N, P), all within bounds.
         seed: of the samples.
     """
@@ -64,10 +72,16 @@ class Ranges:
     samples: np.ndarray
     seed: int
 
+    @property
+    def truncated(self) -> list[Quantity]:
+        """Those that a bound cuts off so far that samples have another mean and covariance."""
+        return [q for q in self.quantities if q.outside > CUT]
+
     def to_json(self) -> dict:
         """For all three files."""
         return {
             "seed": self.seed,
+            "truncated": [q.name for q in self.truncated],
             "quantities": [q.to_json() for q in self.quantities],
             "covariance": self.covariance.tolist(),
             "samples": self.samples.tolist(),
