@@ -105,13 +105,13 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(tmp_path):
     assert not (tmp_path / "o.lcmlog").exists()
 
 
-def _written(path, *topics):
+def _written(path, *topics, chunk_bytes=2000, compression=CompressionType.NONE):
     """An MCAP file of the package mcap, with messages packed by hand as CDR (OMG DDS-XTypes).
 
     Each topic: its name, type, definition, and rows of (time of receipt in s, payload).
     """
     with path.open("wb") as stream:
-        writer = McapWriter(stream, chunk_size=2000, compression=CompressionType.NONE)
+        writer = McapWriter(stream, chunk_size=chunk_bytes, compression=compression)
         writer.start(profile="ros2", library="test")
         for topic, kind, definition, rows in topics:
             schema = writer.register_schema(kind, "ros2msg", definition.encode())
@@ -358,8 +358,22 @@ def test_wheels_are_taken_by_the_names_of_their_joints(tmp_path):
     np.testing.assert_allclose(robots[1].command[-1], [1, 2, 3, 4])
 
 
-def test_a_bag_that_was_cut_off_is_read_to_there_and_that_is_said(tmp_path):
-    whole = _written(tmp_path / "whole.mcap", _poses(), _twists()).read_bytes()
+@pytest.mark.parametrize(
+    ("compression", "chunk_bytes"),
+    [*((kind, 2000) for kind in CompressionType), (CompressionType.NONE, 10**6)],
+)
+def test_a_bag_that_was_cut_off_is_read_to_there_and_that_is_said(
+    tmp_path, compression, chunk_bytes
+):
+    rng = np.random.default_rng(2)  # what cannot be packed small
+    poses = _poses()
+    poses = (
+        *poses[:3],
+        [(t, _pose(t, x)) for (t, _), x in zip(poses[3], rng.random(60), strict=True)],
+    )
+    twists = [(t, struct.pack("<6d", *rng.random(6))) for t, _ in _twists()[3]]
+    how = {"chunk_bytes": chunk_bytes, "compression": compression}
+    whole = _written(tmp_path / "whole.mcap", poses, (*_twists()[:3], twists), **how).read_bytes()
     bag = tmp_path / "cut.mcap"
     bag.write_bytes(whole[: len(whole) * 6 // 10])
     assert [t.name for t in list_topics(bag)] == ["/cmd_vel", "/pose"]

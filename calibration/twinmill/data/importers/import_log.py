@@ -123,6 +123,8 @@ def import_log(
             f"--robot-id {options.robot_id}: must be in 0..99 and fits one robot; "
             "number several by their folders' names."
         )
+    if options.mapping and options.rename and not detections:
+        raise LogError("--rename: does nothing beside --mapping; write it into that file.")
     tables = [path for path in (poses, commands) if path and not options.mapping]
     check_renames(
         options.rename, tables + ([detections] if detections else []), KNOWN | OF_DETECTIONS

@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MCAP files that were cut off, since the recorder was stopped hard: what is before the break."""
+"""MCAP files that were cut off, since the recorder was stopped hard: what is before the break.
 
+Names of records and their layout: mcap.dev, specification.
+"""
+
+import io
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 
 from twinmill.data.log import LogError
 
-MAGIC = b"\x89MCAP0\r\n"  # first and last in a whole file (mcap.dev, specification)
+MAGIC = b"\x89MCAP0\r\n"  # first and last in a whole file
+CHUNK = 6  # opcode
+TIMES_SIZES = 28  # bytes of a chunk before the name of its compression
 
 
 def is_cut(path: Path) -> bool:
@@ -23,44 +30,66 @@ def write_whole(path: Path, out: Path) -> None:
     """Copies the messages before the break to a whole file.
 
     Raises:
-        LogError: not even the first chunk of messages is whole.
+        LogError: there are none.
     """
-    from mcap.exceptions import McapError
-    from mcap.reader import NonSeekingReader
+    from mcap.records import Channel, Message, Schema
     from mcap.writer import Writer
 
-    with path.open("rb") as stream, out.open("wb") as target:
+    schemas: dict[int, int] = {}
+    channels: dict[int, int] = {}
+    with out.open("wb") as target:
         writer = Writer(target)
         writer.start(profile="ros2", library="twinmill")
-        schemas: dict[int, int] = {}
-        channels: dict[int, int] = {}
-        try:
-            for schema, channel, message in NonSeekingReader(stream).iter_messages(
-                log_time_order=False
-            ):
-                if schema.id not in schemas:
-                    schemas[schema.id] = writer.register_schema(
-                        schema.name, schema.encoding, schema.data
-                    )
-                if channel.id not in channels:
-                    channels[channel.id] = writer.register_channel(
-                        channel.topic,
-                        channel.message_encoding,
-                        schemas[schema.id],
-                        dict(channel.metadata),
-                    )
-                writer.add_message(
-                    channels[channel.id],
-                    message.log_time,
-                    message.data,
-                    message.publish_time,
-                    message.sequence,
+        for r in _records(path):
+            if isinstance(r, Schema) and r.id not in schemas:
+                schemas[r.id] = writer.register_schema(r.name, r.encoding, r.data)
+            elif isinstance(r, Channel) and r.id not in channels:
+                channels[r.id] = writer.register_channel(
+                    r.topic, r.message_encoding, schemas.get(r.schema_id, 0), dict(r.metadata)
                 )
-        except (McapError, struct.error):  # the break
-            pass
+            elif isinstance(r, Message) and r.channel_id in channels:
+                channel = channels[r.channel_id]
+                writer.add_message(channel, r.log_time, r.data, r.publish_time, r.sequence)
         writer.finish()
     if not channels:
         raise LogError(
-            f"{path}: cannot be read as a ROS bag (it was cut off within its first chunk of "
-            f"messages); try `mcap recover {path.name} -o whole.mcap`."
+            f"{path}: cannot be read as a ROS bag (it was cut off before its first messages were "
+            f"whole); try `mcap recover {path.name} -o whole.mcap`, or record it again."
         )
+
+
+def _records(path: Path) -> Iterator[object]:
+    """All records before the break, those of an uncompressed chunk that is cut, too."""
+    with path.open("rb") as stream:
+        yield from _until_break(stream, skip_magic=False)
+        inside = _cut_chunk(stream, path.stat().st_size)
+    yield from _until_break(io.BytesIO(inside), skip_magic=True)
+
+
+def _until_break(stream: io.BufferedIOBase, skip_magic: bool) -> Iterator[object]:
+    from mcap.exceptions import McapError
+    from mcap.stream_reader import StreamReader
+
+    try:
+        yield from StreamReader(stream, skip_magic=skip_magic).records
+    except (McapError, struct.error):
+        return
+
+
+def _cut_chunk(stream: io.BufferedIOBase, size: int) -> bytes:
+    """The records in the chunk within which the file ends; empty if it ends elsewhere."""
+    stream.seek(len(MAGIC))
+    while len(head := stream.read(9)) == 9:
+        kind, length = struct.unpack("<BQ", head)
+        if stream.tell() + length > size:
+            body = stream.read() if kind == CHUNK else b""
+            return _unpacked(body) if len(body) > TIMES_SIZES + 4 else b""
+        stream.seek(length, io.SEEK_CUR)
+    return b""
+
+
+def _unpacked(chunk: bytes) -> bytes:
+    """As many records of a chunk as its bytes hold; none of a compressed one, which has no end."""
+    begin = TIMES_SIZES + 4
+    (length,) = struct.unpack_from("<I", chunk, TIMES_SIZES)
+    return b"" if length else chunk[begin + 8 :]
