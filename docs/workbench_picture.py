@@ -48,6 +48,8 @@ def take(url: str) -> None:
         page.get_by_test_id("tab-missing").click()
         page.get_by_test_id("diagnose").click()
         page.get_by_test_id("finding-coasting").wait_for()
+        page.get_by_test_id("show-coasting").click()
+        page.wait_for_function("document.body.dataset.beside === 'with coasting'")
         page.evaluate(f"twinmill.seek({AT_S}); twinmill.look({AT_S} - 10, {AT_S} + 20)")
         page.mouse.move(5, 5)
         page.wait_for_timeout(500)

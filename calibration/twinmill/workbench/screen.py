@@ -16,6 +16,7 @@ from twinmill.workbench.swarm_panel import SwarmPanel
 from twinmill.workbench.words import scored, tone
 
 REFRESH_S = 0.15
+HINT_MS = 900  # over a tab, before its hint covers what is below
 HINTS = {
     "knobs": "Every quantity of the model, with its interval",
     "missing": "What is missing in the model",
@@ -132,7 +133,8 @@ class Screen:
         with ui.tabs(on_change=lambda e: self._turn_to(e.value)) as self.tabs:
             self.tabs.props("dense no-caps inline-label align=justify")
             for key, label in TABS.items():
-                ui.tab(key, label=label).props(f'data-testid="tab-{key}"').tooltip(HINTS[key])
+                with ui.tab(key, label=label).props(f'data-testid="tab-{key}"'):
+                    ui.tooltip(HINTS[key]).props(f"delay={HINT_MS}")
         with ui.tab_panels(self.tabs, value=chosen).props("animated=false keep-alive"):
             with ui.tab_panel("knobs"):
                 self.knobs = KnobsPanel(self)

@@ -9,6 +9,7 @@ import { Swarm } from "./swarm.js";
 const SHORTEST_S = 0.5; // stretch that can be looked at
 const SAVE_MS = 400;
 const STEP_S = 0.1;
+const WORST_S = 2.5; // of the worst moment that is played
 
 class Stage {
   constructor({ token, view, log }) {
@@ -21,6 +22,7 @@ class Stage {
     this.end_s = 10;
     this.marks = [];
     this.playing = false;
+    this._until = Infinity;
     this.frames = 0;
     this.robots = [];
     this.robot = null;
@@ -173,18 +175,23 @@ class Stage {
 
   play(on = !this.playing) {
     this.playing = on;
+    this._until = Infinity;
     if (on && this.t >= this.end_s - 0.01) this.seek(0);
     document.querySelector("#play").textContent = on ? "pause" : "play_arrow";
     this._last = null;
     this._moved = true;
   }
 
-  /** Moments to be marked, and the cursor shortly before the worst. */
+  /** Moments to be marked; the worst is played from shortly before. */
   mark(times, worst, why) {
     this.marks = times;
     const words = document.querySelector("#marks");
     words.textContent = times.length ? `${why}: ${times.length} moments ✕` : "";
-    if (times.length) this.seek(Math.max(worst, 0));
+    if (times.length) {
+      this.seek(Math.max(worst, 0));
+      this.play(true);
+      this._until = worst + WORST_S;
+    }
     if (times.length && this.span[1] - this.span[0] > 20) this.look(worst - 5, worst + 10);
     this.redraw();
   }
@@ -215,7 +222,7 @@ class Stage {
       const passed = this._last ? (now - this._last) / 1000 : 0;
       this._last = now;
       this.seek(this.t + this.rate * passed);
-      if (this.t >= this.end_s) this.play(false);
+      if (this.t >= Math.min(this.end_s, this._until)) this.play(false);
     }
     if (this._still) {
       this.floor.drawStill();
