@@ -6,7 +6,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
-#include <sched.h>
 #include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -284,22 +283,13 @@ static void report_dead_children(void)
     }
 }
 
-// Tells for how long nothing ran in the guest, if that is longer than this process waits.
-static void report_standstill(uint64_t looked_ns)
+static void report_standstill(void)
 {
-    const uint64_t t_ns = now_ns();
-    const uint64_t stood[] = {t_ns, t_ns - looked_ns};
-    if (stood[1] > STOOD_STILL_NS)
+    const uint64_t stood[] = {now_ns(), standstill_take_ns()};
+    if (stood[1] > 0)
     {
         send_message('s', stood, sizeof stood);
     }
-}
-
-// Before all programs, and none that it starts. Without the right to, standstills are guessed at.
-static void take_priority(void)
-{
-    const struct sched_param highest = {.sched_priority = sched_get_priority_max(SCHED_FIFO)};
-    (void)sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &highest);
 }
 
 // The port that QEMU gave our name; it comes up late.
@@ -363,20 +353,19 @@ int main(void)
     board = open("/dev/hilboard", O_RDWR | O_NONBLOCK | O_CLOEXEC);
     bus = open_bus();
     dead_children = watch_children();
-    if (port < 0 || board < 0 || bus < 0 || dead_children < 0)
+    if (port < 0 || board < 0 || bus < 0 || dead_children < 0 || !standstill_watch())
     {
-        die("port, board or bus");
+        die("port, board, bus or a thread");
     }
     send_message('r', "", 0);
-    take_priority();
-    for (uint64_t looked_ns = now_ns();; looked_ns = now_ns())
+    for (;;)
     {
         struct pollfd fds[] = {{.fd = port, .events = POLLIN},
                                {.fd = board, .events = POLLIN},
                                {.fd = bus, .events = POLLIN},
                                {.fd = dead_children, .events = POLLIN}};
-        (void)poll(fds, 4, LOOK_MS);
-        report_standstill(looked_ns);
+        (void)poll(fds, 4, -1);
+        report_standstill();
         void (*const take[])(void) = {take_command, report_board, report_packet,
                                       report_dead_children};
         for (int i = 3; i >= 0; --i)

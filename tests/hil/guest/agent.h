@@ -4,6 +4,7 @@
 #ifndef HIL_AGENT_H
 #define HIL_AGENT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -27,6 +28,11 @@ void boot_load_modules(void);
 void boot_join_multicast_to_lo(void);
 // @return 0, or -1 and errno.
 int load_module(const char *path, const char *parameters);
+
+// standstill.c: looks at the clock from now on. @return false, and errno, if it cannot.
+bool standstill_watch(void);
+// @return for how long nothing ran in the guest, at most, since this was asked; 0: not for long.
+uint64_t standstill_take_ns(void);
 
 // camera.c: @return 0 or a number of bytes, or -1 and errno.
 // Opens the writing end of a loopback camera, which gives YUYV frames of this size from now on.
