@@ -111,6 +111,15 @@ def test_the_advice_for_a_strange_name_works_as_printed(imported):
     _same_poses(imported(poses, options={"rename": {"rot_deg": "theta_deg"}})[0][4])
 
 
+@pytest.mark.parametrize(("top", "new"), [(255, "left_pwm"), (80, "left_pct"), (0.5, "left_unit")])
+def test_the_advice_for_a_name_without_a_unit_is_the_unit_that_it_looks_like(imported, top, new):
+    rows = pd.DataFrame({"t_s": [0.0, 1, 2], "robot_id": 4, "left": top, "right_pct": 50})
+    with pytest.raises(LogError, match=f"--rename left={new} "):
+        imported(commands=rows)
+    robot = imported(commands=rows, options={"rename": {"left": new}})[0][4]
+    assert robot.command[-1, 0] == pytest.approx({255: 1, 80: 0.8, 0.5: 0.5}[top], abs=1e-6)
+
+
 def test_wrong_units_are_named_before_any_advice_on_the_heading(imported):
     degrees = POSES.assign(theta_rad=np.degrees(POSES.theta_rad))
     _, warnings = imported(degrees)

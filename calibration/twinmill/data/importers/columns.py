@@ -367,12 +367,15 @@ def _unsure(table: str, guess: Guess) -> LogError:
             f"let --explain-columns FILE write down all columns, write the factor there "
             f"({RADIUS}), and give that to --mapping."
         )
+    stem, ours = split_unit(target)
     if len(guess.targets) > 1:  # both wheels of a side
-        target = "left_pct" if guess.targets == LEFT else "right_pct"
-    doubt = "has no unit" if split_unit(target)[1] else f"may be {target}"
-    more = " (or _mm, _deg, _ms, _pwm ...)" if split_unit(target)[1] else ""
+        stem = "left" if guess.targets == LEFT else "right"
+    unit = next((u for u, known in UNITS.items() if known == (ours, guess.factor)), ours)
+    new = f"{stem}_{unit}" if unit else target
+    doubt = "has no unit" if ours else f"may be {target}"
+    more = " (or _mm, _deg, _ms, _pwm ...)" if ours else ""
     return LogError(
         f"{table}: column '{guess.column}' {doubt} ({guess.why}); say what it is with "
-        f"--rename {guess.column}={target}{more}, or let --explain-columns FILE write down all "
+        f"--rename {guess.column}={new}{more}, or let --explain-columns FILE write down all "
         "columns and give that to --mapping."
     )
