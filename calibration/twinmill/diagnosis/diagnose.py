@@ -11,6 +11,7 @@ from twinmill.data.steady_table import Sheet
 from twinmill.diagnosis.detections.merge import with_bits
 from twinmill.diagnosis.encoders import geometry_notes, time_base_notes
 from twinmill.diagnosis.findings import findings_of, lateness, ranking_of
+from twinmill.diagnosis.irregularity import notes_on
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
 from twinmill.diagnosis.resolution import resolutions
 from twinmill.diagnosis.rest import rest_of
@@ -37,11 +38,8 @@ from twinmill.model.parameters import (
     base_parameters,
     catalogue,
 )
-from twinmill.predict.problem import Scene
-from twinmill.steady.scene import SteadyScene
 
 DRIFT_STD = 0.04  # gains of a calibrated robot wander so much with battery and heat
-NOISIER = 2.0  # drive noise over that of the model file, beyond which it is a finding
 # What a measurement must have for an effect to show, and what to say where it has not.
 LACKS = {
     "changes": "acts only while the speed changes, and a steady table has no starts and stops",
@@ -177,7 +175,7 @@ def _concluded(
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]
     scenes = [r.scene.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
-    noise = _noises(model_file, scenes)
+    noise = notes_on(opened, [s.noise for s in scenes], model_file.model)
     faint = _hidden(done, first.model)
     hidden = [*faint, *unseen.items()]
     refit = _refit(done)
@@ -258,24 +256,6 @@ def _shown(done: Search, hidden: Sequence[tuple[str, str]]) -> list[str]:
     """Effects that would be seen if they were there."""
     names = {name for name, _ in hidden} | {REFIT}
     return [s.name for s in done.rounds[-1].screened if s.name not in names]
-
-
-def _noises(model_file: ModelFile, scenes: Sequence[Scene | SteadyScene]) -> list[str]:
-    """A note for each log whose drive noise is far above what another log told."""
-    usual = model_file.model.get("noise.drive_mps")
-    if usual <= 0:
-        return []
-    notes = []
-    for scene in scenes:
-        noise = scene.noise
-        ratio = noise.position.drive / usual if noise else 0.0
-        if ratio > NOISIER:
-            notes.append(
-                f"{scene.measurement.label}: the random disturbance of the motion is {ratio:.1f} "
-                "times what the model file says; no effect that follows from commands, place or "
-                "time is like that (slipping wheels or a rough floor may be)."
-            )
-    return notes
 
 
 # What shows an effect, by the words of its card's `identify`.

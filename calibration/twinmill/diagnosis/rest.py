@@ -12,15 +12,12 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import twinmill_native as native
 
-from twinmill.data.track import command_at
+from twinmill.diagnosis.library import Term, library
 from twinmill.diagnosis.moments import Moment, moments_of
-from twinmill.fitting.floor import body_velocity_at
+from twinmill.diagnosis.place import comes_again
 from twinmill.fitting.opening import Opened
-from twinmill.fitting.response import Response
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.model.parameters import words
 
 FOLDS = 5
 FLIPS = 499  # random signs of blocks that make the null distribution
@@ -28,36 +25,9 @@ BESIDE = 0.1  # share by which a group must raise what better groups bring
 ALPHA = 0.01  # chance of naming anything if nothing is left, over all that is tested
 AGAIN = 2.0  # times what the model left in other logs already: no news
 FIRM_T = 3.0
-STILL = (0.002, 0.002, 0.01)  # m/s, m/s, rad/s: below it an axis does not move; wheels differ
-TYPICAL = (0.01, 0.01, 0.05)  # m/s, m/s, rad/s: what a term of full size may add
-# Rates, voltage, history: not at hand in a body's formula.
-NO_NAMES = {"dvx", "dvy", "domega", "V", "after_reversal"}
-CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
-CHANGE = "change of the command"
 MOMENTS = "single moments"
-REVERSAL_S = 0.15  # how long a reversal is felt
+PLACE = "place"
 LEFT_OVER = 0.02  # share of a term's norm that must survive the projection
-
-
-@dataclass(frozen=True)
-class Term:
-    """One candidate formula: adds p0 times `formula` to a velocity of the body.
-
-    Attributes:
-        group: what it depends on.
-        adds_to, formula: as the effect `equation` takes them, but for names in NO_NAMES.
-        size: of the formula's values, 95th percentile.
-    """
-
-    group: str
-    adds_to: str
-    formula: str
-    size: float
-
-    @property
-    def addable(self) -> bool:
-        """The effect `equation` knows all its names."""
-        return not words(self.formula) & NO_NAMES
 
 
 @dataclass(frozen=True)
@@ -130,8 +100,11 @@ def rest_of(
         return Rest(share, False, [])
     firm = _firm(logs, fit)
     found = _dependences(logs, fit, known)
-    moments = moments_of([own for _, own in logs], [fit.models[i] for i, _ in logs])
+    own_logs, models = [own for _, own in logs], [fit.models[i] for i, _ in logs]
+    moments = moments_of(own_logs, models)
     depends_on = [*found.depends_on, *([MOMENTS] if moments else [])]
+    if PLACE not in depends_on and comes_again(own_logs, models):
+        depends_on.append(PLACE)
     return replace(found, share=share, firm=firm, depends_on=depends_on, moments=tuple(moments))
 
 
@@ -149,29 +122,28 @@ def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:
     return bool(falls.mean() > FIRM_T * np.std(falls, ddof=1) / np.sqrt(len(falls)))
 
 
-# -- the library --------------------------------------------------------------------------------
+# -- what it depends on ----------------------------------------------------------------------------
 
 
 def _dependences(logs: list[tuple[int, Opened]], fit: ScoreFit, known: Mapping[str, float]) -> Rest:
     rows, _ = fit.state
-    terms, sizes = _terms_of(logs, fit)
+    terms, each = library([own for _, own in logs], [fit.models[i] for i, _ in logs])
     left, free, blocks = fit.whitened([i for i, _ in logs])
     columns = np.concatenate(
         [
-            np.sqrt(fit.weight(i, rows[i]))[:, None] * _columns(own, fit.models[i], values, sizes)
-            for (i, own), values in zip(logs, terms, strict=True)
+            np.sqrt(fit.weight(i, rows[i]))[:, None] * changed
+            for (i, _), changed in zip(logs, each, strict=True)
         ]
     )
-    named = [Term(g, CHANNELS[a], f, s) for (g, f), s in sizes.items() for a in range(3)]
     before = np.linalg.norm(columns, axis=0)
     if free.shape[1]:
         basis = np.linalg.qr(free)[0]
         columns = columns - basis @ (basis.T @ columns)
     keep = np.linalg.norm(columns, axis=0) > LEFT_OVER * np.maximum(before, 1e-12)
     keep &= before > 1e-9
-    named = [t for t, k in zip(named, keep, strict=True) if k]
+    terms = [t for t, k in zip(terms, keep, strict=True) if k]
     products = _Products(columns[:, keep], left, blocks)
-    return _verdict(named, products, float(left @ left), known)
+    return _verdict(terms, products, float(left @ left), known)
 
 
 def _verdict(
@@ -238,8 +210,7 @@ def _best_term(terms: list[Term], products: "_Products", group: str) -> tuple[Te
     energy = np.diag(products.grams.sum(0))[own] + 1.0
     best = int(np.argmax(moment**2 / energy))
     term = terms[own[best]]
-    typical = TYPICAL[CHANNELS.index(term.adds_to)] / term.size
-    return term, float(moment[best] / energy[best] * typical)
+    return term, float(moment[best] / energy[best] * term.strength)
 
 
 class _Products:
@@ -271,150 +242,3 @@ class _Products:
             gain += 2 * np.sum(moments[:, test].sum(1) * fitted, axis=1)
             gain -= np.sum(fitted @ grams[test].sum(0) * fitted, axis=1)
         return float(gain[0]), gain[1:]
-
-
-def _terms_of(
-    logs: list[tuple[int, Opened]], fit: ScoreFit
-) -> tuple[list[dict], dict[tuple[str, str], float]]:
-    """Values (N,) of each term in each log, and one size of each term for all logs."""
-    middles = _middles([own for _, own in logs])
-    values = [_named_terms(own, fit.models[i], middles) for i, own in logs]
-    sizes = {}
-    for key in [k for k in values[0] if all(k in v for v in values)]:
-        every = np.concatenate([v[key] for v in values])
-        # What all but the largest are below; of rare ones, which that would call nothing, the RMS.
-        large = float(np.percentile(np.abs(every), 95))
-        sizes[key] = max(large, float(np.sqrt(np.mean(every**2))), 1e-9)
-    return values, sizes
-
-
-def _middles(opened: Sequence[Opened]) -> dict[str, float]:
-    """Of place, time and voltage over all logs, to four digits, as a formula has them."""
-    parts: dict[str, list[np.ndarray]] = {"x": [], "y": [], "t": [], "V": []}
-    for own in opened:
-        response = own.floor.response
-        parts["x"].append(response.pose[:, 0])
-        parts["y"].append(response.pose[:, 1])
-        parts["t"].append(response.middle_s)
-        parts["V"].append(np.nan_to_num(own.measurement.track.battery_V))
-    return {name: float(f"{np.mean(np.concatenate(p)):.4g}") for name, p in parts.items()}
-
-
-def _columns(own: Opened, model: native.Model, terms: dict, sizes: dict) -> np.ndarray:
-    """(R, 3 T) change of the rows by each term at typical strength in each body axis."""
-    response = own.floor.response
-    velocity = body_velocity_at(own.data, model, response.points)
-    values = np.stack([terms[key] / sizes[key] for key in sizes], axis=-1)
-    parts = [
-        _displaced(response, velocity, TYPICAL[axis] * values, axis) for axis in range(3)
-    ]  # each (W, H, 3, T)
-    columns = np.stack(parts, axis=-1) * np.nan_to_num(own.data.weight)[..., None, None]
-    return columns.reshape(-1, values.shape[1] * 3)
-
-
-def _displaced(
-    response: Response, velocity: np.ndarray, values: np.ndarray, axis: int
-) -> np.ndarray:
-    """(W, H, 3, T) change of windows' displacements by (N, T) velocities in a body axis, linear."""
-    step, heading = response.step_s[:, None], response.heading_rad
-    c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
-    start, ends = response.starts, np.maximum(response.ends, 0)
-    if axis < 2:
-        along = (c, s) if axis == 0 else (-s, c)
-        x, y = (np.cumsum(a * step * values, axis=0) for a in along)
-        dx, dy = x[ends] - x[start][:, None], y[ends] - y[start][:, None]
-        turn = np.zeros_like(dx)
-    else:
-        angle = np.cumsum(step * values, axis=0)
-        middle = angle - step * values / 2
-        wx = -(s[:, 0] * velocity[:, 0] + c[:, 0] * velocity[:, 1])[:, None] * step
-        wy = (c[:, 0] * velocity[:, 0] - s[:, 0] * velocity[:, 1])[:, None] * step
-        x, y = np.cumsum(middle * wx, axis=0), np.cumsum(middle * wy, axis=0)
-        ox, oy = np.cumsum(wx, axis=0), np.cumsum(wy, axis=0)
-        first = angle[start][:, None]
-        dx = x[ends] - x[start][:, None] - first * (ox[ends] - ox[start][:, None])
-        dy = y[ends] - y[start][:, None] - first * (oy[ends] - oy[start][:, None])
-        turn = angle[ends] - first
-    track = response.data.measurement.track
-    at = np.nan_to_num(track.heading_smooth[response.data.windows.starts])
-    ch, sh = np.cos(at)[:, None, None], np.sin(at)[:, None, None]
-    return np.stack([ch * dx + sh * dy, -sh * dx + ch * dy, turn], axis=2)
-
-
-def _named_terms(
-    own: Opened, model: native.Model, middles: Mapping[str, float]
-) -> dict[tuple[str, str], np.ndarray]:
-    """(group, formula) to values (N,) at the response's points."""
-    response, track = own.floor.response, own.measurement.track
-    velocity = body_velocity_at(own.data, model, response.points)
-    vx, vy, turn = np.where(np.abs(velocity) < STILL, 0.0, velocity).T
-    theta, t_s = response.heading_rad, response.middle_s
-    x, y = response.pose[:, 0], response.pose[:, 1]
-    voltage = command_at(t_s, track.command_t_s, np.nan_to_num(track.battery_V)[:, None])[:, 0]
-    moving = (np.hypot(vx, vy) + 0.1 * np.abs(turn) > 0.01) * 1.0
-    change = [_rate(v, response.step_s) for v in (vx, vy, turn)]
-    terms = {
-        ("direction of rotation", "abs(vx)"): np.abs(vx),
-        ("direction of rotation", "abs(vy)"): np.abs(vy),
-        ("direction of rotation", "abs(omega)"): np.abs(turn),
-        ("speed", "vx*abs(vx)"): vx * np.abs(vx),
-        ("speed", "vy*abs(vy)"): vy * np.abs(vy),
-        ("speed", "omega*abs(omega)"): turn * np.abs(turn),
-        ("speed", "sign(vx)"): np.tanh(vx / 0.02),
-        ("speed", "sign(vy)"): np.tanh(vy / 0.02),
-        ("speed", "sign(omega)"): np.tanh(turn / 0.1),
-        ("coupling of the axes", "vx*omega"): vx * turn,
-        ("coupling of the axes", "vy*omega"): vy * turn,
-        ("coupling of the axes", "vx*vy"): vx * vy,
-        ("coupling of the axes", "vx*abs(omega)"): vx * np.abs(turn),
-        ("coupling of the axes", "vx*abs(vy)"): vx * np.abs(vy),
-        ("coupling of the axes", "vy*abs(vx)"): vy * np.abs(vx),
-        ("coupling of the axes", "vy*abs(omega)"): vy * np.abs(turn),
-        ("coupling of the axes", "omega*abs(vx)"): turn * np.abs(vx),
-        ("coupling of the axes", "omega*abs(vy)"): turn * np.abs(vy),
-        (CHANGE, "dvx"): change[0],
-        (CHANGE, "dvy"): change[1],
-        (CHANGE, "domega"): change[2],
-        (CHANGE, "abs(dvx)"): np.abs(change[0]),
-        (CHANGE, "abs(dvy)"): np.abs(change[1]),
-        (CHANGE, "abs(domega)"): np.abs(change[2]),
-    }
-    speeds = (("vx", vx), ("vy", vy), ("omega", turn))
-    for name, values in speeds:
-        term = _after_reversal(values, t_s)
-        if term.any():
-            terms["reversals", f"after_reversal({name})"] = term
-    if np.ptp(theta) > 0.1:
-        for n in (1, 2, 3):
-            for name, wave in (("cos", np.cos(n * theta)), ("sin", np.sin(n * theta))):
-                for carrier, values in (("moves", moving), *speeds):
-                    terms["heading", f"{name}({n}*theta)*{carrier}"] = wave * values
-    for group, name, values in (
-        ("place", "x", x), ("place", "y", y), ("time", "t", t_s), ("battery voltage", "V", voltage)
-    ):  # fmt: skip
-        if np.ptp(values) <= 0:
-            continue
-        away = values - middles[name]
-        text = f"({name} - {middles[name]:g})"
-        for carrier, speed in speeds:
-            terms[group, f"{text}*{carrier}"] = away * speed
-            if group == "place":
-                terms[group, f"{text}*{text}*{carrier}"] = away**2 * speed
-    return terms
-
-
-def _rate(values: np.ndarray, step_s: np.ndarray) -> np.ndarray:
-    """Rate of change; zero where a stretch begins."""
-    rate = np.diff(values, prepend=values[0]) / np.where(step_s > 0, step_s, np.inf)
-    return rate
-
-
-def _after_reversal(speed: np.ndarray, t_s: np.ndarray) -> np.ndarray:
-    """Direction of a motion that was turned round, fading with the time since; 0 before any."""
-    place = np.arange(len(speed))
-    last = np.maximum.accumulate(np.where(speed != 0, place, 0))
-    sign = np.sign(speed[last])
-    turned = np.concatenate([[False], (sign[1:] * sign[:-1]) < 0])
-    since_s = t_s - t_s[np.maximum.accumulate(np.where(turned, place, 0))]
-    begun = np.cumsum(turned) > 0
-    return np.where(begun, sign * np.exp(-since_s / REVERSAL_S), 0.0)

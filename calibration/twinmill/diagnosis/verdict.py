@@ -52,7 +52,7 @@ class Weighed:
             return "ambiguous" if top.group else "effect_missing"
         if self._outside or self.rest.moments or (self.effects and self._noise_outweighs):
             return "outside_catalogue"
-        if self._left_in_the_dark:
+        if self._left_in_the_dark or self.noises:
             return "cannot_tell"
         if self._stale and not self.silent and not self._instead:
             return "refit_enough"
@@ -86,6 +86,8 @@ class Weighed:
     @property
     def _outside(self) -> bool:
         """Something is left that no effect takes: it depends on something, or it is much."""
+        if self.noises and self._continuous:
+            return True
         if self.last <= GOOD * self.known:
             return False
         return bool(self._continuous) or self.last > WORSE * self.known
@@ -112,6 +114,11 @@ class Weighed:
             return (
                 f"The model misses by more than the noise (score {self.last:.2f}), and these logs "
                 "do not tell why: no effect and no formula that was tried takes it."
+            )
+        if verdict == "cannot_tell" and self.noises:
+            return (
+                "Nothing is missing that follows from the commands, but the motion is far less "
+                "regular than the model file says, and these logs do not tell why."
             )
         if verdict == "cannot_tell" and self.last > MISSING:
             return f"Nothing new is missing that these logs would show.{self._as_before}"

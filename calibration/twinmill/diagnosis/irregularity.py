@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How much less regular a log's motion is than the noise in the model file says.
+
+The floor of a log is what no smooth response to its commands follows. Where that is far above the
+disturbance that the model file states, something is there that such a response cannot follow
+either: play, joints between tiles, drop-outs, or more noise.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.fitting.opening import Opened
+from twinmill.predict.noise import ChannelNoise, Noise
+from twinmill.predict.windows import HORIZONS_S, rms
+
+IRREGULAR = 2.2  # floor over what the model file's noise makes, beyond which it is a finding
+
+
+def notes_on(
+    opened: Sequence[Opened], noises: Sequence[Noise | None], model: native.Model
+) -> list[str]:
+    """A sentence for each log that is far less regular than the model's noise says.
+
+    Args:
+        opened: logs over their floors; tables have no noise.
+        noises: that each shows.
+        model: what it states of the disturbance was told by another log.
+    """
+    if model.get("noise.drive_mps") <= 0:
+        return []
+    notes = []
+    for own, noise in zip(opened, noises, strict=True):
+        ratio = irregularity(own, noise, model) if noise and own.data else 0.0
+        if ratio > IRREGULAR:
+            notes.append(
+                f"{own.measurement.label}: what no smooth response to the commands follows is "
+                f"{ratio:.1f} times what the noise in the model file makes (more random "
+                "disturbance, slipping wheels, play in the gears or a rough floor may be)."
+            )
+    return notes
+
+
+def irregularity(own: Opened, noise: Noise, model: native.Model) -> float:
+    """Floor of a log over what the sensor's noise and the model's disturbance make.
+
+    The largest of the three channels, each the geometric mean over horizons. The sensor's noise is
+    the log's own. A turn by the disturbance moves the robot sideways, by a third of its square.
+    """
+    position, heading = (
+        ChannelNoise(sensor, model.get(f"noise.{drive}"), model.get(f"noise.{memory}"))
+        for sensor, drive, memory in (
+            (noise.position.sensor, "drive_mps", "drive_s"),
+            (noise.heading.sensor, "drive_radps", "drive_turn_s"),
+        )
+    )
+    horizons_s = np.array(HORIZONS_S)
+    along, turn = position.displaced(horizons_s), heading.displaced(horizons_s)
+    way_m = rms(own.data.measured)[:, 0]
+    usual = np.sqrt(np.column_stack([along, along + way_m**2 * turn / 3, turn]))
+    with np.errstate(invalid="ignore"):
+        over = np.log(own.floor.rms / usual)
+    known = np.isfinite(over).any(axis=0)
+    return float(np.exp(np.nanmean(over[:, known], axis=0).max())) if known.any() else 0.0

@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Candidate formulas without physics names: what the velocity of a body or of a wheel may lack.
+
+Of the body: terms in its velocity, its changes, heading, place, time and voltage. Of a wheel: terms
+in its command. Each comes with how the rows of a fit change by it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.track import command_at
+from twinmill.fitting.floor import body_velocity_at
+from twinmill.fitting.opening import Opened
+from twinmill.fitting.response import Response
+from twinmill.model.parameters import effect_names, words
+
+STILL = (0.002, 0.002, 0.01)  # m/s, m/s, rad/s: below it an axis does not move; wheels differ
+CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
+# m/s, m/s, rad/s, m/s: what a term of full size may add.
+TYPICAL = {"vx_mps": 0.01, "vy_mps": 0.01, "omega_radps": 0.05, "rim_mps": 0.01}
+# Rates, voltage, history: not at hand in a body's formula.
+NO_NAMES = {"dvx", "dvy", "domega", "V", "after_reversal"}
+CHANGE = "change of the command"
+REVERSAL_S = 0.15  # how long a reversal is felt
+# Of one wheel's command, with its half `h`; in proportion to u is a wheel's gain.
+SHAPES = ("u*abs(u)", "abs(u)", "sign(u)*max(0, abs(u) - h)")
+
+
+@dataclass(frozen=True)
+class Term:
+    """One candidate formula: adds p0 times `formula` to a velocity of the body or of a rim.
+
+    Attributes:
+        group: what it depends on.
+        adds_to, formula: as the effect `equation` takes them, but for names in NO_NAMES.
+        size: of the formula's values, 95th percentile.
+    """
+
+    group: str
+    adds_to: str
+    formula: str
+    size: float
+
+    @property
+    def addable(self) -> bool:
+        """The effect `equation` knows all its names."""
+        return not words(self.formula) & NO_NAMES
+
+    @property
+    def strength(self) -> float:
+        """p0 at which the term adds what is typical."""
+        return TYPICAL[self.adds_to] / self.size
+
+
+def library(
+    opened: Sequence[Opened], models: Sequence[native.Model]
+) -> tuple[list[Term], list[np.ndarray]]:
+    """Terms, and (R, T) change of the rows of each log by each at its strength.
+
+    Args:
+        opened: logs over their floors.
+        models: with what was found, one for each.
+    """
+    middles = _middles(opened)
+    pairs = list(zip(opened, models, strict=True))
+    values = [_named_terms(own, model, middles) for own, model in pairs]
+    sizes = _sizes(values)
+    terms = [Term(g, CHANNELS[a], f, s) for (g, f), s in sizes.items() for a in range(3)]
+    of_wheels = _wheel_terms(opened, models[0])
+    columns = [
+        np.hstack([_body_columns(own, model, v, sizes), _wheel_columns(own, model, of_wheels)])
+        for (own, model), v in zip(pairs, values, strict=True)
+    ]
+    return terms + of_wheels, columns
+
+
+def _sizes(values: list[dict]) -> dict[tuple[str, str], float]:
+    """One size of each term for all logs."""
+    sizes = {}
+    for key in [k for k in values[0] if all(k in v for v in values)]:
+        every = np.concatenate([v[key] for v in values])
+        # What all but the largest are below; of rare ones, which that would call nothing, the RMS.
+        large = float(np.percentile(np.abs(every), 95))
+        sizes[key] = max(large, float(np.sqrt(np.mean(every**2))), 1e-9)
+    return sizes
+
+
+def _middles(opened: Sequence[Opened]) -> dict[str, float]:
+    """Of place, time and voltage over all logs, to four digits, as a formula has them."""
+    parts: dict[str, list[np.ndarray]] = {"x": [], "y": [], "t": [], "V": []}
+    for own in opened:
+        response = own.floor.response
+        parts["x"].append(response.pose[:, 0])
+        parts["y"].append(response.pose[:, 1])
+        parts["t"].append(response.middle_s)
+        parts["V"].append(np.nan_to_num(own.measurement.track.battery_V))
+    return {name: float(f"{np.mean(np.concatenate(p)):.4g}") for name, p in parts.items()}
+
+
+def _body_columns(own: Opened, model: native.Model, terms: dict, sizes: dict) -> np.ndarray:
+    """(R, 3 T) change of the rows by each term in each body axis."""
+    response = own.floor.response
+    velocity = body_velocity_at(own.data, model, response.points)
+    values = np.stack([terms[key] / sizes[key] for key in sizes], axis=-1)
+    parts = [
+        _displaced(response, velocity, TYPICAL[channel] * values, axis)
+        for axis, channel in enumerate(CHANNELS)
+    ]  # each (W, H, 3, T)
+    columns = np.stack(parts, axis=-1) * np.nan_to_num(own.data.weight)[..., None, None]
+    return columns.reshape(-1, values.shape[1] * 3)
+
+
+def _wheel_terms(opened: Sequence[Opened], model: native.Model) -> list[Term]:
+    """Of each wheel that has a command of its own."""
+    if model.drive not in ("duty", "wheel_speed"):
+        return []
+    command = np.abs(np.concatenate([own.measurement.track.command for own in opened]))
+    largest = float(np.percentile(command, 95))
+    if largest <= 0:
+        return []
+    sides = {}
+    for wheel in model.wheels():
+        side, named = f"left {_sign(wheel['y_m'])}", wheel["words"]
+        if model.wheel_kind == "differential":  # both wheels of a side have one command
+            named = f"{'left' if wheel['y_m'] > 0 else 'right'} wheels"
+        else:
+            side += f" && front {_sign(wheel['x_m'])}"
+        sides[side] = f"command of the {named}"
+    half = f"{largest / 2:.4g}"
+    sizes = (largest**2, largest, largest / 2)
+    return [
+        Term(group, "rim_mps", f"({side} ? {shape.replace('h', half)} : 0)", size)
+        for side, group in sides.items()
+        for shape, size in zip(SHAPES, sizes, strict=True)
+    ]
+
+
+def _sign(place_m: float) -> str:
+    return "> 0" if place_m > 1e-9 else "< 0" if place_m < -1e-9 else "== 0"
+
+
+def _wheel_columns(own: Opened, model: native.Model, terms: Sequence[Term]) -> np.ndarray:
+    """(R, T) change of the rows by each term of a wheel, by the plant itself."""
+    columns = []
+    for term in terms:
+        with_it = model.copy()
+        texts = {"adds_to": term.adds_to, "formula": f"p0*{term.formula}"}
+        with_it.add_effect("equation", texts)
+        name = f"{effect_names(with_it)[-1]}.p0"
+        before, after = own.data.rows(with_it, [name], np.array([[0.0], [term.strength]]))
+        columns.append(before - after)
+    return np.array(columns).T.reshape(-1, len(terms))
+
+
+def _displaced(
+    response: Response, velocity: np.ndarray, values: np.ndarray, axis: int
+) -> np.ndarray:
+    """(W, H, 3, T) change of windows' displacements by (N, T) velocities in a body axis, linear."""
+    step, heading = response.step_s[:, None], response.heading_rad
+    c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
+    start, ends = response.starts, np.maximum(response.ends, 0)
+    if axis < 2:
+        along = (c, s) if axis == 0 else (-s, c)
+        x, y = (np.cumsum(a * step * values, axis=0) for a in along)
+        dx, dy = x[ends] - x[start][:, None], y[ends] - y[start][:, None]
+        turn = np.zeros_like(dx)
+    else:
+        angle = np.cumsum(step * values, axis=0)
+        middle = angle - step * values / 2
+        wx = -(s[:, 0] * velocity[:, 0] + c[:, 0] * velocity[:, 1])[:, None] * step
+        wy = (c[:, 0] * velocity[:, 0] - s[:, 0] * velocity[:, 1])[:, None] * step
+        x, y = np.cumsum(middle * wx, axis=0), np.cumsum(middle * wy, axis=0)
+        ox, oy = np.cumsum(wx, axis=0), np.cumsum(wy, axis=0)
+        first = angle[start][:, None]
+        dx = x[ends] - x[start][:, None] - first * (ox[ends] - ox[start][:, None])
+        dy = y[ends] - y[start][:, None] - first * (oy[ends] - oy[start][:, None])
+        turn = angle[ends] - first
+    track = response.data.measurement.track
+    at = np.nan_to_num(track.heading_smooth[response.data.windows.starts])
+    ch, sh = np.cos(at)[:, None, None], np.sin(at)[:, None, None]
+    return np.stack([ch * dx + sh * dy, -sh * dx + ch * dy, turn], axis=2)
+
+
+def _named_terms(
+    own: Opened, model: native.Model, middles: Mapping[str, float]
+) -> dict[tuple[str, str], np.ndarray]:
+    """(group, formula) to values (N,) at the response's points."""
+    response, track = own.floor.response, own.measurement.track
+    velocity = body_velocity_at(own.data, model, response.points)
+    vx, vy, turn = np.where(np.abs(velocity) < STILL, 0.0, velocity).T
+    theta, t_s = response.heading_rad, response.middle_s
+    x, y = response.pose[:, 0], response.pose[:, 1]
+    voltage = command_at(t_s, track.command_t_s, np.nan_to_num(track.battery_V)[:, None])[:, 0]
+    moving = (np.hypot(vx, vy) + 0.1 * np.abs(turn) > 0.01) * 1.0
+    change = [_rate(v, response.step_s) for v in (vx, vy, turn)]
+    terms = {
+        ("direction of rotation", "abs(vx)"): np.abs(vx),
+        ("direction of rotation", "abs(vy)"): np.abs(vy),
+        ("direction of rotation", "abs(omega)"): np.abs(turn),
+        ("speed", "vx*abs(vx)"): vx * np.abs(vx),
+        ("speed", "vy*abs(vy)"): vy * np.abs(vy),
+        ("speed", "omega*abs(omega)"): turn * np.abs(turn),
+        ("speed", "sign(vx)"): np.tanh(vx / 0.02),
+        ("speed", "sign(vy)"): np.tanh(vy / 0.02),
+        ("speed", "sign(omega)"): np.tanh(turn / 0.1),
+        ("coupling of the axes", "vx*omega"): vx * turn,
+        ("coupling of the axes", "vy*omega"): vy * turn,
+        ("coupling of the axes", "vx*vy"): vx * vy,
+        ("coupling of the axes", "vx*abs(omega)"): vx * np.abs(turn),
+        ("coupling of the axes", "vx*abs(vy)"): vx * np.abs(vy),
+        ("coupling of the axes", "vy*abs(vx)"): vy * np.abs(vx),
+        ("coupling of the axes", "vy*abs(omega)"): vy * np.abs(turn),
+        ("coupling of the axes", "omega*abs(vx)"): turn * np.abs(vx),
+        ("coupling of the axes", "omega*abs(vy)"): turn * np.abs(vy),
+        (CHANGE, "dvx"): change[0],
+        (CHANGE, "dvy"): change[1],
+        (CHANGE, "domega"): change[2],
+        (CHANGE, "abs(dvx)"): np.abs(change[0]),
+        (CHANGE, "abs(dvy)"): np.abs(change[1]),
+        (CHANGE, "abs(domega)"): np.abs(change[2]),
+    }
+    speeds = (("vx", vx), ("vy", vy), ("omega", turn))
+    for name, values in speeds:
+        term = _after_reversal(values, t_s)
+        if term.any():
+            terms["reversals", f"after_reversal({name})"] = term
+    if np.ptp(theta) > 0.1:
+        for n in (1, 2, 3):
+            for name, wave in (("cos", np.cos(n * theta)), ("sin", np.sin(n * theta))):
+                for carrier, values in (("moves", moving), *speeds):
+                    terms["heading", f"{name}({n}*theta)*{carrier}"] = wave * values
+    for group, name, values in (
+        ("place", "x", x), ("place", "y", y), ("time", "t", t_s), ("battery voltage", "V", voltage)
+    ):  # fmt: skip
+        if np.ptp(values) <= 0:
+            continue
+        away = values - middles[name]
+        text = f"({name} - {middles[name]:g})"
+        for carrier, speed in speeds:
+            terms[group, f"{text}*{carrier}"] = away * speed
+            if group == "place":
+                terms[group, f"{text}*{text}*{carrier}"] = away**2 * speed
+    return terms
+
+
+def _rate(values: np.ndarray, step_s: np.ndarray) -> np.ndarray:
+    """Rate of change; zero where a stretch begins."""
+    rate = np.diff(values, prepend=values[0]) / np.where(step_s > 0, step_s, np.inf)
+    return rate
+
+
+def _after_reversal(speed: np.ndarray, t_s: np.ndarray) -> np.ndarray:
+    """Direction of a motion that was turned round, fading with the time since; 0 before any."""
+    place = np.arange(len(speed))
+    last = np.maximum.accumulate(np.where(speed != 0, place, 0))
+    sign = np.sign(speed[last])
+    turned = np.concatenate([[False], (sign[1:] * sign[:-1]) < 0])
+    since_s = t_s - t_s[np.maximum.accumulate(np.where(turned, place, 0))]
+    begun = np.cumsum(turned) > 0
+    return np.where(begun, sign * np.exp(-since_s / REVERSAL_S), 0.0)
