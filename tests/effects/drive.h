@@ -116,9 +116,11 @@ constexpr Wheels kTurnLeft{-1, 1, -1, 1}, kStrafeLeft{-1, 1, 1, -1};
 constexpr double kFull_mps = 0.36;          // rim speed of the default model at full duty
 constexpr double kLever_m = 0.059 + 0.067;  // its half wheelbase plus half track
 
-// `model` with one more effect; parameters without a value stay neutral.
+// `model` with one more effect, driven as the effect asks; parameters without a value stay neutral.
 inline Model With(const std::string &effect, const std::vector<double> &values, Model model = {})
 {
+    if (!(FindEffect(effect)->card.drives & static_cast<unsigned>(model.base.drive)))
+        model.base.drive = Drive::kTwist;
     model.AddEffect(effect);
     for (size_t i = 0; i < values.size(); ++i)
         model.effects.back().parameters[i].value = values[i];

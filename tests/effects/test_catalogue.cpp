@@ -339,9 +339,11 @@ Model Noisy()
 TEST_P(EveryEffect, AtNeutralLeavesAWholeDriveAlone)
 {
     Random random_a(1, 0, "drive_noise"), random_b(1, 0, "drive_noise");
-    Player plain(Noisy(), 0.022, {}, &random_a);
-    Player neutral(With(GetParam()->card.name, Neutral(*GetParam()), Noisy()), 0.022, {},
-                   &random_b);
+    const Model with_it = With(GetParam()->card.name, Neutral(*GetParam()), Noisy());
+    Model without = with_it;
+    without.RemoveEffect(0);
+    Player plain(without, 0.022, {}, &random_a);
+    Player neutral(with_it, 0.022, {}, &random_b);
     PlayMedley(plain);
     PlayMedley(neutral);
     ExpectSame(plain.state, neutral.state);

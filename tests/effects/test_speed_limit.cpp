@@ -10,9 +10,7 @@ namespace
 
 Player Limited(double limit_mps)
 {
-    Model model = With("speed_limit", {1 / limit_mps});
-    model.base.drive = Drive::kTwist;
-    return Player(model, 0.02);
+    return Player(With("speed_limit", {1 / limit_mps}), 0.02);
 }
 
 TEST(SpeedLimit, CutsSpeedAndKeepsDirectionAndTurnRate)

@@ -2,6 +2,7 @@
 // Names, values and per-robot copies of a model; parse.cpp reads the file.
 #include "model_file/model.h"
 
+#include <algorithm>
 #include <optional>
 #include <stdexcept>
 
@@ -117,7 +118,11 @@ void Model::Set(const std::string &name, double value)
 std::string Model::WhyNot(const EffectSpec &spec) const
 {
     if (!(spec.card.drives & static_cast<unsigned>(base.drive)))
-        return "acts on wheel duties, and this model's robot is not driven by duties";
+        return spec.card.drives == kDutyOnly
+                   ? "acts on wheel duties, and this model's robot is not driven by duties"
+                   : "acts on commanded velocities, and this model's robot is driven by others";
+    if (base.wheels == WheelKind::kNone && std::ranges::any_of(spec.parameters, IsPerWheel))
+        return "acts on single wheels, and base.wheels of this model is \"none\"";
     if (spec.needs_sides && base.wheels == WheelKind::kOmni3)
         return "acts on left and right wheels, and an omni3 robot has none";
     return "";

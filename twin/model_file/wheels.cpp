@@ -59,12 +59,12 @@ Parameter Made(const ParameterSpec &spec, const Wheel &wheel)
     return p;
 }
 
+}  // namespace
+
 bool IsPerWheel(const ParameterSpec &spec)
 {
     return std::string(spec.name).find("{wheel}") != std::string::npos;
 }
-
-}  // namespace
 
 double Wheel::grip_x() const
 {

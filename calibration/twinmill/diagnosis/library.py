@@ -144,15 +144,15 @@ def _sign(place_m: float) -> str:
 
 def _wheel_columns(own: Opened, model: native.Model, terms: Sequence[Term]) -> np.ndarray:
     """(R, T) change of the rows by each term of a wheel, by the plant itself."""
-    columns = []
-    for term in terms:
+    columns = np.zeros((own.data.measured.size, len(terms)))
+    for k, term in enumerate(terms):
         with_it = model.copy()
         texts = {"adds_to": term.adds_to, "formula": f"p0*{term.formula}"}
         with_it.add_effect("equation", texts)
         name = f"{effect_names(with_it)[-1]}.p0"
         before, after = own.data.rows(with_it, [name], np.array([[0.0], [term.strength]]))
-        columns.append(before - after)
-    return np.array(columns).T.reshape(-1, len(terms))
+        columns[:, k] = before - after
+    return columns
 
 
 def _displaced(

@@ -159,7 +159,7 @@ def _attempt(before: Trial, name: str) -> Trial:
     model = before.state.model
     free = tuple(replace(p, usual=1.0, std=WIDE_STD) for p in base_parameters(model, GAINS))
     state = replace(before.state, free=free)
-    fit = ScoreFit(state.datasets, state.models, free).fit()
+    fit = ScoreFit(state.datasets, state.models, free, state.by_channel).fit()
     evidence = before.fit.held_cost - fit.held_cost
     return Trial(("gains",), fit, replace(state, models=fit.models), evidence, evidence, 0.0)
 

@@ -50,6 +50,9 @@ std::vector<Wheel> DrivenWheels(const Robot &robot, WheelKind kind);
 
 const char *WheelKindName(WheelKind kind);
 
+// One parameter for each driven wheel.
+bool IsPerWheel(const ParameterSpec &spec);
+
 // The parameters of an effect for a robot with these wheels, at their neutral values.
 std::vector<Parameter> ParametersFor(const EffectSpec &spec, const std::vector<Wheel> &wheels);
 
