@@ -10,7 +10,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import Sheet
 from twinmill.diagnosis.detections.merge import with_bits
 from twinmill.diagnosis.encoders import geometry_notes, time_base_notes
-from twinmill.diagnosis.findings import findings_of, lateness, ranking_of
+from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_lag
 from twinmill.diagnosis.irregularity import notes_on
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
 from twinmill.diagnosis.resolution import resolutions
@@ -170,6 +170,7 @@ def _concluded(
     hashes = [o.measurement.log_sha256 for o in known]
     start, last = done.rounds[0].before, done.last
     findings, chain = findings_of(done, first)
+    findings = with_stale_lag(findings, last.state.model, model_file.lag_std_s(hashes))
     rest = rest_of(known, last.fit, start.held_score, last.held_score, model_file.left_over(hashes))
     models = zip(known, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.diagnosis.constancy import Change, changes_of
 from twinmill.diagnosis.search import REFIT, Round, Search, State, Trial, fitted, grown, without
@@ -14,6 +15,7 @@ from twinmill.predict.windows import HORIZONS_S
 
 HORIZON = HORIZONS_S.index(0.5)
 MISSES = 1.5  # score of a final model whose errors are not noise
+WITHIN = 2.0  # standard deviations: a lag that differs by less is the model's own error
 BEYOND = 3.0  # usual sizes: a larger value is doubtful
 DELAY, CLOCK_OFF, MOTOR_LAG = "input_delay", "clock_offset", "motor_lag"
 
@@ -118,6 +120,31 @@ def findings_of(done: Search, first: State) -> tuple[list[Finding], list[tuple[s
         share = float(np.clip((errors[k] - errors[k + 1]) / excess, 0.0, 1.0))
         found.append(_finding(done, name, share, changes))
     return found, [(n, t.held_score) for n, t in zip(names, chain[1:], strict=True)]
+
+
+def with_stale_lag(
+    found: Sequence[Finding], model: native.Model, lag_std_s: float
+) -> list[Finding]:
+    """Findings in which a lag that the model may well have by its own error is a stale number.
+
+    Args:
+        found: in the order of worth.
+        model: the final one.
+        lag_std_s: how well the model's lag was known.
+    """
+    own = next((f for f in found if f.effect == MOTOR_LAG and not f.group), None)
+    if own is None or lag_std_s <= 0:
+        return list(found)
+    extra = own.parameters[0]
+    if abs(extra.value) > WITHIN * np.hypot(extra.std, lag_std_s):
+        return list(found)
+    lag = replace(extra, name=LAG, value=model.get(LAG) + extra.value)
+    stale = next((f for f in found if f.effect == REFIT), None)
+    if stale is None:
+        as_refit = Finding(REFIT, None, [lag], own.share, "sure")
+        return [as_refit if f is own else f for f in found]
+    whole = replace(stale, parameters=[*stale.parameters, lag], share=stale.share + own.share)
+    return [whole if f is stale else f for f in found if f is not own]
 
 
 def _from_final(state: State, last: Trial) -> Trial:

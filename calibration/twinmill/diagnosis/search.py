@@ -37,6 +37,7 @@ class Settings:
     Attributes:
         evidence: least fall of the held-out cost (twice a log likelihood ratio) of one addition ...
         without_best: ... and without the block that speaks loudest for it.
+        without_visit: the same for an effect of a place, which speaks where the robot comes by.
         less_evidence, blocks_t: the same where what the model lacks besides drowns the evidence,
             and blocks agree: t of the relative fall over blocks.
         worth: least share of the first excess that one takes, in a single data set ...
@@ -54,6 +55,7 @@ class Settings:
 
     evidence: float = 16.0
     without_best: float = 8.0
+    without_visit: float = 4.0
     less_evidence: float = 9.0
     blocks_t: float = 3.7
     worth: float = 0.01
@@ -70,7 +72,7 @@ class Settings:
     def stricter(self, times: float) -> "Settings":
         """The same with so many times the evidence."""
         times = min(max(times, 1.0), STRICTEST)
-        raised = ("evidence", "without_best", "less_evidence")
+        raised = ("evidence", "without_best", "without_visit", "less_evidence")
         return replace(self, **{k: times * getattr(self, k) for k in raised})
 
 
@@ -307,7 +309,9 @@ def _proven(trial: Trial, settings: Settings) -> bool:
     """Enough evidence, and blocks that agree."""
     count = len(trial.names)
     loud = trial.evidence >= settings.evidence * count
-    spread = trial.without_best >= settings.without_best * count
+    somewhere = count == 1 and _has_place(trial.names[0])
+    least = settings.without_visit if somewhere else settings.without_best
+    spread = trial.without_best >= least * count
     agreed = (
         trial.evidence >= settings.less_evidence * count and trial.blocks_t >= settings.blocks_t
     )

@@ -62,6 +62,19 @@ class ModelFile:
             )
         return told
 
+    def lag_std_s(self, log_sha256: Collection[str]) -> float:
+        """How well other logs told the lag; 0 where none did."""
+        if not self.told_by_others(log_sha256):
+            return 0.0
+        document = tomlkit.parse(self.text)
+        parts = [document["base"].get("std", {}).get("motor_lag_s", 0.0)]
+        parts += [
+            e.get("std", {}).get("extra_s", 0.0)
+            for e in document.get("effect", [])
+            if e["name"] == "motor_lag"
+        ]
+        return math.hypot(*map(float, parts))
+
     def fitted_on(self, log_sha256: Collection[str]) -> bool:
         """Whether the base was fitted to one of these very logs."""
         base = tomlkit.parse(self.text).get("base", {})
