@@ -140,7 +140,7 @@ class Screened:
         columns: (R, k) of all data sets, weighted, what is free projected out.
         gain: expected fall of the cost.
         size: expected fall of the cost if it had its usual strength.
-        start: values that the fit begins at, by name; those of a place are searched.
+        start: values that the fit begins at, by name; those of a place or limit are searched.
     """
 
     name: str
@@ -309,7 +309,7 @@ def _proven(trial: Trial, settings: Settings) -> bool:
     """Enough evidence, and blocks that agree."""
     count = len(trial.names)
     loud = trial.evidence >= settings.evidence * count
-    somewhere = count == 1 and _has_place(trial.names[0])
+    somewhere = count == 1 and _has(trial.names[0], "place")
     least = settings.without_visit if somewhere else settings.without_best
     spread = trial.without_best >= least * count
     agreed = (
@@ -361,7 +361,8 @@ def screen(before: Trial) -> list[Screened]:
     rest = padded - basis @ (basis.T @ padded)
     found = []
     for name in candidates(state):
-        start = _best_place(name, state, rows, weights, rest) if _has_place(name) else {}
+        searched = _has(name, "place") or _has(name, "limit")
+        start = _best_start(name, state, rows, weights, rest) if searched else {}
         found.append(_screened(name, state, rows, weights, basis, rest, start))
     return found
 
@@ -380,16 +381,16 @@ def _widths(name: str, parameters: Sequence[Parameter], start: dict[str, float])
     return np.maximum(std / np.maximum(reach, 1e-12), 1.0)
 
 
-def _has_place(name: str) -> bool:
-    """Whether an effect acts somewhere in the room, so that its place must be searched."""
-    return name != REFIT and any(p["role"] == "place" for p in catalogue()[name]["parameters"])
+def _has(name: str, role: str) -> bool:
+    """Whether an effect has a parameter of this role: its value must be searched."""
+    return name != REFIT and any(p["role"] == role for p in catalogue()[name]["parameters"])
 
 
-def _best_place(
+def _best_start(
     name: str, state: State, rows: list[np.ndarray], weights: list[np.ndarray], rest: np.ndarray
 ) -> dict[str, float]:
-    """Of several places the one where the usual strength explains most."""
-    starts = _places(name, state)
+    """Of several places or limits the one that explains most at the usual strength."""
+    starts = _places(name, state) if _has(name, "place") else _limits(name, state)
     if len(starts) < 2:
         return {}
     gains = np.zeros(len(starts))
@@ -518,6 +519,16 @@ def _places(name: str, state: State) -> list[dict[str, float]]:
                 at = {"x_m": float(x), "y_m": float(y), "radius_m": radius_m}
                 starts.append({f"{instance}.{key}": value for key, value in at.items()})
     return starts or [{}]
+
+
+LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual one
+
+
+def _limits(name: str, state: State) -> list[dict[str, float]]:
+    """Starts of an effect with a limit."""
+    instance = f"{name}#2" if name in state.model.effects else name
+    limits = [p for p in catalogue()[name]["parameters"] if p["role"] == "limit"]
+    return [{f"{instance}.{p['name']}": k * p["default"] for p in limits} for k in LIMITS]
 
 
 def _promising(screened: list[Screened], settings: Settings) -> list[Screened]:

@@ -163,5 +163,28 @@ def test_a_robot_told_velocities_is_seen_to_turn_faster_to_the_left(tmp_path):
     assert parameter.value == pytest.approx(asymmetry, abs=0.02)
 
 
+def test_a_top_speed_of_the_controller_is_no_slip(tmp_path):
+    """Commands above 0.3 m/s are cut to it, in any direction."""
+    random = np.random.default_rng(5)
+    period_s, limit_mps = 0.02, 0.3
+    levels_mps = (-0.5, -0.4, -0.2, -0.1, 0.1, 0.15, 0.25, 0.35, 0.45, 0.5)
+    legs = drive_legs(3000, random, levels_mps, (-1.0, 1.0))
+    speed = np.clip(legs[:, 0], -limit_mps, limit_mps)
+    heading = np.cumsum(legs[:, 1]) * period_s
+    middle = heading - legs[:, 1] * period_s / 2
+    x, y = (np.cumsum(speed * f(middle)) * period_s for f in (np.cos, np.sin))
+    pose = np.column_stack([x, y, heading]) + random.normal(size=(len(x), 3)) * (3e-4, 3e-4, 2e-3)
+    t_s = period_s * np.arange(len(x))
+    write_csv(tmp_path / "c.csv", "t_s,vx_mps,vy_mps,omega_radps",
+              np.column_stack([t_s, legs[:, 0], 0 * t_s, legs[:, 1]]))  # fmt: skip
+    write_csv(tmp_path / "p.csv", "t_s,x_m,y_m,theta_rad", np.column_stack([t_s + period_s, pose]))
+    log = tmp_path / "run.lcmlog"
+    import_log(tmp_path / "p.csv", tmp_path / "c.csv", log, options=ImportOptions(robot_id=2))
+    found = diagnose(load_measurements([log]), model_file(tmp_path, CART))
+    assert found.findings[0].effect == "speed_limit"
+    (pace,) = found.findings[0].parameters
+    assert 1 / pace.value == pytest.approx(limit_mps, abs=0.005)
+
+
 def write_csv(path, header, rows):
     np.savetxt(path, rows, fmt="%.6f", delimiter=",", header=header, comments="")

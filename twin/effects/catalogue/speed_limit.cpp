@@ -26,7 +26,7 @@ constexpr Card kCard = {
 
 constexpr ParameterSpec kParameters[] = {
     {"pace_s_per_m", "s/m", 0, 2, 0, 20, "time for a metre at top speed, 1 / limit; 0: no limit",
-     "does not reach fast commands", "reaches them"},
+     "does not reach fast commands", "reaches them", 2, Role::kLimit},
 };
 
 void Step(DutySignals &s, const Numbers &v, double *)

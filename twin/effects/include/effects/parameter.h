@@ -14,6 +14,7 @@ enum class Role
     kSize,      // how strong the effect is
     kPlace,     // where in the room it acts, how far: a search starts from several places
     kLateness,  // how late a response comes: only the sum with other such parameters is firm
+    kLimit,     // beyond which something happens, with no trace below: a search starts from several
 };
 
 // A row of an effect's table, the only place of the parameter's name, unit and bounds. A name that

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is left over: errors that come again at their place, irregular motion, single wheels."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import twinmill_native as native
+
+from twinmill.diagnosis.findings import Finding, with_stale_lag
+from twinmill.diagnosis.irregularity import IRREGULAR, irregularity
+from twinmill.diagnosis.library import SHAPES, _wheel_terms
+from twinmill.diagnosis.place import HORIZON, comes_again
+from twinmill.diagnosis.search import REFIT
+from twinmill.model.parameters import Estimate
+from twinmill.predict.noise import ChannelNoise, Noise
+from twinmill.predict.windows import HORIZONS_S
+
+EVERY_S, WINDOWS, BLOCK_S = 0.25, 400, 8.0
+
+
+def wander(seed, gain_at):
+    """A log of a robot that wanders over 2 m x 2 m; its ways are longer by `gain_at` (x, y, t)."""
+    random = np.random.default_rng(seed)
+    t_s = EVERY_S * np.arange(WINDOWS + 2)
+    heading = np.cumsum(random.normal(0, 0.5, len(t_s)))
+    step_m = 0.05
+    at = np.zeros((len(t_s), 2))
+    for k in range(1, len(t_s)):
+        ahead = at[k - 1] + step_m * np.array([np.cos(heading[k]), np.sin(heading[k])])
+        if np.abs(ahead).max() > 1:
+            heading[k:] += np.pi - 0.3
+            ahead = at[k - 1] + step_m * np.array([np.cos(heading[k]), np.sin(heading[k])])
+        at[k] = ahead
+    starts = np.arange(WINDOWS)
+    way = np.zeros((WINDOWS, len(HORIZONS_S), 3))
+    way[:, HORIZON, 0] = 2 * step_m
+    middle = (at[starts] + at[starts + 2]) / 2
+    errors = random.normal(0, 0.003, way.shape)
+    errors[:, HORIZON, 0] += 2 * step_m * gain_at(*middle.T, t_s[starts])
+    block = np.repeat((t_s[starts] // BLOCK_S).astype(int), way[0].size)
+    ends = np.tile((starts + 2)[:, None], (1, len(HORIZONS_S)))
+    track = SimpleNamespace(pose=np.column_stack([at, heading]))
+    data = SimpleNamespace(
+        errors=lambda model: errors, measured=way + errors, keep=np.ones(WINDOWS, bool),
+        block=block, windows=SimpleNamespace(starts=starts, ends=ends),
+        measurement=SimpleNamespace(track=track),
+    )  # fmt: skip
+    return SimpleNamespace(data=data, floor=SimpleNamespace(across=errors))
+
+
+def test_joints_between_tiles_come_again_at_their_places():
+    def tiles(x, y, t):
+        return 0.1 * np.sign(np.sin(2 * np.pi * x / 0.6) * np.sin(2 * np.pi * y / 0.6))
+
+    assert comes_again([wander(1, tiles)], [None])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_comes_with_time_or_by_chance_has_no_place(seed):
+    assert not comes_again([wander(seed, lambda x, y, t: 0 * x)], [None])
+    assert not comes_again([wander(seed, lambda x, y, t: 0.1 * np.sin(t / 3))], [None])
+
+
+def test_what_noise_moves_in_a_time_is_the_integral_of_its_disturbance():
+    """Ornstein-Uhlenbeck velocities stepped by hand, 4000 of them."""
+    random, step_s = np.random.default_rng(2), 0.005
+    noise = ChannelNoise(sensor=0.001, drive=0.02, memory_s=0.3)
+    velocity, moved = noise.drive * random.normal(size=4000), 0.0
+    for _ in range(round(1.0 / step_s)):
+        moved = moved + step_s * velocity
+        kick = np.sqrt(2 * step_s / noise.memory_s) * noise.drive
+        velocity = velocity * (1 - step_s / noise.memory_s) + kick * random.normal(size=4000)
+    readings = np.subtract(*random.normal(0, noise.sensor, (2, 4000)))
+    (expected,) = noise.displaced(np.array([1.0]))
+    assert np.var(moved + readings) == pytest.approx(expected, rel=0.1)
+
+
+def test_a_floor_as_the_noise_makes_it_is_regular_and_one_three_times_as_high_is_not():
+    model = native.Model.load("turbopi.toml")
+    channels = [
+        ChannelNoise(s, model.get(f"noise.{d}"), model.get(f"noise.{m}"))
+        for s, d, m in ((3e-4, "drive_mps", "drive_s"), (2e-3, "drive_radps", "drive_turn_s"))
+    ]
+    along, turn = (np.sqrt(c.displaced(np.array(HORIZONS_S))) for c in channels)
+    data = SimpleNamespace(measured=np.zeros((10, len(HORIZONS_S), 3)))
+    floor = np.column_stack([along, along, turn])
+    for times in (1.0, 3.0):
+        own = SimpleNamespace(data=data, floor=SimpleNamespace(rms=times * floor))
+        found = irregularity(own, Noise(*channels), model)
+        assert found == pytest.approx(times)
+        assert (found > IRREGULAR) == (times > 1)
+
+
+def test_each_wheel_with_a_command_of_its_own_has_its_formulas():
+    """They are taken by `equation`; on a mecanum robot one wheel's command turns it."""
+    model = native.Model.load("turbopi.toml")
+    track = SimpleNamespace(command=np.ones((3, 4)))
+    own = SimpleNamespace(measurement=SimpleNamespace(track=track))
+    terms = _wheel_terms([own], model)
+    assert len({t.group for t in terms}) == 4
+    assert len(terms) == 4 * len(SHAPES)
+    for term in terms:
+        assert term.addable
+        model.copy().add_effect("equation", {"adds_to": "rim_mps", "formula": f"p0*{term.formula}"})
+
+
+@pytest.mark.parametrize(("known_s", "effect"), [(0.0133, REFIT), (0.001, "motor_lag")])
+def test_a_lag_within_the_models_own_error_is_a_stale_number(known_s, effect):
+    model = native.Model.load("turbopi.toml")
+    extra = Estimate("motor_lag.extra_s", -0.0108, 0.0028, "s", False, True)
+    found = with_stale_lag([Finding("motor_lag", None, [extra], 0.6, "sure")], model, known_s)
+    assert [f.effect for f in found] == [effect]
+    if effect == REFIT:
+        (lag,) = found[0].parameters
+        assert lag.name == "base.motor_lag_s"
+        assert lag.value == pytest.approx(model.get("base.motor_lag_s") - 0.0108)
