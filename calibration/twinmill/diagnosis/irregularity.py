@@ -15,6 +15,7 @@ from twinmill.fitting.opening import Opened
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S, rms
 
+LEAST_DRIVE = (1e-3, 1e-2)  # m/s, rad/s: no robot follows more regularly
 IRREGULAR = 2.2  # floor over what the model file's noise makes, beyond which it is a finding
 
 
@@ -49,10 +50,10 @@ def irregularity(own: Opened, noise: Noise, model: native.Model) -> float:
     the log's own. A turn by the disturbance moves the robot sideways, by a third of its square.
     """
     position, heading = (
-        ChannelNoise(sensor, model.get(f"noise.{drive}"), model.get(f"noise.{memory}"))
-        for sensor, drive, memory in (
-            (noise.position.sensor, "drive_mps", "drive_s"),
-            (noise.heading.sensor, "drive_radps", "drive_turn_s"),
+        ChannelNoise(sensor, max(model.get(f"noise.{drive}"), least), model.get(f"noise.{memory}"))
+        for sensor, drive, memory, least in (
+            (noise.position.sensor, "drive_mps", "drive_s", LEAST_DRIVE[0]),
+            (noise.heading.sensor, "drive_radps", "drive_turn_s", LEAST_DRIVE[1]),
         )
     )
     horizons_s = np.array(HORIZONS_S)
