@@ -15,7 +15,7 @@ from twinmill.fitting.opening import Opened
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S, rms
 
-LEAST_DRIVE = (1e-3, 1e-2)  # m/s, rad/s: no robot follows more regularly
+LEAST_DRIVE = (2e-3, 2e-2)  # m/s, rad/s: no robot follows more regularly
 IRREGULAR = 2.2  # floor over what the model file's noise makes, beyond which it is a finding
 
 
