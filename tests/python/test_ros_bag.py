@@ -269,6 +269,15 @@ def test_a_robot_has_the_number_of_its_name(tmp_path):
     assert sorted(_import(bag, *pairs, robots={"alice": 4, "bob": 9})[0]) == [4, 9]
 
 
+def test_topics_of_other_numbers_are_said(tmp_path):
+    bag = _written(
+        tmp_path / "two.mcap", _poses("/r1/pose"), _twists("/r2/cmd"), _twists("/r1/cmd")
+    )
+    robots, warnings = _import(bag, ("/r1/pose", "/r2/cmd"))
+    assert list(robots) == [2] and "/r1/pose and /r2/cmd are taken for robot 2." in warnings
+    assert "are taken for robot" not in _import(bag, ("/r1/pose", "/r1/cmd"))[1]
+
+
 def test_a_clock_that_is_set_back_is_refused_with_the_remedy(tmp_path):
     jump = _poses(stamp_of=lambda k, t: START_S + t - (5 if k >= 30 else 0))
     bag = _written(tmp_path / "jump.mcap", jump, _twists())

@@ -162,6 +162,9 @@ def read_bag(
     pairs = list(zip(poses, commands, strict=True))
     numbers = [_number(pair, options, len(pairs)) for pair in pairs]
     rows = _rows(path, [*poses, *commands], options.receive)
+    for (pose, command), number in zip(pairs, numbers, strict=True):
+        if {_told(pose, "", {}), _told("", command, {})} - {None, number}:
+            rows[pose][-1].append(f"{pose} and {command} are taken for robot {number}.")
     pose_series = [_poses(n, t, *rows[t]) for n, t in zip(numbers, poses, strict=True)]
     command_series = [
         _commands(n, t, *rows[t], options) for n, t in zip(numbers, commands, strict=True)
