@@ -56,6 +56,24 @@ class Detector:
         return numbers.ravel().astype(int), np.array(corners, float).reshape(-1, 4, 2)
 
 
+def check_single(seen: Sightings) -> None:
+    """Two tags of one number in a frame, apart by more than half a side, are two things.
+
+    Raises:
+        ValueError: there are such.
+    """
+    order = np.lexsort([seen.number, seen.frame])
+    frame, number, corners_px = seen.frame[order], seen.number[order], seen.corners_px[order]
+    step_px = np.linalg.norm(np.diff(corners_px.mean(axis=1), axis=0), axis=1)
+    side_px = np.linalg.norm(corners_px[1:, 0] - corners_px[1:, 1], axis=1)
+    same = (np.diff(frame) == 0) & (np.diff(number) == 0)
+    for k in np.flatnonzero(same & (step_px > side_px / 2))[:1]:
+        raise ValueError(
+            f"number {number[k]} was seen twice in one picture (frame {frame[k]}); give each robot "
+            "its own."
+        )
+
+
 def gather(found: list[tuple[np.ndarray, np.ndarray]]) -> Sightings:
     """What Detector.find gave for each frame of a film."""
     counts = [len(numbers) for numbers, _ in found]

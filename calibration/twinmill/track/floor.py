@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the camera is over the floor, from points whose places on it were measured."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,11 +11,11 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from twinmill.track.camera import Camera
-from twinmill.track.detect import ROBOTS, TAGS, Sightings, centres
+from twinmill.track.detect import ROBOTS, TAGS, Sightings, centres, check_single
 
 FEWEST = 4  # three leave two places for the camera, and nothing to check by
 FLAT = 0.05  # points are on a line if they stretch less than this share across it
-WORST_PX = 20.0
+WORST_PX, WORST_M = 2.0, 0.005  # beyond both it is no tape measure's error
 
 
 @dataclass(frozen=True)
@@ -112,9 +113,13 @@ def _check_spread(who: str, place_m: np.ndarray) -> None:
         raise ValueError(
             f"{who} {len(place_m)} floor points, and {FEWEST} are needed; measure more of them."
         )
-    stretch = np.linalg.svd(place_m - place_m.mean(axis=0), compute_uv=False)
-    if stretch[1] < FLAT * stretch[0]:
+    if _on_a_line(place_m):
         raise ValueError(f"{who} floor points that are all on one line; lay one beside it.")
+
+
+def _on_a_line(place_m: np.ndarray) -> bool:
+    stretch = np.linalg.svd(place_m - place_m.mean(axis=0), compute_uv=False)
+    return bool(stretch[1] < FLAT * stretch[0])
 
 
 def look(camera: Camera, floor: Floor, seen: Sightings) -> View:
@@ -126,8 +131,9 @@ def look(camera: Camera, floor: Floor, seen: Sightings) -> View:
         seen: tags of a film; each floor tag's centre is the median over it.
 
     Raises:
-        ValueError: too few of the tags were seen, or the points do not fit.
+        ValueError: too few of the tags were seen, one at two places, or the points do not fit.
     """
+    check_single(seen.of(np.isin(seen.number, floor.tag)))
     pixel = floor.pixel.copy()
     for k in np.flatnonzero(floor.tag >= 0):
         rows = seen.number == floor.tag[k]
@@ -143,6 +149,14 @@ def look(camera: Camera, floor: Floor, seen: Sightings) -> View:
             )
     place_m, pixel = floor.place_m[known], pixel[known]
     _check_spread("floor: sees", place_m)
+    view = _pose(camera, place_m, pixel)
+    if _misses(view, place_m):
+        raise ValueError(_which(view, place_m, pixel, floor.tag[known]))
+    return view
+
+
+def _pose(camera: Camera, place_m: np.ndarray, pixel: np.ndarray) -> View:
+    """From (N, 2) m and (N, 2) px."""
     solid = np.column_stack([place_m, np.zeros(len(place_m))])
     lens = camera.matrix, camera.distortion
     found, turns, shifts, _ = cv2.solvePnPGeneric(solid, pixel, *lens, flags=cv2.SOLVEPNP_IPPE)
@@ -159,10 +173,42 @@ def look(camera: Camera, floor: Floor, seen: Sightings) -> View:
             "floor: the points are mirrored, the camera would be under the floor; x to y must turn "
             "counter-clockwise, seen from above."
         )
-    best = min(views, key=lambda view: view.error_px)
-    if best.error_px > WORST_PX:
-        raise ValueError(
-            f"floor: the points miss the picture by {best.error_px:.0f} px; check their places, "
-            "which is which, and that the lens file is this camera's."
+    return min(views, key=lambda view: view.error_px)
+
+
+def _error_m(view: View, place_m: np.ndarray) -> float:
+    """The points' miss on the floor, about."""
+    away_m = np.linalg.norm(view.position_m - np.append(place_m.mean(axis=0), 0))
+    return float(view.error_px * away_m / view.camera.matrix[0, 0])
+
+
+def _misses(view: View, place_m: np.ndarray) -> bool:
+    return view.error_px > WORST_PX and _error_m(view, place_m) > WORST_M
+
+
+def _which(view: View, place_m: np.ndarray, pixel: np.ndarray, tag: np.ndarray) -> str:
+    """The sentence on points that do not fit: without which one the rest do."""
+    head = (
+        f"floor: the points miss the picture by {view.error_px:.1f} px "
+        f"({1e3 * _error_m(view, place_m):.0f} mm)"
+    )
+    names = [
+        f"tag {n}" if n >= 0 else f"the point at {u:g}, {v:g} px"
+        for n, (u, v) in zip(tag.tolist(), pixel, strict=True)
+    ]
+    rests = []
+    for k in range(len(place_m)) if len(place_m) > FEWEST else ():
+        rest = np.arange(len(place_m)) != k
+        if not _on_a_line(place_m[rest]):
+            with suppress(ValueError):
+                rests.append((_pose(view.camera, place_m[rest], pixel[rest]), k, place_m[rest]))
+    best = min(rests, key=lambda found: found[0].error_px, default=None)
+    if best and not _misses(best[0], best[2]):
+        return (
+            f"{head}; without {names[best[1]]} the rest miss by {best[0].error_px:.1f} px: measure "
+            "anew where it is, or take it out of the floor file."
         )
-    return best
+    return (
+        f"{head}; check the places of {', '.join(names)}, which is which, and that the lens file "
+        f"is this camera's{'; a fifth point would show which is wrong' * (len(names) == FEWEST)}."
+    )

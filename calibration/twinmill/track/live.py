@@ -10,7 +10,7 @@ import numpy as np
 import turbopi
 
 from twinmill.track.camera import Camera
-from twinmill.track.detect import ROBOTS, Detector, gather
+from twinmill.track.detect import ROBOTS, Detector, Sightings, check_single, gather
 from twinmill.track.floor import Floor, View, look
 from twinmill.track.locate import locate
 from twinmill.track.paths import ERROR_PX, SIZE_ODD, Tags, too_far
@@ -59,6 +59,9 @@ def publish(
         view: the camera.
         tags: on the robots.
         say: channel and payload to the bus.
+
+    Raises:
+        ValueError: two tags of one number are in a picture.
     """
     detector, count = Detector(), LiveCount()
     last: dict[int, tuple[float, np.ndarray]] = {}
@@ -72,6 +75,8 @@ def publish(
         t_s = stamp_s + camera.exposure_s / 2 + camera.line_delay_s * rows_px
         good = np.abs(squares.side_m / tags.size_m - 1) < SIZE_ODD
         good &= squares.error_px < ERROR_PX
+        in_frame = np.full(np.count_nonzero(good), count.frames)
+        check_single(Sightings(in_frame, numbers[good], corners[good]))
         seen = {}
         for k in np.flatnonzero(good)[np.argsort(-squares.error_px[good])]:
             now = (float(t_s[k]), squares.pose[k])

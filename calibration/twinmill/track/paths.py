@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from twinmill.files import replacing
-from twinmill.track.detect import ROBOTS, Sightings
+from twinmill.track.detect import ROBOTS, Sightings, check_single
 from twinmill.track.floor import View
 from twinmill.track.locate import Squares, fit_squares, locate
 
@@ -69,7 +69,8 @@ def follow(stamp_s: np.ndarray, seen: Sightings, view: View, tags: Tags) -> list
         tags: what is on the robots.
 
     Raises:
-        ValueError: no tag was found, a robot never was, or the tags are of another size.
+        ValueError: no tag was found, a robot never was, two have one number, or the tags are of
+            another size.
     """
     counts = {n: int(np.sum(seen.number == n)) for n in np.unique(seen.number).tolist()}
     robots = _choose(counts, len(stamp_s), tags.robots)
@@ -78,6 +79,7 @@ def follow(stamp_s: np.ndarray, seen: Sightings, view: View, tags: Tags) -> list
     _check_size(squares, tags)
     ratio = squares.side_m / np.nanmedian(squares.side_m)
     good = (np.abs(ratio - 1) < SIZE_ODD) & (squares.error_px < ERROR_PX)
+    check_single(seen.of(good))
     return [_one(n, stamp_s, seen, squares, good, view, tags) for n in robots]
 
 
@@ -118,7 +120,7 @@ def _one(
     view: View,
     tags: Tags,
 ) -> RobotPath:
-    """One robot: of two sightings in a frame the better, no impossible jumps, rows' times."""
+    """One robot: of two sightings of it in a frame the better, no impossible jumps, rows' times."""
     mine = np.flatnonzero(seen.number == robot_id)
     kept = mine[good[mine]]
     order = np.lexsort([squares.error_px[kept], seen.frame[kept]])

@@ -18,7 +18,7 @@ from twinmill.track.boards import Board
 from twinmill.track.camera import Camera, read_camera
 from twinmill.track.detect import Sightings, centres
 from twinmill.track.film import Film
-from twinmill.track.floor import View
+from twinmill.track.floor import Floor, View, look
 from twinmill.track.live import publish
 from twinmill.track.locate import locate
 from twinmill.track.paths import Tags, follow
@@ -217,6 +217,42 @@ def test_of_two_tags_of_a_number_in_a_frame_the_squarer_counts():
     )
     (path,) = follow(t_s, seen, view_of(LENS), Tags(0.10, HEIGHT_M))
     assert np.abs(path.pose[:, :2] - ROBOTS[0].path(t_s)[:, :2]).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("points", "words"),
+    [
+        (6, r"miss the picture by .* px \(.* mm\); without tag 502 the rest miss by 0\.0 px"),
+        (4, r"check the places of tag 500, tag 501, tag 502, tag 503.* a fifth point would show"),
+    ],
+)
+def test_a_floor_tag_that_was_measured_10_cm_wrong_is_refused(points, words):
+    places = [(-1.3, -1.1), (1.4, -1.0), (1.3, 0.9), (-1.2, 0.85), (0.1, -1.2), (-0.2, 1.0)]
+    tags = [Tag(500 + k, still(*xy, 0.3), 0.12, 0.0) for k, xy in enumerate(places[:points])]
+    corners = np.concatenate([corners_of(tag, np.zeros(1)) for tag in tags])
+    seen = Sightings(np.zeros(points, int), 500 + np.arange(points), corners)
+    measured = np.array(places[:points])
+    floor = Floor(measured, np.full((points, 2), np.nan), seen.number)
+    camera = view_of(LENS).camera
+    assert look(camera, floor, seen).error_px < 0.5
+    measured[2, 0] += 0.1
+    with pytest.raises(ValueError, match=words):
+        look(camera, floor, seen)
+
+
+def test_two_robots_of_one_number_are_refused():
+    t_s = np.arange(10) / 30
+    corners = np.concatenate([corners_of(ROBOTS[0], t_s), corners_of(ROBOTS[2], t_s[6:])])
+    seen = Sightings(np.append(np.arange(10), np.arange(6, 10)), np.full(14, 1), corners)
+    with pytest.raises(ValueError, match=r"number 1 was seen twice in one picture \(frame 6\)"):
+        follow(t_s, seen, view_of(LENS), Tags(0.10, HEIGHT_M))
+
+
+def test_live_two_robots_of_one_number_are_refused():
+    twins = [ROBOTS[0], replace(ROBOTS[2], number=1)]
+    frames = iter([(1000.0, Scene(LENS, twins).frame(0))])
+    with pytest.raises(ValueError, match="number 1 was seen twice"):
+        list(publish(frames, view_of(LENS), Tags(0.10, HEIGHT_M), lambda *message: None))
 
 
 def test_shear_of_a_rolling_shutter_is_taken_out():
