@@ -195,6 +195,10 @@ def test_a_run_may_come_as_a_log(planned: Path, tmp_path: Path, capsys):
         told.append(json.loads(capsys.readouterr().out))
     assert told[0]["log_score"] == told[1]["log_score"]
     assert told[0]["missing"] == [2, 3, 4, 5, 6]
+    other = "jammed" if ended != "jammed" else "milling"
+    both = {"class": [other, *[""] * 5], "log": ["run.lcmlog", *[""] * 5]}
+    with pytest.raises(ValueError, match=f"'{other}', but the log 'run.lcmlog' ended '{ended}'"):
+        run(["score-floor", str(planned / "plan"), str(fill(form, tmp_path / "both.csv", both))])
 
 
 @pytest.mark.parametrize(
@@ -204,6 +208,9 @@ def test_a_run_may_come_as_a_log(planned: Path, tmp_path: Path, capsys):
         ("run,class\n99,milling\n", "run '99' is none of the plan's"),
         ("run,class\n1,milling\n1,milling\n", "run 1 is there twice"),
         ("class\nmilling\n", "no column 'run'"),
+        ("run,class,range_m\n1,milling,7\n", r"line 2: range_m is '7', but the plan's run 1 has"),
+        ("run,class,cone_deg\n1,milling,x\n", "line 2: cone_deg is 'x', but the plan's run 1 has"),
+        ("run,class,log\n1,milling,no.lcmlog\n", r"line 2: log 'no.lcmlog' is not there: /.*no"),
         ("run,class\n1,\n", "no run has a class or a log"),
     ],
 )

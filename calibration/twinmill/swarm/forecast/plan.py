@@ -174,6 +174,7 @@ def read_outcomes(path: Path, plan: Plan) -> tuple[np.ndarray, np.ndarray, list[
         for row in reader:
             try:
                 number = _run_number(row["run"], plan, seen)
+                _check_cell(row, plan, plan.order[number - 1])
                 if (ended := _outcome(row, path, plan, plan.order[number - 1])) is not None:
                     seen[number] = ended
             except ValueError as error:
@@ -195,13 +196,34 @@ def _run_number(text: str | None, plan: Plan, seen: dict[int, int]) -> int:
     return int(text or "")
 
 
+def _check_cell(row: dict, plan: Plan, cell: int) -> None:
+    """Axis values that stand in the row are the plan's, to the digits of the form."""
+    for name, value in zip(plan.names, plan.expected.points[cell], strict=True):
+        text = (row.get(name) or "").strip()
+        try:
+            right = not text or np.isclose(float(text), value, rtol=1e-4, atol=1e-9)
+        except ValueError:
+            right = False
+        if not right:
+            raise ValueError(
+                f"{name} is '{text}', but the plan's run {row['run']} has {value:g}; score the run "
+                "under its own number, or leave the plan's columns as they are."
+            )
+
+
 def _outcome(row: dict, path: Path, plan: Plan, cell: int) -> int | None:
     name, log = (row.get("class") or "").strip(), (row.get("log") or "").strip()
-    if log and not name:
+    if log:
+        place = path.parent / log
+        if not place.exists():
+            raise ValueError(f"log '{log}' is not there: {place.resolve()} does not exist.")
         point = plan.expected.points[cell]
         model = plan.request.cell_model(tuple(point))
         scale = model.get("sensor.range_m"), model.get("robot.body_radius_m")
-        name = swarm_metrics(read_log(path.parent / log), *scale).final
+        ended = swarm_metrics(read_log(place), *scale).final
+        if name and name != ended:
+            raise ValueError(f"class is '{name}', but the log '{log}' ended '{ended}'; keep one.")
+        name = ended
     if not name:
         return None
     if name not in OUTCOMES:
