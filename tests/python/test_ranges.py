@@ -111,6 +111,14 @@ def test_what_no_bound_touches_is_not_called_truncated(model, capsys):
     assert json.loads(capsys.readouterr().out)["warnings"] == []
 
 
+def test_a_covariance_of_what_the_model_has_not_is_refused_with_the_nearest_name(model):
+    text = (model / "m.toml").read_text()
+    (model / "odd.toml").write_text(text.replace('"dead_zone.width"', '"effect.dead_zone.width"'))
+    with pytest.raises(ValueError, match=r"'effect.dead_zone.width' is no.*'dead_zone.width'"):
+        run(["export-model", "odd.toml", "--ranges"])
+    assert not list(model.glob("odd_*"))
+
+
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not(model):
     for out, seed in (("a", 1), ("b", 1), ("c", 2)):
         run(["export-model", "m.toml", "--ranges", "--out", f"{out}.x", "--seed", str(seed)])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the errors of fitted quantities go together."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -45,6 +45,11 @@ class Covariance:
         if size and np.linalg.eigvalsh(_correlation(values))[0] < -SYMMETRIC * size:
             raise ValueError("is none: some sum of its quantities would have a negative variance.")
         return cls(names, values)
+
+    def of(self, names: Collection[str]) -> "Covariance":
+        """Of those of its quantities that are among the names."""
+        kept = [i for i, name in enumerate(self.names) if name in names]
+        return Covariance(tuple(self.names[i] for i in kept), self.values[np.ix_(kept, kept)])
 
     def to_toml(self) -> dict[str, list]:
         """As `from_toml` reads it, six digits."""

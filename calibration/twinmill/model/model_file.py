@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model files: read by the twin's own reader, written anew with what was fitted."""
 
+import difflib
 import hashlib
 import math
 import os
@@ -102,18 +103,32 @@ class ModelFile:
         """Of what fits told; empty if there was none, or an older version wrote the file.
 
         Raises:
-            ModelError: what stands there is none.
+            ModelError: what stands there is none, or is of quantities that the model has not.
         """
         table = tomlkit.parse(self.text).get("fit", {}).get("covariance", {})
         try:
-            return Covariance.from_toml(table)
+            found = Covariance.from_toml(table)
         except ValueError as error:
             raise ModelError(f"{self.path}: [fit.covariance] {error}") from error
+        known = _names(self.model)
+        for name in found.names:
+            if name not in known:
+                (near,) = difflib.get_close_matches(name, sorted(known), n=1, cutoff=0)
+                raise ModelError(
+                    f"{self.path}: [fit.covariance] '{name}' is no quantity of this model; the "
+                    f"nearest known is '{near}'."
+                )
+        return found
 
     @property
     def hash(self) -> str:
         """Of the text, as a child names its parent."""
         return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+def _names(model: native.Model) -> set[str]:
+    """Of all quantities; effects' as `wheel_gain.fl`."""
+    return {v["name"] for v in model.values()}
 
 
 class NoiseTable(Protocol):
@@ -175,7 +190,7 @@ def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> 
         section["std"] = {key: _short(e.std) for key, e in clock.items()}
         section["fitted_on"] = list(fitted.logs.values())
     old = document.get("fit", {}).get("left_over", {})
-    covariance = parent.covariance.replaced_by(fitted.covariance)
+    covariance = parent.covariance.of(_names(fitted.model)).replaced_by(fitted.covariance)
     document["fit"] = {
         "logs": list(fitted.logs),
         "score_before": _short(fitted.score_before),

@@ -4,10 +4,8 @@
 import math
 from collections.abc import Mapping
 
-import numpy as np
 import tomlkit
 
-from twinmill.model.covariance import Covariance
 from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.model.parameters import effect_names
 
@@ -74,8 +72,7 @@ def _forget_fit(
     if "fit" not in document:
         return
     told = parent.covariance
-    kept = [i for i, name in enumerate(told.names) if name not in names]
+    left = told.of(set(told.names) - set(names))
     document.pop("fit")
-    if kept:
-        left = Covariance(tuple(told.names[i] for i in kept), told.values[np.ix_(kept, kept)])
+    if left.names:
         document["fit"] = {"covariance": left.to_toml()}
