@@ -153,6 +153,7 @@ def _track(
         notes.append(f"! The film breaks off: of {film.count} frames {len(found)} can be read.")
     if strangers:
         notes.append(f"! Tags that were not asked for: {', '.join(map(str, strangers))}.")
+    notes += [f"! {warning}" for warning in quality.warnings]
     deliver(data, _text(out, paths, quality, view, notes), as_json)
     return data
 

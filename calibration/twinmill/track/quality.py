@@ -11,6 +11,7 @@ from twinmill.track.paths import RobotPath
 THIRD = np.array([-1.0, 3.0, -3.0, 1.0])  # takes out a place, a speed and an acceleration
 TO_SIGMA = 1.4826 / np.sqrt(np.sum(THIRD**2))  # from the median size of such a difference
 EVEN = 0.3  # frames are evenly spaced if their steps differ by less than this share
+CORNERS_PX = 0.5  # a sharp tag's miss by 0.1 to 0.3
 SPEED_MPS, WINDOW_S = 0.3, 0.5
 LEVER_M = 0.126  # half wheelbase and half track of a TurboPi
 
@@ -61,8 +62,19 @@ class Quality:
     weakest_wheel: float
 
     def to_json(self) -> dict:
-        """All of it, and the sentence."""
-        return {**asdict(self), "meaning": self.sentence}
+        """All of it, warnings, and the sentence."""
+        return {**asdict(self), "warnings": self.warnings, "meaning": self.sentence}
+
+    @property
+    def warnings(self) -> list[str]:
+        """What makes poses wrong that look quiet."""
+        worst_px = max((r.error_px for r in self.robots if np.isfinite(r.error_px)), default=0.0)
+        if worst_px < CORNERS_PX:
+            return []
+        return [
+            f"the tags' corners miss by {worst_px:.2f} px: the lens file or the height does not "
+            "fit, or the size; poses may be off by centimetres."
+        ]
 
     @property
     def sentence(self) -> str:

@@ -22,6 +22,7 @@ from twinmill.track.floor import Floor, View, look
 from twinmill.track.live import publish
 from twinmill.track.locate import locate
 from twinmill.track.paths import Tags, follow
+from twinmill.track.quality import judge
 from twinmill_cli import main as cli
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -238,6 +239,21 @@ def test_a_floor_tag_that_was_measured_10_cm_wrong_is_refused(points, words):
     measured[2, 0] += 0.1
     with pytest.raises(ValueError, match=words):
         look(camera, floor, seen)
+
+
+@pytest.mark.parametrize(
+    ("height_m", "bend", "warns"), [(HEIGHT_M, 1, False), (0.17, 1, True), (HEIGHT_M, 0, True)]
+)
+def test_a_wrong_height_or_lens_bends_corners_and_is_warned_of(height_m, bend, warns):
+    """Tags of 20 cm, all over the picture; a lens file without the bend that the lens has."""
+    t_s = np.arange(20) / 30
+    tag = Tag(1, circle(0.1, 0.0, 1.0, 9.0, 0.0), 0.2)
+    true = view_of(LENS)
+    camera = replace(true.camera, distortion=bend * true.camera.distortion)
+    view = replace(true, camera=camera)
+    seen = Sightings(np.arange(20), np.full(20, 1), corners_of(tag, t_s))
+    quality = judge(follow(t_s, seen, view, Tags(0.2, height_m)), view, 0.2)
+    assert [w.startswith("the tags' corners miss by") for w in quality.warnings] == [True] * warns
 
 
 def test_two_robots_of_one_number_are_refused():
