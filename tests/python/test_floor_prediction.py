@@ -105,6 +105,21 @@ def test_scores_are_those_of_their_definitions():
     assert found.hits == 1
 
 
+@pytest.mark.parametrize("sure", [0.9, 0.99])
+def test_intervals_of_scores_stay_in_their_range(sure):
+    """One miss in a cell of six, all said for sure: a symmetric interval goes below Brier's 0."""
+    said = np.full((1, 6, 5), (1 - sure) / 4)
+    said[..., 0] = sure
+    expected = Forecast(np.arange(6.0)[:, None], said[0], said)
+    cell = np.repeat(np.arange(6), 2)
+    seen = np.where(np.arange(12) == 0, 1, 0)
+    found = score(expected, cell, seen, ["x"], 1)
+    assert 0 <= found.brier.low < found.brier.value < found.brier.high <= 2
+    assert found.log_score.low < found.log_score.value < found.log_score.high <= 0
+    few = score(expected, cell[:8], seen[:8], ["x"], 1)
+    assert np.isnan([few.brier.low, few.brier.high, few.log_score.low]).all()
+
+
 def test_a_wrong_model_scores_worse_than_it_expects_and_its_misses_are_told():
     """It says milling for sure where x is high; there they part, always."""
     sure = np.full((1, 6, 5), 0.0125)

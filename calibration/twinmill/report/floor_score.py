@@ -11,7 +11,7 @@ from twinmill.report.tables import Cell, Table, number
 from twinmill.swarm.classes import COLORS
 from twinmill.swarm.forecast.draws import OUTCOMES
 from twinmill.swarm.forecast.plan import Plan
-from twinmill.swarm.forecast.score import ALPHA, Mean, Score
+from twinmill.swarm.forecast.score import ALPHA, FEWEST_CELLS, FEWEST_RUNS, Mean, Score
 
 NOTE = (
     "The log score is the mean log probability that was given to what came of each run: 0 is best, "
@@ -36,6 +36,11 @@ def sentences(found: Score, missing: list[int]) -> list[str]:
         f"{_capital(verdict)} (expected {number(expected.value, 2)}, 95 % of its worlds "
         f"{number(expected.low, 2)} to {number(expected.high, 2)}; p = {found.p_value:.2g})."
     )
+    if not np.isfinite(log.low):
+        lines.append(
+            "So few runs or cells tell no interval of a score; it takes "
+            f"{FEWEST_RUNS} runs in {FEWEST_CELLS} cells."
+        )
     for rival in found.rivals:
         gain = rival.gain
         better = (
@@ -144,6 +149,8 @@ def _table(found: Score) -> Table:
 
 def _words(mean: Mean, sign: bool = False) -> str:
     form = "{:+.2f}" if sign else "{:.2f}"
+    if not np.isfinite(mean.low):
+        return form.format(mean.value)
     low, high = form.format(mean.low), form.format(mean.high)
     return f"{form.format(mean.value)} ({low} to {high})"
 

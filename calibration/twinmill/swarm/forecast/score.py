@@ -5,17 +5,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import fisher_exact, mannwhitneyu, t
+from scipy.stats import bootstrap, fisher_exact, mannwhitneyu, t
 
 from twinmill.swarm.forecast.draws import OUTCOMES, Forecast
 
 LABS = 2000  # imagined, of the models drawn
 ALPHA = 0.05
+FEWEST_RUNS, FEWEST_CELLS = 10, 5  # below either no interval of a score is told
 
 
 @dataclass(frozen=True)
 class Mean:
-    """A mean over runs with its 95 % interval; cells are what varies by chance."""
+    """A mean over runs with its 95 % interval, or NaN; cells are what varies by chance."""
 
     value: float
     low: float
@@ -94,13 +95,13 @@ def score(
         ("all classes alike", even),
     ):
         theirs = np.log(other[cell, seen])
-        brier = _mean(_brier(other, cell, seen), cell)
-        rivals.append(Rival(name, _mean(theirs, cell), brier, _mean(logs - theirs, cell)))
+        brier = _bounded(_brier(other, cell, seen), cell, seed)
+        rivals.append(Rival(name, _bounded(theirs, cell, seed), brier, _mean(logs - theirs, cell)))
     missed = share[cell].argmax(axis=1) != seen
     return Score(
         len(seen),
-        _mean(logs, cell),
-        _mean(squares, cell),
+        _bounded(logs, cell, seed),
+        _bounded(squares, cell, seed),
         Mean(float(imagined.mean()), *map(float, np.quantile(imagined, [0.025, 0.975]))),
         float((1 + np.sum(imagined <= logs.mean())) / (1 + LABS)),
         rivals,
@@ -125,6 +126,24 @@ def _mean(values: np.ndarray, cell: np.ndarray) -> Mean:
     error = np.sqrt(n / (n - 1) * np.sum(off**2)) / len(values)
     half = float(t.ppf(0.975, n - 1) * error)
     return Mean(mean, mean - half, mean + half)
+
+
+def _bounded(values: np.ndarray, cell: np.ndarray, seed: int) -> Mean:
+    """The same for a score that has ends: percentiles of bootstrapped cells stay within."""
+    mean = float(values.mean())
+    cells = np.unique(cell)
+    if len(values) < FEWEST_RUNS or len(cells) < FEWEST_CELLS:
+        return Mean(mean, np.nan, np.nan)
+    sums = np.array([values[cell == c].sum() for c in cells])
+    runs = np.array([np.sum(cell == c) for c in cells])
+    found = bootstrap(
+        (sums, runs),
+        lambda s, n, axis: s.sum(axis=axis) / n.sum(axis=axis),
+        paired=True,
+        method="percentile",
+        rng=seed,
+    ).confidence_interval
+    return Mean(mean, float(found.low), float(found.high))
 
 
 def _imagined(expected: Forecast, cell: np.ndarray, seed: int) -> np.ndarray:
