@@ -146,7 +146,7 @@ def read_script(path: Path) -> tuple[np.ndarray, np.ndarray]:
         ValueError: it is no script.
     """
     try:
-        table = read_table(path, {}, frozenset({"t_s", *INPUTS, *DUTIES}))
+        table = read_table(path, frozenset({"t_s", *INPUTS, *DUTIES}))
         columns = INPUTS if table.has(INPUTS[0]) else DUTIES
         t_s, values = table.finite("t_s"), [table.finite(name) for name in columns]
     except LogError as error:
