@@ -15,7 +15,7 @@ from twinmill.data.track import command_at
 from twinmill.fitting.floor import body_velocity_at
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.response import Response
-from twinmill.model.parameters import effect_names, words
+from twinmill.model.parameters import CLOCK, effect_names, words
 
 STILL = (0.002, 0.002, 0.01)  # m/s, m/s, rad/s: below it an axis does not move; wheels differ
 CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
@@ -144,13 +144,14 @@ def _sign(place_m: float) -> str:
 
 def _wheel_columns(own: Opened, model: native.Model, terms: Sequence[Term]) -> np.ndarray:
     """(R, T) change of the rows by each term of a wheel, by the plant itself."""
-    columns = np.zeros((own.data.measured.size, len(terms)))
+    (before,) = own.data.rows(model, [CLOCK], np.array([[model.get(CLOCK)]]))
+    columns = np.zeros((len(before), len(terms)))
     for k, term in enumerate(terms):
         with_it = model.copy()
         texts = {"adds_to": term.adds_to, "formula": f"p0*{term.formula}"}
         with_it.add_effect("equation", texts)
         name = f"{effect_names(with_it)[-1]}.p0"
-        before, after = own.data.rows(with_it, [name], np.array([[0.0], [term.strength]]))
+        (after,) = own.data.rows(with_it, [name], np.array([[term.strength]]))
         columns[:, k] = before - after
     return columns
 

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import twinmill_native as native
 from scipy.stats import chi2
 
 from twinmill.diagnosis.odd import ODD, middle_and_scale
@@ -20,6 +21,7 @@ from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     GAINS,
     Estimate,
+    Parameter,
     base_parameters,
     catalogue,
 )
@@ -153,11 +155,15 @@ def _suspects(states: dict[int, State], progress: Callable[[str], None]) -> list
     return ["gains", *best[:TRIED]]
 
 
+def wide_gains(model: native.Model) -> tuple[Parameter, ...]:
+    """A robot's own gains where they are in question."""
+    return tuple(replace(p, usual=1.0, std=WIDE_STD) for p in base_parameters(model, GAINS))
+
+
 def _attempt(before: Trial, name: str) -> Trial:
     if name != "gains":
         return attempt(before, (name,))
-    model = before.state.model
-    free = tuple(replace(p, usual=1.0, std=WIDE_STD) for p in base_parameters(model, GAINS))
+    free = wide_gains(before.state.model)
     state = replace(before.state, free=free)
     fit = ScoreFit(state.datasets, state.models, free, state.by_channel).fit()
     evidence = before.fit.held_cost - fit.held_cost

@@ -4,12 +4,12 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
+from twinmill.diagnosis.outliers import wide_gains
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.model.parameters import GAINS, base_parameters
+from twinmill.model.parameters import GAINS
 
 SURE = 4.0  # standard deviations: as much evidence as the search asks for
-WIDE_STD = 0.15  # of the gains, in question
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def _of_robot(logs: Sequence[Opened]) -> Resolution:
     for model in models:
         for name in GAINS:
             model.set(name, 1.0)
-    free = [replace(p, usual=1.0, std=WIDE_STD) for p in base_parameters(models[0], GAINS)]
+    free = wide_gains(models[0])
     data = [replace(o.data, own=_clock(o)) for o in logs]
     estimates = {e.name: e for e in ScoreFit(data, models, free).fit().estimates}
     speed, turn = (SURE * estimates[n].std if estimates[n].seen else None for n in GAINS)

@@ -144,20 +144,10 @@ def test_a_real_mecanum_robot_loses_sideways_and_its_tracked_point_is_off(omni4,
 
 def test_a_robot_told_velocities_is_seen_to_turn_faster_to_the_left(tmp_path):
     random = np.random.default_rng(3)
-    period_s, asymmetry = 0.02, 0.12
+    asymmetry = 0.12
     legs = drive_legs(2500, random, (-0.2, 0.15, 0.25), (-1.0, -0.6, 0.6, 1.0))
     turn = legs[:, 1] + asymmetry * np.abs(legs[:, 1])
-    heading = np.cumsum(turn) * period_s
-    middle = heading - turn * period_s / 2
-    x, y = (np.cumsum(legs[:, 0] * f(middle)) * period_s for f in (np.cos, np.sin))
-    pose = np.column_stack([x, y, heading]) + random.normal(size=(len(x), 3)) * (3e-4, 3e-4, 2e-3)
-    t_s = period_s * np.arange(len(x))
-    write_csv(tmp_path / "c.csv", "t_s,vx_mps,vy_mps,omega_radps",
-              np.column_stack([t_s, legs[:, 0], 0 * t_s, legs[:, 1]]))  # fmt: skip
-    write_csv(tmp_path / "p.csv", "t_s,x_m,y_m,theta_rad", np.column_stack([t_s + period_s, pose]))
-    log = tmp_path / "run.lcmlog"
-    import_log(tmp_path / "p.csv", tmp_path / "c.csv", log, options=ImportOptions(robot_id=2))
-    found = diagnose(load_measurements([log]), model_file(tmp_path, CART))
+    found = diagnosed_cart(tmp_path, legs, np.column_stack([legs[:, 0], turn]), random)
     assert found.found == ["turn_asymmetry"]
     (parameter,) = found.ranking[0].parameters
     assert parameter.value == pytest.approx(asymmetry, abs=0.02)
@@ -166,24 +156,29 @@ def test_a_robot_told_velocities_is_seen_to_turn_faster_to_the_left(tmp_path):
 def test_a_top_speed_of_the_controller_is_no_slip(tmp_path):
     """Commands above 0.3 m/s are cut to it, in any direction."""
     random = np.random.default_rng(5)
-    period_s, limit_mps = 0.02, 0.3
+    limit_mps = 0.3
     levels_mps = (-0.5, -0.4, -0.2, -0.1, 0.1, 0.15, 0.25, 0.35, 0.45, 0.5)
     legs = drive_legs(3000, random, levels_mps, (-1.0, 1.0))
-    speed = np.clip(legs[:, 0], -limit_mps, limit_mps)
-    heading = np.cumsum(legs[:, 1]) * period_s
-    middle = heading - legs[:, 1] * period_s / 2
-    x, y = (np.cumsum(speed * f(middle)) * period_s for f in (np.cos, np.sin))
-    pose = np.column_stack([x, y, heading]) + random.normal(size=(len(x), 3)) * (3e-4, 3e-4, 2e-3)
-    t_s = period_s * np.arange(len(x))
-    write_csv(tmp_path / "c.csv", "t_s,vx_mps,vy_mps,omega_radps",
-              np.column_stack([t_s, legs[:, 0], 0 * t_s, legs[:, 1]]))  # fmt: skip
-    write_csv(tmp_path / "p.csv", "t_s,x_m,y_m,theta_rad", np.column_stack([t_s + period_s, pose]))
-    log = tmp_path / "run.lcmlog"
-    import_log(tmp_path / "p.csv", tmp_path / "c.csv", log, options=ImportOptions(robot_id=2))
-    found = diagnose(load_measurements([log]), model_file(tmp_path, CART))
+    driven = np.clip(legs, (-limit_mps, -np.inf), (limit_mps, np.inf))
+    found = diagnosed_cart(tmp_path, legs, driven, random)
     assert found.findings[0].effect == "speed_limit"
     (pace,) = found.findings[0].parameters
     assert 1 / pace.value == pytest.approx(limit_mps, abs=0.005)
+
+
+def diagnosed_cart(folder, told, driven, random, period_s=0.02):
+    """Diagnosis of a cart told (K, 2) speeds and rates of turn, which drives others."""
+    heading = np.cumsum(driven[:, 1]) * period_s
+    middle = heading - driven[:, 1] * period_s / 2
+    x, y = (np.cumsum(driven[:, 0] * f(middle)) * period_s for f in (np.cos, np.sin))
+    pose = np.column_stack([x, y, heading]) + random.normal(size=(len(x), 3)) * (3e-4, 3e-4, 2e-3)
+    t_s = period_s * np.arange(len(x))
+    write_csv(folder / "c.csv", "t_s,vx_mps,vy_mps,omega_radps",
+              np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]]))  # fmt: skip
+    write_csv(folder / "p.csv", "t_s,x_m,y_m,theta_rad", np.column_stack([t_s + period_s, pose]))
+    log = folder / "run.lcmlog"
+    import_log(folder / "p.csv", folder / "c.csv", log, options=ImportOptions(robot_id=2))
+    return diagnose(load_measurements([log]), model_file(folder, CART))
 
 
 def write_csv(path, header, rows):
