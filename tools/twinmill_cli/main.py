@@ -29,6 +29,11 @@ COMMANDS = (
         "export_model",
         "Write a model for other simulators, and name what their file cannot carry.",
     ),
+    (
+        "wheels",
+        "wheels",
+        "Write a script that drives one wheel at a time; with its log, say what each wheel did.",
+    ),
     ("plot", "plot", "Draw paths, speeds, bits and wheel commands of all robots in a log."),
     (
         "watch",

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One wheel, or one velocity, at a time: the script of it, and what the poses say came of each.
+
+Turned alone, each wheel takes the body another way: which wheel it was and which way it turned
+follow from the signs of three speeds (Lynch and Park 2017, section 13.2.1).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.checks import InputFinding, check_tracks
+from twinmill.data.checks.geometry import body_by_command, columns_in_use
+from twinmill.data.checks.motion import Motion
+from twinmill.data.checks.words import COLUMNS
+from twinmill.data.log import CommandKind, LogError, RobotLog
+from twinmill.data.track import Track, command_at, make_track
+
+DRIVEN_S, STILL_S = 2.0, 1.5
+RIM_MPS, TURN_RADPS = 0.15, 0.6  # of wheels that are told speeds, of bodies that are told theirs
+MARGIN_S = 0.4  # after each change: clocks, lag
+FEWEST = 3  # velocities in which one column was driven
+STANDS = 0.1  # of what the fastest does: this column moves nothing
+LIKE = 0.7  # cosine, below which a direction is that of no column
+AS_GOOD = 0.1  # cosine that another column must gain: front and rear may do the same
+
+
+@dataclass(frozen=True)
+class Column:
+    """What one column of commands did, as it was driven forward.
+
+    Attributes:
+        name: of the column.
+        body: (3,) forward m/s, left m/s, turn rad/s; NaN where it was not driven alone.
+        like: the column that does this by the model; empty if it stood, or none does.
+        sign: -1 where it went backward.
+        stood: nothing moved.
+    """
+
+    name: str
+    body: np.ndarray
+    like: str
+    sign: int
+    stood: bool
+
+    @property
+    def right(self) -> bool:
+        """It does what it should."""
+        return self.like == self.name and self.sign > 0
+
+    @property
+    def driven(self) -> bool:
+        """It was driven alone for long enough to tell."""
+        return bool(np.isfinite(self.body).all())
+
+
+@dataclass(frozen=True)
+class WheelSigns:
+    """Of one robot: its columns, and mistakes of signs, cables and axes that explain them all."""
+
+    robot_id: int
+    columns: list[Column]
+    findings: list[InputFinding]
+
+    @property
+    def right(self) -> bool:
+        """Every column was driven alone and did what it should."""
+        return all(c.right for c in self.columns) and not any(f.fatal for f in self.findings)
+
+
+def script(model: native.Model, duty_pct: int) -> tuple[list[str], np.ndarray]:
+    """Names of the columns and (K, 1 + C) rows, t_s first: each column forth, still, back, still.
+
+    Raises:
+        ValueError: the robot steers, so that no column alone tells how it turns.
+    """
+    if model.wheel_kind == "ackermann":
+        raise ValueError(
+            "wheels: this robot steers; drive a curve to the left and see that it goes there."
+        )
+    kind = model.drive
+    names = [name for name in COLUMNS[kind] if name]
+    if kind == "twist":
+        sideways_mps = 0.0 if model.wheel_kind == "differential" else RIM_MPS
+        size = np.array([RIM_MPS, sideways_mps, TURN_RADPS])
+    else:
+        rim_radps = round(RIM_MPS / model.get("robot.wheel_radius_m"), 2)
+        level = rim_radps if kind == "wheel_speed" else float(duty_pct)
+        size = level * np.any(body_by_command(model, kind), axis=0)
+    rows, t_s = [np.zeros(1 + len(names))], 1.0
+    for k in np.flatnonzero(size):
+        for sign in (1, -1):
+            value = np.where(np.arange(len(names)) == k, sign * size, 0.0)
+            rows += [np.array([t_s, *value]), np.array([t_s + DRIVEN_S, *np.zeros(len(names))])]
+            t_s += DRIVEN_S + STILL_S
+    rows.append(np.array([t_s, *np.zeros(len(names))]))
+    return names, np.array(rows)
+
+
+def read_signs(robot: RobotLog, model: native.Model, label: str) -> WheelSigns:
+    """What each column did, by the poses.
+
+    Args:
+        robot: a log in which columns of the commands were driven one at a time.
+        model: of the robot: its kind of wheels and of commands.
+        label: the log's name.
+
+    Raises:
+        LogError: no column was driven alone, the heading was not recorded, or the model is driven
+            by another kind of command.
+    """
+    track = make_track(robot)
+    body = body_by_command(model, track.command_kind)
+    if body is None:
+        raise LogError(
+            f"{label}: the commands are {track.command_kind}, the model is driven by "
+            f"{model.drive}; take a model of this robot."
+        )
+    if not track.has_heading:
+        raise LogError(f"{label}: has no heading, which tells the wheels apart; record it.")
+    used = [k for k in range(columns_in_use(body)) if np.any(body[:, k])]
+    names = [COLUMNS[track.command_kind][k] for k in used]
+    did = _responses(track, used)
+    if np.isnan(did).all():
+        raise LogError(
+            f"{label}: no command was alone for {2 * MARGIN_S + 0.5:.1f} s; play the script that "
+            "`twinmill wheels -o wheels.csv` writes."
+        )
+    columns = _named(names, body[:, used], did, track.command_kind)
+    return WheelSigns(robot.robot_id, columns, check_tracks([(label, track)], model))
+
+
+def _responses(track: Track, used: list[int]) -> np.ndarray:
+    """(3, C) mean velocity of the body while one column alone is driven, by its sign."""
+    motion = Motion.of(track)
+    at_s = motion.t_s[:, None] + np.linspace(-MARGIN_S, MARGIN_S, 9)
+    told = command_at(at_s.ravel(), track.command_t_s, track.command).reshape(*at_s.shape, -1)
+    same = (told == told[:, :1]).all(axis=(1, 2))
+    told, body = told[:, 4][:, used], motion.body_mps()
+    speeds = np.column_stack([body.real, body.imag, motion.turn_radps])
+    did = np.full((3, len(used)), np.nan)
+    for k in range(len(used)):
+        alone = same & (told[:, k] != 0) & (np.count_nonzero(told, axis=1) == 1)
+        if np.count_nonzero(alone) >= FEWEST:
+            did[:, k] = np.mean(np.sign(told[alone, k])[:, None] * speeds[alone], axis=0)
+    return did
+
+
+def _named(
+    names: list[str], wanted: np.ndarray, did: np.ndarray, kind: CommandKind
+) -> list[Column]:
+    """Each column by the direction that is nearest to what it did."""
+    forward, turn = np.abs(wanted[0]).max(), np.abs(wanted[2]).max()
+    weight = np.array([[1.0], [1.0], [0.2 if kind == "twist" else forward / turn]])
+    size = np.linalg.norm(weight * did, axis=0)
+    unit = weight * did / np.maximum(size, 1e-9)
+    known = weight * wanted / np.linalg.norm(weight * wanted, axis=0)
+    columns = []
+    for k, name in enumerate(names):
+        cosine = known.T @ unit[:, k]
+        best = int(np.argmax(np.abs(cosine)))
+        if abs(cosine[k]) > abs(cosine[best]) - AS_GOOD:
+            best = k
+        stood = bool(size[k] < STANDS * np.nanmax(size))
+        clear = abs(cosine[best]) > LIKE and not stood
+        like, sign = (names[best], int(np.sign(cosine[best]))) if clear else ("", 1)
+        columns.append(Column(name, did[:, k], like, sign, stood))
+    return columns
