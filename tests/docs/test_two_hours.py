@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import twinmill_native as native
 
+from twinmill_cli.guide import ANSWERS
 from twinmill_cli.main import COMMANDS, LazyCommand
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,6 +29,10 @@ def test_each_command_and_its_options_exist(line):
     command = LazyCommand(words[0], f"twinmill_cli.{module}", "").command()
     known = {option for p in command.params for option in p.opts}
     assert [w for w in words[1:] if w.startswith("-") and w not in known] == []
+
+
+def test_the_answers_are_those_of_the_guide():
+    assert [" | ".join(row) for row in ANSWERS if f"| {' | '.join(row)} |" not in PAGE] == []
 
 
 def test_what_takes_seconds_runs(tmp_path):

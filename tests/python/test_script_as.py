@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scripts for robots on ROS: bytes of the bag by hand, the publisher run on a stand-in of rclpy."""
 
-import signal
 import sqlite3
 import struct
-import types
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
 from twinmill_cli.main import run
+
+sys.path.insert(0, str(Path(__file__).parent))
+from ros_stand_in import StandIn
 
 SCRIPT = "t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,0,0,0,0\n1,50,50,50,50\n2,-40,40,-40,40\n3,0,0,0,0\n"
 # Of the model below: 0.36 m/s at full duty; turning 0.4 * 0.36 / 0.126 at duty 40 %.
@@ -48,68 +51,6 @@ def test_a_bag_holds_the_velocities_that_the_model_reaches(folder):
     assert t_s[-1] == 3 and not values[-1].any()
 
 
-class StandIn:
-    """As much of rclpy as a publisher needs; its clock runs a tick at a time."""
-
-    def __init__(self, monkeypatch, stop_after=10**9):
-        self.said, self.now_s, self.stop_after = [], 0.0, stop_after
-        stand_in = self
-
-        class Node:
-            def __init__(self, name):
-                pass
-
-            def create_publisher(self, kind, topic, depth):
-                return types.SimpleNamespace(publish=stand_in.hear)
-
-            def create_timer(self, period_s, call):
-                stand_in.period_s, stand_in.call = period_s, call
-
-            def destroy_node(self):
-                pass
-
-        def vector():
-            return types.SimpleNamespace(x=0.0, y=0.0, z=0.0)
-
-        def twist():
-            return types.SimpleNamespace(linear=vector(), angular=vector())
-
-        rclpy = types.ModuleType("rclpy")
-        rclpy.init, rclpy.spin = lambda **_: None, self.spin
-        rclpy.shutdown = lambda: None
-        modules = {
-            "rclpy": rclpy,
-            "rclpy.node": types.SimpleNamespace(Node=Node),
-            "rclpy.signals": types.SimpleNamespace(
-                SignalHandlerOptions=types.SimpleNamespace(NO=0)
-            ),
-            "geometry_msgs": types.ModuleType("geometry_msgs"),
-            "geometry_msgs.msg": types.SimpleNamespace(Twist=twist),
-        }
-        for name, module in modules.items():
-            monkeypatch.setitem(__import__("sys").modules, name, module)
-
-    def hear(self, twist):
-        self.said.append((self.now_s, twist.linear.x, twist.linear.y, twist.angular.z))
-
-    def spin(self, node):
-        while True:
-            self.now_s += self.period_s
-            if self.now_s > self.stop_after:
-                raise KeyboardInterrupt
-            self.call()
-
-    def run(self, path, monkeypatch):
-        """The program, on this clock; what it does to signals is undone."""
-        monkeypatch.setattr("time.monotonic", lambda: self.now_s)
-        monkeypatch.setattr("time.sleep", lambda _: None)
-        before = signal.getsignal(signal.SIGTERM)
-        try:
-            exec(compile(path.read_text(), path, "exec"), {"__name__": "__main__"})
-        finally:
-            signal.signal(signal.SIGTERM, before)
-
-
 def test_a_publisher_says_the_script_and_then_stops(folder, monkeypatch):
     assert convert("publisher", "p.py") == 0
     stand_in = StandIn(monkeypatch)
@@ -119,6 +60,11 @@ def test_a_publisher_says_the_script_and_then_stops(folder, monkeypatch):
         row = np.argmin(np.abs(said[:, 0] - at_s))
         np.testing.assert_allclose(said[row, 1:], wanted, atol=1e-5)
     assert said[-1, 0] == pytest.approx(3, abs=0.06) and not said[-5:, 1:].any()
+    header, *rows = (folder / "p_sent.csv").read_text().split()
+    sent = np.array([row.split(",") for row in rows], float)
+    assert header == "t_s,vx_mps,vy_mps,omega_radps"
+    np.testing.assert_allclose(sent[:3, 1:], WANTED, atol=1e-5)  # a row for each change
+    np.testing.assert_allclose(np.diff(sent[:, 0]), 1, atol=0.06)
 
 
 def test_a_publisher_that_is_interrupted_stops_the_robot(folder, monkeypatch):

@@ -100,7 +100,9 @@ def test_a_log_without_single_wheels_is_refused(driven, model):
         read_signs(driven(), model, "made")
 
 
-def test_the_command_writes_the_script_and_reads_its_log(tmp_path, monkeypatch, capsys, model_text, write_log, message):
+def test_the_command_writes_the_script_and_reads_its_log(
+    tmp_path, monkeypatch, capsys, model_text, write_log, message
+):
     """Of a robot that is told velocities and turns the wrong way; from messages on."""
     monkeypatch.chdir(tmp_path)
     text = model_text("m").replace('drive = "duty"', 'drive = "twist"')

@@ -11,6 +11,11 @@ from twinmill_cli.lazy import CommandGroup, LazyCommand
 
 # Name, module and what it does, in the order of the help. The modules are imported when called.
 COMMANDS = (
+    (
+        "guide",
+        "guide",
+        "Ask what you have, and write the plan from an unknown robot to a named effect.",
+    ),
     ("import", "import_log", "Make a log from motion capture exports and command tables."),
     ("export", "export", "Write a log as MCAP for Foxglove, or as tables, CSV or Parquet."),
     ("tags", "tags", "Print tags for robots, to scale, for `twinmill track`."),

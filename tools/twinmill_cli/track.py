@@ -126,7 +126,8 @@ def _track(
     check_new_file(out, force)
     measured, film = read_floor(floor), _film(video, rate_hz)
     _check_size(str(video), film.size_px, eye)
-    orders = read_commands(commands, Columns()) if commands else []
+    only = next(iter(wanted)) if wanted and len(wanted) == 1 else None
+    orders = read_commands(commands, Columns(robot_id=only)) if commands else []
     detector, stamp_s, found = Detector(), [], []
     for at_s, picture in _shown(f"looking for tags in {video}", film):
         stamp_s.append(start_s + at_s)

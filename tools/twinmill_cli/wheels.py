@@ -21,7 +21,7 @@ if working():  # not for --help
     from rich.text import Text
 
     from twinmill.data.log import read_log
-    from twinmill.experiment.wheel_signs import Column, WheelSigns, read_signs, script
+    from twinmill.experiment.wheel_signs import Column, WheelSigns, csv_text, read_signs, script
     from twinmill.export.script import TwistScript
     from twinmill.files import replacing
     from twinmill.report import show
@@ -77,18 +77,15 @@ def _write(
         twists = _twists(model, rows[:-1, 0], rows[:-1, 1:], float(rows[-1, 0]))
         write_script(twists, form, output, force, f"twinmill wheels --script-as {form}")
     else:
-        lines = [",".join(["t_s", *names]), *(",".join(f"{v:g}" for v in row) for row in rows)]
         with replacing(output, force) as temporary:
-            temporary.write_text("\n".join([*lines, ""]))
+            temporary.write_text(csv_text(names, rows))
     data = {"script": str(output), "columns": names, "duration_s": float(rows[-1, 0])}
     text = f"Written: {output}, {rows[-1, 0]:g} s, one of {', '.join(names)} at a time."
     deliver(data, text, as_json)
     return 0
 
 
-def _twists(
-    model: native.Model, t_s: np.ndarray, values: np.ndarray, end_s: float
-) -> TwistScript:
+def _twists(model: native.Model, t_s: np.ndarray, values: np.ndarray, end_s: float) -> TwistScript:
     """Velocities as they are; those that duties lead to."""
     if model.drive == "twist":
         return TwistScript(t_s, values, end_s)

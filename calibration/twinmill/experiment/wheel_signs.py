@@ -11,7 +11,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.checks import InputFinding, check_tracks
-from twinmill.data.checks.geometry import body_by_command, columns_in_use
+from twinmill.data.checks.geometry import body_by_command
 from twinmill.data.checks.motion import Motion
 from twinmill.data.checks.words import COLUMNS
 from twinmill.data.log import CommandKind, LogError, RobotLog
@@ -69,6 +69,14 @@ class WheelSigns:
         return all(c.right for c in self.columns) and not any(f.fatal for f in self.findings)
 
 
+def columns_that_act(model: native.Model, kind: CommandKind) -> list[int]:
+    """Places of the columns of commands that move this robot."""
+    body = body_by_command(model, kind)
+    if kind == "twist" and model.wheel_kind == "differential":  # told to go sideways, it stays
+        return [0, 2]
+    return [k for k in range(4) if np.any(body[:, k])]
+
+
 def script(model: native.Model, duty_pct: int) -> tuple[list[str], np.ndarray]:
     """Names of the columns and (K, 1 + C) rows, t_s first: each column forth, still, back, still.
 
@@ -82,20 +90,24 @@ def script(model: native.Model, duty_pct: int) -> tuple[list[str], np.ndarray]:
     kind = model.drive
     names = [name for name in COLUMNS[kind] if name]
     if kind == "twist":
-        sideways_mps = 0.0 if model.wheel_kind == "differential" else RIM_MPS
-        size = np.array([RIM_MPS, sideways_mps, TURN_RADPS])
+        size = np.array([RIM_MPS, RIM_MPS, TURN_RADPS])
     else:
         rim_radps = round(RIM_MPS / model.get("robot.wheel_radius_m"), 2)
-        level = rim_radps if kind == "wheel_speed" else float(duty_pct)
-        size = level * np.any(body_by_command(model, kind), axis=0)
+        size = np.full(4, rim_radps if kind == "wheel_speed" else float(duty_pct))
     rows, t_s = [np.zeros(1 + len(names))], 1.0
-    for k in np.flatnonzero(size):
+    for k in columns_that_act(model, kind):
         for sign in (1, -1):
             value = np.where(np.arange(len(names)) == k, sign * size, 0.0)
             rows += [np.array([t_s, *value]), np.array([t_s + DRIVEN_S, *np.zeros(len(names))])]
             t_s += DRIVEN_S + STILL_S
     rows.append(np.array([t_s, *np.zeros(len(names))]))
     return names, np.array(rows)
+
+
+def csv_text(names: list[str], rows: np.ndarray) -> str:
+    """The script as a table: t_s and the columns, each row held until the next."""
+    lines = [",".join(f"{value:g}" for value in row + 0.0) for row in rows]
+    return "\n".join([",".join(["t_s", *names]), *lines, ""])
 
 
 def read_signs(robot: RobotLog, model: native.Model, label: str) -> WheelSigns:
@@ -119,7 +131,7 @@ def read_signs(robot: RobotLog, model: native.Model, label: str) -> WheelSigns:
         )
     if not track.has_heading:
         raise LogError(f"{label}: has no heading, which tells the wheels apart; record it.")
-    used = [k for k in range(columns_in_use(body)) if np.any(body[:, k])]
+    used = columns_that_act(model, track.command_kind)
     names = [COLUMNS[track.command_kind][k] for k in used]
     did = _responses(track, used)
     if np.isnan(did).all():

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill guide`: what its plan prints runs as printed, to the answer on the wheels."""
+
+import csv
+import io
+import itertools
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import twinmill_native as native
+
+from twinmill_cli.main import COMMANDS, LazyCommand, run
+
+sys.path.insert(0, str(Path(__file__).parent))
+from ros_stand_in import StandIn
+
+TWIN = ["--robot", "twin"]
+MINUTES = ("compare", "diagnose", "explain", "next", "export-model")  # which other tests run
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def plan(*words):
+    run(["guide", *words])
+    with open("plan/plan.md") as stream:
+        text = stream.read()
+    blocks = re.findall(r"^```(\w*)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    return text, [line for kind, block in blocks if not kind for line in block.splitlines()]
+
+
+def told(robot, poses, drive, wheels, clocks):
+    words = f"--robot {robot} --poses {poses} --drive {drive} --wheels {wheels} --clocks {clocks}"
+    return words.split()
+
+
+CASES = [
+    *(
+        ("other", poses, "duty", wheels, "two")
+        for poses, wheels in itertools.product(
+            ("camera", "optitrack", "csv"), ("mecanum", "differential")
+        )
+    ),
+    ("other", "ros", "duty", "mecanum", "one"),
+    *(("other", "csv", "wheel_speed", wheels, "two") for wheels in ("mecanum", "omni3")),
+    *(("ros", poses, "twist", "differential", "two") for poses in ("camera", "ros", "optitrack")),
+    *(
+        ("ros", "ros", "twist", wheels, "one")
+        for wheels in ("mecanum", "omni3", "ackermann", "none")
+    ),
+    *(("turbopi", poses, "duty", "mecanum", "two") for poses in ("camera", "optitrack")),
+]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: "-".join(case))
+def test_each_plan_has_a_model_that_loads_and_commands_that_exist(case):
+    text, commands = plan(*told(*case))
+    model = native.Model.load("plan/mine.toml")
+    assert (model.drive, model.wheel_kind) == (case[2], case[3])
+    assert ("--same-clock" in text) == (case[4] == "one" and case[1] in ("ros", "csv"))
+    modules = {name: module for name, module, _ in COMMANDS}
+    for words in map(shlex.split, commands):
+        if words[0] == "twinmill":
+            command = LazyCommand(words[1], f"twinmill_cli.{modules[words[1]]}", "").command()
+            known = {option for p in command.params for option in p.opts}
+            assert [w for w in words[2:] if w.startswith("--") and w not in known] == []
+    assert "{" not in text and "\n\n\n" not in text
+    assert not re.search(r"[^\n]\n## ", text)  # an empty line before each heading
+
+
+def test_with_the_twin_as_robot_all_runs_as_printed():
+    _, commands = plan(*TWIN)
+    quick = [c for c in commands if not any(f"twinmill {word} " in c for word in MINUTES)]
+    said = ""
+    for command in quick:
+        done = subprocess.run(
+            ["bash", "-c", command.replace("twin_run", '"$TWIN_RUN"')],
+            cwd="plan",
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        said += done.stdout
+    assert "Each does what it should" in said
+
+
+def integrated(sent):
+    """Poses of a body that does exactly what was sent, by the midpoint rule."""
+    t_s = np.arange(sent[0, 0] - 0.5, sent[-1, 0] + 0.5, 0.01)
+    row = np.searchsorted(sent[:, 0], t_s, "right") - 1
+    vx, vy, omega = np.where(row[:, None] >= 0, sent[row, 1:], 0.0).T
+    theta = np.cumsum(omega) * 0.01
+    place = np.cumsum(np.exp(1j * (theta - omega * 0.005)) * (vx + 1j * vy)) * 0.01
+    return np.column_stack([t_s, place.real, place.imag, theta])
+
+
+def test_a_robot_on_ros_comes_to_the_answer_on_its_axes(folder, monkeypatch, capsys):
+    """Its publisher is run; its poses are a table; import and wheels run as printed."""
+    _, commands = plan(*told("ros", "csv", "twist", "differential", "one"))
+    monkeypatch.chdir(folder / "plan")
+    StandIn(monkeypatch).run(folder / "plan/wheels.py", monkeypatch)
+    with open("wheels_sent.csv") as stream:
+        _, *rows = csv.reader(stream)
+    poses = integrated(np.array(rows, float))
+    head = "t_s,x_m,y_m,theta_rad"
+    np.savetxt("wheels_poses.csv", poses, "%.6f", delimiter=",", header=head, comments="")
+    capsys.readouterr()
+    lines = [c for c in commands if "wheels_poses" in c or "twinmill wheels" in c]
+    assert len(lines) == 2
+    for line in lines:
+        result = run(shlex.split(line)[1:])
+    assert result == 0 and "Each does what it should" in capsys.readouterr().out
+
+
+def test_what_is_not_said_is_asked(monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    monkeypatch.setattr("sys.stdin", Terminal("other\nbicycle\ncsv\ndifferential\nduty\ntwo\n"))
+    text, _ = plan()
+    assert "differential wheels, told duties; poses from a table" in text
+
+
+def test_what_is_missing_or_does_not_go_together_is_one_sentence(folder):
+    with pytest.raises(ValueError, match=r"--poses is not said.*camera, optitrack"):
+        run(["guide", "--json", "--robot", "other"])
+    with pytest.raises(ValueError, match=r"--drive duty: .*twist"):
+        run(["guide", *told("ros", "ros", "duty", "mecanum", "one")])
+    assert list(folder.iterdir()) == []
+    (folder / "plan").mkdir()
+    with pytest.raises(ValueError, match="plan: exists"):
+        run(["guide", *TWIN])

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill guide`: from what you have to a plan, a model file to fill in and two scripts."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from twinmill_cli.lazy import working
+from twinmill_cli.output import AsJson, deliver
+
+if working():  # not for --help
+    import re
+
+    import numpy as np
+    import twinmill_native as native
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from rich.console import Group
+    from rich.prompt import Prompt
+    from rich.text import Text
+
+    from twinmill.challenge.drives import drive as plan
+    from twinmill.data.checks.words import COLUMNS
+    from twinmill.experiment.wheel_signs import csv_text, script
+    from twinmill.export.script import TwistScript, write_publisher
+    from twinmill.files import check_new_folder
+
+
+class Poses(StrEnum):
+    """Where they come from."""
+
+    CAMERA = "camera"
+    OPTITRACK = "optitrack"
+    ROS = "ros"
+    CSV = "csv"
+
+
+class Robot(StrEnum):
+    """What drives it."""
+
+    TURBOPI = "turbopi"
+    ROS = "ros"
+    OTHER = "other"
+    TWIN = "twin"
+
+
+class Drive(StrEnum):
+    """What it is told."""
+
+    DUTY = "duty"
+    WHEEL_SPEED = "wheel_speed"
+    TWIST = "twist"
+
+
+class Wheels(StrEnum):
+    """What it rolls on."""
+
+    MECANUM = "mecanum"
+    DIFFERENTIAL = "differential"
+    OMNI3 = "omni3"
+    ACKERMANN = "ackermann"
+    NONE = "none"
+
+
+class Clocks(StrEnum):
+    """Who stamps poses and commands."""
+
+    ONE = "one"
+    TWO = "two"
+
+
+QUESTIONS = {
+    "robot": (Robot, "What drives it: our program, ROS, another program, or the twin to try this"),
+    "poses": (Poses, "Where do the robot's poses come from"),
+    "wheels": (Wheels, "What does it roll on"),
+    "drive": (Drive, "What is it told: duties, wheel speeds or velocities"),
+    "clocks": (Clocks, "Does one computer stamp poses and commands (one), or do two"),
+}
+TOLD = {"duty": "duties", "wheel_speed": "wheel speeds", "twist": "velocities of the body"}
+SEEN = {
+    "camera": "a camera on the ceiling",
+    "optitrack": "OptiTrack",
+    "ros": "ROS topics",
+    "csv": "a table",
+}
+ANSWERS = (
+    (
+        "score near 1",
+        "the model predicts as well as this log can tell",
+        "stop, or drive something new",
+    ),
+    ("`model_adequate`", "nothing is missing that this log would show", "use the model"),
+    ("`refit_enough`", "the numbers are stale, no effect is missing", "`fit`"),
+    (
+        "`effect_missing`",
+        "one effect or more, named, tested on data that was not fitted",
+        "`explain`",
+    ),
+    ("`ambiguous`, `group`", "this log cannot tell some effects apart", "`next`"),
+    (
+        "`outside_catalogue`",
+        "something is missing that no effect explains; `rest` says when it comes",
+        "look there, or `add equation`",
+    ),
+    ("`cannot_tell`", "what the log does not show would change the answer", "`next`"),
+    ("`bad_input`", "the log itself is wrong; `input` says what", "correct it, import again"),
+)
+DRIVE_S, SEED = 60.0, 1
+FULL_MPS, FULL_RADPS = 0.3, 2.0  # of robots that are told velocities, in the first drive
+
+
+@dataclass(frozen=True)
+class Have:
+    """What there is."""
+
+    poses: str
+    robot: str
+    drive: str
+    wheels: str
+    clocks: str
+    number: int
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the application."""
+    app.command("guide")(_guide)
+
+
+def _guide(
+    poses: Annotated[Poses | None, typer.Option("--poses", show_default=False)] = None,
+    robot: Annotated[Robot | None, typer.Option("--robot", show_default=False)] = None,
+    drive: Annotated[Drive | None, typer.Option("--drive", show_default=False)] = None,
+    wheels: Annotated[Wheels | None, typer.Option("--wheels", show_default=False)] = None,
+    clocks: Annotated[Clocks | None, typer.Option("--clocks", show_default=False)] = None,
+    number: Annotated[int, typer.Option("--number", min=0, max=99, help="The robot's.")] = 3,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of the plan.")
+    ] = Path("plan"),
+    as_json: AsJson = False,
+) -> Have:
+    """Ask what you have, and write the plan from an unknown robot to a named effect.
+
+    The folder holds plan.md, a model file to write your measures into, and two
+    scripts: one wheel at a time, and the first drive. What an option says is
+    not asked; without a terminal or with --json all must be said.
+
+    Example: twinmill guide --robot twin -o plan
+    """
+    given = {"poses": poses, "robot": robot, "drive": drive, "wheels": wheels, "clocks": clocks}
+    have = _have(given, number, not as_json and sys.stdin.isatty())
+    if output.exists():
+        raise ValueError(f"{output}: exists; choose another folder.")
+    check_new_folder(output)
+    with tempfile.TemporaryDirectory(prefix=f".{output.name}.", dir=output.parent) as temporary:
+        fresh = Path(temporary) / output.name
+        fresh.mkdir()
+        text = _write(have, fresh)
+        fresh.rename(output)
+    blocks = re.findall(r"^```(\w*)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    commands = [line for kind, block in blocks if not kind for line in block.splitlines()]
+    data = {"have": asdict(have), "out": str(output), "commands": commands, "plan": text}
+    words = Text(f"{text}\nWritten: {output}/plan.md", no_wrap=True, overflow="ignore")
+    deliver(data, Group(words), as_json)
+    return have
+
+
+def _have(given: dict[str, StrEnum | None], number: int, asks: bool) -> Have:
+    """What was said, what follows from it, and what is asked.
+
+    Raises:
+        ValueError: something is not said and nobody can be asked, or does not go together.
+    """
+    known = {name: answer for name, answer in given.items() if answer}
+    for name, (kind, question) in QUESTIONS.items():
+        answer = known.get(name) or _following(known).get(name)
+        if answer is None and not asks:
+            words = ", ".join(kind)
+            raise ValueError(f"guide: --{name} is not said, and nobody can be asked; say {words}.")
+        known[name] = answer or kind(Prompt.ask(question, choices=[word.value for word in kind]))
+    for name, answer in _following(known).items():
+        if known[name] != answer:
+            raise ValueError(f"--{name} {known[name]}: what else was said makes it {answer}.")
+    return Have(**{name: answer.value for name, answer in known.items()}, number=number)
+
+
+def _following(known: dict[str, StrEnum]) -> dict[str, StrEnum]:
+    """What follows from what is known."""
+    robot, poses, wheels = (known.get(name) for name in ("robot", "poses", "wheels"))
+    found: dict[str, StrEnum] = {}
+    if robot in (Robot.TWIN, Robot.TURBOPI):
+        found |= {"drive": Drive.DUTY, "wheels": Wheels.MECANUM}
+    elif robot is Robot.ROS or wheels in (Wheels.ACKERMANN, Wheels.NONE):
+        found["drive"] = Drive.TWIST
+    if robot is Robot.TWIN:
+        found |= {"poses": Poses.CSV, "clocks": Clocks.ONE}
+    elif poses in (Poses.CAMERA, Poses.OPTITRACK):  # films and takes count from their start
+        found["clocks"] = Clocks.TWO
+    return found
+
+
+def _write(have: Have, folder: Path) -> str:
+    """The plan, after all files of the folder."""
+    model_text = _render("guide_model.toml.j2", have=have)
+    (folder / "mine.toml").write_text(model_text)
+    model = native.Model.from_toml(model_text, "mine.toml")
+    suffix = "py" if have.robot == "ros" else "csv"
+    signs = have.wheels != "ackermann"
+    signs_s = _play(*script(model, 50), folder / f"wheels.{suffix}") if signs else 0.0
+    drive_s = _play(*_first_drive(model), folder / f"drive.{suffix}")
+    text = _render(
+        "guide.md.j2",
+        have=have,
+        told=TOLD[have.drive],
+        seen="the twin" if have.robot == "twin" else SEEN[have.poses],
+        one_clock=have.clocks == "one",
+        same_clock=" --same-clock" if have.clocks == "one" else "",
+        wheels=f"wheels.{suffix}",
+        drive=f"drive.{suffix}",
+        signs=signs,
+        signs_s=signs_s,
+        drive_s=drive_s,
+        answers=ANSWERS,
+    )
+    text = re.sub(r"\n{3,}", "\n\n", text)
+    (folder / "plan.md").write_text(text)
+    return text
+
+
+def _render(template: str, **values: Any) -> str:
+    environment = Environment(
+        loader=PackageLoader("twinmill_cli", "."),
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+    )
+    return environment.get_template(template).render(**values)
+
+
+def _play(names: list[str], rows: np.ndarray, path: Path) -> float:
+    """Writes a script, as a table or as a publisher; returns how long it takes, s."""
+    if path.suffix == ".py":
+        command = f"twinmill guide, {path.name}"
+        write_publisher(TwistScript(rows[:-1, 0], rows[:-1, 1:], rows[-1, 0]), path, False, command)
+    else:
+        path.write_text(csv_text(names, rows))
+    return float(rows[-1, 0])
+
+
+def _first_drive(model: native.Model) -> tuple[list[str], np.ndarray]:
+    """Columns and rows, t_s first, of a drive that shows most effects."""
+    sideways = model.wheel_kind in ("mecanum", "omni3", "none")
+    legs = plan("mixed", DRIVE_S, sideways, np.random.default_rng(SEED))
+    axes = np.array([leg[1] for leg in legs])
+    t_s = np.cumsum([0.0, *(leg[0] for leg in legs)])
+    if model.wheel_kind == "ackermann":
+        axes[:, 2] *= np.abs(axes[:, 0])  # it does not turn on the spot
+    values = axes * [FULL_MPS, FULL_MPS, FULL_RADPS]
+    if model.drive != "twist":
+        speeds = np.array([model.wheel_speeds(*row) for row in values])
+        speeds = np.pad(speeds, ((0, 0), (0, 4 - speeds.shape[1])))
+        top = np.abs(speeds).max()
+        values = np.rint(100 * speeds / top) if model.drive == "duty" else speeds
+    names = [name for name in COLUMNS[model.drive] if name]
+    still = np.zeros(len(names))
+    rows = [np.append(at_s, row) for at_s, row in zip(t_s, [*values, still], strict=True)]
+    return names, np.round(rows, 3)
