@@ -25,6 +25,11 @@ COMMANDS = (
         "Find tagged robots in a film of one camera over the floor, and write their poses.",
     ),
     (
+        "optitrack",
+        "optitrack",
+        "Publish the poses that OptiTrack Motive streams (NatNet), or say why none arrive.",
+    ),
+    (
         "track-calibrate",
         "track",
         "Find a camera's lens from a film of a board that is moved about before it.",

@@ -134,13 +134,27 @@ def _row(row: list[str], header: _Header, where: str) -> list[float]:
 def _pose_series(
     robot_id: int, utime_us: np.ndarray, position_m: np.ndarray, quaternion: np.ndarray, up: str
 ) -> PoseSeries:
-    if up == "y":
-        position_m = position_m[:, [0, 2, 1]] * [1, -1, 1]
-        quaternion = quaternion[:, [0, 1, 3, 2]] * [1, 1, -1, 1]
+    position_m, quaternion = with_z_up(position_m, quaternion, up)
     norm = np.linalg.norm(quaternion, axis=1)
     valid = np.isfinite(position_m).all(axis=1) & (np.abs(norm - 1) < 0.05)
     unit = quaternion / np.where(valid, norm, np.nan)[:, None]
     return PoseSeries(robot_id, utime_us, np.where(valid[:, None], position_m, np.nan), unit, valid)
+
+
+def with_z_up(
+    position_m: np.ndarray, quaternion_wxyz: np.ndarray, up: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 3) and (N, 4) as they are, or with y up turned by x, y, z -> x, -z, y."""
+    if up == "z":
+        return position_m, quaternion_wxyz
+    return position_m[:, [0, 2, 1]] * [1, -1, 1], quaternion_wxyz[:, [0, 1, 3, 2]] * [1, 1, -1, 1]
+
+
+def number_of(body: str, robots: dict[str, int]) -> int:
+    """robot_id of a rigid body: as `robots` says, else the last digits in its name; -1 if none."""
+    digits = re.findall(r"\d+", body)
+    number = robots.get(body, int(digits[-1]) if digits else -1)
+    return number if 0 <= number <= 99 else -1
 
 
 def _numbered(header: _Header, robots: dict[str, int], name: str) -> dict[str, int]:
@@ -152,9 +166,8 @@ def _numbered(header: _Header, robots: dict[str, int], name: str) -> dict[str, i
         )
     numbered = {}
     for body in header.bodies:
-        digits = re.findall(r"\d+", body)
-        number = robots.get(body, int(digits[-1]) if digits else -1)
-        if not 0 <= number <= 99 or number in numbered.values():
+        number = number_of(body, robots)
+        if number < 0 or number in numbered.values():
             raise LogError(
                 f"{name}: rigid body '{body}' gives no robot_id of its own in 0..99; "
                 f"give it with --robot '{body}=ID'."
