@@ -25,10 +25,20 @@ static int64_t monotonic_us(void)
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
-// Whoever shouts what is not obeyed gets an answer now and then, and never fills the way of a stop.
+// Signed for this run of the program, and made after all of these before.
+static bool is_new(struct radio *radio, const struct fw_command *order)
+{
+    const bool is = order->seal == FW_SEAL_GOOD && order->session == radio->session &&
+                    order->made_us > radio->made_us;
+    radio->made_us = is ? order->made_us : radio->made_us;
+    return is;
+}
+
+// Whoever shouts what is not obeyed, or says again what was heard, gets an answer now and then, and
+// never fills the way of a stop.
 static bool is_worth_an_answer(struct radio *radio, const struct fw_command *order)
 {
-    if (order->verb == FW_VERB_STOP || order->seal == FW_SEAL_GOOD)
+    if (order->verb == FW_VERB_STOP || is_new(radio, order))
     {
         return true;
     }

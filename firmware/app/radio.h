@@ -27,7 +27,9 @@ struct radio
     struct seal_key key;
     // Channel on which robots of this number say who they are.
     char link_channel[24];
-    // When a command that is not obeyed is answered again (monotonic).
+    // When the newest signed command of this session was made.
+    int64_t made_us;
+    // When a command that is not obeyed, or a copy, is answered again (monotonic).
     int64_t refusal_us;
     // Packets on the operator's channels that were not even answered.
     atomic_uint ignored_count;

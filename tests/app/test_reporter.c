@@ -2,8 +2,16 @@
 // Tests of firmware/app/reporter.c: the loop never waits for the network.
 #include "reporter.h"
 
+#include <arpa/inet.h>
+#include <stdio.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <time.h>
+#include <turbopi_signed_command_t.h>
+#include <turbopi_swarm_command_t.h>
+#include <unistd.h>
+
+#include "radio/wire.h"
 
 #include "unity.h"
 
@@ -11,7 +19,7 @@
 
 static struct app_config config;
 static struct reporter reporter;
-static struct link link;
+static struct link to_loop;
 static const struct seal_key no_key;
 
 void setUp(void)
@@ -29,18 +37,108 @@ static int64_t now_us(void)
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
+// Of this process alone: the same tests may run beside it.
+static int port(void)
+{
+    return 20000 + getpid() % 10000;
+}
+
+static void pause_ms(int duration_ms)
+{
+    (void)nanosleep(&(struct timespec){.tv_nsec = duration_ms * 1000000L}, NULL);
+}
+
+struct datagram
+{
+    uint8_t bytes[512];
+    size_t size;
+};
+
+// A whole LCM message of one packet: "LC02", number, channel, data.
+static uint8_t *address_to(struct datagram *datagram, const char *channel)
+{
+    memcpy(datagram->bytes, "LC02\0\0\0\1", 8);
+    memcpy(datagram->bytes + 8, channel, strlen(channel) + 1);
+    datagram->size = 8 + strlen(channel) + 1;
+    return datagram->bytes + datagram->size;
+}
+
+static struct datagram make_stop(void)
+{
+    struct datagram datagram;
+    uint8_t *data = address_to(&datagram, WIRE_COMMAND_CHANNEL);
+    const turbopi_swarm_command_t order = {
+        .robot_id = WIRE_ALL_ROBOTS, .verb = FW_VERB_STOP, .behavior = ""};
+    datagram.size += (size_t)turbopi_swarm_command_t_encode(data, 0, 256, &order);
+    return datagram;
+}
+
+static struct datagram make_start(const struct seal_key *key, int64_t session)
+{
+    struct datagram datagram;
+    uint8_t inner[128], *data = address_to(&datagram, WIRE_SIGNED_CHANNEL);
+    const turbopi_swarm_command_t order = {.verb = FW_VERB_START, .behavior = ""};
+    turbopi_signed_command_t message = {.session = session, .made_us = 1, .command = inner};
+    message.command_size = turbopi_swarm_command_t_encode(inner, 0, sizeof inner, &order);
+    const int size = turbopi_signed_command_t_encode(data, 0, 256, &message);
+    seal_sign(key, data, (size_t)size);
+    datagram.size += (size_t)size;
+    return datagram;
+}
+
+// To this machine alone, some at a time so that the socket holds them.
+static void say_again_and_again(const struct datagram *datagram, int count)
+{
+    const struct sockaddr_in here = {.sin_family = AF_INET,
+                                     .sin_port = htons((uint16_t)port()),
+                                     .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+    for (int i = 0; i < count; ++i)
+    {
+        (void)sendto(fd, datagram->bytes, datagram->size, 0, (const struct sockaddr *)&here,
+                     sizeof here);
+        if (i % 20 == 19)
+        {
+            pause_ms(2);
+        }
+    }
+    (void)close(fd);
+}
+
 // Test
+
+// The loop is slower than who repeats, as fast as the radio takes it, a start that was signed.
+static void test_commands_said_again_do_not_fill_the_way_of_a_stop(void)
+{
+    struct seal_key key = {.present = true};
+    (void)snprintf(config.lcm_url, sizeof config.lcm_url, "udpm://239.255.76.67:%d?ttl=0", port());
+    TEST_ASSERT_EQUAL(FW_OK, reporter_start(&reporter, &config, &key, &to_loop));
+    const struct datagram start = make_start(&key, to_loop.session), stop = make_stop();
+    say_again_and_again(&start, 2000);
+    pause_ms(100);
+    say_again_and_again(&stop, 20);
+    pause_ms(100);
+    int starts = 0, stops = 0;
+    for (struct link_command heard; to_loop.receive(to_loop.context, &heard);)
+    {
+        starts += heard.order.verb == FW_VERB_START && heard.order.seal == FW_SEAL_GOOD;
+        stops += heard.order.verb == FW_VERB_STOP;
+    }
+    reporter_stop(&reporter);
+    TEST_ASSERT_GREATER_THAN(0, starts);
+    TEST_ASSERT_GREATER_THAN(0, stops);
+}
 
 // Ten minutes of steps at once: what the thread cannot take is lost, and the caller goes on.
 static void test_flood_of_reports_is_dropped_and_told_to_the_loop(void)
 {
-    TEST_ASSERT_EQUAL(FW_OK, reporter_start(&reporter, &config, &no_key, &link));
+    TEST_ASSERT_EQUAL(FW_OK, reporter_start(&reporter, &config, &no_key, &to_loop));
     const struct link_report report = {.utime_us = 1};
     int taken = 0, lost = 0;
     const int64_t begin_us = now_us();
     for (int i = 0; i < 18000; ++i)
     {
-        const bool ok = link.send_report(link.context, &report);
+        const bool ok = to_loop.send_report(to_loop.context, &report);
         taken += ok;
         lost += !ok;
     }
@@ -48,18 +146,18 @@ static void test_flood_of_reports_is_dropped_and_told_to_the_loop(void)
     TEST_ASSERT_EQUAL(18000, taken + lost);
     TEST_ASSERT_GREATER_THAN(100, taken);
     struct link_command command;
-    TEST_ASSERT_FALSE(link.receive(link.context, &command));
+    TEST_ASSERT_FALSE(to_loop.receive(to_loop.context, &command));
     reporter_stop(&reporter);
 }
 
 // A second's reports fit even if the thread is not run meanwhile.
 static void test_second_of_reports_fits(void)
 {
-    TEST_ASSERT_EQUAL(FW_OK, reporter_start(&reporter, &config, &no_key, &link));
+    TEST_ASSERT_EQUAL(FW_OK, reporter_start(&reporter, &config, &no_key, &to_loop));
     const struct link_report report = {.utime_us = 1};
     for (int i = 0; i < 30; ++i)
     {
-        TEST_ASSERT_TRUE(link.send_report(link.context, &report));
+        TEST_ASSERT_TRUE(to_loop.send_report(to_loop.context, &report));
     }
     reporter_stop(&reporter);
     // Without a bus all of them are counted as unsent.
@@ -69,12 +167,13 @@ static void test_second_of_reports_fits(void)
 static void test_log_that_cannot_be_opened_is_an_error(void)
 {
     strcpy(config.io_tsv, "/nowhere/io.tsv");
-    TEST_ASSERT_EQUAL(FW_ERR_IO, reporter_start(&reporter, &config, &no_key, &link));
+    TEST_ASSERT_EQUAL(FW_ERR_IO, reporter_start(&reporter, &config, &no_key, &to_loop));
 }
 
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_commands_said_again_do_not_fill_the_way_of_a_stop);
     RUN_TEST(test_flood_of_reports_is_dropped_and_told_to_the_loop);
     RUN_TEST(test_second_of_reports_fits);
     RUN_TEST(test_log_that_cannot_be_opened_is_an_error);
