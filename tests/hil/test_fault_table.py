@@ -40,27 +40,25 @@ CALLS = {
     "motor board: read": ("read", 0, I2C, EREMOTEIO),
     "button and lights: ioctl": ("ioctl", 0, GPIO, EIO),
 }
-# Calls that open a part again after it was lost: the robot stands meanwhile.
+# What loses a part; then calls that open it again, while the robot stands, and that close it.
+LOSING = {"camera": "camera: VIDIOC_DQBUF", "button and lights": "button and lights: ioctl"}
 OPENING = {
-    "open": ("open", 0, VIDEO, EIO),
-    "VIDIOC_QUERYCAP": ("ioctl", 0x80685600, VIDEO, EIO),
-    "VIDIOC_ENUM_FMT": ("ioctl", 0xC0405602, VIDEO, EIO),
-    "VIDIOC_S_FMT": ("ioctl", 0xC0D05605, VIDEO, EIO),
-    "VIDIOC_REQBUFS": ("ioctl", 0xC0145608, VIDEO, EIO),
-    "VIDIOC_QUERYBUF": ("ioctl", 0xC0585609, VIDEO, EIO),
-    "mmap": ("mmap", 0, VIDEO, EIO),
-    "VIDIOC_STREAMON": ("ioctl", 0x40045612, VIDEO, EIO),
+    ("camera", "open"): ("open", 0, VIDEO, EIO),
+    ("camera", "VIDIOC_QUERYCAP"): ("ioctl", 0x80685600, VIDEO, EIO),
+    ("camera", "VIDIOC_ENUM_FMT"): ("ioctl", 0xC0405602, VIDEO, EIO),
+    ("camera", "VIDIOC_S_FMT"): ("ioctl", 0xC0D05605, VIDEO, EIO),
+    ("camera", "VIDIOC_REQBUFS"): ("ioctl", 0xC0145608, VIDEO, EIO),
+    ("camera", "VIDIOC_QUERYBUF"): ("ioctl", 0xC0585609, VIDEO, EIO),
+    ("camera", "mmap"): ("mmap", 0, VIDEO, EIO),
+    ("camera", "VIDIOC_STREAMON"): ("ioctl", 0x40045612, VIDEO, EIO),
+    ("button and lights", "open"): ("open", 0, CHIP, EIO),
+    ("button and lights", "ioctl"): ("ioctl", 0, CHIP, EIO),
 }
-OPENING_LINES = {
-    "open": ("open", 0, CHIP, EIO),
-    "ioctl": ("ioctl", 0, CHIP, EIO),
-}
-# Calls that close a part once another of its calls has failed.
 CLOSING = {
-    "camera: VIDIOC_STREAMOFF": ("ioctl", 0x40045613, VIDEO, EIO),
-    "camera: munmap": ("munmap", 0, "-", EIO),
-    "camera: close": ("close", 0, VIDEO, EIO),
-    "button and lights: close": ("close", 0, GPIO, EIO),
+    ("camera", "VIDIOC_STREAMOFF"): ("ioctl", 0x40045613, VIDEO, EIO),
+    ("camera", "munmap"): ("munmap", 0, "-", EIO),
+    ("camera", "close"): ("close", 0, VIDEO, EIO),
+    ("button and lights", "close"): ("close", 0, GPIO, EIO),
 }
 OPENING_BOARD = {"open": ("open", 0, I2C, EMFILE), "I2C_SLAVE": ("ioctl", 0x0703, I2C, EIO)}
 
@@ -228,40 +226,24 @@ def test_nobody_can_open_the_board_again(guest, drive, table, call):
     note(table, f"motor board: {call} fails, driver killed", stands_after(robot, fault_s))
 
 
-def lose(guest, robot, call):
-    """Makes a robot lose a part. Returns when (guest, s)."""
-    fail(guest, CALLS[call])
-    robot.show_until(lambda: robot.wire() == ZERO)
-    return failed_s(guest)
-
-
-@pytest.mark.parametrize("call", OPENING)
-def test_camera_cannot_be_opened_again(guest, drive, table, call):
+@pytest.mark.parametrize(("part", "call"), OPENING)
+def test_part_cannot_be_opened_again(guest, drive, table, part, call):
     robot = drive(environment=PRELOAD)
-    fault_s = lose(guest, robot, "camera: VIDIOC_DQBUF")
-    fail(guest, OPENING[call])
-    note(table, f"camera lost, then {call} fails", stands_after(robot, fault_s, frames=True))
+    fail(guest, CALLS[LOSING[part]])
+    robot.show_until(lambda: robot.wire() == ZERO)
+    fault_s = failed_s(guest)
+    fail(guest, OPENING[part, call])
+    note(table, f"{part} lost, then {call} fails", stands_after(robot, fault_s, frames=True))
     guest.words("w", CONTROL, "")
     robot.drive_until(LEFT)
 
 
-@pytest.mark.parametrize("call", OPENING_LINES)
-def test_lines_cannot_be_opened_again(guest, drive, table, call):
+@pytest.mark.parametrize(("part", "call"), CLOSING)
+def test_part_that_is_lost_cannot_be_closed(guest, drive, table, part, call):
     robot = drive(environment=PRELOAD)
-    fault_s = lose(guest, robot, "button and lights: ioctl")
-    fail(guest, OPENING_LINES[call])
-    note(table, f"lines lost, then {call} fails", stands_after(robot, fault_s, frames=True))
-    guest.words("w", CONTROL, "")
-    robot.drive_until(LEFT)
-
-
-@pytest.mark.parametrize("call", CLOSING)
-def test_what_is_lost_cannot_be_closed(guest, drive, table, call):
-    robot = drive(environment=PRELOAD)
-    first = CALLS["camera: VIDIOC_DQBUF" if "camera" in call else "button and lights: ioctl"]
-    fail(guest, first, CLOSING[call])
+    fail(guest, CALLS[LOSING[part]], CLOSING[part, call])
     robot.show_until(lambda: robot.wire() == ZERO)
-    note(table, f"{call} fails, too", stands_after(robot, failed_s(guest), frames=True))
+    note(table, f"{part}: {call} fails, too", stands_after(robot, failed_s(guest), frames=True))
     guest.words("w", CONTROL, "")
     robot.drive_until(LEFT)
 
