@@ -3,6 +3,7 @@
 
 import math
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -54,6 +55,23 @@ def replacing(out: Path, force: bool) -> Iterator[Path]:
         ) from error
     finally:
         Path(name).unlink(missing_ok=True)
+
+
+@contextmanager
+def replacing_folder(out: Path, force: bool) -> Iterator[Path]:
+    """The path of a new folder that takes the place of `out` if the block succeeds.
+
+    Raises:
+        ValueError: it exists, or a folder cannot be made there.
+    """
+    if out.exists() and not (force and out.is_dir()):
+        raise ValueError(f"{out}: exists; choose another name, or replace it with --force.")
+    check_new_folder(out)
+    with tempfile.TemporaryDirectory(prefix=f".{out.name}.", dir=out.parent) as folder:
+        yield Path(folder) / out.name
+        if out.exists():
+            shutil.rmtree(out)
+        (Path(folder) / out.name).rename(out)
 
 
 def check_new_folder(path: Path) -> None:

@@ -6,6 +6,7 @@ import importlib
 import json
 import math
 import shutil
+import struct
 import subprocess
 
 import lcm
@@ -16,7 +17,7 @@ import turbopi
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from twinmill.data.importers.import_log import import_log
+from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import read_log
 from twinmill.data.track import command_at
 from twinmill.export import recording
@@ -209,3 +210,78 @@ def test_a_new_message_is_exported_with_its_fields(write_log, tmp_path, monkeypa
     assert rows[0]["note"] == "a, b"
     assert rows[0]["tag"] == "0a2c00"  # a comma and a new line of a CSV they must not be
     assert rows[0]["place_x_m"] == "0.25"
+
+
+def cdr(raw):
+    """A reader of CDR (OMG DDS-XTypes, plain, little-endian), behind its four bytes."""
+    assert raw[:2] == b"\0\1"
+    place = 4
+
+    def read(form):
+        nonlocal place
+        size = struct.calcsize(form)
+        place += -(place - 4) % size
+        place += size
+        return struct.unpack_from(f"<{form}", raw, place - size)[0]
+
+    def text():
+        nonlocal place
+        length = read("I")
+        place += length
+        return raw[place - length : place - 1].decode()
+
+    return read, text
+
+
+def test_a_ros_bag_holds_the_poses_as_other_readers_find_them(log, tmp_path):
+    """By MCAP's own reader and CDR by hand."""
+    run(["export", str(log), "--to", "rosbag2", "-o", str(tmp_path / "bag")])
+    sent = [(s, m) for c, s, m in lcm_events(log) if c == "R01_POSE" and m.valid]
+    found, kinds = [], {}
+    with open(next((tmp_path / "bag").glob("*.mcap")), "rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages():
+            kinds[channel.topic] = schema.name
+            if channel.topic == "/r01/pose":
+                read, text = cdr(message.data)
+                utime_us = read("i") * 10**6 + read("I") // 1000
+                assert text() == "world"
+                found.append((message.log_time, utime_us, [read("d") for _ in range(7)]))
+    assert len(found) == len(sent) == 40  # and not the lost one
+    for (stamp_us, pose), (log_ns, utime_us, values) in zip(sent, found, strict=True):
+        assert (log_ns, utime_us) == (1000 * stamp_us, pose.utime_us)
+        w, x, y, z = pose.orientation_wxyz
+        assert values == [*pose.position_m, x, y, z, w]
+    assert kinds["/tf"] == "tf2_msgs/msg/TFMessage"
+    assert kinds["/r02/truth"] == "nav_msgs/msg/Odometry"
+    assert kinds["/twin_r02/pose"] == "geometry_msgs/msg/PoseStamped"
+
+
+@pytest.mark.parametrize("kind", [0, 1, 2])
+def test_a_ros_bag_can_be_imported(kind, write_log, message, tmp_path):
+    """Poses and commands of each kind come back, and the bag is listed."""
+    values = np.array([[10.0 + k, -20.0, 30.5, 0.0] for k in range(40)])
+    events = []
+    for k, value in enumerate(values):
+        utime_us = T0_US + 25_000 * k
+        pose = message("pose", utime_us=utime_us, robot_id=3, position_m=[0.01 * k, 0.5, 0.1])
+        drive = message("drive", utime_us=utime_us, robot_id=3, kind=kind, value=value.tolist())
+        events += [("R03_POSE", pose), ("R03_DRIVE", drive)]
+    run(["export", str(write_log(*events)), "--to", "rosbag2", "-o", str(tmp_path / "bag")])
+    topic = {0: "/r03/duty_pct", 1: "/r03/wheels", 2: "/r03/cmd_vel"}[kind]
+    options = ImportOptions(
+        pose_topics=("/r03/pose",), command_topics=(topic,), receive_stamps=kind == 0
+    )
+    import_log(None, None, tmp_path / "again.lcmlog", bag=tmp_path / "bag", options=options)
+    robot = read_log(tmp_path / "again.lcmlog").robots[3]
+    assert robot.command_kind == ("duty", "wheel_speed", "twist")[kind]
+    np.testing.assert_allclose(robot.command, values / (100 if kind == 0 else 1))
+    np.testing.assert_allclose(robot.pose[:, 0], 0.01 * np.arange(40))
+
+
+def test_what_ros_has_no_messages_for_is_said(log, tmp_path, capsys):
+    run(["export", str(log), "--to", "rosbag2", "-o", str(tmp_path / "bag"), "--json"])
+    said = json.loads(capsys.readouterr().out)["warnings"]
+    assert any("R01_ACK, SWARM_COMMAND" in words for words in said)
+    with pytest.raises(ValueError, match="bag: exists"):
+        run(["export", str(log), "--to", "rosbag2", "-o", str(tmp_path / "bag")])
+    run(["export", str(log), "--to", "rosbag2", "-o", str(tmp_path / "bag"), "--force"])

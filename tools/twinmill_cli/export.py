@@ -25,8 +25,9 @@ if working():  # not for --help
 
     from twinmill.export.mcap_file import write_mcap
     from twinmill.export.recording import Recording, read_recording
+    from twinmill.export.rosbag2_file import left_out, write_rosbag2
     from twinmill.export.tables import tables_of, write_csv, write_parquet
-    from twinmill.files import check_new_folder, replacing
+    from twinmill.files import check_new_folder, replacing, replacing_folder
     from twinmill.model.outlines import Body
     from twinmill_cli.frame import open_model
 
@@ -37,6 +38,7 @@ class Format(StrEnum):
     MCAP = "mcap"
     CSV = "csv"
     PARQUET = "parquet"
+    ROSBAG2 = "rosbag2"
 
 
 def register(app: typer.Typer) -> None:
@@ -53,19 +55,21 @@ def _export(
             "--output",
             "-o",
             show_default=False,
-            help="File (mcap) or folder (csv, parquet); default: LOG's name, here.",
+            help="File (mcap) or folder (the others); default: LOG's name, here.",
         ),
     ] = None,
     model: Model = DEFAULT_MODEL,
     force: Annotated[bool, typer.Option("--force", help="Replace what exists.")] = False,
     as_json: AsJson = False,
 ) -> dict:
-    """Write a log as MCAP for Foxglove, or as tables, CSV or Parquet.
+    """Write a log as MCAP for Foxglove, as a ROS bag, or as tables, CSV or Parquet.
 
     MCAP holds all channels with all fields, and robots, views and paths to look
     at in Foxglove's 3D panel; the model says how large they are and how far they
     see. Tables are one file per message type; `twinmill import` reads pose.csv,
-    telemetry.csv and drive.csv. A log that breaks off is read up to there.
+    telemetry.csv and drive.csv. A rosbag2 folder holds ROS's own messages (poses,
+    /tf, velocities, wheels) for RViz and PlotJuggler. A log that breaks off is
+    read up to there.
 
     Example: twinmill export run.lcmlog --to mcap
     """
@@ -84,19 +88,26 @@ def _export(
             with replacing(out, force) as temporary:
                 write_mcap(recording, temporary, provenance, body)
             files = [out]
+        elif to is Format.ROSBAG2:
+            with replacing_folder(out, force) as temporary:
+                write_rosbag2(recording, temporary)
+            files = [out]
         else:
             writer = write_csv if to is Format.CSV else write_parquet
             files = _write_tables(tables_of(recording, provenance), out, to, writer, force)
+    warnings = list(recording.warnings)
+    if to is Format.ROSBAG2 and (strange := left_out(recording)):
+        warnings.append(f"ROS has no messages for {', '.join(strange)}: left out.")
     counts = {channel.name: len(channel.messages) for channel in recording.channels}
     data = {
         "out": str(out),
         "files": [str(file) for file in files],
         "messages": sum(counts.values()),
         "channels": counts,
-        "warnings": recording.warnings,
+        "warnings": warnings,
         **provenance,
     }
-    deliver(data, _text(recording, files), as_json)
+    deliver(data, _text(recording, files, warnings), as_json)
     return data
 
 
@@ -121,11 +132,11 @@ def _write_tables(
     return files
 
 
-def _text(recording: Recording, files: list[Path]) -> str:
+def _text(recording: Recording, files: list[Path], warnings: list[str]) -> str:
     count = sum(len(channel.messages) for channel in recording.channels)
     return "\n".join(
         [
             f"{count} messages of {len(recording.channels)} channels: {', '.join(map(str, files))}",
-            *(f"! {warning}" for warning in recording.warnings),
+            *(f"! {warning}" for warning in warnings),
         ]
     )

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import sys
-import tempfile
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -29,7 +28,7 @@ if working():  # not for --help
     from twinmill.data.checks.words import COLUMNS
     from twinmill.experiment.wheel_signs import csv_text, script
     from twinmill.export.script import TwistScript, write_publisher
-    from twinmill.files import check_new_folder
+    from twinmill.files import replacing_folder
 
 
 class Poses(StrEnum):
@@ -154,14 +153,9 @@ def _guide(
     """
     given = {"poses": poses, "robot": robot, "drive": drive, "wheels": wheels, "clocks": clocks}
     have = _have(given, number, not as_json and sys.stdin.isatty())
-    if output.exists():
-        raise ValueError(f"{output}: exists; choose another folder.")
-    check_new_folder(output)
-    with tempfile.TemporaryDirectory(prefix=f".{output.name}.", dir=output.parent) as temporary:
-        fresh = Path(temporary) / output.name
-        fresh.mkdir()
-        text = _write(have, fresh)
-        fresh.rename(output)
+    with replacing_folder(output, force=False) as folder:
+        folder.mkdir()
+        text = _write(have, folder)
     blocks = re.findall(r"^```(\w*)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
     commands = [line for kind, block in blocks if not kind for line in block.splitlines()]
     data = {"have": asdict(have), "out": str(output), "commands": commands, "plan": text}

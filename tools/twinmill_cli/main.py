@@ -17,7 +17,7 @@ COMMANDS = (
         "Ask what you have, and write the plan from an unknown robot to a named effect.",
     ),
     ("import", "import_log", "Make a log from motion capture exports and command tables."),
-    ("export", "export", "Write a log as MCAP for Foxglove, or as tables, CSV or Parquet."),
+    ("export", "export", "Write a log as MCAP for Foxglove, as a ROS bag, or as tables."),
     ("tags", "tags", "Print tags for robots, to scale, for `twinmill track`."),
     (
         "track",

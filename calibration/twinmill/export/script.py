@@ -5,8 +5,6 @@ Duties become the body velocities that the model reaches at them. Robots stop wh
 for a while, so each is said again every PERIOD_S.
 """
 
-import shutil
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from string import Template
@@ -14,7 +12,7 @@ from string import Template
 import numpy as np
 import twinmill_native as native
 
-from twinmill.files import check_new_file, check_new_folder
+from twinmill.files import check_new_file, replacing_folder
 from twinmill.model.model_file import write_whole
 
 TOPIC = "/cmd_vel"
@@ -69,22 +67,14 @@ def write_bag(script: TwistScript, out: Path, force: bool) -> None:
     from rosbags.rosbag2 import Writer  # slow to import
     from rosbags.typesys import Stores, get_typestore
 
-    if out.exists() and not (force and out.is_dir()):
-        raise ValueError(f"{out}: exists; choose another name, or replace it with --force.")
-    check_new_folder(out)
     store = get_typestore(Stores.ROS2_HUMBLE)
     vector, twist = store.types["geometry_msgs/msg/Vector3"], store.types[TWIST]
-    with tempfile.TemporaryDirectory(prefix=f".{out.name}.", dir=out.parent) as folder:
-        bag = Path(folder) / out.name
-        with Writer(bag, version=BAG_VERSION) as writer:
-            topic = writer.add_connection(TOPIC, TWIST, typestore=store)
-            for t_s, (vx, vy, omega) in zip(*script.repeated(), strict=True):
-                message = twist(vector(x=vx, y=vy, z=0.0), vector(x=0.0, y=0.0, z=omega))
-                raw = store.serialize_cdr(message, TWIST)
-                writer.write(topic, round(t_s * 1e9), raw)
-        if out.exists():
-            shutil.rmtree(out)
-        bag.rename(out)
+    with replacing_folder(out, force) as bag, Writer(bag, version=BAG_VERSION) as writer:
+        topic = writer.add_connection(TOPIC, TWIST, typestore=store)
+        for t_s, (vx, vy, omega) in zip(*script.repeated(), strict=True):
+            message = twist(vector(x=vx, y=vy, z=0.0), vector(x=0.0, y=0.0, z=omega))
+            raw = store.serialize_cdr(message, TWIST)
+            writer.write(topic, round(t_s * 1e9), raw)
 
 
 def write_publisher(script: TwistScript, out: Path, force: bool, command: str) -> None:
