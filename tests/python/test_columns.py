@@ -119,3 +119,51 @@ def test_a_mapping_that_makes_no_sense_is_refused_in_a_sentence(imported, tmp_pa
     (tmp_path / "m.toml").write_text(f"[poses]\n{text}\n")
     with pytest.raises(LogError, match=r"m\.toml: .*; (correct it|check the name)\.$"):
         imported(mapping=tmp_path / "m.toml")
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "cp1252", "utf-8-sig"])
+def test_files_of_other_programs_encodings_are_read(tmp_path, encoding):
+    """As Motive, Excel and Windows' editor save them, with their marks."""
+    mark = {"utf-16-le": b"\xff\xfe", "utf-16-be": b"\xfe\xff"}.get(encoding, b"")
+    text = POSES.replace("theta_rad", "Winkel (°)")
+    (tmp_path / "p.csv").write_bytes(mark + text.encode(encoding))
+    (tmp_path / "c.csv").write_bytes(mark + COMMANDS.encode(encoding))
+    import_log(tmp_path / "p.csv", tmp_path / "c.csv", tmp_path / "o.lcmlog")
+    robot = read_log(tmp_path / "o.lcmlog").robots[4]
+    np.testing.assert_allclose(robot.pose[:, 2], np.radians([0, 0.5, 1]))
+
+
+@pytest.mark.parametrize(
+    "units", ["ms,-,mm,cm,deg", "[ms],,[mm],[cm],[°]", "(ms), 1 ,(mm),(cm),(Grad)"]
+)
+def test_a_row_of_units_below_the_names_is_read(imported, units):
+    robot, warnings = imported(
+        f"t,robot_id,x,y,heading\n{units}\n0,4,0,0,0\n1000,4,500,25,90\n2000,4,1000,50,180\n"
+    )
+    np.testing.assert_allclose(robot.pose_t_s, [0, 1, 2])
+    np.testing.assert_allclose(robot.pose[:, :2], [[0, 0], [0.5, 0.25], [1, 0.5]])
+    np.testing.assert_allclose(robot.pose[:, 2], [0, np.pi / 2, np.pi])
+    assert any("taken for their units" in w for w in warnings)
+
+
+def test_a_first_row_that_is_broken_is_no_row_of_units(imported):
+    with pytest.raises(LogError, match=r"row 2: t_s is 'start', not a number"):
+        imported("t_s,robot_id,x_m,y_m,theta_rad\nstart,4,m,0,0\n1,4,0,0,0\n2,4,0,0,0\n")
+
+
+def test_german_names_are_asked_about_and_kept(tmp_path):
+    poses, commands = tmp_path / "p.csv", tmp_path / "c.csv"
+    rows = [f"{k / 20:g};{k * 20};{k};{k * 2}" for k in range(60)]
+    poses.write_text("Zeit;X;Y;Winkel\n" + "\n".join(rows).replace(".", ",") + "\n")
+    commands.write_text("Zeit;VL;VR;HL;HR\n0;0,5;-1;0,25;1\n2;0;0;0;0\n")
+    with pytest.raises(LogError, match=r"'Zeit' has no unit .*--explain-columns"):
+        import_log(poses, commands, tmp_path / "o.lcmlog", options=ImportOptions(robot_id=4))
+    mapping = tmp_path / "m.toml"
+    files = ["import", "--poses", str(poses), "--commands", str(commands)]
+    result = CliRunner().invoke(app, [*files, "--explain-columns", str(mapping)])
+    assert result.exit_code == 0, result.output
+    options = ImportOptions(robot_id=4, mapping=mapping)
+    import_log(poses, commands, tmp_path / "o.lcmlog", options=options)
+    robot = read_log(tmp_path / "o.lcmlog").robots[4]
+    np.testing.assert_allclose(robot.command[0], [0.5, -1, 0.25, 1])
+    np.testing.assert_allclose(robot.pose[-1, 2], np.radians(118))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Text tables of measurements, turned to numbers with errors that name the row."""
 
+import codecs
 import csv
 import difflib
 import gzip
@@ -26,7 +27,9 @@ DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
 DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d")
 TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d")
 DAY_S = 86_400
+UNITLESS = ("-", "1", "#", "id")  # as they stand in a row of units
 FLAGS = {"true": 1.0, "yes": 1.0, "false": 0.0, "no": 0.0}
+BEGINNING_BYTES = 65536  # tell the encoding
 FEWEST_ROWS = 10  # from which on a last cell that is shorter than all above it was cut
 
 
@@ -47,12 +50,25 @@ def open_text(path: Path) -> Iterator[TextIO]:
             disable=not sys.stderr.isatty(),
         ) as raw:
             binary = gzip.GzipFile(fileobj=raw) if path.suffix == ".gz" else raw
-            yield io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
+            buffered = io.BufferedReader(binary, BEGINNING_BYTES)
+            yield io.TextIOWrapper(buffered, _encoding(buffered), newline="")
     except (OSError, EOFError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
         raise LogError(
             f"{path}: cannot be read as text ({reason}); check the name and the format."
         ) from error
+
+
+def _encoding(binary: io.BufferedReader) -> str:
+    """By the first bytes: UTF-16 has a mark, and what is no UTF-8 is Windows' Western encoding."""
+    beginning = binary.peek()[:BEGINNING_BYTES]
+    if beginning.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(beginning)
+    except UnicodeDecodeError:
+        return "cp1252" if b"\0" not in beginning else "utf-8"
+    return "utf-8-sig"
 
 
 @dataclass(frozen=True)
@@ -212,7 +228,9 @@ def read_header(path: Path) -> list[str]:
     """
     with open_text(path) as text:
         lines, _, delimiter = _begin(text)
-        return _names(next(csv.reader(lines, delimiter=delimiter, skipinitialspace=True), []))
+        reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
+        header = _names(next(reader, []))
+        return _with_units(header, next(reader, [])) or header
 
 
 def read_table(path: Path, known: frozenset[str]) -> Table:
@@ -240,6 +258,10 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
             if len(row) < len(header) and not last[0].endswith(("\n", "\r")):
                 notes.append(_cut(path.name, before + reader.line_num))
                 break
+            if not rows and (named := _with_units(header, row)):
+                header = named
+                notes.append(f"{path.name}: the row under the names is taken for their units.")
+                continue
             if len(row) != len(header):
                 raise LogError(
                     f"{path.name}: row {before + reader.line_num}: has {len(row)} cells, but the "
@@ -295,6 +317,23 @@ def _delimiter(header: str) -> str:
 
 def _names(header: list[str]) -> list[str]:
     return [cell.strip() for cell in header]
+
+
+def _with_units(header: list[str], row: list[str]) -> list[str] | None:
+    """Names with the units of the row below them; None if that is no row of units."""
+    units = [cell.strip().strip("[]()").strip() for cell in row]
+    known = [split_unit(f"_ [{unit}]")[1] for unit in units]
+    if len(row) != len(header) or not any(known):
+        return None
+    if any(
+        unit and not found and unit not in UNITLESS
+        for unit, found in zip(units, known, strict=True)
+    ):
+        return None
+    return [
+        f"{name} [{unit}]" if found and not split_unit(name)[1] else name
+        for name, unit, found in zip(header, units, known, strict=True)
+    ]
 
 
 def _remembered(lines: Iterator[str], last: list[str]) -> Iterator[str]:

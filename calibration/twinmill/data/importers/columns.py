@@ -149,6 +149,21 @@ USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]
         for name in (wheel, f"pwm_{wheel}", f"duty_{wheel}")
     },
     **{q: ((q,), _plain) for q in ("qw", "qx", "qy", "qz")},
+    # German
+    **dict.fromkeys(("zeit", "zeitstempel"), (("t_s",), _time)),
+    **dict.fromkeys(("roboter", "roboter_id", "nummer"), (("robot_id",), _plain)),
+    **dict.fromkeys(("h\u00f6he", "hoehe"), (("z_m",), _length)),
+    **dict.fromkeys(
+        ("winkel", "richtung", "ausrichtung", "orientierung"), (("theta_rad",), _angle)
+    ),
+    **dict.fromkeys(("geschwindigkeit", "tempo"), (("vx_mps",), _speed)),
+    **dict.fromkeys(("drehrate", "winkelgeschwindigkeit"), (("omega_radps",), _turn)),
+    "links": (LEFT, _duty),
+    "rechts": (RIGHT, _duty),
+    **{
+        name: ((f"{wheel}_pct",), _duty)
+        for name, wheel in (("vl", "fl"), ("vr", "fr"), ("hl", "rl"), ("hr", "rr"))
+    },
 }
 
 
