@@ -183,7 +183,7 @@ def test_existing_and_unwritable_outputs_are_refused(put, tmp_path):
 def test_not_gzip_and_not_text_are_refused(put, tmp_path):
     commands = put("c.csv", COMMANDS)
     for name in ("p.csv.gz", "p.csv"):
-        (tmp_path / name).write_bytes(b"\xff\xfe\x00plain")
+        (tmp_path / name).write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
         with pytest.raises(LogError, match="cannot be read as text"):
             import_log(tmp_path / name, commands, tmp_path / "o.lcmlog")
 
