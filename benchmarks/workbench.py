@@ -76,7 +76,7 @@ def _session(log: Path, given: ModelFile, folder: Path) -> Iterator[Ratio]:
     def turn() -> None:
         for value in np.linspace(0.05, 0.15, TURNS):
             session.drag("base.motor_lag_s", float(value))
-            session.predicted(0)
+            session.robots[0].predicted(session.shown(0).model)
 
     turned_s, _ = _timed(turn)
     yield single("turn of a knob : 50 ms", turned_s / TURNS, KNOB_S, "s", at_most=1)

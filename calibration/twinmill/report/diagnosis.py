@@ -2,6 +2,7 @@
 """A diagnosis as tables, for the terminal and as a section of a report."""
 
 import numpy as np
+import twinmill_native as native
 from rich.console import Group, RenderableType
 from rich.text import Text
 
@@ -12,6 +13,7 @@ from twinmill.report import Figure, Section, show, tables, views
 from twinmill.report.detection_figures import field_of_view
 from twinmill.report.detection_tables import bit_steps, bit_tables
 from twinmill.report.error_figures import waterfall
+from twinmill.report.charted import charts
 from twinmill.report.sections import robot_pictures
 from twinmill.report.tables import Cell, Table, Tone, number, tone
 
@@ -245,10 +247,20 @@ def section(diagnosis: Diagnosis) -> Section:
         views.facts(before),
         [*_bit_figures(diagnosis), waterfall(_labelled(diagnosis)), *robot_pictures(before)],
         [*_tables(diagnosis), *_bit_steps(diagnosis), *_bit_tables(diagnosis)],
+        charts=charts(before, *_found(diagnosis)),
         next_step=next_run(diagnosis),
         notes=lines(diagnosis),
         warnings=before.warnings,
     )
+
+
+def _found(diagnosis: Diagnosis) -> tuple[str, list[native.Model]]:
+    """What was found, and each robot's model with it; nothing if that is the model as given."""
+    if not diagnosis.findings:
+        return "", []
+    return f"with {' and '.join(diagnosis.motion) or 'its base refitted'}", [
+        o.model for o in diagnosis.opened
+    ]
 
 
 def _tables(diagnosis: Diagnosis) -> list[Table]:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sections of text, tables and figures to one HTML file."""
 
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 
@@ -42,6 +43,8 @@ class Section:
         verdict: what the score means.
         facts: label and text.
         figures, tables: in their order.
+        charts: HTML, made when it is asked for, of which a page has one: that of its last section
+            that has any; None without.
         next_step: a sentence.
         commands: where or when, and the command line to type there; below next_step.
         notes: sentences on the result, below the verdict.
@@ -55,6 +58,7 @@ class Section:
     figures: list[Figure] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
     _: KW_ONLY
+    charts: Callable[[], str] | None = None
     next_step: str = ""
     commands: list[tuple[str, str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -100,6 +104,7 @@ def render_page(title: str, source: Provenance, sections: list[Section], note: s
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    charted = next((s for s in reversed(sections) if s.charts), None)
     return environment.get_template("report.html.j2").render(
-        title=title, source=source, sections=sections, note=note
+        title=title, source=source, sections=sections, note=note, charted=charted
     )

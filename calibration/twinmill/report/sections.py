@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results of calibration to sections of a report."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from twinmill.fitting.add import AddResult
@@ -8,10 +9,11 @@ from twinmill.fitting.compare import Comparison, RobotComparison
 from twinmill.fitting.fit import FitResult
 from twinmill.report import tables, views
 from twinmill.report.advice import advice
+from twinmill.report.charted import charts
 from twinmill.report.detection_figures import field_of_view
 from twinmill.report.error_figures import error_growth, regimes, waterfall
 from twinmill.report.html import Figure, Section
-from twinmill.report.motion_figures import floor_map, path, speeds
+from twinmill.report.motion_figures import floor_map
 from twinmill.report.steady_figures import steady_values
 from twinmill.report.tables import number, tone
 
@@ -30,6 +32,7 @@ def comparison_section(result: Comparison) -> Section:
             *([field_of_view(result.bits)] if result.bits else []),
         ],
         views.robot_tables(result),
+        charts=charts(result),
         next_step=advice(result),
         warnings=result.warnings,
     )
@@ -46,6 +49,7 @@ def fit_section(result: FitResult) -> Section:
         views.facts(result.after),
         _pictures(result.after, [("before", before), ("after", after)]),
         [tables.parameters(result.parameters), *views.robot_tables(result.after)],
+        charts=_before_and_after(result),
         next_step=advice(result.after),
         warnings=result.after.warnings,
     )
@@ -68,6 +72,7 @@ def added_section(result: AddResult) -> Section:
         views.facts(result.after),
         _pictures(result.after, [("before", before), ("after", after)]),
         [tables.parameters(result.parameters), *tables.held_out(result)],
+        charts=_before_and_after(result),
         next_step=advice(result.after),
         warnings=result.after.warnings,
     )
@@ -79,6 +84,12 @@ def steps_section(title: str, scores: list[tuple[str, float]], verdict: str) -> 
     return Section(title, ends, verdict, figures=[waterfall(scores)], tables=[tables.steps(scores)])
 
 
+def _before_and_after(result: FitResult | AddResult) -> Callable[[], str] | None:
+    """Charts of the new model, the old one beside."""
+    old = [r.scene.model for r in result.before.robots]
+    return charts(result.after, "before", old)
+
+
 def _same_robot(result: FitResult | AddResult) -> tuple[RobotComparison, RobotComparison]:
     """The robot that the new model misses most, with the old model and with the new one."""
     pairs = zip(result.before.robots, result.after.robots, strict=True)
@@ -86,12 +97,11 @@ def _same_robot(result: FitResult | AddResult) -> tuple[RobotComparison, RobotCo
 
 
 def robot_pictures(result: Comparison) -> list[Figure]:
-    """Where and how fast the robot that is missed most went, and when the model fails."""
+    """When the model fails the robot that is missed most, and where."""
     robot, steady = result.worst, views.sheets(result)
     own = []
     if robot not in steady:
-        own = [path(robot), speeds(robot), *([regimes(robot)] if robot.where else [])]
-        own.append(floor_map(robot))
+        own = [*([regimes(robot)] if robot.where else []), floor_map(robot)]
     if len(result.robots) > 1:
         own = [replace(f, title=f"{f.title}: {robot.scene.measurement.label}") for f in own]
     if steady:

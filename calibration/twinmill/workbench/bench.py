@@ -8,25 +8,18 @@ import asyncio
 import json
 from collections import Counter
 from collections.abc import Callable
-from time import perf_counter
 from typing import Any
 
+from twinmill.charts.arrays import measured_path
+from twinmill.charts.packed import pack, pack_log, pack_prediction, pack_robot
+from twinmill.data.camera_frames import frames_of
 from twinmill.diagnosis.detections.add import is_of_camera
 from twinmill.files import plain
-from twinmill.model.parameters import CLOCK
-from twinmill.workbench.drawing import commands, measured_path, pack, seen
 from twinmill.workbench.session import Session
 from twinmill.workbench.state_file import StateFile
 from twinmill.workbench.worker import Done, Work, Worker
 
 AWAITED = ("fit", "add", "diagnose", "next", "swarm")  # work that the user waits for
-COMMAND_WORDS = {
-    "duty": (("FL", "FR", "RL", "RR"), "%"),
-    "wheel_speed": (("FL", "FR", "RL", "RR"), "rad/s"),
-    "twist": (("vx", "vy", "turn"), "m/s, rad/s"),
-}
-# Colours of Okabe and Ito (2008), told apart by colour-blind readers.
-COLORS = ("#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7d8c94")
 
 
 class Bench:
@@ -213,45 +206,23 @@ class Bench:
     def log_bytes(self, place: int) -> bytes:
         """Paths of all robots of one log."""
         log = self.session.logs[place]
-        arrays, robots = {}, []
-        for k, robot in enumerate(log.robots.values()):
-            name = f"R{robot.robot_id:02d}"
-            label = f"{log.path.name} {name}"
-            arrays[f"path{k}"] = measured_path(robot)["path"]
-            robots.append(
-                {
-                    "name": name,
-                    "label": label,
-                    "color": COLORS[k % len(COLORS)],
-                    "heading": robot.has_heading,
-                    "radius_m": self.session.given.model.get("robot.body_radius_m"),
-                }
-            )
-        ends = [float(a[-1, 0]) for a in arrays.values() if len(a)]
-        return pack(arrays, robots=robots, end_s=max(ends, default=1.0))
+        paths = {n: measured_path(r.pose_t_s, r.pose, r.valid) for n, r in log.robots.items()}
+        headings = {n: r.has_heading for n, r in log.robots.items()}
+        radius_m = self.session.given.model.get("robot.body_radius_m")
+        return pack_log(log.path.name, paths, headings, radius_m)
 
     def robot_bytes(self, index: int) -> bytes:
         """Speeds, commands and band of one robot."""
-        view, raw = self.session.robots[index], self.session.raw(index)
-        names, unit = COMMAND_WORDS.get(raw.command_kind, ((), ""))
-        arrays = {**view.measured(), **commands(raw), **seen(raw)}
-        sight = self.session.given.model.sight()
-        cone = {key: sight[key] for key in ("range_m", "cone_rad", "pan_rad")}
-        return pack(arrays, command_names=names, command_unit=unit, cone=cone)
+        raw = self.session.raw(index)
+        return pack_robot(
+            self.session.robots[index], raw, frames_of(raw), self.session.given.model
+        )
 
     def prediction_bytes(self, index: int) -> bytes:
-        """What the model shown says of one robot, with its score."""
-        begin = perf_counter()
-        arrays = self.session.predicted(index) | self.session.predicted_beside(index)
-        beside = self.session.beside
-        return pack(
-            arrays,
-            beside=beside.label if beside else "",
-            step_s=self.session.robots[index].step_s,
-            revision=self.changes["prediction"],
-            clock_s=self.session.shown(index).model.get(CLOCK),
-            compute_ms=1000 * (perf_counter() - begin),
-        )
+        """What the model shown says of one robot."""
+        shown, beside = self.session.shown(index).model, self.session.beside_of(index)
+        revision = self.changes["prediction"]
+        return pack_prediction(self.session.robots[index], shown, beside, revision=revision)
 
     def swarm_bytes(self) -> bytes:
         """Poses of the twin's swarms."""

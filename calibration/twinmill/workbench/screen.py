@@ -6,6 +6,7 @@ from collections import Counter
 
 from nicegui import context, ui
 
+from twinmill.charts.stage import stage_html
 from twinmill.workbench.bench import Bench
 from twinmill.workbench.fails_panel import FailsPanel
 from twinmill.workbench.knobs_panel import KnobsPanel
@@ -26,25 +27,12 @@ HINTS = {
     "swarm": "What a swarm would do with the model now",
 }
 HEAD = """
+<link rel="stylesheet" href="/charts/charts.css">
 <link rel="stylesheet" href="/look/workbench.css">
-<link rel="modulepreload" href="/look/stage.js">
+<link rel="modulepreload" href="/look/workbench.js">
 """
-STAGE = """
-<div id="stage"><div class="sheet"><canvas id="floor"></canvas><div class="key">
-<span style="color:#3c3c3c99"><i></i>measured</span>
-<span style="color:#d55e00"><i></i>predicted</span>
-<span style="color:#009e73"><i></i>95 % band of a right model</span>
-<button id="beside" title="Draw the model alone"></button></div></div>
-<div class="sheet"><canvas id="series"></canvas></div>
-<div class="sheet" id="transport">
-<button id="play" title="Play or pause (space)">play_arrow</button>
-<button id="rate" title="Speed of playing"></button>
-<input id="scrubber" type="range" min="0" max="10" step="0.01" value="0" aria-label="Time">
-<span id="clock">0.00 s</span><button id="marks" title="Forget these marks"></button>
-<span class="soft">predict</span>
-<button data-ahead="0.5" title="Predictions of half a second">0.5 s</button>
-<button data-ahead="2" title="Predictions of two seconds">2 s</button></div></div>
-<script type="module">import { start } from "/look/stage.js"; start(OPTIONS);</script>
+SCRIPT = """
+<script type="module">import { start } from "/look/workbench.js"; start(OPTIONS);</script>
 """
 TABS = {
     "knobs": "Knobs",
@@ -84,7 +72,7 @@ class Screen:
         place = self.bench.log_of(self.bench.picked)
         options = {"token": self.bench.state.token, "view": self.bench.view, "log": place}
         ui.add_head_html(HEAD)
-        ui.add_body_html(STAGE.replace("OPTIONS", json.dumps(options)))
+        ui.add_body_html(stage_html() + SCRIPT.replace("OPTIONS", json.dumps(options)))
         self._bar()
         with ui.element("div").props("id=side"):
             self._panels()

@@ -16,6 +16,7 @@ from nicegui import app, ui
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.responses import PlainTextResponse, Response
 
+from twinmill.charts.stage import STATIC as CHARTS
 from twinmill.workbench.bench import Bench
 from twinmill.workbench.screen import Screen
 
@@ -45,6 +46,7 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
     url = f"http://{HOST}:{port}/?token={bench.state.token}"
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
     app.add_static_files("/look", STATIC, max_cache_age=0)
+    app.add_static_files("/charts", CHARTS, max_cache_age=0)
     _add_data(bench)
     _add_page(bench)
 

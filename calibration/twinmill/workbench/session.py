@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import twinmill_native as native
 
+from twinmill.charts.arrays import RobotView
 from twinmill.data.log import Log, RobotLog, read_log
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.steady_table import is_sheet
@@ -31,8 +32,7 @@ from twinmill.model.parameters import (
     effect_parameters,
 )
 from twinmill.predict.datasets import total_score
-from twinmill.predict.regimes import HORIZON, Regime, where_it_fails
-from twinmill.workbench.drawing import Arrays, RobotView
+from twinmill.predict.regimes import Regime, where_it_fails
 from twinmill.workbench.knobs import Knob, knobs
 from twinmill.workbench.next_run import next_command, then_commands
 from twinmill.workbench.swarm import swarm_commands
@@ -42,6 +42,14 @@ from twinmill.workbench.worker import Done, Work
 FORESEEN_ROUNDS = 2  # of the fit that gives a first answer
 FORESEEN_WINDOWS = 1500  # of the robots that it is about
 DRAGGED_ROUNDS = 1  # of the search for the clock while a knob is turned
+
+
+class OpenedView(RobotView):
+    """One robot that was judged, with its floor and clock."""
+
+    def __init__(self, opened: Opened) -> None:
+        super().__init__(opened.measurement, opened.floor, not opened.same_clock)
+        self.opened = opened
 
 
 @dataclass(frozen=True)
@@ -88,7 +96,7 @@ class Session:
         self.tree = Tree(self.given, model)
         self.logs: list[Log] = []
         self.measurements = Measurements([], [], [])
-        self.robots: dict[int, RobotView] = {}
+        self.robots: dict[int, OpenedView] = {}
         self.held: set[str] = set()
         self.diagnosis: dict | None = None
         self.plan: dict | None = None
@@ -126,14 +134,14 @@ class Session:
     def judge(self, index: int) -> None:
         """Finds clock and noise floor of one robot; after the last, the score of all."""
         (opened,) = open_measurements([self.measurements[index]], self.given)
-        self.robots = {**self.robots, index: RobotView(opened)}
+        self.robots = {**self.robots, index: OpenedView(opened)}
         if self.unjudged:
             return
         all_opened = [view.opened for view in self.robots.values()]
         for k, view in self.robots.items():
             on_clock = on_clock_of_others(view.opened, all_opened)
             if on_clock is not view.opened:
-                self.robots[k] = RobotView(on_clock)
+                self.robots[k] = OpenedView(on_clock)
         self.score_now(exact=self.tree.current.number == 0)
 
     def raw(self, index: int) -> RobotLog:
@@ -323,10 +331,6 @@ class Session:
             self._passing[index] = settled.aligned(model, settled.model.get(CLOCK), DRAGGED_ROUNDS)
         return self._passing[index]
 
-    def predicted(self, index: int) -> Arrays:
-        """As `RobotView.predicted`, of the model shown."""
-        return self.robots[index].predicted(self.shown(index).model)
-
     def passing_score(self, index: int) -> float:
         """About that of the model shown, from as many robots as can be asked at once."""
         return total_score([self.shown(k).score for k in self._foremost(index)])
@@ -336,12 +340,11 @@ class Session:
         known = self.beside.opened
         return total_score([known[k].score for k in self._foremost(index) if k in known])
 
-    def predicted_beside(self, index: int) -> Arrays:
-        """The same of the model beside, each name with `_beside`; empty without one."""
+    def beside_of(self, index: int) -> tuple[str, native.Model] | None:
+        """Label and model of one robot that is drawn beside the model shown."""
         if self.beside is None or index not in self.beside.opened:
-            return {}
-        arrays = self.robots[index].predicted(self.beside.opened[index].model)
-        return {f"{name}_beside": a for name, a in arrays.items() if name != "starts"}
+            return None
+        return self.beside.label, self.beside.opened[index].model
 
     def own_scores(self) -> dict[int, float]:
         """Of each robot where the tree stands; NaN without a floor."""
@@ -357,12 +360,7 @@ class Session:
 
     def moments(self, index: int, group: str, regime: str) -> tuple[np.ndarray, float]:
         """(K,) s, starts of the predictions in a regime, and that of the worst."""
-        view, model = self.robots[index], self.shown(index).model
-        inside = view.moments(model)[group, regime]
-        squares = np.mean((view.errors(model)[:, HORIZON] / view.floor[HORIZON]) ** 2, axis=1)
-        t_s = view.track.pose_t_s[view.windows.starts]
-        worst = np.argmax(np.where(inside & np.isfinite(squares), squares, -1.0))
-        return t_s[inside], float(t_s[worst])
+        return self.robots[index].moments(self.shown(index).model)[group, regime]
 
     def score_now(self, exact: bool = False) -> None:
         """Of all robots where the tree stands, unless it is known."""

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from playwright.sync_api import expect, sync_playwright
+from playwright.sync_api import expect
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.programs import find_program
@@ -23,33 +23,7 @@ from twinmill.report.tables import number
 from twinmill.workbench.swarm import EVERY
 from twinmill_cli import main as cli
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-PATIENT_MS = 120_000  # for a machine that is busy with other tests
 LONG_S = 80.0  # of the real recording: four pairs of runs
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt install chromium")
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        # As root there is no sandbox to be had.
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
-@pytest.fixture
-def page(browser):
-    page = browser.new_page(viewport={"width": 1366, "height": 768})
-    page.set_default_timeout(PATIENT_MS)
-    expect.set_options(timeout=PATIENT_MS)
-    page.foreign, page.broken = [], []
-    page.on("request", lambda r: None if "//127.0.0.1:" in r.url else page.foreign.append(r.url))
-    page.on("pageerror", lambda error: page.broken.append(str(error)))
-    yield page
-    page.close()
-    assert not page.foreign
-    assert not page.broken
 
 
 @contextmanager

@@ -30,6 +30,11 @@ def opened(brief_coasting_robot, tmp_path_factory):
     os.chdir(before)
 
 
+def predicted(session):
+    """What is drawn of the first robot."""
+    return session.robots[0].predicted(session.shown(0).model)
+
+
 @pytest.fixture(scope="module")
 def compared(opened):
     return cli.run(["compare", "run.lcmlog", "--model", "model.toml"])
@@ -58,19 +63,19 @@ def test_regimes_are_those_of_compare_and_their_moments_lie_in_the_log(session, 
 
 
 def test_predictions_follow_a_knob_and_come_back(session):
-    before = session.predicted(0)["ahead"]
+    before = predicted(session)["ahead"]
     session.drag("base.forward_gain", 1.2)
-    turned = session.predicted(0)["ahead"]
+    turned = predicted(session)["ahead"]
     assert np.nanmax(np.abs(turned - before)) > 0.05  # 20 % of 0.36 m/s for two seconds
     session.keep()
     session.score_now()
     assert session.tree.scores[session.tree.current.number].fitted > session.tree.scores[0].fitted
     session.undo()
-    np.testing.assert_array_equal(session.predicted(0)["ahead"], before)
+    np.testing.assert_array_equal(predicted(session)["ahead"], before)
 
 
 def test_errors_drawn_are_measured_less_predicted(session, compared):
-    drawn = session.predicted(0)["errors"]
+    drawn = predicted(session)["errors"]
     rows = compared.main.errors[:, 2]  # half a second ahead
     np.testing.assert_allclose(drawn[:, 1], np.hypot(rows[:, 0], rows[:, 1]), rtol=1e-6)
     np.testing.assert_allclose(drawn[:, 2], rows[:, 2], rtol=1e-6)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The twin's swarms from above, side by side, each with a short trail; they play by themselves.
 
-import { MEASURED, SMALL, Sheet, WHEELS, WORDS } from "./look.js";
+import { MEASURED, SMALL, Sheet, WHEELS, WORDS } from "/charts/look.js";
 
 const TRAIL_S = 4;
 const RATE = 5; // times real time

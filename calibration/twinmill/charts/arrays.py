@@ -1,19 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the browser draws, as arrays: thinned to what an eye can tell, packed as 32-bit numbers."""
-
-import json
-import struct
-from collections.abc import Mapping
+"""What a browser draws, as arrays: thinned to what an eye can tell."""
 
 import numpy as np
 import twinmill_native as native
 
+from twinmill.data.camera_frames import Frames
 from twinmill.data.log import RobotLog
+from twinmill.data.measurement import Measurement
 from twinmill.data.track import Track, local_line
-from twinmill.fitting.opening import Opened
+from twinmill.fitting.floor import NoiseFloor
 from twinmill.predict.datasets import displacement
 from twinmill.predict.problem import Scene
-from twinmill.predict.regimes import regime_masks
+from twinmill.predict.regimes import HORIZON, regime_masks
 from twinmill.predict.residual import StepGrid, body_velocity, rotate
 from twinmill.predict.windows import HORIZONS_S, Windows, difference
 
@@ -28,30 +26,17 @@ WITHIN_95 = 1.96  # standard deviations
 Arrays = dict[str, np.ndarray]
 
 
-def pack(arrays: Mapping[str, np.ndarray], **facts: object) -> bytes:
-    """Facts as JSON and arrays behind it.
-
-    Layout: uint32 length of the JSON, the JSON padded to 4 bytes, then each array as float32. The
-    JSON's `arrays` has the shape of each, in their order.
-    """
-    flat = {name: np.ascontiguousarray(a, "<f4") for name, a in arrays.items()}
-    head = json.dumps({**facts, "arrays": {name: a.shape for name, a in flat.items()}}).encode()
-    head += b" " * (-len(head) % 4)
-    return struct.pack("<I", len(head)) + head + b"".join(a.tobytes() for a in flat.values())
-
-
-def measured_path(robot: RobotLog) -> Arrays:
-    """(T, 4) t_s, x_m, y_m, theta_rad of a robot as it was recorded; NaN where it was lost."""
-    if not len(robot.pose_t_s):
+def measured_path(t_s: np.ndarray, pose: np.ndarray, known: np.ndarray) -> Arrays:
+    """(T, 4) t_s, x_m, y_m, theta_rad of (N, 3) poses; NaN where they are not known."""
+    if not len(t_s):
         return {"path": np.empty((0, 4))}
-    period_s = float(np.median(np.diff(robot.pose_t_s))) if len(robot.pose_t_s) > 1 else PATH_S
+    period_s = float(np.median(np.diff(t_s))) if len(t_s) > 1 else PATH_S
     every = max(1, round(PATH_S / period_s))
-    pose = robot.pose if robot.has_heading else np.nan_to_num(robot.pose)
-    pose = np.where(robot.valid[:, None], pose, np.nan)
-    return {"path": np.column_stack([robot.pose_t_s, pose])[::every]}
+    pose = np.column_stack([pose[:, :2], np.nan_to_num(pose[:, 2])])
+    return {"path": np.column_stack([t_s, np.where(known[:, None], pose, np.nan)])[::every]}
 
 
-def commands(robot: RobotLog) -> Arrays:
+def commands(robot: RobotLog | Track) -> Arrays:
     """(M, 1 + C) robot's clock and commands, where they change and at the end."""
     width = 3 if robot.command_kind == "twist" else 4
     if not len(robot.command_t_s):
@@ -65,16 +50,14 @@ def commands(robot: RobotLog) -> Arrays:
     return {"commands": rows[kept]}
 
 
-def seen(robot: RobotLog) -> Arrays:
+def seen(frames: Frames | None) -> Arrays:
     """(K, 2) robot's clock and whether its camera saw another robot, where that changes."""
-    t_s, bit = robot.seen_t_s, robot.seen
-    if not len(t_s) and np.isfinite(robot.frame_t_s).any():
-        t_s, bit = robot.command_t_s, robot.detected > 0
-    if not len(t_s):
+    if frames is None or not len(frames.t_s):
         return {"seen": np.empty((0, 2))}
+    bit = frames.voted if frames.has_vote else frames.raw
     kept = np.concatenate([[True], np.diff(bit.astype(int)) != 0])
     kept[-1] = True
-    return {"seen": np.column_stack([t_s, bit])[kept]}
+    return {"seen": np.column_stack([frames.t_s, bit])[kept]}
 
 
 def measured_speed(track: Track) -> Arrays:
@@ -92,36 +75,44 @@ class RobotView:
     """One robot in one log as it is drawn: what does not depend on the model is found once.
 
     Args:
-        opened: the measurement with floor and clock.
+        measurement: of the robot.
+        noise: its floor.
+        clock_free: the clock's offset was found from this log itself.
     """
 
-    def __init__(self, opened: Opened) -> None:
-        self.opened = opened
-        self.track = opened.measurement.track
-        self.grid = StepGrid.of(opened.measurement)
+    def __init__(self, measurement: Measurement, noise: NoiseFloor, clock_free: bool) -> None:
+        self.measurement, self.noise, self.clock_free = measurement, noise, clock_free
+        self.track = measurement.track
+        self.grid = StepGrid.of(measurement)
         self.windows = Windows.of(self.track)
-        self._measured = displacement(opened.measurement, self.windows, None)
+        self._measured = displacement(measurement, self.windows, None)
         self._starts, self._ends = _everywhere(self.track)
 
     @property
     def floor(self) -> np.ndarray:
         """(H, 3) errors that count as one; NaN without a floor."""
-        return self.opened.floor.rms
+        return self.noise.rms
 
     def errors(self, model: native.Model) -> np.ndarray:
         """(W, H, 3) measured less predicted; NaN where it is not judged."""
-        predicted = displacement(self.opened.measurement, self.windows, model)
+        predicted = displacement(self.measurement, self.windows, model)
         errors = difference(self._measured, predicted)
-        return np.where(self.opened.floor.keep[:, None, None], errors, np.nan)
+        return np.where(self.noise.keep[:, None, None], errors, np.nan)
 
     def scene(self, model: native.Model) -> Scene:
         """Measurement and model, without the noise, which no drawing needs."""
-        return Scene(self.opened.measurement, model, self.grid, not self.opened.same_clock)
+        return Scene(self.measurement, model, self.grid, self.clock_free)
 
-    def moments(self, model: native.Model) -> dict[tuple[str, str], np.ndarray]:
-        """(W,) bool by group and regime: windows that lie in it."""
-        masks = regime_masks(self.scene(model), self.windows)
-        return {(group, name): mask for group, name, mask in masks}
+    def moments(self, model: native.Model) -> dict[tuple[str, str], tuple[np.ndarray, float]]:
+        """By group and regime: (K,) s, starts of the predictions in it, and that of the worst."""
+        over = (self.errors(model)[:, HORIZON] / self.floor[HORIZON]) ** 2
+        squares = over[:, np.isfinite(self.floor[HORIZON])].mean(axis=1)
+        t_s = self.track.pose_t_s[self.windows.starts]
+        found = {}
+        for group, name, inside in regime_masks(self.scene(model), self.windows):
+            worst = np.argmax(np.where(inside & np.isfinite(squares), squares, -1.0))
+            found[group, name] = t_s[inside], float(t_s[worst])
+        return found
 
     def measured(self) -> Arrays:
         """What the log alone tells: speeds, and the band that a right model keeps to.
@@ -135,22 +126,22 @@ class RobotView:
     def predicted(self, model: native.Model) -> Arrays:
         """What the model says.
 
-        starts: (S, 4) t_s and pose from which a prediction starts; ahead: (S, AHEAD, 3) poses
+        starts: (S, 4) t_s and pose from which a prediction starts; ahead: (S, AHEAD, 2) places
         after each step, NaN where the track ends; predicted_speed: (T, 4) as the measured one;
         errors: (W, 5) t_s, then position in m and heading in rad, 0.5 s and 2 s ahead.
         """
-        played = self.opened.measurement.played
+        played = self.measurement.played
         ahead = native.windows(model, played, self._starts, self._ends)
         ahead[self._ends < 0] = np.nan
         starts = np.column_stack([self.track.pose_t_s[self._starts], self.track.pose[self._starts]])
-        velocity = body_velocity(self.opened.measurement, self.grid, model)
+        velocity = body_velocity(self.measurement, self.grid, model)
         every = max(1, round(SPEED_S / self.grid.period_s))
         errors = self.errors(model)
         start_s = self.track.pose_t_s[self.windows.starts]
         far = [f(errors[:, h]) for h in (SHORT, LONG) for f in (_position_m, _heading_rad)]
         return {
             "starts": starts,
-            "ahead": ahead,
+            "ahead": ahead[..., :2],
             "predicted_speed": np.column_stack([self.grid.t_s, velocity])[::every],
             "errors": np.column_stack([start_s, *far]),
         }

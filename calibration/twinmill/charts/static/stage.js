@@ -2,18 +2,25 @@
 // The stage: floor and series with one cursor, which moves here, without the server.
 
 import { Floor } from "./floor.js";
-import { unpack } from "./packed.js";
 import { Series, rowsOf } from "./series.js";
-import { Swarm } from "./swarm.js";
 
 const SHORTEST_S = 0.5; // stretch that can be looked at
 const SAVE_MS = 400;
 const STEP_S = 0.1;
 const WORST_S = 2.5; // of the worst moment that is played
+const ZOOM = 1.25; // of a key
 
-class Stage {
-  constructor({ token, view, log }) {
-    this.token = token;
+/**
+ * Where data come from and wishes go to, `source`:
+ * `log(place)`, `robot(index)`, `prediction(index)`: what packed.js unpacks, or null where there is
+ * no answer: once there is one, the stage is told to ask again. `ask(label)`: another robot is
+ * wanted. `leave()`: only the model itself. `remember(view)`: cursor, stretch and the like.
+ * `keys`: more acts by key. `alone`: no page scrolls behind, and all keys are the stage's.
+ */
+export class Stage {
+  constructor({ source, view }) {
+    this.source = source;
+    this.box = document.querySelector("#stage");
     this.t = view.t ?? 0;
     this.ahead_s = view.ahead_s ?? 2;
     this.rate = view.rate ?? 1;
@@ -31,19 +38,12 @@ class Stage {
     this.floor = new Floor(document.querySelector("#floor"), this);
     this.series = new Series(document.querySelector("#series"), this);
     this._wire();
-    new ResizeObserver(() => this.redraw()).observe(document.querySelector("#stage"));
+    new ResizeObserver(() => this.redraw()).observe(this.box);
     this._frame = this._frame.bind(this);
     requestAnimationFrame(this._frame);
-    this.showLog(log);
   }
 
   // -- data -------------------------------------------------------------------------------------
-
-  /** Null where the server does not answer: once it does, the page is told to ask again. */
-  async _get(what) {
-    const answer = await fetch(`data/${what}&token=${this.token}`).catch(() => null);
-    return answer?.ok ? unpack(await answer.arrayBuffer()) : null;
-  }
 
   /** Paths of all robots of a log; nothing where they are shown. */
   async showLog(log) {
@@ -54,7 +54,7 @@ class Stage {
   }
 
   async _showLog(log) {
-    const found = await this._get(`log?log=${log}`);
+    const found = await this.source.log(log);
     if (!found) return;
     this.end_s = found.end_s;
     this.robots = found.robots.map((r, k) => ({ ...r, path: found.arrays[`path${k}`] }));
@@ -72,7 +72,7 @@ class Stage {
 
   /** One robot's series; its prediction follows. */
   async pick(label, index) {
-    const found = await this._get(`robot?index=${index}`);
+    const found = await this.source.robot(index);
     if (!found) return;
     const robot = this.robots.find((r) => r.label === label);
     if (!robot) return;
@@ -91,7 +91,7 @@ class Stage {
     while (this._stale && this.robot) {
       this._stale = false;
       const robot = this.robot;
-      const found = await this._get(`prediction?index=${robot.index}`);
+      const found = await this.source.prediction(robot.index);
       if (found && robot === this.robot) this._predicted(found);
     }
     this._asking = false;
@@ -102,24 +102,7 @@ class Stage {
     document.body.dataset.predicted = found.revision;
     document.body.dataset.beside = found.beside;
     document.querySelector("#beside").textContent = found.beside ? `${found.beside} ✕` : "";
-    document.body.dataset.predictedMs = found.compute_ms;
     this._renew();
-  }
-
-  /** Why nothing can be opened; it stays when the server has gone. */
-  fail(words) {
-    const card = document.createElement("div");
-    card.id = "failed";
-    card.setAttribute("role", "alert");
-    card.textContent = words;
-    document.body.append(card);
-  }
-
-  /** What the twin's swarms did. */
-  async showSwarm() {
-    this.swarm = await this._get("swarm?");
-    this._swarmView?.end();
-    this._swarmView = this.swarm && new Swarm(document.querySelector("#swarm"), this.swarm);
   }
 
   _renew() {
@@ -177,7 +160,7 @@ class Stage {
     this.playing = on;
     this._until = Infinity;
     if (on && this.t >= this.end_s - 0.01) this.seek(0);
-    document.querySelector("#play").textContent = on ? "pause" : "play_arrow";
+    document.querySelector("#play").classList.toggle("playing", on);
     this._last = null;
     this._moved = true;
   }
@@ -203,11 +186,6 @@ class Stage {
     }
     this._renew();
     this._remember();
-  }
-
-  /** Another robot is wanted: the server knows what goes with it. */
-  ask(robot) {
-    window.emitEvent("pick", robot.label);
   }
 
   // -- drawing ----------------------------------------------------------------------------------
@@ -244,7 +222,7 @@ class Stage {
     this._clock = document.querySelector("#clock");
     this._scrubber.addEventListener("input", () => this.seek(Number(this._scrubber.value)));
     document.querySelector("#play").addEventListener("click", () => this.play());
-    document.querySelector("#beside").addEventListener("click", () => window.emitEvent("leave", {}));
+    document.querySelector("#beside").addEventListener("click", () => this.source.leave());
     document.querySelector("#marks").addEventListener("click", () => this.mark([], 0, ""));
     for (const button of document.querySelectorAll("[data-ahead]")) {
       button.addEventListener("click", () => this.setAhead(Number(button.dataset.ahead)));
@@ -259,24 +237,49 @@ class Stage {
       this._remember();
     });
     window.addEventListener("keydown", (e) => this._key(e));
+    // After a click the keys are the cursor's again; one who tabs to a button presses it.
+    window.addEventListener("click", (e) => {
+      if (e.detail) e.target.closest("button, [role=button], [role=tab]")?.blur();
+    });
     window.addEventListener("pagehide", () => this._tell());
   }
 
   _key(e) {
-    if (e.target.closest("input:not([type=range]), textarea, [contenteditable], .q-dialog")) return;
-    const onKnob = e.target.closest(".q-slider, .q-tab, [role=listbox]");
-    const act = {
-      " ": () => this.play(),
-      z: () => window.emitEvent("undo", {}),
-      y: () => window.emitEvent("redo", {}),
+    if (!this.source.alone && !this.box.contains(e.target)) return;
+    if (e.ctrlKey || e.metaKey || e.altKey) return;
+    const typed = "input:not([type=range]), textarea, select, [contenteditable], .q-dialog";
+    if (e.target.closest(typed)) return;
+    const moves = {
       Home: () => this.seek(0),
       End: () => this.seek(this.end_s),
       ArrowRight: () => this.seek(this.t + (e.shiftKey ? 1 : STEP_S)),
       ArrowLeft: () => this.seek(this.t - (e.shiftKey ? 1 : STEP_S)),
-    }[e.key];
-    if (!act || (onKnob && e.key !== "z" && e.key !== "y" && e.key !== " ")) return;
+    };
+    const acts = {
+      " ": () => this.play(),
+      "+": () => this._zoom(1 / ZOOM),
+      "-": () => this._zoom(ZOOM),
+      0: () => this.look(0, this.end_s),
+      ...this.source.keys,
+    };
+    // A focused knob, tab or list moves by the arrows; a focused button is pressed by the space.
+    const taken = e.target.closest(".q-slider, .q-tab, [role=listbox], [role=combobox]");
+    if (e.key === " " && e.target.closest("button, [role=button], .q-tab, [role=combobox]")) return;
+    const act = acts[e.key] ?? (taken ? null : moves[e.key]);
+    if (!act) return;
     e.preventDefault();
     act();
+  }
+
+  /** Whether a turn of the wheel is for the charts: within a page, only with Ctrl. */
+  zooms(e) {
+    return this.source.alone || e.ctrlKey || e.metaKey;
+  }
+
+  /** About the cursor. */
+  _zoom(factor) {
+    const [a, b] = this.span;
+    this.look(this.t - (this.t - a) * factor, this.t + (b - this.t) * factor);
   }
 
   _remember() {
@@ -287,12 +290,6 @@ class Stage {
     clearTimeout(this._due);
     this._due = null;
     const { t, span, ahead_s, rate } = this;
-    navigator.sendBeacon(
-      `data/view?token=${this.token}`, JSON.stringify({ t, span, ahead_s, rate }),
-    );
+    this.source.remember({ t, span, ahead_s, rate });
   }
-}
-
-export function start(options) {
-  window.twinmill = new Stage(options);
 }

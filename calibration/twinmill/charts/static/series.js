@@ -297,6 +297,7 @@ export class Series {
     });
     canvas.addEventListener("dblclick", () => this.stage.look(0, this.stage.end_s));
     canvas.addEventListener("wheel", (e) => {
+      if (!this.stage.zooms(e)) return;
       e.preventDefault();
       const [a, b] = this.stage.span;
       if (Math.abs(e.deltaX) > Math.abs(e.deltaY)) {

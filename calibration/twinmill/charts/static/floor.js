@@ -94,7 +94,7 @@ export class Floor {
     g.textBaseline = "bottom";
     for (const x of across.at) {
       this._stroke(g, this._x(x), 0, this._x(x), h);
-      if (this._x(x) > 40 && this._x(x) < w - 30) {
+      if (this._x(x) > 40 && this._x(x) < w - 75) {
         g.fillText(worded(x, across.step), this._x(x), h - 3);
       }
     }
@@ -175,7 +175,7 @@ export class Floor {
     const steps = Math.round(this.stage.ahead_s / prediction.step_s);
     g.moveTo(this._x(starts.data[4 * k + 1]), this._y(starts.data[4 * k + 2]));
     for (let i = 0; i < steps; i++) {
-      const at = k * ahead.width + 3 * i;
+      const at = k * ahead.width + 2 * i;
       if (Number.isNaN(ahead.data[at])) break;
       g.lineTo(this._x(ahead.data[at]), this._y(ahead.data[at + 1]));
     }
@@ -217,7 +217,7 @@ export class Floor {
     g.globalAlpha = 0.25;
     g.beginPath();
     for (let i = 0; i < steps; i++) {
-      const at = k * ahead.width + 3 * i;
+      const at = k * ahead.width + 2 * i;
       if (Number.isNaN(ahead.data[at])) break;
       const [forward, left] = this.stage.bandAt((i + 1) * prediction.step_s);
       if (Number.isNaN(forward)) break;
@@ -251,7 +251,7 @@ export class Floor {
 
   _lastOf(k, steps, ahead) {
     for (let i = steps - 1; i >= 0; i--) {
-      const at = k * ahead.width + 3 * i;
+      const at = k * ahead.width + 2 * i;
       if (!Number.isNaN(ahead.data[at])) return [ahead.data[at], ahead.data[at + 1], i + 1];
     }
     return null;
@@ -336,6 +336,7 @@ export class Floor {
       this.stage.redraw();
     });
     canvas.addEventListener("wheel", (e) => {
+      if (!this.stage.zooms(e)) return;
       e.preventDefault();
       const factor = Math.exp(-e.deltaY / 500);
       const [x, y] = [(e.offsetX - this.left) / this.scale, (this.foot - e.offsetY) / this.scale];
@@ -361,7 +362,7 @@ export class Floor {
       const pose = valuesAt(robot.path, t);
       if (!pose || robot === this.stage.robot) continue;
       const away = Math.hypot(this._x(pose[1]) - px, this._y(pose[2]) - py);
-      if (away < Math.max(12, robot.radius_m * this.scale)) return this.stage.ask(robot);
+      if (away < Math.max(12, robot.radius_m * this.scale)) return this.stage.source.ask(robot.label);
     }
     const path = this.stage.robot?.path;
     if (!path) return;

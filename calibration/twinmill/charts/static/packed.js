@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads what twinmill.workbench.drawing.pack wrote.
+// Reads what twinmill.charts.packed.pack wrote.
 
 /** Facts, and arrays by name: `data` (Float32Array, row by row), `rows`, `width` of a row. */
 export function unpack(buffer) {

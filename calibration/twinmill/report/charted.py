@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The charts of a report: all robots of a comparison, the worst stretch of the worst one first."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.charts.arrays import RobotView
+from twinmill.charts.embedded import Shown, embedded
+from twinmill.fitting.compare import Comparison, RobotComparison
+from twinmill.predict.regimes import HORIZON
+from twinmill.report.tables import number
+
+STRETCH_S = 20.0  # that can be looked at without getting lost
+
+
+def charts(
+    result: Comparison, label: str = "", beside: Sequence[native.Model] = ()
+) -> Callable[[], str] | None:
+    """HTML of the charts, made when it is asked for; None where no robot has a log.
+
+    Args:
+        result: its models' predictions are shown.
+        label, beside: of other models that are drawn beside, one for each of the robots.
+    """
+    places = [k for k, r in enumerate(result.robots) if isinstance(r, RobotComparison)]
+    robots = [result.robots[k] for k in places]
+    others = [beside[k] for k in places] if beside else []
+    return partial(_drawn, result.worst, robots, label, others) if robots else None
+
+
+def _drawn(
+    worst: RobotComparison, robots: list[RobotComparison], label: str, others: list[native.Model]
+) -> str:
+    shown = []
+    for k, robot in enumerate(robots):
+        scene = robot.scene
+        view = RobotView(scene.measurement, robot.floor, scene.clock_free)
+        name = f"{scene.measurement.label} · {number(robot.score)}"
+        other = (label, others[k]) if others else None
+        shown.append(Shown(view, name, scene.model, robot.where, other))
+    first = robots.index(worst) if worst in robots else 0
+    return embedded(shown, first, _stretch(robots[first]))
+
+
+def _stretch(robot: RobotComparison) -> tuple[float, float]:
+    """The 20 s in which predictions miss most."""
+    track, starts = robot.scene.measurement.track, robot.windows.starts
+    square = np.nansum((robot.errors / robot.floor.rms)[:, HORIZON] ** 2, axis=1)
+    total = np.concatenate([[0], np.cumsum(square)])
+    t_s = track.pose_t_s[starts]
+    begins = np.flatnonzero(t_s <= max(t_s[0], t_s[-1] - STRETCH_S))
+    finish = np.searchsorted(t_s, t_s[begins] + STRETCH_S)
+    from_s = float(t_s[begins[np.argmax(total[finish] - total[begins])]])
+    return from_s, min(from_s + STRETCH_S, float(t_s[-1]))

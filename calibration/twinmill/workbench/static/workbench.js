@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// The stage in the workbench: data come from the server, and wishes go to it.
+
+import { unpack } from "/charts/packed.js";
+import { Stage } from "/charts/stage.js";
+import { Swarm } from "./swarm.js";
+
+class Server {
+  alone = true;
+
+  keys = {
+    z: () => window.emitEvent("undo", {}),
+    y: () => window.emitEvent("redo", {}),
+  };
+
+  constructor(token) {
+    this.token = token;
+  }
+
+  log(place) {
+    return this.get(`log?log=${place}`);
+  }
+
+  robot(index) {
+    return this.get(`robot?index=${index}`);
+  }
+
+  prediction(index) {
+    return this.get(`prediction?index=${index}`);
+  }
+
+  ask(label) {
+    window.emitEvent("pick", label);
+  }
+
+  leave() {
+    window.emitEvent("leave", {});
+  }
+
+  remember(view) {
+    navigator.sendBeacon(`data/view?token=${this.token}`, JSON.stringify(view));
+  }
+
+  /** Null where the server does not answer. */
+  async get(what) {
+    const answer = await fetch(`data/${what}&token=${this.token}`).catch(() => null);
+    return answer?.ok ? unpack(await answer.arrayBuffer()) : null;
+  }
+}
+
+class Workbench extends Stage {
+  /** Why nothing can be opened; it stays when the server has gone. */
+  fail(words) {
+    const card = document.createElement("div");
+    card.id = "failed";
+    card.setAttribute("role", "alert");
+    card.textContent = words;
+    document.body.append(card);
+  }
+
+  /** What the twin's swarms did. */
+  async showSwarm() {
+    this.swarm = await this.source.get("swarm?");
+    this._swarmView?.end();
+    this._swarmView = this.swarm && new Swarm(document.querySelector("#swarm"), this.swarm);
+  }
+}
+
+export function start({ token, view, log }) {
+  window.twinmill = new Workbench({ source: new Server(token), view });
+  window.twinmill.showLog(log);
+}
