@@ -1,13 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
+import io
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 
 import pytest
+from rich.console import Console
 
 from twinmill.data.measurement import load_measurements
 from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
-from twinmill.report import Provenance, Section, comparison_section, steps_section, write_report
+from twinmill.report import (
+    Provenance,
+    Section,
+    comparison_section,
+    show,
+    steps_section,
+    write_report,
+)
 
 SOURCE = Provenance("twinmill compare run.lcmlog", "twinmill 0.1.0", "ab" * 32)
 
@@ -97,3 +106,15 @@ def test_a_chain_shows_each_step_and_its_score(tmp_path):
     assert [row[1].bar for row in section.tables[0].rows] == pytest.approx(
         [1.0, 0.8694, 0.2577, 0.3090], abs=1e-4
     )
+
+
+@pytest.mark.parametrize("columns", [40, 48, 80])
+def test_no_word_of_a_table_is_lost_in_a_narrow_terminal(section, columns):
+    for table in section.tables:
+        console = Console(width=columns, file=io.StringIO())
+        console.print(show.table(table))
+        words = {word.strip(";") for word in console.file.getvalue().split()}
+        told = {word for row in table.rows for cell in row for word in cell.text.split()}
+        heads = {word for column in table.columns for word in column.split()}
+        assert told | heads <= words
+        assert max(map(len, console.file.getvalue().splitlines())) <= columns

@@ -133,9 +133,35 @@ def test_ball_is_found_by_itself():
         assert found.radius_px == pytest.approx(ball.radius_px, rel=0.15)
 
 
+def with_rectangle(rgb, left, top, width, height):
+    rgb = rgb.copy()
+    rgb[top : top + height, left : left + width] = GREEN
+    return rgb
+
+
+@pytest.mark.parametrize("size", [(70, 60), (64, 64), (120, 40)])
+def test_a_larger_green_rectangle_is_no_ball(size):
+    rgb, _ = scene(0, (60, 180, 25))
+    found = find_ball(from_rgb("a", with_rectangle(rgb, 180, 20, *size)))
+    assert (found.x_px, found.y_px) == pytest.approx((60, 180), abs=4)
+
+
+def test_a_rectangle_alone_is_refused_and_said_where():
+    rgb, _ = scene(0, (160, 120, 0.5))
+    with pytest.raises(ValueError, match=r"a: the largest green thing, at 21\d,5\d, is not round"):
+        find_ball(from_rgb("a", with_rectangle(rgb, 180, 20, 70, 60)))
+
+
+def test_the_picture_whose_ball_was_mistaken_is_the_one_that_is_named():
+    pictures, balls, _ = scenes(distractor=TEAL)
+    taken = [balls[0], Ball(260, 60, 30), balls[2]]  # the teal disc of the second
+    problem = fit_box(pictures, taken, MIN_BLOB_PX).problem
+    assert problem.startswith("1: what was taken for the ball, at 260,60, has another colour")
+
+
 def test_two_balls_are_not_guessed_between():
     rgb, _ = scene(0, distractor=GREEN)
-    with pytest.raises(ValueError, match="more than one"):
+    with pytest.raises(ValueError, match=r"the things at \d+,\d+ and at \d+,\d+"):
         find_ball(from_rgb("a", rgb))
 
 

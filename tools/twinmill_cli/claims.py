@@ -17,6 +17,7 @@ if working():  # not for --help
     import hashlib
     from importlib.metadata import version
 
+    import numpy as np
     from rich.console import Group
     from rich.text import Text
 
@@ -83,9 +84,9 @@ def _claims(
         f"twinmill {version('twinmill')}",
         hashlib.sha256(ModelFile.load("paper.toml").text.encode()).hexdigest(),
     )
-    hold = all(claim.holds for claim in found)
+    agree = all(claim.agrees for claim in found)
     data = {
-        "hold": hold,
+        "agree": agree,
         "seeds": seeds,
         "claims": [claim.to_json() for claim in found],
         **source.to_json(),
@@ -95,7 +96,7 @@ def _claims(
     if out:
         lines.append(f"Report: {_write(out, source, found, data)}")
     deliver(data, Group(*lines), as_json)
-    return 0 if hold else 1
+    return 0 if agree else 1
 
 
 def _command_line(only: list[str] | None, seeds: int, odd_turn: list[float] | None) -> str:
@@ -109,16 +110,23 @@ def _differing(claim: Claim) -> list[Row]:
 
 
 def _line(claim: Claim) -> Text:
+    mark = (f"{claim.outcome:12}", {True: "green", False: "red", None: ""}[claim.seen])
+    numbers = "" if claim.agrees else "bold red"
+    return Text.assemble(
+        mark, f" {claim.title}. {claim.finding} ", (f"{_numbers(claim)}.", numbers)
+    )
+
+
+def _numbers(claim: Claim) -> str:
     good, of = claim.count
-    mark = ("holds  ", "green") if claim.holds else ("DIFFERS", "red")
-    return Text.assemble(mark, f" {claim.title} ({good} of {of} numbers). {claim.finding}")
+    known = "" if good == of or not claim.agrees else ", and why the others do not is known"
+    return f"{good} of {of} numbers agree with the reference{known}"
 
 
 def _write(out: Path, source: Provenance, found: list[Claim], data: dict) -> Path:
-    good = sum(claim.holds for claim in found)
-    report = write_report(
-        out, f"Published claims: {good} of {len(found)} hold", source, _sections(found), NOTE
-    )
+    counts = np.sum([claim.count for claim in found], axis=0)
+    title = "Published claims, run again: {} of {} numbers agree".format(*counts)
+    report = write_report(out, title, source, _sections(found), NOTE)
     write_whole(out / "claims.json", json.dumps(plain(data), indent=1, allow_nan=False) + "\n")
     for claim in found:
         for k, figure in enumerate(claim.figures, 1):
@@ -132,9 +140,9 @@ def _sections(found: list[Claim]) -> list[Section]:
             title=claim.title,
             score=[
                 (
-                    "{} of {} numbers agree".format(*claim.count),
-                    "holds" if claim.holds else "differs",
-                    "good" if claim.holds else "bad",
+                    _numbers(claim),
+                    claim.outcome,
+                    {True: "good", False: "warn", None: ""}[claim.seen],
                 )
             ],
             verdict=claim.finding,

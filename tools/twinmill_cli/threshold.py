@@ -22,6 +22,7 @@ if working():  # not for --help
     from rich.text import Text
 
     from twinmill.files import check_new_file
+    from twinmill.report.show import Fitting
     from twinmill.robots.remote import Remote
     from twinmill.threshold import pictures as source
     from twinmill.threshold.box import KEYS, Ball, Box, Fitted, find_ball, fit_box, look
@@ -191,7 +192,7 @@ def _tell(
             f"{row['false_px']} (before {row['false_px_before']})",
         )
     words = f"Cannot be told apart: {fitted.problem}." if fitted.problem else _options(fitted.box)
-    deliver(data, Group(table, Text(words, "red" if fitted.problem else "")), as_json)
+    deliver(data, Group(Fitting(table), Text(words, "red" if fitted.problem else "")), as_json)
 
 
 def _options(box: Box) -> str:

@@ -55,7 +55,9 @@ def embedded(robots: Sequence[Shown], first: int, span_s: tuple[float, float]) -
         span_s: stretch of time that is shown first.
     """
     logs = list(dict.fromkeys(_log(r) for r in robots))
-    blocks = {f"log{k}": _log_bytes([r for r in robots if _log(r) == log]) for k, log in enumerate(logs)}
+    blocks = {
+        f"log{k}": _log_bytes([r for r in robots if _log(r) == log]) for k, log in enumerate(logs)
+    }
     for k, robot in enumerate(robots):
         measurement = robot.view.measurement
         own = pack_robot(robot.view, measurement.track, measurement.frames, robot.model)
@@ -69,7 +71,9 @@ def embedded(robots: Sequence[Shown], first: int, span_s: tuple[float, float]) -
     names = "".join(f"<option>{html.escape(r.name)}</option>" for r in robots)
     choices = f'<select id="robot" aria-label="Robot">{names}</select>'
     choices += '<select id="where" aria-label="Where it fails"></select>'
-    data = "".join(f'<script type="text/plain" id="{key}">{slim(b)}</script>\n' for key, b in blocks.items())
+    data = "".join(
+        f'<script type="text/plain" id="{key}">{slim(b)}</script>\n' for key, b in blocks.items()
+    )
     return (
         f"<style>{(STATIC / 'charts.css').read_text()}</style>\n{stage_html(choices)}"
         f'<p class="hint">{HINT}</p>\n{data}{_script(options)}'

@@ -57,6 +57,8 @@ REGION = {  # kind, deg/s: share at each of V_MPS; from..to where only that is k
     ("robot", 60): (1.0, 1.0, (0.99, 1.0), (0.96, 0.99), (0.91, 0.94), (0.91, 0.94)),
 }
 MILL = "share that mills"
+MOST = 0.5  # share of runs beyond which they do what a claim says
+PUBLISHED_TURN, MIDDLE = -3.0, 0.2  # of the odd robot; so near is in the middle, in radii
 FOUR_CLASSES = ("milling", "ellipsoidal", "cluster", "separated")
 ALIKE = {0.01: 0.024, 0.02: 0.048, 0.03: 0.074, 0.04: 0.099}  # spread: circliness
 # Turn of the odd robot over that of the ring: odd robot's distance over the ring's radius, for six
@@ -92,6 +94,7 @@ def milling(seeds: int) -> Claim:
         "Six robots mill",
         "Six robots with speed 0.25 m/s, turning at 45 deg/s to one side for nothing seen and to "
         "the other for seen, end on one circle: circliness below 0.2.",
+        best.value > MOST,
         f"{_percent(best)} of runs, if any part of the neighbour's body is seen. If only its "
         "centre counts, as the text has it, the circle holds just as long as all robots are alike, "
         f"and the step of the simulation is an effect of its own: {euler} by forward Euler, as "
@@ -125,6 +128,7 @@ def diffusing(seeds: int) -> Claim:
         "Eight robots diffuse, and delta tells it",
         "Eight robots with speed 0.3 m/s and turn rate 150 deg/s part until nobody's turning "
         "centre is within another's view: delta above 1, which tells diffusing from mere scatter.",
+        rows[5].value > MOST and rows[-3].value < 1 - MOST,
         f"{_percent(rows[3])} after 30 s, {_percent(rows[5])} after 120 s. Robots strewn at random "
         f"over {side_m:.1f} m have the same scatter, but never delta above 1.",
         rows,
@@ -169,11 +173,12 @@ def bullseye(seeds: int, turns: tuple[float, ...] = ODD_TURNS) -> Claim:
     words = "; ".join(f"{row.value:.2f} of its radius at {t:+g} times" for t, row in six.items())
     return Claim(
         "bullseye",
-        "One odd robot makes a bull's-eye",
+        "Where one odd robot goes in a mill",
         "One robot that spins at -3 times the others' turn rate while it sees nothing comes to the "
         "middle of the mill.",
-        f"It orbits inside the ring, not in its middle: {words} (six robots, whole bodies seen). "
-        "The published sign is -3; where the paper's figure has it in the middle, +3 is nearer.",
+        six[PUBLISHED_TURN].value < MIDDLE if PUBLISHED_TURN in six else None,
+        f"Its distance from the middle is {words} (six robots, whole bodies seen). The published "
+        f"sign is -3; where the paper's figure has it in the middle, +3 is nearer.",
         rows,
         [figures.odd_ratios(runs_of), figures.paths(typical, odd=1)],
     )
@@ -192,6 +197,7 @@ def more_robots(seeds: int) -> Claim:
         "more_robots",
         "More robots are not always better",
         "How many robots mill has an upper edge too: beyond it, more of them spoil the mill.",
+        all(by_n[14].value < 1 - MOST < MOST < by_n[6].value for by_n in shown.values()),
         f"Whole bodies seen: {_percent(shown['disc'][6])} at 6, {_percent(shown['disc'][8])} at 8. "
         f"Centres alone: {_percent(shown['point'][7])} at 7, {_percent(shown['point'][10])} at 10.",
         rows,
@@ -219,8 +225,10 @@ def region(seeds: int) -> Claim:
         "The mill's region of speed and turn rate, and four classes",
         "Over 56 pairs of speed and turn rate swarms end as a stable mill (circliness below 0.2), "
         "an ellipsoidal one (up to 1), a colliding cluster or separated groups (above 1).",
-        "All four occur. Slow turns at high speed part the swarm, as the free circle comes near "
-        "the view range; from 40 deg/s nearly all mill, if whole bodies are seen.",
+        all(row.value > 0 for row in rows[-len(FOUR_CLASSES) :]),
+        f"{_occurring(rows[-len(FOUR_CLASSES) :])} Slow turns at high speed part the swarm, as the "
+        "free circle comes near the view range; from 40 deg/s nearly all mill, if whole bodies are "
+        "seen.",
         rows,
         [
             *figures.maps(maps),
@@ -248,6 +256,7 @@ def alike(seeds: int) -> Claim:
         "alike",
         "How alike robots must be",
         "Each robot's speed is off by its own factor; how homogeneous must they be for a mill?",
+        None,
         f"A locked ring has radii in proportion to speeds: circliness is {slope.value:.2f} times "
         f"the spread (theory {RING_RANGE:g}), so that 0.2 needs a spread below 0.08.",
         [slope, *rows],
@@ -263,6 +272,11 @@ CLAIMS: dict[str, Callable[..., Claim]] = {
     "region": region,
     "alike": alike,
 }
+
+
+def _occurring(classes: list[Row]) -> str:
+    lacking = [row.what.partition(",")[0] for row in classes if row.value == 0]
+    return f"Not one run is {' or '.join(lacking)}." if lacking else "All four occur."
 
 
 def _kind(kind: str, spread: float) -> str:

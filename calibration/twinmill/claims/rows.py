@@ -58,18 +58,25 @@ class Claim:
     Attributes:
         name: in commands and file names.
         sentence: the claim.
+        seen: whether our runs do what it says; None of a question, which claims nothing.
         finding: ours, in words.
     """
 
     name: str
     title: str
     sentence: str
+    seen: bool | None
     finding: str
     rows: list[Row]
     figures: list[Figure]
 
     @property
-    def holds(self) -> bool:
+    def outcome(self) -> str:
+        """What became of the claim, in two words."""
+        return {True: "as published", False: "not seen", None: "measured"}[self.seen]
+
+    @property
+    def agrees(self) -> bool:
         """Whether all numbers that have a reference agree with it, or are known not to."""
         return not any(row.surprises for row in self.rows)
 
@@ -85,7 +92,8 @@ class Claim:
             "name": self.name,
             "claim": self.sentence,
             "finding": self.finding,
-            "holds": self.holds,
+            "seen": self.seen,
+            "agrees": self.agrees,
             "numbers": [row.to_json() for row in self.rows],
         }
 

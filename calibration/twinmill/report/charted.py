@@ -23,7 +23,8 @@ def charts(
 
     Args:
         result: its models' predictions are shown.
-        label, beside: of other models that are drawn beside, one for each of the robots.
+        label: of other models that are drawn beside.
+        beside: these, one for each robot of the result; or none.
     """
     places = [k for k, r in enumerate(result.robots) if isinstance(r, RobotComparison)]
     robots = [result.robots[k] for k in places]

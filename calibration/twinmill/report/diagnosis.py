@@ -10,10 +10,10 @@ from twinmill.diagnosis.explain import Explanation, steps
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.model.parameters import Estimate
 from twinmill.report import Figure, Section, show, tables, views
+from twinmill.report.charted import charts
 from twinmill.report.detection_figures import field_of_view
 from twinmill.report.detection_tables import bit_steps, bit_tables
 from twinmill.report.error_figures import waterfall
-from twinmill.report.charted import charts
 from twinmill.report.sections import robot_pictures
 from twinmill.report.tables import Cell, Table, Tone, number, tone
 

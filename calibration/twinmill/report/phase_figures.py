@@ -6,6 +6,8 @@ import twinmill_native as native
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch, Rectangle
+from matplotlib.patheffects import withStroke
+from scipy.interpolate import CubicSpline
 
 from twinmill.report import Figure
 from twinmill.report.canvas import WIDTH_IN, draw
@@ -15,6 +17,7 @@ from twinmill.swarm.experiments import Experiment
 from twinmill.swarm.phase import CLASSES, Phase
 
 TRACE_S, TRACE_EVERY_S = 8.0, 0.1
+BETWEEN = 5  # pieces that a step of a trace is drawn in
 MOST_NUMBERS = 150  # cells beyond which numbers in them cannot be read
 DARK = "#222222"
 MAPS_ACROSS = 2
@@ -201,9 +204,10 @@ def probability_figure(phase: Phase, at: dict[str, float]) -> Figure:
         mesh = axes.pcolormesh(x, y, probability[cells], vmin=0, vmax=1, cmap="viridis")
         if min(cells.shape) > 1:
             middle = [(e[1:] + e[:-1]) / 2 for e in (x, y)]
-            axes.contour(
-                *middle, probability[cells], levels=[0.5, 0.9], colors="white", linewidths=1
+            lines = axes.contour(
+                *middle, probability[cells], levels=[0.5, 0.9], colors="black", linewidths=1
             )
+            lines.set_path_effects([withStroke(linewidth=3, foreground="white")])  # on any colour
         axes.figure.colorbar(mesh, label=f"probability of '{phase.goal}'")
         _label(axes, phase)
 
@@ -260,12 +264,20 @@ def _typical(phase: Phase, cell: int, k: int) -> np.ndarray:
     return trace[-int(TRACE_S / TRACE_EVERY_S) :]
 
 
+def _curve(path: np.ndarray) -> np.ndarray:
+    """A (T, 2) path with points between: straight lines would draw a small circle as a polygon."""
+    steps = np.arange(len(path))
+    if len(path) < 3:
+        return path
+    return CubicSpline(steps, path)(np.linspace(0, steps[-1], BETWEEN * steps[-1] + 1))
+
+
 def paint_paths(axes: Axes, trace: np.ndarray, color: str, odd: int = 0) -> None:
     """Paths of a (T, n, 3) trace, dots at their ends, hollow for the last `odd`; a bar of 1 m."""
     robots = trace.shape[1]
     for k, robot in enumerate(trace.transpose(1, 0, 2)):
         fill = "white" if k >= robots - odd else DARK
-        axes.plot(robot[:, 0], robot[:, 1], color=color, lw=1)
+        axes.plot(*_curve(robot[:, :2]).T, color=color, lw=1)
         axes.plot(robot[-1, 0], robot[-1, 1], "o", ms=3.5, color=DARK, mfc=fill)
     middle = (trace[..., :2].min(axis=(0, 1)) + trace[..., :2].max(axis=(0, 1))) / 2
     half = max(0.8, 1.08 * float(np.abs(trace[..., :2] - middle).max()))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finds the ball, and limits of colour that hold it and nothing else."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import twinmill_native as native
@@ -22,7 +22,12 @@ SURE_INSIDE, SURE_OUTSIDE = 0.85, 1.2  # of the ball's radius: its edge is of bo
 # Of the ball's pixels: with more of the background inside, single ones though they be, limits lie
 # in the middle of another colour.
 MOST_FALSE = 0.05
-ROUND = 0.6  # least share of its box that a blob fills to be taken for a ball; a disc fills 0.785
+# Least overlap of a blob with the disc of the same area and middle, over their union: a disc has 1,
+# a square 0.83, a longer rectangle less.
+ROUND = 0.88
+SMALLEST_PX = 50  # of a blob, below which nothing is told of its form
+OTHER_HUE_RAD = 0.35  # two pictures of one ball differ less, whatever the light
+COLOURLESS = 6  # counts of U and V about grey, below which there is no hue
 
 
 @dataclass(frozen=True)
@@ -61,26 +66,47 @@ def find_ball(picture: Picture) -> Ball:
     """The largest round blob of anything green.
 
     Raises:
-        ValueError: there is none, or a second one as large.
+        ValueError: there is none, or a second one of half its size.
     """
     mask = native.inside(picture.yuyv, native.green_box())
     labels, _ = ndimage.label(ndimage.binary_opening(mask, iterations=2))
-    found = []
-    for index, (rows, columns) in enumerate(ndimage.find_objects(labels), 1):
-        area_px = np.count_nonzero(labels[rows, columns] == index)
-        height, width = rows.stop - rows.start, columns.stop - columns.start
-        is_round = area_px > ROUND * height * width and 0.5 < height / width < 2
-        if is_round and area_px > 50:
-            middle = ((columns.start + columns.stop - 1) / 2, (rows.start + rows.stop - 1) / 2)
-            found.append((area_px, Ball(*middle, max(height, width) / 2)))
-    found.sort(key=lambda item: -item[0])
+    blobs = [
+        (rows, columns, labels[rows, columns] == index)
+        for index, (rows, columns) in enumerate(ndimage.find_objects(labels), 1)
+    ]
+    blobs = [blob for blob in blobs if np.count_nonzero(blob[2]) > SMALLEST_PX]
+    blobs.sort(key=lambda blob: -np.count_nonzero(blob[2]))
+    found = [blob for blob in blobs if _roundness(blob[2]) > ROUND]
     if not found:
-        raise ValueError(f"{picture.name}: no green ball was found; say where it is: --ball X,Y,R.")
-    if len(found) > 1 and found[1][0] > 0.5 * found[0][0]:
+        largest = f"the largest green thing, at {_where(blobs[0])}, is not round" if blobs else ""
         raise ValueError(
-            f"{picture.name}: more than one thing could be the ball; say where it is: --ball X,Y,R."
+            f"{picture.name}: {largest or 'nothing in it is green'}; say where the ball is: "
+            "--ball X,Y,R."
         )
-    return found[0][1]
+    sizes = [np.count_nonzero(blob[2]) for blob in found]
+    if len(found) > 1 and sizes[1] > 0.5 * sizes[0]:
+        raise ValueError(
+            f"{picture.name}: round and green are the things at {_where(found[0])} and at "
+            f"{_where(found[1])}; say which is the ball: --ball X,Y,R."
+        )
+    rows, columns, _ = found[0]
+    middle = ((columns.start + columns.stop - 1) / 2, (rows.start + rows.stop - 1) / 2)
+    return Ball(*middle, max(rows.stop - rows.start, columns.stop - columns.start) / 2)
+
+
+def _roundness(blob: np.ndarray) -> float:
+    """Overlap of an (H, W) mask with the disc of its area about its middle, over their union."""
+    area_px, middle = np.count_nonzero(blob), np.argwhere(blob).mean(axis=0)
+    edge = round(np.sqrt(area_px))  # the disc may stand out of the blob's box
+    y, x = np.mgrid[-edge : blob.shape[0] + edge, -edge : blob.shape[1] + edge]
+    disc = np.hypot(y - middle[0], x - middle[1]) <= np.sqrt(area_px / np.pi)
+    both = np.count_nonzero(disc & np.pad(blob, edge))
+    return both / (area_px + np.count_nonzero(disc) - both)
+
+
+def _where(blob: tuple[slice, slice, np.ndarray]) -> str:
+    rows, columns, _ = blob
+    return f"{(columns.start + columns.stop) // 2},{(rows.start + rows.stop) // 2}"
 
 
 def look(picture: Picture, ball: Ball, box: Box) -> Look:
@@ -139,8 +165,36 @@ def fit_box(pictures: list[Picture], balls: list[Ball], min_blob_px: int) -> Fit
         looks = [look(*both, box) for both in zip(shown, at, strict=True)]
         fitted = Fitted(box, looks[: len(pictures)], _problem(shown, looks, min_blob_px))
         if not fitted.problem:
-            break
-    return fitted
+            return fitted
+    return replace(fitted, problem=_other_colour(pictures, balls) or fitted.problem)
+
+
+def _other_colour(pictures: list[Picture], balls: list[Ball]) -> str:
+    """Whose ball has another hue than those of the other pictures, as a sentence; or nothing."""
+    hues = np.array([_hue_rad(*both) for both in zip(pictures, balls, strict=True)])
+    if len(hues) < 2 or not np.isfinite(hues).all():
+        return ""
+    apart = np.abs(np.angle(np.exp(1j * (hues[:, None] - hues))))
+    off = np.array([np.median(np.delete(row, k)) for k, row in enumerate(apart)])
+    if off.max() < OTHER_HUE_RAD:
+        return ""
+    if len(hues) == 2:
+        return (
+            f"what was taken for the ball in {pictures[0].name} has another colour than in "
+            f"{pictures[1].name}; say where it is in each: --ball X,Y,R"
+        )
+    name, ball = pictures[int(off.argmax())].name, balls[int(off.argmax())]
+    return (
+        f"{name}: what was taken for the ball, at {ball.x_px:.0f},{ball.y_px:.0f}, has another "
+        "colour than in the other pictures; say where it is, once per picture: --ball X,Y,R"
+    )
+
+
+def _hue_rad(picture: Picture, ball: Ball) -> float:
+    """Direction of the ball's colour from grey, which light does not change; NaN of grey."""
+    inside = picture.yuv[ball.distance(picture.yuv.shape[:2]) < SURE_INSIDE]
+    u, v = np.median(inside[:, 1:].astype(float), axis=0) - 128
+    return float(np.arctan2(v, u)) if np.hypot(u, v) > COLOURLESS else float("nan")
 
 
 def _tight(target: np.ndarray, trim: float) -> np.ndarray:

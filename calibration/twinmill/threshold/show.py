@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
 
 from twinmill.threshold.box import SURE_OUTSIDE, Ball, Look
 from twinmill.threshold.pictures import Picture
@@ -24,7 +25,9 @@ def draw(
         axes = [figure.add_subplot(len(rows), 3, 3 * row + k + 1) for k in range(3)]
         picture, ball = pictures[row], balls[row]
         axes[0].imshow(picture.rgb)
-        axes[0].add_patch(Circle((ball.x_px, ball.y_px), ball.radius_px, fill=False, color="w"))
+        ring = Circle((ball.x_px, ball.y_px), ball.radius_px, fill=False, ec="white", lw=1.2)
+        ring.set_path_effects([withStroke(linewidth=3.5, foreground="black")])  # on any colour
+        axes[0].add_patch(ring)
         axes[0].set_title(picture.name)
         for axis, seen, words in ((axes[1], before[row], "before"), (axes[2], after[row], "after")):
             axis.imshow(_coloured(picture, ball, seen))

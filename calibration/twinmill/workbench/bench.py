@@ -214,9 +214,7 @@ class Bench:
     def robot_bytes(self, index: int) -> bytes:
         """Speeds, commands and band of one robot."""
         raw = self.session.raw(index)
-        return pack_robot(
-            self.session.robots[index], raw, frames_of(raw), self.session.given.model
-        )
+        return pack_robot(self.session.robots[index], raw, frames_of(raw), self.session.given.model)
 
     def prediction_bytes(self, index: int) -> bytes:
         """What the model shown says of one robot."""

@@ -23,7 +23,9 @@ class SwarmPanel:
             self.n = ui.number("robots", value=asked.get("n", 8), min=2, max=100, precision=0)
             self.n.props('dense outlined data-testid="swarm-n"').style("width: 78px")
             self.duration_s = ui.number("time (s)", value=asked.get("duration_s", 60), min=10)
-            self.duration_s.props("dense outlined").style("width: 78px")
+            self.duration_s.props('dense outlined data-testid="swarm-duration"').style(
+                "width: 78px"
+            )
             self.behavior = ui.input("behaviour", value=asked.get("behavior", "milling_cmaes"))
             self.behavior.props("dense outlined").style("flex: 1; min-width: 130px")
         with ui.element("div").classes("buttons"):
