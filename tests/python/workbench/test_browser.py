@@ -93,7 +93,9 @@ def test_why_a_log_cannot_be_opened_is_said_in_the_page(import_turbopi, page):
     import_turbopi(0.0)
     with workbench(ends_with=1) as url:
         page.goto(url)
-        expect(page.locator("#failed")).to_contain_text(re.compile(r"--heading-offset-deg=-1(79|80)\b"))
+        expect(page.locator("#failed")).to_contain_text(
+            re.compile(r"--heading-offset-deg=-1(79|80)\b")
+        )
 
 
 def test_the_whole_conversation(import_turbopi, page):
