@@ -197,7 +197,7 @@ def more_robots(seeds: int) -> Claim:
         "more_robots",
         "More robots are not always better",
         "How many robots mill has an upper edge too: beyond it, more of them spoil the mill.",
-        all(by_n[14].value < MOST < by_n[6].value for by_n in shown.values()),
+        all(n[14].value < MOST < max(row.value for row in n.values()) for n in shown.values()),
         f"Whole bodies seen: {_percent(shown['disc'][6])} at 6, {_percent(shown['disc'][8])} at 8. "
         f"Centres alone: {_percent(shown['point'][7])} at 7, {_percent(shown['point'][10])} at 10.",
         rows,
