@@ -45,6 +45,17 @@ def test_what_the_tutorial_links_to_was_written(outputs, folder):
     assert [name for name in linked if not (folder / name).is_file()] == []
 
 
+def test_the_readme_runs_as_it_is_printed(tmp_path):
+    """With the tutorial's recording, and the environment where the page has it."""
+    (tmp_path / ".venv").symlink_to(sys.prefix)
+    run(f"python {ROOT}/examples/make_recording.py", tmp_path)
+    for command in commands_of((ROOT / "README.md").read_text()):
+        run(command, tmp_path)
+    assert {"better.toml", "best.toml", "script.csv", "swarm.lcmlog"} <= {
+        p.name for p in tmp_path.iterdir()
+    }
+
+
 def test_the_notebook_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("EXAMPLES", str(ROOT / "examples"))

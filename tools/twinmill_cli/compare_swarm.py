@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -143,7 +144,11 @@ def _compare_swarm(
     Example: twinmill compare-swarm floor.lcmlog --model fitted.toml --out report
     """
     model_file = open_model(model, out)
-    source = provenance(command_line("compare-swarm", [log], model), model_file)
+    runs = ["--seeds", str(seeds), "--first-seed", str(first_seed)]
+    runs += ["--odd", odd] if odd else []
+    runs += ["--behavior", behavior] if behavior else []
+    verb = shlex.join(["compare-swarm", *runs])
+    source = provenance(command_line(verb, [log], model), model_file)
     scale = (
         model_file.model.get("sensor.range_m"),
         model_file.model.get("robot.body_radius_m"),

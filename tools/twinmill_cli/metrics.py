@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -83,11 +84,15 @@ def _metrics(
         raise ValueError("--out: a report is of a log; record the bus with lcm-logger.")
     model_file = open_model(model, out)
     scale = tuple(model_file.model.get(n) for n in ("sensor.range_m", "robot.body_radius_m"))
+    not_of_ring = ["--odd", odd] if odd else []
     if live:
         question = Question(channel_prefix, *scale, robot_ids(odd))
-        source = provenance(command_line("metrics --live", [], model), model_file)
+        swarm = ["--channel-prefix", channel_prefix] if channel_prefix else []
+        verb = shlex.join(["metrics", "--live", *swarm, *not_of_ring])
+        source = provenance(command_line(verb, [], model), model_file)
         return follow(lcm_url, duration_s, question, source.to_json(), as_json)
-    source = provenance(command_line("metrics", [log], model), model_file)
+    verb = shlex.join(["metrics", *not_of_ring])
+    source = provenance(command_line(verb, [log], model), model_file)
     with busy(f"reading {log}"):
         series = swarm_metrics(read_log(log), *scale, robot_ids(odd))
     section = _section(series)

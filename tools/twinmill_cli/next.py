@@ -63,6 +63,7 @@ def _next(
     """
     limits = Limits(duration_s, _sides(floor_m), max_duty_pct / 100)
     verb = f"next --duration-s {duration_s:g} --floor-m {floor_m} --max-duty-pct {max_duty_pct}"
+    verb += f" --script-as {script_as}" if script_as else ""
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )

@@ -79,6 +79,7 @@ def _phase(
     target = out or folder / "phase"
     check_new_folder(target)
     words = ["twinmill", "phase", str(folder), "--goal", phase.goal]
+    words += [word for text in at or [] for word in ("--at", text)]
     words += ["--experiments", str(experiments)] if experiments else []
     words += ["--rival", str(rival)] if rival else []
     source = Provenance(

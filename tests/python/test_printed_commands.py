@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every command that a page, a help text or a result prints can be typed as it stands."""
+
+import io
+import json
+import re
+import shlex
+import subprocess
+from collections.abc import Iterator
+from contextlib import redirect_stdout
+from pathlib import Path
+
+import pytest
+from typer.core import TyperGroup
+
+from twinmill.programs import find_program
+from twinmill_cli import main as cli
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+SOURCES = [
+    path
+    for folder in ("calibration/twinmill", "tools/twinmill_cli")
+    for path in sorted((ROOT / folder).rglob("*.py"))
+]
+COMMANDS = {name: cli.LazyCommand(name, f"twinmill_cli.{m}", "") for name, m, _ in cli.COMMANDS}
+LINE = re.compile(r"^(?:    |\$ )(?:build/bin/)?((?:twinmill|twin_run|twin_sweep|make) .*)", re.M)
+EXAMPLE = re.compile(r"^ +Example: (twinmill .*)$", re.M)
+QUOTED = re.compile(r"`(twinmill [a-z][^`]*)`")
+
+
+def lines_of(page: Path) -> Iterator[str]:
+    """Commands in blocks of a page, with lines that go on joined, without what a shell adds."""
+    yield from LINE.findall(page.read_text().replace("\\\n", " "))
+
+
+def words_of(line: str) -> list[str]:
+    """Of a command line, without comments, pipes and redirections."""
+    lexer = shlex.shlex(line, posix=True, punctuation_chars="|>;&")
+    lexer.whitespace_split = True
+    words = list(lexer)
+    ends = [k for k, word in enumerate(words) if set(word) <= set("|>;&")]
+    return words[: ends[0]] if ends else words
+
+
+def check(line: str) -> None:
+    """The command, its options and the kinds of their values exist, and nothing needed lacks."""
+    program, *words = words_of(line)
+    if program == "make":
+        targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.M))
+        assert {word for word in words if "=" not in word} <= targets
+    elif program == "twinmill":
+        command = COMMANDS[words[0]].command()
+        if isinstance(command, TyperGroup):
+            command, words = command.commands[words[1]], words[1:]
+        command.make_context(words[0], words[1:])
+    else:
+        done = subprocess.run(
+            [str(find_program(program)), "--help"], capture_output=True, text=True, check=True
+        )
+        known = set(re.findall(r"--[\w-]+", done.stdout)) | {"-h"}
+        assert {w.partition("=")[0] for w in words if w.startswith("--")} <= known
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_on_a_page_can_be_typed(page):
+    for line in lines_of(page):
+        check(line)
+
+
+def test_examples_in_help_can_be_typed():
+    found = [line for path in SOURCES for line in EXAMPLE.findall(path.read_text())]
+    assert len(found) > 30
+    for line in found:
+        check(line)
+
+
+def test_commands_named_in_messages_exist_with_their_options():
+    """What stands between back quotes may leave files out, so options alone are looked at."""
+    found = {line for path in SOURCES for line in QUOTED.findall(path.read_text())}
+    assert len(found) > 20
+    for line in found:
+        name, *words = line.split()[1:]
+        command = COMMANDS[name].command()
+        if isinstance(command, TyperGroup) and words and not words[0].startswith("-"):
+            command = command.commands[words[0]]
+        known = {option for p in command.params for option in (*p.opts, *p.secondary_opts)}
+        known.add("--help")
+        assert {w.partition("=")[0] for w in words if re.match(r"--?[a-z]", w)} <= known, line
+
+
+# -- results: what made them makes them again -----------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def swarm(tmp_path_factory) -> Path:
+    """A folder with the log of a small swarm, and a sweep of three axes."""
+    folder = tmp_path_factory.mktemp("printed")
+    log = ["twin_run", "--plant", "planar", "--n", "4", "--duration-s", "15", "--log", "s.lcmlog"]
+    grid = ["--x", "v_mps=0.2:0.3:2", "--y", "omega_degps=40:60:2", "--z", "n=4,6"]
+    sweep = ["twin_sweep", *grid, "--seeds", "10", "--duration-s", "15", "--out", "sweep"]
+    for program, *words in (log, sweep):
+        subprocess.run(
+            [str(find_program(program)), *words], cwd=folder, check=True, capture_output=True
+        )
+    return folder
+
+
+@pytest.mark.parametrize("line", [
+    "metrics s.lcmlog --odd 2 --model paper.toml",
+    "compare-swarm s.lcmlog --seeds 39 --first-seed 3 --odd 2",
+    "phase sweep --goal milling --at n=6 --out {made}",
+    "plot s.lcmlog -o {made}.svg",
+    "ask how-many --behavior milling --n 5 --seeds 10 --duration-s 5 --at-least 0.8 --start disc",
+])  # fmt: skip
+def test_the_command_that_a_result_names_makes_it_again(swarm, line, monkeypatch):
+    monkeypatch.chdir(swarm)
+    first = said(line.format(made="first"))
+    again = said(first["command"].removeprefix("twinmill ") + (
+        " --out second" if " --out " in line else " --force" if line.startswith("plot") else ""
+    ))  # fmt: skip
+    assert without_place(first) == without_place(again)
+
+
+def said(line: str) -> dict:
+    out = io.StringIO()
+    with redirect_stdout(out):
+        cli.run([*shlex.split(line), "--json"])
+    return json.loads(out.getvalue())
+
+
+def without_place(data: dict) -> dict:
+    return {k: v for k, v in data.items() if k not in ("report", "out")}
