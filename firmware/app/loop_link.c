@@ -94,13 +94,15 @@ static void keep_latch(struct loop *loop)
     {
         return;
     }
-    state->stopped_file_is_there = loop->inbox.latched;
     if (!loop->inbox.latched)
     {
+        state->stopped_file_is_there = false;
         (void)unlink(state->stopped_file);
         return;
     }
+    // In every step until there is room for it.
     const int fd = open(state->stopped_file, O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+    state->stopped_file_is_there = fd >= 0;
     if (fd >= 0)
     {
         (void)close(fd);

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "robot.h"
@@ -93,6 +94,22 @@ static void test_stop_outlives_the_program(void)
     TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
 }
 
+// As on a full disk: a folder that is not there yet.
+static void test_stop_that_cannot_be_kept_in_mind_is_kept_later(void)
+{
+    char path[128];
+    snprintf(robot.config.run_dir, sizeof robot.config.run_dir, "%s/later", folder);
+    snprintf(path, sizeof path, "%s/stopped", robot.config.run_dir);
+    robot_boot();
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
+    robot_steps(3);
+    TEST_ASSERT_EQUAL(0, mkdir(robot.config.run_dir, 0700));
+    robot_steps(1);
+    TEST_ASSERT_EQUAL(0, access(path, F_OK));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_ARM, 0, ""));
+    TEST_ASSERT_EQUAL(0, rmdir(robot.config.run_dir));
+}
+
 static void test_robot_that_loses_its_operator_stops(void)
 {
     robot.link_timeout_ms = 1000;
@@ -168,6 +185,7 @@ int main(void)
     RUN_TEST(test_stop_from_the_future_locks_nobody_out);
     RUN_TEST(test_button_starts_a_robot_that_was_stopped);
     RUN_TEST(test_stop_outlives_the_program);
+    RUN_TEST(test_stop_that_cannot_be_kept_in_mind_is_kept_later);
     RUN_TEST(test_robot_that_loses_its_operator_stops);
     RUN_TEST(test_robot_that_hears_its_operator_goes_on);
     RUN_TEST(test_robot_that_lost_its_operator_does_not_start_later);
