@@ -120,10 +120,13 @@ static enum fw_err write_duties(void *device, const int8_t wheel_duty_pct[FW_WHE
     return send_frame(board, frame, count);
 }
 
+// Twice: nothing answers it, and one frame is lost to noise or to the part of a frame that a killed
+// process has left.
 static enum fw_err stop(void *device)
 {
     static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
-    return write_duties(device, zero_pct);
+    const enum fw_err err = write_duties(device, zero_pct);
+    return err != FW_OK ? err : write_duties(device, zero_pct);
 }
 
 static void drop_received(struct motors_uart *board, size_t count)
@@ -187,10 +190,20 @@ static enum fw_err receive(struct motors_uart *board)
     return err;
 }
 
+static bool is_heard(const struct motors_uart *board)
+{
+    return board->was_heard && hal_clock_monotonic_us(&board->clock) - board->heard_us < HEARD_US;
+}
+
+// What it said last is old once it is heard no more: then it is gone, also while the robot drives.
 static enum fw_err read_battery(void *device, int32_t *pack_mV)
 {
     struct motors_uart *board = device;
     const enum fw_err err = receive(board);
+    if (err == FW_OK && board->config.must_be_heard && board->was_heard && !is_heard(board))
+    {
+        return FW_ERR_NO_DEVICE;
+    }
     if (err != FW_OK || !board->has_battery)
     {
         return err != FW_OK ? err : FW_ERR_TIMEOUT;
@@ -199,23 +212,30 @@ static enum fw_err read_battery(void *device, int32_t *pack_mV)
     return FW_OK;
 }
 
-static bool is_heard(const struct motors_uart *board)
+static bool is_sending(const struct motors_uart *board)
 {
-    return board->was_heard && hal_clock_monotonic_us(&board->clock) - board->heard_us < HEARD_US;
+    int unsent_bytes = 0;
+    return ioctl(board->fd, TIOCOUTQ, &unsent_bytes) == 0 && unsent_bytes > 0;
 }
 
-// The board does not answer: it is enough that the frame has left and that the board is heard.
+// The board does not answer: it is enough that the frame has left and that the board is heard. A line
+// takes bytes at once and sends them in its own time: half a millisecond, or some by USB.
 static enum fw_err confirm(void *device)
 {
     struct motors_uart *board = device;
-    int unsent_bytes = 0;
     const enum fw_err err = receive(board);
-    if (err != FW_OK)
+    if (err != FW_OK || !board->config.must_be_heard)
     {
         return err;
     }
-    const bool sent = ioctl(board->fd, TIOCOUTQ, &unsent_bytes) != 0 || unsent_bytes == 0;
-    return !board->config.must_be_heard || (sent && is_heard(board)) ? FW_OK : FW_ERR_TIMEOUT;
+    bool is_late = false;
+    for (int64_t left_us = board->config.retry_us; !is_late && is_sending(board);
+         left_us -= RETRY_PAUSE_US)
+    {
+        is_late = left_us <= 0;
+        hal_clock_wait(&board->clock, NULL, 0, RETRY_PAUSE_US);
+    }
+    return !is_late && is_heard(board) ? FW_OK : FW_ERR_TIMEOUT;
 }
 
 struct hal_motors motors_uart_make(struct motors_uart *board,

@@ -3,8 +3,10 @@
 #include "hal_linux/motors_uart.h"
 
 #include <fcntl.h>
+#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -18,9 +20,30 @@ static int board_fd;
 static struct motors_uart driver;
 static struct hal_motors motors;
 static struct hal_battery battery;
+// How often the line still has bytes to send when it is asked: a pseudo terminal never has.
+static int asked_while_sending;
+
+int __real_ioctl(int fd, unsigned long request, ...);
+int __wrap_ioctl(int fd, unsigned long request, ...);
+
+int __wrap_ioctl(int fd, unsigned long request, ...)
+{
+    va_list arguments;
+    va_start(arguments, request);
+    void *argument = va_arg(arguments, void *);
+    va_end(arguments);
+    if (request == TIOCOUTQ && asked_while_sending > 0)
+    {
+        --asked_while_sending;
+        *(int *)argument = 27;
+        return 0;
+    }
+    return __real_ioctl(fd, request, argument);
+}
 
 void setUp(void)
 {
+    asked_while_sending = 0;
     board_fd = posix_openpt(O_RDWR | O_NOCTTY);
     TEST_ASSERT_TRUE(board_fd >= 0 && grantpt(board_fd) == 0 && unlockpt(board_fd) == 0);
     static char path[64];
@@ -116,6 +139,27 @@ static void test_battery_is_unknown_until_the_board_reports_it(void)
     TEST_ASSERT_EQUAL(7708, pack_mV);
 }
 
+static void test_board_that_falls_silent_is_gone(void)
+{
+    uint8_t frame[16];
+    int32_t pack_mV = 0;
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_open(&motors));
+    board_sends(frame, uart_frame_make(0, (const uint8_t *)"\x04\x1C\x1E", 3, frame));
+    TEST_ASSERT_EQUAL(FW_OK, read_battery(&pack_mV));
+    driver.heard_us -= 3000000;
+    TEST_ASSERT_EQUAL(FW_ERR_NO_DEVICE, hal_battery_read(&battery, &pack_mV));
+    board_sends(frame, uart_frame_make(0, (const uint8_t *)"\x04\x1C\x1E", 3, frame));
+    int tries = 0;
+    while (hal_battery_read(&battery, &pack_mV) != FW_OK && ++tries < 100)
+    {
+        usleep(1000);
+    }
+    TEST_ASSERT_LESS_THAN(100, tries);
+    driver.heard_us -= 3000000;
+    driver.config.must_be_heard = false;
+    TEST_ASSERT_EQUAL(FW_OK, hal_battery_read(&battery, &pack_mV));
+}
+
 static void test_endless_noise_neither_blocks_nor_fools(void)
 {
     uint8_t noise[1024];
@@ -158,6 +202,41 @@ static void test_stop_is_confirmed_while_the_board_is_heard(void)
     TEST_ASSERT_EQUAL(FW_OK, hal_motors_confirm(&motors));
 }
 
+// A serial line sends 27 bytes in 270 us, one on USB later: who asks at once is too early.
+static void test_stop_is_confirmed_when_it_has_left(void)
+{
+    uint8_t frame[64];
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_stop(&motors));
+    board_sends(frame, uart_frame_make(7, (const uint8_t *)"\x01\x02", 2, frame));
+    TEST_ASSERT_EQUAL(FW_OK, confirm_soon());
+    asked_while_sending = 4;
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_confirm(&motors));
+    TEST_ASSERT_EQUAL(0, asked_while_sending);
+    asked_while_sending = 1000000;
+    TEST_ASSERT_EQUAL(FW_ERR_TIMEOUT, hal_motors_confirm(&motors));
+}
+
+// The rest of a frame whose writer was killed is missing: the board takes it from the next one.
+static void test_stop_arrives_after_a_part_of_a_frame(void)
+{
+    uint8_t bytes[128];
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_open(&motors));
+    TEST_ASSERT_EQUAL(10, write(driver.fd, "\xAA\x55\x03\x16\x05\x04\0\0\0\xC8", 10));
+    TEST_ASSERT_EQUAL(FW_OK, hal_motors_stop(&motors));
+    const ssize_t count = read(board_fd, bytes, sizeof bytes);
+    size_t at = 0, whole = 0;
+    while (at + UART_FRAME_HEADER < (size_t)count)
+    {
+        // A board that knows no better than to skip a frame whose check is wrong.
+        const size_t size = UART_FRAME_OVERHEAD + (size_t)bytes[at + 3];
+        const bool is_frame = bytes[at] == 0xAA && bytes[at + 1] == 0x55;
+        whole +=
+            is_frame && uart_frame_check(bytes + at, (size_t)count - at, 64) == UART_FRAME_WHOLE;
+        at += is_frame ? size : 1;
+    }
+    TEST_ASSERT_GREATER_THAN(0, whole);
+}
+
 static void test_probe_believes_a_frame_and_nothing_else(void)
 {
     uint8_t frame[16];
@@ -183,8 +262,11 @@ int main(void)
     RUN_TEST(test_duties_are_one_frame_of_floats);
     RUN_TEST(test_line_is_raw_and_fast);
     RUN_TEST(test_battery_is_unknown_until_the_board_reports_it);
+    RUN_TEST(test_board_that_falls_silent_is_gone);
     RUN_TEST(test_endless_noise_neither_blocks_nor_fools);
     RUN_TEST(test_stop_is_confirmed_while_the_board_is_heard);
+    RUN_TEST(test_stop_is_confirmed_when_it_has_left);
+    RUN_TEST(test_stop_arrives_after_a_part_of_a_frame);
     RUN_TEST(test_probe_believes_a_frame_and_nothing_else);
     RUN_TEST(test_line_that_vanishes_is_an_error);
     return UNITY_END();
