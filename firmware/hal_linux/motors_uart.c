@@ -218,8 +218,8 @@ static bool is_sending(const struct motors_uart *board)
     return ioctl(board->fd, TIOCOUTQ, &unsent_bytes) == 0 && unsent_bytes > 0;
 }
 
-// The board does not answer: it is enough that the frame has left and that the board is heard. A line
-// takes bytes at once and sends them in its own time: half a millisecond, or some by USB.
+// The board does not answer: it is enough that the frame has left and that the board is heard. A
+// line takes bytes at once and sends them in its own time: half a millisecond, or some by USB.
 static enum fw_err confirm(void *device)
 {
     struct motors_uart *board = device;
