@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from twinmill.claims.published import Points
 from twinmill.programs import find_program
 from twinmill.swarm.forecast.choose import choose
-from twinmill.swarm.forecast.draws import OUTCOMES, Forecast, forecast
+from twinmill.swarm.forecast.draws import OUTCOMES, Forecast, forecast, out_of_bounds
 from twinmill.swarm.forecast.plan import read_plan
 from twinmill.swarm.forecast.score import score
 from twinmill.swarm.store import read_sweep
@@ -52,6 +52,20 @@ def swept(tmp_path_factory) -> Path:
     request = make_request("milling", str(folder / "m.toml"), AXES, seeds=40, duration_s=SECONDS)
     sweep(request, folder / "sweep")
     return folder
+
+
+def test_draws_that_bounds_refuse_are_counted(swept):
+    """As many as a normal has beyond the bounds of its two gains."""
+    wide = MODEL.replace(f"forward_gain = {STD}", "forward_gain = 1.0")
+    (swept / "wide.toml").write_text(wide)
+    request = make_request("milling", str(swept / "wide.toml"), AXES, seeds=1)
+    bounds = {v["name"]: (v["min"], v["max"]) for v in request.model.values()}
+    sizes = {"base.forward_gain": 1.0, "base.yaw_gain": STD}
+    ends = [(np.array(bounds[name]) - 1) / std for name, std in sizes.items()]
+    within = np.prod([norm.cdf(high) - norm.cdf(low) for low, high in ends])
+    anew, names = out_of_bounds(request, 2000, 1)
+    assert 2000 / (2000 + anew) == pytest.approx(within, abs=0.04)
+    assert names == ["base.forward_gain"]
 
 
 def laboratories(cells: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import twinmill_native as native
 import yaml
-from scipy.stats import chi2, truncnorm
+from scipy.stats import chi2, norm, truncnorm
 
 from twinmill.model.ranges import Quantity, sampled
 from twinmill_cli.main import run
@@ -30,7 +30,8 @@ def test_samples_have_the_covariance_and_their_distances_are_chi_squared():
     covariance = root @ root.T
     stds = np.sqrt(np.diag(covariance))
     known = [quantity(v, s) for v, s in zip((1, 0.2, -7), stds, strict=True)]
-    drawn = sampled(known, covariance, COUNT, 1)
+    drawn, tried = sampled(known, covariance, COUNT, 1)
+    assert tried >= COUNT
     assert np.all(np.abs(drawn.mean(0) - (1, 0.2, -7)) < 4 * stds / np.sqrt(COUNT))
     apart = np.abs(np.cov(drawn.T) - covariance)
     error = np.sqrt((np.outer(stds, stds) ** 2 + covariance**2) / COUNT)
@@ -43,7 +44,9 @@ def test_samples_have_the_covariance_and_their_distances_are_chi_squared():
 
 def test_a_bound_cuts_the_normal_off_and_piles_nothing_up_there():
     """The mean of a normal cut off at one std below it, by scipy."""
-    drawn = sampled([quantity(0.1, 0.05, low=0.05)], np.array([[0.0025]]), COUNT, 2)
+    drawn, tried = sampled([quantity(0.1, 0.05, low=0.05)], np.array([[0.0025]]), COUNT, 2)
+    within = norm.cdf(1)  # the bound is a standard deviation below the mean
+    assert COUNT / tried == pytest.approx(within, abs=4 * np.sqrt(within * (1 - within) / tried))
     assert drawn.min() > 0.05
     whole = truncnorm(-1, np.inf, loc=0.1, scale=0.05)
     assert drawn.mean() == pytest.approx(whole.mean(), abs=4 * whole.std() / np.sqrt(COUNT))

@@ -86,6 +86,36 @@ def test_a_swarm_has_settled_since_its_groups_parted():
     assert parted_s + 1.25 - 5 - 0.1 <= rows[0, -1] <= parted_s + 1.25 - 5 + 1.1
 
 
+AHEAD = [40, 0, 40, 0]  # inputs of a robot that drives straight whatever it sees
+
+
+def test_in_mujoco_robots_that_meet_head_on_stop_each_other():
+    """Momenta of equal bodies add up to nothing; without bodies they drive through each other."""
+    model = native.Model.load("turbopi.toml")
+    for name in ("robot.body_radius_m", "idiosyncrasy.theta_a1_std", "idiosyncrasy.theta_a2_std"):
+        model.set(name, 0)
+    cell = native.Cell(model, [AHEAD] * 2, 2, poses=[[-0.2, 0, 0], [0.2, 0, math.pi]])
+    world = [cell], np.zeros(1, np.int64), np.ones(1, np.uint64)
+    radius_m = {
+        plant: native.run_worlds(*world, 11.0, True, plant)[0, 1] for plant in ("planar", "mujoco")
+    }
+    assert radius_m["mujoco"] < 0.2 < 0.5 < radius_m["planar"]  # half a robot's length, metres
+
+
+def test_mujoco_sweeps_have_the_same_bytes_on_any_number_of_workers(tmp_path: Path):
+    asked = request(["n=2,3"], model="turbopi.toml", plant="mujoco", seeds=1, duration_s=0.3)
+    sweep(asked, tmp_path / "one", workers=1)
+    sweep(asked, tmp_path / "two", workers=2)
+    one, two = ((tmp_path / name / "sweep.parquet").read_bytes() for name in ("one", "two"))
+    assert one == two
+    table = read_sweep(tmp_path / "one")[1]
+    assert set(table["kernel"].to_pylist()) == {"mujoco"} and table["n"].to_pylist() == [2, 3]
+    with pytest.raises(ValueError, match="other parameters"):
+        sweep(request(["n=2,3"], model="turbopi.toml", seeds=1, duration_s=0.3), tmp_path / "one")
+    with pytest.raises(ValueError, match="--plant moon"):
+        request(plant="moon")
+
+
 KILLED = """
 import sys
 from twinmill.swarm import request as r

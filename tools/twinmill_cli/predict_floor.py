@@ -14,7 +14,7 @@ from twinmill_cli.output import AsJson, deliver
 if working():  # not for --help
     from twinmill.files import check_new_folder
     from twinmill.swarm.forecast.choose import choose
-    from twinmill.swarm.forecast.draws import forecast, knows_errors
+    from twinmill.swarm.forecast.draws import forecast, knows_errors, out_of_bounds
     from twinmill.swarm.forecast.plan import PLAN, SEALED, Plan, in_random_order, write_plan
     from twinmill.swarm.store import read_sweep
     from twinmill.swarm.sweep import progress_bar
@@ -91,7 +91,11 @@ def _predict_floor(
         ],
         "runs": len(order),
         "draws": len(expected.draws) if knows_errors(request) else 0,
+        "draws_out_of_bounds": 0,
+        "truncated": [],
     }
+    if data["draws"]:
+        data["draws_out_of_bounds"], data["truncated"] = out_of_bounds(request, draws, seed)
     lines = [
         f"{len(order)} runs of {cells} cells are planned; together they are worth {bits[-1]:.1f} "
         "bit.",
@@ -101,6 +105,12 @@ def _predict_floor(
         lines.append(
             f"{request.model_name} says nothing of the errors of its numbers, so that the "
             "probabilities count chance alone; fit the model first (twinmill fit), sweep again."
+        )
+    if anew := data["draws_out_of_bounds"]:
+        names = f" ({', '.join(data['truncated'])})" if data["truncated"] else ""
+        lines.append(
+            f"{anew} of {anew + draws} models drawn were out of bounds{names} and drawn anew: the "
+            "predictions are of what is within."
         )
     deliver(data, "\n".join([*lines, f"Plan: {output / PLAN}"]), as_json)
     return plan

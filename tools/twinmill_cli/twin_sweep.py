@@ -73,6 +73,9 @@ def _command(
     full: Annotated[
         bool, typer.Option("--full", help="Each robot its firmware and plant, always.")
     ] = False,
+    plant: Annotated[
+        str, typer.Option("--plant", help="planar, or mujoco: wheels that slip, bodies with mass.")
+    ] = "planar",
     as_json: AsJson = False,
 ) -> None:
     """Run swarms over a grid of parameters, with metrics and a class for each.
@@ -95,6 +98,7 @@ def _command(
         target_radius_m=target_radius_m,
         full=full,
         same_seeds=same_seeds,
+        plant=plant,
     )
     data = sweep(request, out, workers, dask)
     deliver(data, _text(data), as_json)

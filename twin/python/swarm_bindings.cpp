@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "arrays.h"
+#include "plant_mujoco/mujoco_plant.h"
 #include "swarm/metrics.h"
 #include "swarm/species.h"
 #include "sweep/worlds.h"
@@ -91,10 +92,24 @@ Cell MakeCell(const Model &model, const Tables &rows, size_t ring_size, const st
     return {model, std::move(tables), ring_size, StartNamed(start), spread_m, std::move(starts)};
 }
 
+// In steps of 5 ms at most, of which many worlds are made. Robots with other wheels than the
+// installed one's are made of their models' numbers.
+std::unique_ptr<Plant> MakeMujoco(const std::vector<Model> &models,
+                                  const std::vector<Pose2> &starts, uint64_t seed)
+{
+    const WheelKind wheels = models[0].base.wheels;
+    const bool installed = wheels == WheelKind::kMecanum || wheels == WheelKind::kNone;
+    return std::make_unique<MujocoPlant>(installed ? FindModelFile("turbopi.xml") : "", models,
+                                         starts,
+                                         MujocoOptions{.timestep_s = 0.005, .seed = seed});
+}
+
 // (W, 10): the metrics, the least diffusion, and since when the class has held.
 Array Run(const std::vector<const Cell *> &cells, Indices cell, Seeds seeds, double duration_s,
-          bool full)
+          bool full, const std::string &plant)
 {
+    if (plant != "planar" && plant != "mujoco")
+        throw std::invalid_argument("plant '" + plant + "' must be 'planar' or 'mujoco'");
     if (cell.size() != seeds.size())
         throw std::invalid_argument("cell and seeds must be as long as each other");
     std::vector<World> worlds;
@@ -103,7 +118,10 @@ Array Run(const std::vector<const Cell *> &cells, Indices cell, Seeds seeds, dou
     std::vector<double> rows;
     {
         nb::gil_scoped_release unlocked;
-        for (const Outcome &o : RunWorlds(worlds, duration_s, full ? Path::kFull : Path::kBest))
+        for (const Outcome &o :
+             plant == "mujoco"
+                 ? RunWorldsIn(MakeMujoco, worlds, duration_s)
+                 : RunWorlds(worlds, duration_s, full ? Path::kFull : Path::kBest))
         {
             Append(rows, o.mean);
             rows.insert(rows.end(), {o.least_diffusion, o.settled_s});
@@ -195,6 +213,7 @@ void BindSwarms(nb::module_ &m)
         .def_prop_ro("why_not_lean", [](const Cell &cell) { return WhyNotLean(cell.model); });
     m.def(
         "run_worlds", &Run, "cells"_a, "cell"_a, "seeds"_a, "duration_s"_a, "full"_a = false,
+        "plant"_a = "planar",
         "(W, 10) OUTCOMES of worlds of cell and seed: METRICS and their least diffusion over the last "
         "10 s; since when the class has held, NaN of the lean kernel.");
     m.def("trace_world", &Trace, "cell"_a, "seed"_a, "duration_s"_a, "every_s"_a,

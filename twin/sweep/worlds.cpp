@@ -18,14 +18,13 @@ namespace twin
 namespace
 {
 
-Swarm MakeSwarm(const World &world)
+Swarm MakeSwarm(const World &world, const PlantMaker &make)
 {
     const Cell &cell = *world.cell;
     const int n = static_cast<int>(cell.tables.size());
     const auto robots = DrawRobots(cell.model, n, world.seed);
     const auto starts = StartsOf(cell, world.seed);
-    return Swarm(std::make_unique<PlanarBodies>(robots, starts, world.seed), robots, cell.tables,
-                 {.seed = world.seed});
+    return Swarm(make(robots, starts, world.seed), robots, cell.tables, {.seed = world.seed});
 }
 
 // The classes that a swarm goes through.
@@ -55,11 +54,11 @@ private:
     std::vector<std::pair<double, std::string_view>> classes_;
 };
 
-Outcome RunFull(const World &world, double duration_s)
+Outcome RunFull(const World &world, double duration_s, const PlantMaker &make)
 {
     const Cell &cell = *world.cell;
     const MetricScale scale{cell.model.sensor.range_m, cell.model.robot.body_radius_m};
-    Swarm swarm = MakeSwarm(world);
+    Swarm swarm = MakeSwarm(world, make);
     const StepCount count = CountSteps(swarm.PeriodS(), duration_s);
     MetricWindow window(std::numeric_limits<double>::infinity());
     History history;
@@ -106,6 +105,12 @@ std::vector<Pose2> StartsOf(const Cell &cell, uint64_t seed)
                       cell.model.robot.body_radius_m, seed);
 }
 
+std::unique_ptr<Plant> MakePlanarBodies(const std::vector<Model> &models,
+                                        const std::vector<Pose2> &starts, uint64_t seed)
+{
+    return std::make_unique<PlanarBodies>(models, starts, seed);
+}
+
 std::string WhyNotLean(const Model &model)
 {
     if (!model.effects.empty())
@@ -135,7 +140,7 @@ std::vector<Outcome> RunWorlds(std::span<const World> worlds, double duration_s,
         const World &world = worlds[done];
         size_t size = 1;
         if (path == Path::kFull || !WhyNotLean(world.cell->model).empty())
-            outcomes[done] = RunFull(world, duration_s);
+            outcomes[done] = RunFull(world, duration_s, MakePlanarBodies);
         else
         {
             size = BatchSize(worlds.subspan(done));
@@ -147,9 +152,18 @@ std::vector<Outcome> RunWorlds(std::span<const World> worlds, double duration_s,
     return outcomes;
 }
 
+std::vector<Outcome> RunWorldsIn(const PlantMaker &make, std::span<const World> worlds,
+                                 double duration_s)
+{
+    std::vector<Outcome> outcomes;
+    for (const World &world : worlds)
+        outcomes.push_back(RunFull(world, duration_s, make));
+    return outcomes;
+}
+
 std::vector<std::vector<Pose2>> TraceWorld(const World &world, double duration_s, double every_s)
 {
-    Swarm swarm = MakeSwarm(world);
+    Swarm swarm = MakeSwarm(world, MakePlanarBodies);
     const int steps = CountSteps(swarm.PeriodS(), duration_s).steps;
     const int stride = std::max(1, static_cast<int>(std::lround(every_s / swarm.PeriodS())));
     std::vector<std::vector<Pose2>> trace;

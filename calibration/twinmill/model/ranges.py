@@ -65,12 +65,14 @@ class Ranges:
         covariance: (P, P), of the normal before bounds cut it off.
         samples: (N, P), all within bounds.
         seed: of the samples.
+        tried: draws that it took: those out of bounds were drawn anew.
     """
 
     quantities: list[Quantity]
     covariance: np.ndarray
     samples: np.ndarray
     seed: int
+    tried: int
 
     @property
     def truncated(self) -> list[Quantity]:
@@ -145,14 +147,18 @@ def ranges(file: ModelFile, model: native.Model, count: int, seed: int) -> Range
     theirs = [place[known[i].name] for i in own]
     covariance[np.ix_(own, own)] = fit.values[np.ix_(theirs, theirs)]
     try:
-        samples = sampled(known, covariance, count, seed)
+        samples, tried = sampled(known, covariance, count, seed)
     except ValueError as error:
         raise ValueError(f"{file.path}: {error}") from error
-    return Ranges(known, covariance, samples, seed)
+    return Ranges(known, covariance, samples, seed, tried)
 
 
-def sampled(known: list[Quantity], covariance: np.ndarray, count: int, seed: int) -> np.ndarray:
-    """(count, P) of the multivariate normal within the bounds: what lies outside is drawn anew.
+def sampled(
+    known: list[Quantity], covariance: np.ndarray, count: int, seed: int
+) -> tuple[np.ndarray, int]:
+    """(count, P) of the multivariate normal within the bounds, and how many draws that took.
+
+    What lies outside is drawn anew.
 
     Raises:
         ValueError: nearly all samples lie outside, as the end of a sentence.
@@ -161,13 +167,15 @@ def sampled(known: list[Quantity], covariance: np.ndarray, count: int, seed: int
     mean, low, high = (np.array([getattr(q, k) for q in known]) for k in ("value", "min", "max"))
     kept = np.zeros((0, len(known)))
     outside = np.zeros(len(known))
-    for _ in range(ROUNDS):
+    for done in range(ROUNDS):
         drawn = random.multivariate_normal(mean, covariance, size=count, method="eigh")
         out = (drawn < low) | (drawn > high)
         outside += out.sum(axis=0)
-        kept = np.vstack([kept, drawn[~out.any(axis=1)]])
-        if len(kept) >= count:
-            return kept[:count]
+        good = np.flatnonzero(~out.any(axis=1))
+        if len(kept) + len(good) >= count:
+            last = int(good[count - len(kept) - 1]) if count > len(kept) else -1
+            return np.vstack([kept, drawn[good]])[:count], done * count + last + 1
+        kept = np.vstack([kept, drawn[good]])
     worst = known[int(np.argmax(outside))]
     raise ValueError(
         f"hardly any sample is within all bounds; {worst.name} = {worst.value:g} with a std of "

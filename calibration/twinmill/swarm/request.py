@@ -13,8 +13,10 @@ import twinmill_native as native
 from twinmill.swarm.axes import QUANTITIES, Axis, set_speeds
 
 MAX_ROBOTS = 1000
-# Agent-steps in one part: about a second's work. The lean kernel is a hundred times faster.
-PART_LEAN, PART_FULL = 50_000_000, 1_000_000
+# Agent-steps in one part: about a second's work. The lean kernel is a hundred times faster, and in
+# MuJoCo a world of two minutes is a part.
+PART_LEAN, PART_FULL, PART_MUJOCO = 50_000_000, 1_000_000, 5_000
+PLANTS = ("planar", "mujoco")
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,7 @@ class Request:
         full: every robot its firmware and plant, also where the lean kernel would serve.
         same_seeds: every cell has the seeds of the first, so that cells differ by their values
             alone: for differences between cells.
+        plant: "planar" or "mujoco"; the latter runs every robot its firmware.
     """
 
     behavior: str
@@ -47,6 +50,7 @@ class Request:
     tables: list[tuple[str, list[int]]] = field(default_factory=list)
     full: bool = False
     same_seeds: bool = False
+    plant: str = "planar"
 
     def to_json(self) -> str:
         """One line, the same for the same request."""
@@ -145,13 +149,19 @@ class Request:
         """Control periods of one world."""
         return self.duration_s / model.get("base.control_period_s")
 
+    def kernel(self, cell: native.Cell) -> str:
+        """What runs a cell: lean, full or mujoco."""
+        if self.plant == "mujoco":
+            return "mujoco"
+        return "full" if self.full or cell.why_not_lean else "lean"
+
     def parts(self) -> list[range]:
         """Worlds in pieces that depend on the request alone."""
-        cells = [self.cell(point) for point in (self.points[0], self.points[-1])]
-        lean = not self.full and not any(cell.why_not_lean for cell in cells)
+        kernels = {self.kernel(self.cell(point)) for point in (self.points[0], self.points[-1])}
+        work = {"lean": PART_LEAN, "full": PART_FULL, "mujoco": PART_MUJOCO}
         robots = max(self.robots(point) for point in (self.points[0], self.points[-1]))
         agent_steps = robots * self.steps(self.model)
-        size = max(1, int((PART_LEAN if lean else PART_FULL) / agent_steps))
+        size = max(1, int(min(work[kernel] for kernel in kernels) / agent_steps))
         return [
             range(first, min(first + size, self.world_count))
             for first in range(0, self.world_count, size)
@@ -170,7 +180,12 @@ def run_part(request: Request, worlds: range) -> dict[str, list]:
     used = list(range(cell_of[0], cell_of[-1] + 1))
     cells = [request.cell(points[c]) for c in used]
     rows = native.run_worlds(
-        cells, cell_of - used[0], seeds.astype(np.uint64), request.duration_s, request.full
+        cells,
+        cell_of - used[0],
+        seeds.astype(np.uint64),
+        request.duration_s,
+        request.full,
+        request.plant,
     )
     columns: dict[str, list] = {"cell": cell_of.tolist(), "seed": seeds.tolist()}
     for a, axis in enumerate(request.axes):
@@ -180,6 +195,6 @@ def run_part(request: Request, worlds: range) -> dict[str, list]:
     for k, name in enumerate(native.OUTCOMES):
         columns[name] = rows[:, k].tolist()
     columns["class"] = native.classify(rows)
-    lean = [not request.full and not cell.why_not_lean for cell in cells]
-    columns["kernel"] = ["lean" if lean[c - used[0]] else "full" for c in cell_of]
+    kernels = [request.kernel(cell) for cell in cells]
+    columns["kernel"] = [kernels[c - used[0]] for c in cell_of]
     return columns

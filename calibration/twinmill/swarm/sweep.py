@@ -8,12 +8,20 @@ from importlib.metadata import version
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from twinmill.files import check_new_folder
 from twinmill.model.model_file import ModelFile
 from twinmill.swarm.axes import parse_axis
-from twinmill.swarm.request import Request
+from twinmill.swarm.request import PLANTS, Request
 from twinmill.swarm.store import Store, read_sweep
 from twinmill.swarm.workers import run_here, run_on_dask
 
@@ -40,6 +48,8 @@ def make_request(
         tables=[parse_table(text) for text in tables or []],
         **rest,
     )
+    if request.plant not in PLANTS:
+        raise ValueError(f"--plant {request.plant}: must be {' or '.join(PLANTS)}.")
     for point in request.points:
         request.cell(point)
     return request
@@ -120,7 +130,8 @@ def _summary(request: Request, folder: Path, begin_s: float) -> dict:
     _, table = read_sweep(folder)
     wall_s = time.monotonic() - begin_s
     kernels = Counter(table["kernel"].to_pylist())
-    reasons = {request.cell(point).why_not_lean for point in request.points} - {""}
+    planar = request.plant == "planar"
+    reasons = {request.cell(point).why_not_lean for point in request.points if planar} - {""}
     return {
         "out": str(folder),
         "file": str(Store(folder).result),
@@ -132,6 +143,7 @@ def _summary(request: Request, folder: Path, begin_s: float) -> dict:
         "classes": dict(sorted(Counter(table["class"].to_pylist()).items())),
         "kernels": dict(sorted(kernels.items())),
         "why_full": "asked for" if request.full else "; ".join(sorted(reasons)),
+        "plant": request.plant,
         "wall_s": wall_s,
     }
 
@@ -139,9 +151,15 @@ def _summary(request: Request, folder: Path, begin_s: float) -> dict:
 def progress_bar() -> Progress:
     """Work done and time left, on stderr if that is a terminal."""
     console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+    )
     return Progress(
         *columns,
+        TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
         console=console,

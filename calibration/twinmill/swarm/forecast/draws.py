@@ -103,6 +103,17 @@ def _file(request: Request) -> ModelFile:
     return ModelFile(Path(request.model_name), request.model_text, request.model)
 
 
+def out_of_bounds(request: Request, count: int, seed: int) -> tuple[int, list[str]]:
+    """How many draws were out of bounds and drawn anew, and the quantities whose bounds did that.
+
+    Raises:
+        ValueError: as drawn_models.
+    """
+    file = _file(request)
+    known = ranges(file, file.model, count, seed)
+    return known.tried - count, [q.name for q in known.truncated]
+
+
 def drawn_models(request: Request, count: int, seed: int) -> list[str]:
     """Texts of model files like the request's, their numbers drawn from its uncertainty.
 

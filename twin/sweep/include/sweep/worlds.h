@@ -3,13 +3,16 @@
 #ifndef SWEEP_WORLDS_H
 #define SWEEP_WORLDS_H
 
+#include <functional>
 #include <limits>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "fw/table.h"
 #include "model_file/model.h"
+#include "plant/plant.h"
 #include "swarm/metrics.h"
 #include "swarm/starts.h"
 
@@ -51,6 +54,12 @@ enum class Path
     kFull,  // every robot its firmware, its effects and its plant
 };
 
+// The plant of a swarm: one model and one start a robot, and the seed of its noise.
+using PlantMaker = std::function<std::unique_ptr<Plant>(
+    const std::vector<Model> &models, const std::vector<Pose2> &starts, uint64_t seed)>;
+std::unique_ptr<Plant> MakePlanarBodies(const std::vector<Model> &models,
+                                        const std::vector<Pose2> &starts, uint64_t seed);
+
 // Why the lean kernel cannot run this model: effects, lag, noise, a delay near the firmware's
 // time-out. Empty if it can.
 std::string WhyNotLean(const Model &model);
@@ -58,6 +67,10 @@ std::string WhyNotLean(const Model &model);
 // Runs each world for `duration_s`; outcomes in the same order. They depend on nothing but the
 // world and the duration. Throws std::invalid_argument in one sentence if a swarm cannot be made.
 std::vector<Outcome> RunWorlds(std::span<const World> worlds, double duration_s, Path path);
+
+// The same in another plant, by the full path.
+std::vector<Outcome> RunWorldsIn(const PlantMaker &make, std::span<const World> worlds,
+                                 double duration_s);
 
 // Poses of one world by the full path, every `every_s`, the start first: robots within times.
 std::vector<std::vector<Pose2>> TraceWorld(const World &world, double duration_s, double every_s);
