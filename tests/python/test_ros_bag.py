@@ -4,7 +4,10 @@
 import json
 import math
 import shlex
+import sqlite3
 import struct
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -423,7 +426,47 @@ def test_a_bag_of_another_writer_is_read(tmp_path):
             writer.add_message(channel_id=channel, log_time=10**9 * k, publish_time=0, data=data)
         writer.finish()
     topic = "/r05/cmd_vel"
-    kind, utime_us, values, _ = _rows(tmp_path / "run.mcap", [topic], receive=False)[topic]
+    rows = _rows(tmp_path / "run.mcap", [topic], receive=False)[topic]
+    kind, utime_us, values = rows.kind, rows.utime_us, rows.value.tolist()
     assert kind == "geometry_msgs/msg/Twist"
     np.testing.assert_array_equal(utime_us, np.arange(20) * 10**6)
     np.testing.assert_allclose(values, [(0.1 * k, 0, -0.5, 0) for k in range(20)])
+
+
+PEAK = """
+import resource, sys
+from pathlib import Path
+from twinmill.data.importers.import_log import ImportOptions, import_log
+options = ImportOptions(pose_topics=("/r03/pose",), command_topics=("/r03/cmd_vel",))
+import_log(None, None, Path(sys.argv[2]), bag=Path(sys.argv[1]), options=options)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+PICTURE_BYTES = 2_000_000
+
+
+def _with_pictures(path, pictures):
+    """A bag with a camera's topic, as the largest ones are: written between the others."""
+    image = T["sensor_msgs/msg/Image"]
+    header = T["std_msgs/msg/Header"](T["builtin_interfaces/msg/Time"](START_S, 0), "camera")
+    data = np.random.default_rng(1).integers(0, 255, PICTURE_BYTES, np.uint8)
+    raw = STORE.serialize_cdr(image(header, 1000, 2000, "mono8", 0, 2000, data), image.__msgtype__)
+    _bag(path, StoragePlugin.SQLITE3)
+    with sqlite3.connect(next(path.glob("*.db3"))) as base:
+        kind = ("sensor_msgs/msg/Image", "cdr", "", "")
+        base.execute("insert into topics values (9, '/camera', ?, ?, ?, ?)", kind)
+        stamps = ((9, START_S * 10**9 + k, raw) for k in range(pictures))
+        base.executemany(
+            "insert into messages (topic_id, timestamp, data) values (?, ?, ?)", stamps
+        )
+    return path
+
+
+def test_memory_does_not_grow_with_the_length_of_a_bag(tmp_path):
+    """Twenty megabytes more of pictures; the system's own count of the most that was held."""
+    peak_bytes = []
+    for pictures in (1, 11):
+        bag = _with_pictures(tmp_path / f"bag{pictures}", pictures)
+        command = [sys.executable, "-c", PEAK, bag, tmp_path / f"{pictures}.lcmlog"]
+        peak_bytes.append(1024 * int(subprocess.check_output(command, text=True)))
+    assert peak_bytes[1] - peak_bytes[0] < 3 * PICTURE_BYTES
+    assert len(read_log(tmp_path / "11.lcmlog").robots[3].pose) == 200

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Poses and commands from ROS bags (rosbag1; rosbag2 with sqlite3 or MCAP), without ROS.
 
-Messages are read one by one, so that a bag of any size takes the memory of its poses alone.
+Messages are read one by one, so that a bag of any size takes the memory of its poses alone, 72
+bytes each.
 """
 
 import re
+from array import array
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import islice
@@ -14,6 +17,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import turbopi
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from twinmill.data.importers.ros_cut import is_cut, write_whole
 from twinmill.data.importers.ros_frames import Frames
@@ -164,10 +169,10 @@ def read_bag(
     rows = _rows(path, [*poses, *commands], options.receive)
     for (pose, command), number in zip(pairs, numbers, strict=True):
         if {_told(pose, "", {}), _told("", command, {})} - {None, number}:
-            rows[pose][-1].append(f"{pose} and {command} are taken for robot {number}.")
-    pose_series = [_poses(n, t, *rows[t]) for n, t in zip(numbers, poses, strict=True)]
+            rows[pose].notes.append(f"{pose} and {command} are taken for robot {number}.")
+    pose_series = [_poses(n, rows[topic]) for n, topic in zip(numbers, poses, strict=True)]
     command_series = [
-        _commands(n, t, *rows[t], options) for n, t in zip(numbers, commands, strict=True)
+        _commands(n, rows[topic], options) for n, topic in zip(numbers, commands, strict=True)
     ]
     return pose_series, command_series
 
@@ -244,39 +249,78 @@ def _remedy(path: Path) -> str:
 
 @dataclass
 class _Messages:
-    """Of one topic, as they come."""
+    """Of one topic, as they come; `values` are the rows one after the other."""
 
     kind: str
-    header_ns: list[int] = field(default_factory=list)
-    received_ns: list[int] = field(default_factory=list)
-    values: list[Row] = field(default_factory=list)
+    header_ns: array = field(default_factory=lambda: array("q"))
+    received_ns: array = field(default_factory=lambda: array("q"))
+    values: array = field(default_factory=lambda: array("d"))
+    widths: set[int] = field(default_factory=set)
     root: str = ""  # of the tree, for a frame of tf
     lost: int = 0  # the bag says that it has more
 
     def add(self, stamp: object, received_ns: int, value: Row) -> None:
         self.header_ns.append(stamp.sec * 10**9 + stamp.nanosec if stamp else 0)
         self.received_ns.append(received_ns)
-        self.values.append(value)
+        self.values.extend(value)
+        self.widths.add(len(value))
+
+    def __len__(self) -> int:
+        return len(self.header_ns)
 
 
-def _rows(
-    path: Path, topics: list[str], receive: bool
-) -> dict[str, tuple[str, np.ndarray, list[Row], list[str]]]:
-    """By topic: type, (N,) stamps in us, values, remarks."""
-    found = _read(path, topics)
-    rows, of_bag = {}, _of_bag(path)
-    for topic, messages in found.items():
+@dataclass(frozen=True)
+class _Rows:
+    """Of one topic, ready to be taken for poses or commands.
+
+    Attributes:
+        topic, kind: its name and type.
+        utime_us: (N,) as they came.
+        value: (N, W); (N, 0) where the messages have different numbers of values.
+        widths: how many values they have.
+        notes: remarks.
+    """
+
+    topic: str
+    kind: str
+    utime_us: np.ndarray
+    value: np.ndarray
+    widths: list[int]
+    notes: list[str]
+
+    @classmethod
+    def of(cls, topic: str, messages: _Messages, receive: bool) -> "_Rows":
+        """Those that are kept, on the clock that is taken."""
         stamps_ns, kept, notes = _stamps(topic, messages, receive)
-        notes, of_bag = [*of_bag, *notes], []
         if messages.lost:
             notes.append(
-                f"{topic}: {messages.lost} of {len(messages.values) + messages.lost} messages "
+                f"{topic}: {messages.lost} of {len(messages) + messages.lost} messages "
                 "cannot be read: the bag is damaged."
             )
         if messages.root:
             notes.append(f"{topic}: its place in the frame {messages.root} is taken.")
-        values = [messages.values[k] for k in np.flatnonzero(kept)]
-        rows[topic] = messages.kind, stamps_ns[kept] // 1000, values, notes
+        value = np.empty((len(messages), 0))
+        if len(messages.widths) == 1:
+            value = np.frombuffer(messages.values).reshape(len(messages), -1)
+        widths = sorted(messages.widths)
+        return cls(topic, messages.kind, stamps_ns[kept] // 1000, value[kept], widths, notes)
+
+    def ordered(self) -> tuple[np.ndarray, list[str]]:
+        """Rows in order of time, the last of each stamp; remarks."""
+        rows = np.argsort(self.utime_us, kind="stable")
+        last = np.append(np.diff(self.utime_us[rows]) > 0, True)
+        if last.all():
+            return rows, self.notes
+        repeated = np.count_nonzero(~last)
+        note = f"{self.topic}: {repeated} messages repeat a stamp; the last of each was kept."
+        return rows[last], [*self.notes, note]
+
+
+def _rows(path: Path, topics: list[str], receive: bool) -> dict[str, _Rows]:
+    """By topic; what is to be said of the bag stands with the first."""
+    found = _read(path, topics)
+    rows = {topic: _Rows.of(topic, messages, receive) for topic, messages in found.items()}
+    next(iter(rows.values())).notes[:0] = _of_bag(path)
     return rows
 
 
@@ -315,7 +359,8 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
         chosen = [
             c for c in reader.connections if c.topic in names or (with_frames and c.msgtype == TF)
         ]
-        for connection, received_ns, raw in reader.messages(connections=chosen):
+        count = sum({c.topic: reader.topics[c.topic].msgcount for c in chosen}.values())
+        for connection, received_ns, raw in _shown(path, count, reader.messages(chosen)):
             message, name = reader.deserialize(raw, connection.msgtype), connection.topic
             if connection.msgtype == TF:
                 _put(frames, message, name, received_ns, found)
@@ -325,11 +370,21 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
             stamp = getattr(getattr(message, "header", None), "stamp", None)
             found[name].add(stamp, received_ns, value_of(message))
         for name in set(names) & set(found):
-            found[name].lost = reader.topics[name].msgcount - len(found[name].values)
+            found[name].lost = reader.topics[name].msgcount - len(found[name])
     for topic, messages in found.items():
-        if not messages.values:
+        if not messages:
             raise LogError(f"{path.name}: {topic} holds nothing; choose another.")
     return found
+
+
+def _shown(path: Path, count: int, messages: Iterator) -> Iterator:
+    """The messages, with progress and time left on stderr if that is a terminal."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as progress:
+        yield from progress.track(messages, total=count, description=path.name)
 
 
 def _put(
@@ -348,7 +403,7 @@ def _put(
         if root != messages.root:  # what came before the tree was whole is of another frame
             messages.root = root
             for rows in (messages.header_ns, messages.received_ns, messages.values):
-                rows.clear()
+                del rows[:]
         messages.add(transform.header.stamp, received_ns, row)
 
 
@@ -395,54 +450,29 @@ def _stamps(
     return header, kept, notes
 
 
-def _ordered(topic: str, utime_us: np.ndarray, notes: list[str]) -> tuple[np.ndarray, list[str]]:
-    """Rows in order of time, the last of each stamp; remarks."""
-    rows = np.argsort(utime_us, kind="stable")
-    last = np.append(np.diff(utime_us[rows]) > 0, True)
-    if not last.all():
-        double = np.count_nonzero(~last)
-        notes = [*notes, f"{topic}: {double} messages repeat a stamp; the last of each was kept."]
-    return rows[last], notes
-
-
-def _poses(
-    robot_id: int,
-    topic: str,
-    kind: str,
-    utime_us: np.ndarray,
-    values: list[Row],
-    notes: list[str],
-) -> PoseSeries:
-    if kind not in POSES and kind != TF:
-        raise LogError(f"--pose: {topic} holds {kind}, which is no pose.")
-    rows, notes = _ordered(topic, utime_us, notes)
-    value = np.array(values)[rows]
+def _poses(robot_id: int, given: _Rows) -> PoseSeries:
+    if given.kind not in POSES and given.kind != TF:
+        raise LogError(f"--pose: {given.topic} holds {given.kind}, which is no pose.")
+    rows, notes = given.ordered()
+    value = given.value[rows]
     norm = np.linalg.norm(value[:, 3:], axis=1)
     valid = np.isfinite(value).all(axis=1) & (np.abs(norm - 1) < 0.05)
     value[~valid] = np.nan
     value[valid, 3:] /= norm[valid, None]
-    return PoseSeries(robot_id, utime_us[rows], value[:, :3], value[:, 3:], valid, notes)
+    return PoseSeries(robot_id, given.utime_us[rows], value[:, :3], value[:, 3:], valid, notes)
 
 
-def _commands(
-    robot_id: int,
-    topic: str,
-    kind: str,
-    utime_us: np.ndarray,
-    values: list[Row],
-    notes: list[str],
-    options: BagOptions,
-) -> CommandSeries:
+def _commands(robot_id: int, given: _Rows, options: BagOptions) -> CommandSeries:
+    topic, kind = given.topic, given.kind
     if kind not in COMMANDS:
         raise LogError(f"--command: {topic} holds {kind}, which is no command.")
-    widths = sorted({len(v) for v in values})
-    if len(widths) > 1 or widths[0] not in (2, 3, WIDTH):
+    if len(given.widths) > 1 or given.widths[0] not in (2, 3, WIDTH):
         raise LogError(
-            f"--command: {topic} has {' or '.join(map(str, widths))} numbers a message, but a "
-            "robot here has two to four wheels, and each message tells all; choose another topic."
+            f"--command: {topic} has {' or '.join(map(str, given.widths))} numbers a message, but "
+            "a robot here has two to four wheels, and each message tells all; choose another topic."
         )
-    rows, notes = _ordered(topic, utime_us, notes)
-    value = np.array(values, float)[rows]
+    rows, notes = given.ordered()
+    value = given.value[rows]
     if not np.isfinite(value).all():
         raise LogError(
             f"--command: {topic} holds numbers that are not finite; correct the program that "
@@ -461,7 +491,7 @@ def _commands(
     unknown = np.full((len(rows), 2), np.nan)
     return CommandSeries(
         robot_id,
-        utime_us[rows],
+        given.utime_us[rows],
         command_kind,
         value,
         command_kind == "duty",
