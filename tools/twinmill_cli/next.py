@@ -14,18 +14,25 @@ import typer
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Logs, Model, Out, ScriptAs
-from twinmill_cli.output import AsJson, telling
+from twinmill_cli.output import AsJson, deliver, telling
 
 if working():  # not for --help
     import numpy as np
 
+    from twinmill.data.measurement import Measurements
     from twinmill.diagnosis.diagnose import diagnose
-    from twinmill.experiment.design import Limits, Plan, check, design
+    from twinmill.experiment.design import Limits, Plan, check, design, log_of
     from twinmill.experiment.script_file import csv_text
     from twinmill.export.script import TwistScript
     from twinmill.files import check_new_file
-    from twinmill.model.model_file import write_whole
+    from twinmill.fitting.opening import open_measurements
+    from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import next_run as present
+    from twinmill.report.narrowing import terminal as present_narrowing
+    from twinmill.swarm.classes import goal_of
+    from twinmill.swarm.narrowing import Narrowing, design_for, spread_of
+    from twinmill.swarm.request import Request
+    from twinmill.swarm.sweep import make_request, progress_bar
     from twinmill_cli.frame import command_line, finish, load, open_model, provenance
     from twinmill_cli.ros_script import check_new_script, ros_path, write_script
 
@@ -48,16 +55,32 @@ def _next(
     max_duty_pct: Annotated[
         int, typer.Option("--max-duty-pct", min=20, max=100, help="Highest duty of a wheel.")
     ] = 100,
+    behavior: Annotated[
+        str,
+        typer.Option(
+            "--for",
+            metavar="BEHAVIOR",
+            help="Narrow what a swarm of it is predicted to do, as milling; not the parameters.",
+        ),
+    ] = "",
+    n: Annotated[int, typer.Option("--n", min=2, help="Robots of that swarm.")] = 6,
+    draws: Annotated[int, typer.Option("--draws", min=4, help="Models that are drawn.")] = 40,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Runs of each.")] = 20,
+    swarm_s: Annotated[float, typer.Option("--swarm-s", min=10, help="Of each run.")] = 120,
     force: Annotated[bool, typer.Option("--force", help="Replace SCRIPT if it exists.")] = False,
     script_as: ScriptAs = None,
     as_json: AsJson = False,
     out: Out = None,
-) -> Plan:
+) -> Plan | Narrowing:
     """Design the run that best tells apart what these logs cannot, and write its script.
 
     What is in question is what `diagnose` leaves open: effects that look alike,
     else effects that would not show. Play the script, log it, and diagnose
     the old and the new logs together.
+
+    With --for the run tells what a swarm's predicted share of success hangs on:
+    models drawn from what the fits leave open are run as swarms, and the drive
+    that narrows their spread most is put together.
 
     Example: twinmill next run.lcmlog --model fitted.toml -o script.csv
     """
@@ -70,6 +93,14 @@ def _next(
     check_new_file(output, force)
     if script_as:
         check_new_script(script_as, ros_path(script_as, output), force)
+    if behavior:
+        swarm = make_request(behavior, model, [], n=n, seeds=seeds, duration_s=swarm_s, full=True)
+        narrowing = _narrowing(load(logs, model_file, as_json), model_file, limits, swarm, draws)
+        write_whole(output, csv_text(narrowing.rows))
+        how = _how(narrowing, logs, model, output)
+        data = {"script": str(output), **narrowing.to_json(), **source.to_json()}
+        deliver(data, present_narrowing(narrowing, how), as_json)
+        return narrowing
     with telling(f"designing a run with {model}") as say:
         measurements = load(logs, model_file, as_json)
         check(measurements, model_file, limits)
@@ -86,6 +117,19 @@ def _next(
     return plan
 
 
+def _narrowing(
+    measurements: Measurements, model_file: ModelFile, limits: Limits, swarm: Request, draws: int
+) -> Narrowing:
+    """Runs the swarms, then designs the drive."""
+    check(measurements, model_file, limits)
+    with progress_bar() as progress:
+        task = progress.add_task("swarms of models drawn", total=draws)
+        spread = spread_of(swarm, goal_of(swarm), draws, 1, lambda: progress.advance(task))
+    logs = [o for o in open_measurements(measurements, model_file) if o.floor]
+    excess = model_file.usual_score([o.measurement.log_sha256 for o in logs]) ** 2
+    return design_for(spread, goal_of(swarm), log_of([o.scene() for o in logs]), limits, excess)
+
+
 def _sides(text: str) -> tuple[float, float]:
     """`2x1.5` to its sides in m."""
     found = re.fullmatch(r"(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)", text)
@@ -96,7 +140,7 @@ def _sides(text: str) -> tuple[float, float]:
     return float(found[1]), float(found[2])
 
 
-def _how(plan: Plan, logs: list[Path], model: str, script: Path) -> present.How:
+def _how(plan: Plan | Narrowing, logs: list[Path], model: str, script: Path) -> present.How:
     """How to play the script and what to do then."""
     path, number = shlex.quote(str(script)), plan.robot_id
     cap_pct = round(100 * float(np.abs(plan.rows.duty).max()))

@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import twinmill_native as native
@@ -146,8 +147,9 @@ def design(
     if not wanted:
         raise ValueError(f"{why} No move that the twin can play shows any of them.")
     say("choosing moves")
-    floor = _Floor(limits, scene, list(wanted.values()))
-    chosen = _choose(moves, ledger, told, ledger.foreseen(foreseen), list(wanted), floor)
+    floor = Floor(limits, scene, list(wanted.values()))
+    worth = partial(_worth, ledger, wanted=list(wanted))
+    chosen = choose(moves, worth, told, ledger.foreseen(foreseen), floor)
     say("checking the whole script")
     whole = Played.of([chosen], scene)
     planned = whole.scene(scene, CENTRE)
@@ -197,7 +199,7 @@ def check(
             f"a run of {limits.duration_s:g} s is too short: no model is judged on less than "
             f"{SHORTEST_LOG_S:g} s, and moves come whole; allow {SHORTEST_RUN_S:g} s."
         )
-    floor = _Floor(limits, scene, [])
+    floor = Floor(limits, scene, [])
     if not any(floor.holds([m]) for m in family(limits.max_duty)):
         size = "x".join(f"{side:g}" for side in limits.floor_m)
         need_m = 2 * (scene.model.get("robot.body_radius_m") + WANDER_M)
@@ -207,7 +209,7 @@ def check(
         )
 
 
-class _Floor:
+class Floor:
     """Keeps the robot on the floor, whichever of the effects it has."""
 
     def __init__(self, limits: Limits, scene: Scene, richer: list[native.Model]) -> None:
@@ -234,20 +236,27 @@ def with_effect(model: native.Model, effect: Subject) -> native.Model:
     return richer
 
 
-def _choose(
+def choose(
     moves: list[Move],
-    ledger: Ledger,
+    worth_of: Callable[[np.ndarray], np.ndarray],
     told: np.ndarray,
     foreseen: np.ndarray,
-    wanted: list[int],
-    floor: _Floor,
+    floor: Floor,
 ) -> list[Move]:
-    """Greedy: each time the move that adds most per second and still stays on the floor."""
+    """Greedy: each time the move that adds most per second and still stays on the floor.
+
+    Args:
+        moves: M of them.
+        worth_of: (..., C, C) products of what runs tell to (...,) what they are worth.
+        told: (C, C) of the runs so far.
+        foreseen: (M, C, C) of each move.
+        floor: with its limits.
+    """
     left_s = floor.limits.duration_s - 2 * LEAD_S
     duration_s = np.array([m.duration_s for m in moves])
     chosen: list[Move] = []
     while True:
-        worth = _worth(ledger, told + foreseen, wanted) - _worth(ledger, told, wanted)
+        worth = worth_of(told + foreseen) - worth_of(told)
         worth = np.where(duration_s <= left_s, worth / duration_s, -np.inf)
         order = [int(k) for k in np.argsort(worth)[::-1] if np.isfinite(worth[k])]
         best = next((k for k in order if floor.holds([*chosen, moves[k]])), None)

@@ -51,7 +51,7 @@ class Forecast:
 
 def knows_errors(request: Request) -> bool:
     """Whether the sweep's model says how well its numbers are known."""
-    file = _file(request)
+    file = file_of(request)
     return any(q.source != "robots" for q in quantities(file, file.model))
 
 
@@ -99,7 +99,8 @@ def forecast(
     return Forecast(points, swept, _shrunk(np.array(counts)))
 
 
-def _file(request: Request) -> ModelFile:
+def file_of(request: Request) -> ModelFile:
+    """The model file of a request."""
     return ModelFile(Path(request.model_name), request.model_text, request.model)
 
 
@@ -109,7 +110,7 @@ def out_of_bounds(request: Request, count: int, seed: int) -> tuple[int, list[st
     Raises:
         ValueError: as drawn_models.
     """
-    file = _file(request)
+    file = file_of(request)
     known = ranges(file, file.model, count, seed)
     return known.tried - count, [q.name for q in known.truncated]
 
@@ -120,7 +121,7 @@ def drawn_models(request: Request, count: int, seed: int) -> list[str]:
     Raises:
         ValueError: it says nothing of the errors of its numbers, or hardly any draw is in bounds.
     """
-    file = _file(request)
+    file = file_of(request)
     known = ranges(file, file.model, count, seed)
     kept = [(i, q.name) for i, q in enumerate(known.quantities) if q.source != "robots"]
     return [

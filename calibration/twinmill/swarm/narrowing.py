@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The run of one robot that narrows most what a swarm is predicted to do.
+
+Models drawn from what the fits leave open end differently; the slope g of the share that reaches
+the goal by the numbers drawn, and their covariance S, make its variance g' S g. A run whose
+one-step errors have the Fisher information F leaves (S^-1 + F)^-1 of S. Moves are chosen one by one
+so that g sees least of what is left: c-optimal design (Atkinson, Donev and Tobias 2007, ch. 10).
+"""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pyarrow as pa
+import twinmill_native as native
+
+from twinmill.experiment.design import CENTRE, Floor, Limits, choose
+from twinmill.experiment.foresight import Played, Rows, rows_of
+from twinmill.experiment.moves import Move, family
+from twinmill.experiment.one_step_fit import System
+from twinmill.model.parameters import (
+    BASE_GAINS,
+    LAG,
+    Parameter,
+    all_effect_parameters,
+    base_parameters,
+    duty_table,
+)
+from twinmill.model.ranges import Ranges, ranges
+from twinmill.predict.problem import Scene
+from twinmill.swarm.classes import reached
+from twinmill.swarm.forecast.draws import drawn_models, file_of
+from twinmill.swarm.request import Request, run_part
+
+CLOCKS = 2  # offset and rate of a run
+LEAST_STD = 0.01  # of the share: less is nothing to narrow
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How the share that reaches the goal hangs on the numbers of the model.
+
+    Attributes:
+        names: (P,) of the numbers that are drawn.
+        covariance: (P, P) of what the fits leave open.
+        shares: (D,) of the models drawn.
+        slope: (P,) of the share by each number.
+    """
+
+    names: list[str]
+    covariance: np.ndarray
+    shares: np.ndarray
+    slope: np.ndarray
+
+    @classmethod
+    def of(cls, known: Ranges, shares: np.ndarray) -> "Spread":
+        """By least squares over the draws, numbers in units of their standard errors.
+
+        A prior of the size of all the scatter holds numbers that the draws hardly tell.
+        """
+        kept = [i for i, q in enumerate(known.quantities) if q.source != "robots"]
+        std = np.array([known.quantities[i].std for i in kept])
+        rows = known.samples[:, kept] / std
+        rows, centred = rows - rows.mean(axis=0), shares - shares.mean()
+        size = max(float(shares.std()), 1e-6)
+        left = max(float(centred @ centred) / len(shares) / 2, 1e-9)
+        gram = rows.T @ rows + left / size**2 * np.eye(len(kept))
+        slope = np.linalg.solve(gram, rows.T @ centred) / std
+        names = [known.quantities[i].name for i in kept]
+        return cls(names, known.covariance[np.ix_(kept, kept)], shares, slope)
+
+    def std(self, covariance: np.ndarray) -> float:
+        """Of the share, as far as it is linear in the numbers."""
+        return float(np.sqrt(self.slope @ covariance @ self.slope))
+
+    def parts(self) -> dict[str, float]:
+        """Share of the variance by number, largest first; with what goes together with it."""
+        part = self.slope * (self.covariance @ self.slope)
+        part = part / max(part.sum(), 1e-12)
+        order = np.argsort(-np.abs(part))
+        return {self.names[i]: float(part[i]) for i in order}
+
+
+def spread_of(
+    request: Request, goal: str, draws: int, seed: int, tell: Callable[[], None]
+) -> Spread:
+    """Runs models drawn from the request's uncertainty, with the same seeds, on all cores.
+
+    Raises:
+        ValueError: the model knows no errors, or all draws end alike.
+    """
+    file = file_of(request)
+    known = ranges(file, file.model, draws, seed)
+    asked = [replace(request, model_text=text) for text in drawn_models(request, draws, seed)]
+
+    def share(one: Request) -> float:
+        columns = run_part(one, range(one.world_count))
+        tell()
+        return float(reached(pa.table(columns), goal).mean())
+
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        shares = np.array(list(pool.map(share, asked)))
+    found = Spread.of(known, shares)
+    if found.std(found.covariance) < LEAST_STD:
+        raise ValueError(
+            f"--for {request.behavior}: models drawn from what the fits leave open end alike "
+            f"({shares.min():.0%} to {shares.max():.0%} reach the goal), so no run of a robot can "
+            "narrow that; design for what is missing, without --for."
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class Narrowing:
+    """The script and what is foreseen of it.
+
+    Attributes:
+        spread: before it.
+        goal: class that is wanted.
+        moves, rows: the script.
+        covariance: (P, P) of what it would leave.
+        untold: part of the variance by numbers that no drive of one robot shows.
+        robot_id: of the log.
+    """
+
+    spread: Spread
+    goal: str
+    moves: list[Move]
+    rows: Rows
+    covariance: np.ndarray
+    untold: float
+    robot_id: int
+
+    @property
+    def stds(self) -> tuple[float, float]:
+        """Of the share, before the run and after it."""
+        return self.spread.std(self.spread.covariance), self.spread.std(self.covariance)
+
+    def to_json(self) -> dict:
+        """Plain values."""
+        before, after = self.stds
+        return {
+            "goal": self.goal,
+            "share": float(self.spread.shares.mean()),
+            "std_before": before,
+            "std_after": after,
+            "parts": self.spread.parts(),
+            "untold": self.untold,
+            "draws": len(self.spread.shares),
+            "moves": [m.name for m in self.moves],
+            "duration_s": self.rows.end_s,
+        }
+
+
+def design_for(spread: Spread, goal: str, scene: Scene, limits: Limits, excess: float) -> Narrowing:
+    """Designs the run.
+
+    Args:
+        spread: of the share over the numbers.
+        goal: class that is wanted.
+        scene: a log's, whose clock, noise and rate of poses the next run is taken to have.
+        limits: time, floor, duty; as `check` let them pass.
+        excess: how much more errors scatter than the noise alone: the square of the usual score.
+
+    Raises:
+        ValueError: the share hangs on numbers that no drive of one robot shows.
+    """
+    free = _told_by_drives(scene.model, spread.names)
+    place = [spread.names.index(p.name) for p in free]
+    untold = sum(
+        part for name, part in spread.parts().items() if name not in {p.name for p in free}
+    )
+    if not free or untold > 1 - 1e-3:
+        names = ", ".join(list(spread.parts())[:3])
+        raise ValueError(
+            f"what the swarm does hangs on {names}, which no drive of one robot shows; measure "
+            "these by themselves (twinmill effects NAME)."
+        )
+    moves, floor = family(limits.max_duty), Floor(limits, scene, [])
+    prior = np.linalg.inv(spread.covariance)
+
+    def left(grams: np.ndarray) -> np.ndarray:
+        """(..., P, P) covariance after runs of these products, each with a clock of its own."""
+        information = np.broadcast_to(prior, (*grams.shape[:-2], *prior.shape)).copy()
+        rows, columns = np.ix_(place, place)
+        information[..., rows, columns] += _without_clock(grams, len(free)) / excess
+        return np.linalg.inv(information)
+
+    def worth(grams: np.ndarray) -> np.ndarray:
+        return -np.einsum("i,...ij,j->...", spread.slope, left(grams), spread.slope)
+
+    nothing = np.zeros((len(free) + CLOCKS,) * 2)
+    foreseen = _products(Played.of([[m] for m in moves], scene).scene(scene, CENTRE), free)
+    chosen = choose(moves, worth, nothing, foreseen, floor)
+    (whole,) = _products(Played.of([chosen], scene).scene(scene, CENTRE), free)
+    robot_id = scene.measurement.track.robot_id
+    return Narrowing(spread, goal, chosen, rows_of(chosen), left(whole), untold, robot_id)
+
+
+def _told_by_drives(model: native.Model, names: list[str]) -> list[Parameter]:
+    """Those of the numbers that the path of one robot shows."""
+    base = [n for n in (*BASE_GAINS, LAG, *duty_table(model)) if n in names]
+    effects = [p for p in all_effect_parameters(model) if p.name in names]
+    return [*base_parameters(model, base), *effects]
+
+
+def _products(planned: Scene, free: list[Parameter]) -> np.ndarray:
+    """(K, F + CLOCKS, F + CLOCKS) products of slopes of each part's errors, its clock's last."""
+    system = System([planned], free)
+    slopes = system.jacobian(system.start)[: -len(system.unknowns)]
+    if not planned.clock_free:
+        slopes = np.hstack([slopes, np.zeros((len(slopes), CLOCKS))])
+    parts = [slice(3 * p.start, 3 * p.stop) for p in planned.grid.slices]
+    return np.array([slopes[p].T @ slopes[p] for p in parts])
+
+
+def _without_clock(grams: np.ndarray, count: int) -> np.ndarray:
+    """(..., F, F) what is told of the numbers where the clock must be found from the same run."""
+    own = grams[..., count:, count:] + 1e-9 * np.eye(CLOCKS)
+    cross = grams[..., count:, :count]
+    told = grams[..., :count, :count]
+    return told - np.swapaxes(cross, -1, -2) @ np.linalg.solve(own, cross)

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`next --for`: where one number decides what the swarm does, the run tells that number."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from twinmill.data.measurement import load_measurements
+from twinmill.experiment.design import Limits
+from twinmill.fitting.opening import open_measurements
+from twinmill.model.model_file import ModelFile
+from twinmill.swarm import narrowing
+from twinmill.swarm.narrowing import Spread, _without_clock, design_for
+from twinmill_cli.main import run
+
+NAMES = ["base.forward_gain", "base.yaw_gain", "sensor.range_m"]
+STDS = np.array([0.1, 0.1, 0.05])
+ERRORS = """
+[base.std]
+forward_gain = 0.1
+yaw_gain = 0.1
+[sensor.std]
+range_m = 0.05
+"""
+LIMITS = Limits(20.0, (3.0, 3.0), 1.0)
+
+
+@pytest.fixture(scope="module")
+def scene(brief_coasting_robot):
+    """Of a log and the model that it was made with."""
+    file = ModelFile.load(str(brief_coasting_robot.true_model))
+    (opened,) = open_measurements(load_measurements([brief_coasting_robot.log], file.model), file)
+    return opened.scene()
+
+
+def spread(slope):
+    return Spread(NAMES, np.diag(STDS**2), np.array([0.2, 0.8]), np.array(slope, float))
+
+
+def turning(found):
+    """Share of the driven duty that turns the robot on the spot."""
+    duty = np.vstack([m.duty for m in found.moves])
+    turn = np.abs(duty @ [-1, 1, -1, 1])
+    return turn.sum() / (turn + np.abs(duty.sum(axis=1))).sum()
+
+
+def test_the_slope_is_that_of_a_planted_line():
+    random = np.random.default_rng(1)
+    slope = np.array([2.0, -1.0, 0.0])
+    samples = random.normal(size=(400, 3)) * STDS
+    shares = 0.5 + samples @ slope + 0.02 * random.normal(size=400)
+    quantities = [
+        SimpleNamespace(name=name, std=std, source="std")
+        for name, std in zip(NAMES, STDS, strict=True)
+    ]
+    known = SimpleNamespace(quantities=quantities, samples=samples, covariance=np.diag(STDS**2))
+    found = Spread.of(known, shares)
+    np.testing.assert_allclose(found.slope, slope, atol=4 * 0.02 / STDS.min() / 20)
+    assert found.std(known.covariance) == pytest.approx(np.hypot(0.2, 0.1), rel=0.05)
+    assert next(iter(found.parts())) == NAMES[0]  # 4 of 5 parts of the variance
+
+
+def test_a_clock_that_must_be_found_takes_away_what_the_inverse_says():
+    """The block of an inverse is the inverse of the Schur complement."""
+    columns = np.random.default_rng(2).normal(size=(50, 5))
+    gram = columns.T @ columns
+    told = _without_clock(gram, 3)
+    np.testing.assert_allclose(np.linalg.inv(told), np.linalg.inv(gram)[:3, :3], rtol=1e-6)
+
+
+def test_the_run_tells_the_number_that_decides(scene):
+    forward = design_for(spread([3, 0, 0]), "milling", scene, LIMITS, 1.0)
+    yaw = design_for(spread([0, 3, 0]), "milling", scene, LIMITS, 1.0)
+    assert turning(yaw) > 0.6 > 0.4 > turning(forward)
+    assert forward.untold == 0 and forward.rows.end_s <= LIMITS.duration_s
+    for own, other in ((forward, yaw), (yaw, forward)):
+        before, after = own.stds
+        assert before == pytest.approx(0.3)
+        assert after < 0.2 * before and after <= own.spread.std(other.covariance)
+
+
+def test_what_no_drive_shows_is_said(scene):
+    found = design_for(spread([3, 0, 6]), "milling", scene, LIMITS, 1.0)
+    assert found.untold == pytest.approx(0.5)
+    assert found.stds[1] == pytest.approx(0.3, rel=0.05)  # what the range leaves open stays
+    with pytest.raises(ValueError, match=r"sensor.range_m.*no drive of one robot shows"):
+        design_for(spread([0, 0, 6]), "milling", scene, LIMITS, 1.0)
+
+
+@pytest.fixture
+def planted(brief_coasting_robot, tmp_path, monkeypatch):
+    """Swarms mill where the robots turn quickly enough, whatever else they do."""
+    text = brief_coasting_robot.true_model.read_text()
+    (tmp_path / "m.toml").write_text(text + "[sensor]\nrange_m = 1.1\n" + ERRORS)
+    monkeypatch.chdir(tmp_path)
+
+    def ends(request, worlds):
+        mills = request.model.get("base.yaw_gain") > 1
+        return {"class": ["milling" if mills else "cluster" for _ in worlds]}
+
+    monkeypatch.setattr(narrowing, "run_part", ends)
+    return ["next", str(brief_coasting_robot.log), "--model", "m.toml", "--for", "milling"]
+
+
+def test_the_command_writes_the_script_and_says_why(planted, capsys):
+    run([*planted, "--draws", "30", "--duration-s", "20", "--floor-m", "3x3", "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert next(iter(found["parts"])) == "base.yaw_gain" and found["parts"]["base.yaw_gain"] > 0.8
+    assert found["std_after"] < 0.5 * found["std_before"]
+    with open("script.csv") as script:
+        assert next(script).startswith("t_s,fl_pct")
+
+
+def test_where_all_draws_end_alike_there_is_nothing_to_narrow(planted, monkeypatch):
+    monkeypatch.setattr(
+        narrowing, "run_part", lambda r, worlds: {"class": ["milling"] * len(worlds)}
+    )
+    with pytest.raises(ValueError, match=r"end alike \(100% to 100%"):
+        run([*planted, "--draws", "6"])
