@@ -4,7 +4,7 @@
 PYTHON := .venv/bin/python
 CTEST := ctest --test-dir build --output-on-failure --no-tests=error --parallel $(shell nproc)
 
-.PHONY: bench build check check-long claims demo docs format lint clean wheel
+.PHONY: bench build check check-long demo docs format lint clean paper wheel
 
 build:
 	@scripts/setup
@@ -20,9 +20,9 @@ check: build
 check-long: build
 	@$(CTEST) --label-regex '^long$$'
 
-# What was published of these swarms, checked, with figures.
-claims: build
-	@.venv/bin/twinmill claims --out claims
+# What was published of these swarms, part by part, checked, with figures.
+paper: build
+	@.venv/bin/twinmill claims --out paper
 
 demo: build
 	@$(PYTHON) -m twinmill_cli.demo

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from twinmill.claims import claims, rows
+from twinmill.claims import claims, paper, rows
 from twinmill.claims.claims import CLAIMS
 from twinmill.claims.swarms import KINDS, run
 from twinmill_cli import main as cli
@@ -61,6 +61,10 @@ def test_a_page_and_an_exit_code(tmp_path, capsys, monkeypatch):
     assert cli.run(command) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["agree"] and said["claims"][0]["name"] == "alike"
+    ran = {part["shows"]: part["of"] for part in said["paper"] if part["of"]}
+    assert set(ran.values()) == {len(said["claims"][0]["numbers"]) - 6}  # but the outer spreads
+    page = (tmp_path / "a/index.html").read_text()
+    assert all(part["shows"] in page for part in said["paper"])
     assert {path.name for path in (tmp_path / "a").iterdir()} == {
         "index.html", "claims.json", "alike_1.svg"}  # fmt: skip
     monkeypatch.setitem(claims.ALIKE, 0.03, 0.3)
@@ -69,6 +73,21 @@ def test_a_page_and_an_exit_code(tmp_path, capsys, monkeypatch):
         cli.run(["claims", "--only", "alik"])
     with pytest.raises(ValueError, match="--odd-turn nan: must be from -4 to 4"):
         cli.run(["claims", "--only", "bullseye", "--odd-turn", "nan"])
+
+
+def test_every_claim_stands_for_a_part_of_the_paper():
+    assert {name for part in paper.PARTS for name in part.claims} == set(CLAIMS)
+    assert all(part.claims or part.elsewhere for part in paper.PARTS)
+
+
+def test_a_number_that_differs_is_named_with_why():
+    good = rows.Row("a", 1, 1, 1, (1, 1), True)
+    known = rows.Row("b", 1, 1, 1, (2, 2), False, "+9 standard deviations", known="a reason")
+    strange = rows.Row("c", 1, 1, 1, (2, 2), False, "+9 standard deviations")
+    claim = rows.Claim("bullseye", "", "", False, "so", [good, known, strange], [])
+    (answer,) = [a for a in paper.answers([claim]) if a.of]
+    assert (answer.agree, answer.of, answer.found) == (1, 3, "not seen: so")
+    assert answer.differs == ["b: a reason", "c: not known why (+9 standard deviations)"]
 
 
 def literally(n: int, seeds: int, spread: float = 0.04) -> float:

@@ -22,6 +22,7 @@ if working():  # not for --help
     from rich.text import Text
 
     from twinmill.claims.claims import CLAIMS, ODD_TURNS
+    from twinmill.claims.paper import Answer, answers
     from twinmill.claims.rows import Claim, Row
     from twinmill.files import check_new_folder, plain
     from twinmill.model.model_file import ModelFile, write_whole
@@ -89,6 +90,10 @@ def _claims(
         "agree": agree,
         "seeds": seeds,
         "claims": [claim.to_json() for claim in found],
+        "paper": [
+            {"shows": a.part.shows, "agree": a.agree, "of": a.of, "differs": a.differs}
+            for a in answers(found)
+        ],
         **source.to_json(),
     }
     lines = [_line(claim) for claim in found]
@@ -126,12 +131,47 @@ def _numbers(claim: Claim) -> str:
 def _write(out: Path, source: Provenance, found: list[Claim], data: dict) -> Path:
     counts = np.sum([claim.count for claim in found], axis=0)
     title = "Published claims, run again: {} of {} numbers agree".format(*counts)
-    report = write_report(out, title, source, _sections(found), NOTE)
+    report = write_report(out, title, source, [_paper(found), *_sections(found)], NOTE)
     write_whole(out / "claims.json", json.dumps(plain(data), indent=1, allow_nan=False) + "\n")
     for claim in found:
         for k, figure in enumerate(claim.figures, 1):
             write_whole(out / f"{claim.name}_{k}.svg", figure.svg)
     return report
+
+
+def _paper(found: list[Claim]) -> Section:
+    """What the paper shows, part by part."""
+    told = answers(found)
+    rows = [
+        [
+            Cell(answer.part.shows),
+            _agreement(answer),
+            Cell(answer.found),
+            Cell("; ".join(answer.differs) or "-", "warn" if answer.differs else "dim"),
+            Cell(answer.part.open or "-", "dim"),
+        ]
+        for answer in told
+    ]
+    columns = [
+        "the paper shows",
+        "numbers agree",
+        "here",
+        "what differs, and why",
+        "not in the text",
+    ]
+    return Section(
+        title="The paper, part by part",
+        score=[],
+        verdict="Beside the paper, in its order; the sections below have each number.",
+        tables=[Table("Parts", columns, rows, words=(0, 2, 3, 4))],
+    )
+
+
+def _agreement(answer: Answer) -> Cell:
+    if not answer.of:
+        return Cell("-", "dim")
+    tone = "good" if answer.agree == answer.of else "warn"
+    return Cell(f"{answer.agree} of {answer.of}", tone)
 
 
 def _sections(found: list[Claim]) -> list[Section]:
