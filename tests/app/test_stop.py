@@ -220,24 +220,37 @@ def test_unread_messages_do_not_keep_it_from_ending(unheard):
     assert unheard.duties() == ZERO
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        b"\x00\xff garbage \n" * 50,
-        b"behaviour = milling\n",
-        b"behavior = dance\n",
-        b"behaviors = /nowhere.toml\n",
-        b"watchdog_ms = never\n",
-    ],
-    ids=["garbage", "typo", "unknown behaviour", "no table file", "bad value"],
-)
-def test_stop_needs_no_configuration(tmp_path, text):
-    record, config = tmp_path / "board.csv", tmp_path / "robot.conf"
-    config.write_bytes(f"board = stub:{record}\n".encode() + text)
-    done = stop("--config", str(config))
-    assert done.returncode == 0, done.stderr
+WRONG = {
+    "garbage": b"\x00\xff garbage \n" * 50,
+    "typo": b"behaviour = milling\n",
+    "unknown behaviour": b"behavior = dance\n",
+    "no table file": b"behaviors = /nowhere.toml\n",
+    "bad value": b"watchdog_ms = never\n",
+}
+
+
+@pytest.fixture(scope="module")
+def stops(tmp_path_factory):
+    """`turbopi --stop` with each wrong configuration, at once: each looks for boards."""
+    folder, started = tmp_path_factory.mktemp("stops"), {}
+    for name, text in WRONG.items():
+        record, config = folder / f"{name}.csv", folder / f"{name}.conf"
+        config.write_bytes(f"board = stub:{record}\n".encode() + text)
+        command = [*TURBOPI, "--stop", "--config", str(config)]
+        started[name] = record, subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    yield started
+    for _, process in started.values():
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_stop_needs_no_configuration(stops, what):
+    record, process = stops[what]
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 0, said
     assert record.read_text().endswith(",0,0,0,0\n")
-    assert f"{record}: zero to all wheels, confirmed" in done.stderr
+    assert f"{record}: zero to all wheels, confirmed" in said
 
 
 def test_stop_waits_for_no_pipe(tmp_path):
@@ -253,16 +266,20 @@ def test_stop_ends_the_program_that_drives(driving):
     assert code == 0 and driving.duties() == ZERO
 
 
-@pytest.mark.parametrize("options", [[], ["--board", "uart"]], ids=["auto", "uart"])
-def test_a_line_that_opens_is_no_board(options):
-    """A pseudo terminal takes every byte, and answers none."""
-    board, line = pty.openpty()
-    named = ("--set", f"uart_device={os.ttyname(line)}", "--set", "i2c_device=/nowhere")
-    done = stop("--config", "/dev/null", *named, *options)
-    assert done.returncode == 1
-    assert "NOT CONFIRMED" in done.stderr and "SWITCH" in done.stderr.upper()
-    os.close(board)
-    os.close(line)
+def test_a_line_that_opens_is_no_board():
+    """A pseudo terminal takes every byte, and answers none, whether it was named or not."""
+    lines, stops = [pty.openpty() for _ in range(2)], []
+    for (_, line), options in zip(lines, ([], ["--board", "uart"]), strict=True):
+        named = ("--set", f"uart_device={os.ttyname(line)}", "--set", "i2c_device=/nowhere")
+        command = [*TURBOPI, "--stop", "--config", "/dev/null", *named, *options]
+        stops.append(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
+    for process in stops:
+        _, said = process.communicate(timeout=60)
+        assert process.returncode == 1
+        assert "NOT CONFIRMED" in said and "SWITCH" in said.upper()
+    for fds in lines:
+        for fd in fds:
+            os.close(fd)
 
 
 def test_a_board_is_found_by_its_answer(tmp_path):

@@ -23,7 +23,7 @@ REQUIRED = ("mmdebstrap", "unshare", "chroot", "dpkg-deb")
 
 
 def cut_lists(root: Path) -> None:
-    """Leaves in apt's lists what is installed, and LIBRARY: all of Debian takes it seconds each time."""
+    """Leaves in apt's lists what is installed, and LIBRARY: all of Debian takes it seconds."""
     status = (root / "var/lib/dpkg/status").read_text().splitlines()
     kept = {f"Package: {LIBRARY}", *(line for line in status if line.startswith("Package: "))}
     for path in (root / "var/lib/apt/lists").glob("*_Packages"):
