@@ -6,6 +6,7 @@ what happened as JSON.
 """
 
 import json
+import multiprocessing
 import os
 import re
 import subprocess
@@ -89,6 +90,15 @@ def failures(flash: Flasher, robot: SshRobot, package: Path) -> dict:
     return run
 
 
+def beside(work, *arguments):
+    """Does something in a process of its own. Returns what waits for its result."""
+    context = multiprocessing.get_context("fork")
+    here, there = context.Pipe()
+    context.Process(target=lambda: there.send(work(*arguments)), daemon=True).start()
+    there.close()
+    return here.recv
+
+
 def threshold(robot: SshRobot, config: Path) -> dict:
     """Limits from frames of the robot's camera, put into its configuration."""
     x, y = np.meshgrid(np.arange(320), np.arange(240))
@@ -155,6 +165,7 @@ def main(folder: Path) -> dict:
     )
     flash, result, both = Flasher(config), {"version": version}, ("robot03", "robot04")
     try:
+        failed = beside(failures, flash, robots[2], new)
         result["dry_run"] = flash.run(*both, "--package", old, "--dry-run", "-b", "diffusing")
         result["touched_by_dry_run"] = (robots[0].folder / "system/usr/bin/turbopi").exists()
         result["first"] = flash.run(*both, "--package", old, "--behavior", "diffusing")
@@ -168,7 +179,7 @@ def main(folder: Path) -> dict:
         result["back_to"] = (robots[0].folder / "installed").read_text().strip()
         result["mixed"] = flash.run("robot03", "robot09", "robot08", "nobody7.invalid",
                                     "--package", new)  # fmt: skip
-        result["failures"] = failures(flash, robots[2], new)
+        result["failures"] = failed()
         result["threshold"] = threshold(robots[1], config)
         result["same_number"] = flash.run("robot03", "robot04=3", "--package", new)
         result["left_in_tmp"] = sorted(path.name for path in Path("/tmp").glob("turbopi.??????"))
