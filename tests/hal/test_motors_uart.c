@@ -3,6 +3,7 @@
 #include "hal_linux/motors_uart.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
@@ -223,15 +224,20 @@ static void test_stop_arrives_after_a_part_of_a_frame(void)
     TEST_ASSERT_EQUAL(FW_OK, hal_motors_open(&motors));
     TEST_ASSERT_EQUAL(10, write(driver.fd, "\xAA\x55\x03\x16\x05\x04\0\0\0\xC8", 10));
     TEST_ASSERT_EQUAL(FW_OK, hal_motors_stop(&motors));
-    const ssize_t count = read(board_fd, bytes, sizeof bytes);
-    size_t at = 0, whole = 0;
-    while (at + UART_FRAME_HEADER < (size_t)count)
+    size_t count = 0, at = 0, whole = 0;
+    for (struct pollfd line = {.fd = board_fd, .events = POLLIN};
+         count < 10 + 2 * 27 && poll(&line, 1, 1000) > 0;)
+    {
+        const ssize_t more = read(board_fd, bytes + count, sizeof bytes - count);
+        TEST_ASSERT_GREATER_THAN(0, more);
+        count += (size_t)more;
+    }
+    while (at + UART_FRAME_HEADER < count)
     {
         // A board that knows no better than to skip a frame whose check is wrong.
         const size_t size = UART_FRAME_OVERHEAD + (size_t)bytes[at + 3];
         const bool is_frame = bytes[at] == 0xAA && bytes[at + 1] == 0x55;
-        whole +=
-            is_frame && uart_frame_check(bytes + at, (size_t)count - at, 64) == UART_FRAME_WHOLE;
+        whole += is_frame && uart_frame_check(bytes + at, count - at, 64) == UART_FRAME_WHOLE;
         at += is_frame ? size : 1;
     }
     TEST_ASSERT_GREATER_THAN(0, whole);
