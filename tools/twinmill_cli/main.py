@@ -17,7 +17,11 @@ COMMANDS = (
         "Ask what you have, and write the plan from an unknown robot to a named effect.",
     ),
     ("import", "import_log", "Make a log from motion capture exports and command tables."),
-    ("export", "export", "Write a log as MCAP for Foxglove, as a ROS bag, or as tables."),
+    (
+        "export",
+        "export",
+        "Write a log as MCAP for Foxglove, as a ROS bag, or as tables, CSV or Parquet.",
+    ),
     ("tags", "tags", "Print tags for robots, to scale, for `twinmill track`."),
     (
         "track",
@@ -42,7 +46,7 @@ COMMANDS = (
     (
         "wheels",
         "wheels",
-        "Write a script that drives one wheel at a time; with its log, say what each wheel did.",
+        "Write a script that drives one wheel at a time; with its LOG, say what each wheel did.",
     ),
     ("plot", "plot", "Draw paths, speeds, bits and wheel commands of all robots in a log."),
     (

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Annotated
 
@@ -14,7 +15,6 @@ from twinmill_cli.options import LcmUrl
 from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
-    import math
     from dataclasses import asdict
 
     from rich.console import Console
