@@ -99,6 +99,9 @@ def main(folder: Path, seconds: float, seed: int) -> dict:
         status = subprocess.run(
             [sys.executable, "-c", STATUS, str(key_file)], stdout=subprocess.DEVNULL, timeout=60
         )
+        # Who has not listened for long takes what was said then for the robot's time now.
+        fleet = Fleet(URL, key=key)
+        tell.find(fleet, {ID})
         tell.arm(fleet, {ID})
         drives = tell.start(fleet, {ID}, "", 0.5, partial=False).answers[0].accepted
         robot_stands = tell.stop(fleet, {ID})[0].stands
