@@ -166,13 +166,14 @@ def bit_scenes(scenes: list) -> list[BitScene]:
     for together in logs.values():
         for own, scene in enumerate(together):
             if len(together) > 1 and scene.measurement.frames is not None:
-                made = _bit_scene(together, own)
+                made = bit_scene(together, own)
                 if made.usable.any():
                     found.append(made)
     return found
 
 
-def _bit_scene(together: list[Scene], own: int) -> BitScene:
+def bit_scene(together: list[Scene], own: int) -> BitScene:
+    """Of one robot of a log that has frames; of the others the tracks alone are used."""
     scene = together[own]
     noise, frames = scene.noise.to_json(), scene.measurement.frames
     block = ((frames.t_s - frames.t_s[0]) // BLOCK_S).astype(int)
