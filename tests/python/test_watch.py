@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 
 from twinmill.data.lcm_log import split_events
+from twinmill.data.log import read_log
+from twinmill.data.measurement import load_measurements
 from twinmill.data.multi_log import Actor, everyone_in
 from twinmill.data.stream import Window, from_log
+from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
 from twinmill.watch.judge import WINDOW_S, Judge
 from twinmill_cli import watch as command
@@ -144,3 +147,11 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(log, tmp_path):
         with pytest.raises(ValueError, match=sentence):
             run(["watch", *arguments])
     assert set(tmp_path.iterdir()) == before
+
+
+def test_the_score_is_that_of_compare(brief_coasting_robot):
+    """Of one stretch; its first 1.5 s, which need commands of before, are not judged here."""
+    model = ModelFile.load(str(brief_coasting_robot.model))
+    said = compare(load_measurements([brief_coasting_robot.log], model.model), model).score
+    robot = read_log(brief_coasting_robot.log).robots[3]
+    assert Judge(model).judge(Actor("", robot)).score == pytest.approx(said, rel=0.03)

@@ -27,6 +27,7 @@ if working():  # not for --help
     from twinmill.data.stream import from_bus, from_log
     from twinmill.files import check_new_file, replacing
     from twinmill.model.model_file import ModelFile
+    from twinmill.watch.judge import WINDOW_S
     from twinmill_cli.frame import open_model
 
 RERUN = "rerun-sdk==0.41.0"
@@ -62,7 +63,7 @@ def _watch(
 
     From above: paths, headings, what each camera looks over, green while it
     sees a neighbour; orange, where the model would have the robot go from two
-    seconds ago. Over time: bits, and the model's score over the last 12 s.
+    seconds ago. Over time: bits, and the model's score over the last 30 s.
 
     Example: twinmill watch run.lcmlog --save run.rrd
     """
@@ -127,11 +128,12 @@ def _show(batches, model_file: ModelFile, log_name: str | None, file: Path | Non
 
 def _text(show, save: Path | None, warnings: list[str]) -> str:
     scores = ", ".join(f"{name} {score:.2f}" for name, score in sorted(show.scores.items()))
+    told = f"score of the last {WINDOW_S:g} s: {scores}"
     return "\n".join(
         [
             f"{show.messages} messages of {len(show.shown)} robots"
             + (f": {save}; look at it with: rerun {save}" if save else ""),
-            f"score of the last 12 s: {scores}" if scores else "no score: too little was heard",
+            told if scores else "no score: too little was heard",
             *(f"! {warning}" for warning in warnings),
         ]
     )

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well a model predicts what robots did in the last seconds, over and over."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 import twinmill_native as native
-from scipy.optimize import minimize_scalar
 
 from twinmill.data.clock import estimate_offset
 from twinmill.data.log import LogError
@@ -13,6 +12,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.multi_log import Actor
 from twinmill.data.track import REST_S, Track, make_track
 from twinmill.fitting.floor import NoiseFloor, noise_floor
+from twinmill.fitting.opening import Opened
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import CLOCK
 from twinmill.predict.datasets import Trajectory
@@ -20,8 +20,6 @@ from twinmill.predict.windows import Windows
 
 WINDOW_S = 30.0  # of poses that are judged: less does not tell noise from motion
 AHEAD_S = 2.0  # of the prediction that is shown
-NEAR_S = 0.03  # how far the clock's offset is searched from where it was
-OFFSETS = 21  # of which the median is used: clocks drift less in so many seconds
 POINTS = 20  # of a prediction's line
 
 
@@ -46,8 +44,8 @@ class Judge:
     """
 
     model_file: ModelFile
-    _offsets_s: list[float] = field(default_factory=list)
     _floor: NoiseFloor | None = None
+    _offset_s: float | None = None  # of the clock, where the model predicted best last
 
     def judge(self, actor: Actor) -> Judgement | None:
         """None while poses and commands are too few, or the robot stands."""
@@ -58,41 +56,27 @@ class Judge:
             if not drives or not (windows.ends[:, -1] >= 0).any():
                 return None
             data = Trajectory.at(measurement, windows)
-            model, known = self._own(measurement)
+            model, same_clock = self._own(measurement)
             if self._floor is None or self._floor.kind is None:
-                self._floor = noise_floor(data, model, known)
+                self._floor = noise_floor(data, model, same_clock)
+                if self._floor.kind is None:
+                    return None
+                data = replace(data, keep=self._floor.keep)
             data = data.over(self._floor.rms)
-            if not known:
-                self._settle_clock(data, model)
+            own = Opened(measurement, data, model, self._floor, same_clock)
+            own = own.aligned(self.model_file.model, self._offset_s)
+            self._offset_s = own.model.get(CLOCK)
         except (LogError, ValueError):
             return None
-        return Judgement(data.score(model), _ahead(measurement, model))
+        return Judgement(own.score, _ahead(measurement, own.model))
 
     def _own(self, measurement: Measurement) -> tuple[native.Model, bool]:
-        """The robot's model on its clock, and whether that clock is known."""
+        """The robot's model, and whether its clock is known."""
         own = self.model_file.model.for_robot(measurement.track.robot_id)
         known = own.clock_known or measurement.same_clock
         if not known:
-            if not self._offsets_s:
-                self._offsets_s.append(estimate_offset(measurement.track).offset_s)
-            own.set(CLOCK, float(np.median(self._offsets_s)))
+            own.set(CLOCK, self._offset_s or estimate_offset(measurement.track).offset_s)
         return own, known
-
-    def _settle_clock(self, data: Trajectory, model: native.Model) -> None:
-        """Finds the offset at which this very model predicts best, near where it was."""
-        middle_s = float(np.median(self._offsets_s))
-
-        def loss(offset_s: float) -> float:
-            return float(np.sum(data.rows(model, [CLOCK], np.array([[offset_s]])) ** 2))
-
-        found = minimize_scalar(
-            loss,
-            bounds=(middle_s - NEAR_S, middle_s + NEAR_S),
-            method="bounded",
-            options={"xatol": 1e-3},
-        )
-        self._offsets_s = [*self._offsets_s[1 - OFFSETS :], float(found.x)]
-        model.set(CLOCK, float(np.median(self._offsets_s)))
 
 
 def _settled(track: Track) -> Windows:
