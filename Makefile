@@ -6,11 +6,14 @@ CTEST := ctest --test-dir build --output-on-failure --no-tests=error --parallel 
 
 .PHONY: bench build check check-long demo docs format lint clean paper wheel
 
+# The native module into the environment.
+INSTALL = cmake --install build --component python --prefix "$$($(PYTHON) -c \
+	    'import sysconfig; print(sysconfig.get_path("platlib"))')" >/dev/null
+
 build:
 	@scripts/setup
 	@cmake --build build
-	@cmake --install build --component python --prefix "$$($(PYTHON) -c \
-	    'import sysconfig; print(sysconfig.get_path("platlib"))')" >/dev/null
+	@$(INSTALL)
 
 # All tests in C, C++ and Python, and the lint.
 check: build
@@ -24,7 +27,11 @@ check-long: build
 paper: build
 	@.venv/bin/twinmill claims --out paper
 
-demo: build
+# Installs and builds no more than it shows.
+demo:
+	@scripts/setup demo
+	@cmake --build build --target twin_run twinmill_native lcm_types_generated
+	@$(INSTALL)
 	@$(PYTHON) -m twinmill_cli.demo
 
 # Ourselves against named alternatives, which are installed into .deps, not .venv.

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows the whole loop: a swarm in the twin, then a robot's log and a model made to agree with it.
+"""A robot with a secret: two effects, drawn by lot and sealed, are found from a log and unsealed.
 
 Prints each command as a user would type it, then its real output; all files go to demo/.
 """
 
+import hashlib
 import os
 import shlex
 import shutil
@@ -14,58 +15,64 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import tomlkit
 import typer
 from rich.console import Console
+from rich.text import Text
 
+from twinmill.challenge.script import write_rich_script
+from twinmill.diagnosis.explain import Explanation
 from twinmill.model.model_file import ModelFile
-from twinmill.predict.windows import HORIZONS_S, rms
-from twinmill.report import (
-    Section,
-    added_section,
-    comparison_section,
-    fit_section,
-    show,
-    steps_section,
-    tables,
-    write_report,
-)
-from twinmill.report.tables import Cell, Table, number
+from twinmill.model.parameters import Estimate, catalogue
+from twinmill.report import Figure, Section, show, write_report
+from twinmill.report import diagnosis as present
+from twinmill.report.canvas import FLOOR, PREDICTED, draw, legend_above
+from twinmill.report.tables import Cell, Table, number, tone
 from twinmill_cli import main as cli
 from twinmill_cli.frame import provenance
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDER, LOG = Path("demo"), "demo/robot.lcmlog"
-NOMINAL = "turbopi_nominal.toml"
-CANDIDATES = ("speed_curve", "coasting", "lag_by_duty", "wheel_gain", "reverse_asymmetry")
-SHOWN_S = (0.2, 0.5, 1.0)
-# What the twin has and the user's model lacks, where no real log is at hand.
-HIDDEN = """
-[noise]
-sensor_m = 0.0003
-sensor_rad = 0.0017
-drive_mps = 0.005
-drive_radps = 0.03
-
-[[effect]]
-name = "speed_curve"
-bend = 1.2
-
-[[effect]]
-name = "coasting"
-deceleration_mps2 = 0.7
-"""
+FOLDER = Path("demo")
+LOG, SEALED, FOUND = "demo/robot.lcmlog", "demo/sealed.toml", "demo/found.toml"
+GIVEN = "turbopi.toml"
+DURATION_S = 90.0
+# Parameter of each effect, and the sizes between which the lot falls.
+SIZES = {
+    "coasting": ("deceleration_mps2", 0.4, 0.9),
+    "slew_limit": ("ramp_s", 0.25, 0.5),
+    "floor_tilt": ("drift_x_mps", 0.015, 0.03),
+    "carpet_grain": ("c2", 0.06, 0.12),
+    "turn_asymmetry": ("asymmetry", 0.08, 0.16),
+    "reverse_asymmetry": ("left", -0.15, -0.08),
+}
+# Of which one is drawn: a minute and a half of one robot can tell both of a pair.
+PAIRS = (
+    ("coasting", "floor_tilt"),
+    ("coasting", "carpet_grain"),
+    ("coasting", "turn_asymmetry"),
+    ("coasting", "reverse_asymmetry"),
+    ("slew_limit", "floor_tilt"),
+)
+WITHIN_95 = 1.96
+TONES = {"right": ("good", "green"), "in part": ("warn", "yellow"), "wrong": ("bad", "red")}
 
 
 @dataclass(frozen=True)
-class Step:
-    """Where the model stands after a step: score, and (H, 3) RMS errors on data not fitted to."""
+class Hidden:
+    """One effect that the robot has and the model given does not know."""
 
-    label: str
-    score: float
-    rms: np.ndarray
+    effect: str
+    parameter: str
+    value: float
+
+    @property
+    def name(self) -> str:
+        """As estimates name it."""
+        return f"{self.effect}.{self.parameter}"
 
 
 def main(
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the lot: another secret.")] = 1,
     programs: Annotated[Path, typer.Option("--bin", help="Folder of twin_run.")] = Path(
         "build/bin"
     ),
@@ -74,144 +81,157 @@ def main(
     os.chdir(ROOT)
     shutil.rmtree(FOLDER, ignore_errors=True)
     FOLDER.mkdir()
-    twin_run = str(programs / "twin_run")
-    _say("Eight robots in the twin")
-    _shell(
-        twin_run,
-        "--mjcf",
-        "turbopi.xml",
-        "--n",
-        "8",
-        "--duration-s",
-        "20",
-        "--log",
-        "demo/twin.lcmlog",
-    )
-    recordings = (
-        Path(os.environ.get("TWINMILL_DATA", "../shared/data")) / "turbopi_optitrack_straight"
-    )
-    if recordings.is_dir():
-        _say("A real robot's run, as motion capture and commands")
-        _twinmill(
-            "import",
-            "--poses",
-            str(recordings / "poses.csv"),
-            "--commands",
-            str(recordings / "commands.csv"),
-            "--heading-offset-deg",
-            "180",
-            "-o",
-            LOG,
-        )
-    else:
-        _say("No recordings here: the twin plays a robot with effects that the model will not know")
-        _make_hidden_log(twin_run)
-    steps, sections = _calibrate()
-    chain = [(s.label, s.score) for s in steps]
-    summary = steps_section("What was gained", chain, _gain(steps))
-    summary.tables[:] = [_summary(steps)]
-    _say("What was gained")
-    Console().print(show.table(_summary(steps)))
-    Console().print(_gain(steps))
-    source = provenance("python -m twinmill_cli.demo", ModelFile.load(NOMINAL))
+    digest = _hide(seed)
+    _say("It drives for a minute and a half; commands and poses are logged")
+    write_rich_script(FOLDER / "script.csv", DURATION_S, seed)
+    robot = ["--plant", "planar", "--model", SEALED, "--n", "1", "--script", "demo/script.csv"]
+    _shell(str(programs / "twin_run"), *robot, "--seed", str(seed), "--log", LOG)
+    _say("How far does the model that we have miss?")
+    _twinmill("compare", LOG, "--model", GIVEN)
+    _say("What is missing? Kept is only what helps on data not fitted to")
+    result = _twinmill("explain", LOG, "--model", GIVEN, "-o", FOUND)
+    _say("The seal is broken")
+    if _digest() != digest:
+        raise ValueError(f"{SEALED}: was changed since it was sealed.")
+    print(f"$ sha256sum {SEALED}\n{_digest()}  {SEALED}\nIt is the same file.")
+    hidden = _unsealed()
+    grade, words = judged(hidden, result)
+    Console().print(show.table(_table(hidden, result)))
+    Console().print(Text(words, f"bold {TONES[grade][1]}"))
+    page = _section(hidden, result, words, grade)
     report = write_report(
         FOLDER / "report",
-        "Twinmill demo: from a data sheet to a fitted model",
-        source,
-        [summary, *sections],
+        page.title,
+        provenance(f"python -m twinmill_cli.demo --seed {seed}", ModelFile.load(GIVEN)),
+        [page, present.section(result.diagnosis)],
     )
     print(f"\nReport: {report.resolve()}")
+    print(f"The same by hand, in the browser: twinmill open {LOG} --model {GIVEN}")
+    print(f"Another secret: .venv/bin/python -m twinmill_cli.demo --seed {seed + 1}")
 
 
-def _calibrate() -> tuple[list[Step], list[Section]]:
-    """Compares, fits, and adds each candidate that makes predictions of unseen data better."""
-    _say("How good is the model from the data sheet?")
-    compared = _twinmill("compare", LOG, "--model", NOMINAL)
-    _say("Fit its numbers")
-    model = "demo/fitted.toml"
-    fitted = _twinmill("fit", LOG, "--model", NOMINAL, "-o", model)
-    sections = [comparison_section(compared), fit_section(fitted)]
-    steps = [Step("data sheet", fitted.before.score, rms(compared.worst.errors))]
-    for effect in CANDIDATES:
-        _say(f"Add {effect.replace('_', ' ')}")
-        richer = f"demo/{effect}.toml"
-        added = _twinmill("add", effect, LOG, "--model", model, "-o", richer)
-        if len(steps) == 1:
-            steps.append(Step("numbers fitted", fitted.after.score, added.heldout_refit.rms))
-        if added.heldout_after.score >= added.heldout_refit.score:
-            print(f"Left out: on data not fitted to, {effect} does not help.")
-            continue
-        model = richer
-        steps.append(Step(f"+ {effect}", added.after.score, added.heldout_after.rms))
-        sections.append(added_section(added))
-    _say("Compare again")
-    final = _twinmill("compare", LOG, "--model", model)
-    return steps, [*sections, comparison_section(final)]
+def _hide(seed: int) -> str:
+    """Draws two effects, writes the robot that has them, and tells the digest of its file."""
+    random = np.random.default_rng(seed)
+    text = ModelFile.load(GIVEN).text
+    for effect in PAIRS[random.integers(len(PAIRS))]:
+        parameter, low, high = SIZES[effect]
+        value = round(float(random.uniform(low, high)), 3)
+        text += f'\n[[effect]]\nname = "{effect}"\n{parameter} = {value}\n'
+    Path(SEALED).write_text(text)
+    _say("A robot with a secret")
+    print(
+        f"Two of the {len(catalogue())} effects that are known, and their sizes, were drawn by lot "
+        f"into a file that nothing\nbut the robot reads until the end. Its SHA-256:\n{_digest()}"
+    )
+    return _digest()
 
 
-def _summary(steps: list[Step]) -> Table:
-    """Scores with bars, and how far predictions of unseen data miss."""
-    table = tables.steps([(s.label, s.score) for s in steps])
-    at = [HORIZONS_S.index(horizon_s) for horizon_s in SHOWN_S]
-    rows = [
-        [*row, *(Cell(number(1000 * np.hypot(*step.rms[h, :2]))) for h in at)]
-        for row, step in zip(table.rows, steps, strict=True)
+def _digest() -> str:
+    return hashlib.sha256(Path(SEALED).read_bytes()).hexdigest()
+
+
+def _unsealed() -> list[Hidden]:
+    """What is hidden in the file."""
+    known = len(tomlkit.parse(ModelFile.load(GIVEN).text).get("effect", []))
+    tables = tomlkit.parse(Path(SEALED).read_text())["effect"][known:]
+    return [
+        Hidden(str(table["name"]), key, float(value))
+        for table in tables
+        for key, value in table.items()
+        if key != "name"
     ]
+
+
+def judged(hidden: list[Hidden], result: Explanation) -> tuple[str, str]:
+    """The answer in a word (`right`, `in part` or `wrong`), and in sentences."""
+    names = {h.effect for h in hidden}
+    sure = [e for e in result.diagnosis.found if e in names]
+    groups = {f.effect: set(f.group or ()) for f in result.diagnosis.findings}
+    meant = {e: groups.get(e, set()) & names - set(sure) for e in result.diagnosis.found}
+    among = {hidden: e for e, found in meant.items() for hidden in found if e not in names}
+    missed = [h.effect for h in hidden if h.effect not in (*sure, *among)]
+    wrong = [e for e in result.diagnosis.found if e not in names and not meant[e]]
+    if not (missed or wrong or among):
+        told = f"Right: {' and '.join(sure)} were hidden, both were found, and nothing else."
+        return "right", f"{told} {_sizes(hidden, result)}"
+    words = [f"{effect} was hidden and found" for effect in sure]
+    words += [
+        f"{effect} was hidden, and {e} was named, which this log cannot part from it"
+        for effect, e in among.items()
+    ]
+    words += [f"{effect} was hidden and not found" for effect in missed]
+    words += [f"{effect} was found and not hidden" for effect in wrong]
+    grade = "in part" if sure or among else "wrong"
+    start = "In part right" if grade == "in part" else "Wrong"
+    return grade, f"{start}: {'; '.join(words)}."
+
+
+def _sizes(hidden: list[Hidden], result: Explanation) -> str:
+    held = [h for h in hidden if _holds(_estimate(h, result), h)]
+    count = {0: "Neither size", 1: "One of the two sizes", 2: "Both sizes"}[len(held)]
+    return f"{count} lie{'' if len(held) == 2 else 's'} within the 95 % interval that was told."
+
+
+def _estimate(hidden: Hidden, result: Explanation) -> Estimate | None:
+    return next((e for e in result.parameters if e.name == hidden.name), None)
+
+
+def _holds(estimate: Estimate, hidden: Hidden) -> bool:
+    return abs(estimate.value - hidden.value) <= max(
+        WITHIN_95 * estimate.std, 0.1 * abs(hidden.value)
+    )
+
+
+def _table(hidden: list[Hidden], result: Explanation) -> Table:
+    """Hidden beside found."""
+    rows = []
+    for h in hidden:
+        estimate = _estimate(h, result)
+        told = "not found" if estimate is None else f"{estimate.value:.3g} ± {estimate.std:.1g}"
+        rows.append([Cell(h.name), Cell(f"{h.value:g}"), Cell(told)])
     return Table(
-        table.title,
-        [*table.columns, *(f"{s:g} s\nmm" for s in SHOWN_S)],
-        rows,
-        table.note + " In mm: how far predictions of data not fitted to miss in position.",
+        "The secret", ["quantity", "hidden", "found"], rows, "Found: with its standard deviation."
     )
 
 
-def _gain(steps: list[Step]) -> str:
-    half_s = HORIZONS_S.index(0.5)
-    first, last = (1000 * float(np.hypot(*s.rms[half_s, :2])) for s in (steps[0], steps[-1]))
-    return (
-        f"Half a second ahead, predictions of data not fitted to missed by {number(first)} mm "
-        f"at first and miss by {number(last)} mm now."
+def _section(hidden: list[Hidden], result: Explanation, words: str, grade: str) -> Section:
+    before, after = result.diagnosis.before.score, result.after.score
+    return Section(
+        "A robot with a secret",
+        [
+            ("answer", grade, TONES[grade][0]),
+            ("score as given", number(before), tone(before)),
+            ("with what was found", number(after), tone(after)),
+        ],
+        words,
+        figures=[_answer_figure(hidden, result)],
+        tables=[_table(hidden, result)],
     )
 
 
-def _make_hidden_log(twin_run: str) -> None:
-    """The twin with hidden effects plays steps and turns of many sizes."""
-    nominal = ModelFile.load(NOMINAL).text
-    (FOLDER / "hidden.toml").write_text(nominal + HIDDEN)
-    rows, t_s = ["t_s,fl_pct,fr_pct,rl_pct,rr_pct"], 1.0
-    for left, right in (
-        (100, 100),
-        (-100, -100),
-        (80, 80),
-        (-80, -80),
-        (60, 60),
-        (-60, -60),
-        (45, 45),
-        (-45, -45),
-        (90, 50),
-        (-90, -50),
-        (50, 90),
-        (-50, -90),
-        (70, -70),
-        (-70, 70),
-    ):
-        rows += [f"{t_s:g},{left},{right},{left},{right}", f"{t_s + 3:g},0,0,0,0"]
-        t_s += 4.5
-    (FOLDER / "script.csv").write_text(
-        "\n".join([rows[0], "0,0,0,0,0", *rows[1:]]) + f"\n{t_s:g},0,0,0,0\n"
-    )
-    _shell(
-        twin_run,
-        "--plant",
-        "planar",
-        "--model",
-        "demo/hidden.toml",
-        "--n",
-        "1",
-        "--script",
-        "demo/script.csv",
-        "--log",
-        LOG,
+def _answer_figure(hidden: list[Hidden], result: Explanation) -> Figure:
+    """What was found over what was hidden; 1 is the sealed size."""
+
+    def paint(axes) -> None:
+        axes.axvline(1, color=FLOOR, lw=6, alpha=0.35, label="hidden")
+        for row, h in enumerate(hidden):
+            if (e := _estimate(h, result)) is not None:
+                spread = abs(WITHIN_95 * e.std / h.value)
+                axes.errorbar(
+                    e.value / h.value, row, xerr=spread, fmt="o", color=PREDICTED, capsize=4,
+                    label=None if row else "found, 95 % interval",
+                )  # fmt: skip
+        axes.set_yticks(range(len(hidden)), [h.name for h in hidden])
+        axes.set(xlabel="size over what was hidden", ylim=(len(hidden) - 0.4, -0.6))
+        axes.set_xlim(min(0.0, axes.get_xlim()[0]), max(1.6, axes.get_xlim()[1]))
+        legend_above(axes, 2)
+
+    return Figure(
+        draw(1.9, paint),
+        "Found beside hidden",
+        "The model knew nothing of these effects. The dots are what the log alone told of their "
+        "sizes, with 95 % intervals; the green line is what the sealed file held.",
     )
 
 
