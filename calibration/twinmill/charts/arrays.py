@@ -10,6 +10,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.track import Track, local_line
 from twinmill.fitting.floor import NoiseFloor
 from twinmill.predict.datasets import displacement
+from twinmill.predict.detections import BitScene
 from twinmill.predict.problem import Scene
 from twinmill.predict.regimes import HORIZON, regime_masks
 from twinmill.predict.residual import StepGrid, body_velocity, rotate
@@ -58,6 +59,15 @@ def seen(frames: Frames | None) -> Arrays:
     kept = np.concatenate([[True], np.diff(bit.astype(int)) != 0])
     kept[-1] = True
     return {"seen": np.column_stack([frames.t_s, bit])[kept]}
+
+
+def expected(bits: BitScene, model: native.Model) -> Arrays:
+    """(K, 2) robot's clock and how likely a model has the bit that `seen` tells; NaN if unknown."""
+    frames = bits.frames
+    chance = np.where(bits.usable, bits.reported(model, raw=not frames.has_vote), np.nan)
+    period_s = float(np.median(np.diff(frames.t_s))) if len(frames.t_s) > 1 else STEP_S
+    every = max(1, round(STEP_S / max(period_s, 1e-3)))
+    return {"expected": np.column_stack([frames.t_s, chance])[::every]}
 
 
 def measured_speed(track: Track) -> Arrays:

@@ -15,6 +15,7 @@ import twinmill_native as native
 from twinmill.charts.arrays import RobotView, measured_path
 from twinmill.charts.packed import pack_log, pack_prediction, pack_robot
 from twinmill.charts.stage import STATIC, stage_html
+from twinmill.predict.detections import BitScene
 from twinmill.predict.regimes import Regime
 
 MODULES = ("look", "packed", "floor", "series", "stage", "embedded")  # each uses those before it
@@ -37,6 +38,7 @@ class Shown:
         model: whose predictions are shown.
         regimes: where it fails.
         beside: label and model that is drawn beside, or None.
+        bits: of its camera, or None.
     """
 
     view: RobotView
@@ -44,6 +46,7 @@ class Shown:
     model: native.Model
     regimes: Sequence[Regime]
     beside: tuple[str, native.Model] | None = None
+    bits: BitScene | None = None
 
 
 def embedded(robots: Sequence[Shown], first: int, span_s: tuple[float, float]) -> str:
@@ -62,7 +65,9 @@ def embedded(robots: Sequence[Shown], first: int, span_s: tuple[float, float]) -
         measurement = robot.view.measurement
         own = pack_robot(robot.view, measurement.track, measurement.frames, robot.model)
         blocks[f"robot{k}"] = own
-        blocks[f"prediction{k}"] = pack_prediction(robot.view, robot.model, robot.beside)
+        blocks[f"prediction{k}"] = pack_prediction(
+            robot.view, robot.model, robot.beside, robot.bits
+        )
     options = {
         "robots": [_facts(r, logs.index(_log(r))) for r in robots],
         "first": first,

@@ -8,11 +8,12 @@ from collections.abc import Mapping
 import numpy as np
 import twinmill_native as native
 
-from twinmill.charts.arrays import Arrays, RobotView, commands, seen
+from twinmill.charts.arrays import Arrays, RobotView, commands, expected, seen
 from twinmill.data.camera_frames import Frames
 from twinmill.data.log import RobotLog
 from twinmill.data.track import Track
 from twinmill.model.parameters import CLOCK
+from twinmill.predict.detections import BitScene
 
 COMMAND_WORDS = {
     "duty": (("FL", "FR", "RL", "RR"), "%"),
@@ -69,10 +70,14 @@ def pack_prediction(
     view: RobotView,
     model: native.Model,
     beside: tuple[str, native.Model] | None,
+    bits: BitScene | None,
     **facts: object,
 ) -> bytes:
-    """What a model says of one robot; another model's words beside it, with its label."""
-    arrays = view.predicted(model)
+    """What a model says of one robot; another model's words beside it, with its label.
+
+    `bits`: of its camera, if it has one and others are near.
+    """
+    arrays = view.predicted(model) | (expected(bits, model) if bits else {})
     if beside:
         others = view.predicted(beside[1])
         arrays |= {f"{name}_beside": a for name, a in others.items() if name != "starts"}

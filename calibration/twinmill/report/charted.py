@@ -10,6 +10,7 @@ import twinmill_native as native
 from twinmill.charts.arrays import RobotView
 from twinmill.charts.embedded import Shown, embedded
 from twinmill.fitting.compare import Comparison, RobotComparison
+from twinmill.predict.detections import bit_scenes
 from twinmill.predict.regimes import HORIZON
 from twinmill.report.tables import number
 
@@ -35,13 +36,15 @@ def charts(
 def _drawn(
     worst: RobotComparison, robots: list[RobotComparison], label: str, others: list[native.Model]
 ) -> str:
+    bits = {b.label: b for b in bit_scenes([r.scene for r in robots])}
     shown = []
     for k, robot in enumerate(robots):
         scene = robot.scene
         view = RobotView(scene.measurement, robot.floor, scene.clock_free)
         name = f"{scene.measurement.label} · {number(robot.score)}"
         other = (label, others[k]) if others else None
-        shown.append(Shown(view, name, scene.model, robot.where, other))
+        seen = bits.get(scene.measurement.label)
+        shown.append(Shown(view, name, scene.model, robot.where, other, seen))
     first = robots.index(worst) if worst in robots else 0
     return embedded(shown, first, _stretch(robots[first]))
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from twinmill.fitting.add import AddResult
-from twinmill.fitting.compare import GOOD, MISSING, SUSPECT, Comparison, RobotComparison
+from twinmill.fitting.compare import GOOD, MISSING, Comparison, RobotComparison
 from twinmill.model.parameters import Estimate
 from twinmill.predict.noise import Noise
 from twinmill.predict.regimes import HORIZON, Regime
@@ -62,8 +62,6 @@ def tone(score: float) -> Tone:
     """Colour of a score or of a ratio."""
     if not np.isfinite(score):
         return "dim"
-    if score < SUSPECT:
-        return "warn"
     return "good" if score <= GOOD else "warn" if score <= MISSING else "bad"
 
 

@@ -74,7 +74,7 @@ class Bench:
                 self._reads = True
                 self.worker.start(self.session.work("read"))
         self.opening = ""
-        self.changed("work", "model", "score")
+        self.changed("work", "model", "score", "prediction")
 
     def changed(self, *what: str) -> None:
         """Notes what a screen must draw anew."""
@@ -220,7 +220,8 @@ class Bench:
         """What the model shown says of one robot."""
         shown, beside = self.session.shown(index).model, self.session.beside_of(index)
         revision = self.changes["prediction"]
-        return pack_prediction(self.session.robots[index], shown, beside, revision=revision)
+        view, bits = self.session.robots[index], self.session.bits(index)
+        return pack_prediction(view, shown, beside, bits, revision=revision)
 
     def swarm_bytes(self) -> bytes:
         """Poses of the twin's swarms."""

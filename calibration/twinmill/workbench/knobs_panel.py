@@ -57,6 +57,7 @@ class _Row:
 
     def __init__(self, knob: Knob, panel: KnobsPanel) -> None:
         self.name, self.panel = knob.name, panel
+        self._typing = False
         with ui.element("div").classes("knob").props(f'data-testid="knob-{knob.name}"'):
             with ui.element("div").classes("line"):
                 if knob.fitted:
@@ -67,7 +68,8 @@ class _Row:
                 self.number = ui.number(value=knob.value, format="%.4g").props(
                     "dense borderless hide-bottom-space"
                 )
-                self.number.on("keydown.enter", self._typed).on("blur", self._typed)
+                self.number.on("focus", lambda: self._type(True))
+                self.number.on("keydown.enter", self._typed).on("blur", self._left)
                 ui.label("" if knob.unit == "1" else knob.unit).classes("unit")
             with ui.element("div").classes("reach"):
                 self.interval = ui.element("div").classes("interval")
@@ -82,7 +84,8 @@ class _Row:
         self.knob = knob
         self.slider.props.update({"min": knob.low, "max": knob.high, "step": knob.step})
         self.slider.set_value(knob.value)
-        self.number.set_value(float(f"{knob.value:.6g}"))
+        if not self._typing:  # what is half typed is not taken away
+            self.number.set_value(float(f"{knob.value:.6g}"))
         self.interval.set_visibility(knob.interval is not None)
         if knob.interval:
             wide = (knob.high - knob.low) or 1.0
@@ -100,10 +103,23 @@ class _Row:
         self.number.set_value(float(f"{value:.6g}"))
         self.panel.page.drag(self.name, value)
 
+    def _type(self, typing: bool) -> None:
+        self._typing = typing
+
+    async def _left(self) -> None:
+        self._type(False)
+        await self._typed()
+
     async def _typed(self) -> None:
-        value = self.number.value
-        if value is None or float(f"{self.knob.value:.6g}") == value:
+        known, value = float(f"{self.knob.value:.6g}"), self.number.value
+        if value is None or value == known:
+            self.number.set_value(known)
             return
-        value = min(max(float(value), self.knob.least), self.knob.most)
+        asked, knob = float(value), self.knob
+        value = min(max(asked, knob.least), knob.most)
+        if value != asked:
+            bounds = f"{knob.least:g} to {knob.most:g}"
+            ui.notify(f"{knob.name} = {asked:g}: must be within {bounds}; {value:g} was taken.")
+        self.number.set_value(float(f"{value:.6g}"))
         self.panel.page.drag(self.name, value)
         await self.panel.page.keep()

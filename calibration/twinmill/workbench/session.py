@@ -32,6 +32,7 @@ from twinmill.model.parameters import (
     effect_parameters,
 )
 from twinmill.predict.datasets import total_score
+from twinmill.predict.detections import BitScene, bit_scene
 from twinmill.predict.regimes import Regime, where_it_fails
 from twinmill.workbench.knobs import Knob, knobs
 from twinmill.workbench.next_run import next_command, then_commands
@@ -103,6 +104,7 @@ class Session:
         self.swarm: dict | None = None
         self.beside: Beside | None = None
         self._files = {0: self.given}
+        self._bits: dict[int, BitScene | None] = {}
         self._dragged: dict[str, float] = {}
         self._foreseen: dict[int, Opened] = {}
         self._passing: dict[int, Opened] = {}
@@ -345,6 +347,23 @@ class Session:
         if self.beside is None or index not in self.beside.opened:
             return None
         return self.beside.label, self.beside.opened[index].model
+
+    def bits(self, index: int) -> BitScene | None:
+        """What its camera told, with the paths of its log's other robots; None without them."""
+        if index not in self._bits and not self.unjudged:
+            self._bits[index] = self._bit_scene(index)
+        return self._bits.get(index)
+
+    def _bit_scene(self, index: int) -> BitScene | None:
+        log = self.measurements[index].log_sha256
+        members = [k for k in self.robots if self.measurements[k].log_sha256 == log]
+        if len(members) < 2 or self.measurements[index].frames is None:
+            return None
+        scenes = [self.robots[k].scene(self.robots[k].opened.model) for k in members]
+        own = members.index(index)
+        scenes[own] = self.robots[index].opened.scene()
+        made = bit_scene(scenes, own)
+        return made if made.usable.any() else None
 
     def own_scores(self) -> dict[int, float]:
         """Of each robot where the tree stands; NaN without a floor."""

@@ -5,10 +5,14 @@ import html
 
 from nicegui import ui
 
+from twinmill.swarm.classes import COLORS
 from twinmill.workbench.hands import Hands
 from twinmill.workbench.swarm import STARTS
 from twinmill.workbench.words import scored
 
+AXIS = {"nameLocation": "middle", "splitLine": {"show": False}, "axisLabel": {"fontSize": 11}}
+CELL_PX = (31, 21)
+LEAST = 1e-3  # m/s or rad/s, below which nothing moves
 SHOWN = ("circliness", "radius_m", "rotation", "groups", "contacts")
 
 
@@ -77,6 +81,12 @@ class SwarmPanel:
                 values = [s["metrics"][name] for s in swarm["swarms"].values()]
                 self._row(name, [scored(value) for value in values])
             ui.label(f"Classes and means of the last 10 s, over {STARTS} starts.").classes("soft")
+            ui.label(
+                "Phase diagram: the model as given, going and turning faster or slower by a "
+                "factor. The points are both models, by how a robot goes that sees nobody."
+            ).classes("soft")
+            chart = ui.echart(_diagram(swarm)).props('data-testid="diagram"')
+            chart.style("height: 290px; width: 100%")
             text = html.escape("\n".join(swarm["commands"]))
             ui.label("The first start from a terminal:").classes("soft")
             ui.html(f'<pre class="command">{text}</pre>', sanitize=False).props(
@@ -87,3 +97,64 @@ class SwarmPanel:
     def _row(self, name: str, values: list[str]) -> None:
         cells = "".join(f"<div>{value}</div>" for value in values)
         ui.html(f"<div>{name}</div>{cells}", sanitize=False).classes("model still")
+
+
+def _diagram(swarm: dict) -> dict:
+    """Cells in the colours of their classes, paler where runs differ, and the models' places."""
+    cells = swarm["diagram"]
+    values = sorted({cell["speed"] for cell in cells})
+    half = (values[1] - values[0]) / 2
+    ends = {"min": round(values[0] - half, 6), "max": round(values[-1] + half, 6)}
+    given = next(iter(swarm["swarms"].values()))
+    places = [
+        {
+            "value": [_over(s, given, "speed_mps"), _over(s, given, "turn_radps")],
+            "name": label,
+            "label": {"position": "top" if k else "bottom", "formatter": label},
+        }
+        for k, (label, s) in enumerate(swarm["swarms"].items())
+    ]
+    kinds = [kind for kind in COLORS if any(cell["class"] == kind for cell in cells)]
+    return {
+        "animation": False,
+        "grid": {"left": 46, "right": 14, "top": 48, "bottom": 40},
+        "legend": {"top": 0, "itemWidth": 12, "itemHeight": 12, "data": kinds},
+        "tooltip": {},
+        "xAxis": {"type": "value", "name": "speed", **AXIS, "nameGap": 24, **ends},
+        "yAxis": {"type": "value", "name": "turn rate", **AXIS, "nameGap": 30, **ends},
+        "series": [
+            *(_cells(kind, [c for c in cells if c["class"] == kind]) for kind in kinds),
+            {
+                "type": "line",
+                "data": places,
+                "symbol": "circle",
+                "symbolSize": 13,
+                "itemStyle": {"color": "#ffffff", "borderColor": "#26343b", "borderWidth": 2.5},
+                "lineStyle": {"color": "#26343b", "width": 2},
+                "label": {"show": True, "fontWeight": "bold", "color": "#26343b",
+                          "textBorderColor": "#ffffff", "textBorderWidth": 3},
+                "z": 5,
+            },
+        ],
+    }  # fmt: skip
+
+
+def _over(swarm: dict, given: dict, name: str) -> float:
+    """Factor of a quantity; 1 of one that the behaviour does not have."""
+    return swarm[name] / given[name] if given[name] > LEAST else 1.0
+
+
+def _cells(kind: str, cells: list[dict]) -> dict:
+    """Squares of one class."""
+    return {
+        "name": kind,
+        "type": "scatter",
+        "symbol": "rect",
+        "symbolSize": CELL_PX,
+        "itemStyle": {"color": COLORS[kind]},
+        "silent": True,
+        "data": [
+            {"value": [c["speed"], c["turn"]], "itemStyle": {"opacity": 0.25 + 0.6 * c["share"]}}
+            for c in cells
+        ],
+    }

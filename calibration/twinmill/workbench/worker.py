@@ -132,6 +132,8 @@ def _serve(pipe: Connection, logs: list[Path]) -> None:
             return
         try:
             pipe.send(perform(work, logs, measurements, pipe.send))
+        except BrokenPipeError:  # the server was killed
+            return
         except (ValueError, OSError) as error:
             pipe.send(Done(work, {}, failure=" ".join(str(error).split())))
 
@@ -149,12 +151,15 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
         ValueError: it cannot be done, in one sentence.
     """
     if work.kind == "swarm":
-        from twinmill.workbench.swarm import run_swarms
+        from twinmill.workbench.swarm import phase_diagram, run_swarms
 
         texts = {"as given": work.given}
         if work.text != work.given:
             texts["now"] = work.text
-        return Done(work, {"swarms": run_swarms(texts, work.options, say)})
+        swarms = run_swarms(texts, work.options, say)
+        return Done(
+            work, {"swarms": swarms, "diagram": phase_diagram(work.given, work.options, say)}
+        )
     import twinmill_native as native
 
     from twinmill.data.measurement import load_measurements

@@ -127,6 +127,22 @@ def test_the_whole_conversation(import_turbopi, page):
         page.get_by_test_id("tab-models").click()
         expect(page.get_by_test_id("model-2")).to_have_class(re.compile("now"))
         assert exact(page, 2) == added
+        ask_for_the_drive_that_parts(page)
+
+
+def ask_for_the_drive_that_parts(page) -> None:
+    """By keys alone: the button designs a run, in its own panel."""
+    page.get_by_test_id("tab-models").focus()
+    while page.evaluate("document.activeElement.dataset.testid") != "tab-missing":
+        page.keyboard.press("ArrowLeft")
+    page.keyboard.press("Enter")
+    page.get_by_test_id("part-them").and_(page.locator(":enabled")).first.focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_test_id("status")).to_contain_text("Designing a run")
+    expect(page.get_by_test_id("design")).to_have_count(1)
+    page.get_by_test_id("cancel").focus()
+    page.keyboard.press(" ")
+    expect(page.get_by_test_id("cancel")).not_to_be_visible()
 
 
 def turn_a_knob_and_back(page, given: str) -> None:
@@ -137,7 +153,12 @@ def turn_a_knob_and_back(page, given: str) -> None:
     slider.click(position={"x": 0.95 * box["width"], "y": box["height"] / 2})
     expect(shown).not_to_have_text(given)
     page.get_by_test_id("undo").and_(page.locator(":enabled")).wait_for()
+    turned = shown.text_content()
     page.keyboard.press("z")
+    expect(shown).to_have_text(given)
+    page.get_by_test_id("redo").click()
+    expect(shown).to_have_text(re.compile(re.escape(turned.strip("≈ "))))
+    page.get_by_test_id("undo").click()
     expect(shown).to_have_text(given)
     page.get_by_test_id("knob-base.sideways_gain").locator(".lock").click()
 
@@ -192,6 +213,7 @@ def run_the_twin(page) -> None:
     page.get_by_test_id("swarm-duration").fill(str(SWARM_S))
     page.get_by_test_id("run-twin").and_(page.locator(":enabled")).click()
     expect(page.get_by_test_id("swarm-table")).to_contain_text("circliness")
+    page.get_by_test_id("diagram").locator("canvas").wait_for()
     commands = page.get_by_test_id("swarm-commands").text_content().strip().splitlines()
     words = shlex.split(commands[-2])
     shutil.copy("mine.toml", words[words.index("--model") + 1])  # as its command writes it

@@ -11,6 +11,7 @@ const RIGHT_PX = 16;
 const FOOT_PX = 18;
 const HEAD_PX = 17;
 const DEGREES = 180 / Math.PI;
+const LOST_S = 0.6; // without a value a line is broken
 
 /** Rows of a robot: each a quantity with its lines (array, column, factor). */
 export function rowsOf(robot, prediction, band, ahead_s) {
@@ -42,13 +43,13 @@ export function rowsOf(robot, prediction, band, ahead_s) {
     },
   ];
   if (robot.arrays.seen.rows) {
-    rows.push({
-      title: "camera", unit: "1: sees another robot", least: 1, from: 0,
-      lines: [{
-        of: robot.arrays.seen, column: 1, factor: 1, color: FLOOR, width: 1.5, alpha: 1, name: "bit",
-        held: true, shift: prediction?.clock_s ?? 0,
-      }],
-    });
+    const line = { column: 1, factor: 1, width: 1.5, shift: prediction?.clock_s ?? 0 };
+    const lines = [
+      { ...line, of: robot.arrays.seen, color: MEASURED, alpha: 0.6, name: "bit", held: true },
+    ];
+    const of = prediction?.arrays.expected;
+    if (of) lines.push({ ...line, of, color: PREDICTED, alpha: 1, name: "its chance by the model" });
+    rows.push({ title: "camera", unit: "1: sees another robot", least: 1, from: 0, lines });
   }
   if (prediction) {
     const far = ahead_s > 1 ? 3 : 1;
@@ -223,13 +224,17 @@ export class Series {
     g.beginPath();
     let broken = true;
     let before = 0;
+    let since = -Infinity;
     for (let k = first; k <= last; k++) {
+      const t = of.data[k * of.width];
       const v = of.data[k * of.width + column] * factor;
       if (Number.isNaN(v)) {
         broken = true;
         continue;
       }
-      const [x, y] = [this.x(of.data[k * of.width] + shift), this._y(row, v)];
+      if (!held && t - since > LOST_S) broken = true;
+      since = t;
+      const [x, y] = [this.x(t + shift), this._y(row, v)];
       if (broken) g.moveTo(x, y);
       else {
         if (held) g.lineTo(x, before);
@@ -262,18 +267,25 @@ export class Series {
     for (const row of this.rows) this._read(g, row, t);
   }
 
-  /** Values at the cursor, beside the row's title. */
+  /** Values at the cursor, beside the row's title; without their names where these do not fit. */
   _read(g, row, t) {
-    let at = row.words_px;
-    for (const { of, column, factor, color, name, shift = 0 } of row.lines) {
+    const told = row.lines.map(({ of, column, factor, color, name, held, shift = 0 }) => {
       const k = rowAt(of, t - shift);
-      const v = k < 0 ? NaN : of.data[k * of.width + column] * factor;
-      const words = `${name} ${Number.isNaN(v) ? "–" : worded(v, row.least / 10)}`;
+      const lost = k < 0 || (!held && t - shift - of.data[k * of.width] > LOST_S);
+      const v = lost ? NaN : of.data[k * of.width + column] * factor;
+      return { name, color, value: Number.isNaN(v) ? "–" : worded(v, row.least / 10) };
+    });
+    const room = this.sheet.width - RIGHT_PX - row.words_px;
+    const named = told.map(({ name, value }) => `${name} ${value}`);
+    const wide = named.reduce((sum, words) => sum + g.measureText(words).width + 12, 0);
+    let at = row.words_px;
+    g.textAlign = "left";
+    told.forEach(({ value, color }, i) => {
+      const words = wide <= room ? named[i] : value;
       g.fillStyle = color;
-      g.textAlign = "left";
       g.fillText(words, at, row.top - 3);
       at += g.measureText(words).width + 12;
-    }
+    });
   }
 
   // -- hands ------------------------------------------------------------------------------------
