@@ -275,3 +275,16 @@ def test_a_command_works_after_its_help_was_shown(twinmill):
 def test_help_may_be_the_value_of_an_option(twinmill):
     code, _, err = twinmill("effects", "--json", "--", "--help")
     assert code == 1 and "effect '--help': not in the catalogue" in err
+
+
+def test_a_package_that_is_not_installed_is_one_sentence(monkeypatch, capsys):
+    def lacking(_):
+        raise ModuleNotFoundError("No module named 'cv2'", name="cv2")
+
+    monkeypatch.setattr(cli, "run", lacking)
+    with pytest.raises(SystemExit) as left:
+        cli.main()
+    assert left.value.code == 1
+    assert capsys.readouterr().err.strip() == (
+        "twinmill: the Python package of 'cv2' is not installed; `make build` does that."
+    )

@@ -106,8 +106,8 @@ def main(
         [page, present.section(result.diagnosis)],
     )
     print(f"\nReport: {report.resolve()}")
-    print(f"The same by hand, in the browser: twinmill open {LOG} --model {GIVEN}")
-    print(f"Another secret: .venv/bin/python -m twinmill_cli.demo --seed {seed + 1}")
+    print(f"By hand, in the browser: make build && .venv/bin/twinmill open {LOG} --model {GIVEN}")
+    print(f"Another secret:          .venv/bin/python -m twinmill_cli.demo --seed {seed + 1}")
 
 
 def _hide(seed: int) -> str:
@@ -241,7 +241,7 @@ def _say(text: str) -> None:
 
 def _shell(*command: str) -> None:
     print(f"$ {shlex.join(command)}", flush=True)
-    subprocess.run(command, check=True)
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 
 def _twinmill(*arguments: str) -> Any:

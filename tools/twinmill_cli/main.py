@@ -241,6 +241,11 @@ def main() -> None:
         sentence = error.format_message()  # empty where help was printed instead
         if sentence:
             _complain(f"{sentence} (--help lists what can be given)" if code == 2 else sentence)
+    except ModuleNotFoundError as error:  # `make demo` installs a part
+        if (error.name or "twinmill").startswith("twinmill"):
+            raise
+        code = 1
+        _complain(f"the Python package of '{error.name}' is not installed; `make build` does that.")
     except (ValueError, OSError) as error:
         code = 1
         _complain(str(error))
