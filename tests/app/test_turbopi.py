@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import lcm
@@ -173,9 +174,21 @@ def write_frames(path: Path, seed: int, count: int):
     path.write_bytes(frames.tobytes())
 
 
-def play(tmp_path, *arguments):
+@dataclass
+class Played:
+    """What went through the program, and what it wrote of it."""
+
+    frames: Path
+    telemetry: list
+    runs: list
+    io_tsv: Path
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory):
     """Plays a file of frames through the program and reads its log."""
-    frames, log = tmp_path / "frames.yuyv", tmp_path / "a.lcmlog"
+    folder = tmp_path_factory.mktemp("played")
+    frames, log, io_tsv = folder / "frames.yuyv", folder / "a.lcmlog", folder / "io.tsv"
     write_frames(frames, seed=5, count=150)
     done = run(
         *("--config", "/dev/null", "--start", "--camera", f"stub:{frames}", "--board", "stub"),
@@ -188,19 +201,19 @@ def play(tmp_path, *arguments):
             f"height_px={HEIGHT_PX}",
         ),
         *("--set", "rate_Hz=100", "--set", "frame_timeout_ms=5000", "--set", "robot_id=7"),
-        *("--lcm-url", f"file://{log}?mode=w", *arguments),
+        *("--lcm-url", f"file://{log}?mode=w", "--io-tsv", str(io_tsv)),
     )
     assert done.returncode == 0, done.stderr
     events = list(lcm.EventLog(str(log), "r"))
     telemetry = [turbopi.telemetry_t.decode(e.data) for e in events if e.channel == "R07_TELEMETRY"]
     runs = [turbopi.run_t.decode(e.data) for e in events if e.channel == "R07_RUN"]
-    return frames, telemetry, runs
+    return Played(frames, telemetry, runs, io_tsv)
 
 
-def test_duties_are_those_of_the_core_byte_for_byte(tmp_path):
-    frames, telemetry, _ = play(tmp_path)
+def test_duties_are_those_of_the_core_byte_for_byte(played):
+    telemetry = played.telemetry
     expected = subprocess.run(
-        [*CORE_DUTIES, frames, str(WIDTH_PX), str(HEIGHT_PX)],
+        [*CORE_DUTIES, played.frames, str(WIDTH_PX), str(HEIGHT_PX)],
         capture_output=True,
         text=True,
         check=True,
@@ -213,8 +226,8 @@ def test_duties_are_those_of_the_core_byte_for_byte(tmp_path):
     assert {t.detected_raw for t in decided.values()} == {0, 1}
 
 
-def test_telemetry_explains_itself(tmp_path):
-    _, telemetry, runs = play(tmp_path)
+def test_telemetry_explains_itself(played):
+    telemetry, runs = played.telemetry, played.runs
     assert [t.seq for t in telemetry] == list(range(len(telemetry)))
     for t in telemetry:
         assert t.frame_utime_us <= t.utime_us
@@ -229,10 +242,8 @@ def test_telemetry_explains_itself(tmp_path):
     assert config["robot_id"] == 7 and config["rate_Hz"] == 100 and config["panel"] == "none"
 
 
-def test_io_tsv_is_read_by_the_importer(tmp_path):
-    io_tsv = tmp_path / "io.tsv"
-    _, telemetry, _ = play(tmp_path, "--io-tsv", str(io_tsv))
-    series = read_io_tsv(io_tsv, 7)
+def test_io_tsv_is_read_by_the_importer(played):
+    telemetry, series = played.telemetry, read_io_tsv(played.io_tsv, 7)
     logged = {t.utime_us: t for t in telemetry}
     assert len(series.utime_us) == len(telemetry)
     moving = [t for t in telemetry if t.mode == t.MODE_TABLE]
@@ -249,7 +260,7 @@ def test_io_tsv_is_read_by_the_importer(tmp_path):
 )
 def test_log_that_cannot_be_written_is_told(tmp_path, log):
     frames = tmp_path / "frames.yuyv"
-    frames.write_bytes(GREEN * 150)
+    frames.write_bytes(GREEN * 30)
     size = ("--set", f"width_px={WIDTH_PX}", "--set", f"height_px={HEIGHT_PX}")
     done = run(
         *("--config", "/dev/null", "--start", "--camera", f"stub:{frames}", "--board", "stub"),
