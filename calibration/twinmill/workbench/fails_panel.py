@@ -26,6 +26,8 @@ class FailsPanel:
             "Error over noise, half a second ahead, by what the robot was doing. Click a bar: its "
             "moments are marked in all views."
         ).classes("soft")
+        self.choice = ui.select([], label="or choose one", on_change=self._chosen)
+        self.choice.props('dense outlined options-dense data-testid="regime"').style("width: 100%")
         self.chart = ui.echart({}, on_point_click=self._clicked).props('data-testid="regimes"')
 
     def draw(self) -> None:
@@ -34,6 +36,7 @@ class FailsPanel:
         if not self.bench.ready:
             return
         self._regimes = session.regimes(self.bench.picked)[::-1]
+        self.choice.set_options([_name(r) for r in self._regimes[::-1]], value=None)
         self.chart.options.clear()
         self.chart.options.update(_chart(self._regimes))
         self.chart.style(f"height: {60 + ROW_PX * len(self._regimes)}px")
@@ -42,12 +45,20 @@ class FailsPanel:
     def _clicked(self, event: events.EChartPointClickEventArguments) -> None:
         self.mark(self._regimes[event.data_index])
 
+    def _chosen(self, event: events.ValueChangeEventArguments) -> None:
+        if event.value is not None:
+            self.mark(next(r for r in self._regimes if _name(r) == event.value))
+
     def mark(self, regime: Regime) -> None:
         """Its moments, and the cursor before the worst."""
         times, worst = self.bench.session.moments(self.bench.picked, regime.group, regime.regime)
-        why = json.dumps(f"{regime.group}: {regime.regime}")
+        why = json.dumps(_name(regime))
         moments = json.dumps([round(float(t), 3) for t in times])
         self.page.javascript(f"twinmill.mark({moments}, {worst - BEFORE_S:.3f}, {why})")
+
+
+def _name(regime: Regime) -> str:
+    return f"{regime.group}: {regime.regime}"
 
 
 def _chart(regimes: list[Regime]) -> dict:
@@ -75,7 +86,7 @@ def _chart(regimes: list[Regime]) -> dict:
         },
         "yAxis": {
             "type": "category",
-            "data": [f"{r.group}: {r.regime}" for r in regimes],
+            "data": [_name(r) for r in regimes],
             "axisTick": {"show": False},
             "axisLabel": {"fontSize": 11, "interval": 0},
         },

@@ -61,7 +61,10 @@ class _Row:
         with ui.element("div").classes("knob").props(f'data-testid="knob-{knob.name}"'):
             with ui.element("div").classes("line"):
                 if knob.fitted:
-                    self.icon = ui.icon("lock_open").on("click", lambda: panel.toggle(knob.name))
+                    self.icon = ui.icon("lock_open").props("role=button tabindex=0")
+                    self.icon.props.update({"aria-label": f"Hold {knob.name}"})
+                    for event in ("click", "keydown.enter", "keydown.space"):
+                        self.icon.on(event, lambda: panel.toggle(knob.name))
                     self.lock(knob.name in panel.bench.session.held)
                 label = ui.label(knob.label).classes("what")
                 label.props.update(title=f"{knob.name}: {knob.words}" if knob.words else knob.name)
@@ -95,7 +98,7 @@ class _Row:
 
     def lock(self, held: bool) -> None:
         """Shows whether it is held."""
-        self.icon.props(f"name={'lock' if held else 'lock_open'}")
+        self.icon.props(f"name={'lock' if held else 'lock_open'} aria-pressed={str(held).lower()}")
         self.icon.classes(replace="lock held" if held else "lock")
 
     def _dragged(self, event: events.GenericEventArguments) -> None:

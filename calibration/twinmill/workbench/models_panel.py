@@ -53,7 +53,9 @@ class ModelsPanel:
         )
         row = ui.html(words, sanitize=False).props(f'data-testid="model-{tried.number}"')
         row.classes("model now" if tried.number == tree.current.number else "model")
-        row.on("click", lambda n=tried.number: self.page.go(n))
+        row.props("role=button tabindex=0")
+        for event in ("click", "keydown.enter"):
+            row.on(event, lambda n=tried.number: self.page.go(n))
 
     def _draw_commands(self) -> None:
         tree = self.bench.session.tree

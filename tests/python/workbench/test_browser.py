@@ -170,6 +170,13 @@ def find_where_it_fails(page) -> None:
     chart.wait_for()
     chart.click(position={"x": 132, "y": 6 + 0.5 * 21}, force=True)
     page.wait_for_function("twinmill.marks.length > 0 && twinmill.t > 0")
+    # The same by keys alone.
+    page.locator("#marks").click()
+    page.wait_for_function("twinmill.marks.length === 0")
+    page.get_by_test_id("regime").get_by_role("combobox").focus()
+    for key in ("Enter", "ArrowDown", "Enter"):
+        page.keyboard.press(key)
+    page.wait_for_function("twinmill.marks.length > 0")
 
 
 def name_coasting(page) -> None:
