@@ -18,7 +18,7 @@ from twinmill.data.optitrack import Robots, View
 from twinmill_cli.main import run
 
 sys.path.insert(0, str(Path(__file__).parent))
-from motive_server import PERIOD_S, START_S, Body, Motive
+from motive_server import PERIOD_S, START_S, Body, Motive, frame, models
 
 LONGEST_S = 30.0  # on a busy machine; all end when they have what they need
 TURN_RAD = 0.8
@@ -111,6 +111,31 @@ def test_broken_packets_are_dropped_and_said():
     with Motive([Body(3, "r3")], extra=extra) as motive:
         robots, _ = listen(motive)
     assert robots.poses[3] > 30 and "cannot be read" in wrong(robots)["packets"]
+
+
+def test_no_packet_takes_longer_than_its_bytes():
+    """Counts that are not true end in an error, not in gigabytes or minutes."""
+    random = np.random.default_rng(1)
+    bodies = [Body(3, "r3"), Body(4, "r4")]
+    with Motive(bodies, (4, 1), streams=False) as motive:
+        stream = Stream(find_server("127.0.0.1", port=motive.port))
+    for whole in 100 * [frame(5, bodies, (4, 1)), models(bodies, (4, 1))]:
+        changed = bytearray(whole)
+        for place in random.integers(4, len(whole), 3):
+            changed[place] = random.integers(256)
+        stream._read(bytes(changed[: random.integers(4, len(whole) + 1)]))
+    stream.close()
+    assert stream.broken > 50
+
+
+def test_others_on_the_port_are_not_heard_but_named():
+    with Motive([Body(3, "r3")], multicast=True) as motive:
+        server = replace(find_server("127.0.0.1", port=motive.port), address="127.0.0.2")
+        robots = Robots(Stream(server), View())
+        for _ in robots.stream.frames(0.5):
+            pass
+        robots.stream.close()
+    assert "give --server 127.0.0.1" in wrong(robots)["frames"]
 
 
 def test_why_nothing_arrives(monkeypatch):

@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from natnet import DataDescriptions, DataFrame, Version
+from natnet import DataDescriptions, DataFrame, NatNetError, Version
 from natnet.packet_buffer import PacketBuffer
 
 COMMAND_PORT, DATA_PORT, GROUP = 1510, 1511, "239.255.42.99"
@@ -112,6 +112,30 @@ def unpacked(packet: bytes) -> tuple[int, bytes]:
     return kind, packet[HEADER.size : HEADER.size + size]
 
 
+class Packet(PacketBuffer):
+    """The library's reader, which believes any count: here none goes beyond the packet."""
+
+    def read_float32_array(self, count: int) -> tuple[float, ...]:
+        """So many numbers.
+
+        Raises:
+            ValueError: the packet does not have them.
+        """
+        if 4 * count > len(self.data) - self.pointer:
+            raise ValueError("a packet says that it has more than it has")
+        return super().read_float32_array(count)
+
+    def read_string(self, max_length: int | None = None, static_length: bool = False) -> str:
+        """A text.
+
+        Raises:
+            ValueError: the packet is at its end.
+        """
+        if self.pointer >= len(self.data):
+            raise ValueError("a packet ends where a text should be")
+        return super().read_string(max_length, static_length)
+
+
 class Stream:
     """Frames of one server.
 
@@ -120,6 +144,7 @@ class Stream:
         multicast: listens to its group, beside what is sent to us alone.
         names: of rigid bodies by their number in the stream, once the server has told them.
         broken: packets that could not be read.
+        strangers: addresses of others that sent to us; their packets are dropped.
     """
 
     def __init__(self, server: Server, multicast: bool | None = None) -> None:
@@ -132,6 +157,7 @@ class Stream:
         self.server, self.multicast = server, told is not False
         self.names: dict[int, str] = {}
         self.broken = 0
+        self.strangers: set[str] = set()
         self._asked_s = -1e9
         self._offsets: deque[tuple[float, float]] = deque()
         self._mouth = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -172,8 +198,11 @@ class Stream:
             self._ask()
             for ear in select.select(self._ears, [], [], min(left_s, AGAIN_S))[0]:
                 try:
-                    packet = ear.recv(PACKET_MAX)
+                    packet, (sender, _) = ear.recvfrom(PACKET_MAX)
                 except OSError:  # the server's port was closed for a moment
+                    continue
+                if sender != self.server.address:
+                    self.strangers.add(sender)
                     continue
                 arrived_s = time.time()
                 if frame := self._read(packet):
@@ -193,14 +222,14 @@ class Stream:
 
     def _read(self, packet: bytes) -> DataFrame | None:
         kind, payload = unpacked(packet)
-        buffer, protocol = PacketBuffer(payload), self.server.protocol
+        buffer, protocol = Packet(payload), self.server.protocol
         try:
             if kind == MODELS:
                 models = DataDescriptions.read_from_buffer(buffer, protocol)
                 self.names |= {body.id_num: body.name for body in models.rigid_bodies}
             if kind == FRAME:
                 return DataFrame.read_from_buffer(buffer, protocol)
-        except (struct.error, ValueError, IndexError, MemoryError, OverflowError):
+        except (NatNetError, struct.error, ValueError):
             self.broken += 1
         return None
 

@@ -136,7 +136,9 @@ class Robots:
         server = self.stream.server
         if self.frames:
             return Check("frames", True, f"{self.frames} frames")
-        if not self.stream.multicast:
+        if others := sorted(self.stream.strangers):
+            mend = f"give --server {others[0]}: that is who streams here"
+        elif not self.stream.multicast:
             mend = (
                 f"let UDP from {server.address} through this machine's firewall; or Motive streams "
                 "by multicast, which --multicast hears"

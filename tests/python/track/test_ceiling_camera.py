@@ -383,6 +383,16 @@ def test_mistakes_on_the_command_line_get_one_sentence(folder, monkeypatch, argu
     assert sorted(folder.iterdir()) == before
 
 
+def test_commands_of_the_only_robot_need_no_number(folder, tmp_path):
+    """As a publisher writes them; three frames are too few to place them, and that comes then."""
+    sent = tmp_path / "sent.csv"
+    sent.write_text("t_s,vx_mps,vy_mps,omega_radps\n0,0.1,0,0\n1,0,0,0\n")
+    with pytest.raises(ValueError, match="robot_id is missing"):
+        track(folder, "--robots", "1-3", "--commands", sent, video="short.mp4")
+    with pytest.raises(ValueError, match="where the film begins"):
+        track(folder, "--robots", "1", "--commands", sent, video="short.mp4")
+
+
 def test_a_film_that_is_none_or_shows_no_robot_is_said(folder, tmp_path):
     (tmp_path / "text.mp4").write_text("no film")
     with pytest.raises(ValueError, match="no video"):
