@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a parameter that was found is one number, or changes with speed, turning, duty or time.
+"""Whether a parameter that was found is one number, or changes with what the robot was doing.
 
 An effect that stands in for other physics fits each kind of drive with another strength. Each
 parameter gets a companion that is proportional to it and to what the robot was doing; a score test
@@ -41,7 +41,7 @@ class Change:
     @property
     def why(self) -> str:
         """For people."""
-        way = "grows" if self.relative > 0 else "falls"
+        way = "changes" if self.on == "heading" else "grows" if self.relative > 0 else "falls"
         return (
             f"{self.parameter} {way} with {self.on} (by {100 * abs(self.relative):.0f} % for a "
             "usual difference): the same physics in another form, or another effect"
@@ -64,10 +64,10 @@ def changes_of(trial: Trial) -> dict[str, Change]:
     basis = np.linalg.qr(np.vstack([columns, np.diag(1 / fit.std)]))[0]
     doing = [_doing(fit.datasets[i]) for i in logs]
     found: dict[str, Change] = {}
-    for on in [name for name in doing[0] if all(name in d for d in doing)]:
+    for on, way in [key for key in doing[0] if all(key in d for d in doing)]:
         values = np.concatenate(
             [
-                np.repeat(d[on], fit.datasets[i].measured[0].size)
+                np.repeat(d[on, way], fit.datasets[i].measured[0].size)
                 for d, i in zip(doing, logs, strict=True)
             ]
         )
@@ -79,18 +79,23 @@ def changes_of(trial: Trial) -> dict[str, Change]:
     return found
 
 
-def _doing(data: Trajectory) -> dict[str, np.ndarray]:
-    """(W,) of each thing that a parameter may change with."""
+def _doing(data: Trajectory) -> dict[tuple[str, str], np.ndarray]:
+    """(W,) of each thing that a parameter may change with, and of each way in which it may."""
     moved = np.nan_to_num(data.measured[:, HORIZON]) / HORIZONS_S[HORIZON]
-    found = {
-        "speed": np.hypot(moved[:, 0], moved[:, 1]),
-        "turning": np.abs(moved[:, 2]),
-        "time": data.start_s - data.start_s[0],
-    }
     track = data.measurement.track
+    heading_rad = np.nan_to_num(track.heading_smooth[data.windows.starts])
+    found = {
+        ("speed", ""): np.hypot(moved[:, 0], moved[:, 1]),
+        ("turning", ""): np.abs(moved[:, 2]),
+        ("time", ""): data.start_s - data.start_s[0],
+        ("heading", "cos"): np.cos(heading_rad),
+        ("heading", "sin"): np.sin(heading_rad),
+    }
     if track.command_kind == "duty":
         middle_s = data.start_s + HORIZONS_S[HORIZON] / 2
-        found["duty"] = np.abs(command_at(middle_s, track.command_t_s, track.command)).max(axis=1)
+        found["duty", ""] = np.abs(command_at(middle_s, track.command_t_s, track.command)).max(
+            axis=1
+        )
     return found
 
 

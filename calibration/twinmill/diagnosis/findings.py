@@ -17,6 +17,7 @@ HORIZON = HORIZONS_S.index(0.5)
 MISSES = 1.5  # score of a final model whose errors are not noise
 WITHIN = 2.0  # standard deviations: a lag that differs by less is the model's own error
 BEYOND = 3.0  # usual sizes: a larger value is doubtful
+NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
 DELAY, CLOCK_OFF, MOTOR_LAG = "input_delay", "clock_offset", "motor_lag"
 
 
@@ -228,6 +229,8 @@ def _finding(done: Search, name: str, share: float, changes: Mapping[str, Change
     doubt = _doubt(catalogue_of(done.last.state.model)[name], own)
     if not doubt and instance in changes:
         doubt = changes[instance].why
+    if not doubt and done.last.fit.chance_of_none(instance) > NOTHING:
+        doubt = f"parts of these logs do not agree that {name} is there: its size may be nothing"
     certainty = "doubtful" if doubt else "group" if group else "sure"
     return Finding(name, group, own, share, certainty, doubt)
 

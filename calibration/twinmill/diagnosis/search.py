@@ -40,13 +40,14 @@ class Settings:
         without_visit: the same for an effect of a place, which speaks where the robot comes by.
         less_evidence, blocks_t: the same where what the model lacks besides drowns the evidence,
             and blocks agree: t of the relative fall over blocks.
-        worth: least share of the first excess that one takes, in a single data set ...
+        worth: least share of the first excess that one takes ...
         enough: ... or this fall of the squared score, if that is less.
         fitted: so many candidates are fitted in each round.
         pairs: so many pairs are tried where no single candidate is accepted.
         most: rounds.
         alike: canonical correlation of signatures from which two candidates are one group.
         tie: difference of the held-out cost that decides nothing within a group.
+        each: what a number that was fitted costs besides, where candidates are compared.
         imitates: share of the squared score taken by other numbers of the base that an effect must
             take to be as good an answer.
         group: most members of a group, the most alike: more is no answer.
@@ -65,6 +66,7 @@ class Settings:
     most: int = 6
     alike: float = 0.95
     tie: float = 6.0
+    each: float = 2.0
     imitates: float = 0.95
     group: int = 4
     faint: float = 16.0
@@ -204,10 +206,11 @@ def search(
         settings = settings.stricter(known)
     rounds: list[Round] = []
     dropped: list[str] = []
+    ways: Ways = {}
     first_excess = max(before.held_score**2 - 1, 0.0)
     for number in range(settings.most):
         progress(f"round {number + 1}: screening the catalogue")
-        screened = screen(before)
+        screened = screen(before, ways)
         this = Round(before, screened, [])
         rounds.append(this)
         for candidate in _promising(screened, settings)[: settings.fitted]:
@@ -283,19 +286,21 @@ def _against(less: ScoreFit, more: ScoreFit) -> tuple[float, float, float]:
 def _best(
     before: Trial, trials: list[Trial], first_excess: float, settings: Settings
 ) -> Trial | None:
-    """Of those with enough evidence, and that matter, the one with the least held-out cost."""
-    alone = len(before.state.datasets) == 1
+    """Of those with enough evidence, and that matter, the one with the least held-out cost.
+
+    Of two that do as well, the one with fewer numbers.
+    """
     good = []
     for trial in trials:
         fall = before.held_score**2 - trial.held_score**2
         if fall <= 0:
             continue
         least = min(settings.worth * first_excess, settings.enough)
-        matters = fall >= least * len(trial.names) or not alone
+        matters = fall >= least * len(trial.names)
         at_nothing = all(_is_neutral(trial, n) for n in trial.names)
         if matters and not at_nothing and _proven(trial, settings):
             good.append(trial)
-    best = min(good, key=lambda t: t.fit.held_cost, default=None)
+    best = min(good, key=lambda t: t.fit.held_cost + settings.each * len(t.fit.x), default=None)
     # Stale numbers of the base are more likely than an effect that does the same.
     stale = [
         t
@@ -349,9 +354,20 @@ def candidates(state: State) -> list[str]:
     return names
 
 
-def screen(before: Trial) -> list[Screened]:
-    """Every candidate's expected worth, by its signature over what is free."""
+# Of an effect: starts, and (S, R) how each data set's rows change by it from each of them.
+Ways = dict[str, tuple[list[dict[str, float]], list[np.ndarray]]]
+
+
+def screen(before: Trial, ways: Ways | None = None) -> list[Screened]:
+    """Every candidate's expected worth, by its signature over what is free.
+
+    Args:
+        before: what is free in it is projected out.
+        ways: of effects whose start is searched, found in earlier rounds; new ones are added. What
+            was accepted since changes little of how a patch of the floor changes the rows.
+    """
     fit, state = before.fit, before.state
+    ways = {} if ways is None else ways
     rows, _ = fit.state
     weights = [np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)]
     left, columns, _ = fit.whitened(range(len(rows)))
@@ -362,7 +378,9 @@ def screen(before: Trial) -> list[Screened]:
     found = []
     for name in candidates(state):
         searched = _has(name, "place") or _has(name, "limit")
-        start = _best_start(name, state, rows, weights, rest) if searched else {}
+        if searched and name not in ways:
+            ways[name] = _ways(name, state, rows)
+        start = _best_start(*ways[name], weights, rest) if searched else {}
         found.append(_screened(name, state, rows, weights, basis, rest, start))
     return found
 
@@ -386,27 +404,33 @@ def _has(name: str, role: str) -> bool:
     return name != REFIT and any(p["role"] == role for p in catalogue()[name]["parameters"])
 
 
-def _best_start(
-    name: str, state: State, rows: list[np.ndarray], weights: list[np.ndarray], rest: np.ndarray
-) -> dict[str, float]:
-    """Of several places or limits the one that explains most at the usual strength."""
+def _ways(
+    name: str, state: State, rows: list[np.ndarray]
+) -> tuple[list[dict[str, float]], list[np.ndarray]]:
+    """Starts of an effect of a place or limit, and the change of the rows from each, see Ways."""
     starts = _places(name, state) if _has(name, "place") else _limits(name, state)
     if len(starts) < 2:
-        return {}
-    gains = np.zeros(len(starts))
-    parts = [[] for _ in starts]
-    for dataset, model, row, weight in zip(
-        state.datasets, state.models, rows, weights, strict=True
-    ):
+        return starts, []
+    changes = []
+    for dataset, model, row in zip(state.datasets, state.models, rows, strict=True):
         points = [_points(name, state, model, s) for s in starts]
         names = points[0][1]
         values = np.array([p[2].values[-1] for p in points])
-        changed = weight * (row - dataset.rows(points[0][2].model, names, values))
-        for k, column in enumerate(changed):
-            parts[k].append(column)
-    for k, columns in enumerate(parts):
-        column = np.concatenate(columns)
-        gains[k] = (column @ rest[: len(column)]) ** 2 / (column @ column + 1e-12)
+        changes.append(row - dataset.rows(points[0][2].model, names, values))
+    return starts, changes
+
+
+def _best_start(
+    starts: list[dict[str, float]],
+    changes: list[np.ndarray],
+    weights: list[np.ndarray],
+    rest: np.ndarray,
+) -> dict[str, float]:
+    """Of several places or limits the one that explains most at the usual strength."""
+    if not changes:
+        return {}
+    columns = np.concatenate([w * c for w, c in zip(weights, changes, strict=True)], axis=1)
+    gains = (columns @ rest[: columns.shape[1]]) ** 2 / ((columns**2).sum(axis=1) + 1e-12)
     return starts[int(np.argmax(gains))]
 
 
@@ -590,7 +614,8 @@ def _tied(this: Round, settings: Settings) -> list[Trial]:
         apart = trial.fit.held_cost - accepted.fit.held_cost
         *_, blocks_t = _against(trial.fit, accepted.fit)
         same = canonical_correlation(columns[accepted.names[0]], columns[trial.names[0]])
-        if (apart < settings.tie and blocks_t < 2.0) or (
+        below = max(accepted.held_score, trial.held_score) < 1.0  # differences there are no news
+        if (apart < settings.tie and (blocks_t < 2.0 or below)) or (
             same > settings.alike and apart < settings.evidence
         ):
             tied.append((same, trial))

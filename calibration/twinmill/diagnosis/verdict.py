@@ -47,10 +47,10 @@ class Weighed:
     @property
     def verdict(self) -> str:
         """As in Diagnosis."""
-        if self.effects and not self._noise_outweighs:
+        if self.effects and not self._noise_outweighs and not self._rest_outweighs:
             top = self.effects[0]
             return "ambiguous" if top.group else "effect_missing"
-        if self._outside or self.rest.moments or (self.effects and self._noise_outweighs):
+        if self._outside or self.rest.moments or self.effects:
             return "outside_catalogue"
         if self._left_in_the_dark or self.noises:
             return "cannot_tell"
@@ -102,7 +102,18 @@ class Weighed:
         """The motion is far noisier than it was, and what was found takes little beside."""
         if not self.noises:
             return False
-        return sum(f.share for f in self.effects) < 0.5
+        return self._taken < 0.5
+
+    @property
+    def _rest_outweighs(self) -> bool:
+        """No effect is beyond doubt, and more is left than they take, which depends on something."""
+        doubtful = all(f.certainty == "doubtful" for f in self.effects)
+        return doubtful and bool(self._continuous) and self.rest.share > self._taken
+
+    @property
+    def _taken(self) -> float:
+        """Share of the squared error that effects take."""
+        return sum(f.share for f in self.effects)
 
     @property
     def sentence(self) -> str:

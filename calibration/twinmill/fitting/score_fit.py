@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 import twinmill_native as native
+from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from twinmill.model.covariance import Covariance
@@ -21,7 +22,7 @@ from twinmill.model.parameters import GAINS, Estimate, Parameter, stated_names
 from twinmill.predict.datasets import PARTS, Dataset
 
 ROUNDS = 12
-CONVERGED = 1e-4  # relative change of the cost
+CONVERGED = 1e-2  # change of the cost that decides nothing
 FEW_ROWS = 2000  # of all data sets: below it every part is fitted anew
 LEAST_SQUARE = 0.25  # of a squared score: errors far below the floor tell nothing more
 # Strengths at which a fit of something new may begin, times the usual, from where nothing happens.
@@ -414,6 +415,24 @@ class ScoreFit:
     def stds(self) -> np.ndarray:
         """(P,) half 95 % intervals over 1.96."""
         return self._widening * np.sqrt(np.diag(self.covariance))
+
+    def chance_of_none(self, instance: str) -> float:
+        """Chance of an effect's sizes if all were neutral; 0 where it has no sizes.
+
+        Wald's test with the covariance of left-out blocks, so that an effect that some blocks ask
+        for and others deny is no sure one: F with as many degrees of freedom as blocks less one
+        (Cameron and Miller 2015, section VI).
+        """
+        own = [
+            c
+            for c, u in enumerate(self.unknowns)
+            if u.parameter.role == "size" and u.parameter.name.split(".")[0] == instance
+        ]
+        if not own:
+            return 0.0
+        away = (self.x - self.usual)[own]
+        square = away @ np.linalg.pinv(self.covariance[np.ix_(own, own)]) @ away
+        return float(fisher.sf(square / len(own), len(own), max(self.blocks - 1, 1)))
 
     @cached_property
     def estimates(self) -> list[Estimate]:

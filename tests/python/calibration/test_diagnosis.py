@@ -126,7 +126,7 @@ def test_what_can_do_all_that_another_does_stands_in_one_group_with_it(behind, t
         )
 
     trials = [
-        SimpleNamespace(names=(name,), fit=fit_of(cost, factor))
+        SimpleNamespace(names=(name,), fit=fit_of(cost, factor), held_score=2 * factor)
         for name, cost, factor in (
             ("line", 100.0, 1.0),
             ("plane", 100.0 + behind, np.exp(behind / 100)),

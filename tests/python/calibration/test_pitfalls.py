@@ -309,6 +309,19 @@ def test_a_weakness_that_comes_later_is_no_sure_weakness(
     assert ("time" in weak.why) == (certainty == "doubtful")
 
 
+def test_a_compass_that_errs_with_heading_is_no_turned_marker(tanh_robot, measure, fitted):
+    """Iron in the floor: the heading is wrong by up to 6 degrees, to the left in the north."""
+
+    def iron(pose, valid):
+        x_m, y_m, heading_rad = pose.T
+        return np.column_stack([x_m, y_m, heading_rad + 0.1 * np.sin(heading_rad + 0.5)]), valid
+
+    found = diagnose([measure(tanh_robot(), 23, 40.0, spoil=iron)], fitted)
+    assert found.verdict == "outside_catalogue"
+    assert not [f for f in found.findings if f.certainty == "sure" and f.effect != "refit"]
+    assert "heading" in found.rest.depends_on
+
+
 def test_where_two_levels_are_driven_a_dead_zone_may_be_behind_stale_gains(
     tanh_robot, measure, fitted
 ):

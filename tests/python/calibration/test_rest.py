@@ -11,7 +11,9 @@ from twinmill.diagnosis.findings import Finding, with_stale_lag
 from twinmill.diagnosis.irregularity import IRREGULAR, irregularity
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
 from twinmill.diagnosis.place import HORIZON, comes_again
+from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import REFIT
+from twinmill.diagnosis.verdict import Weighed
 from twinmill.model.parameters import Estimate
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S
@@ -115,3 +117,19 @@ def test_a_lag_within_the_models_own_error_is_a_stale_number(known_s, effect):
         (lag,) = found[0].parameters
         assert lag.name == "base.motor_lag_s"
         assert lag.value == pytest.approx(model.get("base.motor_lag_s") - 0.0108)
+
+
+@pytest.mark.parametrize(
+    ("certainty", "left", "verdict"),
+    [
+        ("doubtful", 0.4, "outside_catalogue"),
+        ("doubtful", 0.2, "effect_missing"),
+        ("sure", 0.4, "effect_missing"),
+    ],
+)
+def test_what_is_left_outweighs_a_doubtful_effect_that_takes_less(certainty, left, verdict):
+    found = [Finding("heading_bias", None, [], 0.3, certainty, "it changes with heading")]
+    rest = Rest(left, True, ["heading"])
+    weighed = Weighed(4.2, 4.2, 3.6, 2.8, found, rest, [], [], [], 1.0)
+    assert weighed.verdict == verdict
+    assert "heading_bias" in weighed.sentence and "heading" in weighed.sentence

@@ -10,7 +10,7 @@ from twinmill.fitting.fit import base_names, fit
 from twinmill.fitting.opening import judged, open_measurements
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import base_parameters
+from twinmill.model.parameters import base_parameters, effect_parameters
 
 LOGS = 6
 LAG = "base.motor_lag_s"
@@ -99,6 +99,31 @@ def test_intervals_cover_the_truth_beside_a_small_effect_that_is_not_modelled(
             for e in found.shared_estimates()
         ]
     assert np.mean(inside) >= 0.8
+
+
+def chance_of_a_turned_marker(measurement, guess):
+    """What the fit of a model with `heading_bias` says of its being nothing."""
+    (opened,) = judged(open_measurements([measurement], guess))
+    model = opened.model.copy()
+    model.add_effect("heading_bias")
+    free = [*parameters(guess, [opened]), *effect_parameters(model, "heading_bias", fresh=True)]
+    return ScoreFit([opened.data], [model], free).fit().chance_of_none("heading_bias")
+
+
+def test_an_effect_that_is_there_is_hardly_nothing_and_one_that_is_not_may_be(
+    tanh_robot, measure, model_file
+):
+    """A marker turned by 2 degrees, and one that is not: of four logs none by chance of 1 %."""
+    turned = measure(
+        tanh_robot(),
+        160,
+        30.0,
+        spoil=lambda pose, valid: (pose + np.array([0, 0, np.radians(2)]), valid),
+    )
+    assert chance_of_a_turned_marker(turned, model_file()) < 1e-4
+    for seed in range(4):
+        straight = measure(tanh_robot(), 160 + seed, 30.0)
+        assert chance_of_a_turned_marker(straight, model_file()) > 0.01
 
 
 @pytest.mark.parametrize("lag_s", [0.02, 0.2])
