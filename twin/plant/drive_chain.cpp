@@ -84,14 +84,23 @@ double SignOf(double place_m)
     return std::abs(place_m) < kMiddle_m ? 0.0 : std::copysign(1.0, place_m);
 }
 
+Wheels SpinOf(const Model &model)
+{
+    Wheels spin = Kinematics(model.robot, model.base.wheels).Inverse({0, 0, 1}).rim_mps;
+    double square = 0;
+    for (const double v : spin)
+        square += v * v;
+    for (double &v : spin)
+        v = square > 0 ? v / std::sqrt(square) : 0;
+    return spin;
+}
+
 RobotFacts FactsOf(const Model &model)
 {
     const std::vector<Wheel> wheels = model.MakeWheels();
-    RobotFacts facts{static_cast<int>(wheels.size()),
-                     {},
-                     {},
-                     model.robot.wheel_radius_m,
-                     model.robot.battery_nominal_V};
+    RobotFacts facts{
+        static_cast<int>(wheels.size()), {}, {}, SpinOf(model), model.robot.wheel_radius_m,
+        model.robot.battery_nominal_V};
     for (size_t k = 0; k < wheels.size(); ++k)
     {
         facts.left[k] = SignOf(wheels[k].y_m);

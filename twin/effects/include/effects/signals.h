@@ -20,9 +20,11 @@ constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 // rear-left, rear-right.
 struct RobotFacts
 {
-    int wheels = kMaxWheels;       // driven
-    Wheels left{1, -1, 1, -1};     // 1: the wheel is left of the middle, -1: right, 0: neither
-    Wheels front{1, 1, -1, -1};    // the same for front and rear
+    int wheels = kMaxWheels;     // driven
+    Wheels left{1, -1, 1, -1};   // 1: the wheel is left of the middle, -1: right, 0: neither
+    Wheels front{1, 1, -1, -1};  // the same for front and rear
+    // Rim speeds that turn the body on the spot, of length 1; 0 where wheels alone cannot.
+    Wheels spin{-0.5, 0.5, -0.5, 0.5};
     double wheel_radius_m = 0;     // of the base model
     double battery_nominal_V = 0;  // pack voltage at which the base model's speeds hold
 };

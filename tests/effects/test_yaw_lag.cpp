@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "drive.h"
+
+namespace twin::test
+{
+namespace
+{
+
+constexpr double kLag_s = 0.08;
+
+// First order from rest with its own time constant, at any step.
+TEST(YawLag, GivesTurningItsOwnTimeConstant)
+{
+    for (const double extra_s : {-0.05, 0.04})
+        for (const double dt_s : {0.004, 0.022, 0.1})
+        {
+            Player player(With("yaw_lag", {extra_s}, Lagging(kLag_s)), dt_s);
+            for (int step = 1; step < 20; ++step)
+            {
+                player.Play(kTurnLeft, dt_s);
+                const double part = 1 - std::exp(-step * dt_s / (kLag_s + extra_s));
+                EXPECT_NEAR(player.state.rim_mps[1], kFull_mps * part, 1e-12);
+                EXPECT_NEAR(player.state.rim_mps[0], -kFull_mps * part, 1e-12);
+            }
+        }
+}
+
+TEST(YawLag, LeavesDrivingAsItIs)
+{
+    for (const Wheels &command : {kForward, kStrafeLeft})
+    {
+        Player with(With("yaw_lag", {-0.05}, Lagging(kLag_s)), 0.02), plain(Lagging(kLag_s), 0.02);
+        for (Player *player : {&with, &plain})
+            player->Play(command, 0.3);
+        EXPECT_NEAR(with.state.pose.x_m, plain.state.pose.x_m, 1e-12);
+        EXPECT_NEAR(with.state.pose.y_m, plain.state.pose.y_m, 1e-12);
+    }
+}
+
+// An arc is the sum of both: the left wheel has v (1 - e1) - w (1 - e2).
+TEST(YawLag, PartsAnArcIntoDrivingAndTurning)
+{
+    Player player(With("yaw_lag", {-0.03}, Lagging(kLag_s)), 0.02);
+    player.Play({0.5, 1, 0.5, 1}, 0.1);
+    const double drive = 1 - std::exp(-0.1 / kLag_s), turn = 1 - std::exp(-0.1 / 0.05);
+    EXPECT_NEAR(player.state.rim_mps[0], kFull_mps * (0.75 * drive - 0.25 * turn), 1e-12);
+    EXPECT_NEAR(player.state.rim_mps[1], kFull_mps * (0.75 * drive + 0.25 * turn), 1e-12);
+}
+
+// The angle after a step of the command is rate (t - tau) once the lag has passed.
+TEST(YawLag, TurnsAsFarAsItsTimeConstantSays)
+{
+    Player player(With("yaw_lag", {-0.04}, Lagging(kLag_s)), 0.002);
+    player.Play(kTurnLeft, 1);
+    const double rate_radps = player.state.omega_radps;
+    EXPECT_NEAR(player.state.pose.theta_rad, rate_radps * (1 - 0.04), 1e-3 * rate_radps);
+}
+
+}  // namespace
+}  // namespace twin::test
