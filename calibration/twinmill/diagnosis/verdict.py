@@ -106,7 +106,7 @@ class Weighed:
 
     @property
     def _rest_outweighs(self) -> bool:
-        """No effect is beyond doubt, and more is left than they take, which depends on something."""
+        """No effect is beyond doubt, and more is left that depends on something than they take."""
         doubtful = all(f.certainty == "doubtful" for f in self.effects)
         return doubtful and bool(self._continuous) and self.rest.share > self._taken
 
