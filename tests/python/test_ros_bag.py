@@ -433,6 +433,14 @@ def test_a_bag_of_another_writer_is_read(tmp_path):
     np.testing.assert_allclose(values, [(0.1 * k, 0, -0.5, 0) for k in range(20)])
 
 
+def test_a_folder_of_rosbag2_may_end_in_bag(tmp_path):
+    _bag(tmp_path / "run.bag", StoragePlugin.MCAP)
+    assert {topic.name for topic in list_topics(tmp_path / "run.bag")} == {
+        "/r03/pose",
+        "/r03/cmd_vel",
+    }
+
+
 PEAK = """
 import resource, sys
 from pathlib import Path

@@ -208,6 +208,10 @@ def _open(path: Path):
             if is_cut(storage):
                 write_whole(storage, Path(folder) / "whole.mcap")
                 storage = Path(folder) / "whole.mcap"
+            if storage.is_dir() and storage.suffix == ".bag":  # the library takes it for rosbag1
+                link = Path(folder) / "bag"
+                link.symlink_to(storage.resolve())
+                storage = link
             with AnyReader([storage], default_typestore=store) as reader:
                 yield reader
     except (
