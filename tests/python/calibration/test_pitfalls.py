@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from twinmill.diagnosis.diagnose import diagnose, first_state
 from twinmill.diagnosis.search import Settings, attempt
@@ -307,6 +308,27 @@ def test_a_weakness_that_comes_later_is_no_sure_weakness(
     weak = next(f for f in found.findings if f.effect == "wheel_gain")
     assert weak.certainty == certainty
     assert ("time" in weak.why) == (certainty == "doubtful")
+
+
+def test_a_body_that_turns_sooner_than_it_drives_is_named(tanh_robot, measure, fitted):
+    """Driving takes the robot's 0.09 s, turning 0.04 s: first orders by themselves, summed."""
+    spin = np.array([-1, 1, -1, 1]) / 2
+
+    def first_order(target, lag_s):
+        part = EULER_S / lag_s
+        return lfilter([part], [1, part - 1], target, axis=0)
+
+    class Light(tanh_robot):
+        def wheels_mps(self, duty):
+            target = self.speed_mps(duty)
+            turning = np.outer(target @ spin, spin)
+            return first_order(target - turning, self.lag_s) + first_order(turning, 0.04)
+
+    found = diagnose([measure(Light(), 24, 40.0)], fitted)
+    first = found.findings[0]
+    assert (first.effect, first.certainty) == ("yaw_lag", "sure")
+    (extra,) = first.parameters
+    assert extra.value == pytest.approx(-0.05, abs=2 * extra.std + EULER_S)
 
 
 def test_a_compass_that_errs_with_heading_is_no_turned_marker(tanh_robot, measure, fitted):
