@@ -97,9 +97,17 @@ static enum fw_err robot_camera_take(void *device, struct fw_frame *frame)
     return FW_OK;
 }
 
+static inline bool robot_stands(void)
+{
+    static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
+    return memcmp(robot.board.wheel_duty_pct, zero_pct, sizeof zero_pct) == 0;
+}
+
+// It may take seconds.
 static void robot_camera_close(void *device)
 {
     (void)device;
+    TEST_ASSERT_TRUE_MESSAGE(robot_stands(), "the camera is closed while wheels turn");
     robot.camera_is_open = false;
 }
 
@@ -236,12 +244,6 @@ static inline void robot_drive(enum robot_view view)
     robot_boot();
     loop_start(&robot.loop);
     robot_steps(15);
-}
-
-static inline bool robot_stands(void)
-{
-    static const int8_t zero_pct[FW_WHEEL_COUNT] = {0};
-    return memcmp(robot.board.wheel_duty_pct, zero_pct, sizeof zero_pct) == 0;
 }
 
 // Milling, by hand: 100 -+ 126 * 0.5, so that the slow side has 37.
