@@ -100,8 +100,7 @@ std::unique_ptr<Plant> MakeMujoco(const std::vector<Model> &models,
     const WheelKind wheels = models[0].base.wheels;
     const bool installed = wheels == WheelKind::kMecanum || wheels == WheelKind::kNone;
     return std::make_unique<MujocoPlant>(installed ? FindModelFile("turbopi.xml") : "", models,
-                                         starts,
-                                         MujocoOptions{.timestep_s = 0.005, .seed = seed});
+                                         starts, MujocoOptions{.timestep_s = 0.005, .seed = seed});
 }
 
 // (W, 10): the metrics, the least diffusion, and since when the class has held.
@@ -119,9 +118,8 @@ Array Run(const std::vector<const Cell *> &cells, Indices cell, Seeds seeds, dou
     {
         nb::gil_scoped_release unlocked;
         for (const Outcome &o :
-             plant == "mujoco"
-                 ? RunWorldsIn(MakeMujoco, worlds, duration_s)
-                 : RunWorlds(worlds, duration_s, full ? Path::kFull : Path::kBest))
+             plant == "mujoco" ? RunWorldsIn(MakeMujoco, worlds, duration_s)
+                               : RunWorlds(worlds, duration_s, full ? Path::kFull : Path::kBest))
         {
             Append(rows, o.mean);
             rows.insert(rows.end(), {o.least_diffusion, o.settled_s});
