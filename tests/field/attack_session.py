@@ -269,14 +269,43 @@ def latched_without_a_folder(program: list[str], folder: Path, key: bytes) -> di
         return {"drove": drove, "stands": answer.stands, "moved_after": moved}
 
 
+COMMAND = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
+
+
+def unknown_mode(robot: Robot, key_file: Path, key: bytes) -> dict:
+    """Telemetry of a robot that nobody has, in a mode that there is not, while another drives."""
+    fleet, over = Fleet(URL, key=key), threading.Event()
+    tell.find(fleet, {ID})
+    tell.arm(fleet, {ID})
+    tell.start(fleet, {ID}, "", 0.5, partial=False, link_timeout_ms=0)
+    telemetry = turbopi.telemetry_t()
+    telemetry.robot_id, telemetry.mode = ID + 2, 77
+
+    def says():
+        attacker = UdpBus(URL)
+        while not over.is_set():
+            attacker.publish(f"R{ID + 2:02d}_TELEMETRY", telemetry.encode())
+            time.sleep(0.03)
+
+    thread = threading.Thread(target=says)
+    thread.start()
+    drove, said = robot.wait_for(LEFT), ""
+    for words in (["status", "--once"], ["stop", "--robots", f"{ID},{ID + 2}"]):
+        command = [sys.executable, "-c", COMMAND, "swarm", *words, "--key", str(key_file)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        said += done.stdout + done.stderr
+    over.set()
+    thread.join()
+    return {"drove": drove, "stands": robot.duties() == ZERO, "said": said}
+
+
 def start_that_cannot_be_told(robot: Robot, key_file: Path, key: bytes) -> dict:
     """The operator's disk is full below the words of his command: robots that drive are stopped."""
-    code = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
     command = ["swarm", "start", "--untethered", "--arm", "--key", str(key_file)]
     begin_s = time.monotonic()
     with open("/dev/full", "w") as full:
         done = subprocess.run(
-            [sys.executable, "-c", code, *command],
+            [sys.executable, "-c", COMMAND, *command],
             stdout=full,
             stderr=subprocess.PIPE,
             text=True,
@@ -343,6 +372,7 @@ def main(folder: Path) -> dict:
         result["flood_of_nonsense"] = flood_of_nonsense(robot, key)
         result["forged_stands"] = forged_stands(robot, heard, key)
         result["lost_operator"] = lost_operator(robot, key)
+        result["unknown_mode"] = unknown_mode(robot, key_file, key)
         result["start_that_cannot_be_told"] = start_that_cannot_be_told(robot, key_file, key)
     result["latched"] = latched_without_a_folder(program, folder, key)
     result["restarted"] = restarted(program, folder, heard, key)

@@ -44,6 +44,12 @@ def test_stop_holds_though_the_driver_dies_where_nothing_can_be_written(session)
     assert session["latched"] == {"drove": True, "stands": True, "moved_after": False}
 
 
+def test_mode_that_there_is_not_keeps_no_tool_from_its_work(session):
+    found = session["unknown_mode"]
+    assert found["drove"] and found["stands"]
+    assert "unknown mode 77" in found["said"] and "Traceback" not in found["said"]
+
+
 def test_robots_stop_if_the_command_that_started_them_fails(session):
     assert session["start_that_cannot_be_told"] == {"code": 1, "drove": True, "stands": True}
 
