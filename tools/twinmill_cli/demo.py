@@ -23,7 +23,7 @@ from rich.text import Text
 from twinmill.challenge.script import write_rich_script
 from twinmill.diagnosis.explain import Explanation
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import Estimate, catalogue
+from twinmill.model.parameters import Estimate
 from twinmill.report import Figure, Section, show, write_report
 from twinmill.report import diagnosis as present
 from twinmill.report.canvas import FLOOR, PREDICTED, draw, legend_above
@@ -45,7 +45,8 @@ SIZES = {
     "turn_asymmetry": ("asymmetry", 0.08, 0.16),
     "reverse_asymmetry": ("left", -0.15, -0.08),
 }
-# Of which one is drawn: a minute and a half of one robot can tell both of a pair.
+# Of which one is drawn. Not by chance: with each, both were found in a trial. A slew limit hid a
+# grain or an asymmetry beside it, and speed_curve and strafe_loss went into a refit of the base.
 PAIRS = (
     ("coasting", "floor_tilt"),
     ("coasting", "carpet_grain"),
@@ -121,8 +122,10 @@ def _hide(seed: int) -> str:
     Path(SEALED).write_text(text)
     _say("A robot with a secret")
     print(
-        f"Two of the {len(catalogue())} effects that are known, and their sizes, were drawn by lot "
-        f"into a file that nothing\nbut the robot reads until the end. Its SHA-256:\n{_digest()}"
+        f"One of {len(PAIRS)} pairs of effects, and their sizes, were drawn by lot into a file\n"
+        "that nothing but the robot reads until the end. The pairs are ones that so short\n"
+        "a log can tell; of the others `twinmill challenge` shows how often it does.\n"
+        f"SHA-256: {_digest()}"
     )
     return _digest()
 
