@@ -24,6 +24,7 @@ LEVERS_M = (0.05, 0.3)  # turning (rad/s) is weighed against moving (m/s) by the
 TWIST_LEVER_M = 0.2  # where there are no wheels
 ONE_FLIP = ((-1, -1, -1, -1), (-1, 1, -1, 1), (1, -1, 1, -1))  # all, the left, the right wheels
 TRIED = 4  # lags and shifts
+TRIED_OWN = 12  # of the columns as they are
 LATES_S = np.arange(EARLY_S, LATE_S + STEP_S / 2, STEP_S)
 
 
@@ -125,7 +126,7 @@ class Search:
         self.felt = felt or {lag_s: motion.felt(lag_s) for lag_s in LAGS_S}
         self.starts = np.searchsorted(motion.block, np.arange(blocks))
         self._own_key: list[tuple[float, float]] = []
-        self._keys: dict[tuple, list[tuple[float, float]]] = {}
+        self._wholes: dict[tuple[int, bool], dict] = {}
 
     def _by_block(self, rows: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(B, SHAPES, 4, n) sums over stretches of products of (K, SHAPES, 4) with (K, ..., n)."""
@@ -140,30 +141,44 @@ class Search:
         sums[filled] = np.add.reduceat(values, self.starts[filled])
         return sums
 
+    def _whole(
+        self, body: np.ndarray, sign: int, mirrored: bool
+    ) -> dict[tuple[float, float], tuple[np.ndarray, np.ndarray]]:
+        """By lag and shift: (4, 4) and (4, 3) sums of products of commands, and with the motion."""
+        if (sign, mirrored) not in self._wholes:
+            speeds = self._speeds(body, sign)
+            whole = {}
+            for lag_s, (begin_s, shapes) in self.felt.items():
+                linear = begin_s, shapes[:, 1]
+                for late_s in self.lates_s:
+                    rows = self.motion.at(linear, late_s)
+                    whole[lag_s, late_s] = rows.T @ rows, rows.T @ speeds
+            self._wholes[sign, mirrored] = whole
+        return self._wholes[sign, mirrored]
+
     def _likely(self, body: np.ndarray, sign: int, mirrored: bool) -> list[tuple[float, float]]:
         """Lags and shifts at which any mixture of the commands explains most.
 
         They do not depend on the order or the signs of the columns, nor on a constant angle.
         """
-        if (sign, mirrored) not in self._keys:
-            speeds = self._speeds(body, sign)
-            explained = {}
-            for lag_s, (begin_s, shapes) in self.felt.items():
-                linear = begin_s, shapes[:, 1]
-                for late_s in self.lates_s:
-                    rows = self.motion.at(linear, late_s)
-                    gram, moment = rows.T @ rows, rows.T @ speeds
-                    ridge = 1e-6 * (np.trace(gram) + 1e-12) * np.eye(4)
-                    explained[lag_s, late_s] = np.sum(
-                        moment * np.linalg.solve(gram + ridge, moment)
-                    )
-            ranked = sorted(explained, key=explained.get, reverse=True)
-            self._keys[sign, mirrored] = ranked[:TRIED]
-        return self._keys[sign, mirrored]
+        explained = {}
+        for key, (gram, moment) in self._whole(body, sign, mirrored).items():
+            ridge = 1e-6 * (np.trace(gram) + 1e-12) * np.eye(4)
+            explained[key] = np.sum(moment * np.linalg.solve(gram + ridge, moment))
+        return sorted(explained, key=explained.get, reverse=True)[:TRIED]
+
+    def _explained(self, gram: np.ndarray, moment: np.ndarray) -> float:
+        """Of the motion's square by the columns as they are, from sums as in `_whole`."""
+        weighted = self.wheels * np.array([1, 1, self.lever_m])[:, None]
+        along = np.maximum(np.einsum("ci,ic->c", weighted, moment), 0)
+        power = np.einsum("ci,ij,cj->c", weighted, gram, weighted)
+        return float(np.sum(along**2 / np.maximum(power, 1e-12)))
 
     def own(self) -> Explained:
         """The columns as they are, at the lag and the shift where they explain most of all."""
-        keys = [(lag_s, late_s) for lag_s in self.felt for late_s in self.lates_s]
+        whole = self._whole(self.motion.body_mps(), 1, False)
+        explained = {key: self._explained(*sums) for key, sums in whole.items()}
+        keys = sorted(explained, key=explained.get, reverse=True)[:TRIED_OWN]
         own = self._best_of([OWN], 1, False, False, keys)[0]
         self._own_key = [(own.lag_s, own.late_s)]
         return own
@@ -184,18 +199,19 @@ class Search:
         body = self.motion.body_mps()
         speeds = self._speeds(body, 1)
         total = self._sums(np.sum(speeds**2, axis=1))
-        best: Explained | None = None
         middle_s = rate * float(np.ptp(self.motion.t_s)) / 2
-        for late_s in own.late_s - middle_s + np.arange(-0.06, 0.061, 0.03):
-            rows = self.motion.at(self.felt[own.lag_s], late_s, rate)
-            left, gain = self._left(
-                self.wheels[None], self._by_block(rows, rows), self._by_block(rows, speeds), total
-            )
-            if best is None or left.sum() < best.left:
-                best = Explained(
-                    OWN, float(left.sum()), left[0], 0.0, gain[0], own.lag_s, float(late_s)
-                )
-        return best
+        begin_s, shapes = self.felt[own.lag_s]
+
+        def explained(late_s: float) -> float:
+            rows = self.motion.at((begin_s, shapes[:, 1]), late_s, rate)
+            return self._explained(rows.T @ rows, rows.T @ speeds)
+
+        late_s = max(own.late_s - middle_s + np.arange(-0.06, 0.061, 0.03), key=explained)
+        rows = self.motion.at(self.felt[own.lag_s], late_s, rate)
+        left, gain = self._left(
+            self.wheels[None], self._by_block(rows, rows), self._by_block(rows, speeds), total
+        )
+        return Explained(OWN, float(left.sum()), left[0], 0.0, gain[0], own.lag_s, float(late_s))
 
     def _best_of(
         self,
