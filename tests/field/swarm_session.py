@@ -26,6 +26,7 @@ KEY = b""  # the operator's, from main()
 STOP = "import sys; from twinmill_cli.main import run; sys.exit(run(sys.argv[1:]))"
 ROUNDS = 2
 AHEAD_S = 1.0
+WAIT_S = 20.0
 PROTOCOL = {  # verb, behaviour, start after now in us, age of the command in us
     "select_unknown": (2, "dance", 0, 0),
     "script_with_folder": (3, "../s.csv", 0, 0),
@@ -37,7 +38,14 @@ PROTOCOL = {  # verb, behaviour, start after now in us, age of the command in us
 
 
 def first_move_s(robot: Robot, since_s: float) -> float:
-    return next(t for t, duties in robot.rows() if t > since_s and duties != ZERO)
+    """When its wheels first turned after a time; waits for them."""
+    until_s = time.monotonic() + WAIT_S
+    while time.monotonic() < until_s:
+        for t_s, duties in robot.rows():
+            if t_s > since_s and duties != ZERO:
+                return t_s
+        time.sleep(0.02)
+    raise TimeoutError(f"no wheel turned for {WAIT_S:g} s")
 
 
 def lossy_round(robots: dict, seed: int) -> dict:

@@ -4,6 +4,7 @@
 import csv
 import io
 import itertools
+import os
 import re
 import shlex
 import subprocess
@@ -84,6 +85,7 @@ def test_with_the_twin_as_robot_all_runs_as_printed():
         done = subprocess.run(
             ["bash", "-c", command.replace("twin_run", '"$TWIN_RUN"')],
             cwd="plan",
+            env={**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"},
             capture_output=True,
             text=True,
             check=True,

@@ -24,7 +24,6 @@ LEVERS_M = (0.05, 0.3)  # turning (rad/s) is weighed against moving (m/s) by the
 TWIST_LEVER_M = 0.2  # where there are no wheels
 ONE_FLIP = ((-1, -1, -1, -1), (-1, 1, -1, 1), (1, -1, 1, -1))  # all, the left, the right wheels
 TRIED = 4  # lags and shifts
-TRIED_OWN = 12  # of the columns as they are
 LATES_S = np.arange(EARLY_S, LATE_S + STEP_S / 2, STEP_S)
 
 
@@ -176,9 +175,7 @@ class Search:
 
     def own(self) -> Explained:
         """The columns as they are, at the lag and the shift where they explain most of all."""
-        whole = self._whole(self.motion.body_mps(), 1, False)
-        explained = {key: self._explained(*sums) for key, sums in whole.items()}
-        keys = sorted(explained, key=explained.get, reverse=True)[:TRIED_OWN]
+        keys = [(lag_s, late_s) for lag_s in self.felt for late_s in self.lates_s]
         own = self._best_of([OWN], 1, False, False, keys)[0]
         self._own_key = [(own.lag_s, own.late_s)]
         return own

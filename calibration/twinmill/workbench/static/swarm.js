@@ -8,8 +8,7 @@ const RATE = 5; // times real time
 const MARGIN_PX = 18;
 
 export class Swarm {
-  constructor(canvas, found) {
-    this.sheet = new Sheet(canvas);
+  constructor(found) {
     this.found = found;
     this.begin = performance.now();
     this._frame = this._frame.bind(this);
@@ -24,8 +23,10 @@ export class Swarm {
   _frame(now) {
     if (!this.found) return;
     requestAnimationFrame(this._frame);
+    const canvas = document.querySelector("#swarm"); // the page may not have it yet
+    if (!canvas?.offsetParent) return;
+    if (this.sheet?.canvas !== canvas) this.sheet = new Sheet(canvas);
     this.sheet.fit();
-    if (!this.sheet.canvas.isConnected || !this.sheet.canvas.offsetParent) return;
     const { labels, arrays, radius_m, step_s } = this.found;
     const steps = arrays.pose0.rows;
     const k = Math.floor((RATE * (now - this.begin)) / 1000 / step_s) % steps;

@@ -62,7 +62,7 @@ class Workbench extends Stage {
   async showSwarm() {
     this.swarm = await this.source.get("swarm?");
     this._swarmView?.end();
-    this._swarmView = this.swarm && new Swarm(document.querySelector("#swarm"), this.swarm);
+    this._swarmView = this.swarm && new Swarm(this.swarm);
   }
 }
 
