@@ -125,7 +125,7 @@ class Search:
         self.felt = felt or {lag_s: motion.felt(lag_s) for lag_s in LAGS_S}
         self.starts = np.searchsorted(motion.block, np.arange(blocks))
         self._own_key: list[tuple[float, float]] = []
-        self._wholes: dict[tuple[int, bool], dict] = {}
+        self._keys: dict[tuple, list[tuple[float, float]]] = {}
 
     def _by_block(self, rows: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(B, SHAPES, 4, n) sums over stretches of products of (K, SHAPES, 4) with (K, ..., n)."""
@@ -140,34 +140,29 @@ class Search:
         sums[filled] = np.add.reduceat(values, self.starts[filled])
         return sums
 
-    def _whole(
-        self, body: np.ndarray, sign: int, mirrored: bool
-    ) -> dict[tuple[float, float], tuple[np.ndarray, np.ndarray]]:
-        """By lag and shift: (4, 4) and (4, 3) sums of products of commands, and with the motion."""
-        if (sign, mirrored) not in self._wholes:
-            speeds = self._speeds(body, sign)
-            whole = {}
-            for lag_s, (begin_s, shapes) in self.felt.items():
-                linear = begin_s, shapes[:, 1]
-                for late_s in self.lates_s:
-                    rows = self.motion.at(linear, late_s)
-                    whole[lag_s, late_s] = rows.T @ rows, rows.T @ speeds
-            self._wholes[sign, mirrored] = whole
-        return self._wholes[sign, mirrored]
-
     def _likely(self, body: np.ndarray, sign: int, mirrored: bool) -> list[tuple[float, float]]:
         """Lags and shifts at which any mixture of the commands explains most.
 
         They do not depend on the order or the signs of the columns, nor on a constant angle.
         """
-        explained = {}
-        for key, (gram, moment) in self._whole(body, sign, mirrored).items():
-            ridge = 1e-6 * (np.trace(gram) + 1e-12) * np.eye(4)
-            explained[key] = np.sum(moment * np.linalg.solve(gram + ridge, moment))
-        return sorted(explained, key=explained.get, reverse=True)[:TRIED]
+        if (sign, mirrored) not in self._keys:
+            speeds = self._speeds(body, sign)
+            explained = {}
+            for lag_s, (begin_s, shapes) in self.felt.items():
+                linear = begin_s, shapes[:, 1]
+                for late_s in self.lates_s:
+                    rows = self.motion.at(linear, late_s)
+                    gram, moment = rows.T @ rows, rows.T @ speeds
+                    ridge = 1e-6 * (np.trace(gram) + 1e-12) * np.eye(4)
+                    explained[lag_s, late_s] = np.sum(
+                        moment * np.linalg.solve(gram + ridge, moment)
+                    )
+            ranked = sorted(explained, key=explained.get, reverse=True)
+            self._keys[sign, mirrored] = ranked[:TRIED]
+        return self._keys[sign, mirrored]
 
     def _explained(self, gram: np.ndarray, moment: np.ndarray) -> float:
-        """Of the motion's square by the columns as they are, from sums as in `_whole`."""
+        """Of the motion's square by the columns as they are, from (4, 4) and (4, 3) sums."""
         weighted = self.wheels * np.array([1, 1, self.lever_m])[:, None]
         along = np.maximum(np.einsum("ci,ic->c", weighted, moment), 0)
         power = np.einsum("ci,ij,cj->c", weighted, gram, weighted)
