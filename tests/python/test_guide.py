@@ -47,7 +47,7 @@ CASES = [
     *(
         ("other", poses, "duty", wheels, "two")
         for poses, wheels in itertools.product(
-            ("camera", "optitrack", "csv"), ("mecanum", "differential")
+            ("camera", "optitrack", "vicon", "csv"), ("mecanum", "differential")
         )
     ),
     ("other", "ros", "duty", "mecanum", "one"),

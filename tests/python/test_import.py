@@ -262,6 +262,35 @@ def test_motive_y_up_millimetres_become_z_up_metres(put, tmp_path):
     assert robot.valid.tolist() == [True, True, False]
 
 
+def test_motive_euler_angles_are_about_axes_that_turn_with_the_body(put, tmp_path):
+    """Yaw about Y first, by the vector that is carried along: turned 90 degrees, then nodding."""
+    head = MOTIVE.replace("Quaternion", "YXZ").replace("Rotation,Rotation,Rotation,Rotation",
+        "Rotation,Rotation,Rotation").replace(",X,X,Y,Z,W,X", ",X,X,Y,Z,X")  # fmt: skip
+    head = head.replace(",turbopi-04" * 8, ",turbopi-04" * 7)
+    rows = "".join(f"{k},{k / 100:.3f},1,20,{90 * k},0,100,50,200,0.1\n" for k in range(3))
+    take = head.replace(",Rigid Body" * 8, ",Rigid Body" * 7).replace(",B" * 8, ",B" * 7)
+    take = take[: take.index("0,0.000")] + rows
+    import_log(None, put("c.csv", COMMANDS), tmp_path / "o.lcmlog", motive=put("take.csv", take))
+    robot = read_log(tmp_path / "o.lcmlog").robots[4]
+    # A nod about the body's own x axis leaves where that axis points.
+    np.testing.assert_allclose(robot.pose[:, 2], [0, np.pi / 2, np.pi], atol=1e-9)
+
+
+def test_motive_bodies_that_are_no_robots_are_left_out_and_named(put, tmp_path):
+    take = MOTIVE.replace("turbopi-04,turbopi-04\n", "turbopi-04,box\n")
+    types, names, ids, parts, axes = take.splitlines()[2:7]
+    wide = [f"{row}{more}" for row, more in zip(
+        (types, names, ids, parts, axes),
+        (",Rigid Body" * 7, ",box" * 7, ",X" * 7,
+         ",Rotation" * 4 + ",Position" * 3, ",X,Y,Z,W,X,Y,Z"), strict=True)]  # fmt: skip
+    frames = [row + ",0,0,0,1,5,5,5" for row in MOTIVE.splitlines()[7:]]
+    text = "\n".join([*MOTIVE.splitlines()[:2], *wide, *frames, ""])
+    done = import_log(None, put("c.csv", COMMANDS), tmp_path / "o.lcmlog",
+                      motive=put("take.csv", text))  # fmt: skip
+    assert [robot["robot_id"] for robot in done["robots"]] == [4]
+    assert "rigid body 'box' gives no robot_id" in done["warnings"][0]
+
+
 def test_motive_z_up_is_left_as_it_is(put, tmp_path):
     import_log(
         None,
@@ -277,7 +306,7 @@ def test_motive_z_up_is_left_as_it_is(put, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("Quaternion", "XYZ", "Rotation Type is 'XYZ'"),
+        ("Quaternion", "Matrix", "Rotation Type is 'Matrix'"),
         ("Millimeters", "Inches", "Length Units is 'Inches'"),
         ("Format", "Farmat", "no Motive export"),
         ("Rigid Body", "Bone", "has no rigid body"),

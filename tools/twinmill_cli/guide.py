@@ -36,6 +36,7 @@ class Poses(StrEnum):
 
     CAMERA = "camera"
     OPTITRACK = "optitrack"
+    VICON = "vicon"
     ROS = "ros"
     CSV = "csv"
 
@@ -85,6 +86,7 @@ TOLD = {"duty": "duties", "wheel_speed": "wheel speeds", "twist": "velocities of
 SEEN = {
     "camera": "a camera on the ceiling",
     "optitrack": "OptiTrack",
+    "vicon": "Vicon",
     "ros": "ROS topics",
     "csv": "a table",
 }
@@ -193,7 +195,7 @@ def _following(known: dict[str, StrEnum]) -> dict[str, StrEnum]:
         found["drive"] = Drive.TWIST
     if robot is Robot.TWIN:
         found |= {"poses": Poses.CSV, "clocks": Clocks.ONE}
-    elif poses in (Poses.CAMERA, Poses.OPTITRACK):  # films and takes count from their start
+    elif poses in (Poses.CAMERA, Poses.OPTITRACK, Poses.VICON):  # films and takes count from their start
         found["clocks"] = Clocks.TWO
     return found
 

@@ -50,10 +50,12 @@ def _command(
     motive: Annotated[
         Path | None,
         typer.Option(
-            help=(
-                "CSV export of OptiTrack Motive with rigid bodies, quaternions, global coordinates."
-            )
+            help="CSV export of OptiTrack Motive with rigid bodies in global coordinates."
         ),
+    ] = None,
+    vicon: Annotated[
+        Path | None,
+        typer.Option(help="CSV export of Vicon Tracker or Nexus with objects or segments."),
     ] = None,
     commands: Annotated[
         Path | None,
@@ -106,7 +108,7 @@ def _command(
         list[str] | None,
         typer.Option(
             metavar="NAME=ID",
-            help="Number of a robot by its name: a Motive rigid body, a word in the column "
+            help="Number of a robot by its name: a rigid body, a word in the column "
             "robot_id or in a bag's topics; else digits in it.",
         ),
     ] = None,
@@ -132,7 +134,13 @@ def _command(
         list[str] | None,
         typer.Option(metavar="COLUMN", help="Change the sign of one of our columns, as in y_m."),
     ] = None,
-    up: Annotated[str, typer.Option(help="Axis that is up in the Motive export: y or z.")] = "y",
+    up: Annotated[
+        str | None,
+        typer.Option(
+            show_default=False,
+            help="Axis that is up in the export, y or z; default: Motive's y, Vicon's z.",
+        ),
+    ] = None,
     pose_shift_s: Annotated[float, typer.Option(help="Added to the times of poses.")] = 0.0,
     pose_clock_ppm: Annotated[
         float, typer.Option(help="By which the poses' clock gains on the commands', taken out.")
@@ -158,7 +166,7 @@ def _command(
     Example: twinmill import --poses poses.csv --commands commands.csv -o run.lcmlog
     """
     try:
-        if up not in ("y", "z"):
+        if up not in ("y", "z", None):
             raise LogError(f"--up {up}: must be y or z.")
         if explain_columns_to:
             _explain(explain_columns(poses, commands), explain_columns_to, force)
@@ -194,6 +202,7 @@ def _command(
             commands,
             out,
             motive=motive,
+            vicon=vicon,
             io_tsv=tuple(io_tsv or ()),
             bag=bag,
             detections=detections,

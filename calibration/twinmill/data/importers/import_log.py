@@ -31,6 +31,7 @@ from twinmill.data.importers.series import (
     in_body_frame,
     multiply,
 )
+from twinmill.data.importers.vicon import read_vicon
 from twinmill.data.log import Log, LogError, RobotLog, read_log
 from twinmill.data.measurement_table import Table, read_table
 from twinmill.data.track import make_track
@@ -45,12 +46,12 @@ class ImportOptions:
 
     Attributes:
         robot_id: whose the rows are, for files that do not say.
-        robots: robot_id by name: of a Motive rigid body, in a table's column robot_id, or as a word
+        robots: robot_id by name: of a rigid body, in a table's column robot_id, or as a word
             in a bag's topics.
         rename: column in a plain CSV file to column as we name it, or with another unit.
         mapping: file that says which column is what, in place of `rename`.
         flips: our columns that are to change their sign.
-        up: "y" or "z", the axis that a Motive export calls up.
+        up: "y" or "z", the axis that an export of Motive or Vicon calls up; None: its default.
         pose_shift_s: added to the stamps of all poses.
         pose_clock_ppm: by which the poses' clock gains on the commands', taken out.
         heading_offset_rad: from the tracked body's x axis to the robot's front, left positive.
@@ -67,7 +68,7 @@ class ImportOptions:
     rename: dict[str, str] = field(default_factory=dict)
     mapping: Path | None = None
     flips: frozenset[str] = frozenset()
-    up: str = "y"
+    up: str | None = None
     pose_shift_s: float = 0.0
     pose_clock_ppm: float = 0.0
     heading_offset_rad: float = 0.0
@@ -86,6 +87,7 @@ def import_log(
     out: Path,
     *,
     motive: Path | None = None,
+    vicon: Path | None = None,
     io_tsv: tuple[Path, ...] = (),
     bag: Path | None = None,
     detections: Path | None = None,
@@ -94,10 +96,11 @@ def import_log(
     """Makes a log from one source of poses and one of commands.
 
     Args:
-        poses: plain CSV, or None with `motive`.
+        poses: plain CSV, or None with `motive` or `vicon`.
         commands: plain CSV, or None with `io_tsv`.
         out: the log to write; nothing is there until all went well.
         motive: export of OptiTrack Motive.
+        vicon: export of Vicon Tracker or Nexus.
         io_tsv: one per robot.
         bag: ROS bag with both, in place of all others.
         detections: plain CSV of what cameras saw, beside any kind of command.
@@ -111,12 +114,13 @@ def import_log(
         LogError: one sentence on what is wrong; nothing was written.
     """
     options = options or ImportOptions()
-    if bag and (poses or motive or commands or io_tsv):
+    captures = [path for path in (poses, motive, vicon) if path]
+    if bag and (captures or commands or io_tsv):
         raise LogError("--bag: holds poses and commands; give no other source beside it.")
-    if not bag and ((poses is None) == (motive is None) or (commands is None) == (not io_tsv)):
+    if not bag and (len(captures) != 1 or (commands is None) == (not io_tsv)):
         raise LogError(
-            "a log needs one source of poses and one of commands: give --poses or "
-            "--motive, and --commands or --io-tsv."
+            "a log needs one source of poses and one of commands: give --poses, --motive or "
+            "--vicon, and --commands or --io-tsv."
         )
     if options.robot_id is not None and (not 0 <= options.robot_id <= 99 or len(io_tsv) > 1):
         raise LogError(
@@ -140,7 +144,8 @@ def import_log(
         )
         pose_series, command_series = read_bag(bag, *topics, how)
     else:
-        pose_series, command_series = _read_files(poses, commands, motive, io_tsv, options)
+        pose_series = _read_poses(poses, motive, vicon, options, absolute=bool(io_tsv))
+        command_series = _read_commands(commands, io_tsv, options)
     _check_names(options, [series.robot_id for series in (*pose_series, *command_series)])
     pose_series = [_moved(series, options) for series in pose_series]
     shift = not bag or options.receive_stamps
@@ -151,7 +156,7 @@ def import_log(
         for series in command_series
     ]
     seen = _detections(detections, options, by_robot) if detections else []
-    paths = (poses, motive, commands, *io_tsv, detections)
+    paths = (poses, motive, vicon, commands, *io_tsv, detections)
     sources = [path for path in paths if path is not None]
     with replacing(out, options.force) as temporary:
         provenance = _provenance(sources, options)
@@ -160,25 +165,28 @@ def import_log(
         return _summary(read_log(temporary), out, warnings)
 
 
-def _read_files(
+def _read_poses(
     poses: Path | None,
-    commands: Path | None,
     motive: Path | None,
-    io_tsv: tuple[Path, ...],
+    vicon: Path | None,
     options: ImportOptions,
-) -> tuple[list[PoseSeries], list[CommandSeries]]:
-    """Series of one source of poses and one of commands."""
-    pose_series = (
-        read_motive(motive, options.robots, options.up, absolute=bool(io_tsv))
-        if motive
-        else read_poses(poses, _columns(options, "poses"))
-    )
-    command_series = (
-        read_commands(commands, _columns(options, "commands"))
-        if commands
-        else [read_io_tsv(path, options.robot_id) for path in io_tsv]
-    )
-    return pose_series, command_series
+    absolute: bool,
+) -> list[PoseSeries]:
+    """Series of the one that is given; stamps since the epoch, or since the capture's start."""
+    if motive:
+        return read_motive(motive, options.robots, options.up or "y", absolute)
+    if vicon:
+        return read_vicon(vicon, options.robots, options.up or "z")
+    return read_poses(poses, _columns(options, "poses"))
+
+
+def _read_commands(
+    commands: Path | None, io_tsv: tuple[Path, ...], options: ImportOptions
+) -> list[CommandSeries]:
+    """Series of the one that is given."""
+    if commands:
+        return read_commands(commands, _columns(options, "commands"))
+    return [read_io_tsv(path, options.robot_id) for path in io_tsv]
 
 
 def _detections(
@@ -302,7 +310,7 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
         {
             "import": {
                 "files": files,
-                "up": options.up,
+                "up": options.up or "",
                 "same_clock": options.same_clock,
                 "pose_shift_s": options.pose_shift_s,
                 "pose_clock_ppm": options.pose_clock_ppm,

@@ -4,16 +4,19 @@
 Line 1 holds pairs of key and value; then rows of types, names, identifiers and components stand
 over the row `Frame,Time (Seconds),...` that names the axes. Columns are found by these rows, since
 their order and number vary (markers, mean errors, time codes).
-(docs.optitrack.com, "Data Export: CSV".)
+(docs.optitrack.com, "Data Export: CSV".) Euler angles are degrees about axes that turn with the
+body, in the order that the rotation type names (help.naturalpoint.com, "Changes in Motive's
+Reported Euler Angles").
 """
 
 import csv
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from twinmill.data.importers.series import PoseSeries
 from twinmill.data.log import LogError
@@ -22,7 +25,8 @@ from twinmill.data.measurement_table import open_text
 UNIT_M = {"Meters": 1.0, "Centimeters": 0.01, "Millimeters": 0.001}
 HEADER_ROWS = 10  # more than any version has above the first frame
 CAPTURE_TIME = "%Y-%m-%d %I.%M.%S.%f %p"
-COMPONENTS = [("Position", axis) for axis in "XYZ"] + [("Rotation", axis) for axis in "WXYZ"]
+QUATERNION = "Quaternion"
+ROTATIONS = (QUATERNION, "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 
 @dataclass(frozen=True)
@@ -30,15 +34,20 @@ class _Header:
     """What the rows above the first frame say."""
 
     fields: dict[str, str]
-    bodies: dict[str, list[int]]  # name: columns of COMPONENTS
+    bodies: dict[str, list[int]]  # name: columns of position and rotation
     time_column: int
+
+    @property
+    def rotation(self) -> str:
+        """One of ROTATIONS."""
+        return self.fields.get("Rotation Type", QUATERNION)
 
 
 def read_motive(path: Path, robots: dict[str, int], up: str, absolute: bool) -> list[PoseSeries]:
     """Poses of all rigid bodies.
 
     Args:
-        path: the export, `.gz` too, with quaternions and global coordinates.
+        path: the export, `.gz` too, in global coordinates.
         robots: robot_id by name of the rigid body; bodies not named here get the last digits in
             their name.
         up: "y", Motive's default, or "z": the axis that the export calls up. Y up is turned by
@@ -65,13 +74,58 @@ def read_motive(path: Path, robots: dict[str, int], up: str, absolute: bool) -> 
             "than the one before; export the take again."
         )
     scale = _unit_m(header, path.name)
-    series = []
-    for k, (name, number) in enumerate(_numbered(header, robots, path.name).items()):
-        block = values[:, 1 + 7 * k : 8 + 7 * k]
-        series.append(_pose_series(number, utime_us, block[:, :3] * scale, block[:, 3:], up))
-        if not series[-1].valid.any():
-            raise LogError(f"{path.name}: rigid body '{name}' is never tracked; export it solved.")
-    return series
+    blocks = np.split(values[:, 1:], len(header.bodies), axis=1)
+    poses = {
+        body: with_z_up(block[:, :3] * scale, _quaternion(block[:, 3:], header.rotation), up)
+        for body, block in zip(header.bodies, blocks, strict=True)
+    }
+    return robots_of(poses, utime_us, robots, path.name)
+
+
+def robots_of(
+    poses: dict[str, tuple[np.ndarray, np.ndarray]],
+    utime_us: np.ndarray,
+    robots: dict[str, int],
+    name: str,
+) -> list[PoseSeries]:
+    """The bodies that are robots and were seen; the others are named in a warning.
+
+    Args:
+        poses: (N, 3) m in W and (N, 4) quaternion, w first, of each body; NaN where it was lost.
+        utime_us: (N,) ascending.
+        robots: robot_id by body; others get the last digits in their names.
+        name: of the file.
+
+    Raises:
+        LogError: no body is a robot or was seen, two have one number, or `robots` names another.
+    """
+    if unknown := set(robots) - set(poses):
+        raise LogError(
+            f"{name}: has no rigid body '{min(unknown)}' (it has {', '.join(poses)}); correct "
+            "--robot."
+        )
+    series: dict[int, PoseSeries] = {}
+    left_out = []
+    for body, (position_m, quaternion) in poses.items():
+        number = number_of(body, robots)
+        if number in series:
+            raise LogError(
+                f"{name}: rigid body '{body}' gives the number {number}, which another has; give "
+                f"it its own in 0..99 with --robot '{body}=ID'."
+            )
+        own = _pose_series(number, utime_us, position_m, quaternion)
+        if number < 0:
+            left_out.append(
+                f"rigid body '{body}' gives no robot_id in 0..99; give it with --robot '{body}=ID'"
+            )
+        elif not own.valid.any():
+            left_out.append(f"rigid body '{body}' is never tracked; export it solved")
+        else:
+            series[number] = own
+    if not series:
+        raise LogError(f"{name}: {left_out[0]}.")
+    told = [f"{name}: {reason}; it is left out." for reason in left_out]
+    return [replace(s, warnings=told if k == 0 else []) for k, s in enumerate(series.values())]
 
 
 def _header(reader, name: str) -> _Header:
@@ -88,17 +142,20 @@ def _header(reader, name: str) -> _Header:
             "(Seconds)', so it is no Motive export; use --poses for plain CSV."
         )
     fields = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
-    for key, needed in (("Rotation Type", "Quaternion"), ("Coordinate Space", "Global")):
-        if fields.get(key, needed) != needed:
+    for key, good in (("Rotation Type", ROTATIONS), ("Coordinate Space", ("Global",))):
+        if fields.get(key, good[0]) not in good:
             raise LogError(
-                f"{name}: {key} is '{fields[key]}', but {needed} is needed; export "
+                f"{name}: {key} is '{fields[key]}', but must be {' or '.join(good)}; export "
                 "again with that setting."
             )
-    return _Header(fields, _bodies(rows, name), rows[-1].index("Time (Seconds)"))
+    axes = "WXYZ" if fields.get("Rotation Type", QUATERNION) == QUATERNION else "XYZ"
+    return _Header(fields, _bodies(rows, axes, name), rows[-1].index("Time (Seconds)"))
 
 
-def _bodies(rows: list[list[str]], name: str) -> dict[str, list[int]]:
-    """Columns of each rigid body in the order of COMPONENTS."""
+def _bodies(rows: list[list[str]], turned_about: str, name: str) -> dict[str, list[int]]:
+    """Columns of each rigid body: position, then rotation."""
+    wanted = [("Position", axis) for axis in "XYZ"]
+    wanted += [("Rotation", axis) for axis in turned_about]
     types = next((k for k, row in enumerate(rows) if "Rigid Body" in row), None)
     if types is None:
         raise LogError(
@@ -110,15 +167,15 @@ def _bodies(rows: list[list[str]], name: str) -> dict[str, list[int]]:
         if kind == "Rigid Body":
             places.setdefault(names[k], {})[components[k], axes[k]] = k
     for body, columns in places.items():
-        if missing := [" ".join(c) for c in COMPONENTS if c not in columns]:
+        if missing := [" ".join(c) for c in wanted if c not in columns]:
             raise LogError(
-                f"{name}: rigid body '{body}' lacks {missing[0]}; export positions and quaternions."
+                f"{name}: rigid body '{body}' lacks {missing[0]}; export positions and rotations."
             )
-    return {body: [columns[c] for c in COMPONENTS] for body, columns in places.items()}
+    return {body: [columns[c] for c in wanted] for body, columns in places.items()}
 
 
 def _row(row: list[str], header: _Header, where: str) -> list[float]:
-    """Time, then the seven components of each body; empty cells are NaN."""
+    """Time, then the components of each body; empty cells are NaN."""
     columns = [column for body in header.bodies.values() for column in body]
     try:
         return [
@@ -131,13 +188,25 @@ def _row(row: list[str], header: _Header, where: str) -> list[float]:
         ) from None
 
 
+def _quaternion(turned: np.ndarray, rotation: str) -> np.ndarray:
+    """(N, 4) w, x, y, z as they are, or of (N, 3) degrees about X, Y and Z in that order."""
+    if rotation == QUATERNION:
+        return turned
+    quaternion = np.full((len(turned), 4), np.nan)
+    known = np.isfinite(turned).all(axis=1)
+    ordered = turned[known][:, ["XYZ".index(axis) for axis in rotation]]
+    about = Rotation.from_euler(rotation, ordered, degrees=True)
+    quaternion[known] = about.as_quat(scalar_first=True)
+    return quaternion
+
+
 def _pose_series(
-    robot_id: int, utime_us: np.ndarray, position_m: np.ndarray, quaternion: np.ndarray, up: str
+    robot_id: int, utime_us: np.ndarray, position_m: np.ndarray, quaternion_wxyz: np.ndarray
 ) -> PoseSeries:
-    position_m, quaternion = with_z_up(position_m, quaternion, up)
-    norm = np.linalg.norm(quaternion, axis=1)
+    """Poses; not valid where a number is missing or a quaternion is far from length 1."""
+    norm = np.linalg.norm(quaternion_wxyz, axis=1)
     valid = np.isfinite(position_m).all(axis=1) & (np.abs(norm - 1) < 0.05)
-    unit = quaternion / np.where(valid, norm, np.nan)[:, None]
+    unit = quaternion_wxyz / np.where(valid, norm, np.nan)[:, None]
     return PoseSeries(robot_id, utime_us, np.where(valid[:, None], position_m, np.nan), unit, valid)
 
 
@@ -155,25 +224,6 @@ def number_of(body: str, robots: dict[str, int]) -> int:
     digits = re.findall(r"\d+", body)
     number = robots.get(body, int(digits[-1]) if digits else -1)
     return number if 0 <= number <= 99 else -1
-
-
-def _numbered(header: _Header, robots: dict[str, int], name: str) -> dict[str, int]:
-    """robot_id by body, in the order of the columns."""
-    if unknown := set(robots) - set(header.bodies):
-        raise LogError(
-            f"{name}: has no rigid body '{min(unknown)}' (it has "
-            f"{', '.join(header.bodies)}); correct --robot."
-        )
-    numbered = {}
-    for body in header.bodies:
-        number = number_of(body, robots)
-        if number < 0 or number in numbered.values():
-            raise LogError(
-                f"{name}: rigid body '{body}' gives no robot_id of its own in 0..99; "
-                f"give it with --robot '{body}=ID'."
-            )
-        numbered[body] = number
-    return numbered
 
 
 def _unit_m(header: _Header, name: str) -> float:
