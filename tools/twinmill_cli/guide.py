@@ -195,7 +195,7 @@ def _following(known: dict[str, StrEnum]) -> dict[str, StrEnum]:
         found["drive"] = Drive.TWIST
     if robot is Robot.TWIN:
         found |= {"poses": Poses.CSV, "clocks": Clocks.ONE}
-    elif poses in (Poses.CAMERA, Poses.OPTITRACK, Poses.VICON):  # films and takes count from their start
+    elif poses in (Poses.CAMERA, Poses.OPTITRACK, Poses.VICON):  # they count from their start
         found["clocks"] = Clocks.TWO
     return found
 

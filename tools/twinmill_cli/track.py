@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -26,16 +26,18 @@ if working():  # not for --help
     from twinmill.data.bus import open_bus
     from twinmill.data.importers.plain import Columns, read_commands
     from twinmill.files import check_new_file
-    from twinmill.track.align import align, shifted
+    from twinmill.track.align import align
     from twinmill.track.boards import Board
     from twinmill.track.camera import Camera, read_camera
-    from twinmill.track.detect import ROBOTS, Detector, gather
+    from twinmill.track.detect import ROBOTS, Detector, Sightings, gather
     from twinmill.track.film import Film, LiveCamera
-    from twinmill.track.floor import View, look, read_floor
+    from twinmill.track.floor import Floor, View, look, read_floor
     from twinmill.track.lens import Calibration, calibrate, pick_views
     from twinmill.track.live import find_view, publish
+    from twinmill.track.page import Page
     from twinmill.track.paths import RobotPath, Tags, follow, write_poses
     from twinmill.track.quality import Quality, judge
+    from twinmill.track.together import Pair, clocks, compared, merged, on_clock
     from twinmill_cli.numbers import parse_numbers
 
 WHOLE = 0.98  # of the frames that a container promises; some count them wrongly by a few
@@ -62,21 +64,31 @@ def register(app: typer.Typer) -> None:
 
 def _track(
     lens: Annotated[
-        Path,
-        typer.Option("--lens", metavar="TOML", show_default=False, help="Of track-calibrate."),
+        list[Path],
+        typer.Option(
+            "--lens",
+            metavar="TOML",
+            show_default=False,
+            help="Of track-calibrate; one for all cameras, or one for each.",
+        ),
     ],
     floor: Annotated[
-        Path,
-        typer.Option("--floor", metavar="TOML", show_default=False, help="Points on the floor."),
+        list[Path],
+        typer.Option(
+            "--floor", metavar="TOML", show_default=False, help="Points on the floor; likewise."
+        ),
     ],
     height_m: Annotated[
         float,
         typer.Option("--height", metavar="M", show_default=False, help="Of the tags over it."),
     ],
-    video: Annotated[Path | None, typer.Argument(metavar="[VIDEO]", show_default=False)] = None,
+    videos: Annotated[
+        list[Path] | None, typer.Argument(metavar="[VIDEO]...", show_default=False)
+    ] = None,
     camera: Annotated[
-        str, typer.Option("--camera", metavar="DEVICE", help="Or live: 0, or /dev/video0.")
-    ] = "",
+        list[str] | None,
+        typer.Option("--camera", metavar="DEVICE", help="Or live: 0, or /dev/video0; repeatable."),
+    ] = None,
     robots: Annotated[
         str, typer.Option("--robots", metavar="IDS", help="As 1-8,12; default: all seen.")
     ] = "",
@@ -91,8 +103,12 @@ def _track(
     exposure_ms: ExposureMs = None,
     line_delay_us: LineDelayUs = None,
     start_s: Annotated[
-        float, typer.Option("--start-s", help="Stamp of the first frame on the other clock.")
-    ] = 0.0,
+        list[float] | None,
+        typer.Option(
+            "--start-s",
+            help="Stamp of the first frame on the other clock; of each film, or of the first.",
+        ),
+    ] = None,
     commands: Annotated[
         Path | None,
         typer.Option("--commands", metavar="CSV", help="Or the commands, to find it by."),
@@ -100,63 +116,199 @@ def _track(
     duration_s: Annotated[
         float | None, typer.Option("--duration-s", min=0.1, help="Live; else until Ctrl-C.")
     ] = None,
+    port: Annotated[
+        int, typer.Option("--port", min=0, max=65535, help="Of the page; 0: any that is free.")
+    ] = 0,
     lcm_url: LcmUrl = "",
     force: Force = False,
     as_json: AsJson = False,
 ) -> dict:
-    """Find tagged robots in a film of one camera over the floor, and write their poses.
+    """Find tagged robots in films of cameras over the floor, and write their poses.
 
-    The CSV is what `twinmill import --poses` reads. With --camera the poses
-    are published on the bus, as those of a motion capture.
+    The CSV is what `twinmill import --poses` reads. Several films of one run are
+    joined: their clocks by robots that two cameras see at once. With --camera the
+    poses are published on the bus, as those of a motion capture, and a page shows
+    the pictures with what was found.
 
     Example: twinmill track run.mp4 --lens camera.toml --floor floor.toml --height 0.12
     """
-    if commands and (camera or start_s):
+    videos, camera, starts_s = videos or [], camera or [], start_s or []
+    if commands and (camera or starts_s):
         raise ValueError("--commands: say when a film began; give it a video, and no --start-s.")
-    if bool(video) == bool(camera):
-        raise ValueError("track: give a video, or --camera: one of them.")
+    if bool(videos) == bool(camera):
+        raise ValueError("track: give videos, or --camera: one of them.")
     wanted = frozenset(parse_numbers("--robots", robots, ROBOTS)) if robots else None
     if not 0.01 <= size_m <= 1 or not 0 <= height_m <= 5:
         raise ValueError("track: --size must be in 0.01..1 m, --height in 0..5 m.")
-    tags = Tags(size_m, height_m, wanted)
-    eye = _shutter(read_camera(lens), exposure_ms, line_delay_us)
+    tags, count = Tags(size_m, height_m, wanted), len(videos or camera)
+    eyes = [
+        _shutter(read_camera(path), exposure_ms, line_delay_us)
+        for path in _each("--lens", lens, count)
+    ]
+    floors = _each("--floor", floor, count)
     if camera:
-        return _live(camera, eye, floor, tags, lcm_url, duration_s, as_json)
-    out = out or Path(f"{video.stem}.csv")
+        return _live(camera, eyes, floors, tags, lcm_url, duration_s, port, as_json)
+    out = out or Path(f"{videos[0].stem}.csv")
     check_new_file(out, force)
-    measured, film = read_floor(floor), _film(video, rate_hz)
-    _check_size(str(video), film.size_px, eye)
+    if len(starts_s) not in (0, 1, count):
+        raise ValueError(f"--start-s: {len(starts_s)} are given for {count} films; give one each.")
+    measured = [read_floor(path) for path in floors]
+    films = [_film(video, rate_hz) for video in videos]
+    for film, eye in zip(films, eyes, strict=True):
+        _check_size(str(film.path), film.size_px, eye)
     only = next(iter(wanted)) if wanted and len(wanted) == 1 else None
     orders = read_commands(commands, Columns(robot_id=only)) if commands else []
-    detector, stamp_s, found = Detector(), [], []
-    for at_s, picture in _shown(f"looking for tags in {video}", film):
-        stamp_s.append(start_s + at_s)
-        found.append(detector.find(picture))
-    seen = gather(found)
-    view = look(eye, measured, seen)
-    paths = follow(np.array(stamp_s), seen, view, tags)
+    found = _found(films, eyes, measured, tags, starts_s)
+    paths, begins_s = found.paths, found.starts_s[0]
     if orders:
-        start_s = align(paths, orders)
-        paths = shifted(paths, start_s)
-    quality = judge(paths, view, size_m)
+        begins_s = align(paths, orders)
+        paths = on_clock(paths, begins_s)
+    quality = judge(paths, found.views[0], size_m)
     write_poses(out, paths, height_m, force)
-    strangers = sorted(set(seen.number.tolist()) & set(ROBOTS) - {p.robot_id for p in paths})
+    strangers = sorted(found.numbers & set(ROBOTS) - {p.robot_id for p in paths})
     data = {
         "out": str(out),
-        "frames": len(found),
-        "frames_in_file": film.count,
-        "start_s": start_s,
+        "frames": sum(found.frames),
+        "frames_in_file": sum(film.count for film in films),
+        "start_s": begins_s,
         "strangers": strangers,
         **quality.to_json(),
+        "cameras": found.to_json(),
     }
-    notes = [f"The film began at {start_s:.2f} s of the commands."] if orders else []
-    if len(found) < WHOLE * film.count:
-        notes.append(f"! The film breaks off: of {film.count} frames {len(found)} can be read.")
+    notes = [f"The film began at {begins_s:.2f} s of the commands."] if orders else []
     if strangers:
         notes.append(f"! Tags that were not asked for: {', '.join(map(str, strangers))}.")
     notes += [f"! {warning}" for warning in quality.warnings]
-    deliver(data, _text(out, paths, quality, view, notes), as_json)
+    deliver(data, _text(out, paths, quality, [*notes, *found.notes()]), as_json)
     return data
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What was found in films, in their order.
+
+    Attributes:
+        films: which.
+        frames: how many of each could be read.
+        numbers: of all tags.
+        views: their cameras.
+        starts_s: what was added to their stamps.
+        pairs: how each agrees with those before it; None if no robot is in two.
+        paths: of the robots, through all films.
+    """
+
+    films: list[Film]
+    frames: list[int]
+    numbers: set[int]
+    views: list[View]
+    starts_s: list[float]
+    pairs: list[Pair | None]
+    paths: list[RobotPath]
+
+    def to_json(self) -> list[dict]:
+        """One object for each camera."""
+        return [
+            {
+                "video": str(film.path),
+                "start_s": start_s,
+                "camera_height_m": float(view.position_m[2]),
+                "camera_tilt_rad": view.tilt_rad,
+                "floor_error_px": view.error_px,
+                "apart_m": pair and pair.apart_m,
+                "apart_rad": pair and pair.apart_rad,
+                "overlap_s": pair and pair.overlap_s,
+            }
+            for film, view, start_s, pair in zip(
+                self.films, self.views, self.starts_s, self.pairs, strict=True
+            )
+        ]
+
+    def notes(self) -> list[str]:
+        """Sentences on the films and on where their cameras are."""
+        many, said = len(self.films) > 1, []
+        for k, (film, view) in enumerate(zip(self.films, self.views, strict=True)):
+            if self.frames[k] < WHOLE * film.count:
+                of = f" {film.path}" * many
+                words = f"of {film.count} frames {self.frames[k]} can be read."
+                said.append(f"! The film{of} breaks off: {words}")
+            said.append(
+                f"The camera{f' of {film.path}' * many} is {view.position_m[2]:.2f} m over the "
+                f"floor, tilted by {np.degrees(view.tilt_rad):.1f}°; the floor's points miss by "
+                f"{view.error_px:.2f} px."
+            )
+            if k:
+                said.append(_pair_words(film.path, self.starts_s[k], self.pairs[k]))
+        return said
+
+
+def _found(
+    films: list[Film],
+    eyes: list[Camera],
+    measured: list[Floor],
+    tags: Tags,
+    starts_s: list[float],
+) -> _Found:
+    """Looks for tags, puts each film on the floor and all on the first's clock, and joins them."""
+    stamps_s, seen = zip(*map(_looked, films), strict=True)
+    views = [look(*row) for row in zip(eyes, measured, seen, strict=True)]
+    numbers = {n for tagged in seen for n in tagged.number.tolist()}
+    if len(films) > 1 and (missing := (tags.robots or set()) - numbers):
+        raise ValueError(
+            f"--robots: tag {min(missing)} is in none of the films; see which tag is on which "
+            "robot."
+        )
+    tracked = []
+    for stamp_s, tagged, view in zip(stamps_s, seen, views, strict=True):
+        there = tags.robots and tags.robots & set(tagged.number.tolist())
+        own = replace(tags, robots=there) if there and len(films) > 1 else tags
+        tracked.append(follow(stamp_s, tagged, view, own))
+    pairs, starts_s = _placed(tracked, starts_s, [str(film.path) for film in films])
+    tracked = [on_clock(*row) for row in zip(tracked, starts_s, strict=True)]
+    paths = merged(tracked) if len(films) > 1 else tracked[0]
+    return _Found(films, list(map(len, stamps_s)), numbers, views, starts_s, pairs, paths)
+
+
+def _looked(film: Film) -> tuple[np.ndarray, Sightings]:
+    """Stamps of a film's frames, and the tags in them."""
+    detector, stamp_s, found = Detector(), [], []
+    for at_s, picture in _shown(f"looking for tags in {film.path}", film):
+        stamp_s.append(at_s)
+        found.append(detector.find(picture))
+    return np.array(stamp_s), gather(found)
+
+
+def _each(option: str, given: list[Path], count: int) -> list[Path]:
+    """One for each camera."""
+    if len(given) not in (1, count):
+        raise ValueError(
+            f"{option}: {len(given)} are given for {count} cameras; give one for all, or one for "
+            "each in their order."
+        )
+    return given * count if len(given) == 1 else given
+
+
+def _placed(
+    tracked: list[list[RobotPath]], starts_s: list[float], names: list[str]
+) -> tuple[list[Pair | None], list[float]]:
+    """How far apart cameras are where they overlap, and what is added to each film's stamps."""
+    if len(tracked) == 1:
+        return [None], starts_s or [0.0]
+    if len(starts_s) == len(tracked):
+        first = on_clock(tracked[0], starts_s[0])
+        rest = zip(tracked[1:], starts_s[1:], strict=True)
+        return [None, *(compared(first, on_clock(p, s)) for p, s in rest)], starts_s
+    pairs = clocks(tracked, names)
+    first_s = starts_s[0] if starts_s else 0.0
+    return pairs, [first_s + (pair.shift_s if pair else 0.0) for pair in pairs]
+
+
+def _pair_words(video: Path, shift_s: float, pair: Pair | None) -> str:
+    if pair is None:
+        return f"{video} begins at {shift_s:.3f} s; no robot is seen by two cameras at once."
+    return (
+        f"{video} begins at {shift_s:.3f} s; where two cameras see a robot, {pair.overlap_s:.1f} s "
+        f"in all, they are {1e3 * pair.apart_m:.1f} mm and {np.degrees(pair.apart_rad):.2f}° apart."
+    )
 
 
 def _film(video: Path, rate_hz: float | None) -> Film:
@@ -192,9 +344,7 @@ def _shown(what: str, film: Film) -> Iterator[tuple[float, np.ndarray]]:
         yield from progress.track(film.frames(), total=film.count or None, description=what)
 
 
-def _text(
-    out: Path, paths: list[RobotPath], quality: Quality, view: View, notes: list[str]
-) -> Group:
+def _text(out: Path, paths: list[RobotPath], quality: Quality, notes: list[str]) -> Group:
     table = Table(box=frame.SIMPLE_HEAD)
     for name in ("robot", "lost", "longest gap", "left out", "corners", "noise", "heading"):
         table.add_column(name, justify="right")
@@ -208,35 +358,36 @@ def _text(
             f"{1e3 * robot.position_noise_m:.2f} mm",
             f"{np.degrees(robot.heading_noise_rad):.2f}°",
         )
-    where = (
-        f"The camera is {view.position_m[2]:.2f} m over the floor, tilted by "
-        f"{np.degrees(view.tilt_rad):.1f}°; the floor's points miss by {view.error_px:.2f} px."
-    )
     head = f"{out}: {len(paths)} robots, {len(paths[0].t_s)} frames at {quality.rate_hz:.1f} Hz"
-    return Group(Text(head), table, *map(Text, [*notes, where, quality.sentence]))
+    return Group(Text(head), table, *map(Text, [*notes, quality.sentence]))
 
 
 def _live(
-    name: str,
-    eye: Camera,
-    floor: Path,
+    names: list[str],
+    eyes: list[Camera],
+    floors: list[Path],
     tags: Tags,
     lcm_url: str,
     duration_s: float | None,
+    port: int,
     as_json: bool,
 ) -> dict:
-    """Publishes until the time is over, the camera ends, or Ctrl-C."""
-    measured, bus = read_floor(floor), open_bus(lcm_url)
-    source = LiveCamera(name, eye.size_px)
+    """Publishes until the time is over, the cameras end, or Ctrl-C."""
+    measured, bus = [read_floor(floor) for floor in floors], open_bus(lcm_url)
+    page, sources = Page(len(names), port), []
+    console = Console(stderr=True)
     try:
-        _check_size(f"--camera {name}", source.size_px, eye)
-        frames = source.frames()
-        view = find_view(frames, eye, measured)
+        for name, eye in zip(names, eyes, strict=True):
+            sources.append(LiveCamera(name, eye.size_px))
+            _check_size(f"--camera {name}", sources[-1].size_px, eye)
+        frames = [source.frames() for source in sources]
+        views = [find_view(*row) for row in zip(frames, eyes, measured, strict=True)]
+        console.print(f"What the cameras see: {page.url}", soft_wrap=True)
         count, start_s = None, time.monotonic()
-        console = Console(stderr=True)
         with console.status("waiting for frames") as status:
             try:
-                for count in publish(frames, view, tags, bus.publish):
+                for count in publish(frames, views, tags, bus.publish):
+                    page.show(count.sight)
                     took_s = time.monotonic() - start_s
                     status.update(f"{count.frames / took_s:.0f} Hz, poses {count.poses}")
                     if duration_s and took_s >= duration_s:
@@ -244,15 +395,19 @@ def _live(
             except KeyboardInterrupt:
                 pass
     finally:
-        source.close()
+        page.close()
+        for source in sources:
+            source.close()
     if count is None:
-        raise ValueError(f"--camera {name}: gave no more frames; see that it is still plugged in.")
+        raise ValueError(
+            f"--camera {names[0]}: gave no more frames; see that it is still plugged in."
+        )
     took_s = time.monotonic() - start_s
     data = {
         "frames": count.frames,
         "poses": count.poses,
         "rate_hz": count.frames / took_s,
-        "floor_error_px": view.error_px,
+        "floor_error_px": max(view.error_px for view in views),
     }
     told = ", ".join(f"{robot}: {n}" for robot, n in sorted(count.poses.items())) or "none"
     deliver(data, f"{count.frames} frames at {data['rate_hz']:.0f} Hz; poses {told}", as_json)

@@ -4,8 +4,6 @@
 A start value for the estimate of the clocks' offset, which needs it within some tenths of a second.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.signal import correlate
 
@@ -47,11 +45,6 @@ def align(paths: list[RobotPath], commands: list[CommandSeries]) -> float:
             "of different lengths."
         )
     return float(shifts[best] + table_s - film_s)
-
-
-def shifted(paths: list[RobotPath], shift_s: float) -> list[RobotPath]:
-    """The same paths on another clock."""
-    return [replace(path, t_s=path.t_s + shift_s) for path in paths]
 
 
 def _likeness(

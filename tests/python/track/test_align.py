@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from twinmill.data.importers.series import CommandSeries
-from twinmill.track.align import align, shifted
+from twinmill.track.align import align
 from twinmill.track.paths import RobotPath
+from twinmill.track.together import on_clock
 
 EPOCH_S = 1.7e9
 
@@ -51,7 +52,7 @@ def test_beginning_is_found_wherever_it_is(begin_s, duration_s):
     path = driven(series, begin_s, duration_s, hidden=((3.0, 5.0),))
     shift_s = align([path], [series])
     assert shift_s == pytest.approx(EPOCH_S + begin_s, abs=0.05)
-    (moved,) = shifted([path], shift_s)
+    (moved,) = on_clock([path], shift_s)
     assert moved.t_s[0] == shift_s and np.array_equal(moved.pose, path.pose, equal_nan=True)
 
 

@@ -77,10 +77,10 @@ def folder(tmp_path_factory):
 
 
 def track(folder, *arguments, video="run.mp4"):
-    return cli.run(
-        ["track", str(folder / video), "--lens", str(folder / "camera.toml"),
-         "--floor", str(folder / "floor.toml"), "--height", str(HEIGHT_M), *map(str, arguments)]
-    )  # fmt: skip
+    words = ["track", str(folder / video), "--height", str(HEIGHT_M), *map(str, arguments)]
+    for option, name in (("--lens", "camera.toml"), ("--floor", "floor.toml")):
+        words += [] if option in words else [option, str(folder / name)]
+    return cli.run(words)
 
 
 @pytest.fixture(scope="module")
@@ -268,7 +268,7 @@ def test_live_two_robots_of_one_number_are_refused():
     twins = [ROBOTS[0], replace(ROBOTS[2], number=1)]
     frames = iter([(1000.0, Scene(LENS, twins).frame(0))])
     with pytest.raises(ValueError, match="number 1 was seen twice"):
-        list(publish(frames, view_of(LENS), Tags(0.10, HEIGHT_M), lambda *message: None))
+        list(publish([frames], [view_of(LENS)], Tags(0.10, HEIGHT_M), lambda *message: None))
 
 
 def test_shear_of_a_rolling_shutter_is_taken_out():
@@ -294,7 +294,7 @@ def test_live_poses_are_published_as_motion_capture_does():
     frames = ((1000 + k / RATE_HZ, film.frame(k)) for k in range(first, first + 5))
     view = replace(view_of(LENS), camera=replace(view_of(LENS).camera, exposure_s=0.003))
     tags = Tags(0.10, HEIGHT_M, frozenset({1, 2}))
-    counts = list(publish(frames, view, tags, lambda *message: said.append(message)))
+    counts = list(publish([frames], [view], tags, lambda *message: said.append(message)))
     poses = [(channel, turbopi.pose_t.decode(data)) for channel, data in said]
     of = {n: [p for channel, p in poses if channel == f"R{n:02d}_POSE"] for n in (1, 2)}
     assert [p.valid for p in of[1]] == [1] * 5 and counts[-1].poses[1] == 5
