@@ -9,7 +9,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.camera_frames import Frames, frames_of
-from twinmill.data.checks import InputFinding, check_poses, check_tracks
+from twinmill.data.checks import InputFinding, check_driven, check_poses, check_recorded
 from twinmill.data.log import Log, LogError, RobotLog, read_log
 from twinmill.data.steady_table import Sheet, is_sheet, read_sheets
 from twinmill.data.time_base import TimeBase, find_time_base, retimed
@@ -99,6 +99,28 @@ class Measurements(list[Measurement | Sheet]):
         super().__init__(judged)
         self.excluded, self.findings = excluded, findings
 
+    @property
+    def tracks(self) -> list[tuple[str, Track]]:
+        """Name of the log and track of each robot."""
+        return [(m.log_name, m.track) for m in self if isinstance(m, Measurement)]
+
+    def heeding(self, findings: Sequence[InputFinding]) -> "Measurements":
+        """These without the robots that more findings say to be wrong.
+
+        Raises:
+            BadInputError: nothing is left.
+        """
+        found = [*self.findings, *findings]
+        bad = {(f.log_name, f.robot_id) for f in found if f.fatal}
+        left = [
+            m for m in self if isinstance(m, Sheet) or (m.log_name, m.track.robot_id) not in bad
+        ]
+        if bad and not left:
+            raise BadInputError([f for f in found if f.fatal])
+        reasons = [f"Left out: {f}" for f in findings if f.fatal]
+        kept = [f for f in found if f.fatal or (f.log_name, f.robot_id) not in bad]
+        return Measurements(left, [*self.excluded, *reasons], kept)
+
 
 class BadInputError(LogError):
     """Nothing is left to judge, because the input is wrong; `findings` say how."""
@@ -123,6 +145,14 @@ def load_measurements(
         BadInputError: by their findings, nothing is left that could be judged.
         LogError: nothing could be read that could be judged; why not the first.
     """
+    cleaned = clean_measurements(paths, model)
+    return cleaned.heeding(check_driven(cleaned.tracks, model))
+
+
+def clean_measurements(
+    paths: Sequence[Path | Log], model: native.Model | None = None
+) -> Measurements:
+    """The same, but commands are not yet checked against the motion, which takes longest."""
     judged: list[Measurement | Sheet] = []
     excluded: list[LogError] = []
     findings: list[InputFinding] = []
@@ -145,18 +175,10 @@ def load_measurements(
                 judged.append(_measured(log, robot, runs))
             except LogError as error:
                 excluded.append(error)
-    runs = [m for m in judged if isinstance(m, Measurement)]
-    findings += check_tracks([(m.log_name, m.track) for m in runs], model)
-    bad = {(f.log_name, f.robot_id) for f in findings if f.fatal}
-    judged = [
-        m for m in judged if isinstance(m, Sheet) or (m.log_name, m.track.robot_id) not in bad
-    ]
-    if not judged and bad:
-        raise BadInputError([f for f in findings if f.fatal])
-    if not judged:
+    if not (judged or findings):
         raise excluded[0]
-    reasons = [*map(str, excluded), *(str(f) for f in findings if f.fatal)]
-    return Measurements(judged, [f"Left out: {reason}" for reason in reasons], findings)
+    read = Measurements(judged, [f"Left out: {error}" for error in excluded], [])
+    return read.heeding([*findings, *check_recorded(read.tracks, model)])
 
 
 def _measured(log: Log, robot: RobotLog, runs: int) -> Measurement:

@@ -13,6 +13,7 @@ from typing import Any
 from twinmill.charts.arrays import measured_path
 from twinmill.charts.packed import pack, pack_log, pack_prediction, pack_robot
 from twinmill.data.camera_frames import frames_of
+from twinmill.data.log import LogError
 from twinmill.diagnosis.detections.add import is_of_camera
 from twinmill.files import plain
 from twinmill.workbench.session import Session
@@ -46,7 +47,8 @@ class Bench:
         self.view: dict[str, Any] = state.read("view", {})
         self._waiting: Work | None = None
         self._written: tuple = ()
-        self._reads = False
+        self._reading, self._read = False, asyncio.Event()
+        self._checks: Done | None = None
         self.told = asyncio.Event()
         session.restore(state.read("session", {}))
 
@@ -56,7 +58,7 @@ class Bench:
         """Cleans the logs and judges the robots, that which is looked at first; in a thread.
 
         Raises:
-            LogError: nothing in them can be judged.
+            ValueError: nothing in them can be judged.
         """
         self.opening = f"cleaning {', '.join(p.name for p in self.session.paths)}"
         self.changed("work")
@@ -70,11 +72,29 @@ class Bench:
             self.changed("names")
             if index == self.picked:
                 self.changed("robots", "model", "findings")
-            if not self._reads:
-                self._reads = True
+            if not self._reading:
+                self._reading = True
                 self.worker.start(self.session.work("read"))
+            self._heed()
+        self.opening = "checking the commands against the motion"
+        self.changed("work")
+        await self._read.wait()
+        self._heed()
+        await asyncio.to_thread(self.session.conclude)
         self.opening = ""
         self.changed("work", "model", "score", "prediction")
+
+    def _heed(self) -> None:
+        """Leaves out the robots whose commands the worker found to be wrong, once it told."""
+        if self._checks is None or self.session.checked:
+            return
+        if self._checks.failure:
+            raise LogError(self._checks.failure)
+        picked = self.session.measurements[self.picked]
+        self.session.heed(self._checks.result["findings"])
+        places = [k for k, m in enumerate(self.session.measurements) if m is picked]
+        self.view["robot"] = places[0] if places else 0
+        self.changed("robots", "names", "model", "findings")
 
     def changed(self, *what: str) -> None:
         """Notes what a screen must draw anew."""
@@ -143,9 +163,10 @@ class Bench:
         self.changed("prediction", "beside")
 
     def cancel(self) -> None:
-        """Stops it."""
+        """Stops what the user waits for."""
         self._waiting = None
-        self.worker.cancel()
+        if self.doing:
+            self.worker.cancel()
         self.session.forget()
         self.session.beside = None
         self.changed("work", "score", "prediction", "beside")
@@ -158,13 +179,16 @@ class Bench:
         self._write()
 
     async def _take(self, done: Done) -> None:
-        if done.failure:
+        if done.work.kind == "read":
+            self._checks = done
+            self._read.set()
+        elif done.failure:
             self.cancel()
             self.failure = done.failure
         elif done.work.kind in ("fit", "add"):
             self.session.take(done)
             await self._settled()
-        elif done.work.kind != "read":
+        else:
             self.session.take(done)
             self.changed("work", "score", "findings", "plan", "swarm")
 

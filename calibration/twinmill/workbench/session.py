@@ -2,7 +2,8 @@
 """A session at the workbench without any screen: logs, models tried, predictions, scores, findings.
 
 Opened in stages, each slower than the one before: `read` gives the paths, `measure` what can be
-predicted, `judge` the floor and the clock of one robot at a time.
+predicted, `judge` the floor and the clock of one robot at a time. The checks of the commands take
+longest: they are made elsewhere, and `heed` takes in what they found.
 """
 
 import hashlib
@@ -15,8 +16,9 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.charts.arrays import RobotView
+from twinmill.data.checks import InputFinding
 from twinmill.data.log import Log, RobotLog, read_log
-from twinmill.data.measurement import Measurements, load_measurements
+from twinmill.data.measurement import Measurements, clean_measurements
 from twinmill.data.steady_table import is_sheet
 from twinmill.files import replacing
 from twinmill.fitting.fit import base_names
@@ -75,6 +77,7 @@ class Session:
 
     Attributes:
         robots: views of the robots that were judged, by place in `measurements`.
+        checked: the commands were held against the motion, and `heed` was told.
         held: names that a fit leaves alone.
         diagnosis: as `diagnose --json` gives it, and of which model; None before.
         plan: the next run, as the worker told it, or None.
@@ -98,6 +101,7 @@ class Session:
         self.logs: list[Log] = []
         self.measurements = Measurements([], [], [])
         self.robots: dict[int, OpenedView] = {}
+        self.checked = False
         self.held: set[str] = set()
         self.diagnosis: dict | None = None
         self.plan: dict | None = None
@@ -126,7 +130,7 @@ class Session:
         Raises:
             LogError: no run can be judged.
         """
-        self.measurements = load_measurements(self.logs, self.given.model)
+        self.measurements = clean_measurements(self.logs, self.given.model)
 
     @property
     def unjudged(self) -> list[int]:
@@ -134,11 +138,28 @@ class Session:
         return [k for k in range(len(self.measurements)) if k not in self.robots]
 
     def judge(self, index: int) -> None:
-        """Finds clock and noise floor of one robot; after the last, the score of all."""
+        """Finds clock and noise floor of one robot."""
         (opened,) = open_measurements([self.measurements[index]], self.given)
         self.robots = {**self.robots, index: OpenedView(opened)}
-        if self.unjudged:
-            return
+
+    def heed(self, findings: Sequence[InputFinding]) -> None:
+        """Leaves out the robots that the checks of the commands found to be wrong.
+
+        Raises:
+            BadInputError: none is left.
+        """
+        before, self.checked = self.measurements, True
+        self.measurements = before.heeding([f for f in findings if f not in before.findings])
+        places = {id(m): k for k, m in enumerate(self.measurements)}
+        kept = {k: places[id(m)] for k, m in enumerate(before) if id(m) in places}
+        self.robots = {kept[k]: view for k, view in self.robots.items() if k in kept}
+        for known in (self._bits, self._settled):
+            known.clear()
+        self.beside = None
+        self.forget()
+
+    def conclude(self) -> None:
+        """After the last robot: clocks that several share, and the score of all."""
         all_opened = [view.opened for view in self.robots.values()]
         for k, view in self.robots.items():
             on_clock = on_clock_of_others(view.opened, all_opened)
@@ -383,7 +404,7 @@ class Session:
 
     def score_now(self, exact: bool = False) -> None:
         """Of all robots where the tree stands, unless it is known."""
-        if self.unjudged or self.tree.current.number in self.tree.scores:
+        if self.unjudged or not self.checked or self.tree.current.number in self.tree.scores:
             return
         known = [s for s in self.own_scores().values() if np.isfinite(s)]
         total = total_score(known) if known else float("nan")

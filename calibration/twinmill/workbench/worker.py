@@ -178,7 +178,7 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
         known["all"] = load_measurements(logs, model)
     measurements = known["all"]
     if work.kind == "read":
-        return Done(work, {})
+        return Done(work, {"findings": measurements.findings})
     if work.kind in ("diagnose", "next") and known.get("text") != work.text:
         if work.kind == "next":
             check(measurements, model_file, _limits(work.options))

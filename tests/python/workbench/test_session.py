@@ -8,6 +8,7 @@ import shutil
 import numpy as np
 import pytest
 
+from twinmill.data.checks import InputFinding
 from twinmill.data.log import LogError
 from twinmill.model.model_file import ModelError
 from twinmill.workbench.session import Session
@@ -26,6 +27,8 @@ def opened(brief_coasting_robot, tmp_path_factory):
     session.read()
     session.measure()
     session.judge(0)
+    session.heed([])
+    session.conclude()
     yield session
     os.chdir(before)
 
@@ -132,6 +135,23 @@ def test_a_session_of_another_model_is_not_taken_for_this_one(session):
 def test_the_model_as_given_is_not_saved_again(session):
     with pytest.raises(ModelError, match="as given"):
         session.save(type(session.paths[0])("copy.toml"))
+
+
+def test_a_robot_that_the_checks_find_wrong_is_left_out_of_the_scores(session, compared):
+    """They come after the first predictions: places and scores are then those of the others."""
+    shutil.copy("run.lcmlog", "wrong.lcmlog")
+    two = Session([type(session.paths[0])(n) for n in ("wrong.lcmlog", "run.lcmlog")], "model.toml")
+    two.read()
+    two.measure()
+    two.judge(1)
+    number = two.measurements[0].track.robot_id
+    two.heed([InputFinding("exchanged", "by 9 %", "mend it", True, "wrong.lcmlog", number)])
+    two.conclude()
+    assert [m.log_name for m in two.measurements] == ["run.lcmlog"]
+    assert two.notes == [f"Left out: wrong.lcmlog R{number:02d}: exchanged: by 9 %; mend it."]
+    assert two.tree.scores[0].fitted == pytest.approx(compared.score, rel=1e-9)
+    with pytest.raises(LogError, match="exchanged"):
+        two.heed([InputFinding("exchanged", "by 9 %", "mend it", True, "run.lcmlog", number)])
 
 
 def test_a_log_that_is_not_there_is_one_sentence(session):

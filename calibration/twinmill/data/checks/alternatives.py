@@ -7,6 +7,7 @@ stretch of the log and judged on the others.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import permutations, product
 
 import numpy as np
@@ -23,6 +24,7 @@ from twinmill.data.checks.motion import (
 LEVERS_M = (0.05, 0.3)  # turning (rad/s) is weighed against moving (m/s) by the wheels' lever
 TWIST_LEVER_M = 0.2  # where there are no wheels
 ONE_FLIP = ((-1, -1, -1, -1), (-1, 1, -1, 1), (1, -1, 1, -1))  # all, the left, the right wheels
+POSE_SIGNS = ((1, False), (-1, True), (-1, False), (1, True))  # of headings; mirrored
 TRIED = 4  # lags and shifts
 LATES_S = np.arange(EARLY_S, LATE_S + STEP_S / 2, STEP_S)
 
@@ -76,7 +78,7 @@ def pose_alternatives() -> list[Alternative]:
     """Mirrored or turned positions, headings that turn the wrong way."""
     return [
         Alternative(heading_sign=sign, mirrored=mirrored, turned=turned)
-        for sign, mirrored in ((1, False), (-1, True), (-1, False), (1, True))
+        for sign, mirrored in POSE_SIGNS
         for turned in (False, True)
         if turned or sign < 0 or mirrored
     ]
@@ -125,7 +127,6 @@ class Search:
         self.felt = felt or {lag_s: motion.felt(lag_s) for lag_s in LAGS_S}
         self.starts = np.searchsorted(motion.block, np.arange(blocks))
         self._own_key: list[tuple[float, float]] = []
-        self._keys: dict[tuple, list[tuple[float, float]]] = {}
 
     def _by_block(self, rows: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(B, SHAPES, 4, n) sums over stretches of products of (K, SHAPES, 4) with (K, ..., n)."""
@@ -140,38 +141,50 @@ class Search:
         sums[filled] = np.add.reduceat(values, self.starts[filled])
         return sums
 
-    def _likely(self, body: np.ndarray, sign: int, mirrored: bool) -> list[tuple[float, float]]:
-        """Lags and shifts at which any mixture of the commands explains most.
+    @cached_property
+    def _likely(self) -> dict[tuple[int, bool], list[tuple[float, float]]]:
+        """Lags and shifts at which any mixture of the commands explains most, by pose signs.
 
         They do not depend on the order or the signs of the columns, nor on a constant angle.
         """
-        if (sign, mirrored) not in self._keys:
-            speeds = self._speeds(body, sign)
-            explained = {}
-            for lag_s, (begin_s, shapes) in self.felt.items():
-                linear = begin_s, shapes[:, 1]
-                for late_s in self.lates_s:
-                    rows = self.motion.at(linear, late_s)
-                    gram, moment = rows.T @ rows, rows.T @ speeds
-                    ridge = 1e-6 * (np.trace(gram) + 1e-12) * np.eye(4)
-                    explained[lag_s, late_s] = np.sum(
-                        moment * np.linalg.solve(gram + ridge, moment)
-                    )
-            ranked = sorted(explained, key=explained.get, reverse=True)
-            self._keys[sign, mirrored] = ranked[:TRIED]
-        return self._keys[sign, mirrored]
+        speeds = [self._speeds(self.motion.body_mps(*signs), signs[0]) for signs in POSE_SIGNS]
+        beside = np.hstack(speeds)  # (K, 3 of each)
+        explained: list[dict] = [{} for _ in POSE_SIGNS]
+        for lag_s, (begin_s, shapes) in self.felt.items():
+            for late_s in self.lates_s:
+                rows = self.motion.at((begin_s, shapes[:, 1]), late_s)
+                gram, moment = rows.T @ rows, rows.T @ beside
+                ridge = 1e-6 * (np.trace(gram) + 1e-12) * np.eye(4)
+                by_column = np.sum(moment * np.linalg.solve(gram + ridge, moment), axis=0)
+                for of_signs, sums in zip(explained, by_column.reshape(-1, 3), strict=True):
+                    of_signs[lag_s, late_s] = sums.sum()
+        return {
+            signs: sorted(of_signs, key=of_signs.get, reverse=True)[:TRIED]
+            for signs, of_signs in zip(POSE_SIGNS, explained, strict=True)
+        }
 
     def _explained(self, gram: np.ndarray, moment: np.ndarray) -> float:
         """Of the motion's square by the columns as they are, from (4, 4) and (4, 3) sums."""
-        weighted = self.wheels * np.array([1, 1, self.lever_m])[:, None]
+        weighted = self._weighted(self.wheels)
         along = np.maximum(np.einsum("ci,ic->c", weighted, moment), 0)
         power = np.einsum("ci,ij,cj->c", weighted, gram, weighted)
         return float(np.sum(along**2 / np.maximum(power, 1e-12)))
 
     def own(self) -> Explained:
         """The columns as they are, at the lag and the shift where they explain most of all."""
-        keys = [(lag_s, late_s) for lag_s in self.felt for late_s in self.lates_s]
-        own = self._best_of([OWN], 1, False, False, keys)[0]
+        speeds = self._speeds(self.motion.body_mps(), 1)
+        total = self._sums(np.sum(speeds**2, axis=1))
+        found: list[Explained] = []
+        for lag_s, (begin_s, shapes) in self.felt.items():
+            told = begin_s, shapes @ self._weighted(self.wheels).T
+            rows = [self.motion.at(told, late_s) for late_s in self.lates_s]
+            power = np.stack([self._sums(r**2) for r in rows])
+            along = np.stack([self._sums(r * speeds[:, None]) for r in rows])
+            left, gain = self._judged(power, along, total)
+            k = int(left.sum(axis=1).argmin())
+            late_s = float(self.lates_s[k])
+            found.append(Explained(OWN, float(left[k].sum()), left[k], 0.0, gain[k], lag_s, late_s))
+        own = min(found, key=lambda e: e.left)
         self._own_key = [(own.lag_s, own.late_s)]
         return own
 
@@ -182,7 +195,7 @@ class Search:
         for a in alternatives:
             by_pose.setdefault((a.heading_sign, a.mirrored, a.turned), []).append(a)
         for (sign, mirrored, turned), group in by_pose.items():
-            keys = self._likely(self.motion.body_mps(sign, mirrored), sign, mirrored)
+            keys = self._likely[sign, mirrored]
             found += self._best_of(group, sign, mirrored, turned, [*keys, *self._own_key])
         return found
 
@@ -243,13 +256,26 @@ class Search:
         told = rows[:, 1] @ self.wheels[:2].T
         return float(np.angle(np.sum(body * np.conj(told[:, 0] + 1j * told[:, 1]))))
 
+    def _weighted(self, mixing: np.ndarray) -> np.ndarray:
+        """(..., 3, 4) with the turn as fast as the wheels that make it."""
+        return mixing * np.array([1, 1, self.lever_m])[:, None]
+
     def _left(
         self, mixing: np.ndarray, gram: np.ndarray, moment: np.ndarray, total: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """(A, B) share left by stretch, judged by fits to the other half; (A, 3) gains."""
-        weighted = mixing * np.array([1, 1, self.lever_m])[:, None]
+        """(A, B) share left by stretch; (A, 3) gains; of (B, SHAPES, 4, 4 or 3) sums."""
+        weighted = self._weighted(mixing)
         power = np.einsum("aci,bsij,acj->absc", weighted, gram, weighted, optimize=True)
         along = np.einsum("aci,bsic->absc", weighted, moment, optimize=True)
+        return self._judged(power, along, total)
+
+    def _judged(
+        self, power: np.ndarray, along: np.ndarray, total: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(A, B) share left by stretch, judged by fits to the other half; (A, 3) gains.
+
+        Args: power, along (A, B, SHAPES, 3): told times itself and times measured. total (B,).
+        """
         left = np.zeros(power.shape[:2])
         for half in (0, 1):
             fit, judge = self.fold != half, self.fold == half
