@@ -243,10 +243,11 @@ class ScoreFit:
     def fit(self, rounds: int = ROUNDS) -> "ScoreFit":
         """Minimises the cost and leaves the values in the models."""
         x, damping = self.x, 1e-3
+        self.__dict__.pop("state", None)
         if len(x):
             rows, slopes = self._slopes(x)
             cost = self.cost(rows, x)
-            for _ in range(rounds):
+            for done in range(1, rounds + 1):
                 gram, pull = self._normal(rows, slopes, x)
                 moved = None
                 for _ in range(6):
@@ -262,10 +263,14 @@ class ScoreFit:
                     break
                 fell = cost - trial_cost
                 x, cost, damping = moved, trial_cost, max(damping / 10, 1e-9)
+                if done == rounds:  # slopes are found where they are asked for
+                    slopes = None
+                    break
                 rows, slopes = self._slopes(x)
                 if fell < CONVERGED * max(1.0, self.sizes.sum() * 1e-2):
                     break
-            self.__dict__["state"] = (rows, slopes)
+            if slopes is not None:
+                self.__dict__["state"] = (rows, slopes)
         self.x = x
         self.store()
         return self
