@@ -112,6 +112,7 @@ class Session:
         self._dragged: dict[str, float] = {}
         self._foreseen: dict[int, Opened] = {}
         self._passing: dict[int, Opened] = {}
+        self._clocks: dict[int, float] = {}  # as the hand goes on, they come nearer to the best
         self._settled: dict[tuple[int, int], Opened] = {}
 
     # -- opening --------------------------------------------------------------------------------
@@ -228,7 +229,7 @@ class Session:
 
     def forget(self) -> None:
         """Shows the model where the tree stands."""
-        self._dragged, self._passing, self._foreseen = {}, {}, {}
+        self._dragged, self._passing, self._clocks, self._foreseen = {}, {}, {}, {}
 
     def try_beside(self, effect: str, index: int) -> None:
         """Draws what an effect would change beside the model where the tree stands."""
@@ -351,7 +352,9 @@ class Session:
             model = self.model_file.model.copy()
             for name, value in self._dragged.items():
                 model.set(name, value)
-            self._passing[index] = settled.aligned(model, settled.model.get(CLOCK), DRAGGED_ROUNDS)
+            from_s = self._clocks.get(index, settled.model.get(CLOCK))
+            self._passing[index] = settled.aligned(model, from_s, DRAGGED_ROUNDS)
+            self._clocks[index] = self._passing[index].model.get(CLOCK)
         return self._passing[index]
 
     def passing_score(self, index: int) -> float:

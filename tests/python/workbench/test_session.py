@@ -11,6 +11,7 @@ import pytest
 from twinmill.data.checks import InputFinding
 from twinmill.data.log import LogError
 from twinmill.model.model_file import ModelError
+from twinmill.model.parameters import CLOCK
 from twinmill.workbench.session import Session
 from twinmill.workbench.worker import perform
 from twinmill_cli import main as cli
@@ -108,6 +109,17 @@ def test_views_show_a_model_on_the_clock_that_compare_finds_for_it(session):
     assert session.shown(0).score == pytest.approx(compared.score, rel=1e-3)
     on_the_clock_before = session.robots[0].opened.with_model(session.model_file.model).score
     assert session.shown(0).score < 0.9 * on_the_clock_before
+
+
+def test_as_a_hand_turns_a_knob_the_clock_goes_with_it(session):
+    """One step of the search each time is enough."""
+    for lag_s in (0.08, 0.1, 0.12, 0.14, 0.145, 0.15):
+        session.drag("base.motor_lag_s", lag_s)
+        dragged = session.shown(0)
+    session.keep()
+    settled = session.shown(0)
+    assert dragged.model.get(CLOCK) == pytest.approx(settled.model.get(CLOCK), abs=0.005)
+    assert dragged.score == pytest.approx(settled.score, rel=0.02)
 
 
 def test_the_first_answer_of_an_addition_is_near_the_full_one(session):
