@@ -106,6 +106,7 @@ def test_the_whole_conversation(import_turbopi, page):
         page.goto(url)
         is_predicted(page)
         shown = page.get_by_test_id("score")
+        expect(shown).to_have_text(re.compile(r"^\d"))  # the checks of the commands are made
         given = shown.text_content()
         turn_a_knob_and_back(page, given)
         find_where_it_fails(page)
