@@ -12,7 +12,7 @@
 #include "analytic_camera.h"
 #include "fw/step.h"
 #include "plant_mujoco/mujoco_plant.h"
-#include "swarm/camera_eye.h"
+#include "swarm/camera_sensor.h"
 
 namespace twin
 {
@@ -209,17 +209,18 @@ TEST(Camera, SameSeedSameBytes)
 }
 
 // A target straight ahead of a camera that looks left by the pan lands right of the middle.
-TEST(CameraEye, LooksWhereItsPanSays)
+TEST(CameraSensor, LooksWhereItsPanSays)
 {
     Sight sight = CameraSight({}, {});
     sight.pan_rad = 0.3;
-    CameraEye eye({}, 0, sight, 1);
+    CameraSensor camera({}, 0, sight, 1);
     const fw_config config = fw_config_default();
     fw_ctx firmware{};
     ASSERT_EQ(fw_init(&firmware, &config), FW_OK);
     fw_output out;
-    eye.Decide(std::vector<Pose2>{{}, {0.8, 0, 0}}, 1, firmware, out);
-    const Picture picture = eye.LastPicture();
+    camera.Expose(std::vector<Pose2>{{}, {0.8, 0, 0}}, 0, 1);
+    camera.Decide(1, firmware, out);
+    const Image picture = camera.LastImage();
     double columns = 0, count = 0;
     for (size_t i = 3; i < picture.yuyv.size(); i += 4)
         if (picture.yuyv[i] < 100)
@@ -231,19 +232,21 @@ TEST(CameraEye, LooksWhereItsPanSays)
     EXPECT_NEAR(columns / count, 320 + lens.focal_px * lens.Radius(0.3), 4);
 }
 
-TEST(CameraEye, AFrameArrivesAfterItsDelay)
+TEST(CameraSensor, AFrameArrivesAfterItsDelay)
 {
     const CameraWorld world;
     Sight sight = CameraSight({}, world);
     sight.delay_s = 0.05;
-    CameraEye eye(world, 0, sight, 1);
+    CameraSensor camera(world, 0, sight, 1);
     fw_config config = fw_config_default();
     fw_ctx firmware{};
     ASSERT_EQ(fw_init(&firmware, &config), FW_OK);
     fw_output out;
     for (int step = 0; step < 6; ++step)
     {
-        eye.Decide(std::vector<Pose2>{{}, {0.6, 0, 0}}, 1'000'000 + 20'000 * step, firmware, out);
+        const int64_t now_us = 1'000'000 + 20'000 * step;
+        camera.Expose(std::vector<Pose2>{{}, {0.6, 0, 0}}, 0, now_us);
+        camera.Decide(now_us, firmware, out);
         EXPECT_EQ(out.frame_utime_us, step < 3 ? 0 : 1'000'000 + 20'000 * (step - 3));
         EXPECT_EQ(out.detected_raw, step >= 3);
     }

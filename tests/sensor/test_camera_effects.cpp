@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "swarm/camera_eye.h"
+#include "swarm/camera_sensor.h"
 
 namespace twin
 {
@@ -38,7 +38,7 @@ class Looker
 {
 public:
     explicit Looker(const std::vector<Setting> &effects, const CameraWorld &world = Pinhole())
-        : eye_(world, 0, CameraSight(ModelWith(effects), world), 1)
+        : camera_(world, 0, CameraSight(ModelWith(effects), world), 1)
     {
         const fw_config config = fw_config_default();
         EXPECT_EQ(fw_init(&firmware_, &config), FW_OK);
@@ -48,7 +48,8 @@ public:
     {
         std::vector<Pose2> poses{{}};
         poses.insert(poses.end(), others.begin(), others.end());
-        eye_.Decide(poses, now_us_ += kPeriod_us, firmware_, out_);
+        camera_.Expose(poses, 0, now_us_ += kPeriod_us);
+        camera_.Decide(now_us_, firmware_, out_);
         return out_.detected_raw;
     }
 
@@ -77,7 +78,7 @@ private:
         return model;
     }
 
-    CameraEye eye_;
+    CameraSensor camera_;
     fw_ctx firmware_{};
     fw_output out_;
     int64_t now_us_ = 0;

@@ -110,8 +110,8 @@ TEST(CellGrid, SensorsSeeTheSameWithFarRobotsLeftOut)
                 const auto self =
                     static_cast<size_t>(std::ranges::lower_bound(near, i) - near.begin());
                 ConeSensor all(sight, static_cast<int>(i), 1), few(sight, static_cast<int>(i), 1);
-                const bool by_all = all.Expose(poses, 0)->detected;
-                EXPECT_EQ(by_all, few.Expose(some, self, 0)->detected);
+                const bool by_all = all.Next(poses, i, 0)->detected;
+                EXPECT_EQ(by_all, few.Next(some, self, 0)->detected);
                 seen += by_all;
             }
         }

@@ -73,8 +73,8 @@ TEST(ConeSensor, ErrorRatesAreThoseOfTheModel)
     int imagined = 0, missed = 0;
     for (int i = 0; i < kFrames; ++i)
     {
-        imagined += blind.Expose(apart, i)->detected;
-        missed += !seeing.Expose(close, i)->detected;
+        imagined += blind.Next(apart, 0, i)->detected;
+        missed += !seeing.Next(close, 0, i)->detected;
     }
     // Four standard deviations of a binomial count.
     EXPECT_NEAR(imagined, 0.1 * kFrames, 4 * std::sqrt(0.1 * 0.9 * kFrames));
@@ -90,7 +90,7 @@ TEST(ConeSensor, DelayHoldsFramesBackAndKeepsTheirTimeStamps)
     // Seen in the frame at 20 ms alone; 50 ms of delay end at the frame at 80 ms.
     for (int64_t t_us = 0; t_us <= 100'000; t_us += 20'000)
     {
-        const auto frame = delayed.Expose(t_us == 20'000 ? close : apart, t_us);
+        const auto frame = delayed.Next(t_us == 20'000 ? close : apart, 0, t_us);
         ASSERT_EQ(frame.has_value(), t_us >= 60'000) << t_us;
         if (frame)
         {

@@ -85,7 +85,7 @@ TEST(View, ASoftEdgeIsLogistic)
     int seen = 0;
     constexpr int kFrames = 20000;
     for (int i = 0; i < kFrames; ++i)
-        seen += sensor.Expose(std::vector<Pose2>{{}, At(1.02, 0)}, 1000 * i)->detected;
+        seen += sensor.Next(std::vector<Pose2>{{}, At(1.02, 0)}, 0, 1000 * i)->detected;
     const double p = 1 / (1 + std::exp(1));
     EXPECT_NEAR(seen, kFrames * p, 4 * std::sqrt(kFrames * p * (1 - p)));
 }
@@ -167,7 +167,7 @@ TEST(Decide, ADelayedPictureCarriesALateStamp)
     for (int64_t t_us = 0; t_us <= 100'000; t_us += 10'000)
     {
         const double x_m = t_us == 20'000 ? 0.5 : 5;
-        const auto frame = sensor.Expose(std::vector<Pose2>{{}, {x_m, 0, 0}}, t_us);
+        const auto frame = sensor.Next(std::vector<Pose2>{{}, {x_m, 0, 0}}, 0, t_us);
         ASSERT_EQ(frame.has_value(), t_us >= 50'000);
         if (frame)
         {

@@ -45,7 +45,7 @@ void UseCameras(Swarm &swarm, const CameraWorld &world, const std::vector<Model>
     for (int i = 0; i < swarm.Size(); ++i)
     {
         const Sight sight = CameraSight(robots[static_cast<size_t>(i)], world);
-        swarm.LookThrough(i, std::make_unique<CameraEye>(world, i, sight, seed));
+        swarm.SetSensor(i, std::make_unique<CameraSensor>(world, i, sight, seed));
     }
 }
 

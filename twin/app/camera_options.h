@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "model_file/model.h"
-#include "swarm/camera_eye.h"
+#include "swarm/camera_sensor.h"
 #include "swarm/swarm.h"
 
 namespace CLI

@@ -4,7 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 
-#include "hil/firmware_eye.h"
+#include "hil/firmware_sensor.h"
 
 namespace twin
 {
@@ -50,7 +50,7 @@ void UseFirmware(Swarm &swarm, const HilOptions &options, const CameraWorld &wor
         const size_t k = static_cast<size_t>(i);
         const Sight sight = CameraSight(robots[k], world);
         const FirmwareOptions firmware{program, behaviors[k]->name, !options.free_run};
-        swarm.LookThrough(i, std::make_unique<FirmwareEye>(firmware, world, i, sight, seed));
+        swarm.SetSensor(i, std::make_unique<FirmwareSensor>(firmware, world, i, sight, seed));
     }
 }
 

@@ -8,7 +8,7 @@
 
 #include "fw/behavior.h"
 #include "model_file/model.h"
-#include "swarm/camera_eye.h"
+#include "swarm/camera_sensor.h"
 #include "swarm/swarm.h"
 
 namespace CLI

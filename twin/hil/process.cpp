@@ -59,8 +59,8 @@ std::vector<std::string> CommandLine(const FirmwareOptions &options, const Camer
 
 }  // namespace
 
-FirmwareEye::Process::Process(const FirmwareOptions &options, const CameraSettings &camera,
-                              int robot, int vote_frames)
+FirmwareSensor::Process::Process(const FirmwareOptions &options, const CameraSettings &camera,
+                                 int robot, int vote_frames)
     : name_("robot " + std::to_string(robot) + ", " + options.program)
 {
     if (access(options.program.c_str(), X_OK) != 0)
@@ -78,18 +78,18 @@ FirmwareEye::Process::Process(const FirmwareOptions &options, const CameraSettin
     }
 }
 
-FirmwareEye::Process::~Process()
+FirmwareSensor::Process::~Process()
 {
     End();
 }
 
-void FirmwareEye::Process::Fail(const std::string &what) const
+void FirmwareSensor::Process::Fail(const std::string &what) const
 {
     throw std::runtime_error(name_ + ": " + what);
 }
 
-void FirmwareEye::Process::Start(const FirmwareOptions &options, const CameraSettings &camera,
-                                 int robot, int vote_frames)
+void FirmwareSensor::Process::Start(const FirmwareOptions &options, const CameraSettings &camera,
+                                    int robot, int vote_frames)
 {
     std::string folder = (std::filesystem::temp_directory_path() / "twin_hil_XXXXXX").string();
     if (!mkdtemp(folder.data()))
@@ -122,7 +122,7 @@ void FirmwareEye::Process::Start(const FirmwareOptions &options, const CameraSet
         Fail(std::string("cannot be started: ") + std::strerror(errno));
 }
 
-void FirmwareEye::Process::Accept()
+void FirmwareSensor::Process::Accept()
 {
     pollfd waiting{listener_, POLLIN, 0};
     for (int waited_ms = 0; poll(&waiting, 1, kPoll_ms) != 1; waited_ms += kPoll_ms)
@@ -140,7 +140,7 @@ void FirmwareEye::Process::Accept()
         Fail(std::string("does not open its camera: ") + std::strerror(errno));
 }
 
-void FirmwareEye::Process::Send(std::span<const uint8_t> frame)
+void FirmwareSensor::Process::Send(std::span<const uint8_t> frame)
 {
     while (!frame.empty())
     {
@@ -154,7 +154,7 @@ void FirmwareEye::Process::Send(std::span<const uint8_t> frame)
     ++sent_;
 }
 
-void FirmwareEye::Process::Receive(bool wait_for_last)
+void FirmwareSensor::Process::Receive(bool wait_for_last)
 {
     for (;;)
     {
@@ -177,7 +177,7 @@ void FirmwareEye::Process::Receive(bool wait_for_last)
 }
 
 // Asks it to end, and waits; kills it if it does not.
-void FirmwareEye::Process::End()
+void FirmwareSensor::Process::End()
 {
     if (pid_ > 0)
     {

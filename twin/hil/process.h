@@ -11,12 +11,12 @@
 #include <string>
 
 #include "fw/mixing.h"
-#include "hil/firmware_eye.h"
+#include "hil/firmware_sensor.h"
 
 namespace twin
 {
 
-class FirmwareEye::Process
+class FirmwareSensor::Process
 {
 public:
     Process(const FirmwareOptions &options, const CameraSettings &camera, int robot,

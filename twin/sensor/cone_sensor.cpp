@@ -9,7 +9,6 @@ namespace twin
 
 ConeSensor::ConeSensor(const Sight &sight, int robot, uint64_t seed)
     : sight_(sight),
-      self_(static_cast<size_t>(robot)),
       random_(seed, robot, "sensor"),
       age_us_(std::llround(sight.age_s * 1e6)),
       delay_us_(std::llround(sight.delay_s * 1e6))
@@ -31,8 +30,8 @@ double ConeSensor::ReachM() const
     return sight_.softness_m > 0 ? std::numeric_limits<double>::infinity() : sight_.range_m;
 }
 
-std::optional<SensorFrame> ConeSensor::Expose(std::span<const Pose2> poses, size_t self,
-                                              int64_t utime_us)
+std::optional<SensorFrame> ConeSensor::Next(std::span<const Pose2> poses, size_t self,
+                                            int64_t utime_us)
 {
     on_the_way_.push_back({Seen(poses, self), seq_++, utime_us + age_us_});
     std::optional<SensorFrame> newest;
@@ -42,6 +41,19 @@ std::optional<SensorFrame> ConeSensor::Expose(std::span<const Pose2> poses, size
         on_the_way_.pop_front();
     }
     return newest;
+}
+
+void ConeSensor::Expose(std::span<const Pose2> poses, size_t self, int64_t now_us)
+{
+    arrived_ = Next(poses, self, now_us);
+}
+
+void ConeSensor::Decide(int64_t now_us, fw_ctx &firmware, fw_output &out)
+{
+    if (arrived_)
+        fw_step_bit(&firmware, arrived_->detected, arrived_->utime_us, arrived_->seq, now_us, &out);
+    else
+        fw_step(&firmware, nullptr, now_us, &out);
 }
 
 }  // namespace twin

@@ -7,6 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "sensor/cone_sensor.h"
+
 namespace twin
 {
 namespace
@@ -83,17 +85,24 @@ Swarm::Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
         CheckModel(models[i], config);
         members_.push_back({{},
                             {},
-                            ConeSensor(sight, static_cast<int>(i), options.seed),
+                            std::make_unique<ConeSensor>(sight, static_cast<int>(i), options.seed),
                             models[i].base,
                             kFullPack_V,
                             nullptr,
-                            nullptr,
                             0});
-        reach_m_ = std::max(reach_m_, members_.back().sensor.ReachM());
         if (const fw_err error = fw_init(&members_.back().firmware, &config); error != FW_OK)
             throw std::invalid_argument(std::string("the firmware refuses its configuration: ") +
                                         fw_err_str(error));
     }
+    FindReach();
+}
+
+void Swarm::FindReach()
+{
+    reach_m_ = 0;
+    for (const Member &member : members_)
+        if (const double reach_m = member.sensor->ReachM(); std::isfinite(reach_m))
+            reach_m_ = std::max(reach_m_, reach_m);
 }
 
 void Swarm::Play(int robot, std::shared_ptr<const Script> script)
@@ -117,13 +126,13 @@ void Swarm::Select(int robot, const fw_behavior &behavior)
     Member &member = members_[static_cast<size_t>(robot)];
     if (fw_set_table(&member.firmware, &behavior.table) != FW_OK)
         throw std::invalid_argument("the firmware refuses the table");
-    if (member.eye)
-        member.eye->Select(behavior);
+    member.sensor->Select(behavior);
 }
 
-void Swarm::LookThrough(int robot, std::unique_ptr<Eye> eye)
+void Swarm::SetSensor(int robot, std::unique_ptr<RobotSensor> sensor)
 {
-    members_[static_cast<size_t>(robot)].eye = std::move(eye);
+    members_[static_cast<size_t>(robot)].sensor = std::move(sensor);
+    FindReach();
 }
 
 void Swarm::Step()
@@ -143,7 +152,8 @@ void Swarm::Decide()
     for (int i = 0; i < Size(); ++i)
     {
         Member &member = members_[static_cast<size_t>(i)];
-        DecideOne(member, Sense(i, now_us), now_us);
+        Expose(i, now_us);
+        DecideOne(member, now_us);
         const fw_output &out = member.output;
         Command command = CommandFor(member.base, {out.speed_input_pct, out.turn_input_milli},
                                      out.wheel_duty_pct);
@@ -155,14 +165,17 @@ void Swarm::Decide()
 
 bool Swarm::UsesGrid() const
 {
-    return members_.size() >= grid_from_ && reach_m_ > 0 && std::isfinite(reach_m_);
+    return members_.size() >= grid_from_ && reach_m_ > 0;
 }
 
-std::optional<SensorFrame> Swarm::Sense(int robot, int64_t now_us)
+void Swarm::Expose(int robot, int64_t now_us)
 {
-    ConeSensor &sensor = members_[static_cast<size_t>(robot)].sensor;
-    if (!UsesGrid())
-        return sensor.Expose(poses_, now_us);
+    RobotSensor &sensor = *members_[static_cast<size_t>(robot)].sensor;
+    if (!UsesGrid() || !std::isfinite(sensor.ReachM()))
+    {
+        sensor.Expose(poses_, static_cast<size_t>(robot), now_us);
+        return;
+    }
     near_poses_.clear();
     size_t self = 0;
     for (const size_t i : grid_.Near(static_cast<size_t>(robot)))
@@ -171,10 +184,10 @@ std::optional<SensorFrame> Swarm::Sense(int robot, int64_t now_us)
             self = near_poses_.size();
         near_poses_.push_back(poses_[i]);
     }
-    return sensor.Expose(near_poses_, self, now_us);
+    sensor.Expose(near_poses_, self, now_us);
 }
 
-void Swarm::DecideOne(Member &member, const std::optional<SensorFrame> &frame, int64_t now_us)
+void Swarm::DecideOne(Member &member, int64_t now_us)
 {
     if (member.script)
     {
@@ -186,13 +199,8 @@ void Swarm::DecideOne(Member &member, const std::optional<SensorFrame> &frame, i
         else
             fw_step_script_input(&member.firmware, &now.input, &member.output);
     }
-    else if (member.eye)
-        member.eye->Decide(poses_, now_us, member.firmware, member.output);
-    else if (frame)
-        fw_step_bit(&member.firmware, frame->detected, frame->utime_us, frame->seq, now_us,
-                    &member.output);
     else
-        fw_step(&member.firmware, nullptr, now_us, &member.output);
+        member.sensor->Decide(now_us, member.firmware, member.output);
 
     double duty = 0;
     for (const int8_t pct : member.output.wheel_duty_pct)
@@ -227,10 +235,9 @@ double Swarm::BatteryV(int robot) const
     return members_[static_cast<size_t>(robot)].battery_V;
 }
 
-Picture Swarm::LastPicture(int robot) const
+Image Swarm::LastImage(int robot) const
 {
-    const auto &eye = members_[static_cast<size_t>(robot)].eye;
-    return eye ? eye->LastPicture() : Picture{};
+    return members_[static_cast<size_t>(robot)].sensor->LastImage();
 }
 
 }  // namespace twin

@@ -36,7 +36,7 @@ void InitTriangle(mjvGeom *geom, const mjtNum a[3], const mjtNum b[3], const mjt
 }
 
 // Every second pixel of a YUYV frame as RGB (BT.601), the lowest row first.
-void HalveToRgb(const Picture &picture, std::vector<uint8_t> &rgb)
+void HalveToRgb(const Image &picture, std::vector<uint8_t> &rgb)
 {
     rgb.clear();
     const auto byte = [](double value) {
@@ -162,7 +162,7 @@ void Painter::Draw(const Swarm &swarm, int robot_in_corner, const std::string &n
 // The frame that the firmware was given; for robots without one, what MuJoCo's camera shows.
 void Painter::DrawCorner(const Swarm &swarm, int robot, const mjrRect &area)
 {
-    const Picture picture = swarm.LastPicture(robot);
+    const Image picture = swarm.LastImage(robot);
     mjrRect corner{0, kCornerGap_px, kCornerWidth_px, kCornerHeight_px};
     if (!picture.yuyv.empty())
     {

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "plant/random.h"
+#include "sensor/robot_sensor.h"
 #include "sensor/view.h"
 
 namespace twin
@@ -22,7 +23,7 @@ struct SensorFrame
     int64_t utime_us;  // time stamp
 };
 
-class ConeSensor
+class ConeSensor final : public RobotSensor
 {
 public:
     // `sight` is this robot's own, effects included (Model::MakeSight).
@@ -30,27 +31,23 @@ public:
 
     // Exposes a frame at `utime_us`, misses and imagines targets at the given rates, and stamps it
     // age_s later. Returns the newest frame whose stamp is delay_s old or older; none if no further
-    // one has arrived.
-    std::optional<SensorFrame> Expose(std::span<const Pose2> poses, int64_t utime_us)
-    {
-        return Expose(poses, self_, utime_us);
-    }
-    // The same where `self` is this robot's place in `poses`, which may leave out robots that are
-    // ReachM() away or farther.
-    std::optional<SensorFrame> Expose(std::span<const Pose2> poses, size_t self, int64_t utime_us);
+    // one has arrived. `poses` and `self` as in Expose().
+    std::optional<SensorFrame> Next(std::span<const Pose2> poses, size_t self, int64_t utime_us);
 
-    // Robots farther away do not matter; infinite if the range has a soft edge.
-    double ReachM() const;
+    // Infinite if the range has a soft edge.
+    double ReachM() const override;
+    void Expose(std::span<const Pose2> poses, size_t self, int64_t now_us) override;
+    void Decide(int64_t now_us, fw_ctx &firmware, fw_output &out) override;
 
 private:
     bool Seen(std::span<const Pose2> poses, size_t self);
 
     Sight sight_;
-    size_t self_;
     Random random_;
     int64_t age_us_, delay_us_;
     uint32_t seq_ = 0;
     std::deque<SensorFrame> on_the_way_;
+    std::optional<SensorFrame> arrived_;
 };
 
 }  // namespace twin

@@ -10,9 +10,8 @@
 #include "fw/step.h"
 #include "model_file/model.h"
 #include "plant/plant.h"
-#include "sensor/cone_sensor.h"
+#include "sensor/robot_sensor.h"
 #include "swarm/cell_grid.h"
-#include "swarm/eye.h"
 #include "swarm/script.h"
 
 namespace twin
@@ -52,8 +51,8 @@ public:
     void SetRunning(int robot, bool running);
     void Select(int robot, const fw_behavior &behavior);
 
-    // From now on `robot` decides by `eye` instead of the cone.
-    void LookThrough(int robot, std::unique_ptr<Eye> eye);
+    // From now on `robot` decides by `sensor`; at first each decides by a ConeSensor.
+    void SetSensor(int robot, std::unique_ptr<RobotSensor> sensor);
 
     // Decide(), then Substeps() times Advance().
     void Step();
@@ -75,31 +74,31 @@ public:
     // What the firmware decided last.
     const fw_output &Output(int robot) const;
     double BatteryV(int robot) const;
-    // What the robot's eye saw last; empty if the cone decides.
-    Picture LastPicture(int robot) const;
+    // What the robot's sensor drew last; empty if it draws nothing.
+    Image LastImage(int robot) const;
 
 private:
     struct Member
     {
         fw_ctx firmware;
         fw_output output;
-        ConeSensor sensor;
+        std::unique_ptr<RobotSensor> sensor;
         Base base;
         double battery_V;
-        std::unique_ptr<Eye> eye;  // none: the cone decides
         std::shared_ptr<const Script> script;
         double script_begin_s;
     };
     bool UsesGrid() const;
-    std::optional<SensorFrame> Sense(int robot, int64_t now_us);
-    void DecideOne(Member &member, const std::optional<SensorFrame> &frame, int64_t now_us);
+    void FindReach();
+    void Expose(int robot, int64_t now_us);
+    void DecideOne(Member &member, int64_t now_us);
 
     std::unique_ptr<Plant> plant_;
     std::vector<Member> members_;
     std::vector<Pose2> poses_, near_poses_;
     CellGrid grid_;
     size_t grid_from_;
-    double reach_m_ = 0;  // of the sensors; infinite: no grid
+    double reach_m_ = 0;  // the longest finite one of a sensor; 0: none
     double period_s_;
     int substeps_;
     int64_t start_utime_us_;

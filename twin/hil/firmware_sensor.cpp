@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/firmware_eye.h"
+#include "hil/firmware_sensor.h"
 
 #include <cmath>
 #include <cstring>
@@ -9,9 +9,9 @@
 namespace twin
 {
 
-FirmwareEye::FirmwareEye(const FirmwareOptions &options, const CameraWorld &world, int robot,
-                         const Sight &sight, uint64_t seed)
-    : CameraEye(world, robot, sight, seed),
+FirmwareSensor::FirmwareSensor(const FirmwareOptions &options, const CameraWorld &world, int robot,
+                               const Sight &sight, uint64_t seed)
+    : CameraSensor(world, robot, sight, seed),
       options_(options),
       camera_(world.settings),
       robot_(robot),
@@ -20,9 +20,9 @@ FirmwareEye::FirmwareEye(const FirmwareOptions &options, const CameraWorld &worl
 {
 }
 
-FirmwareEye::~FirmwareEye() = default;
+FirmwareSensor::~FirmwareSensor() = default;
 
-void FirmwareEye::Select(const fw_behavior &behavior)
+void FirmwareSensor::Select(const fw_behavior &behavior)
 {
     options_.behavior = behavior.name;
     process_.reset();
@@ -34,7 +34,7 @@ void FirmwareEye::Select(const fw_behavior &behavior)
     }
 }
 
-void FirmwareEye::Show(std::span<const uint8_t> frame)
+void FirmwareSensor::Show(std::span<const uint8_t> frame)
 {
     if (recent_.size() == static_cast<size_t>(vote_frames_))
         recent_.pop_front();
@@ -42,10 +42,9 @@ void FirmwareEye::Show(std::span<const uint8_t> frame)
     process_->Send(frame);
 }
 
-void FirmwareEye::Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
-                         fw_output &out)
+void FirmwareSensor::Decide(int64_t now_us, fw_ctx &firmware, fw_output &out)
 {
-    const std::optional<fw_frame> frame = NextFrame(poses, now_us);
+    const std::optional<fw_frame> frame = DrawArrived();
     fw_step(&firmware, frame ? &*frame : nullptr, now_us, &out);
     if (frame)
         Show({frame->yuyv, frame->length_bytes});

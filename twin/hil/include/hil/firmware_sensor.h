@@ -2,8 +2,8 @@
 // Hardware in the loop: a robot of the swarm whose decisions the robot's own program makes. It runs
 // as a process with a stub camera, to which the twin sends what it draws, and a stub board, whose
 // bytes drive the wheels.
-#ifndef HIL_FIRMWARE_EYE_H
-#define HIL_FIRMWARE_EYE_H
+#ifndef HIL_FIRMWARE_SENSOR_H
+#define HIL_FIRMWARE_SENSOR_H
 
 #include <deque>
 #include <memory>
@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "swarm/camera_eye.h"
+#include "swarm/camera_sensor.h"
 
 namespace twin
 {
@@ -25,18 +25,17 @@ struct FirmwareOptions
     bool lockstep = true;
 };
 
-class FirmwareEye final : public CameraEye
+class FirmwareSensor final : public CameraSensor
 {
 public:
     // Starts the program. Throws std::runtime_error in one sentence if it does not come up.
-    FirmwareEye(const FirmwareOptions &options, const CameraWorld &world, int robot,
-                const Sight &sight, uint64_t seed);
-    ~FirmwareEye() override;
+    FirmwareSensor(const FirmwareOptions &options, const CameraWorld &world, int robot,
+                   const Sight &sight, uint64_t seed);
+    ~FirmwareSensor() override;
 
     // All but the duties is what the built-in firmware says of the same frame. Throws
     // std::runtime_error if the program is gone or silent.
-    void Decide(std::span<const Pose2> poses, int64_t now_us, fw_ctx &firmware,
-                fw_output &out) override;
+    void Decide(int64_t now_us, fw_ctx &firmware, fw_output &out) override;
     // Starts the program anew with that behaviour, and shows it the frames that its vote is about:
     // it then decides as one that was told while it ran.
     void Select(const fw_behavior &behavior) override;

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "swarm/camera_sensor.h"
+
+#include <cmath>
+
+namespace twin
+{
+
+CameraSensor::CameraSensor(const CameraWorld &world, int robot, const Sight &sight, uint64_t seed)
+    : sightings_(world, robot, sight, seed),
+      camera_(sightings_.settings(), robot, seed),
+      age_us_(std::llround(sight.age_s * 1e6)),
+      delay_us_(std::llround(sight.delay_s * 1e6))
+{
+}
+
+void CameraSensor::Expose(std::span<const Pose2> poses, size_t self, int64_t now_us)
+{
+    on_the_way_.push_back({{poses.begin(), poses.end()}, self, now_us + age_us_, seq_++});
+    arrived_.reset();
+    while (!on_the_way_.empty() && on_the_way_.front().utime_us + delay_us_ <= now_us)
+    {
+        arrived_ = std::move(on_the_way_.front());
+        on_the_way_.pop_front();
+    }
+}
+
+std::optional<fw_frame> CameraSensor::DrawArrived()
+{
+    if (!arrived_)
+        return std::nullopt;
+    frame_ = camera_.Draw(sightings_.Next(arrived_->poses), arrived_->poses[arrived_->self]);
+    fw_frame frame{};
+    frame.yuyv = frame_.data();
+    frame.width_px = sightings_.settings().width_px;
+    frame.height_px = sightings_.settings().height_px;
+    frame.stride_bytes = 2 * frame.width_px;
+    frame.utime_us = arrived_->utime_us;
+    frame.seq = arrived_->seq;
+    frame.length_bytes = frame_.size();
+    return frame;
+}
+
+void CameraSensor::Decide(int64_t now_us, fw_ctx &firmware, fw_output &out)
+{
+    const std::optional<fw_frame> frame = DrawArrived();
+    fw_step(&firmware, frame ? &*frame : nullptr, now_us, &out);
+}
+
+}  // namespace twin
