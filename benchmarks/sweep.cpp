@@ -7,7 +7,7 @@
 
 #include "fw/behavior.h"
 #include "paper_kernel.h"
-#include "sweep/lean.h"
+#include "sweep/batch.h"
 #include "sweep/worlds.h"
 
 namespace

@@ -33,7 +33,7 @@ def request(axes: list[str] = AXES, **changes) -> Request:
 @pytest.fixture
 def small_parts(monkeypatch):
     """Twelve parts or so, where the real size would make one."""
-    monkeypatch.setattr(request_module, "PART_LEAN", 7000)
+    monkeypatch.setattr(request_module, "PART_BATCHED", 7000)
 
 
 def test_any_number_of_workers_gives_the_same_bytes(tmp_path: Path, small_parts):
@@ -119,7 +119,7 @@ def test_mujoco_sweeps_have_the_same_bytes_on_any_number_of_workers(tmp_path: Pa
 KILLED = """
 import sys
 from twinmill.swarm import request as r
-r.PART_LEAN = 200000
+r.PART_BATCHED = 200000
 from twinmill_cli.twin_sweep import make_request, sweep
 print(sweep(make_request("milling", "paper.toml", ["v_mps=0.1:0.3:40"], seeds=20, duration_s=60.0),
       __import__("pathlib").Path(sys.argv[1]), workers=1)["parts_kept_before"])
@@ -150,7 +150,7 @@ def test_other_parameters_do_not_mix_into_a_folder(tmp_path: Path):
 def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(tmp_path: Path, monkeypatch):
     from dask.distributed import Client, LocalCluster
 
-    monkeypatch.setattr(request_module, "PART_LEAN", 400_000)
+    monkeypatch.setattr(request_module, "PART_BATCHED", 400_000)
     asked = request(["v_mps=0.1:0.3:20"], seeds=20, duration_s=60.0)
     sweep(asked, tmp_path / "here")
     with (

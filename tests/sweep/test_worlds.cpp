@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The lean kernel against the full path: firmware, cone sensor and planar plant robot by robot.
+// The batched kernel against the full path: firmware, cone sensor and planar plant robot by robot.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 
 #include "fw/behavior.h"
-#include "sweep/lean.h"
+#include "sweep/batch.h"
 #include "sweep/worlds.h"
 
 namespace twin
@@ -81,32 +81,32 @@ void PrintTo(const Variant &variant, std::ostream *out)
     *out << variant.name;
 }
 
-class LeanKernel : public ::testing::TestWithParam<Variant>
+class BatchKernel : public ::testing::TestWithParam<Variant>
 {
 };
 
-void ExpectSame(double lean, double full, double tolerance, const char *what)
+void ExpectSame(double batched, double full, double tolerance, const char *what)
 {
     if (std::isnan(full))
-        EXPECT_TRUE(std::isnan(lean)) << what;
+        EXPECT_TRUE(std::isnan(batched)) << what;
     else
-        EXPECT_NEAR(lean, full, tolerance * (1 + std::abs(full))) << what;
+        EXPECT_NEAR(batched, full, tolerance * (1 + std::abs(full))) << what;
 }
 
-TEST_P(LeanKernel, DoesWhatTheFirmwareAndPlantDo)
+TEST_P(BatchKernel, DoesWhatTheFirmwareAndPlantDo)
 {
     Cell cell = PaperCell();
     GetParam().change(cell);
-    ASSERT_EQ(WhyNotLean(cell.model), "");
+    ASSERT_EQ(WhyNotBatched(cell.model), "");
     std::vector<World> worlds;
     for (uint64_t seed = 1; seed <= 19; ++seed)  // not a multiple of any vector's width
         worlds.push_back({&cell, seed});
-    const auto lean = RunWorlds(worlds, GetParam().duration_s, Path::kBest);
+    const auto batched = RunWorlds(worlds, GetParam().duration_s, Path::kBest);
     const auto full = RunWorlds(worlds, GetParam().duration_s, Path::kFull);
     for (size_t w = 0; w < worlds.size(); ++w)
     {
         SCOPED_TRACE(worlds[w].seed);
-        const Metrics &l = lean[w].mean, &f = full[w].mean;
+        const Metrics &l = batched[w].mean, &f = full[w].mean;
         ExpectSame(l.circliness, f.circliness, 1e-7, "circliness");
         ExpectSame(l.radius_m, f.radius_m, 1e-7, "radius_m");
         ExpectSame(l.scatter_m2, f.scatter_m2, 1e-7, "scatter_m2");
@@ -115,14 +115,14 @@ TEST_P(LeanKernel, DoesWhatTheFirmwareAndPlantDo)
         ExpectSame(l.diffusion, f.diffusion, 1e-7, "diffusion");
         ExpectSame(l.groups, f.groups, 0.01, "groups");
         ExpectSame(l.contacts, f.contacts, 0.01, "contacts");
-        ExpectSame(lean[w].least_diffusion, full[w].least_diffusion, 1e-7, "least_diffusion");
+        ExpectSame(batched[w].least_diffusion, full[w].least_diffusion, 1e-7, "least_diffusion");
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Variants, LeanKernel, ::testing::ValuesIn(kVariants),
+INSTANTIATE_TEST_SUITE_P(Variants, BatchKernel, ::testing::ValuesIn(kVariants),
                          [](const auto &variant) { return std::string(variant.param.name); });
 
-TEST(LeanKernel, GivesTheSameBytesInAnyWidth)
+TEST(BatchKernel, GivesTheSameBytesInAnyWidth)
 {
     Cell cell = PaperCell(8);
     cell.model.robot.body_radius_m = 0.1;
@@ -134,12 +134,12 @@ TEST(LeanKernel, GivesTheSameBytesInAnyWidth)
     for (uint64_t seed = 1; seed <= 16; ++seed)
         worlds.push_back({&cell, seed});
     std::vector<std::vector<Outcome>> runs;
-    for (const LeanWidth &width : LeanWidths())
+    for (const BatchWidth &width : BatchWidths())
     {
         auto &run = runs.emplace_back(worlds.size());
         for (size_t at = 0; at < worlds.size(); at += width.lanes)
-            RunLean(width, std::span(worlds).subspan(at, width.lanes), 30,
-                    std::span(run).subspan(at));
+            RunBatch(width, std::span(worlds).subspan(at, width.lanes), 30,
+                     std::span(run).subspan(at));
         for (size_t w = 0; w < worlds.size(); ++w)
         {
             EXPECT_EQ(run[w].mean.circliness, runs[0][w].mean.circliness) << width.lanes;
@@ -174,7 +174,7 @@ TEST(CountSteps, MeasuresTheLastTenSeconds)
 
 // What single precision cannot tell is left to doubles: near and far from the origin, discs, wide
 // cones, and robots that stand in one place.
-TEST(LeanKernel, GivesTheSameBytesWithoutItsScreen)
+TEST(BatchKernel, GivesTheSameBytesWithoutItsPrefilter)
 {
     const std::function<void(Cell &)> changes[] = {
         [](Cell &) {}, [](Cell &c) { c.model.sensor.target_radius_m = 0.1; },
@@ -189,11 +189,11 @@ TEST(LeanKernel, GivesTheSameBytesWithoutItsScreen)
         Cell cell = PaperCell();
         change(cell);
         std::vector<World> worlds;
-        for (uint64_t seed = 1; seed <= LeanWidths().front().lanes; ++seed)
+        for (uint64_t seed = 1; seed <= BatchWidths().front().lanes; ++seed)
             worlds.push_back({&cell, seed});
         std::vector<Outcome> with(worlds.size()), without(worlds.size());
-        RunLean(LeanWidths().front(), worlds, 300, with, true);
-        RunLean(LeanWidths().front(), worlds, 300, without, false);
+        RunBatch(BatchWidths().front(), worlds, 300, with, true);
+        RunBatch(BatchWidths().front(), worlds, 300, without, false);
         for (size_t w = 0; w < worlds.size(); ++w)
         {
             EXPECT_EQ(with[w].mean.scatter_m2, without[w].mean.scatter_m2);

@@ -13,6 +13,7 @@
 #include "plant_mujoco/mujoco_plant.h"
 #include "swarm/metrics.h"
 #include "swarm/species.h"
+#include "sweep/batch.h"
 #include "sweep/worlds.h"
 
 using namespace nanobind::literals;
@@ -208,12 +209,12 @@ void BindSwarms(nb::module_ &m)
             "model"_a, "tables"_a, "ring_size"_a, "start"_a = "square", "spread_m"_a = 1.2,
             "poses"_a = std::vector<std::array<double, 3>>())
         .def_prop_ro("period_s", [](const Cell &cell) { return cell.model.base.control_period_s; })
-        .def_prop_ro("why_not_lean", [](const Cell &cell) { return WhyNotLean(cell.model); });
+        .def_prop_ro("why_not_batched", [](const Cell &cell) { return WhyNotBatched(cell.model); });
     m.def(
         "run_worlds", &Run, "cells"_a, "cell"_a, "seeds"_a, "duration_s"_a, "full"_a = false,
         "plant"_a = "planar",
         "(W, 10) OUTCOMES of worlds of cell and seed: METRICS and their least diffusion over the last "
-        "10 s; since when the class has held, NaN of the lean kernel.");
+        "10 s; since when the class has held, NaN of the batched kernel.");
     m.def("trace_world", &Trace, "cell"_a, "seed"_a, "duration_s"_a, "every_s"_a,
           "(T, n, 3) poses of one world, the start first.");
     m.def("measure", &MeasureAll, "pose"_a, "velocity"_a, "ring_size"_a, "range_m"_a,

@@ -11,7 +11,7 @@
 #include "swarm/bodies.h"
 #include "swarm/robots.h"
 #include "swarm/swarm.h"
-#include "sweep/lean.h"
+#include "sweep/batch.h"
 
 namespace twin
 {
@@ -83,13 +83,13 @@ Outcome RunFull(const World &world, double duration_s, const PlantMaker &make)
     return outcome;
 }
 
-// How many of the first worlds make one batch of the lean kernel.
+// How many of the first worlds make one batch of the batched kernel.
 size_t BatchSize(std::span<const World> worlds)
 {
     size_t size = 1;
-    const size_t most = std::min(worlds.size(), LeanWidths().front().lanes);
+    const size_t most = std::min(worlds.size(), BatchWidths().front().lanes);
     while (size < most && (worlds[size].cell == worlds[0].cell ||
-                           (WhyNotLean(worlds[size].cell->model).empty() &&
+                           (WhyNotBatched(worlds[size].cell->model).empty() &&
                             SameBatch(*worlds[size].cell, *worlds[0].cell))))
         ++size;
     return size;
@@ -97,39 +97,10 @@ size_t BatchSize(std::span<const World> worlds)
 
 }  // namespace
 
-std::vector<Pose2> StartsOf(const Cell &cell, uint64_t seed)
-{
-    if (!cell.poses.empty())
-        return cell.poses;
-    return StartPoses(cell.start, static_cast<int>(cell.tables.size()), cell.spread_m,
-                      cell.model.robot.body_radius_m, seed);
-}
-
 std::unique_ptr<Plant> MakePlanarBodies(const std::vector<Model> &models,
                                         const std::vector<Pose2> &starts, uint64_t seed)
 {
     return std::make_unique<PlanarBodies>(models, starts, seed);
-}
-
-std::string WhyNotLean(const Model &model)
-{
-    if (!model.effects.empty())
-        return std::string("the model has the effect ") + model.effects.front().spec->card.name;
-    if (model.noise.drive_mps > 0 || model.noise.drive_radps > 0)
-        return "the model has drive noise";
-    // With a frame older than this at the next step, the firmware forgets its votes.
-    const double timeout_s = static_cast<double>(fw_config_default().frame_timeout_us) * 1e-6;
-    if (model.sensor.delay_s + 2 * model.base.control_period_s > timeout_s)
-        return "the sensor's delay comes near the firmware's time-out";
-    if (model.base.motor_lag_s > 0)
-        return "the model has motor lag";
-    for (const auto &[id, values] : model.robot_overrides)
-    {
-        const Model robot = model.ForRobot(id);
-        if (robot.base.motor_lag_s > 0 || robot.sensor.delay_s != model.sensor.delay_s)
-            return "a robot of the model has a lag or delay of its own";
-    }
-    return "";
 }
 
 std::vector<Outcome> RunWorlds(std::span<const World> worlds, double duration_s, Path path)
@@ -139,13 +110,13 @@ std::vector<Outcome> RunWorlds(std::span<const World> worlds, double duration_s,
     {
         const World &world = worlds[done];
         size_t size = 1;
-        if (path == Path::kFull || !WhyNotLean(world.cell->model).empty())
+        if (path == Path::kFull || !WhyNotBatched(world.cell->model).empty())
             outcomes[done] = RunFull(world, duration_s, MakePlanarBodies);
         else
         {
             size = BatchSize(worlds.subspan(done));
-            RunLean(LeanWidths().front(), worlds.subspan(done, size), duration_s,
-                    std::span(outcomes).subspan(done, size));
+            RunBatch(BatchWidths().front(), worlds.subspan(done, size), duration_s,
+                     std::span(outcomes).subspan(done, size));
         }
         done += size;
     }

@@ -13,9 +13,9 @@ import twinmill_native as native
 from twinmill.swarm.axes import QUANTITIES, Axis, set_speeds
 
 MAX_ROBOTS = 1000
-# Agent-steps in one part: about a second's work. The lean kernel is a hundred times faster, and in
-# MuJoCo a world of two minutes is a part.
-PART_LEAN, PART_FULL, PART_MUJOCO = 50_000_000, 1_000_000, 5_000
+# Agent-steps in one part: about a second's work. The batched kernel is a hundred times faster, and
+# in MuJoCo a world of two minutes is a part.
+PART_BATCHED, PART_FULL, PART_MUJOCO = 50_000_000, 1_000_000, 5_000
 PLANTS = ("planar", "mujoco")
 
 
@@ -29,7 +29,7 @@ class Request:
         n: robots; None: what the behaviour says, or 6.
         first_seed, seeds: the first cell has so many seeds from the first on, the next cell the
             next ones: what is unlucky in one cell is not so in the others.
-        full: every robot its firmware and plant, also where the lean kernel would serve.
+        full: every robot its firmware and plant, also where the batched kernel would serve.
         same_seeds: every cell has the seeds of the first, so that cells differ by their values
             alone: for differences between cells.
         plant: "planar" or "mujoco"; the latter runs every robot its firmware.
@@ -150,15 +150,15 @@ class Request:
         return self.duration_s / model.get("base.control_period_s")
 
     def kernel(self, cell: native.Cell) -> str:
-        """What runs a cell: lean, full or mujoco."""
+        """What runs a cell: batched, full or mujoco."""
         if self.plant == "mujoco":
             return "mujoco"
-        return "full" if self.full or cell.why_not_lean else "lean"
+        return "full" if self.full or cell.why_not_batched else "batched"
 
     def parts(self) -> list[range]:
         """Worlds in pieces that depend on the request alone."""
         kernels = {self.kernel(self.cell(point)) for point in (self.points[0], self.points[-1])}
-        work = {"lean": PART_LEAN, "full": PART_FULL, "mujoco": PART_MUJOCO}
+        work = {"batched": PART_BATCHED, "full": PART_FULL, "mujoco": PART_MUJOCO}
         robots = max(self.robots(point) for point in (self.points[0], self.points[-1]))
         agent_steps = robots * self.steps(self.model)
         size = max(1, int(min(work[kernel] for kernel in kernels) / agent_steps))

@@ -131,7 +131,7 @@ def _summary(request: Request, folder: Path, begin_s: float) -> dict:
     wall_s = time.monotonic() - begin_s
     kernels = Counter(table["kernel"].to_pylist())
     planar = request.plant == "planar"
-    reasons = {request.cell(point).why_not_lean for point in request.points if planar} - {""}
+    reasons = {request.cell(point).why_not_batched for point in request.points if planar} - {""}
     return {
         "out": str(folder),
         "file": str(Store(folder).result),

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sweep/lean.h"
+#include "sweep/batch.h"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
 
+#include "fw/config.h"
 #include "fw/mixing.h"
 #include "plant/planar_plant.h"
 #include "plant/random.h"
@@ -21,17 +22,17 @@ namespace
 constexpr double kWindow_s = 10, kSample_s = 0.1;
 constexpr size_t kAlign = 64;
 
-std::vector<LeanWidth> UsableWidths()
+std::vector<BatchWidth> UsableWidths()
 {
-    std::vector<LeanWidth> widths;
+    std::vector<BatchWidth> widths;
 #ifdef __x86_64__
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512vl"))
-        widths.push_back({16, LeanAdvance16});
+        widths.push_back({16, BatchAdvance16});
     if (__builtin_cpu_supports("avx2"))
-        widths.push_back({8, LeanAdvance8});
+        widths.push_back({8, BatchAdvance8});
 #endif
-    widths.push_back({4, LeanAdvance4});
+    widths.push_back({4, BatchAdvance4});
     return widths;
 }
 
@@ -47,14 +48,14 @@ double StepS(const Base &base)
 }
 
 // The firmware's view of time: which frame has arrived, which votes are in.
-std::vector<LeanStep> Schedule(const Model &model, const StepCount &count, int vote_frames,
-                               int &kept_frames)
+std::vector<BatchStep> Schedule(const Model &model, const StepCount &count, int vote_frames,
+                                int &kept_frames)
 {
     const auto utime_us = [&](int step) {
         return std::llround(step * model.base.control_period_s * 1e6);
     };
     const int64_t delay_us = std::llround(model.sensor.delay_s * 1e6);
-    std::vector<LeanStep> schedule;
+    std::vector<BatchStep> schedule;
     schedule.reserve(static_cast<size_t>(count.steps));
     int frame = -1, pushed = 0;
     kept_frames = 1;
@@ -68,7 +69,7 @@ std::vector<LeanStep> Schedule(const Model &model, const StepCount &count, int v
         schedule.push_back({frame, slot, std::min(pushed, vote_frames), count.Measures(step)});
         kept_frames = std::max(kept_frames, step - std::max(frame, 0) + 1);
     }
-    for (LeanStep &step : schedule)
+    for (BatchStep &step : schedule)
         step.frame = step.frame < 0 ? -1 : step.frame % kept_frames;
     return schedule;
 }
@@ -76,7 +77,8 @@ std::vector<LeanStep> Schedule(const Model &model, const StepCount &count, int v
 class Batch
 {
 public:
-    Batch(const LeanWidth &width, std::span<const World> worlds, double duration_s, bool screens)
+    Batch(const BatchWidth &width, std::span<const World> worlds, double duration_s,
+          bool prefilters)
         : worlds_(worlds), lanes_(width.lanes), advance_(width.advance)
     {
         const Cell &cell = *worlds.front().cell;
@@ -86,14 +88,14 @@ public:
         plan_.n = static_cast<int>(cell.tables.size());
         plan_.ring = static_cast<int>(cell.ring_size);
         plan_.step_count = count.steps;
-        plan_.screens = screens;
+        plan_.prefilters = prefilters;
         plan_.substeps = SubstepCount(model.base.control_period_s, SwarmOptions{}.max_step_s);
         plan_.vote_frames = static_cast<int>(std::lround(model.sensor.vote_frames));
         schedule_ = Schedule(model, count, plan_.vote_frames, plan_.kept_frames);
         plan_.steps = schedule_.data();
         plan_.body_m = 2 * model.robot.body_radius_m;
         plan_.touch_m = plan_.body_m * kTouch;
-        const size_t size = static_cast<size_t>(LeanLayout(plan_).total) * lanes_ / 2;
+        const size_t size = static_cast<size_t>(BatchLayout(plan_).total) * lanes_ / 2;
         memory_.assign(size + kAlign / sizeof(double), 0.0);
         numbers_ = Aligned(memory_);
         for (size_t lane = 0; lane < lanes_; ++lane)  // idle lanes repeat the first world
@@ -104,7 +106,7 @@ public:
 
     Outcome OutcomeOf(size_t lane) const
     {
-        const auto mean = [&](LeanSum sum) { return Sum(sum, lane) / measured_; };
+        const auto mean = [&](BatchSum sum) { return Sum(sum, lane) / measured_; };
         return {{mean(kCirclinessSum), mean(kRadiusSum), mean(kScatterSum), mean(kRotationSum),
                  mean(kOddSum), mean(kDiffusionSum), mean(kGroupsSum), mean(kContactsSum)},
                 Sum(kLeastDiffusion, lane)};
@@ -117,10 +119,10 @@ private:
         return memory.data() + (kAlign - address % kAlign) % kAlign / sizeof(double);
     }
 
-    // A number of a lane, `at` that of LeanLayout.
+    // A number of a lane, `at` that of BatchLayout.
     double &Number(int at, size_t lane) const
     {
-        const size_t half = lanes_ / 2, size = static_cast<size_t>(LeanLayout(plan_).size);
+        const size_t half = lanes_ / 2, size = static_cast<size_t>(BatchLayout(plan_).size);
         return numbers_[(lane / half * size + static_cast<size_t>(at)) * half + lane % half];
     }
 
@@ -129,7 +131,7 @@ private:
         return Number(column * plan_.n + static_cast<int>(robot), lane);
     }
 
-    double &Sum(int sum, size_t lane) const { return Number(LeanLayout(plan_).sums + sum, lane); }
+    double &Sum(int sum, size_t lane) const { return Number(BatchLayout(plan_).sums + sum, lane); }
 
     void FillLane(size_t lane, const World &world)
     {
@@ -149,7 +151,7 @@ private:
             FillRow(i, lane, kUnseenX, kUnseenCourse, chain, robots[i].base, cell.tables[i].unseen);
             FillRow(i, lane, kSeenX, kSeenCourse, chain, robots[i].base, cell.tables[i].seen);
         }
-        Number(LeanLayout(plan_).range, lane) = cell.model.sensor.range_m;
+        Number(BatchLayout(plan_).range, lane) = cell.model.sensor.range_m;
         Sum(kLeastDiffusion, lane) = std::numeric_limits<double>::infinity();
     }
 
@@ -190,19 +192,19 @@ private:
 
     std::span<const World> worlds_;
     size_t lanes_;
-    LeanAdvance advance_;
+    BatchAdvance advance_;
     int measured_ = 0;
-    LeanPlan plan_{};
-    std::vector<LeanStep> schedule_;
+    BatchPlan plan_{};
+    std::vector<BatchStep> schedule_;
     std::vector<double> memory_;
     double *numbers_ = nullptr;
 };
 
 }  // namespace
 
-std::span<const LeanWidth> LeanWidths()
+std::span<const BatchWidth> BatchWidths()
 {
-    static const std::vector<LeanWidth> widths = UsableWidths();
+    static const std::vector<BatchWidth> widths = UsableWidths();
     return widths;
 }
 
@@ -225,10 +227,31 @@ StepCount CountSteps(double period_s, double duration_s)
     return {steps, first, stride};
 }
 
-void RunLean(const LeanWidth &width, std::span<const World> worlds, double duration_s,
-             std::span<Outcome> outcomes, bool screens)
+std::string WhyNotBatched(const Model &model)
 {
-    Batch batch(width, worlds, duration_s, screens);
+    if (!model.effects.empty())
+        return std::string("the model has the effect ") + model.effects.front().spec->card.name;
+    if (model.noise.drive_mps > 0 || model.noise.drive_radps > 0)
+        return "the model has drive noise";
+    // With a frame older than this at the next step, the firmware forgets its votes.
+    const double timeout_s = static_cast<double>(fw_config_default().frame_timeout_us) * 1e-6;
+    if (model.sensor.delay_s + 2 * model.base.control_period_s > timeout_s)
+        return "the sensor's delay comes near the firmware's time-out";
+    if (model.base.motor_lag_s > 0)
+        return "the model has motor lag";
+    for (const auto &[id, values] : model.robot_overrides)
+    {
+        const Model robot = model.ForRobot(id);
+        if (robot.base.motor_lag_s > 0 || robot.sensor.delay_s != model.sensor.delay_s)
+            return "a robot of the model has a lag or delay of its own";
+    }
+    return "";
+}
+
+void RunBatch(const BatchWidth &width, std::span<const World> worlds, double duration_s,
+              std::span<Outcome> outcomes, bool prefilters)
+{
+    Batch batch(width, worlds, duration_s, prefilters);
     batch.Run();
     for (size_t lane = 0; lane < worlds.size(); ++lane)
         outcomes[lane] = batch.OutcomeOf(lane);

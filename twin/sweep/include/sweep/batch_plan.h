@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the lean kernel works on: plain numbers, laid out by the caller. No headers of
+// What the batched kernel works on: plain numbers, laid out by the caller. No headers of
 // the library, see lanes.h.
-#ifndef SWEEP_LEAN_PLAN_H
-#define SWEEP_LEAN_PLAN_H
+#ifndef SWEEP_BATCH_PLAN_H
+#define SWEEP_BATCH_PLAN_H
 
 #include <stdint.h>
 
@@ -12,7 +12,7 @@ namespace twin
 {
 
 // Columns of n robots each.
-enum LeanColumn
+enum BatchColumn
 {
     // State.
     kX,
@@ -46,11 +46,11 @@ enum LeanColumn
     kCourseNow = kSeenCourse + kCourse,
     // Scratch.
     kScratch = kCourseNow + kCourse,
-    kLeanColumns = kScratch + 3,
+    kBatchColumns = kScratch + 3,
 };
 
 // Columns of n robots in single precision, 2 W worlds.
-enum ScreenColumn
+enum PrefilterColumn
 {
     kScreenX,
     kScreenY,
@@ -62,10 +62,10 @@ enum ScreenColumn
     kScreenHalfSin,
     kScreenTarget2,
     kScreenMargin,
-    kScreenColumns,
+    kPrefilterColumns,
 };
 
-enum LeanSum
+enum BatchSum
 {
     kCirclinessSum,
     kRadiusSum,
@@ -76,11 +76,11 @@ enum LeanSum
     kGroupsSum,
     kContactsSum,
     kLeastDiffusion,
-    kLeanSums,
+    kBatchSums,
 };
 
 // What the controller knows in a step: the same for all robots.
-struct LeanStep
+struct BatchStep
 {
     int32_t frame;   // newest that has reached it, modulo kept_frames; -1: none so far
     int32_t slot;    // of the vote that it takes; -1: it voted before
@@ -89,46 +89,46 @@ struct LeanStep
 };
 
 // What all lanes of a batch share.
-struct LeanPlan
+struct BatchPlan
 {
     int n, ring, step_count, substeps;
     int vote_frames;  // majority over this many
     int kept_frames;  // of the sensor, newest included
-    const LeanStep *steps;
+    const BatchStep *steps;
     bool target_is_disc, errors;
-    bool screens;    // in single precision first; results are the same to the bit
-    double most_m;   // that a robot may drive in a step
-    double body_m;   // diameter; 0: no bodies
-    double touch_m;  // nearer bodies count as in contact
+    bool prefilters;  // in single precision first; results are the same to the bit
+    double most_m;    // that a robot may drive in a step
+    double body_m;    // diameter; 0: no bodies
+    double touch_m;   // nearer bodies count as in contact
 };
 
 // Numbers of one lane, in units of the lane count: columns, range, sums, bits seen, votes' ones,
-// frames on the way, frames that vote. `total`: of two halves of a batch and their screen.
-struct LeanLayout
+// frames on the way, frames that vote. `total`: of two halves of a batch and their prefilter.
+struct BatchLayout
 {
     // Always inlined: see lanes.h on inline functions that are compiled for several processors.
-    [[gnu::always_inline]] explicit LeanLayout(const LeanPlan &p)
-        : range(kLeanColumns * p.n),
+    [[gnu::always_inline]] explicit BatchLayout(const BatchPlan &p)
+        : range(kBatchColumns * p.n),
           sums(range + 1),
-          seen(sums + kLeanSums),
+          seen(sums + kBatchSums),
           ones(seen + p.n),
           frames(ones + p.n),
           votes(frames + p.kept_frames * p.n),
           size(votes + p.vote_frames * p.n),
-          total(2 * size + kScreenColumns * p.n)
+          total(2 * size + kPrefilterColumns * p.n)
     {
     }
     int range, sums, seen, ones, frames, votes, size, total;
 };
 
-// Runs all steps of 2 W worlds. `numbers`: LeanLayout::total * W doubles, aligned to 64 bytes:
-// those of the first W worlds, of the others, of the screen.
-using LeanAdvance = void (*)(const LeanPlan &, double *numbers);
+// Runs all steps of 2 W worlds. `numbers`: BatchLayout::total * W doubles, aligned to 64 bytes:
+// those of the first W worlds, of the others, of the prefilter.
+using BatchAdvance = void (*)(const BatchPlan &, double *numbers);
 
-void LeanAdvance4(const LeanPlan &, double *numbers);
+void BatchAdvance4(const BatchPlan &, double *numbers);
 #ifdef __x86_64__
-void LeanAdvance8(const LeanPlan &, double *numbers);
-void LeanAdvance16(const LeanPlan &, double *numbers);
+void BatchAdvance8(const BatchPlan &, double *numbers);
+void BatchAdvance16(const BatchPlan &, double *numbers);
 #endif
 
 }  // namespace twin

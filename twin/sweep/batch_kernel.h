@@ -2,18 +2,18 @@
 // W worlds of robots without memory in their drive: a table row is a constant velocity, so that
 // a step is a rotation and a displacement worked out beforehand. Same rules as Swarm, PlanarBodies
 // and ConeSensor; differences are those of rounding.
-#ifndef SWEEP_LEAN_KERNEL_H
-#define SWEEP_LEAN_KERNEL_H
+#ifndef SWEEP_BATCH_KERNEL_H
+#define SWEEP_BATCH_KERNEL_H
 
 #include "plant/split_mix.h"
 #include "swarm/metrics_lanes.h"
-#include "sweep/lean_plan.h"
+#include "sweep/batch_plan.h"
 
 namespace twin
 {
 
 template <int W>
-class LeanKernel
+class BatchKernel
 {
     using L = Lanes<W>;
     using Real = typename L::Real;
@@ -21,7 +21,7 @@ class LeanKernel
     using Bits = typename L::Bits;
 
 public:
-    LeanKernel(const LeanPlan &plan, double *numbers)
+    BatchKernel(const BatchPlan &plan, double *numbers)
         : p_(plan), n_(plan.n), at_(plan), numbers_(reinterpret_cast<Real *>(numbers))
     {
     }
@@ -100,7 +100,7 @@ private:
         Mask *sent = BitsAt(at_.frames) + (step % p_.kept_frames) * n_;
         for (int i = 0; i < n_; ++i)
             sent[i] = seen[i];
-        const LeanStep now = p_.steps[step];
+        const BatchStep now = p_.steps[step];
         const Mask *arrived = BitsAt(at_.frames) + now.frame * n_;
         Mask *slot = BitsAt(at_.votes) + now.slot * n_;
         for (int i = 0; now.slot >= 0 && i < n_; ++i)
@@ -185,9 +185,9 @@ private:
         sums[kLeastDiffusion] = L::Min(sums[kLeastDiffusion], m.diffusion);
     }
 
-    const LeanPlan &p_;
+    const BatchPlan &p_;
     int n_;
-    LeanLayout at_;
+    BatchLayout at_;
     Real *numbers_;
 };
 

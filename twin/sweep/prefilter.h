@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // What robots see, worked out in single precision for two halves of a batch at once, with a bound
 // on its error: where that leaves doubt, doubles must tell.
-#ifndef SWEEP_LEAN_SCREEN_H
-#define SWEEP_LEAN_SCREEN_H
+#ifndef SWEEP_PREFILTER_H
+#define SWEEP_PREFILTER_H
 
 #include "single_lanes.h"
-#include "sweep/lean_plan.h"
+#include "sweep/batch_plan.h"
 
 namespace twin
 {
 
 template <int W>
-class LeanScreen
+class Prefilter
 {
     using S = SingleLanes<W>;
     using Real = typename S::Real;
@@ -19,8 +19,8 @@ class LeanScreen
     using Double = typename S::Double;
 
 public:
-    // `low`, `high`: the columns of each half; `memory`: kScreenColumns * n * W doubles.
-    LeanScreen(const LeanPlan &plan, const Double *low, const Double *high, double *memory)
+    // `low`, `high`: the columns of each half; `memory`: kPrefilterColumns * n * W doubles.
+    Prefilter(const BatchPlan &plan, const Double *low, const Double *high, double *memory)
         : n_(plan.n),
           // What bodies push each other is not bounded as well as what robots drive.
           refresh_(plan.body_m > 0 ? 1 : kRefresh),
@@ -94,7 +94,7 @@ private:
             FindMargins<kDisc, 0>();
     }
 
-    // The tests of LeanKernel::Sense as areas, positive inside: the robot sees the other if both
+    // The tests of BatchKernel::Sense as areas, positive inside: the robot sees the other if both
     // the range's and the cone's are. The largest over the others is kept.
     template <bool kDisc, int N>
     void FindMargins()

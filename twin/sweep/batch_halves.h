@@ -1,24 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // 2 W worlds to their end: what is seen in single precision where that is sure, all else in
 // doubles.
-#ifndef SWEEP_LEAN_BATCH_H
-#define SWEEP_LEAN_BATCH_H
+#ifndef SWEEP_BATCH_HALVES_H
+#define SWEEP_BATCH_HALVES_H
 
-#include "lean_kernel.h"
-#include "lean_screen.h"
+#include "batch_kernel.h"
+#include "prefilter.h"
 
 namespace twin
 {
 
 template <int W>
-class LeanBatch
+class BatchHalves
 {
 public:
-    LeanBatch(const LeanPlan &plan, double *numbers)
+    BatchHalves(const BatchPlan &plan, double *numbers)
         : p_(plan),
           low_(plan, numbers),
-          high_(plan, numbers + LeanLayout(plan).size * W),
-          screen_(plan, low_.Columns(), high_.Columns(), numbers + 2 * LeanLayout(plan).size * W)
+          high_(plan, numbers + BatchLayout(plan).size * W),
+          prefilter_(plan, low_.Columns(), high_.Columns(),
+                     numbers + 2 * BatchLayout(plan).size * W)
     {
     }
 
@@ -39,25 +40,25 @@ private:
     template <bool kDisc>
     void Sense(int step)
     {
-        if (p_.screens)
-            screen_.template Sense<kDisc>(step);
+        if (p_.prefilters)
+            prefilter_.template Sense<kDisc>(step);
         for (int i = 0; i < p_.n; ++i)
-            if (!p_.screens || screen_.Doubtful(i))
+            if (!p_.prefilters || prefilter_.Doubtful(i))
             {
                 low_.template Sense<kDisc>(i);
                 high_.template Sense<kDisc>(i);
             }
             else
             {
-                const auto seen = screen_.Seen(i);
+                const auto seen = prefilter_.Seen(i);
                 low_.Seen()[i] = SingleLanes<W>::Low(seen);
                 high_.Seen()[i] = SingleLanes<W>::High(seen);
             }
     }
 
-    const LeanPlan &p_;
-    LeanKernel<W> low_, high_;
-    LeanScreen<W> screen_;
+    const BatchPlan &p_;
+    BatchKernel<W> low_, high_;
+    Prefilter<W> prefilter_;
 };
 
 }  // namespace twin
