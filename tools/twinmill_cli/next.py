@@ -22,13 +22,12 @@ if working():  # not for --help
     from twinmill.data.measurement import Measurements
     from twinmill.diagnosis.diagnose import diagnose
     from twinmill.experiment.design import Limits, Plan, check, design, log_of
-    from twinmill.experiment.script_file import csv_text
+    from twinmill.experiment.foresight import csv_text
     from twinmill.export.script import TwistScript
     from twinmill.files import check_new_file
     from twinmill.fitting.opening import open_measurements
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import next_run as present
-    from twinmill.report.narrowing import terminal as present_narrowing
     from twinmill.swarm.classes import goal_of
     from twinmill.swarm.narrowing import Narrowing, design_for, spread_of
     from twinmill.swarm.request import Request
@@ -99,7 +98,7 @@ def _next(
         write_whole(output, csv_text(narrowing.rows))
         how = _how(narrowing, logs, model, output)
         data = {"script": str(output), **narrowing.to_json(), **source.to_json()}
-        deliver(data, present_narrowing(narrowing, how), as_json)
+        deliver(data, present.narrowing_terminal(narrowing, how), as_json)
         return narrowing
     with telling(f"designing a run with {model}") as say:
         measurements = load(logs, model_file, as_json)

@@ -17,8 +17,12 @@ if working():  # not for --help
 
     from twinmill.files import check_new_folder
     from twinmill.report import Provenance, Section, write_report
-    from twinmill.report.phase_figures import map_figure, probability_figure, thumbnail_figure
-    from twinmill.report.phase_slider import slider_figure
+    from twinmill.report.phase_figures import (
+        map_figure,
+        probability_figure,
+        slider_figure,
+        thumbnail_figure,
+    )
     from twinmill.report.tables import Cell, Table, number
     from twinmill.swarm.axes import ALIASES
     from twinmill.swarm.classes import check_goal, goal_of

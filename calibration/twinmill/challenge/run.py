@@ -12,7 +12,7 @@ from twinmill.challenge.drives import Leg, sampled
 from twinmill.challenge.physics import STEP_S, Hidden, Signals, slow
 from twinmill.challenge.robots import Robot
 from twinmill.challenge.rollers import drive_by_forces
-from twinmill.data.log_file import log_file
+from twinmill.data.lcm_log import log_file
 
 EPOCH_US = 1_700_000_000_000_000
 ROBOT_ID = 1

@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Events of an LCM log file, and the fixed-size messages in them as numpy arrays.
+"""LCM log files: their events, the fixed-size messages in them as numpy arrays, and a writer.
 
 Own reader of the container: LCM's drops a good event before a broken one, writes on stderr itself
 and does not say where the file breaks. Format: sync word, event number, stamp, two lengths (all
 big-endian), channel, data (LCM 1.5, lcm/eventlog.c).
 """
 
+import errno
+import os
 import re
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 
+import lcm
 import numpy as np
 import turbopi
 
@@ -139,3 +145,27 @@ def decode(payloads: list[bytes], message: type, channel: str) -> np.ndarray:
                 "message types; convert it with the programs that wrote it."
             )
     return np.frombuffer(b"".join(payloads), layout)
+
+
+@contextmanager
+def log_file(path: Path) -> Iterator[lcm.EventLog]:
+    """A new log for write_event(utime_us, channel, data), whole at the end of the block.
+
+    LCM closes a log without a word where its last events do not fit on the disk.
+
+    Args:
+        path: replaced if it exists.
+
+    Raises:
+        OSError: it could not be written; what there is of it stays.
+    """
+    log = lcm.EventLog(str(path), "w", overwrite=True)
+    try:
+        yield log
+        size_bytes = log.tell()
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    finally:
+        log.close()
+    if path.stat().st_size != size_bytes:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))

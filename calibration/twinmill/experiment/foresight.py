@@ -36,6 +36,17 @@ def rows_of(moves: list[Move]) -> Rows:
     return Rows((ends_s - hold_s)[fresh], duty[fresh], float(ends_s[-1]))
 
 
+def csv_text(rows: Rows) -> str:
+    """The script as firmware and twin read it.
+
+    Rows `t_s,fl_pct,fr_pct,rl_pct,rr_pct`, each held until the next; the last one stops.
+    """
+    lines = ["t_s,fl_pct,fr_pct,rl_pct,rr_pct"]
+    for t_s, duty in zip(rows.t_s, rows.duty, strict=True):
+        lines.append(",".join([f"{t_s:.3f}", *(f"{100 * d:.0f}" for d in duty + 0.0)]))
+    return "\n".join([*lines, f"{rows.end_s:.3f},0,0,0,0", ""])
+
+
 @dataclass(frozen=True)
 class Played:
     """Commands of one or several starts on one time axis, and when poses of them are seen.

@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """A log as an MCAP file for Foxglove: all channels with all fields, and robots to look at."""
 
+from functools import cache
 from pathlib import Path
+from typing import Any
 
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap_protobuf.writer import Writer
 
 from twinmill.export.foxglove_scene import COLORS, RobotScene
-from twinmill.export.protobuf import to_protobuf
 from twinmill.export.recording import Recording
 from twinmill.model.outlines import Body
 
+FIELD = descriptor_pb2.FieldDescriptorProto
+KINDS = {int: FIELD.TYPE_INT64, float: FIELD.TYPE_DOUBLE, str: FIELD.TYPE_STRING}
 OTHER = "#cc79a7"  # colour of robots with another channel prefix
 
 
@@ -54,6 +58,32 @@ def write_mcap(recording: Recording, path: Path, provenance: dict, body: Body) -
                 drawn = robot.on_telemetry(message, stamp_us)
             for topic, picture in drawn:
                 writer.write_message(topic, picture, 1000 * stamp_us, 1000 * stamp_us)
-            sent = to_protobuf(message)
+            sent = _to_protobuf(message)
             writer.write_message(channel.name, sent, 1000 * stamp_us, 1000 * message.utime_us)
     return len(events)
+
+
+def _to_protobuf(message: Any) -> Any:
+    """Our message as Protocol Buffers, which Foxglove reads with NaN: int64 and double."""
+    fields = {name: getattr(message, name) for name in message.__slots__}
+    return _protobuf_type(type(message))(**fields)
+
+
+@cache
+def _protobuf_type(kind: type) -> type:
+    file = descriptor_pb2.FileDescriptorProto(
+        name=f"turbopi/{kind.__name__}.proto", package="turbopi", syntax="proto3"
+    )
+    described, neutral = file.message_type.add(name=kind.__name__), kind()
+    for number, name in enumerate(kind.__slots__, start=1):
+        value = getattr(neutral, name)
+        is_array = isinstance(value, list)
+        described.field.add(
+            name=name,
+            number=number,
+            type=KINDS[type(value[0] if is_array else value)],
+            label=FIELD.LABEL_REPEATED if is_array else FIELD.LABEL_OPTIONAL,
+        )
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(file)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName(f"turbopi.{kind.__name__}"))

@@ -13,6 +13,10 @@ from twinmill.model.parameters import catalogue
 from twinmill.report import Section, show
 from twinmill.report import next_run_figures as figures
 from twinmill.report.tables import Cell, Table, Tone, number
+from twinmill.swarm.narrowing import Narrowing
+
+MOST_NAMED = 4  # quantities of a narrowing run
+SMALL_SHARE = 0.05  # of the variance
 
 
 @dataclass(frozen=True)
@@ -129,3 +133,30 @@ def _chances(plan: Plan) -> Table:
 
 def _tone(power: float) -> Tone:
     return "good" if power > 0.8 else "warn" if power > 0.5 else "bad"
+
+
+def narrowing_terminal(found: Narrowing, how: How) -> RenderableType:
+    """What a person reads of a run that narrows what a swarm is predicted to do."""
+    steps = [part for where, command in how.commands for part in (Text(where), _whole(command))]
+    return Group(*map(Text, [*_narrowed(found), how.first]), *steps)
+
+
+def _narrowed(found: Narrowing) -> list[str]:
+    """What is open, why, and what the run does about it."""
+    before, after = found.stds
+    share, shares = found.spread.shares.mean(), found.spread.shares
+    parts = [(name, part) for name, part in found.spread.parts().items() if abs(part) > SMALL_SHARE]
+    named = ", ".join(f"{name} ({part:.0%})" for name, part in parts[:MOST_NAMED])
+    moves = [(name, len(list(group))) for name, group in groupby(m.name for m in found.moves)]
+    drive = ", ".join(f"{count} x {name}" if count > 1 else name for name, count in moves)
+    said = [
+        f"{share:.0%} of runs end as {found.goal}; what the fits leave open makes that +- "
+        f"{before:.0%} ({len(shares)} models drawn, {shares.min():.0%} to {shares.max():.0%}).",
+        f"That hangs on {named}.",
+        f"After this run of {found.rows.end_s:.0f} s it would be +- {after:.0%}: {drive}.",
+    ]
+    if found.untold > SMALL_SHARE:
+        said.append(
+            f"{found.untold:.0%} of it no drive of one robot shows: measure that by itself."
+        )
+    return said

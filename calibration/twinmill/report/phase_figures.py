@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of a phase diagram: the map, the probability, and what the swarm looks like."""
+"""Pictures of a phase diagram: map, probability, what the swarm does, and a map to play with."""
+
+import json
+from importlib.resources import files
 
 import numpy as np
 import twinmill_native as native
@@ -292,3 +295,22 @@ def paint_paths(axes: Axes, trace: np.ndarray, color: str, odd: int = 0) -> None
     axes.plot([low[0], low[0] + 1], [low[1], low[1]], color=DARK, lw=2)
     for spine in axes.spines.values():
         spine.set_visible(True)
+
+
+def slider_figure(phase: Phase) -> Figure:
+    """A map of all axes, drawn by a script in the page itself: nothing is fetched."""
+    data = {
+        "axes": [{"label": axis.label, "values": axis.values} for axis in phase.axes],
+        "counts": phase.counts.tolist(),
+        "hits": phase.hits.tolist(),
+        "seeds": phase.seeds,
+        "goal": phase.goal,
+        "classes": list(COLORS.items()),
+    }
+    text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
+    script = files("twinmill.report").joinpath("slider.js").read_text()
+    return Figure(
+        f'<div id="phase"></div><script>const PHASE={text};\n{script}</script>',
+        "Move through all axes",
+        "Choose what goes along and up; the sliders set the rest. Point at a cell for its counts.",
+    )

@@ -39,6 +39,25 @@ def case(data_dir):
     return lambda letter: load_measurements([data_dir / f"hidden_effects/case_{letter}.lcmlog"])
 
 
+@pytest.fixture(scope="module")
+def explained(calibrated, case, tmp_path_factory):
+    """Case f, whose explanation begins with its diagnosis."""
+    return explain(case("f"), calibrated, tmp_path_factory.mktemp("f") / "explained.toml", "test")
+
+
+@pytest.fixture(scope="module")
+def diagnosed(calibrated, case, explained):
+    """The diagnosis of a case by its letter, made once."""
+    made = {"f": explained.diagnosis}
+
+    def make(letter):
+        if letter not in made:
+            made[letter] = diagnose(case(letter), calibrated)
+        return made[letter]
+
+    return make
+
+
 # Parameter, truth of the README, tolerance: a tenth for the other form of that robot's effects.
 ANSWERS = {
     "a": ("dead_zone", "dead_zone.width", 0.05),
@@ -49,9 +68,9 @@ ANSWERS = {
 
 
 @pytest.mark.parametrize("letter", ANSWERS)
-def test_the_one_hidden_effect_is_named_with_its_strength(calibrated, case, letter):
+def test_the_one_hidden_effect_is_named_with_its_strength(diagnosed, letter):
     effect, parameter, truth = ANSWERS[letter]
-    found = diagnose(case(letter), calibrated)
+    found = diagnosed(letter)
     assert found.verdict == "effect_missing" and found.found == [effect]
     (top,) = [f for f in found.findings if f.effect == effect]
     estimate = next(e for e in top.parameters if e.name == parameter)
@@ -62,15 +81,15 @@ def test_the_one_hidden_effect_is_named_with_its_strength(calibrated, case, lett
     assert found.rest.formula is None
 
 
-def test_a_marker_off_by_6_mm_is_found_though_it_hardly_matters(calibrated, case):
-    found = diagnose(case("d"), calibrated)
+def test_a_marker_off_by_6_mm_is_found_though_it_hardly_matters(diagnosed):
+    found = diagnosed("d")
     assert found.found == ["marker_offset"]
     offset_m = [e.value for e in found.findings[0].parameters]
     assert np.hypot(*offset_m) == pytest.approx(0.006, rel=0.15)
 
 
-def test_nothing_is_named_where_nothing_is_hidden(calibrated, case):
-    found = diagnose(case("e"), calibrated)
+def test_nothing_is_named_where_nothing_is_hidden(diagnosed):
+    found = diagnosed("e")
     assert found.verdict == "model_adequate" and found.found == []
     assert found.rest.formula is None
 
@@ -83,24 +102,23 @@ def test_what_the_catalogue_may_not_name_is_called_outside_it(calibrated, case):
     assert found.rest.depends_on == ["heading"]
 
 
-def test_one_score_for_one_log_and_model(calibrated, case, tmp_path):
+def test_one_score_for_one_log_and_model(calibrated, case, diagnosed, tmp_path):
     """`compare`, `fit`, `add` and `diagnose` say the same of the model as given."""
     logs = case("d")
     told = [
         compare(logs, calibrated).score,
         fit(logs, calibrated, tmp_path / "f.toml", "").before.score,
         add("marker_offset", logs, calibrated, tmp_path / "a.toml", "").before.score,
-        diagnose(logs, calibrated).to_json()["score"],
+        diagnosed("d").to_json()["score"],
     ]
     assert told == pytest.approx([told[0]] * 4, rel=0.01)
 
 
-def test_explain_writes_a_model_that_predicts_the_log(calibrated, case, tmp_path):
-    told = explain(case("f"), calibrated, tmp_path / "explained.toml", "test")
-    again = ModelFile.load(str(tmp_path / "explained.toml"))
+def test_explain_writes_a_model_that_predicts_the_log(case, explained):
+    again = ModelFile.load(str(explained.path))
     assert again.model.effects == ["battery_sag"]
-    assert compare(case("f"), again).score == pytest.approx(told.after.score, rel=0.01)
-    steps = told.to_json()["steps"]
+    assert compare(case("f"), again).score == pytest.approx(explained.after.score, rel=0.01)
+    steps = explained.to_json()["steps"]
     assert steps[0]["effect"] is None and steps[-1]["effect"] == "battery_sag"
     scores = [s["score_heldout"] for s in steps]
     assert scores == sorted(scores, reverse=True)

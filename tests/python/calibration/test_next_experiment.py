@@ -15,12 +15,11 @@ from twinmill.data.measurement import Measurement
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.experiment.design import Limits, Plan, check, design
-from twinmill.experiment.foresight import Rows, rows_of
+from twinmill.experiment.foresight import Rows, csv_text, rows_of
 from twinmill.experiment.information import CLOCKS, Ledger
 from twinmill.experiment.moves import AXES, family
 from twinmill.experiment.power import ALPHA, told_apart
 from twinmill.experiment.relevance import Relevance
-from twinmill.experiment.script_file import csv_text
 from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import Parameter

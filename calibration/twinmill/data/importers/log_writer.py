@@ -10,8 +10,8 @@ import numpy as np
 import turbopi
 
 from twinmill.data.importers.series import CommandSeries, DetectionSeries, PoseSeries
+from twinmill.data.lcm_log import log_file
 from twinmill.data.log import KINDS
-from twinmill.data.log_file import log_file
 
 CONTROL_PERIOD_US = 22_000  # a TurboPi tells its duties once per control step, new or held
 
