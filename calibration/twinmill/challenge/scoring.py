@@ -182,6 +182,8 @@ def _accepted(hidden: Hidden, case: Case) -> frozenset[str]:
     """Names that are right: clocks that are not declared one leave delay and offset open."""
     if hidden.name == "input_delay" and not case.plan.robot.same_clock:
         return frozenset({"input_delay", "clock_offset"})
+    if (hidden.name, hidden.kind) == ("motor_lag", "cousin"):
+        return frozenset({"motor_lag", "second_order_lag"})
     return frozenset({hidden.name})
 
 

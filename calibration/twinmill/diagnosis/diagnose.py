@@ -10,7 +10,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import Sheet
 from twinmill.diagnosis.detections.merge import with_bits
 from twinmill.diagnosis.encoders import geometry_notes, time_base_notes
-from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_lag
+from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_numbers
 from twinmill.diagnosis.irregularity import notes_on
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
 from twinmill.diagnosis.resolution import resolutions
@@ -129,8 +129,7 @@ def _by_clocks(opened: Sequence[Opened]) -> set[str]:
     logs = [o for o in opened if o.floor]
     if any(not o.same_clock for o in logs):
         return {"clock_offset", "clock_rate", "input_delay"}
-    declared = any(o.measurement.same_clock for o in logs)
-    return {"clock_offset"} if declared else set()
+    return {"clock_offset"} if any(o.one_clock for o in logs) else set()
 
 
 def _robot_of(own: Opened) -> int:
@@ -170,7 +169,9 @@ def _concluded(
     hashes = [o.measurement.log_sha256 for o in known]
     start, last = done.rounds[0].before, done.last
     findings, chain = findings_of(done, first)
-    findings = with_stale_lag(findings, last.state.model, model_file.lag_std_s(hashes))
+    findings = with_stale_numbers(
+        findings, last.state.model, model_file.lag_std_s(hashes), model_file.effect_stds
+    )
     rest = rest_of(known, last.fit, start.held_score, last.held_score, model_file.left_over(hashes))
     models = zip(known, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}

@@ -67,7 +67,8 @@ def explain(
     off = diagnosis.robots_off
     model = model_file.model.copy()
     own_effects = [e.name.split(".")[0] for r in off for e in r.parameters if e.name not in GAINS]
-    for effect in dict.fromkeys([*diagnosis.found, *own_effects]):
+    moved = diagnosis.model.effects[len(model.effects) :]
+    for effect in dict.fromkeys([*moved, *diagnosis.camera, *own_effects]):
         model.add_effect(effect.split("#")[0])
     estimates = [*fit.shared_estimates(), *diagnosis.bit_estimates]
     for estimate in estimates:

@@ -19,6 +19,13 @@ WITHIN = 2.0  # standard deviations: a lag that differs by less is the model's o
 BEYOND = 3.0  # usual sizes: a larger value is doubtful
 NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
 DELAY, CLOCK_OFF, MOTOR_LAG = "input_delay", "clock_offset", "motor_lag"
+# What makes a robot late: the part of lateness, and the parameter.
+LATE = {
+    MOTOR_LAG: ("lag", "extra_s"),
+    "second_order_lag": ("lag", "second_s"),
+    DELAY: ("delay", "delay_s"),
+    CLOCK_OFF: ("clock", "offset_s"),
+}
 
 
 @dataclass(frozen=True)
@@ -31,6 +38,7 @@ class Finding:
         share: of the squared held-out error at 0.5 s above the floor that it takes away.
         certainty: sure, group or doubtful.
         why: of a doubt; empty otherwise.
+        again: the model given has the effect already, with other numbers.
     """
 
     effect: str
@@ -39,6 +47,7 @@ class Finding:
     share: float
     certainty: str
     why: str = ""
+    again: bool = False
 
     @property
     def takes(self) -> str:
@@ -123,29 +132,53 @@ def findings_of(done: Search, first: State) -> tuple[list[Finding], list[tuple[s
     return found, [(n, t.held_score) for n, t in zip(names, chain[1:], strict=True)]
 
 
-def with_stale_lag(
-    found: Sequence[Finding], model: native.Model, lag_std_s: float
+def with_stale_numbers(
+    found: Sequence[Finding], model: native.Model, lag_std_s: float, stds: Mapping[str, float]
 ) -> list[Finding]:
-    """Findings in which a lag that the model may well have by its own error is a stale number.
+    """Findings in which what the model may well have by its own error is a stale number.
 
     Args:
         found: in the order of worth.
         model: the final one.
         lag_std_s: how well the model's lag was known.
+        stds: how well other logs told the numbers of the model's effects, by name.
     """
-    own = next((f for f in found if f.effect == MOTOR_LAG and not f.group), None)
-    if own is None or lag_std_s <= 0:
+    stale, rest, parameters = None, [], []
+    for f in found:
+        if f.effect == REFIT:
+            stale = f
+        elif f.effect == MOTOR_LAG and not f.group and _within(f, lag_std_s):
+            extra = f.parameters[0]
+            parameters.append((replace(extra, name=LAG, value=model.get(LAG) + extra.value), f))
+            continue
+        elif f.again and all(_is_error(e, model, stds) for e in f.parameters):
+            parameters += [(e, f) for e in f.parameters]
+            continue
+        rest.append(f)
+    if not parameters:
         return list(found)
-    extra = own.parameters[0]
-    if abs(extra.value) > WITHIN * np.hypot(extra.std, lag_std_s):
-        return list(found)
-    lag = replace(extra, name=LAG, value=model.get(LAG) + extra.value)
-    stale = next((f for f in found if f.effect == REFIT), None)
+    own, gone = [e for e, _ in parameters], {id(f): f for _, f in parameters}
+    share = sum(f.share for f in gone.values())
     if stale is None:
-        as_refit = Finding(REFIT, None, [lag], own.share, "sure")
-        return [as_refit if f is own else f for f in found]
-    whole = replace(stale, parameters=[*stale.parameters, lag], share=stale.share + own.share)
-    return [whole if f is stale else f for f in found if f is not own]
+        place = next(k for k, f in enumerate(found) if id(f) in gone)
+        return [*rest[:place], Finding(REFIT, None, own, share, "sure"), *rest[place:]]
+    whole = replace(stale, parameters=[*stale.parameters, *own], share=stale.share + share)
+    return [whole if f is stale else f for f in rest]
+
+
+def _within(lag: Finding, std_s: float) -> bool:
+    """Whether a lag is within the error of the one that the model had."""
+    extra = lag.parameters[0]
+    return std_s > 0 and abs(extra.value) <= WITHIN * np.hypot(extra.std, std_s)
+
+
+def _is_error(own: Estimate, model: native.Model, stds: Mapping[str, float]) -> bool:
+    """Whether a number that changed did so within the error of the one that the model had."""
+    instance, key = own.name.split(".", 1)
+    name = instance.split("#")[0]
+    card = next(p for p in catalogue_of(model)[name]["parameters"] if p["name"] == key)
+    known = stds.get(f"{name}.{key}", 0.0)
+    return abs(own.value - card["neutral"]) <= WITHIN * np.hypot(own.std, known)
 
 
 def _from_final(state: State, last: Trial) -> Trial:
@@ -232,7 +265,7 @@ def _finding(done: Search, name: str, share: float, changes: Mapping[str, Change
     if not doubt and done.last.fit.chance_of_none(instance) > NOTHING:
         doubt = f"parts of these logs do not agree that {name} is there: its size may be nothing"
     certainty = "doubtful" if doubt else "group" if group else "sure"
-    return Finding(name, group, own, share, certainty, doubt)
+    return Finding(name, group, own, share, certainty, doubt, "#" in instance)
 
 
 def _doubt(card: dict, own: Sequence[Estimate]) -> str:
@@ -291,9 +324,8 @@ def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:
     names = [u.parameter.name for u in fit.unknowns]
     parts = {"lag": [LAG], "delay": [], "clock": []}
     for instance in effect_names(model):
-        kind = {MOTOR_LAG: "lag", DELAY: "delay", CLOCK_OFF: "clock"}.get(instance.split("#")[0])
-        if kind:
-            key = {"lag": "extra_s", "delay": "delay_s", "clock": "offset_s"}[kind]
+        if instance.split("#")[0] in LATE:
+            kind, key = LATE[instance.split("#")[0]]
             parts[kind].append(f"{instance}.{key}")
     value = {k: sum(model.get(n) for n in own) for k, own in parts.items()}
     every = [n for own in parts.values() for n in own]
@@ -304,9 +336,9 @@ def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:
     mask = np.array([n in every for n in names], float)
     free = bool(mask.any())
     std = float(np.sqrt(mask @ fit.covariance @ mask)) if free else None
-    late = {MOTOR_LAG, DELAY, CLOCK_OFF}
-    tied = any(f.group and len(late & set(f.group)) > 1 for f in found)
-    lag_tied = any(f.group and MOTOR_LAG in f.group and len(late & set(f.group)) > 1 for f in found)
+    kinds = [{LATE[n][0] for n in f.group or () if n in LATE} for f in found]
+    tied = any(len(k) > 1 for k in kinds)
+    lag_tied = any(len(k) > 1 and "lag" in k for k in kinds)
     parted = same_clock and not tied
     return Late(
         float(sum(value.values())),

@@ -4,12 +4,13 @@
 Errors of way at two moments far apart in time are multiplied with each other if the moments are
 near each other in the room: a quadratic form with a Gaussian kernel over places, as in Moran's test
 of spatial correlation (Moran 1950, Biometrika 37). It asks for no formula, so that joints between
-tiles are seen like a patch of carpet. A drive that repeats its path repeats every error at its
-place; so both the model's errors and those of the smooth response, which knows commands and
-headings, must do so.
+tiles are seen like a patch of carpet. What all ways of one block of time have in common, as while a
+battery sinks, is taken out before. A drive that repeats its path repeats every error at its place;
+so the errors of the smooth response, which knows commands and headings, must do so as well.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
@@ -21,61 +22,112 @@ HORIZON = HORIZONS_S.index(0.5)
 LENGTHS_M = (0.1, 0.2, 0.4)  # of the kernel
 LEAST_WAY_M = 0.01  # a robot that stands tells nothing of its place
 FLIPS = 999
-CHANCE = 0.01
+STRETCH_S = 2.0  # of one random sign, and least time between two moments
+CHANCE, CHANCE_OF_RESPONSE = 0.01, 0.05
+WORTH = 0.1  # share of the squared error of way
 
 
-def comes_again(opened: Sequence[Opened], models: Sequence[native.Model]) -> bool:
-    """Whether errors repeat at the same places beyond chance, in the logs taken together.
+def comes_again(opened: Sequence[Opened], models: Sequence[native.Model]) -> float:
+    """Least share of the squared error of way that repeats at the same places, in all logs.
+
+    Kernels as wide as what repeats see a part of it.
 
     Args:
         opened: logs over their floors.
         models: with what was found, one for each.
+
+    Returns:
+        0 where it could be chance, or is little.
     """
     of_model = [own.data.errors(model) for own, model in zip(opened, models, strict=True)]
-    of_response = [own.floor.across for own in opened]
-    return all(_repeats(opened, errors) for errors in (of_model, of_response))
+    chance, share = _repeats(opened, of_model)
+    if chance >= CHANCE or share < WORTH:
+        return 0.0
+    chance, _ = _repeats(opened, [own.floor.across for own in opened])
+    return share if chance < CHANCE_OF_RESPONSE else 0.0
 
 
-def _repeats(opened: Sequence[Opened], errors: Sequence[np.ndarray]) -> bool:
-    """Whether the form is larger than almost always under random signs of blocks."""
+def _repeats(opened: Sequence[Opened], errors: Sequence[np.ndarray]) -> tuple[float, float]:
+    """Chance of so large a form under random signs of stretches, and the share that repeats."""
     total = np.zeros((len(LENGTHS_M), 1 + FLIPS))
+    weight = np.zeros(len(LENGTHS_M))
     random = np.random.default_rng(1)
     for own, each in zip(opened, errors, strict=True):
-        middle_m, strength, block = _of_way(own, each)
-        if len(block):
-            flips = random.choice([-1.0, 1.0], (FLIPS, block.max() + 1))
-            signs = np.vstack([np.ones(block.max() + 1), flips])
+        ways = _of_way(own, each)
+        if len(ways.block):
+            stretches = ways.stretch.max() + 1
+            flips = random.choice([-1.0, 1.0], (FLIPS, stretches))
+            signs = np.vstack([np.ones(stretches), flips])
             for k, length_m in enumerate(LENGTHS_M):
-                pairs = _products(middle_m, strength, block, length_m)
+                pairs, full = _products(ways, length_m)
                 total[k] += np.einsum("fi,ij,fj->f", signs, pairs, signs)
+                weight[k] += full
     spread = total[:, 1:].std(axis=1, keepdims=True)
     if not spread.all():
-        return False
+        return 1.0, 0.0
     highest = (total / spread).max(axis=0)
-    return bool(np.mean(highest[1:] >= highest[0]) < CHANCE)
+    best = int(np.argmax(total[:, 0] / spread[:, 0]))
+    return float(np.mean(highest[1:] >= highest[0])), float(total[best, 0] / weight[best])
 
 
-def _of_way(own: Opened, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(n, 2) middles of ways, (n,) errors along them over their size times the way, (n,) blocks."""
+@dataclass(frozen=True)
+class _Ways:
+    """Ways of one log in half a second.
+
+    Attributes:
+        middle_m: (n, 2) where.
+        error: (n,) along the way, over the RMS of all.
+        length: (n,) of the way, over the RMS of all.
+        t_s, block, stretch: (n,) when.
+    """
+
+    middle_m: np.ndarray
+    error: np.ndarray
+    length: np.ndarray
+    t_s: np.ndarray
+    block: np.ndarray
+    stretch: np.ndarray
+
+
+def _of_way(own: Opened, errors: np.ndarray) -> _Ways:
     data, pose = own.data, own.data.measurement.track.pose
     error, way = errors[:, HORIZON, :2], data.measured[:, HORIZON, :2] - errors[:, HORIZON, :2]
     length_m = np.hypot(*way.T)
     usable = data.keep & (np.nan_to_num(length_m) > LEAST_WAY_M)
     error, way, length_m = error[usable], way[usable], length_m[usable]
-    along = np.sum(error * way, axis=1) / length_m
-    ends = (data.windows.starts[usable], data.windows.ends[usable, HORIZON])
-    middle_m = (pose[ends[0], :2] + pose[ends[1], :2]) / 2
-    strength = along * length_m / max(float(np.sqrt(np.mean(along**2))), 1e-12)
-    return middle_m, strength, data.block.reshape(data.measured.shape)[usable, 0, 0]
+    block = data.block.reshape(data.measured.shape)[usable, 0, 0]
+    along = _without_common(np.sum(error * way, axis=1) / length_m, length_m, block)
+    starts, ends = data.windows.starts[usable], data.windows.ends[usable, HORIZON]
+    t_s = data.start_s[usable]
+    _, stretch = np.unique(t_s // STRETCH_S, return_inverse=True)
+    return _Ways(
+        (pose[starts, :2] + pose[ends, :2]) / 2,
+        along / max(float(np.sqrt(np.mean(along**2))), 1e-12) if len(along) else along,
+        length_m / max(float(np.sqrt(np.mean(length_m**2))), 1e-12) if len(along) else length_m,
+        t_s,
+        block,
+        stretch,
+    )
 
 
-def _products(
-    middle_m: np.ndarray, strength: np.ndarray, block: np.ndarray, length_m: float
-) -> np.ndarray:
-    """(B, B) of sums over the pairs of two blocks; zero within one."""
-    apart_m2 = np.sum((middle_m[:, None] - middle_m[None]) ** 2, axis=-1)
-    near = np.exp(-apart_m2 / (2 * length_m**2)) * np.outer(strength, strength)
-    member = (block[:, None] == np.arange(block.max() + 1)).astype(float)
-    pairs = member.T @ near @ member
-    np.fill_diagonal(pairs, 0.0)
-    return pairs
+def _without_common(along: np.ndarray, length_m: np.ndarray, block: np.ndarray) -> np.ndarray:
+    """Errors without what is in proportion to the way in a whole block."""
+    if not len(block):
+        return along
+    moment, energy = np.bincount(block, along * length_m), np.bincount(block, length_m**2)
+    return along - (moment / np.maximum(energy, 1e-12))[block] * length_m
+
+
+def _products(ways: _Ways, length_m: float) -> tuple[np.ndarray, float]:
+    """(S, S) of sums over the pairs of two stretches, and the sum if all errors were of places.
+
+    Pairs of one block, or less than a stretch apart, count for nothing.
+    """
+    apart_m2 = np.sum((ways.middle_m[:, None] - ways.middle_m[None]) ** 2, axis=-1)
+    far = np.abs(ways.t_s[:, None] - ways.t_s[None]) > STRETCH_S
+    far &= ways.block[:, None] != ways.block[None]
+    near = np.exp(-apart_m2 / (2 * length_m**2)) * far
+    strength = ways.error * ways.length
+    member = (ways.stretch[:, None] == np.arange(ways.stretch.max() + 1)).astype(float)
+    pairs = member.T @ (near * np.outer(strength, strength)) @ member
+    return pairs, float(ways.length**2 @ near @ ways.length**2)

@@ -52,6 +52,8 @@ class Rest:
         left_over: fall of the cost per independent error by every group that brings any.
         old: groups that help no more than they did on other logs.
         moments: events that neither commands nor findings explain.
+        again: least share of the squared error of way that comes again at the same places. The floor
+            counts it as noise, since it follows from no command.
     """
 
     share: float
@@ -63,6 +65,7 @@ class Rest:
     left_over: Mapping[str, float] | None = None
     old: tuple[str, ...] = ()
     moments: tuple[Moment, ...] = ()
+    again: float = 0.0
 
     @property
     def formula(self) -> str | None:
@@ -103,9 +106,12 @@ def rest_of(
     own_logs, models = [own for _, own in logs], [fit.models[i] for i, _ in logs]
     moments = moments_of(own_logs, models)
     depends_on = [*found.depends_on, *([MOMENTS] if moments else [])]
-    if PLACE not in depends_on and comes_again(own_logs, models):
+    again = comes_again(own_logs, models)
+    if again and PLACE not in depends_on:
         depends_on.append(PLACE)
-    return replace(found, share=share, firm=firm, depends_on=depends_on, moments=tuple(moments))
+    return replace(
+        found, share=share, firm=firm, depends_on=depends_on, moments=tuple(moments), again=again
+    )
 
 
 def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:

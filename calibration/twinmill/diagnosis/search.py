@@ -42,6 +42,8 @@ class Settings:
             and blocks agree: t of the relative fall over blocks.
         worth: least share of the first excess that one takes ...
         enough: ... or this fall of the squared score, if that is less.
+        below: the same share once the score is below 1, where differences are hardly news ...
+        halves: ... or this share of the squared score, if that is less.
         fitted: so many candidates are fitted in each round.
         pairs: so many pairs are tried where no single candidate is accepted.
         most: rounds.
@@ -61,6 +63,8 @@ class Settings:
     blocks_t: float = 3.7
     worth: float = 0.01
     enough: float = 0.1
+    below: float = 0.1
+    halves: float = 0.5
     fitted: int = 7
     pairs: int = 3
     most: int = 6
@@ -295,8 +299,7 @@ def _best(
         fall = before.held_score**2 - trial.held_score**2
         if fall <= 0:
             continue
-        least = min(settings.worth * first_excess, settings.enough)
-        matters = fall >= least * len(trial.names)
+        matters = fall >= _least_fall(before.held_score, first_excess, settings) * len(trial.names)
         at_nothing = all(_is_neutral(trial, n) for n in trial.names)
         if matters and not at_nothing and _proven(trial, settings):
             good.append(trial)
@@ -308,6 +311,13 @@ def _best(
         if t.names == (REFIT,) and t.fit.held_cost - best.fit.held_cost < settings.tie
     ]
     return stale[0] if stale else best
+
+
+def _least_fall(score: float, first_excess: float, settings: Settings) -> float:
+    """Least fall of the squared score that matters."""
+    if score < 1.0:
+        return min(settings.below * first_excess, settings.halves * score**2)
+    return min(settings.worth * first_excess, settings.enough)
 
 
 def _proven(trial: Trial, settings: Settings) -> bool:
@@ -341,15 +351,19 @@ def _is_neutral(trial: Trial, name: str) -> bool:
 
 
 def candidates(state: State) -> list[str]:
-    """What could be added."""
+    """What could be added.
+
+    An effect that the model has with numbers that are held can be there once more: they changed.
+    """
     model = state.model
+    moved = {p.name.split(".")[0].split("#")[0] for p in state.free}
     names = []
     if any(n not in {p.name for p in state.free} for n in state.base):
         names.append(REFIT)
     for name, entry in catalogue_of(model).items():
         usable = entry["stage"] in MOTION_STAGES and not entry["texts"]
         fits = not entry["duty_only"] or model.drive == "duty"
-        if usable and fits and name not in model.effects and name not in state.excluded:
+        if usable and fits and name not in moved and name not in state.excluded:
             names.append(name)
     return names
 
@@ -529,7 +543,7 @@ PLACES = 5  # along each side of the floor that was driven
 
 def _places(name: str, state: State) -> list[dict[str, float]]:
     """Starts of an effect with a place, over the floor that was driven."""
-    instance = f"{name}#2" if name in state.model.effects else name
+    instance = _next_instance(name, state)
     logs = [d.measurement.track for d in state.datasets if isinstance(d, Trajectory)]
     if not logs:
         return [{}]
@@ -545,12 +559,18 @@ def _places(name: str, state: State) -> list[dict[str, float]]:
     return starts or [{}]
 
 
+def _next_instance(name: str, state: State) -> str:
+    """What the effect is called once it is added."""
+    count = state.model.effects.count(name)
+    return f"{name}#{count + 1}" if count else name
+
+
 LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual one
 
 
 def _limits(name: str, state: State) -> list[dict[str, float]]:
     """Starts of an effect with a limit."""
-    instance = f"{name}#2" if name in state.model.effects else name
+    instance = _next_instance(name, state)
     limits = [p for p in catalogue()[name]["parameters"] if p["role"] == "limit"]
     return [{f"{instance}.{p['name']}": k * p["default"] for p in limits} for k in LIMITS]
 

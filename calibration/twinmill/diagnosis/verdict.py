@@ -86,7 +86,7 @@ class Weighed:
     @property
     def _outside(self) -> bool:
         """Something is left that no effect takes: it depends on something, or it is much."""
-        if self.noises and self._continuous:
+        if self.rest.again or (self.noises and self._continuous):
             return True
         if self.last <= GOOD * self.known:
             return False
@@ -106,9 +106,10 @@ class Weighed:
 
     @property
     def _rest_outweighs(self) -> bool:
-        """No effect is beyond doubt, and more is left that depends on something than they take."""
+        """No effect is beyond doubt, and more is left than they take, which is no noise."""
         doubtful = all(f.certainty == "doubtful" for f in self.effects)
-        return doubtful and bool(self._continuous) and self.rest.share > self._taken
+        no_noise = bool(self._continuous) or self.rest.firm
+        return doubtful and no_noise and self.rest.share > self._taken
 
     @property
     def _taken(self) -> float:
@@ -200,6 +201,12 @@ class Weighed:
     def notes(self) -> list[str]:
         """Sentences on doubts, and on what was left before."""
         doubts = [f"Doubtful: {f.why}." for f in self.findings if f.why]
+        if self.rest.again:
+            doubts.append(
+                f"At least {100 * self.rest.again:.0f} % of the squared error of way in half a "
+                "second comes again where the robot comes by again: the floor is not the same "
+                "everywhere. No score shows it, since no command tells it."
+            )
         old = self.rest.old
         if old:
             doubts.append(
@@ -229,7 +236,7 @@ def _named(finding: Finding) -> str:
         )
         instead = f", or {' or '.join(finding.group[1:])} instead" if finding.group else ""
         return f"stale numbers of the base ({values}; {takes}){instead}"
-    name = finding.effect
+    name = f"{finding.effect} beside the model's own" if finding.again else finding.effect
     if finding.group:
         name = f"one of {' or '.join(finding.group)}, which these logs cannot tell apart"
     doubt = ", doubtful" if finding.certainty == "doubtful" else ""

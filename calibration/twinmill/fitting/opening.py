@@ -46,6 +46,11 @@ class Opened:
         """Of its model; NaN without a floor."""
         return float("nan") if self.data is None else self.data.score(self.model)
 
+    @property
+    def one_clock(self) -> bool:
+        """Whether the log or the model file declares that one clock stamped all."""
+        return self.floor is not None and (self.measurement.same_clock or self.model.clock_same)
+
     def scene(self) -> Scene | SteadyScene:
         """What reports and other tests look at: measurement, model, noise."""
         if isinstance(self.data, SteadyScene):

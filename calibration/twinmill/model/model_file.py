@@ -76,6 +76,12 @@ class ModelFile:
         ]
         return math.hypot(*map(float, parts))
 
+    @property
+    def effect_stds(self) -> dict[str, float]:
+        """How well logs told the numbers of the effects, by name; of several alike the last."""
+        effects = tomlkit.parse(self.text).get("effect", [])
+        return {f"{e['name']}.{k}": float(v) for e in effects for k, v in e.get("std", {}).items()}
+
     def fitted_on(self, log_sha256: Collection[str]) -> bool:
         """Whether the base was fitted to one of these very logs."""
         base = tomlkit.parse(self.text).get("base", {})

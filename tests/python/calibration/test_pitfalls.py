@@ -9,6 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from twinmill.diagnosis.diagnose import diagnose, first_state
+from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.search import Settings, attempt
 from twinmill.diagnosis.search import fitted as fitted_state
 from twinmill.fitting.compare import GOOD, compare
@@ -329,6 +330,41 @@ def test_a_body_that_turns_sooner_than_it_drives_is_named(tanh_robot, measure, f
     assert (first.effect, first.certainty) == ("yaw_lag", "sure")
     (extra,) = first.parameters
     assert extra.value == pytest.approx(-0.05, abs=2 * extra.std + EULER_S)
+
+
+def test_wheels_behind_a_filter_are_no_delay(tanh_robot, measure, fitted):
+    """A filter of 0.05 s before the robot's 0.09 s: both first orders, one after the other."""
+
+    class Filtered(tanh_robot):
+        def wheels_mps(self, duty):
+            part = EULER_S / 0.05
+            return lfilter([part], [1, part - 1], super().wheels_mps(duty), axis=0)
+
+    found = diagnose([measure(Filtered(), 25, 40.0)], fitted)
+    first = found.findings[0]
+    assert first.effect == "second_order_lag"
+    (second,) = first.parameters
+    assert second.value == pytest.approx(0.05, abs=2 * second.std + EULER_S)
+    assert found.late.lag_s == pytest.approx(0.14, abs=0.01)
+
+
+def test_an_effect_that_the_model_has_is_named_again_where_it_changed(
+    tanh_robot, measure, fitted, tmp_path
+):
+    """The marker sat turned by 0.1 rad, and was put back turned by 0.3 rad."""
+
+    def turned(bias_rad):
+        return lambda pose, valid: (pose + (0, 0, bias_rad), valid)
+
+    first = measure(tanh_robot(), 26, 40.0, spoil=turned(0.1))
+    explain([first], fitted, tmp_path / "explained.toml", "explain")
+    model = ModelFile.load(str(tmp_path / "explained.toml"))
+    assert model.model.effects == ["heading_bias"]
+    found = diagnose([measure(tanh_robot(), 27, 40.0, spoil=turned(0.3))], model)
+    assert found.motion == ["heading_bias"]
+    (own,) = found.findings
+    assert own.again and "beside the model's own" in found.sentence
+    assert own.parameters[0].value == pytest.approx(0.2, abs=2 * own.parameters[0].std + 0.005)
 
 
 def test_a_compass_that_errs_with_heading_is_no_turned_marker(tanh_robot, measure, fitted):
