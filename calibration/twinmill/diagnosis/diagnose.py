@@ -14,8 +14,9 @@ from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_
 from twinmill.diagnosis.irregularity import notes_on
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
 from twinmill.diagnosis.resolution import resolutions
-from twinmill.diagnosis.rest import rest_of
+from twinmill.diagnosis.rest import formulas_of, rest_of
 from twinmill.diagnosis.result import Diagnosis
+from twinmill.diagnosis.rivals import less_each
 from twinmill.diagnosis.search import (
     REFIT,
     SETTINGS,
@@ -167,12 +168,14 @@ def _concluded(
 ) -> Diagnosis:
     """What the search of the motion tells, before cameras are looked at."""
     hashes = [o.measurement.log_sha256 for o in known]
+    less = less_each(done, known)
     start, last = done.rounds[0].before, done.last
-    findings, chain = findings_of(done, first)
+    findings, chain = findings_of(done, first, less)
     findings = with_stale_numbers(
         findings, last.state.model, model_file.lag_std_s(hashes), model_file.effect_stds
     )
-    rest = rest_of(known, last.fit, start.held_score, last.held_score, model_file.left_over(hashes))
+    formulas = formulas_of(known, last.fit)
+    rest = rest_of(formulas, last.fit, start.held_score, last.held_score, model_file.left_over(hashes))
     models = zip(known, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]

@@ -8,7 +8,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.constancy import Change, changes_of
-from twinmill.diagnosis.search import REFIT, Round, Search, State, Trial, fitted, grown, without
+from twinmill.diagnosis.search import REFIT, Round, Search, State, Trial, fitted, grown
 from twinmill.model.parameters import LAG, Estimate, catalogue_of, effect_names
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
@@ -108,14 +108,22 @@ class Late:
         return vars(self)
 
 
-def findings_of(done: Search, first: State) -> tuple[list[Finding], list[tuple[str, float]]]:
+def findings_of(
+    done: Search, first: State, less: Mapping[str, Trial | None]
+) -> tuple[list[Finding], list[tuple[str, float]]]:
     """Findings in the order of worth, and the held-out score after each of them.
 
     Worth is what the final model loses without the effect. Shares are those of a chain that adds
     the effects in this order.
+
+    Args:
+        done: the search.
+        first: where it started.
+        less: the final state refitted without each effect.
     """
     names = list(dict.fromkeys(done.found))
-    loss = {name: _loss(done.last, name, first) for name in names}
+    given = _as_given(done.last, first) if REFIT in names else None
+    loss = {n: _loss(done.last, given if n == REFIT else less[n]) for n in names}
     names.sort(key=lambda n: -loss[n])
     state, chain = first, [fitted(first)]
     for name in names:
@@ -193,9 +201,8 @@ def _from_final(state: State, last: Trial) -> Trial:
     return fitted(replace(state, models=models))
 
 
-def _loss(last: Trial, name: str, first: State) -> float:
+def _loss(last: Trial, less: Trial | None) -> float:
     """Rise of the squared held-out score without one effect, or with the base as it was given."""
-    less = _as_given(last, first) if name == REFIT else without(last, name)
     return 0.0 if less is None else less.held_score**2 - last.held_score**2
 
 

@@ -88,8 +88,14 @@ def _sizes(values: list[dict]) -> dict[tuple[str, str], float]:
     return sizes
 
 
+PARTS = (0.2, 0.35, 0.5, 0.65, 0.8)  # of the time of all logs: where something may have changed
+
+
 def _middles(opened: Sequence[Opened]) -> dict[str, float]:
-    """Of place, time and voltage over all logs, to four digits, as a formula has them."""
+    """Of place, time and voltage over all logs, to four digits, as a formula has them.
+
+    And moments at which something may have changed for good, `t0` to `t4`.
+    """
     parts: dict[str, list[np.ndarray]] = {"x": [], "y": [], "t": [], "V": []}
     for own in opened:
         response = own.floor.response
@@ -97,7 +103,10 @@ def _middles(opened: Sequence[Opened]) -> dict[str, float]:
         parts["y"].append(response.pose[:, 1])
         parts["t"].append(response.middle_s)
         parts["V"].append(np.nan_to_num(own.measurement.track.battery_V))
-    return {name: float(f"{np.mean(np.concatenate(p)):.4g}") for name, p in parts.items()}
+    every = {name: np.concatenate(p) for name, p in parts.items()}
+    found = {name: np.mean(values) for name, values in every.items()}
+    found |= {f"t{k}": np.quantile(every["t"], part) for k, part in enumerate(PARTS)}
+    return {name: float(f"{value:.4g}") for name, value in found.items()}
 
 
 def _body_columns(own: Opened, model: native.Model, terms: dict, sizes: dict) -> np.ndarray:
@@ -244,6 +253,9 @@ def _named_terms(
             terms[group, f"{text}*{carrier}"] = away * speed
             if group == "place":
                 terms[group, f"{text}*{text}*{carrier}"] = away**2 * speed
+    for at_s in (middles[f"t{k}"] for k in range(len(PARTS))):
+        for carrier, speed in speeds:
+            terms["time", f"sign(t - {at_s:g})*{carrier}"] = np.sign(t_s - at_s) * speed
     return terms
 
 

@@ -8,6 +8,7 @@ fitted to.
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -80,8 +81,58 @@ class Rest:
         return {"adds_to": self.term.adds_to, "formula": f"p0*{self.term.formula}"}
 
 
+@dataclass(frozen=True)
+class Formulas:
+    """Formulas without physics names over logs, and how the rows of a fit change by each.
+
+    Attributes:
+        logs: place among the fit's data sets, and the log.
+        terms: T formulas.
+        changes: (R, T) of each log.
+    """
+
+    logs: list[tuple[int, Opened]]
+    terms: list[Term]
+    changes: list[np.ndarray]
+
+    def products(self, fit: ScoreFit, beside: Sequence[np.ndarray] = ()) -> "Products":
+        """Products with what a fit leaves, what is free in it projected out.
+
+        Args:
+            fit: of the same data sets.
+            beside: (R,) other changes of each log's rows, one column more before those of formulas.
+        """
+        rows, _ = fit.state
+        left, free, blocks = fit.whitened([i for i, _ in self.logs])
+        changes = self.changes
+        if beside:
+            changes = [np.column_stack(pair) for pair in zip(beside, changes, strict=True)]
+        columns = np.concatenate(
+            [
+                np.sqrt(fit.weight(i, rows[i]))[:, None] * changed
+                for (i, _), changed in zip(self.logs, changes, strict=True)
+            ]
+        )
+        before = np.linalg.norm(columns, axis=0)
+        if free.shape[1]:
+            basis = np.linalg.qr(free)[0]
+            columns = columns - basis @ (basis.T @ columns)
+        seen = np.linalg.norm(columns, axis=0) > LEFT_OVER * np.maximum(before, 1e-12)
+        seen &= before > 1e-9
+        return Products(np.where(seen, columns, 0.0), left, blocks, seen)
+
+
+def formulas_of(opened: Sequence[Opened], fit: ScoreFit) -> Formulas | None:
+    """Formulas over the logs of a fit; None if it has none whose floor told a smooth response."""
+    logs = [(i, o) for i, o in enumerate(opened) if o.floor and o.floor.response]
+    if not logs:
+        return None
+    terms, changes = library([own for _, own in logs], [fit.models[i] for i, _ in logs])
+    return Formulas(logs, terms, changes)
+
+
 def rest_of(
-    opened: Sequence[Opened],
+    formulas: Formulas | None,
     fit: ScoreFit,
     first_score: float,
     last_score: float,
@@ -90,7 +141,7 @@ def rest_of(
     """Tests what a fit leaves.
 
     Args:
-        opened: the fit's measurements, in its order.
+        formulas: over the fit's logs, as the final model moves.
         fit: of the final model.
         first_score: held out, of the model as given.
         last_score: held out, of the fit.
@@ -98,11 +149,11 @@ def rest_of(
     """
     excess = max(first_score**2 - 1, last_score**2 - 1, 1e-9)
     share = float(max(last_score**2 - 1, 0.0) / excess)
-    logs = [(i, o) for i, o in enumerate(opened) if o.floor and o.floor.response]
-    if not logs:
+    if formulas is None:
         return Rest(share, False, [])
+    logs = formulas.logs
     firm = _firm(logs, fit)
-    found = _dependences(logs, fit, known)
+    found = _dependences(formulas, fit, known)
     own_logs, models = [own for _, own in logs], [fit.models[i] for i, _ in logs]
     moments = moments_of(own_logs, models)
     depends_on = [*found.depends_on, *([MOMENTS] if moments else [])]
@@ -131,29 +182,14 @@ def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:
 # -- what it depends on ----------------------------------------------------------------------------
 
 
-def _dependences(logs: list[tuple[int, Opened]], fit: ScoreFit, known: Mapping[str, float]) -> Rest:
-    rows, _ = fit.state
-    terms, each = library([own for _, own in logs], [fit.models[i] for i, _ in logs])
-    left, free, blocks = fit.whitened([i for i, _ in logs])
-    columns = np.concatenate(
-        [
-            np.sqrt(fit.weight(i, rows[i]))[:, None] * changed
-            for (i, _), changed in zip(logs, each, strict=True)
-        ]
-    )
-    before = np.linalg.norm(columns, axis=0)
-    if free.shape[1]:
-        basis = np.linalg.qr(free)[0]
-        columns = columns - basis @ (basis.T @ columns)
-    keep = np.linalg.norm(columns, axis=0) > LEFT_OVER * np.maximum(before, 1e-12)
-    keep &= before > 1e-9
-    terms = [t for t, k in zip(terms, keep, strict=True) if k]
-    products = _Products(columns[:, keep], left, blocks)
-    return _verdict(terms, products, float(left @ left), known)
+def _dependences(formulas: Formulas, fit: ScoreFit, known: Mapping[str, float]) -> Rest:
+    whole = formulas.products(fit)
+    terms = [t for t, seen in zip(formulas.terms, whole.seen, strict=True) if seen]
+    return _verdict(terms, whole.of_seen(), whole.total, known)
 
 
 def _verdict(
-    terms: list[Term], products: "_Products", total: float, known: Mapping[str, float]
+    terms: list[Term], products: "Products", total: float, known: Mapping[str, float]
 ) -> Rest:
     every = _tested(terms, products)
     left_over = {d.group: d.gain / total for d in every if d.gain > 0}
@@ -170,7 +206,7 @@ def _verdict(
     return Rest(0.0, False, names, best, coefficient, takes, left_over, old)
 
 
-def _tested(terms: list[Term], products: "_Products") -> list[Dependence]:
+def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
     """What each group brings, as a whole or by one formula, and whether that is beyond chance.
 
     It is if it is more than the largest of all that is tested is under random signs of blocks, each
@@ -196,7 +232,7 @@ def _tested(terms: list[Term], products: "_Products") -> list[Dependence]:
 
 
 def _without_shadows(
-    groups: list[Dependence], terms: list[Term], products: "_Products"
+    groups: list[Dependence], terms: list[Term], products: "Products"
 ) -> list[Dependence]:
     """Those groups that bring something beside the better ones."""
     kept: list[Dependence] = []
@@ -209,7 +245,7 @@ def _without_shadows(
     return kept
 
 
-def _best_term(terms: list[Term], products: "_Products", group: str) -> tuple[Term, float]:
+def _best_term(terms: list[Term], products: "Products", group: str) -> tuple[Term, float]:
     """The single term of a group that explains most, and its coefficient in its own unit."""
     own = [i for i, t in enumerate(terms) if t.group == group]
     moment = products.moments.sum(0)[own]
@@ -219,15 +255,41 @@ def _best_term(terms: list[Term], products: "_Products", group: str) -> tuple[Te
     return term, float(moment[best] / energy[best] * term.strength)
 
 
-class _Products:
-    """Products of the library's columns with each other and with the errors, block by block."""
+class Products:
+    """Products of columns with each other and with the errors, block by block.
 
-    def __init__(self, columns: np.ndarray, left: np.ndarray, blocks: np.ndarray) -> None:
+    Attributes:
+        seen: (T,) columns of which enough is left beside what is free.
+        total: squared errors of all.
+    """
+
+    def __init__(
+        self, columns: np.ndarray, left: np.ndarray, blocks: np.ndarray, seen: np.ndarray
+    ) -> None:
         order = np.argsort(blocks, kind="stable")
         edges = np.searchsorted(blocks[order], np.arange(blocks.max() + 2))
         parts = [order[a:b] for a, b in pairwise(edges)]
         self.grams = np.array([columns[p].T @ columns[p] for p in parts])
         self.moments = np.array([columns[p].T @ left[p] for p in parts])
+        self.seen, self.total = seen, float(left @ left)
+
+    def of_seen(self) -> "Products":
+        """The same without columns of which nothing is left."""
+        less = copy(self)
+        less.grams = self.grams[:, self.seen][:, :, self.seen]
+        less.moments, less.seen = self.moments[:, self.seen], self.seen[self.seen]
+        return less
+
+    def each_held_out(self) -> np.ndarray:
+        """(T,) fall of the cost by each column alone on blocks not fitted to."""
+        energy, moment = np.einsum("bii->bi", self.grams), self.moments
+        fold = np.arange(len(moment)) % FOLDS
+        gain = np.zeros(moment.shape[1])
+        for k in range(FOLDS):
+            test = fold == k
+            size = moment[~test].sum(0) / (energy[~test].sum(0) + 1.0)
+            gain += 2 * size * moment[test].sum(0) - size**2 * energy[test].sum(0)
+        return gain
 
     def held_out(self, own: np.ndarray) -> tuple[float, np.ndarray]:
         """Fall of the cost by these columns on blocks not fitted to, and (F,) what chance brings.

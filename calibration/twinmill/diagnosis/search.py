@@ -236,7 +236,10 @@ def search(
             settings,
         )
         dropped += gone
-    return Search(rounds, before, dropped, settings)
+    progress("comparing lags and delays")
+    found = [n for r in rounds if r.accepted for n in r.accepted.names if n not in dropped]
+    before, gone = _with_best_lateness(rounds, before, found, settings)
+    return Search(rounds, before, [*dropped, *gone], settings)
 
 
 # -- trials -------------------------------------------------------------------------------------
@@ -318,6 +321,39 @@ def _least_fall(score: float, first_excess: float, settings: Settings) -> float:
     if score < 1.0:
         return min(settings.below * first_excess, settings.halves * score**2)
     return min(settings.worth * first_excess, settings.enough)
+
+
+def _with_best_lateness(
+    rounds: list[Round], last: Trial, found: Sequence[str], settings: Settings
+) -> tuple[Trial, list[str]]:
+    """The last state with each lag or delay in the place of another, if that is better.
+
+    One alone is accepted first that does what two others do together. What is as good is tied.
+
+    Returns:
+        The best, and what is gone from the findings; a swap is one more round.
+    """
+    gone = []
+    for name in [n for n in found if _has(n, "lateness")]:
+        base = without(last, name)
+        others = [n for n in candidates(last.state) if _has(n, "lateness")]
+        trials = [attempt(base, (n,)) for n in others] if base else []
+        trials = [t for t in trials if t.fit.held_cost < last.fit.held_cost + settings.tie]
+        if not trials:
+            continue
+        best = min(trials, key=lambda t: t.fit.held_cost)
+        if best.fit.held_cost >= last.fit.held_cost:
+            this = next(r for r in rounds if r.accepted and name in r.accepted.names)
+            known = {n for t in this.tied for n in t.names}
+            this.tied += [t for t in trials if t.names[0] not in known]
+            continue
+        same = [t for t in trials if t.fit.held_cost < best.fit.held_cost + settings.tie]
+        if last.fit.held_cost < best.fit.held_cost + settings.tie:
+            same.append(replace(last, names=(name,)))
+        tied = [t for t in same if t is not best]
+        rounds.append(Round(base, rounds[-1].screened, trials, best, tied))
+        last, gone = best, [*gone, name]
+    return last, gone
 
 
 def _proven(trial: Trial, settings: Settings) -> bool:

@@ -101,7 +101,7 @@ def test_sum_of_delay_and_lag_is_told_beside_its_parts(lateness, tanh_robot):
     late = lateness.late
     truth_s = tanh_robot().lag_s + MORE_LAG_S + DELAY_S
     assert late.sum_s == pytest.approx(truth_s, abs=2 * late.sum_std_s + 2 * EULER_S)
-    assert late.lag_s == pytest.approx(tanh_robot().lag_s + MORE_LAG_S, abs=0.01)
+    assert late.lag_s is None  # in so short a log a second pole may stand for the delay
     named = {e.name: e for f in lateness.findings for e in f.parameters}
     # What is reported of the lag is what it is beside the delay, not before that was found.
     lag = named["motor_lag.extra_s"]

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Effects that a formula without a name outdoes: other physics stands behind them.
+
+What is not in the catalogue is taken in part by the effect that is most like it, surely and with a
+wrong name. Then a formula of the library takes more on left-out parts than the effect does, each
+with one free factor beside all else that was found.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinmill.diagnosis.library import Term
+from twinmill.diagnosis.rest import Formulas, formulas_of
+from twinmill.diagnosis.search import REFIT, Search, Trial, without
+from twinmill.fitting.opening import Opened
+
+TIMES, MORE = 1.15, 6.0  # a formula that takes so many times as much, and so much more, outdoes it
+
+
+def less_each(done: Search, opened: Sequence[Opened]) -> dict[str, Trial]:
+    """What was found, each with the final state refitted without it; what is outdone is dropped.
+
+    Args:
+        done: what is outdone moves from its findings to what was dropped.
+        opened: its measurements, in its order.
+    """
+    less = {n: without(done.last, n) for n in dict.fromkeys(done.found) if n != REFIT}
+    formulas = formulas_of(opened, done.last.fit) if less else None
+    for name in list(less):
+        if formulas and better_formula(formulas, less[name], done.last):
+            done.last = less[name]
+            done.dropped.append(name)
+            less = {n: without(done.last, n) for n in less if n != name}
+    return less
+
+
+def better_formula(formulas: Formulas, less: Trial, whole: Trial) -> Term | None:
+    """The formula that outdoes an effect, if there is one.
+
+    Args:
+        formulas: over the logs.
+        less: without the effect.
+        whole: with it; the way from one to the other is the effect as it was found.
+    """
+    before, _ = less.fit.state
+    after, _ = whole.fit.state
+    effect = [before[i] - after[i] for i, _ in formulas.logs]
+    gains = formulas.products(less.fit, effect).each_held_out()
+    best = int(np.argmax(gains[1:]))
+    outdone = gains[1 + best] > max(TIMES * gains[0], gains[0] + MORE)
+    return formulas.terms[best] if outdone else None
