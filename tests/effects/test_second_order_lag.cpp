@@ -18,9 +18,9 @@ TEST(SecondOrderLag, StepsLikeTwoRealPoles)
     {
         player.Play(kForward, 0.002);
         const double t_s = 0.002 * step;
-        const double part = 1 - (kLag_s * std::exp(-t_s / kLag_s) -
-                                 kSecond_s * std::exp(-t_s / kSecond_s)) /
-                                    (kLag_s - kSecond_s);
+        const double part =
+            1 - (kLag_s * std::exp(-t_s / kLag_s) - kSecond_s * std::exp(-t_s / kSecond_s)) /
+                    (kLag_s - kSecond_s);
         EXPECT_NEAR(player.state.rim_mps[0], kFull_mps * part, 1e-3 * kFull_mps);
     }
 }

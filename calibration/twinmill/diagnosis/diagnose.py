@@ -175,7 +175,9 @@ def _concluded(
         findings, last.state.model, model_file.lag_std_s(hashes), model_file.effect_stds
     )
     formulas = formulas_of(known, last.fit)
-    rest = rest_of(formulas, last.fit, start.held_score, last.held_score, model_file.left_over(hashes))
+    rest = rest_of(
+        formulas, last.fit, start.held_score, last.held_score, model_file.left_over(hashes)
+    )
     models = zip(known, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]

@@ -53,8 +53,8 @@ class Rest:
         left_over: fall of the cost per independent error by every group that brings any.
         old: groups that help no more than they did on other logs.
         moments: events that neither commands nor findings explain.
-        again: least share of the squared error of way that comes again at the same places. The floor
-            counts it as noise, since it follows from no command.
+        again: least share of the squared error of way that comes again at the same places. The
+            floor counts it as noise, since it follows from no command.
     """
 
     share: float

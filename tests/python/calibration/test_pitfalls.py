@@ -354,7 +354,7 @@ def test_an_effect_that_the_model_has_is_named_again_where_it_changed(
     """The marker sat turned by 0.1 rad, and was put back turned by 0.3 rad."""
 
     def turned(bias_rad):
-        return lambda pose, valid: (pose + (0, 0, bias_rad), valid)
+        return lambda pose, valid: (pose + np.array([0, 0, bias_rad]), valid)
 
     first = measure(tanh_robot(), 26, 40.0, spoil=turned(0.1))
     explain([first], fitted, tmp_path / "explained.toml", "explain")

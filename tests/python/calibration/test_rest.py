@@ -44,7 +44,8 @@ def wander(seed, gain_at):
     ends = np.tile((starts + 2)[:, None], (1, len(HORIZONS_S)))
     track = SimpleNamespace(pose=np.column_stack([at, heading]))
     data = SimpleNamespace(
-        start_s=t_s[starts], errors=lambda model: errors, measured=way + errors, keep=np.ones(WINDOWS, bool),
+        start_s=t_s[starts], errors=lambda model: errors, measured=way + errors,
+        keep=np.ones(WINDOWS, bool),
         block=block, windows=SimpleNamespace(starts=starts, ends=ends),
         measurement=SimpleNamespace(track=track),
     )  # fmt: skip
