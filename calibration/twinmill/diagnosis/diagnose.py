@@ -14,7 +14,7 @@ from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_
 from twinmill.diagnosis.irregularity import notes_on
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
 from twinmill.diagnosis.resolution import resolutions
-from twinmill.diagnosis.rest import formulas_of, rest_of
+from twinmill.diagnosis.rest import rest_of
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.rivals import less_each
 from twinmill.diagnosis.search import (
@@ -168,13 +168,12 @@ def _concluded(
 ) -> Diagnosis:
     """What the search of the motion tells, before cameras are looked at."""
     hashes = [o.measurement.log_sha256 for o in known]
-    less = less_each(done, known)
+    less, formulas = less_each(done, known)
     start, last = done.rounds[0].before, done.last
     findings, chain = findings_of(done, first, less)
     findings = with_stale_numbers(
         findings, last.state.model, model_file.lag_std_s(hashes), model_file.effect_stds
     )
-    formulas = formulas_of(known, last.fit)
     rest = rest_of(
         formulas, last.fit, start.held_score, last.held_score, model_file.left_over(hashes)
     )

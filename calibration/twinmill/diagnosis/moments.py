@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Moments at which a robot did what neither its commands nor what was found explain.
 
-The noise floor leaves out windows in which the smooth response misses by far, so that a push or a
-drop-out does not hide what is there all the time. Where the final model misses these, too, they are
-events: told one by one, since no effect that acts all the time is like that.
+Where both the smooth response of the noise floor and the final model miss by far more than usually,
+something happened that is not there all the time: a push, or a drop-out. Such moments are told one by
+one, since no effect that acts all the time is like that.
 """
 
 from collections.abc import Sequence
@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
-from twinmill.fitting.floor import BUMP
 from twinmill.fitting.opening import Opened
 from twinmill.predict.datasets import displacement
 from twinmill.predict.windows import HORIZONS_S
 
+FAR = 10.0  # times the median squared error; with nothing but noise the largest is 3 to 7
 SEVERAL = 3  # of one log: fewer are an accident
 APART_S = 1.0  # between the starts of windows of two moments
 HORIZON = HORIZONS_S.index(0.5)
@@ -54,17 +54,17 @@ def moments_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> list
     """
     found = []
     for own, model in zip(opened, models, strict=True):
-        if own.floor is not None and not own.floor.keep.all():
+        if own.floor is not None:
             found += _of_log(own, model)
     return found
 
 
 def _of_log(own: Opened, model: native.Model) -> list[Moment]:
     data = own.data
-    judged = np.isfinite(data.floor)
-    square = np.ma.masked_invalid(data.errors(model)[:, judged] / data.floor[judged]) ** 2
-    square = square.mean(axis=1).filled(np.nan)
-    missed = np.flatnonzero(~own.floor.keep & (square > BUMP * np.nanmedian(square)))
+    missed = np.flatnonzero(
+        _is_far(data.errors(model), data.floor)
+        & (_is_far(own.floor.across, data.floor) | ~own.floor.keep)
+    )
     if not len(missed):
         return []
     clusters = np.split(missed, 1 + np.flatnonzero(np.diff(data.start_s[missed]) > APART_S))
@@ -82,6 +82,14 @@ def _of_log(own: Opened, model: native.Model) -> list[Moment]:
         )
         for cluster in clusters
     ]
+
+
+def _is_far(errors: np.ndarray, floor: np.ndarray) -> np.ndarray:
+    """(W,) windows whose squared error is far beyond the median."""
+    judged = np.isfinite(floor)
+    square = np.ma.masked_invalid(errors[:, judged] / floor[judged]) ** 2
+    mean = square.mean(axis=1).filled(np.nan)
+    return mean > FAR * np.nanmedian(mean)
 
 
 def _way(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:

@@ -219,13 +219,16 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
         tested += [(group, np.array([t.formula == f for t in terms])) for f in own]
     if not tested:
         return []
-    found = [products.held_out(own) for _, own in tested]
-    spread = np.array([max(null.std(), 1e-12) for _, null in found])
-    highest = np.max([null / s for (_, null), s in zip(found, spread, strict=True)], axis=0)
-    least, least_gain = np.quantile(highest, 1 - ALPHA), 2 * np.log(len(tested) / ALPHA)
+    gains = np.array([products.held_out(own, 0)[0] for _, own in tested])
+    sure = gains > 2 * np.log(len(tested) / ALPHA)
+    if sure.any():
+        nulls = np.array([products.held_out(own)[1] for _, own in tested])
+        spread = np.maximum(nulls.std(axis=1), 1e-12)
+        highest = (nulls / spread[:, None]).max(axis=0)
+        sure &= gains / spread > np.quantile(highest, 1 - ALPHA)
     best: dict[str, Dependence] = {}
-    for (group, _), (gain, _), scale in zip(tested, found, spread, strict=True):
-        this = Dependence(group, gain, bool(gain / scale > least and gain > least_gain))
+    for (group, _), gain, beyond in zip(tested, gains, sure, strict=True):
+        this = Dependence(group, float(gain), bool(beyond))
         if group not in best or (this.sure, gain) > (best[group].sure, best[group].gain):
             best[group] = this
     return sorted(best.values(), key=lambda d: -d.gain)
@@ -291,18 +294,18 @@ class Products:
             gain += 2 * size * moment[test].sum(0) - size**2 * energy[test].sum(0)
         return gain
 
-    def held_out(self, own: np.ndarray) -> tuple[float, np.ndarray]:
+    def held_out(self, own: np.ndarray, flips: int = FLIPS) -> tuple[float, np.ndarray]:
         """Fall of the cost by these columns on blocks not fitted to, and (F,) what chance brings.
 
         Chance: random signs of what each block still scatters after the columns are fitted to all.
         """
         grams, moments = self.grams[:, own][:, :, own], self.moments[:, own]
-        signs = np.random.default_rng(1).choice([-1.0, 1.0], (FLIPS, len(grams), 1))
+        signs = np.random.default_rng(1).choice([-1.0, 1.0], (flips, len(grams), 1))
         prior = np.eye(own.sum())  # columns are in typical strengths
         scatter = moments - grams @ np.linalg.solve(grams.sum(0) + prior, moments.sum(0))
         moments = np.concatenate([moments[None], signs * scatter])
         fold = np.arange(len(grams)) % FOLDS
-        gain = np.zeros(1 + FLIPS)
+        gain = np.zeros(1 + flips)
         for k in range(FOLDS):
             test = fold == k
             gram = grams[~test].sum(0) + prior

@@ -18,21 +18,26 @@ from twinmill.fitting.opening import Opened
 TIMES, MORE = 1.15, 6.0  # a formula that takes so many times as much, and so much more, outdoes it
 
 
-def less_each(done: Search, opened: Sequence[Opened]) -> dict[str, Trial]:
+def less_each(
+    done: Search, opened: Sequence[Opened]
+) -> tuple[dict[str, Trial], Formulas | None]:
     """What was found, each with the final state refitted without it; what is outdone is dropped.
+
+    And the formulas over the logs as the final model moves.
 
     Args:
         done: what is outdone moves from its findings to what was dropped.
         opened: its measurements, in its order.
     """
     less = {n: without(done.last, n) for n in dict.fromkeys(done.found) if n != REFIT}
-    formulas = formulas_of(opened, done.last.fit) if less else None
+    formulas = formulas_of(opened, done.last.fit)
     for name in list(less):
         if formulas and better_formula(formulas, less[name], done.last):
             done.last = less[name]
             done.dropped.append(name)
             less = {n: without(done.last, n) for n in less if n != name}
-    return less
+            formulas = formulas_of(opened, done.last.fit)
+    return less, formulas
 
 
 def better_formula(formulas: Formulas, less: Trial, whole: Trial) -> Term | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from twinmill.diagnosis import moments
 from twinmill.diagnosis.findings import Finding
 from twinmill.diagnosis.rest import MOMENTS, Rest
-from twinmill.diagnosis.search import REFIT, of_levels
+from twinmill.diagnosis.search import NEWS, REFIT, of_levels
 from twinmill.fitting.compare import GOOD, MISSING
 
 DRIFTED = 0.85  # share of the score as given that drifting gains leave, where they were stale
@@ -159,6 +159,11 @@ class Weighed:
         """What the model left in the logs that it was fitted to, it leaves here, too."""
         if self.last <= GOOD:
             return ""
+        if self.last > NEWS * self.known:
+            return (
+                f" The model misses by a little more than the noise (score {self.last:.2f}): more "
+                "of these drives would tell why."
+            )
         return (
             " The model misses as it did on the logs that it was fitted to (score "
             f"{self.last:.2f}, there {self.known:.2f}): explain those first."

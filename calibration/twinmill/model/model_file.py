@@ -8,6 +8,7 @@ import os
 from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
@@ -44,14 +45,19 @@ class ModelFile:
         except (ValueError, OSError, UnicodeDecodeError) as error:
             raise ModelError(str(error)) from error
 
+    @cached_property
+    def _document(self) -> tomlkit.TOMLDocument:
+        """What the text says; read only."""
+        return tomlkit.parse(self.text)
+
     @property
     def clock_logs(self) -> list[str]:
         """Hashes (sha256) of the logs that told the clock offset."""
-        return list(tomlkit.parse(self.text).get("clock", {}).get("fitted_on", []))
+        return list(self._document.get("clock", {}).get("fitted_on", []))
 
     def told_by_others(self, log_sha256: Collection[str]) -> set[str]:
         """Names of the base quantities that were fitted, and on none of these logs."""
-        base = tomlkit.parse(self.text).get("base", {})
+        base = self._document.get("base", {})
         if not base.get("fitted_on") or set(base["fitted_on"]) & set(log_sha256):
             return set()
         told = set()
@@ -67,7 +73,7 @@ class ModelFile:
         """How well other logs told the lag; 0 where none did."""
         if not self.told_by_others(log_sha256):
             return 0.0
-        document = tomlkit.parse(self.text)
+        document = self._document
         parts = [document["base"].get("std", {}).get("motor_lag_s", 0.0)]
         parts += [
             e.get("std", {}).get("extra_s", 0.0)
@@ -79,12 +85,12 @@ class ModelFile:
     @property
     def effect_stds(self) -> dict[str, float]:
         """How well logs told the numbers of the effects, by name; of several alike the last."""
-        effects = tomlkit.parse(self.text).get("effect", [])
+        effects = self._document.get("effect", [])
         return {f"{e['name']}.{k}": float(v) for e in effects for k, v in e.get("std", {}).items()}
 
     def fitted_on(self, log_sha256: Collection[str]) -> bool:
         """Whether the base was fitted to one of these very logs."""
-        base = tomlkit.parse(self.text).get("base", {})
+        base = self._document.get("base", {})
         return bool(set(base.get("fitted_on", [])) & set(log_sha256))
 
     def usual_score(self, log_sha256: Collection[str]) -> float:
@@ -92,14 +98,14 @@ class ModelFile:
 
         No less than 1: on its own log a fit can look better than it is.
         """
-        score = tomlkit.parse(self.text).get("fit", {}).get("score_after")
+        score = self._document.get("fit", {}).get("score_after")
         if score is None or not self.told_by_others(log_sha256):
             return 1.0
         return max(1.0, float(score))
 
     def left_over(self, log_sha256: Collection[str]) -> dict[str, float]:
         """What the model left in other logs: fall of chi2 per step by what it depends on."""
-        table = tomlkit.parse(self.text).get("fit", {}).get("left_over", {})
+        table = self._document.get("fit", {}).get("left_over", {})
         if set(table.get("fitted_on", [])) & set(log_sha256):
             return {}
         return {str(g): float(v) for g, v in table.items() if g != "fitted_on"}
@@ -111,7 +117,7 @@ class ModelFile:
         Raises:
             ModelError: what stands there is none, or is of quantities that the model has not.
         """
-        table = tomlkit.parse(self.text).get("fit", {}).get("covariance", {})
+        table = self._document.get("fit", {}).get("covariance", {})
         try:
             found = Covariance.from_toml(table)
         except ValueError as error:

@@ -132,6 +132,13 @@ def test_an_effect_that_changed_within_the_models_own_error_is_a_stale_number(kn
     assert [f.effect for f in found] == [effect]
 
 
+@pytest.mark.parametrize(("known", "words"), [(1.0, "a little more than"), (1.2, "as it did")])
+def test_a_model_that_misses_as_before_is_not_said_to_miss_anew(known, words):
+    weighed = Weighed(1.21, 1.21, 1.21, 1.21, [], Rest(1.0, False, []), [], [], [], known)
+    assert weighed.verdict == "model_adequate"
+    assert words in weighed.sentence
+
+
 @pytest.mark.parametrize(
     ("certainty", "left", "verdict"),
     [
