@@ -151,6 +151,13 @@ def _second_order(rim, v, s):
     return slow(slow(rim, s.robot.lag_s), v["second_s"])
 
 
+def _turning_lags(rim, v, s):
+    spin = s.robot.to_wheels[:, 2] / np.linalg.norm(s.robot.to_wheels[:, 2])
+    turning = np.outer(rim @ spin, spin)
+    lag_s = s.robot.lag_s
+    return slow(rim - turning, lag_s) + slow(turning, lag_s + v["extra_s"])
+
+
 def _lag_by_duty(rim, v, s):
     tau = s.robot.lag_s + v["extra_s"] * (1 - np.abs(s.duty))
     share, out = STEP_S / tau, np.zeros_like(rim)
@@ -317,6 +324,17 @@ def _springy(rim, v, s):
     return (1 - v["share"]) * slow(rim, s.robot.lag_s) + v["share"] * swing
 
 
+def _backlash(rim, v, s):
+    gap_m, out = v["gap_rad"] * s.robot.wheel_radius_m, np.zeros_like(rim)
+    low = np.zeros(rim.shape[1])  # of the play: the motor's way is within gap_m above it
+    way = np.cumsum(rim, axis=0) * STEP_S
+    for k in range(len(rim)):
+        moved = np.maximum(low, way[k] - gap_m)
+        moved = np.minimum(moved, way[k])
+        out[k], low = (moved - low) / STEP_S, moved
+    return out
+
+
 def _delay(t_s, v, _):
     return t_s + v["delay_s"]
 
@@ -353,9 +371,12 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
     if robot.drive != "wheel_speed":
         form("motor_lag", "plain", "lag", _lag, extra_s=0.03)
         form("motor_lag", "cousin", "lag", _second_order, second_s=0.03)
+        form("second_order_lag", "plain", "lag", _second_order, second_s=0.03)
+        form("yaw_lag", "plain", "lag", _turning_lags, extra_s=0.04)
         form("input_delay", "plain", "command", _delay, delay_s=0.025)
         form("input_delay", "cousin", "command", _delay_that_varies, delay_s=0.03)
     if robot.drive != "twist":
+        form("backlash", "plain", "rolls", _backlash, gap_rad=0.15)
         gains = random.normal(0, 0.03, len(wheels))
         if robot.wheels == "differential":
             gains[2:] = gains[:2]

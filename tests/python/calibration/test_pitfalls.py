@@ -348,6 +348,24 @@ def test_wheels_behind_a_filter_are_no_delay(tanh_robot, measure, fitted):
     assert found.late.lag_s == pytest.approx(0.14, abs=0.01)
 
 
+def test_play_in_the_gears_is_no_weak_wheel(tanh_robot, measure, fitted):
+    """Each wheel rests while its motor turns back by 0.15 rad, as a stop that is dragged along."""
+
+    class Loose(tanh_robot):
+        def wheels_mps(self, duty):
+            way = np.cumsum(super().wheels_mps(duty), axis=0) * EULER_S
+            wheel, gap_m = np.zeros_like(way), 0.15 * fitted.model.get("robot.wheel_radius_m")
+            for k in range(1, len(way)):
+                wheel[k] = np.clip(wheel[k - 1], way[k] - gap_m, way[k])
+            return np.diff(wheel, axis=0, prepend=0.0) / EULER_S
+
+    found = diagnose([measure(Loose(), 28, 40.0)], fitted)
+    first = found.findings[0]
+    assert (first.effect, first.certainty) == ("backlash", "sure")
+    (gap,) = first.parameters
+    assert gap.value == pytest.approx(0.15, abs=2 * gap.std + 0.005)
+
+
 def test_an_effect_that_the_model_has_is_named_again_where_it_changed(
     tanh_robot, measure, fitted, tmp_path
 ):
