@@ -15,6 +15,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 FOLDERS = (
@@ -102,6 +103,30 @@ def include_flags(compile_commands: Path) -> list[str]:
     return list(flags)
 
 
+def object_circles(args: argparse.Namespace) -> Iterator[str]:
+    """No two files of C or C++ need each other's functions, directly or through others."""
+    defined: dict[str, Path] = {}
+    needed: dict[Path, list[str]] = {}
+    for entry in json.loads(args.compile_commands.read_text(encoding="utf-8")):
+        source, words = Path(entry["file"]), shlex.split(entry["command"])
+        made = Path(entry["directory"]) / words[words.index("-o") + 1]
+        if source.relative_to(args.root).parts[0] not in ("firmware", "twin") or not made.exists():
+            continue
+        names = subprocess.run(["nm", "-g", made], capture_output=True, text=True, check=True)
+        symbols = re.findall(r"([TDBRU]) (\S+)$", names.stdout, flags=re.MULTILINE)
+        defined.update((name, source) for kind, name in symbols if kind != "U")
+        needed[source] = [name for kind, name in symbols if kind == "U"]
+    users = {
+        source: {defined[name] for name in names if name in defined} - {source}
+        for source, names in needed.items()
+    }
+    try:
+        TopologicalSorter(users).prepare()
+    except CycleError as error:
+        circle = " <- ".join(str(path.relative_to(args.root)) for path in error.args[1])
+        yield f"{circle}: these files need each other; move what both need into a third"
+
+
 def headers_alone(args: argparse.Namespace) -> Iterator[str]:
     """Every public header compiles by itself: firmware as C11 and as C++20, the twin as C++20."""
     flags = [*include_flags(args.compile_commands), "-fsyntax-only", "-Wall", "-Wextra", "-Werror"]
@@ -171,6 +196,7 @@ RULES: dict[str, Callable[[argparse.Namespace], Iterator[str]]] = {
         lcm_comments,
         licence_line,
         machine_paths,
+        object_circles,
     )
 }
 
@@ -183,7 +209,7 @@ def main() -> int:
     parser.add_argument("rule", choices=RULES)
     parser.add_argument("root", type=lambda path: Path(path).resolve())
     parser.add_argument("--library", help="the core's static library")
-    parser.add_argument("--compile-commands", type=Path, help="of the build, for include folders")
+    parser.add_argument("--compile-commands", type=Path, help="of the build")
     args = parser.parse_args()
     offences = list(RULES[args.rule](args))
     for offence in offences:
