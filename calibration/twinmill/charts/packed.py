@@ -20,8 +20,8 @@ COMMAND_WORDS = {
     "wheel_speed": (("FL", "FR", "RL", "RR"), "rad/s"),
     "twist": (("vx", "vy", "turn"), "m/s, rad/s"),
 }
-# Colours of Okabe and Ito (2008), told apart by colour-blind readers.
-COLORS = ("#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7d8c94")
+# Of Okabe and Ito (2008), the last of Tol (2021): told apart by colour-blind readers.
+COLORS = ("#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#882255")
 
 
 def pack(arrays: Mapping[str, np.ndarray], **facts: object) -> bytes:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page: a bar, the stage with floor and series, and panels at the side. It only draws."""
 
+import asyncio
 import json
 from collections import Counter
 
@@ -144,11 +145,10 @@ class Screen:
         await self._refresh()
 
     def drag(self, name: str, value: float) -> None:
-        """A knob is being turned: predictions and score follow at once."""
+        """A knob is being turned: predictions follow at once, the score at the next refresh."""
         self.bench.drag(name, value)
         self._seen["prediction"] = self.bench.changes["prediction"]
         self.javascript("twinmill.predict()")
-        self._draw_score()
 
     async def start(self, kind: str, effect: str = "", options: dict | None = None) -> None:
         """A fit, an addition, a diagnosis, a next run or a swarm."""
@@ -211,7 +211,7 @@ class Screen:
         if "work" in new or self.bench.doing:
             self._draw_status()
         if new & {"score", "model", "robots", "names"}:
-            self._draw_score()
+            await self._draw_score()
         self._stale |= {tab for tab, what in DRAWS.items() if new & what}
         self._draw_tab()
         if "work" in new or self.bench.doing:
@@ -268,15 +268,15 @@ class Screen:
         self.status.classes(replace="space bad" if bench.failure else "space")
         self.cancel.set_visibility(bench.doing is not None)
 
-    def _draw_score(self) -> None:
-        session = self.bench.session
+    async def _draw_score(self) -> None:
+        session, of = self.bench.session, self.bench.changes["score"]
         known = session.tree.scores.get(session.tree.current.number)
-        if self.bench.ready and session.is_passing:
-            self._say_score(session.passing_score(self.bench.picked), False)
-        elif known:
+        if known and not (self.bench.ready and session.is_passing):
             self._say_score(known.fitted, known.exact)
         elif self.bench.ready:
-            self._say_score(session.passing_score(self.bench.picked), False)
+            score = await asyncio.to_thread(session.passing_score, self.bench.picked)
+            if self.bench.changes["score"] == of:
+                self._say_score(score, False)
         self.undo.set_enabled(session.tree.can_undo)
         self.redo.set_enabled(session.tree.can_redo)
         self._draw_status()

@@ -217,7 +217,7 @@ class Session:
                 f"{name} = {value:g}: must be within {bounds['min']:g} to {bounds['max']:g}."
             )
         self._foreseen, self.beside = {}, None
-        self._dragged[name] = value
+        self._dragged = {**self._dragged, name: value}
         self._passing = {}
 
     def keep(self) -> None:
@@ -346,16 +346,17 @@ class Session:
         if index in self._foreseen:
             return self._foreseen[index]
         settled = self.settled(self.tree.current.number, index)
-        if not self._dragged:
+        dragged, passing = self._dragged, self._passing  # a hand goes on meanwhile
+        if not dragged:
             return settled
-        if index not in self._passing:
+        if index not in passing:
             model = self.model_file.model.copy()
-            for name, value in self._dragged.items():
+            for name, value in dragged.items():
                 model.set(name, value)
             from_s = self._clocks.get(index, settled.model.get(CLOCK))
-            self._passing[index] = settled.aligned(model, from_s, DRAGGED_ROUNDS)
-            self._clocks[index] = self._passing[index].model.get(CLOCK)
-        return self._passing[index]
+            passing[index] = settled.aligned(model, from_s, DRAGGED_ROUNDS)
+            self._clocks[index] = passing[index].model.get(CLOCK)
+        return passing[index]
 
     def passing_score(self, index: int) -> float:
         """About that of the model shown, from as many robots as can be asked at once."""
