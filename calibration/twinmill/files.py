@@ -36,7 +36,7 @@ def check_new_file(path: Path, force: bool) -> None:
 
 
 @contextmanager
-def replacing(out: Path, force: bool) -> Iterator[Path]:
+def replacing(out: Path, force: bool, mode: int = 0o644) -> Iterator[Path]:
     """A temporary file beside `out` that takes its place if the block succeeds.
 
     Raises:
@@ -47,7 +47,7 @@ def replacing(out: Path, force: bool) -> Iterator[Path]:
     os.close(handle)
     try:
         yield Path(name)
-        os.chmod(name, 0o644)
+        os.chmod(name, mode)
         os.replace(name, out)
     except OSError as error:
         raise ValueError(

@@ -42,7 +42,9 @@ class ModelFile:
             path = Path(native.find_model_file(str(name)))
             text = path.read_text()
             return cls(path, text, native.Model.from_toml(text, str(name)))
-        except (ValueError, OSError, UnicodeDecodeError) as error:
+        except UnicodeDecodeError as error:
+            raise ModelError(f"{name}: is no text, so it is no model file; check the name.") from error
+        except (ValueError, OSError) as error:
             raise ModelError(str(error)) from error
 
     @cached_property

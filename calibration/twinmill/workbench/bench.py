@@ -217,8 +217,13 @@ class Bench:
         now = (sum(self.changes.values()), json.dumps(self.view), sorted(self.session.held))
         if now != self._written:
             data = plain({"view": self.view, "session": self.session.to_json()})
-            self.state.write(json.dumps(data, allow_nan=False))
             self._written = now
+            try:
+                self.state.write(json.dumps(data, allow_nan=False))
+            except ValueError as error:
+                self.failure = f"What you do is not kept: {error}"
+                self.changed("work")
+                self._written = (sum(self.changes.values()), *now[1:])
 
     def close(self) -> None:
         """Ends the worker; keeps the state."""

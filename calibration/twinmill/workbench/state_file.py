@@ -43,6 +43,7 @@ class StateFile:
         if not isinstance(self._data, dict):
             raise ValueError(f"{path}: holds no session of the workbench; remove it.")
         self._data.setdefault("token", secrets.token_urlsafe(16))
+        self.write(json.dumps(self._data))
 
     @property
     def token(self) -> str:
@@ -54,7 +55,10 @@ class StateFile:
         return self._data.get(key, default)
 
     def write(self, text: str) -> None:
-        """All entries anew, from a JSON object."""
-        with replacing(self.path, force=True) as temporary:
+        """All entries anew, from a JSON object.
+
+        Raises:
+            ValueError: it cannot be written.
+        """
+        with replacing(self.path, force=True, mode=0o600) as temporary:
             temporary.write_text(json.dumps({"token": self.token, **json.loads(text)}))
-        self.path.chmod(0o600)
