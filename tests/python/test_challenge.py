@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import twinmill_native as native
 
 from twinmill.challenge.cases import CASES, LEAST, Floors, draw, draw_robots, seal
+from twinmill.challenge.intervals import SETS, coverage, draw_known, errors
 from twinmill.challenge.physics import STEP_S, Signals, catalogue_forms, outside_forms
 from twinmill.challenge.robots import KINDS
 from twinmill.challenge.run import Plan, play
@@ -197,3 +199,32 @@ def test_intervals_of_none_and_all_are_clopper_and_pearsons(hits, of, low, high)
     assert (found["hits"], found["of"]) == (hits, of)
     assert found["low"] == pytest.approx(low)
     assert found["high"] == pytest.approx(high)
+
+
+def test_a_known_drives_truth_are_numbers_of_the_model_that_it_is_fitted_with():
+    for number in range(len(SETS)):
+        known = draw_known(number, 1, 30)
+        model = native.Model.from_toml(known.sheet, "known.toml")
+        for name, value in known.truth.items():
+            model.set(name, value)  # refuses what is out of bounds, or no quantity
+        assert {name.split(".")[0] for name in known.truth} == {"base", *SETS[number]}
+        assert [h.name for h in known.hidden] == list(SETS[number])
+    assert draw_known(3, 1, 30).sheet == draw_known(3, 1, 30).sheet != draw_known(3, 2, 30).sheet
+
+
+@pytest.mark.parametrize(("wide", "share"), [(1.0, 0.95), (2.0, 0.99991), (0.5, 0.673)])
+def test_coverage_of_right_and_wrong_standard_errors_is_the_normals(wide, share):
+    """P(|z| <= 1.96 wide) of a normal; quantities whose truth is not known do not count."""
+    known = draw_known(0, 1, 30)
+    random, truth = np.random.default_rng(5), known.truth["base.yaw_gain"]
+    rows = [
+        row
+        for value in truth + 0.01 * random.standard_normal(4000)
+        for row in errors(known, {"parameters": [
+            {"name": "base.yaw_gain", "value": value, "std": 0.01 * wide},
+            {"name": "theta_a1", "value": 1.0, "std": 0.1}]})
+    ]  # fmt: skip
+    (quantity,) = coverage(rows)
+    assert quantity["name"] == "base.yaw_gain" and quantity["of"] == 4000
+    assert quantity["hits"] / 4000 == pytest.approx(share, abs=4 * np.sqrt(0.25 / 4000))
+    assert quantity["rms"] == pytest.approx(1 / wide, rel=0.05)

@@ -30,6 +30,7 @@ if working():  # not for --help
 
     import twinmill as tm
     from twinmill.challenge.cases import Case, calibration, draw, draw_robots, make_log, seal
+    from twinmill.challenge.intervals import coverage, draw_known, errors
     from twinmill.challenge.robots import Robot
     from twinmill.challenge.run import play, write_log
     from twinmill.challenge.scoring import scored, summary
@@ -58,6 +59,17 @@ def _challenge(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Cases at a time; as many as cores by default.")
     ] = None,
+    intervals: Annotated[
+        int | None,
+        typer.Option(
+            "--intervals",
+            min=1,
+            metavar="N",
+            show_default=False,
+            help="In place of the exam: fit N drives whose numbers are known, and tell of each "
+            "quantity how often its 95 % interval covers the truth.",
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> dict:
     """Draw robots and what is hidden in them, seal the answers, diagnose their logs, unseal, score.
@@ -71,7 +83,9 @@ def _challenge(
     """
     check_new_folder(out)
     (out / DONE).mkdir(parents=True, exist_ok=True)
-    console = Console(stderr=True)
+    console, workers = Console(stderr=True), workers or os.cpu_count() or 1
+    if intervals:
+        return _intervals(out, intervals, seed, duration_s, workers, console, as_json)
     robots = draw_robots(seed)
     cases = [draw(number, seed, robots, duration_s) for number in range(count)]
     answers = seal(cases)
@@ -79,7 +93,7 @@ def _challenge(
     driven = sorted({case.robot for case in cases})
     bases = {k: base_of(out, k, robots[k], seed, duration_s) for k in driven}
     results, times_s = {}, {}
-    for number, result, time_s in _all(out, bases, cases, workers or os.cpu_count() or 1, console):
+    for number, result, time_s in _all(out, bases, cases, workers, console):
         results[number], times_s[number] = result, time_s
     ordered = [results[case.number] for case in cases]
     found = {"seed": seed, "duration_s": duration_s, **summary(ordered), "cases": ordered}
@@ -136,18 +150,65 @@ def diagnosed(folder: Path, base: Path, case: Case) -> tuple[dict, float]:
     return scored(case, found), time_s
 
 
+def _intervals(
+    out: Path,
+    count: int,
+    seed: int,
+    duration_s: float,
+    workers: int,
+    console: Console,
+    as_json: bool,
+) -> dict:
+    """Fits drives whose numbers are known, and counts how often intervals cover them."""
+    calls = [(_fitted, out, number, seed, duration_s) for number in range(count)]
+    rows = dict(_done(calls, "fitting", workers, console))
+    found = {
+        "seed": seed,
+        "duration_s": duration_s,
+        "cases": count,
+        "quantities": coverage([row for number in range(count) for row in rows[number]]),
+    }
+    write_whole(out / "intervals.json", json.dumps(found, indent=1))
+    shutil.rmtree(out / DONE)
+    deliver(found, page.intervals(found), as_json)
+    return found
+
+
+def _fitted(folder: Path, number: int, seed: int, duration_s: float) -> tuple[int, list[dict]]:
+    """A drive's errors, or what a run that was stopped found for it."""
+    known = draw_known(number, seed, duration_s)
+    asked = [version("twinmill"), known.sheet, known.plan.seed, duration_s]
+    name = hashlib.sha256(json.dumps(asked).encode()).hexdigest()
+    kept = folder / DONE / f"{name}.json"
+    if kept.exists():
+        return number, json.loads(kept.read_text())
+    log, sheet = folder / DONE / f"{name}.lcmlog", folder / DONE / f"{name}.toml"
+    write_log(known.plan, play(known.plan, known.hidden), log)
+    write_whole(sheet, known.sheet)
+    rows = errors(known, tm.fit(log, str(sheet)).to_json())
+    log.unlink()
+    write_whole(kept, json.dumps(rows))
+    return number, rows
+
+
 def _all(
     folder: Path, bases: dict[int, Path], cases: Sequence[Case], workers: int, console: Console
 ) -> Iterator[tuple[int, dict, float]]:
-    """Every case as it is done: number, result, time; shows progress and the time left."""
+    """Every case as it is done: number, result, time."""
+    calls = [(_one, folder, bases[case.robot], case) for case in cases]
+    yield from _done(calls, "diagnosing", workers, console)
+
+
+def _done(calls: Sequence[tuple], what: str, workers: int, console: Console) -> Iterator:
+    """What functions with their arguments return, as each is done; shows progress and time left."""
     columns = (*Progress.get_default_columns()[:-1], MofNCompleteColumn(), TimeRemainingColumn())
     pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
     with (
         Progress(*columns, console=console, disable=not console.is_terminal) as progress,
         pool as running,
     ):
-        waiting = [running.submit(_one, folder, bases[case.robot], case) for case in cases]
-        for done in progress.track(as_completed(waiting), len(cases), description="diagnosing"):
+        waiting = [running.submit(*call) for call in calls]
+        for done in progress.track(as_completed(waiting), len(calls), description=what):
             yield done.result()
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Group, RenderableType
 
+from twinmill.challenge.intervals import GOAL
 from twinmill.challenge.scoring import BARS, BINS, LARGEST_GROUP
 from twinmill.report import Figure, Provenance, Section, show, write_report
 from twinmill.report.canvas import BEFORE, draw
@@ -16,6 +17,32 @@ from twinmill.report.tables import Cell, Table
 def shown(found: dict, times_s: list[float]) -> RenderableType:
     """For the terminal."""
     return Group(*(show.table(t) for t in (_rates(found, times_s), _lost(found))))
+
+
+def intervals(found: dict) -> RenderableType:
+    """How often intervals cover the truth, for the terminal."""
+    low, high = GOAL
+    rows = [
+        [
+            Cell(q["name"]),
+            Cell(f"{q['hits']} of {q['of']}"),
+            # Wrong only where so many cases could not come of a right interval.
+            Cell(
+                f"{100 * q['hits'] / q['of']:.0f} %",
+                "good" if q["low"] <= high and q["high"] >= low else "bad",
+            ),
+            Cell(f"{100 * q['low']:.0f} to {100 * q['high']:.0f} %"),
+            Cell(f"{q['rms']:.2f}"),
+        ]
+        for q in found["quantities"]
+    ]
+    note = (
+        f"Goal: {100 * low:.0f} to {100 * high:.0f} %. Errors over standard errors have an RMS of "
+        "1 if these are right; below it intervals are too wide."
+    )
+    head = ["quantity", "covered", "share", "95 % interval of it", "RMS"]
+    title = f"95 % intervals, {found['cases']} drives"
+    return show.table(Table(title, head, rows, note, words=(0,)))
 
 
 def write(folder: Path, found: dict, times_s: list[float]) -> None:

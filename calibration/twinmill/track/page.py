@@ -19,7 +19,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, StreamingResponse
 from starlette.routing import Mount, Route
 
-from twinmill.track.detect import FLOOR
+from twinmill.track.detect import ROBOTS
 from twinmill.track.live import Sight
 
 HOST = "127.0.0.1"
@@ -28,7 +28,7 @@ SHOWN_S = 0.1  # between pictures
 RECENT_S = 2.0  # for rates, and for robots that are lost
 END_S = 1
 # Blue, green, red.
-ROBOT, LOST, FLOOR_TAG, OTHER = (60, 200, 60), (60, 60, 235), (230, 160, 40), (150, 150, 150)
+FOLLOWED, ROBOT, LOST, FLOOR = (60, 200, 60), (170, 220, 170), (60, 60, 235), (230, 160, 40)
 LINE_PX, LETTER = 2, 0.8
 FRAME = b"--frame\r\nContent-Type: image/jpeg\r\n\r\n"
 HTML = """<!DOCTYPE html>
@@ -174,11 +174,14 @@ def _told(robot_id: int, sight: Sight, rate_hz: float) -> dict:
 
 
 def drawn(sight: Sight, rate_hz: float) -> bytes:
-    """A JPEG: robots green with an arrow to their front, floor tags blue, other tags grey."""
+    """A JPEG: robots green with an arrow to their front, pale if another camera has them.
+
+    Floor tags are blue.
+    """
     scale = min(1.0, WIDEST_PX / sight.picture.shape[1])
     picture = cv2.resize(sight.picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     for number, corners in zip(sight.numbers.tolist(), sight.corners_px, strict=True):
-        colour = ROBOT if number in sight.poses else FLOOR_TAG if number in FLOOR else OTHER
+        colour = FOLLOWED if number in sight.poses else ROBOT if number in ROBOTS else FLOOR
         square = np.round(corners * scale).astype(np.int32)
         cv2.polylines(picture, [square], True, colour, LINE_PX, cv2.LINE_AA)
         middle, front = square.mean(axis=0), square[:2].mean(axis=0)
@@ -189,7 +192,7 @@ def drawn(sight: Sight, rate_hz: float) -> bytes:
             )
         _write(picture, str(number), square.max(axis=0) + 2, colour)
     head = f"camera {sight.camera}  {rate_hz:.0f} Hz  {len(sight.poses)} robots"
-    _write(picture, head, (10, 28), ROBOT if sight.poses else LOST)
+    _write(picture, head, (10, 28), FOLLOWED if len(sight.numbers) else LOST)
     if sight.lost:
         _write(picture, f"lost: {', '.join(map(str, sight.lost))}", (10, 58), LOST)
     return cv2.imencode(".jpg", picture)[1].tobytes()
