@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables as people have them: units, usual names, order of rows, and the mapping file."""
 
+import re
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -51,6 +53,54 @@ def test_a_new_name_may_have_another_unit(imported):
 def test_a_name_without_a_unit_is_asked_about(imported, column, usual, looks):
     with pytest.raises(LogError, match=f"'{usual}' has no unit .*looks like {looks}"):
         imported(POSES.replace(column, usual))
+
+
+@pytest.mark.parametrize(
+    ("column", "new", "target"),
+    [
+        ("x_m", "pose.position.x", "x_m"),
+        ("x_m", "field.pose.pose.position.x", "x_m"),
+        ("x_m", "transform.translation.x", "x_m"),
+        ("theta_rad", "pose.orientation.z", "qz"),
+        ("t_s", "%time", "t_s"),
+    ],
+)
+def test_fields_of_messages_are_asked_about_by_what_they_are(imported, column, new, target):
+    with pytest.raises(LogError, match=f"column '{re.escape(new)}' .*--rename .*={target}"):
+        imported(POSES.replace(column, new))
+
+
+def test_velocities_of_the_room_are_asked_about_as_such(imported):
+    rows = "t_s,robot_id,vx_world,vy_world\n0,4,0.1,0.2\n"
+    with pytest.raises(LogError, match=r"'vx_world' has no unit .*--rename vx_world=vx_world_mps"):
+        imported(commands=rows)
+
+
+def test_time_without_a_unit_looks_the_same_in_any_order_of_rows(imported):
+    rows = [f"{0.02 * k:.2f},4,{k},0,0\n" for k in np.random.default_rng(1).permutation(200)]
+    with pytest.raises(LogError, match=r"rows are 0\.02 apart, so it looks like s"):
+        imported("time,robot_id,x_m,y_m,theta_rad\n" + "".join(rows))
+
+
+def test_commands_without_a_robot_are_of_the_only_one_that_has_poses(imported):
+    robot, _ = imported(commands=COMMANDS.replace("robot_id,", "").replace(",4,", ","))
+    np.testing.assert_allclose(robot.command[0], [0.1, 0.2, 0.3, 0.4])
+    two = POSES + POSES.split("\n", 1)[1].replace(",4,", ",5,")
+    with pytest.raises(LogError, match="column robot_id is missing"):
+        imported(two, commands=COMMANDS.replace("robot_id,", "").replace(",4,", ","))
+
+
+def test_a_column_id_that_holds_names_is_asked_about(imported):
+    with pytest.raises(LogError, match=r"'id' may be robot_id \(holds names\)"):
+        imported(POSES.replace("robot_id", "id").replace(",4,", ",bot4,"))
+
+
+def test_a_robot_without_a_valid_pose_is_named(tmp_path):
+    poses = POSES + "0,5,nan,nan,nan\n1,5,nan,nan,nan\n"
+    (tmp_path / "p.csv").write_text(poses)
+    (tmp_path / "c.csv").write_text(COMMANDS + "0,5,10,20,30,40\n")
+    done = import_log(tmp_path / "p.csv", tmp_path / "c.csv", tmp_path / "o.lcmlog")
+    assert any(w.startswith("robot 5: 0 of its 2 poses are valid") for w in done["warnings"])
 
 
 def test_rows_out_of_order_and_repeated_stamps_are_put_right_and_said(imported):

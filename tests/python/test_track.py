@@ -187,3 +187,16 @@ def test_noise_of_five_degrees_is_no_jump(driven):
     robot = driven(30.0)
     robot.pose[:, 2] += np.radians(5) * np.random.default_rng(1).normal(size=len(robot.pose))
     assert make_track(robot).segment.tolist() == [0] * len(robot.pose_t_s)
+
+
+def test_stamps_that_jitter_by_a_whole_period_are_no_jumps_and_a_pick_up_still_is(driven):
+    robot = driven(30.0)
+    random = np.random.default_rng(4)
+    robot.pose[:, 0] = 0.3 * np.maximum(robot.pose_t_s - 20, 0)  # it stands for most of the time
+    off_s = np.median(np.diff(robot.pose_t_s)) * random.normal(size=len(robot.pose_t_s))
+    order = np.argsort(robot.pose_t_s + off_s)
+    pose = robot.pose[order].copy()
+    robot = replace(robot, pose_t_s=(robot.pose_t_s + off_s)[order], pose=pose)
+    assert (make_track(robot).segment == 0).all()
+    robot.pose[3000:, 1] += 0.4
+    assert make_track(robot).segment.max() == 1

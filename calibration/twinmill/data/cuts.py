@@ -14,6 +14,7 @@ JUMP_NOISE_M, JUMP_NOISE_RAD = 0.005, 0.05  # ten times the noise of a motion ca
 JUMP_SIGMA = 8  # times the noise of a camera that is worse than that
 JUMP_FACTOR = 3  # times as fast as just before or after: no wheels do that between two frames
 BESIDE = 3  # steps that tell how fast the robot is just before, or just after
+FAST_S = 0.5  # over which speeds are told where stamps jitter
 MARGIN_S = 0.1  # frames beside a pick-up show the hand or half a marker body
 SHORTEST_S = 0.1  # shortest horizon that is predicted: a segment below it is of no use
 
@@ -59,16 +60,20 @@ class _Limits:
 
     @classmethod
     def of(cls, robot: RobotLog, usable: np.ndarray, *usual: float) -> "_Limits":
-        """With the noise that second differences of the poses show: motion is smooth beside it."""
+        """With the noise that second differences of the poses show: motion is smooth beside it.
+
+        Stamps that jitter are noise as well: the way in the time that they are off.
+        """
         pose = robot.pose[usable]
         pose[:, 2] = np.unwrap(pose[:, 2])
+        late = JUMP_SIGMA * _jitter_s(robot.pose_t_s[usable]) * _fast(robot.pose_t_s[usable], pose)
         bend = np.abs(np.diff(np.nan_to_num(pose), n=2, axis=0))
         sigma = np.median(bend, axis=0) / 0.6745 / np.sqrt(6) if len(bend) else np.zeros(3)
         return cls(
             usual,
             (
-                max(JUMP_NOISE_M, JUMP_SIGMA * float(sigma[:2].max())),
-                max(JUMP_NOISE_RAD, JUMP_SIGMA * float(sigma[2])),
+                max(JUMP_NOISE_M, JUMP_SIGMA * float(sigma[:2].max()), float(late[0])),
+                max(JUMP_NOISE_RAD, JUMP_SIGMA * float(sigma[2]), float(late[1])),
             ),
         )
 
@@ -76,6 +81,23 @@ class _Limits:
         """(K,) longest step of one channel, by the speeds before and after it."""
         fastest = np.maximum(self.usual[channel], JUMP_FACTOR * _beside(speed))
         return fastest * dt_s + self.noise[channel]
+
+
+def _jitter_s(t_s: np.ndarray) -> float:
+    """Standard deviation of stamps about an even beat; 0 where most are even."""
+    steps_s = np.diff(t_s)
+    off_s = np.abs(steps_s - np.median(steps_s)) if len(steps_s) else np.zeros(1)
+    return float(np.median(off_s)) / 0.6745 / np.sqrt(2)
+
+
+def _fast(t_s: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """m/s and rad/s that a robot seldom exceeds, over FAST_S: jitter hardly shows in these."""
+    after = np.searchsorted(t_s, t_s + FAST_S)
+    first = np.flatnonzero(after < len(t_s))
+    if not len(first):
+        return np.zeros(2)
+    rate = np.nan_to_num(pose[after[first]] - pose[first]) / FAST_S
+    return np.quantile([np.hypot(rate[:, 0], rate[:, 1]), np.abs(rate[:, 2])], 0.95, axis=1)
 
 
 def _beside(speed: np.ndarray) -> np.ndarray:

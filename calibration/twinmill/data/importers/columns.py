@@ -6,6 +6,7 @@ never guessed silently: `explain` says what it looks like, a mapping file keeps 
 """
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +16,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from twinmill.data.log import LogError
-from twinmill.data.measurement_table import Table, read_header, read_table
+from twinmill.data.measurement_table import Table, is_number, read_header, read_table
 from twinmill.data.units import UNITS, plain_name, split_unit
 
 
@@ -78,7 +79,8 @@ def by_name(column: str, known: frozenset[str]) -> tuple[tuple[str, ...], float]
 
 
 def _time(values: np.ndarray) -> tuple[float, str]:
-    step = float(np.median(np.abs(np.diff(values)))) if len(values) > 1 else 0.0
+    steps = np.diff(np.unique(values))  # whatever the order of the rows
+    step = float(np.median(steps)) if len(steps) else 0.0
     for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
         if step * factor < 2:
             return factor, f"rows are {step:g} apart, so it looks like {unit}"
@@ -130,13 +132,17 @@ LEFT, RIGHT = ("fl_pct", "rl_pct"), ("fr_pct", "rr_pct")
 ROBOT = ("robot", "agent", "robotid", "robot_name", "name")
 ALWAYS = frozenset((*ROBOT, "qw", "qx", "qy", "qz"))  # need no unit
 WHEELS = {"left": (1, 3), "right": (2, 4), "fl": (1,), "fr": (2,), "rl": (3,), "rr": (4,)}
+# Where a field stands in a message of ROS, as tables of bags have it before its name.
+OF_MESSAGE = re.compile(r"^%?(field_)?((pose|transform|twist)_)*(?=[a-z])")
 # Usual names without a unit: what they mean, and how their values tell the unit.
 USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]]]] = {
     **dict.fromkeys(("t", "time", "timestamp", "stamp", "secs"), (("t_s",), _time)),
     **dict.fromkeys((*ROBOT, "id"), (("robot_id",), _plain)),
-    **dict.fromkeys(("x", "pos_x", "position_x", "px"), (("x_m",), _length)),
-    **dict.fromkeys(("y", "pos_y", "position_y", "py"), (("y_m",), _length)),
-    **dict.fromkeys(("z", "pos_z", "position_z", "pz", "height"), (("z_m",), _length)),
+    **dict.fromkeys(("x", "pos_x", "position_x", "px", "translation_x"), (("x_m",), _length)),
+    **dict.fromkeys(("y", "pos_y", "position_y", "py", "translation_y"), (("y_m",), _length)),
+    **dict.fromkeys(
+        ("z", "pos_z", "position_z", "pz", "height", "translation_z"), (("z_m",), _length)
+    ),
     **dict.fromkeys(("theta", "yaw", "heading", "psi", "phi"), (("theta_rad",), _angle)),
     **dict.fromkeys(("v", "vx", "linear_x", "speed"), (("vx_mps",), _speed)),
     **dict.fromkeys(("vy", "linear_y"), (("vy_mps",), _speed)),
@@ -148,7 +154,17 @@ USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]
         for wheel in ("fl", "fr", "rl", "rr")
         for name in (wheel, f"pwm_{wheel}", f"duty_{wheel}")
     },
+    **{
+        name: ((f"v{axis}_world_mps",), _speed)
+        for axis in "xy"
+        for name in (f"v{axis}_world", f"world_v{axis}", f"v{axis}_global", f"vel_{axis}_world")
+    },
     **{q: ((q,), _plain) for q in ("qw", "qx", "qy", "qz")},
+    **{
+        name: ((f"q{axis}",), _plain)
+        for axis in "wxyz"
+        for name in (f"orientation_{axis}", f"rotation_{axis}", f"quat_{axis}", f"q_{axis}")
+    },
     # German
     **dict.fromkeys(("zeit", "zeitstempel"), (("t_s",), _time)),
     **dict.fromkeys(("roboter", "roboter_id", "nummer"), (("robot_id",), _plain)),
@@ -204,15 +220,23 @@ def _guess(table: Table, column: str, known: frozenset[str], new: str | None) ->
             factor, note = _renamed(table.name, column, new, factor)
         why = "by its name" if factor == 1 else f"by its name, times {factor:.6g}"
         return Guess(column, targets, factor, why, True, note)
-    usual = USUAL.get(plain_name(name))
+    usual = _usual(name)
     if usual and usual[0] == ("t_s",) and table.is_dated(column):
         return Guess(column, usual[0], 1.0, "holds dates or times of day", True)
+    if usual and usual[0] == ("robot_id",) and not all(map(is_number, table.cells(column))):
+        return Guess(column, usual[0], 1.0, "holds names", False)
     values = _numbers(table, column) if usual and known.issuperset(usual[0]) else np.empty(0)
     if not len(values):
         return Guess(column, (), 1.0, "not known: left out", True)
     targets, unit_of = usual
     factor, why = unit_of(values)
     return Guess(column, targets, factor, why, False)
+
+
+def _usual(name: str) -> tuple[tuple[str, ...], Callable] | None:
+    """What a usual name means, wherever in a message of ROS it stands."""
+    plain = plain_name(name)
+    return USUAL.get(plain) or USUAL.get(OF_MESSAGE.sub("", plain))
 
 
 RADIUS = "the factor is 1 / the wheel's radius in m"
@@ -247,7 +271,7 @@ def check_renames(rename: dict[str, str], tables: list[Path], known: frozenset[s
                 f"--rename {old}={new}: no table has a column '{old}'"
                 f"{f' ({names})' if names else ''}; correct the name."
             )
-        if not by_name(new, known) and plain_name(new) not in USUAL:
+        if not by_name(new, known) and not _usual(new):
             raise LogError(
                 f"--rename {old}={new}: {new} is none of our columns; they are "
                 f"{', '.join(sorted(known))}."

@@ -2,7 +2,7 @@
 """Makes a log from motion capture exports and command tables of others."""
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -145,7 +145,9 @@ def import_log(
         pose_series, command_series = read_bag(bag, *topics, how)
     else:
         pose_series = _read_poses(poses, motive, vicon, options, absolute=bool(io_tsv))
-        command_series = _read_commands(commands, io_tsv, options)
+        numbers = {series.robot_id for series in pose_series}
+        only = numbers.pop() if len(numbers) == 1 else None
+        command_series = _read_commands(commands, io_tsv, options, only)
     _check_names(options, [series.robot_id for series in (*pose_series, *command_series)])
     pose_series = [_moved(series, options) for series in pose_series]
     shift = not bag or options.receive_stamps
@@ -181,11 +183,15 @@ def _read_poses(
 
 
 def _read_commands(
-    commands: Path | None, io_tsv: tuple[Path, ...], options: ImportOptions
+    commands: Path | None, io_tsv: tuple[Path, ...], options: ImportOptions, only: int | None
 ) -> list[CommandSeries]:
-    """Series of the one that is given."""
+    """Series of the one that is given; a table without robots is of the only one with poses."""
     if commands:
-        return read_commands(commands, _columns(options, "commands"))
+        columns = _columns(options, "commands")
+        return read_commands(
+            commands,
+            replace(columns, robot_id=only if columns.robot_id is None else columns.robot_id),
+        )
     return [read_io_tsv(path, options.robot_id) for path in io_tsv]
 
 
@@ -346,6 +352,11 @@ def _summary(log: Log, out: Path, warnings: list[str]) -> dict:
         )
         if len(series) == 2 and robot.valid.sum() > 1:
             warnings += _judged(robot)
+        elif len(series) == 2:
+            warnings.append(
+                f"robot {robot.robot_id}: {robot.valid.sum()} of its {len(robot.pose_t_s)} poses "
+                "are valid; nothing of it can be judged, and it is left out there."
+            )
     return {
         "out": str(out),
         "robots": robots,
