@@ -18,9 +18,7 @@ from twinmill.fitting.opening import Opened
 TIMES, MORE = 1.15, 6.0  # a formula that takes so many times as much, and so much more, outdoes it
 
 
-def less_each(
-    done: Search, opened: Sequence[Opened]
-) -> tuple[dict[str, Trial], Formulas | None]:
+def less_each(done: Search, opened: Sequence[Opened]) -> tuple[dict[str, Trial], Formulas | None]:
     """What was found, each with the final state refitted without it; what is outdone is dropped.
 
     And the formulas over the logs as the final model moves.
