@@ -110,7 +110,8 @@ def object_circles(args: argparse.Namespace) -> Iterator[str]:
     for entry in json.loads(args.compile_commands.read_text(encoding="utf-8")):
         source, words = Path(entry["file"]), shlex.split(entry["command"])
         made = Path(entry["directory"]) / words[words.index("-o") + 1]
-        if source.relative_to(args.root).parts[0] not in ("firmware", "twin") or not made.exists():
+        ours = any(source.is_relative_to(args.root / folder) for folder in ("firmware", "twin"))
+        if not ours or not made.exists():
             continue
         names = subprocess.run(["nm", "-g", made], capture_output=True, text=True, check=True)
         symbols = re.findall(r"([TDBRU]) (\S+)$", names.stdout, flags=re.MULTILINE)
