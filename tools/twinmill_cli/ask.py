@@ -157,7 +157,7 @@ def _ask(
     as_json: AsJson = False,
     out: Out = None,
 ) -> list[Curve]:
-    """Answer one of the four design questions with a curve and a sentence.
+    """Answer a design question with a curve and a sentence.
 
     Example: twinmill ask how-many --behavior milling --model turbopi.toml --out answer
     """

@@ -39,14 +39,4 @@ CameraWorld MakeCameraWorld(const CameraOptions &options, double ring_radius_m, 
     return world;
 }
 
-void UseCameras(Swarm &swarm, const CameraWorld &world, const std::vector<Model> &robots,
-                uint64_t seed)
-{
-    for (int i = 0; i < swarm.Size(); ++i)
-    {
-        const Sight sight = CameraSight(robots[static_cast<size_t>(i)], world);
-        swarm.SetSensor(i, std::make_unique<CameraSensor>(world, i, sight, seed));
-    }
-}
-
 }  // namespace twin

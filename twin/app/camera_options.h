@@ -3,12 +3,10 @@
 #ifndef APP_CAMERA_OPTIONS_H
 #define APP_CAMERA_OPTIONS_H
 
+#include <cstdint>
 #include <string>
-#include <vector>
 
-#include "model_file/model.h"
-#include "swarm/camera_sensor.h"
-#include "swarm/swarm.h"
+#include "swarm/camera_sight.h"
 
 namespace CLI
 {
@@ -32,10 +30,6 @@ std::string CameraWords(const CameraOptions &options);
 
 // What all cameras see and share; distractors lie `ring_radius_m` away and beyond.
 CameraWorld MakeCameraWorld(const CameraOptions &options, double ring_radius_m, uint64_t seed);
-
-// One camera for each robot.
-void UseCameras(Swarm &swarm, const CameraWorld &world, const std::vector<Model> &robots,
-                uint64_t seed);
 
 }  // namespace twin
 

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "plant/plant.h"
+#include "sensors.h"
 
 namespace twin
 {
@@ -50,7 +51,7 @@ void AddWorld(CLI::App &app, Options &o)
         ->capture_default_str();
     AddChoice(app, "--plant", o.plant, kPlants, "what moves the robots");
     app.add_option("--sensor", o.sensor, "what gives the bit")
-        ->check(CLI::IsMember({"cone", "camera"}))
+        ->check(CLI::IsMember(SensorNames()))
         ->capture_default_str();
     app.add_option("--n", o.n, "robots; default 6, or the sum of the counts in --behavior")
         ->check(CLI::Range(1, kMaxRobots));

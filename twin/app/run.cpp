@@ -14,6 +14,7 @@
 #include "key.h"
 #include "plant_mujoco/mujoco_plant.h"
 #include "publisher.h"
+#include "sensors.h"
 #include "show.h"
 #include "summary.h"
 #include "swarm/bodies.h"
@@ -99,8 +100,7 @@ Swarm MakeSwarm(const Options &options, const Setup &setup,
         swarm.Play(robot, script);
     const CameraWorld world =
         MakeCameraWorld(options.camera, kRing * options.spread_m, options.seed);
-    if (options.sensor == "camera")
-        UseCameras(swarm, world, setup.robots, options.seed);
+    UseSensor(options.sensor, swarm, world, setup.robots, options.seed);
     UseFirmware(swarm, options.hil, world, setup.robots, setup.behaviors, options.seed);
     return swarm;
 }
