@@ -147,7 +147,7 @@ COMMANDS = (
         "matters",
         "Tell which effects and numbers of a model matter for what the swarm does.",
     ),
-    ("ask", "ask", "Answer one of the four design questions with a curve and a sentence."),
+    ("ask", "ask", "Answer a design question with a curve and a sentence."),
     (
         "claims",
         "claims",
