@@ -43,7 +43,9 @@ class ModelFile:
             text = path.read_text()
             return cls(path, text, native.Model.from_toml(text, str(name)))
         except UnicodeDecodeError as error:
-            raise ModelError(f"{name}: is no text, so it is no model file; check the name.") from error
+            raise ModelError(
+                f"{name}: is no text, so it is no model file; check the name."
+            ) from error
         except (ValueError, OSError) as error:
             raise ModelError(str(error)) from error
 

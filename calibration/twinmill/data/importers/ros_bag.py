@@ -20,16 +20,21 @@ import turbopi
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from twinmill.data.importers.camera_plane import on_floor
 from twinmill.data.importers.ros_cut import is_cut, write_whole
 from twinmill.data.importers.ros_frames import Frames
 from twinmill.data.importers.ros_messages import (
     COMMANDS,
+    CORNERS,
     DEFINITIONS,
+    MANY,
     POSES,
     STEERED,
+    TAGS,
     TF,
     Row,
     role_of,
+    tag_rows,
     transform_row,
 )
 from twinmill.data.importers.series import CommandSeries, PoseSeries
@@ -40,11 +45,15 @@ LOOKED_AT = 5000  # messages of tf, to see which frames there are
 STEP_BACK_S = 1.0  # messages are never exchanged by that much: a clock was set
 CLOCK_FROM_ZERO_S = 60.0  # the least stamp of a clock that began at 0, which is no missing stamp
 FULL_DUTIES = (1.0, 100.0, 255.0)
+OF_CAMERA = re.compile(r"camera|optical|(^|_)cam(_|$)")  # frames whose z is ahead, not up
 
 
 @dataclass(frozen=True)
 class Topic:
-    """One topic of a bag, or a frame of tf as `/tf:frame`: `role` is `pose`, `command` or empty."""
+    """One topic of a bag, a frame of tf as `/tf:frame`, or a tag as `/tag_detections:3`.
+
+    `role` is `pose`, `command` or empty.
+    """
 
     name: str
     kind: str
@@ -86,16 +95,25 @@ def list_topics(path: Path) -> list[Topic]:
     with _open(path) as reader:
         kinds = {c.topic: c.msgtype for c in reader.connections}
         counts = {name: topic.msgcount for name, topic in reader.topics.items()}
-        moving = [c for c in reader.connections if c.msgtype == TF and "static" not in c.topic]
-        frames: Counter[str] = Counter()
-        for connection, _, raw in islice(reader.messages(moving), LOOKED_AT if moving else 0):
-            for transform in reader.deserialize(raw, TF).transforms:
-                frames[f"{connection.topic}:{transform.child_frame_id.lstrip('/')}"] += 1
+        many = [c for c in reader.connections if c.msgtype in MANY and "static" not in c.topic]
+        parts: Counter[tuple[str, str]] = Counter()
+        for connection, _, raw in islice(reader.messages(many), LOOKED_AT if many else 0):
+            kind = connection.msgtype
+            for part in _parts(kind, reader.deserialize(raw, kind)):
+                parts[f"{connection.topic}:{part}", kind] += 1
     if not sum(counts.values()):
         raise LogError(f"{path}: has no messages; check that the recorder was subscribed.")
     topics = [Topic(name, kind, counts[name], role_of(kind)) for name, kind in kinds.items()]
-    topics += [Topic(name, TF, count, "pose") for name, count in frames.items()]
+    topics += [Topic(name, kind, count, "pose") for (name, kind), count in parts.items()]
     return sorted(topics, key=lambda t: t.name)
+
+
+def _parts(kind: str, message: object) -> Iterator[str]:
+    """Frames or tags in a message."""
+    if kind == TF:
+        yield from (t.child_frame_id.lstrip("/") for t in message.transforms)
+    else:
+        yield from (number for number, _ in tag_rows(message))
 
 
 def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
@@ -105,16 +123,27 @@ def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
     robots = sorted({t.robot for t in all_commands})
     for robot in robots:
         commands = [t for t in all_commands if t.robot == robot]
-        poses = [t for t in topics if t.role == "pose" and (t.robot == robot or len(robots) == 1)]
+        poses = [
+            t
+            for t in topics
+            if t.role == "pose"
+            and (t.robot == robot or len(robots) == 1 or _is_tag_of(t, commands[0].name))
+        ]
         if poses:
             best = max(poses, key=lambda t: (t.robot == robot, *_likely(t)))
             pairs.append((best.name, max(commands, key=lambda t: t.count).name))
     return pairs
 
 
+def _is_tag_of(topic: Topic, command: str) -> bool:
+    """Whether a tag has the number of a robot."""
+    of_tag = topic.kind in TAGS or bool(re.search(r":tag.*:\d+$", topic.name))
+    return of_tag and _told(topic.name.rpartition(":")[2], "", {}) == _told("", command, {})
+
+
 def _likely(topic: Topic) -> tuple[bool, bool, int]:
     """Topics of their own before frames, frames of a base before wheels, then the most messages."""
-    return topic.kind != TF, "base" in topic.name, topic.count
+    return topic.kind not in MANY, "base" in topic.name, topic.count
 
 
 def numbering(pairs: list[tuple[str, str]]) -> list[str]:
@@ -283,6 +312,7 @@ class _Rows:
         value: (N, W); (N, 0) where the messages have different numbers of values.
         widths: how many values they have.
         notes: remarks.
+        of_camera: whether poses are in a camera's frame, z ahead.
     """
 
     topic: str
@@ -291,6 +321,7 @@ class _Rows:
     value: np.ndarray
     widths: list[int]
     notes: list[str]
+    of_camera: bool = False
 
     @classmethod
     def of(cls, topic: str, messages: _Messages, receive: bool) -> "_Rows":
@@ -307,7 +338,9 @@ class _Rows:
         if len(messages.widths) == 1:
             value = np.frombuffer(messages.values).reshape(len(messages), -1)
         widths = sorted(messages.widths)
-        return cls(topic, messages.kind, stamps_ns[kept] // 1000, value[kept], widths, notes)
+        camera = messages.kind in TAGS or bool(OF_CAMERA.search(messages.root.lower()))
+        utime_us = stamps_ns[kept] // 1000
+        return cls(topic, messages.kind, utime_us, value[kept], widths, notes, camera)
 
     def ordered(self) -> tuple[np.ndarray, list[str]]:
         """Rows in order of time, the last of each stamp; remarks."""
@@ -352,12 +385,18 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
             )
         for topic, name in zip(topics, names, strict=True):
             kind = kinds[name]
-            if kind == TF and topic == name:
+            if kind in MANY and topic == name:
+                what = "frames" if kind == TF else "tags"
                 raise LogError(
-                    f"{path.name}: {name} holds many frames; name one as {name}:FRAME "
-                    "(`twinmill import --bag` alone lists them)."
+                    f"{path.name}: {name} holds many {what}; name one as {name}:"
+                    f"{what[:-1].upper()} (`twinmill import --bag` alone lists them)."
                 )
-            if not role_of(kind) and kind != TF:
+            if kind == CORNERS:
+                raise LogError(
+                    f"{path.name}: {name} holds corners of tags without poses; record /tf, too, "
+                    "and name the tag there, as in /tf:tag36h11:3."
+                )
+            if not role_of(kind) and kind not in MANY:
                 raise LogError(f"{path.name}: {topic} holds {kind}, which is not read here.")
             found[topic] = _Messages(kind)
         chosen = [
@@ -370,6 +409,11 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
                 _put(frames, message, name, received_ns, found)
                 continue
             kind = connection.msgtype
+            if kind in TAGS:
+                for number, row in tag_rows(message):
+                    if f"{name}:{number}" in found:
+                        found[f"{name}:{number}"].add(message.header.stamp, received_ns, row)
+                continue
             value_of = POSES.get(kind) or COMMANDS[kind][1]
             stamp = getattr(getattr(message, "header", None), "stamp", None)
             found[name].add(stamp, received_ns, value_of(message))
@@ -455,7 +499,7 @@ def _stamps(
 
 
 def _poses(robot_id: int, given: _Rows) -> PoseSeries:
-    if given.kind not in POSES and given.kind != TF:
+    if given.kind not in POSES and given.kind not in MANY:
         raise LogError(f"--pose: {given.topic} holds {given.kind}, which is no pose.")
     rows, notes = given.ordered()
     value = given.value[rows]
@@ -463,6 +507,9 @@ def _poses(robot_id: int, given: _Rows) -> PoseSeries:
     valid = np.isfinite(value).all(axis=1) & (np.abs(norm - 1) < 0.05)
     value[~valid] = np.nan
     value[valid, 3:] /= norm[valid, None]
+    if given.of_camera and valid.any():
+        value[valid, :3], value[valid, 3:], note = on_floor(value[valid, :3], value[valid, 3:])
+        notes = [*notes, f"{given.topic}: {note}."]
     return PoseSeries(robot_id, given.utime_us[rows], value[:, :3], value[:, 3:], valid, notes)
 
 

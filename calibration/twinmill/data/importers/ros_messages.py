@@ -1,14 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What ROS messages of each type say: a pose, a command of a robot, or places of frames (tf)."""
+"""What ROS messages of each type say: a pose, a command, or places of frames (tf) or of tags."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from twinmill.data.log import CommandKind
 
 Row = tuple[float, ...]
 TF = "tf2_msgs/msg/TFMessage"
+TAGS = tuple(  # poses of tags in the camera's frame, by several packages
+    f"{package}/msg/AprilTagDetectionArray"
+    for package in (
+        "apriltag_ros",
+        "apriltags2_ros",
+        "apriltags_ros",
+        "isaac_ros_apriltag_interfaces",
+    )
+)
+CORNERS = "apriltag_msgs/msg/AprilTagDetectionArray"  # without poses: these are on /tf
+MANY = (TF, *TAGS)  # of one topic
 STEERED = ("ackermann_msgs/msg/AckermannDrive", "ackermann_msgs/msg/AckermannDriveStamped")
 DEFINITIONS = {  # of types that the library does not bring; older bags hold none
     STEERED[0]: "float32 steering_angle\nfloat32 steering_angle_velocity\nfloat32 speed\n"
@@ -26,6 +37,15 @@ def transform_row(transform: Any) -> Row:
     """x, y, z in m, then the quaternion, w first."""
     p, q = transform.translation, transform.rotation
     return p.x, p.y, p.z, q.w, q.x, q.y, q.z
+
+
+def tag_rows(message: Any) -> Iterator[tuple[str, Row]]:
+    """Number and pose of each tag; of a bundle that of its first."""
+    for detection in message.detections:
+        number, pose = detection.id, detection.pose
+        while hasattr(pose, "pose"):  # with stamp, with covariance
+            pose = pose.pose
+        yield str(number if isinstance(number, int) else int(number[0])), _pose(pose)
 
 
 def _twist(twist: Any) -> Row:
