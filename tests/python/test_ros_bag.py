@@ -433,6 +433,38 @@ def test_a_bag_of_another_writer_is_read(tmp_path):
     np.testing.assert_allclose(values, [(0.1 * k, 0, -0.5, 0) for k in range(20)])
 
 
+def test_a_topic_of_a_type_that_cannot_be_parsed_spoils_no_other(tmp_path):
+    """As the events of services are, which `ros2 bag record --all` puts beside the topics."""
+    event = ("/add/_service_event", "example_interfaces/srv/Add_Event", "MSG: a/b\nint64 a\n", [])
+    bag = _written(tmp_path / "run.mcap", event, _poses(), _twists())
+    assert [t.name for t in list_topics(bag)] == ["/cmd_vel", "/pose"]
+    assert len(_import(bag, robot_id=1)[0][1].pose_t_s) == 60
+
+
+@pytest.mark.parametrize("kind", ["mcap", "db3"])
+def test_whatever_bytes_are_wrong_it_is_one_sentence_or_read(tmp_path, kind):
+    if kind == "mcap":
+        bag = _written(tmp_path / "whole.mcap", _poses(), _twists())
+    else:
+        (bag,) = _bag(tmp_path / "bag", StoragePlugin.SQLITE3).glob("*.db3")
+    whole, random, refused = bag.read_bytes(), np.random.default_rng(8), 0
+    bad = tmp_path / f"bad.{kind}"
+    for trial in range(40):
+        data = np.frombuffer(whole, np.uint8).copy()
+        places = random.integers(0, len(data), (1, 4, 100)[trial % 3])
+        data[places] = random.integers(0, 256, len(places))
+        end = random.integers(0, len(data)) if trial % 4 == 0 else len(data)
+        bad.write_bytes(data[:end].tobytes())
+        try:
+            topics = [t.name for t in list_topics(bad) if t.role]
+            if topics:
+                _rows(bad, topics, receive=False)
+        except LogError as error:
+            refused += 1
+            assert "\n" not in str(error) and len(str(error)) < 700
+    assert 0 < refused < 40
+
+
 def test_a_folder_of_rosbag2_may_end_in_bag(tmp_path):
     _bag(tmp_path / "run.bag", StoragePlugin.MCAP)
     assert {topic.name for topic in list_topics(tmp_path / "run.bag")} == {

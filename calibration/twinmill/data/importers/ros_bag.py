@@ -6,6 +6,7 @@ bytes each.
 """
 
 import re
+import struct
 from array import array
 from collections import Counter
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import turbopi
@@ -41,6 +43,7 @@ from twinmill.data.importers.series import CommandSeries, PoseSeries
 from twinmill.data.log import LogError
 
 WIDTH = 4  # wheels; velocity commands have a zero in the last place
+LONGEST_REASON = 200  # letters of what the library says
 LOOKED_AT = 5000  # messages of tf, to see which frames there are
 STEP_BACK_S = 1.0  # messages are never exchanged by that much: a clock was set
 CLOCK_FROM_ZERO_S = 60.0  # the least stamp of a clock that began at 0, which is no missing stamp
@@ -222,7 +225,8 @@ def _number(pair: tuple[str, str], options: BagOptions, robots: int) -> int:
 @contextmanager
 def _open(path: Path):
     """The bag, open for reading; what goes wrong inside is one sentence."""
-    from rosbags.highlevel import AnyReader, AnyReaderError  # slow to import
+    from apsw import Error as SqliteError  # slow to import, as the others
+    from rosbags.highlevel import AnyReader, AnyReaderError
     from rosbags.rosbag1 import ReaderError as Error1
     from rosbags.rosbag2 import ReaderError as Error2
     from rosbags.serde import SerdeError
@@ -241,16 +245,55 @@ def _open(path: Path):
                 link = Path(folder) / "bag"
                 link.symlink_to(storage.resolve())
                 storage = link
-            with AnyReader([storage], default_typestore=store) as reader:
+            bag = AnyReader([storage], default_typestore=store)
+            bag.readers = list(map(_Known, bag.readers))
+            with bag as reader:
                 yield reader
-    except (
-        *(AnyReaderError, Error1, Error2, SerdeError, OSError, KeyError, AssertionError),
-        *(AttributeError, IndexError, UnicodeDecodeError),
+    except LogError:
+        raise
+    except (  # whatever the library says of bytes that make no sense
+        *(AnyReaderError, Error1, Error2, SerdeError, SqliteError, OSError, LookupError),
+        *(AssertionError, AttributeError, ValueError, MemoryError, OverflowError, RuntimeError),
+        struct.error,
     ) as error:
-        reason = " ".join(str(error).split())
+        reason = " ".join(str(error).split())[:LONGEST_REASON] or type(error).__name__
         raise LogError(
             f"{path}: cannot be read as a ROS bag ({reason}); {_remedy(path)}."
         ) from error
+
+
+class _Known:
+    """A reader of the library without topics whose types it cannot parse, as services' events."""
+
+    def __init__(self, reader: Any):
+        self._reader = reader
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._reader, name)
+
+    def __enter__(self) -> "_Known":
+        self._reader.__enter__()
+        return self
+
+    def __exit__(self, *error: object) -> object:
+        return self._reader.__exit__(*error)
+
+    @property
+    def connections(self) -> list:
+        """Those that can be read."""
+        return [c for c in self._reader.connections if _is_known(c)]
+
+
+def _is_known(connection: Any) -> bool:
+    from rosbags.typesys import TypesysError, get_types_from_msg
+
+    if connection.msgdef.format.name != "MSG":
+        return True
+    try:
+        get_types_from_msg(connection.msgdef.data, connection.msgtype)
+    except TypesysError:
+        return False
+    return True
 
 
 def _storage(path: Path) -> Path:
