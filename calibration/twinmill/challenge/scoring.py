@@ -96,7 +96,8 @@ def scored(case: Case, found: dict) -> dict:
         case: with its answer.
         found: the object of `twinmill diagnose --json`.
     """
-    findings = said(found)
+    every = said(found)
+    findings = [f for f in every if f.effect not in _there(case)]
     right = [_accepted(h, case) for h in case.hidden if h.kind != "outside"]
     allowed = frozenset().union(*right, *(h.kin for h in case.hidden))
     others = [f.effect for f in findings if not (f.names or {f.effect}) & allowed]
@@ -108,7 +109,9 @@ def scored(case: Case, found: dict) -> dict:
         "verdict_right": first and verdict in NAMED,
         "clean": first and verdict in NAMED and not others,
         "all": bool(right) and all(any(f.names & r for f in findings) for r in right),
-        "alarm": bool(findings) or verdict in (*NAMED, "outside_catalogue", "bad_input"),
+        "alarm": bool(findings)
+        or verdict in ("outside_catalogue", "bad_input")
+        or (verdict in NAMED and not every),
         "told": verdict == "outside_catalogue" or told["share"] >= TOLD_REST,
         "depends": _depends(case.hidden, told),
         "others": others,
@@ -185,6 +188,12 @@ def _accepted(hidden: Hidden, case: Case) -> frozenset[str]:
     if (hidden.name, hidden.kind) == ("motor_lag", "cousin"):
         return frozenset({"motor_lag", "second_order_lag"})
     return frozenset({hidden.name})
+
+
+def _there(case: Case) -> frozenset[str]:
+    """What is there besides: by forces a robot turns with another lag than it drives."""
+    hidden = {h.name for h in case.hidden}
+    return frozenset({"yaw_lag"} - hidden) if case.plan.robot.plant != "planar" else frozenset()
 
 
 def _rest(found: dict) -> dict:

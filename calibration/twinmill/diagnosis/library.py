@@ -70,11 +70,29 @@ def library(
     sizes = _sizes(values)
     terms = [Term(g, CHANNELS[a], f, s) for (g, f), s in sizes.items() for a in range(3)]
     of_wheels = _wheel_terms(opened, models[0])
-    columns = [
-        np.hstack([_body_columns(own, model, v, sizes), _wheel_columns(own, model, of_wheels)])
-        for (own, model), v in zip(pairs, values, strict=True)
-    ]
-    return terms + of_wheels, columns
+    of_all, parts = _terms_of_all_speeds(terms)
+    columns = []
+    for (own, model), v in zip(pairs, values, strict=True):
+        body = _body_columns(own, model, v, sizes)
+        columns.append(np.hstack([body, body @ parts, _wheel_columns(own, model, of_wheels)]))
+    return [*terms, *of_all, *of_wheels], columns
+
+
+def _terms_of_all_speeds(terms: Sequence[Term]) -> tuple[list[Term], np.ndarray]:
+    """What changes all speeds alike with time, and (T, n) its parts among the body's terms."""
+    carriers = dict(zip(CHANNELS, ("vx", "vy", "omega"), strict=True))
+    found: dict[str, dict[int, Term]] = {}
+    for k, term in enumerate(terms):
+        factor, _, carrier = term.formula.rpartition("*")
+        if term.group == "time" and carrier == carriers[term.adds_to]:
+            found.setdefault(factor, {})[k] = term
+    parts, of_all = np.zeros((len(terms), len(found))), []
+    for n, (factor, own) in enumerate(found.items()):
+        size = max(t.size for t in own.values() if t.adds_to != CHANNELS[2])
+        of_all.append(Term("time", "rim_mps", f"{factor}*rim", size))
+        for k, term in own.items():
+            parts[k, n] = of_all[-1].strength / term.strength
+    return of_all, parts
 
 
 def _sizes(values: list[dict]) -> dict[tuple[str, str], float]:
