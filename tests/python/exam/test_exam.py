@@ -33,7 +33,8 @@ def results(tmp_path_factory) -> list[dict]:
 def test_what_was_answered_stays_so(results):
     now = {r["case"] for r in results if lost(r)}
     told = {
-        r["case"]: f"hidden {r['hidden']}, said {r['said']}, verdict {r['verdict']}" for r in results
+        r["case"]: f"hidden {r['hidden']}, said {r['said']}, verdict {r['verdict']}"
+        for r in results
     }
     for number in sorted(now ^ LOST):
         way = "lost" if number in now else "answered now: take it out of LOST"
