@@ -2,8 +2,8 @@
 """Moments at which a robot did what neither its commands nor what was found explain.
 
 Where both the smooth response of the noise floor and the final model miss by far more than usually,
-something happened that is not there all the time: a push, or a drop-out. Such moments are told one by
-one, since no effect that acts all the time is like that.
+something happened that is not there all the time: a push, or a drop-out. Such moments are told one
+by one, since no effect that acts all the time is like that.
 """
 
 from collections.abc import Sequence
