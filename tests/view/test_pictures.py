@@ -74,6 +74,16 @@ def seeds_with_a_neighbour_ahead(tmp_path, words):
             yield seed
 
 
+def test_the_robot_whose_camera_is_in_the_corner_stands_on_a_white_disc(tmp_path):
+    words = ("--n", 3, "--duration-s", 0.02, "--log", tmp_path / "a.lcmlog")
+    run(*words, "--picture", tmp_path / "a.png")
+    image = np.asarray(Image.open(tmp_path / "a.png")).astype(int)
+    image[468:, 948:] = 0
+    white, _ = label(image.min(axis=2) > 200)
+    sizes_px = np.bincount(white.ravel())[1:]
+    assert np.count_nonzero(sizes_px > 500) == 1
+
+
 def test_picture_shows_the_frame_that_the_firmware_was_given(tmp_path):
     words = ("--n", 2, "--spread-m", 0.6)
     for seed in itertools.islice(seeds_with_a_neighbour_ahead(tmp_path, words), 2):

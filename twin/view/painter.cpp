@@ -15,8 +15,17 @@ constexpr int kFanSteps = 12;
 constexpr double kFanHeight_m = 0.004;  // above the floor
 constexpr float kSeen[4] = {0.15f, 0.85f, 0.3f, 0.35f}, kUnseen[4] = {0.95f, 0.6f, 0.15f, 0.22f};
 constexpr int kCornerGap_px = 12, kCornerWidth_px = 320, kCornerHeight_px = 240;
+constexpr double kNumberHeight_m = 0.29, kMarkRadius_m = 0.14, kMarkHalf_m = 0.001;
+constexpr float kMark[4] = {1, 1, 1, 0.7f}, kNumber[4] = {1, 1, 1, 1};
 constexpr double kRoom_m = 0.25;  // between a robot's middle and the edge of the picture
 constexpr int kHullGroup = 3;     // what collides, in turbopi.xml
+
+std::string Numbered(int robot)
+{
+    char name[16];
+    std::snprintf(name, sizeof name, "R%02d", robot);
+    return name;
+}
 
 // A triangle as MuJoCo draws it: two sides from a corner, and the normal.
 void InitTriangle(mjvGeom *geom, const mjtNum a[3], const mjtNum b[3], const mjtNum c[3],
@@ -33,6 +42,7 @@ void InitTriangle(mjvGeom *geom, const mjtNum a[3], const mjtNum b[3], const mjt
             mat[3 * row + k] = sides[k][row];
     }
     mjv_initGeom(geom, mjGEOM_TRIANGLE, lengths, a, mat, rgba);
+    geom->category = mjCAT_DECOR;
 }
 
 // Every second pixel of a YUYV frame as RGB (BT.601), the lowest row first.
@@ -52,6 +62,29 @@ void HalveToRgb(const Image &picture, std::vector<uint8_t> &rgb)
             rgb.push_back(byte(y - 0.392 * u - 0.813 * v));
             rgb.push_back(byte(y + 2.017 * u));
         }
+}
+
+// What the robot's table goes by: a vote of frames, and so a little later than what is in view.
+std::string Acts(int robot, bool detected)
+{
+    return Numbered(robot) + (detected ? " acts on: seen" : " acts on: nobody seen");
+}
+
+// Whose middle is in its cone now, whatever stands between.
+std::string InView(const Swarm &swarm, int robot, const ViewCone &cone)
+{
+    const Pose2 &own = swarm.State(robot).pose;
+    std::string names;
+    for (int i = 0; i < swarm.Size(); ++i)
+    {
+        const Pose2 &other = swarm.State(i).pose;
+        const double x_m = other.x_m - own.x_m, y_m = other.y_m - own.y_m;
+        const double off_rad = std::atan2(y_m, x_m) - own.theta_rad - cone.pan_rad;
+        const bool inside = std::abs(std::remainder(off_rad, 2 * mjPI)) <= cone.angle_rad / 2;
+        if (i != robot && inside && std::hypot(x_m, y_m) <= cone.range_m)
+            names += ' ' + Numbered(i);
+    }
+    return "in view:" + (names.empty() ? " nobody" : names);
 }
 
 }  // namespace
@@ -133,13 +166,37 @@ void Painter::AddCone(const RobotState &state, const ViewCone &cone, bool detect
         at[2] = kFanHeight_m;
     };
     const mjtNum tip[3] = {state.pose.x_m, state.pose.y_m, kFanHeight_m};
-    for (int step = 0; step < kFanSteps && scene_.ngeom < scene_.maxgeom; ++step)
+    for (int step = 0; step < kFanSteps; ++step)
     {
         mjtNum a[3], b[3];
         rim(step, a);
         rim(step + 1, b);
-        InitTriangle(&scene_.geoms[scene_.ngeom], tip, a, b, detected ? kSeen : kUnseen);
-        scene_.geoms[scene_.ngeom++].category = mjCAT_DECOR;
+        if (mjvGeom *geom = NewDecor())
+            InitTriangle(geom, tip, a, b, detected ? kSeen : kUnseen);
+    }
+}
+
+// Room for one more thing that is only looked at, or null.
+mjvGeom *Painter::NewDecor()
+{
+    return scene_.ngeom < scene_.maxgeom ? &scene_.geoms[scene_.ngeom++] : nullptr;
+}
+
+// Its number above it; a white disc below the one whose camera is in the corner.
+void Painter::AddNumber(const RobotState &state, int robot, bool is_in_corner)
+{
+    const mjtNum above[3] = {state.pose.x_m, state.pose.y_m, kNumberHeight_m};
+    if (mjvGeom *geom = NewDecor())
+    {
+        mjv_initGeom(geom, mjGEOM_LABEL, nullptr, above, nullptr, kNumber);
+        geom->category = mjCAT_DECOR;
+        std::snprintf(geom->label, sizeof geom->label, "%s", Numbered(robot).c_str());
+    }
+    const mjtNum size[3] = {kMarkRadius_m, kMarkHalf_m, 0}, below[3] = {above[0], above[1], 0.006};
+    if (mjvGeom *geom = is_in_corner ? NewDecor() : nullptr)
+    {
+        mjv_initGeom(geom, mjGEOM_CYLINDER, size, below, nullptr, kMark);
+        geom->category = mjCAT_DECOR;
     }
 }
 
@@ -151,12 +208,33 @@ void Painter::Draw(const Swarm &swarm, int robot_in_corner, const std::string &n
     mjv_updateScene(figures_.model(), figures_.data(), &option_, nullptr, &camera_, mjCAT_ALL,
                     &scene_);
     for (int i = 0; i < swarm.Size(); ++i)
+    {
         AddCone(swarm.State(i), cones_[static_cast<size_t>(i)], swarm.Output(i).detected);
+        AddNumber(swarm.State(i), i, i == robot_in_corner);
+    }
     mjr_render(area, &scene_, &context_);
     DrawCorner(swarm, robot_in_corner, area);
     char time[32];
     std::snprintf(time, sizeof time, "%.2f s", swarm.TimeS());
     mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, area, time, note.c_str(), &context_);
+}
+
+// What the camera shows beside the cone that the sensor looks over, dark; `half_across` is the
+// tangent of half its field of view.
+void Painter::ShadeBeside(const ViewCone &cone, double half_across, const mjrRect &corner)
+{
+    const auto column_px = [&](double left_rad) {
+        const double at_edge = std::atan(half_across);
+        const double across = std::tan(std::clamp(left_rad, -at_edge, at_edge)) / half_across;
+        return static_cast<int>(corner.width * (1 - across) / 2);
+    };
+    const int from = column_px(cone.pan_rad + cone.angle_rad / 2),
+              to = column_px(cone.pan_rad - cone.angle_rad / 2);
+    const mjrRect left{corner.left, corner.bottom, from, corner.height},
+        right{corner.left + to, corner.bottom, corner.width - to, corner.height};
+    for (const mjrRect &beside : {left, right})
+        if (beside.width > 0)
+            mjr_rectangle(beside, 0.1f, 0.1f, 0.12f, 0.7f);
 }
 
 // The frame that the firmware was given; for robots without one, what MuJoCo's camera shows.
@@ -171,6 +249,7 @@ void Painter::DrawCorner(const Swarm &swarm, int robot, const mjrRect &area)
     }
     corner.left = area.width - corner.width - kCornerGap_px;
     const int camera = figures_.CameraOf(robot);
+    const ViewCone &cone = cones_[static_cast<size_t>(robot)];
     if (!picture.yuyv.empty())
     {
         HalveToRgb(picture, corner_rgb_);
@@ -186,11 +265,13 @@ void Painter::DrawCorner(const Swarm &swarm, int robot, const mjrRect &area)
         mjv_updateScene(figures_.model(), figures_.data(), &option_, nullptr, &view, mjCAT_ALL,
                         &scene_);
         mjr_render(corner, &scene_, &context_);
+        const double half = std::tan(figures_.model()->cam_fovy[camera] * mjPI / 360);
+        ShadeBeside(cone, half * corner.width / corner.height, corner);
     }
-    char name[32];
-    const fw_output &out = swarm.Output(robot);
-    std::snprintf(name, sizeof name, "R%02d %s", robot, out.detected ? "sees" : "sees nothing");
-    mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, corner, name, nullptr, &context_);
+    std::string words = Acts(robot, swarm.Output(robot).detected);
+    if (picture.yuyv.empty())
+        words = InView(swarm, robot, cone) + '\n' + words;
+    mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, corner, words.c_str(), nullptr, &context_);
 }
 
 void Painter::UseOffscreen(int width_px, int height_px)
