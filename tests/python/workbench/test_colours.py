@@ -15,6 +15,7 @@ from colorspacious import cspace_convert, deltaE
 from twinmill.charts.packed import COLORS as ROBOTS
 from twinmill.charts.stage import STATIC
 from twinmill.swarm.classes import COLORS as CLASSES
+from twinmill.threshold.show import FALSE, HIT, MISS
 from twinmill.workbench.fails_panel import TONES
 
 APART = 10.0
@@ -26,6 +27,7 @@ TOGETHER = {
     "wheels": re.findall(r"#\w{6}", re.search(r"WHEELS = (.*);", LOOK)[1]),
     "regimes": TONES,
     "phases": [*CLASSES.values()],
+    "threshold": ["#" + bytes(color).hex() for color in (HIT, MISS, FALSE)],
 }
 
 
