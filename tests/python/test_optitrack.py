@@ -128,6 +128,22 @@ def test_no_packet_takes_longer_than_its_bytes():
     assert stream.broken > 50
 
 
+def test_frames_that_can_be_none_are_dropped_and_bodies_without_a_pose_are_lost():
+    bodies = [Body(3, "r3"), Body(4, "r4", position=(math.nan, 0, 0)),
+              Body(5, "r5", quaternion_xyzw=(3.0, 0.0, 0.0, 1e30))]  # fmt: skip
+    with Motive(bodies, streams=False) as motive:
+        stream = Stream(find_server("127.0.0.1", port=motive.port))
+    robots = Robots(stream, View())
+    stream._read(models(bodies, (3, 1)))
+    poses = list(robots.take(1000.0, stream._read(frame(7, bodies, (3, 1)))))
+    stream.close()
+    assert {p.robot_id: p.valid for p in poses} == {3: 1, 4: 0, 5: 0}
+    assert all(pose.encode() for pose in poses)
+    assert stream._read(frame(2**31, bodies, (3, 1))) is None
+    assert stream._read(frame(int(1e9 / PERIOD_S), bodies, (3, 1))) is None
+    assert stream.broken == 2
+
+
 def test_others_on_the_port_are_not_heard_but_named():
     with Motive([Body(3, "r3")], multicast=True) as motive:
         server = replace(find_server("127.0.0.1", port=motive.port), address="127.0.0.2")

@@ -24,6 +24,7 @@ CONNECTION = struct.Struct("<QHB4B")  # clock's frequency, data port, multicast 
 NAME_BYTES, SENDER_BYTES = 256, 264  # of the program; with both versions
 PACKET_MAX = 65535
 ANSWER_S, AGAIN_S = 2.0, 0.5
+LONGEST_S = 1e9  # since Motive was started
 OFFSET_S = 10.0  # the quickest packet of so long tells the clocks' offset
 
 
@@ -110,6 +111,17 @@ def unpacked(packet: bytes) -> tuple[int, bytes]:
         return -1, b""
     kind, size = HEADER.unpack_from(packet)
     return kind, packet[HEADER.size : HEADER.size + size]
+
+
+def _sane(frame: DataFrame) -> DataFrame:
+    """The frame.
+
+    Raises:
+        ValueError: its number or stamp can be none.
+    """
+    if not (0 <= frame.prefix.frame_number < 2**31 and 0 <= frame.suffix.timestamp < LONGEST_S):
+        raise ValueError("a frame has a number or a stamp that can be none")
+    return frame
 
 
 class Packet(PacketBuffer):
@@ -228,7 +240,7 @@ class Stream:
                 models = DataDescriptions.read_from_buffer(buffer, protocol)
                 self.names |= {body.id_num: body.name for body in models.rigid_bodies}
             if kind == FRAME:
-                return DataFrame.read_from_buffer(buffer, protocol)
+                return _sane(DataFrame.read_from_buffer(buffer, protocol))
         except (NatNetError, struct.error, ValueError):
             self.broken += 1
         return None

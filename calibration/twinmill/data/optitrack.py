@@ -14,6 +14,7 @@ from twinmill.data.importers.series import multiply
 from twinmill.data.natnet_stream import Stream
 
 TURNED_RAD = 0.2  # a body that turned by so much shows which axis is up
+UNIT_OFF = 0.05  # of a quaternion's length
 TRACKED = 0.9  # share of the frames, below which the cameras are asked about
 AXES = ("x", "y", "z")
 
@@ -42,6 +43,12 @@ class Check:
     words: str
 
 
+def _is_pose(position_m: tuple, orientation: np.ndarray) -> bool:
+    """Whether these are numbers and a turn; Motive sends zeros for what it never saw."""
+    unit = abs(np.linalg.norm(orientation) - 1) < UNIT_OFF
+    return bool(unit and np.isfinite(position_m).all())
+
+
 class Robots:
     """Takes frames in, and gives poses.
 
@@ -67,7 +74,7 @@ class Robots:
         numbers = self.numbers([body.id_num for body in frame.rigid_bodies])
         for body in frame.rigid_bodies:
             orientation = np.array([body.rot[3], *body.rot[:3]])
-            tracked = body.tracking_valid is not False and bool(orientation.any())
+            tracked = body.tracking_valid is not False and _is_pose(body.pos, orientation)
             self.seen[body.id_num] += 1
             if tracked:
                 self.tracked[body.id_num] += 1
