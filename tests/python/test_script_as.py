@@ -67,6 +67,24 @@ def test_a_publisher_says_the_script_and_then_stops(folder, monkeypatch):
     np.testing.assert_allclose(np.diff(sent[:, 0]), 1, atol=0.06)
 
 
+def test_a_script_of_velocities_is_published_as_it_is(folder, monkeypatch):
+    rows = [(0, 0, 0, 0), (1, 0.2, -0.1, 0), (2, 0, 0, 1.5), (3, 0, 0, 0)]
+    text = "".join(f"{t},{x},{y},{w}\n" for t, x, y, w in rows)
+    (folder / "s.csv").write_text("t_s,vx_mps,vy_mps,omega_radps\n" + text)
+    assert convert("publisher", "p.py") == 0 == convert("bag", "bag")
+    stand_in = StandIn(monkeypatch)
+    stand_in.run(folder / "p.py", monkeypatch)
+    said = np.array(stand_in.said)
+    for at_s, wanted in zip((0.5, 1.5, 2.5), np.array(rows)[:, 1:], strict=False):
+        row = np.argmin(np.abs(said[:, 0] - at_s))
+        np.testing.assert_allclose(said[row, 1:], wanted, atol=1e-5)
+    assert said[-1, 0] == pytest.approx(3, abs=0.06) and not said[-5:, 1:].any()
+    (folder / "s.csv").write_text("t_s,vx_mps,vy_mps,omega_radps\n" + text[: text.index("3,")])
+    with pytest.raises(ValueError, match="end with a row of zeros, which stops the robot"):
+        convert("publisher", "q.py")
+    assert not (folder / "q.py").exists()
+
+
 def test_a_publisher_that_is_interrupted_stops_the_robot(folder, monkeypatch):
     convert("publisher", "p.py")
     stand_in = StandIn(monkeypatch, stop_after=1.5)

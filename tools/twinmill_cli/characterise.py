@@ -35,7 +35,7 @@ if working():  # not for --help
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     from twinmill.data.log import LogError
-    from twinmill.data.measurement_table import read_table
+    from twinmill.data.measurement_table import read_header, read_table
     from twinmill.data.recorder import Recorder
     from twinmill.export.script import TwistScript
     from twinmill.files import check_new_file
@@ -53,6 +53,7 @@ LOST_S = 0.5  # without telemetry, or without a valid pose: stop
 AFTER_S = 1.0  # logged after the end: the robot still rolls
 INPUTS = ("speed_input", "turn_input")
 DUTIES = ("fl_pct", "fr_pct", "rl_pct", "rr_pct")
+TWIST = ("vx_mps", "vy_mps", "omega_radps")
 
 
 class Abort(Exception):
@@ -100,7 +101,8 @@ def _characterise(
     (/etc/turbopi/scripts) or in twin_run's --script-dir under the same name.
 
     With --script-as nothing is driven: the script is written for ROS, its
-    duties as the velocities that the model reaches at them.
+    duties as the velocities that the model reaches at them. A script of
+    vx_mps, vy_mps, omega_radps is written as it is.
 
     Example: twinmill characterise --robot 3 --script steps.csv --out run.lcmlog
     """
@@ -128,15 +130,39 @@ def _for_ros(
     script: Path, form: ScriptForm, out: Path, model: str, cap_pct: int, force: bool, as_json: bool
 ) -> int:
     """Writes the script as a bag or a publisher."""
-    end_s = check_script(script, cap_pct)
-    if end_s is None:
+    if not script.exists():
         raise ValueError(f"{script}: no such script here; --script-as needs the file itself.")
-    t_s, duties_pct = read_script(script)
-    twists = TwistScript.of(ModelFile.load(model).model, t_s, duties_pct / 100, end_s)
+    if set(TWIST) <= set(read_header(script)):
+        t_s, twist = _read_velocities(script)
+        twists, end_s = TwistScript(t_s, twist, float(t_s[-1])), float(t_s[-1])
+    else:
+        end_s = check_script(script, cap_pct)
+        t_s, duties_pct = read_script(script)
+        twists = TwistScript.of(ModelFile.load(model).model, t_s, duties_pct / 100, end_s)
     words = ["twinmill", "characterise", "--script", str(script), "--script-as", form]
     write_script(twists, form, out, force, shlex.join([*words, "--model", model]))
     deliver({"script_as": str(out), "duration_s": end_s}, f"Written: {out}", as_json)
     return 0
+
+
+def _read_velocities(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """(K,) times in s and (K, 3) velocities of a script that ends at rest.
+
+    Raises:
+        ValueError: it is no such script.
+    """
+    try:
+        table = read_table(path, frozenset({"t_s", *TWIST}))
+        t_s = table.finite("t_s")
+        twist = np.column_stack([table.finite(name) for name in TWIST])
+    except LogError as error:
+        raise ValueError(str(error)) from error
+    if t_s[0] < 0 or (np.diff(t_s) <= 0).any() or twist[-1].any() or len(t_s) < 2:
+        raise ValueError(
+            f"{path}: must have rows whose t_s ascend from 0 on, and end with a row of zeros, "
+            "which stops the robot."
+        )
+    return t_s, twist
 
 
 def read_script(path: Path) -> tuple[np.ndarray, np.ndarray]:

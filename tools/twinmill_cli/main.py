@@ -26,7 +26,7 @@ COMMANDS = (
     (
         "track",
         "track",
-        "Find tagged robots in a film of one camera over the floor, and write their poses.",
+        "Find tagged robots in films of cameras over the floor, and write their poses.",
     ),
     (
         "optitrack",
