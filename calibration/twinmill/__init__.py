@@ -15,7 +15,7 @@ tm.simulate(better, n=8)
 from importlib import import_module
 from typing import Any
 
-from twinmill.programs import use_own_models
+from twinmill.programs import use_own_libraries, use_own_models
 
 # Where each public name is; imported when it is first used.
 _HOME = {
@@ -33,6 +33,7 @@ __all__ = sorted(_HOME)
 
 
 use_own_models()
+use_own_libraries()
 
 
 def __getattr__(name: str) -> Any:

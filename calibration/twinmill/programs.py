@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the programs and the models of this installation are."""
+"""Where the programs, the models and the libraries of this installation are."""
 
+import ctypes
 import os
 import shutil
 import sysconfig
@@ -37,3 +38,12 @@ def use_own_models() -> None:
     models = _PACKAGE / "models"
     if models.is_dir():
         os.environ.setdefault("TWINMILL_MODELS", str(models))
+
+
+def use_own_libraries() -> None:
+    """Loads this package's GLib where the system has none: the package lcm takes it for granted."""
+    try:
+        ctypes.CDLL("libglib-2.0.so.0")
+    except OSError:
+        for library in (_PACKAGE.parent / "twinmill.libs").glob("libglib-2.0.so*"):
+            ctypes.CDLL(str(library))
