@@ -24,7 +24,7 @@ from rich.console import Console, RenderableType
 from twinmill import report
 from twinmill.data.log import read_log
 from twinmill.data.measurement import Measurements, load_measurements
-from twinmill.data.multi_log import read_everyone
+from twinmill.data.multi_log import read_multi_log
 from twinmill.data.steady_table import is_sheet
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill.diagnosis import diagnose as _diagnose
@@ -169,8 +169,8 @@ class Log(_Shown):
 
     def plot(self) -> Figure:
         """Paths of all robots, seen from above."""
-        actors = [actor for log in self._logs for actor in read_everyone(log.path).actors]
-        return draw(4.6, Drawing(actors).paths).picture
+        robots = [recorded for log in self._logs for recorded in read_multi_log(log.path).robots]
+        return draw(4.6, Drawing(robots).paths).picture
 
     def save(self, path: str | Path, force: bool = False) -> None:
         """Copies the log to a file, which must not be there unless `force`.

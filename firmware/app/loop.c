@@ -6,7 +6,7 @@
 
 #include "loop_commands.h"
 #include "loop_link.h"
-#include "loop_tend.h"
+#include "loop_update.h"
 
 #define LONGEST_WAIT_US 100000
 #define STOP_TRIES 10
@@ -302,8 +302,8 @@ void loop_step(struct loop *loop)
     drive(loop, &out);
     loop_link_tell(loop);
     report(loop, &out, begin_us);
-    loop_tend_panel(loop, out.detected);
-    loop_tend_battery(loop);
+    loop_update_panel(loop, out.detected);
+    loop_update_battery(loop);
 }
 
 bool loop_close(struct loop *loop)

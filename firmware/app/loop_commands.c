@@ -166,7 +166,7 @@ static void answer(struct loop *loop, const struct link_command *command)
     struct link_ack ack = {
         .seq = order->seq, .command_utime_us = order->utime_us, .verb = order->verb};
     const enum fw_verdict verdict =
-        fw_command_judge(&loop->inbox, order, hal_clock_unix_us(&loop->devices.clock),
+        fw_command_judge(&loop->filter, order, hal_clock_unix_us(&loop->devices.clock),
                          loop_link_session_us(loop), loop->running);
     (void)snprintf(ack.reason, sizeof ack.reason, "%s", fw_verdict_str(verdict));
     const bool obeyed = verdict == FW_VERDICT_OBEY && obey(loop, command, ack.reason);

@@ -14,7 +14,7 @@ void loop_link_init(struct loop *loop, const struct app_config *config)
         .session_begin_us = loop_now_us(loop),
         .configured_timeout_ms = config->link_timeout_ms,
     };
-    loop->inbox.session = loop->link.session;
+    loop->filter.session = loop->link.session;
     if (config->run_dir[0] != '\0')
     {
         (void)snprintf(state->stopped_file, sizeof state->stopped_file, "%s/stopped",
@@ -22,7 +22,7 @@ void loop_link_init(struct loop *loop, const struct app_config *config)
     }
     state->stopped_file_is_there =
         state->stopped_file[0] != '\0' && access(state->stopped_file, F_OK) == 0;
-    loop->inbox.latched = state->stopped_file_is_there;
+    loop->filter.latched = state->stopped_file_is_there;
 }
 
 int64_t loop_link_session_us(const struct loop *loop)
@@ -33,7 +33,7 @@ int64_t loop_link_session_us(const struct loop *loop)
 void loop_link_obeyed(struct loop *loop, const struct fw_command *command)
 {
     struct loop_link *state = &loop->operator_link;
-    fw_command_obeyed(&loop->inbox, command, loop_link_session_us(loop));
+    fw_command_obeyed(&loop->filter, command, loop_link_session_us(loop));
     if (command->verb == FW_VERB_STOP)
     {
         return;
@@ -51,7 +51,7 @@ void loop_link_start_by_hand(struct loop *loop)
 {
     loop->operator_link.timeout_ms = 0;
     loop->operator_link.lost = false;
-    loop->inbox.latched = false;
+    loop->filter.latched = false;
     loop_start(loop);
 }
 
@@ -88,13 +88,13 @@ static void keep_latch(struct loop *loop)
     struct loop_link *state = &loop->operator_link;
     if (loop->watch != NULL)
     {
-        loop->watch->latched = loop->inbox.latched;
+        loop->watch->latched = loop->filter.latched;
     }
-    if (state->stopped_file[0] == '\0' || state->stopped_file_is_there == loop->inbox.latched)
+    if (state->stopped_file[0] == '\0' || state->stopped_file_is_there == loop->filter.latched)
     {
         return;
     }
-    if (!loop->inbox.latched)
+    if (!loop->filter.latched)
     {
         state->stopped_file_is_there = false;
         (void)unlink(state->stopped_file);
@@ -129,10 +129,10 @@ void loop_link_report(const struct loop *loop, struct link_report *report)
     const struct loop_link *state = &loop->operator_link;
     const bool untethered = loop->running && state->timeout_ms == 0;
     report->session_us = loop_link_session_us(loop);
-    report->counter = loop->inbox.counter;
+    report->counter = loop->filter.counter;
     report->stands = stands(loop);
     report->link_timeout_ms = state->timeout_ms;
     report->status_flags |= (state->lost ? LINK_STATUS_LINK_LOST : 0) |
                             (untethered ? LINK_STATUS_UNTETHERED : 0) |
-                            (loop->inbox.latched ? LINK_STATUS_LATCHED : 0);
+                            (loop->filter.latched ? LINK_STATUS_LATCHED : 0);
 }

@@ -78,7 +78,7 @@ struct loop
     // The operator's wish, and the start that it may wait for.
     bool running;
     struct loop_plan plan;
-    struct fw_inbox inbox;
+    struct fw_command_filter filter;
     struct loop_link operator_link;
 
     // Playing a script instead of the table, since when (monotonic).

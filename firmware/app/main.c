@@ -108,15 +108,15 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
         loop.wake_fd = stop_fd;
         loop.watch = watch;
         loop.may_move = watch->may_move;
-        loop.inbox.latched = loop.inbox.latched || watch->latched;
-        if (options->config.autostart && !loop.inbox.latched)
+        loop.filter.latched = loop.filter.latched || watch->latched;
+        if (options->config.autostart && !loop.filter.latched)
         {
             loop_start(&loop);
         }
         say("robot %d, %s: %s", (int)options->config.robot_id, options->config.behavior,
-            loop.running         ? "started"
-            : loop.inbox.latched ? "was stopped: waits for the button or to be armed"
-                                 : "waits for the button or a command");
+            loop.running          ? "started"
+            : loop.filter.latched ? "was stopped: waits for the button or to be armed"
+                                  : "waits for the button or a command");
         play(&loop, options, stop_fd);
         code = end(&loop, watch);
     }

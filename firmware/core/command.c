@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fw/command.h"
 
-static bool is_copy(const struct fw_inbox *inbox, const struct fw_command *command)
+static bool is_copy(const struct fw_command_filter *filter, const struct fw_command *command)
 {
-    return command->counter == inbox->counter && command->seq == inbox->obeyed_seq &&
-           command->verb == inbox->obeyed_verb;
+    return command->counter == filter->counter && command->seq == filter->obeyed_seq &&
+           command->verb == filter->obeyed_verb;
 }
 
 static bool is_start(const struct fw_command *command)
@@ -21,7 +21,8 @@ static bool clocks_agree(const struct fw_command *command, int64_t now_utime_us)
 }
 
 // Is it from who may command, and for this run of the program?
-static enum fw_verdict judge_sender(const struct fw_inbox *inbox, const struct fw_command *command)
+static enum fw_verdict judge_sender(const struct fw_command_filter *filter,
+                                    const struct fw_command *command)
 {
     switch ((enum fw_seal)command->seal)
     {
@@ -31,24 +32,25 @@ static enum fw_verdict judge_sender(const struct fw_inbox *inbox, const struct f
         case FW_SEAL_NONE:
         default: return FW_VERDICT_UNSIGNED;
     }
-    const bool is_ours = inbox->session != 0 && command->session == inbox->session;
+    const bool is_ours = filter->session != 0 && command->session == filter->session;
     return is_ours ? FW_VERDICT_OBEY : FW_VERDICT_SESSION;
 }
 
 // Made just now, and after the last stop.
-static bool is_fresh(const struct fw_inbox *inbox, const struct fw_command *command,
+static bool is_fresh(const struct fw_command_filter *filter, const struct fw_command *command,
                      int64_t session_us)
 {
     return command->made_us >= session_us - FW_COMMAND_FRESH_US &&
            command->made_us <= session_us + FW_COMMAND_AHEAD_US &&
-           (!inbox->latched || command->made_us > inbox->stopped_us);
+           (!filter->latched || command->made_us > filter->stopped_us);
 }
 
 // Does the robot's state allow it, at the instant that it names?
-static enum fw_verdict judge_state(const struct fw_inbox *inbox, const struct fw_command *command,
-                                   int64_t now_utime_us, bool running)
+static enum fw_verdict judge_state(const struct fw_command_filter *filter,
+                                   const struct fw_command *command, int64_t now_utime_us,
+                                   bool running)
 {
-    if (command->counter <= inbox->counter)
+    if (command->counter <= filter->counter)
     {
         return FW_VERDICT_OLD;
     }
@@ -60,8 +62,9 @@ static enum fw_verdict judge_state(const struct fw_inbox *inbox, const struct fw
                                                                      : FW_VERDICT_OBEY;
 }
 
-enum fw_verdict fw_command_judge(const struct fw_inbox *inbox, const struct fw_command *command,
-                                 int64_t now_utime_us, int64_t session_us, bool running)
+enum fw_verdict fw_command_judge(const struct fw_command_filter *filter,
+                                 const struct fw_command *command, int64_t now_utime_us,
+                                 int64_t session_us, bool running)
 {
     if (command->verb == FW_VERB_STOP)
     {
@@ -71,44 +74,45 @@ enum fw_verdict fw_command_judge(const struct fw_inbox *inbox, const struct fw_c
     {
         return FW_VERDICT_UNKNOWN;
     }
-    const enum fw_verdict verdict = judge_sender(inbox, command);
+    const enum fw_verdict verdict = judge_sender(filter, command);
     if (verdict != FW_VERDICT_OBEY)
     {
         return verdict;
     }
-    if (inbox->latched && is_start(command))
+    if (filter->latched && is_start(command))
     {
         return FW_VERDICT_LATCHED;
     }
-    if (command->verb != FW_VERB_HOLD && is_copy(inbox, command))
+    if (command->verb != FW_VERB_HOLD && is_copy(filter, command))
     {
         return FW_VERDICT_COPY;
     }
-    if (!is_fresh(inbox, command, session_us))
+    if (!is_fresh(filter, command, session_us))
     {
         return FW_VERDICT_EXPIRED;
     }
     // That the operator is there has no order: it says nothing but that.
     return command->verb == FW_VERB_HOLD ? FW_VERDICT_OBEY
-                                         : judge_state(inbox, command, now_utime_us, running);
+                                         : judge_state(filter, command, now_utime_us, running);
 }
 
-void fw_command_obeyed(struct fw_inbox *inbox, const struct fw_command *command, int64_t session_us)
+void fw_command_obeyed(struct fw_command_filter *filter, const struct fw_command *command,
+                       int64_t session_us)
 {
     if (command->verb == FW_VERB_STOP)
     {
-        inbox->latched = true;
-        inbox->stopped_us = session_us;
+        filter->latched = true;
+        filter->stopped_us = session_us;
         return;
     }
-    if (command->verb == FW_VERB_HOLD || command->counter <= inbox->counter)
+    if (command->verb == FW_VERB_HOLD || command->counter <= filter->counter)
     {
         return;
     }
-    inbox->latched = inbox->latched && command->verb != FW_VERB_ARM;
-    inbox->counter = command->counter;
-    inbox->obeyed_seq = command->seq;
-    inbox->obeyed_verb = command->verb;
+    filter->latched = filter->latched && command->verb != FW_VERB_ARM;
+    filter->counter = command->counter;
+    filter->obeyed_seq = command->seq;
+    filter->obeyed_verb = command->verb;
 }
 
 const char *fw_verdict_str(enum fw_verdict verdict)

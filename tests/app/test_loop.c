@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of firmware/app/loop.c and loop_tend.c
+// Tests of firmware/app/loop.c and loop_update.c
 #include "loop.h"
 
 #include <math.h>

@@ -41,7 +41,7 @@ def logged(folder, driver):
 
 
 def test_robots_and_twins_are_told_apart(session):
-    assert session["actors"] == EVERYONE
+    assert session["robots"] == EVERYONE
 
 
 def test_all_that_was_said_is_heard_once_and_in_order(session, folder):

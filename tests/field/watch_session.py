@@ -16,7 +16,7 @@ from pathlib import Path
 
 import lcm
 
-from twinmill.data.multi_log import TWIN, everyone_in
+from twinmill.data.multi_log import TWIN, multi_log_of
 from twinmill.data.stream import Window, from_bus
 
 URL = "udpm://239.255.76.67:7667?ttl=0"
@@ -41,7 +41,7 @@ def listen(heard: Path) -> list[str]:
             for payload in payloads:
                 log.write_event(now_us, channel, payload)
     log.close()
-    return [actor.name for actor in everyone_in(window.events(), heard).actors]
+    return [recorded.name for recorded in multi_log_of(window.events(), heard).robots]
 
 
 def watch(save: Path) -> dict:
@@ -60,7 +60,7 @@ def watch(save: Path) -> dict:
 def main(folder: Path) -> dict:
     with drive(folder / "robots", "", 1) as robots, drive(folder / "twins", TWIN, 2) as twins:
         try:
-            result = {"actors": listen(folder / "heard")}
+            result = {"robots": listen(folder / "heard")}
             if find_spec("rerun"):
                 result["said"] = watch(folder / "shown.rrd")
         finally:

@@ -12,7 +12,7 @@ void tearDown(void) {}
 #define SESSION INT64_C(77)
 #define SESSION_US INT64_C(60000000)
 
-static const struct fw_inbox fresh = {.session = SESSION};
+static const struct fw_command_filter fresh = {.session = SESSION};
 
 // A command as its operator signs it just now.
 static struct fw_command order(enum fw_verb verb, int64_t counter, int32_t seq)
@@ -26,9 +26,10 @@ static struct fw_command order(enum fw_verb verb, int64_t counter, int32_t seq)
                                .counter = counter};
 }
 
-static enum fw_verdict judge(const struct fw_inbox *inbox, const struct fw_command *command)
+static enum fw_verdict judge(const struct fw_command_filter *filter,
+                             const struct fw_command *command)
 {
-    return fw_command_judge(inbox, command, NOW_US, SESSION_US, false);
+    return fw_command_judge(filter, command, NOW_US, SESSION_US, false);
 }
 
 static enum fw_verdict judge_start(int64_t ahead_us)
@@ -54,15 +55,15 @@ static void test_start_is_obeyed_from_2_s_late_to_600_s_ahead(void)
 
 static void test_stop_is_always_obeyed(void)
 {
-    const struct fw_inbox inboxes[] = {
+    const struct fw_command_filter filters[] = {
         {0}, fresh, {.session = SESSION, .counter = INT64_MAX, .latched = true}};
-    for (size_t i = 0; i < sizeof inboxes / sizeof inboxes[0]; ++i)
+    for (size_t i = 0; i < sizeof filters / sizeof filters[0]; ++i)
     {
         for (int8_t seal = FW_SEAL_NONE; seal <= FW_SEAL_NO_KEY; ++seal)
         {
             const struct fw_command stop = {
                 .utime_us = INT64_MIN, .seq = -1, .verb = FW_VERB_STOP, .seal = seal};
-            TEST_ASSERT_EQUAL(FW_VERDICT_OBEY, judge(&inboxes[i], &stop));
+            TEST_ASSERT_EQUAL(FW_VERDICT_OBEY, judge(&filters[i], &stop));
         }
     }
 }
@@ -94,7 +95,7 @@ static void test_command_of_another_session_is_refused(void)
     start.session = SESSION + 1;
     TEST_ASSERT_EQUAL(FW_VERDICT_SESSION, judge(&fresh, &start));
     // A robot without a session obeys none, not even one that names none.
-    const struct fw_inbox none = {0};
+    const struct fw_command_filter none = {0};
     start.session = 0;
     TEST_ASSERT_EQUAL(FW_VERDICT_SESSION, judge(&none, &start));
 }
@@ -116,65 +117,65 @@ static void test_command_is_void_after_3_s(void)
 
 static void test_copy_is_known_by_counter_number_and_verb(void)
 {
-    struct fw_inbox inbox = fresh;
+    struct fw_command_filter filter = fresh;
     const struct fw_command start = order(FW_VERB_START, 8, 5);
-    fw_command_obeyed(&inbox, &start, SESSION_US);
-    TEST_ASSERT_EQUAL(FW_VERDICT_COPY, judge(&inbox, &start));
+    fw_command_obeyed(&filter, &start, SESSION_US);
+    TEST_ASSERT_EQUAL(FW_VERDICT_COPY, judge(&filter, &start));
     const struct fw_command other_number = order(FW_VERB_START, 8, 6);
     const struct fw_command other_verb = order(FW_VERB_SELECT, 8, 5);
     const struct fw_command older = order(FW_VERB_START, 7, 5);
-    TEST_ASSERT_EQUAL(FW_VERDICT_OLD, judge(&inbox, &other_number));
-    TEST_ASSERT_EQUAL(FW_VERDICT_OLD, judge(&inbox, &other_verb));
-    TEST_ASSERT_EQUAL(FW_VERDICT_OLD, judge(&inbox, &older));
+    TEST_ASSERT_EQUAL(FW_VERDICT_OLD, judge(&filter, &other_number));
+    TEST_ASSERT_EQUAL(FW_VERDICT_OLD, judge(&filter, &other_verb));
+    TEST_ASSERT_EQUAL(FW_VERDICT_OLD, judge(&filter, &older));
     const struct fw_command newer = order(FW_VERB_START, 9, 6);
-    TEST_ASSERT_EQUAL(FW_VERDICT_OBEY, judge(&inbox, &newer));
+    TEST_ASSERT_EQUAL(FW_VERDICT_OBEY, judge(&filter, &newer));
     // A copy is known for longer than it would be obeyed.
     struct fw_command late = start;
     late.made_us = SESSION_US - 5000000;
-    TEST_ASSERT_EQUAL(FW_VERDICT_COPY, judge(&inbox, &late));
+    TEST_ASSERT_EQUAL(FW_VERDICT_COPY, judge(&filter, &late));
 }
 
 static void test_stop_holds_until_armed(void)
 {
-    struct fw_inbox inbox = fresh;
+    struct fw_command_filter filter = fresh;
     const struct fw_command start = order(FW_VERB_START, 1, 1);
     const struct fw_command stop = {.verb = FW_VERB_STOP};
-    fw_command_obeyed(&inbox, &start, SESSION_US);
-    fw_command_obeyed(&inbox, &stop, SESSION_US - 1);
+    fw_command_obeyed(&filter, &start, SESSION_US);
+    fw_command_obeyed(&filter, &stop, SESSION_US - 1);
     struct fw_command again = order(FW_VERB_START, 2, 2);
-    TEST_ASSERT_EQUAL(FW_VERDICT_LATCHED, judge(&inbox, &start));  // the copy, too
-    TEST_ASSERT_EQUAL(FW_VERDICT_LATCHED, judge(&inbox, &again));
+    TEST_ASSERT_EQUAL(FW_VERDICT_LATCHED, judge(&filter, &start));  // the copy, too
+    TEST_ASSERT_EQUAL(FW_VERDICT_LATCHED, judge(&filter, &again));
     again.verb = FW_VERB_SCRIPT;
-    TEST_ASSERT_EQUAL(FW_VERDICT_LATCHED, judge(&inbox, &again));
+    TEST_ASSERT_EQUAL(FW_VERDICT_LATCHED, judge(&filter, &again));
     const struct fw_command arm = order(FW_VERB_ARM, 3, 3);
-    TEST_ASSERT_EQUAL(FW_VERDICT_OBEY, judge(&inbox, &arm));
-    fw_command_obeyed(&inbox, &arm, SESSION_US);
-    TEST_ASSERT_EQUAL(FW_VERDICT_OLD, judge(&inbox, &again));
+    TEST_ASSERT_EQUAL(FW_VERDICT_OBEY, judge(&filter, &arm));
+    fw_command_obeyed(&filter, &arm, SESSION_US);
+    TEST_ASSERT_EQUAL(FW_VERDICT_OLD, judge(&filter, &again));
     again = order(FW_VERB_START, 4, 4);
-    TEST_ASSERT_EQUAL(FW_VERDICT_OBEY, judge(&inbox, &again));
+    TEST_ASSERT_EQUAL(FW_VERDICT_OBEY, judge(&filter, &again));
 }
 
 // Somebody may keep an operator's commands back, and let them through after the stop.
 static void test_arming_that_was_said_before_the_stop_does_not_undo_it(void)
 {
-    struct fw_inbox inbox = fresh;
+    struct fw_command_filter filter = fresh;
     const struct fw_command stop = {.verb = FW_VERB_STOP};
     struct fw_command arm = order(FW_VERB_ARM, 1, 1);
     arm.made_us = SESSION_US - 100000;
-    fw_command_obeyed(&inbox, &stop, SESSION_US - 50000);
-    TEST_ASSERT_EQUAL(FW_VERDICT_EXPIRED, judge(&inbox, &arm));
+    fw_command_obeyed(&filter, &stop, SESSION_US - 50000);
+    TEST_ASSERT_EQUAL(FW_VERDICT_EXPIRED, judge(&filter, &arm));
     arm.made_us = SESSION_US - 40000;
-    TEST_ASSERT_EQUAL(FW_VERDICT_OBEY, judge(&inbox, &arm));
+    TEST_ASSERT_EQUAL(FW_VERDICT_OBEY, judge(&filter, &arm));
 }
 
 // It says only that the operator is there, in whatever order it comes.
 static void test_word_that_the_operator_is_there_has_no_order(void)
 {
-    struct fw_inbox inbox = {.session = SESSION, .counter = 100};
+    struct fw_command_filter filter = {.session = SESSION, .counter = 100};
     const struct fw_command hold = order(FW_VERB_HOLD, 0, 0);
-    TEST_ASSERT_EQUAL(FW_VERDICT_OBEY, judge(&inbox, &hold));
-    fw_command_obeyed(&inbox, &hold, SESSION_US);
-    TEST_ASSERT_EQUAL_INT64(100, inbox.counter);
+    TEST_ASSERT_EQUAL(FW_VERDICT_OBEY, judge(&filter, &hold));
+    fw_command_obeyed(&filter, &hold, SESSION_US);
+    TEST_ASSERT_EQUAL_INT64(100, filter.counter);
 }
 
 static void test_script_is_for_robots_that_stand(void)

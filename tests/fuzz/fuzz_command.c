@@ -205,7 +205,7 @@ static void stop_for_good(void)
     CLAIM(ack_count == acks + 1 && last_ack.accepted && last_ack.stands);
     for (int i = 0; i < 3; ++i)
     {
-        CLAIM(!loop.running && !loop.may_move && loop.inbox.latched);
+        CLAIM(!loop.running && !loop.may_move && loop.filter.latched);
         CLAIM(memcmp(board.wheel_duty_pct, zero_pct, sizeof zero_pct) == 0);
         loop_step(&loop);
     }

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from twinmill.data.multi_log import Actor, read_everyone
+from twinmill.data.multi_log import RecordedRobot, read_multi_log
 from twinmill.report.log_figures import Drawing
 from twinmill_cli.main import run
 
@@ -30,14 +30,14 @@ def log(write_log, message):
     return write_log(*events)
 
 
-def painted(actors, name):
+def painted(robots, name):
     axes = Figure().subplots()
-    getattr(Drawing(actors), name)(axes)
+    getattr(Drawing(robots), name)(axes)
     return axes
 
 
 def test_speed_and_turn_of_a_circle(driven):
-    robot = Actor("", driven())
+    robot = RecordedRobot("", driven())
     (speed,), (turn,) = (painted([robot], name).lines for name in ("speed", "turn"))
     # Parabolas over 0.4 s cut the corner of a circle by less than 0.5 %.
     np.testing.assert_allclose(speed.get_ydata(), 0.3, rtol=5e-3)
@@ -45,24 +45,24 @@ def test_speed_and_turn_of_a_circle(driven):
 
 
 def test_robot_and_twin_are_drawn_on_one_time_axis(log):
-    actors = read_everyone(log).actors
-    assert [actor.name for actor in actors] == ["R01", "TWIN_R01"]
-    robot, twin = painted(actors, "speed").lines
+    robots = read_multi_log(log).robots
+    assert [recorded.name for recorded in robots] == ["R01", "TWIN_R01"]
+    robot, twin = painted(robots, "speed").lines
     assert (robot.get_xdata()[0], twin.get_xdata()[0]) == (0.0, 1.0)
     assert (robot.get_linestyle(), twin.get_linestyle()) == ("-", "--")
-    along = painted(actors, "paths").lines[0]
+    along = painted(robots, "paths").lines[0]
     assert np.ptp(along.get_xdata()) == pytest.approx(0.7475, abs=0.13)
     assert np.ptp(along.get_ydata()) == 0
 
 
 def test_bits_are_green_from_when_it_sees_and_commands_have_their_signs(log):
-    actors = read_everyone(log).actors
-    (bits,) = painted(actors, "bits").images
+    robots = read_multi_log(log).robots
+    (bits,) = painted(robots, "bits").images
     row = bits.get_array()[0]
     green = (row == matplotlib.colors.to_rgb("#009e73")).all(axis=1)
     cell_s = bits.get_extent()[1] / len(row)
     assert green.argmax() * cell_s == pytest.approx(1.5, abs=2 * cell_s)
-    (duties,) = painted(actors, "commands").images
+    (duties,) = painted(robots, "commands").images
     assert np.array(duties.get_array())[:, 5].tolist() == [-50, 100, -50, 100]
 
 
@@ -71,7 +71,7 @@ def test_a_robot_that_fell_silent_is_neither_blind_nor_driven(driven):
     speaks = robot.command_t_s < 5
     quiet = ("command_t_s", "command", "battery_V", "frame_t_s", "mode", "detected_raw", "detected")
     silent = replace(robot, **{name: getattr(robot, name)[speaks] for name in quiet})
-    (duties,) = painted([Actor("", silent)], "commands").images
+    (duties,) = painted([RecordedRobot("", silent)], "commands").images
     known = np.isfinite(np.ma.filled(duties.get_array().astype(float), np.nan)[0])
     assert known[:100].all() and not known[106:].any()
 

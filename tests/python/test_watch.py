@@ -14,7 +14,7 @@ import pytest
 from twinmill.data.lcm_log import split_events
 from twinmill.data.log import read_log
 from twinmill.data.measurement import load_measurements
-from twinmill.data.multi_log import Actor, everyone_in
+from twinmill.data.multi_log import RecordedRobot, multi_log_of
 from twinmill.data.stream import Window, from_log
 from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
@@ -55,7 +55,7 @@ def read_back(path, entity, component):
         batch = chunk.to_record_batch()
         names = [n for n in batch.schema.names if n.split("/")[-1].endswith(component)]
         if chunk.entity_path == entity and names and "time" in batch.schema.names:
-            at_s = batch["time"].cast("int64").to_numpy() / 1e9
+            at_s = batch["time"].multi_log("int64").to_numpy() / 1e9
             rows += zip(at_s.tolist(), batch[names[0]].to_pylist(), strict=True)
     rows.sort(key=lambda row: row[0])
     return np.array([at_s for at_s, _ in rows]), [value[0] for _, value in rows]
@@ -96,10 +96,10 @@ def scores(log, model):
     for number, (now_us, batch) in enumerate(batches, start=1):
         window.add(now_us, batch)
         if number % 40 == 0 and number * 0.1 >= WINDOW_S:
-            (actor,) = everyone_in(window.events(), log).actors
-            judgement = judge.judge(actor)
+            (recorded,) = multi_log_of(window.events(), log).robots
+            judgement = judge.judge(recorded)
             found.append(judgement.score)
-            error_m = np.linalg.norm(judgement.predicted[-1, :2] - actor.log.pose[-1, :2])
+            error_m = np.linalg.norm(judgement.predicted[-1, :2] - recorded.log.pose[-1, :2])
             assert error_m < 0.2
     return np.array(found)
 
@@ -115,7 +115,7 @@ def test_score_is_one_for_the_model_that_drove_and_more_without_its_effect(coast
 def test_a_robot_that_stands_has_no_score(driven):
     robot = driven()
     robot.command[:] = 0
-    assert Judge(ModelFile.load("turbopi.toml")).judge(Actor("", robot)) is None
+    assert Judge(ModelFile.load("turbopi.toml")).judge(RecordedRobot("", robot)) is None
 
 
 def test_window_forgets_what_is_old(log):
@@ -154,4 +154,4 @@ def test_the_score_is_that_of_compare(brief_coasting_robot):
     model = ModelFile.load(str(brief_coasting_robot.model))
     said = compare(load_measurements([brief_coasting_robot.log], model.model), model).score
     robot = read_log(brief_coasting_robot.log).robots[3]
-    assert Judge(model).judge(Actor("", robot)).score == pytest.approx(said, rel=0.03)
+    assert Judge(model).judge(RecordedRobot("", robot)).score == pytest.approx(said, rel=0.03)

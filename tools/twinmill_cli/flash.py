@@ -25,7 +25,14 @@ if working():  # not for --help
     from twinmill.robots.fleet import Fleet
     from twinmill.robots.key import load
     from twinmill.robots.package import Packages, read_package
-    from twinmill.robots.robot_update import Outcome, Target, Wish, hand_back, parse_target, update
+    from twinmill.robots.robot_update import (
+        Outcome,
+        Target,
+        UpdateRequest,
+        hand_back,
+        parse_target,
+        update,
+    )
     from twinmill.swarm.behaviors import find_file, read_tables
 
 AT_ONCE = 16
@@ -111,7 +118,7 @@ def _flash(
         raise ValueError("--hand-back stands alone: give no --rollback, --take-over, --dry-run.")
     given = read_package(package) if package else None
     own_key = load(key)
-    wish = Wish(
+    request = UpdateRequest(
         None if rollback else Packages(given),
         settings,
         file if behaviors or behavior in tables else None,
@@ -124,7 +131,7 @@ def _flash(
     if give_back:
         outcomes = [hand_back(target, ssh_config) for target in targets]
     else:
-        outcomes = _update_all(targets, wish, Fleet(lcm_url, key=own_key))
+        outcomes = _update_all(targets, request, Fleet(lcm_url, key=own_key))
     data = {
         "ok": all(outcome.ok for outcome in outcomes),
         "dry_run": dry_run,
@@ -153,7 +160,7 @@ def _parse_settings(pairs: list[str]) -> dict[str, str]:
     return dict(pair.split("=", 1) for pair in pairs)
 
 
-def _update_all(targets: list[Target], wish: Wish, fleet: Fleet) -> list[Outcome]:
+def _update_all(targets: list[Target], request: UpdateRequest, fleet: Fleet) -> list[Outcome]:
     """All at once, one line of progress each on stderr, while this thread hears the bus."""
     console = Console(stderr=True)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
@@ -168,7 +175,7 @@ def _update_all(targets: list[Target], wish: Wish, fleet: Fleet) -> list[Outcome
             def say(step: str, line=line, target=target) -> None:
                 progress.update(line, description=f"{target.host}: {step}")
 
-            futures.append(pool.submit(update, target, wish, fleet, say))
+            futures.append(pool.submit(update, target, request, fleet, say))
         while not all(future.done() for future in futures):
             fleet.listen(0.1)
         return [future.result() for future in futures]

@@ -19,7 +19,7 @@ if working():  # not for --help
     from matplotlib.figure import Figure as Canvas
 
     from twinmill.data.log import LogError
-    from twinmill.data.multi_log import Cast, read_everyone
+    from twinmill.data.multi_log import MultiLog, read_multi_log
     from twinmill.files import replacing
     from twinmill.report import Figure, Provenance, Section, render_page
     from twinmill.report.canvas import STYLE, draw
@@ -55,28 +55,28 @@ def _plot(
     if out.suffix not in SUFFIXES:
         raise ValueError(f"{out}: must end in {', '.join(SUFFIXES)}: the end says what is drawn.")
     with busy(f"drawing {log}"), replacing(out, force) as temporary:
-        cast = read_everyone(log)
-        panels = _panels(cast, log)
+        multi_log = read_multi_log(log)
+        panels = _panels(multi_log, log)
         command = shlex.join(["twinmill", "plot", str(log), "-o", str(out)])
         source = Provenance(command, f"twinmill {version('twinmill')}", "")
         if out.suffix == ".html":
-            temporary.write_text(_page(log, cast, panels, source))
+            temporary.write_text(_page(log, multi_log, panels, source))
         else:
             _sheet(log, panels, temporary, out.suffix[1:])
     data = {
         "out": str(out),
-        "robots": [actor.name for actor in cast.actors],
-        "warnings": cast.warnings,
-        "log_sha256": cast.sha256,
+        "robots": [recorded.name for recorded in multi_log.robots],
+        "warnings": multi_log.warnings,
+        "log_sha256": multi_log.sha256,
         **source.to_json(),
     }
-    deliver(data, "\n".join([str(out), *(f"! {w}" for w in cast.warnings)]), as_json)
+    deliver(data, "\n".join([str(out), *(f"! {w}" for w in multi_log.warnings)]), as_json)
     return data
 
 
-def _panels(cast: Cast, log: Path) -> list[tuple]:
+def _panels(multi_log: MultiLog, log: Path) -> list[tuple]:
     """(painter, height_in, title, caption) of all that the log can show."""
-    drawing = Drawing(cast.actors)
+    drawing = Drawing(multi_log.robots)
     rows = len(drawing.driven)
     panels = []
     if drawing.tracked:
@@ -109,7 +109,7 @@ def _sheet(log: Path, panels: list[tuple], path: Path, kind: str) -> None:
         canvas.savefig(path, format=kind, metadata=metadata[kind])
 
 
-def _page(log: Path, cast: Cast, panels: list[tuple], source: Provenance) -> str:
+def _page(log: Path, multi_log: MultiLog, panels: list[tuple], source: Provenance) -> str:
     figures = [
         Figure(draw(height_in + 0.2, paint), title, caption)
         for paint, height_in, title, caption in panels
@@ -117,8 +117,8 @@ def _page(log: Path, cast: Cast, panels: list[tuple], source: Provenance) -> str
     section = Section(
         title=log.name,
         score=[],
-        verdict=f"{', '.join(actor.name for actor in cast.actors)}.",
+        verdict=f"{', '.join(recorded.name for recorded in multi_log.robots)}.",
         figures=figures,
-        warnings=cast.warnings,
+        warnings=multi_log.warnings,
     )
     return render_page(log.name, source, [section], "")

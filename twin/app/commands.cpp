@@ -34,7 +34,7 @@ Commands::Commands(Outlet &outlet, Swarm &swarm, Publisher &publisher,
         Robot &robot = robots_[static_cast<size_t>(id)];
         robot.script = script;
         robot.key = seal_derive(&options_.key, id);
-        robot.inbox.session = outlet_.BusUrl().empty() ? 0 : seal_random();
+        robot.filter.session = outlet_.BusUrl().empty() ? 0 : seal_random();
         keys.push_back(robot.key);
         options_.wait ? Stop(id) : Start(id);
     }
@@ -78,7 +78,7 @@ void Commands::Answer(int id, const fw_command &order, const std::string &name)
 {
     Robot &robot = robots_[static_cast<size_t>(id)];
     const fw_verdict verdict =
-        fw_command_judge(&robot.inbox, &order, swarm_.UtimeUs(), SessionUs(), robot.running);
+        fw_command_judge(&robot.filter, &order, swarm_.UtimeUs(), SessionUs(), robot.running);
     std::string reason = fw_verdict_str(verdict);
     try
     {
@@ -99,7 +99,7 @@ void Commands::Answer(int id, const fw_command &order, const std::string &name)
 void Commands::Remember(int id, const fw_command &order)
 {
     Robot &robot = robots_[static_cast<size_t>(id)];
-    fw_command_obeyed(&robot.inbox, &order, SessionUs());
+    fw_command_obeyed(&robot.filter, &order, SessionUs());
     if (order.verb == FW_VERB_STOP)
         return;
     robot.heard_us = SessionUs();
@@ -137,7 +137,7 @@ void Commands::SendAck(int id, const fw_command &order, const std::string &reaso
     turbopi::signed_ack_t own{};
     own.utime_us = ack.utime_us;
     own.robot_id = id;
-    own.session = robot.inbox.session;
+    own.session = robot.filter.session;
     own.session_us = SessionUs();
     own.command_utime_us = order.utime_us;
     own.seq = order.seq;
@@ -155,7 +155,7 @@ int32_t Commands::StatusFlags(int id) const
     int32_t flags = swarm_.Output(id).status_flags;
     flags |= robot.link_lost ? telemetry_t::STATUS_LINK_LOST : 0;
     flags |= robot.running && robot.link_timeout_ms == 0 ? telemetry_t::STATUS_UNTETHERED : 0;
-    return flags | (robot.inbox.latched ? telemetry_t::STATUS_LATCHED : 0);
+    return flags | (robot.filter.latched ? telemetry_t::STATUS_LATCHED : 0);
 }
 
 void Commands::PublishLinks()
@@ -169,12 +169,12 @@ void Commands::PublishLinks()
         turbopi::link_t link{};
         link.utime_us = swarm_.UtimeUs();
         link.robot_id = id;
-        link.session = robot.inbox.session;
+        link.session = robot.filter.session;
         link.session_us = SessionUs();
-        link.counter = robot.inbox.counter;
+        link.counter = robot.filter.counter;
         link.mode = swarm_.Output(id).mode;
         link.stands = !robot.running;
-        link.armed = !robot.inbox.latched;
+        link.armed = !robot.filter.latched;
         link.link_timeout_ms = robot.link_timeout_ms;
         link.status_flags = StatusFlags(id);
         outlet_.SendSigned(link.utime_us, options_.channel_prefix + RobotName(id) + "_LINK", link,

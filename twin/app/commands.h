@@ -43,7 +43,7 @@ private:
     // of real time, whatever the pace of the simulation.
     struct Robot
     {
-        fw_inbox inbox{};
+        fw_command_filter filter{};
         seal_key key{};
         int64_t heard_us = 0;
         int32_t link_timeout_ms = 0;

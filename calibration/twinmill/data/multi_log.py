@@ -14,7 +14,7 @@ PREFIXES = ("", TWIN)
 
 
 @dataclass(frozen=True)
-class Actor:
+class RecordedRobot:
     """One robot or twin; times of its series are since the earliest stamp of the whole log."""
 
     prefix: str
@@ -27,40 +27,40 @@ class Actor:
 
 
 @dataclass(frozen=True)
-class Cast:
+class MultiLog:
     """All that speak in a log: robots first, then twins, each by number."""
 
-    actors: list[Actor]
+    robots: list[RecordedRobot]
     t0_utime_us: int
     sha256: str
     warnings: list[str]
 
 
-def read_everyone(path: Path) -> Cast:
+def read_multi_log(path: Path) -> MultiLog:
     """Reads a log with all channel prefixes.
 
     Raises:
         LogError: as read_log.
     """
     data = read_bytes(path)
-    return everyone_in(split_events(data, path.name), path, hashlib.sha256(data).hexdigest())
+    return multi_log_of(split_events(data, path.name), path, hashlib.sha256(data).hexdigest())
 
 
-def everyone_in(events: Events, path: Path, sha256: str = "") -> Cast:
+def multi_log_of(events: Events, path: Path, sha256: str = "") -> MultiLog:
     """The same of events; `path` names them in messages."""
     present = [
         p for p in PREFIXES if any(re.match(rf"{p}R\d{{2,4}}_", c) for c in events.by_channel)
     ]
     logs = {prefix: decode_log(events, path, sha256, prefix) for prefix in present or [""]}
     t0_us = min(log.t0_utime_us for log in logs.values())
-    actors = [
-        Actor(prefix, _shifted(robot, (log.t0_utime_us - t0_us) / 1e6))
+    robots = [
+        RecordedRobot(prefix, _shifted(robot, (log.t0_utime_us - t0_us) / 1e6))
         for prefix, log in logs.items()
         for robot in log.robots.values()
     ]
     # What one prefix does not know, another does: that is no remark.
     warnings = [w for log in logs.values() for w in log.warnings if "other channels" not in w]
-    return Cast(actors, t0_us, sha256, warnings)
+    return MultiLog(robots, t0_us, sha256, warnings)
 
 
 def _shifted(robot: RobotLog, by_s: float) -> RobotLog:

@@ -65,19 +65,19 @@ def _instance(model: native.Model, effect: str) -> str:
 
 
 def candidates(
-    scenes: list[Scene], barred: Collection[str] = ()
+    scenes: list[Scene], excluded: Collection[str] = ()
 ) -> tuple[list[tuple[Candidate, np.ndarray]], list[str]]:
     """Candidates with their columns (R, k), and effects that leave no trace in these logs.
 
     Args:
         scenes: measurements with their models.
-        barred: effects that are not to be thought of.
+        excluded: effects that are not to be thought of.
     """
     model = scenes[0].model
     without = [s.white_errors() for s in scenes]
     found, blind = [], []
     for name, entry in catalogue_of(model).items():
-        if name in model.effects or name in barred or entry["stage"] not in STAGES:
+        if name in model.effects or name in excluded or entry["stage"] not in STAGES:
             continue
         if entry["duty_only"] and model.drive != "duty":
             continue

@@ -11,9 +11,9 @@ import twinmill_native as native
 from twinmill.data.measurement import SHORTEST_LOG_S, Measurement
 from twinmill.data.steady_table import Sheet
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.experiment.contest import Contest, contest, question, subjects
 from twinmill.experiment.foresight import LEAD_S, Played, Rows, rows_of
-from twinmill.experiment.information import Ledger, Subject
+from twinmill.experiment.hypotheses import Hypotheses, hypotheses_of, question, subjects
+from twinmill.experiment.information import FisherInformation, Subject
 from twinmill.experiment.moves import Move, family
 from twinmill.experiment.power import power
 from twinmill.experiment.relevance import relevance
@@ -136,25 +136,25 @@ def design(
     moves = family(limits.max_duty)
     say("playing the moves in the twin")
     names = base_names(model_file.model, logs, model_file.told_by_others(hashes))
-    asked = contest(diagnosis, base_parameters(model_file.model, names))
+    asked = hypotheses_of(diagnosis, base_parameters(model_file.model, names))
     scene = log_of(asked.state.scenes)
     foreseen = Played.of([[m] for m in moves], scene).scene(scene, CENTRE)
     known = subjects(asked.state.scenes, foreseen, asked.state, asked, usual)
-    ledger = Ledger(asked.state.free, known)
-    told = np.sum([ledger.told(s) for s in asked.state.scenes], axis=0)
-    names, why = question(asked, known, _tempered(ledger, told), ENOUGH_CHI2)
+    fisher = FisherInformation(asked.state.free, known)
+    told = np.sum([fisher.told(s) for s in asked.state.scenes], axis=0)
+    names, why = question(asked, known, _tempered(fisher, told), ENOUGH_CHI2)
     wanted = {i: with_effect(scene.model, s) for i, s in enumerate(known) if s.name in names}
     if not wanted:
         raise ValueError(f"{why} No move that the twin can play shows any of them.")
     say("choosing moves")
     floor = Floor(limits, scene, list(wanted.values()))
-    worth = partial(_worth, ledger, wanted=list(wanted))
-    chosen = choose(moves, worth, told, ledger.foreseen(foreseen), floor)
+    worth = partial(_worth, fisher, wanted=list(wanted))
+    chosen = choose(moves, worth, told, fisher.foreseen(foreseen), floor)
     say("checking the whole script")
     whole = Played.of([chosen], scene)
     planned = whole.scene(scene, CENTRE)
-    after = told + ledger.foreseen(planned)[0]
-    outlook = _Outlook(asked, ledger, wanted, usual)
+    after = told + fisher.foreseen(planned)[0]
+    outlook = _Outlook(asked, fisher, wanted, usual)
     return Plan(
         why,
         chosen,
@@ -268,17 +268,17 @@ def choose(
     return chosen
 
 
-def _worth(ledger: Ledger, grams: np.ndarray, wanted: list[int]) -> np.ndarray:
+def _worth(fisher: FisherInformation, grams: np.ndarray, wanted: list[int]) -> np.ndarray:
     """(...,) sum of what is reached of an ample margin: of the effects in question, then of all."""
-    margins = _tempered(ledger, grams).min(axis=-1)
+    margins = _tempered(fisher, grams).min(axis=-1)
     reached = margins / (margins + ENOUGH_CHI2)
     return reached[..., wanted].sum(axis=-1) + BESIDES * reached.sum(axis=-1)
 
 
-def _tempered(ledger: Ledger, grams: np.ndarray) -> np.ndarray:
+def _tempered(fisher: FisherInformation, grams: np.ndarray) -> np.ndarray:
     """(..., T, 1 + J) margins over the scatter of the log."""
-    excess = np.array([s.excess for s in ledger.subjects])
-    return ledger.margins(grams) / excess[:, None]
+    excess = np.array([s.excess for s in fisher.subjects])
+    return fisher.margins(grams) / excess[:, None]
 
 
 @dataclass(frozen=True)
@@ -286,13 +286,13 @@ class _Outlook:
     """What is foreseen of the effects in question.
 
     Attributes:
-        asked, ledger: the question, and what runs tell of all effects.
-        wanted: by place in the ledger the model with the effect.
+        asked, fisher: the question, and what runs tell of all effects.
+        wanted: by place in the fisher the model with the effect.
         usual: score of the model on the logs that it was fitted to.
     """
 
-    asked: Contest
-    ledger: Ledger
+    asked: Hypotheses
+    fisher: FisherInformation
     wanted: dict[int, native.Model]
     usual: float
 
@@ -305,8 +305,8 @@ class _Outlook:
             nearest = int(chi2[row].argmin())
             chances.append(
                 Chance(
-                    self.ledger.subjects[place].name,
-                    self.ledger.subjects[nearest - 1].name if nearest else None,
+                    self.fisher.subjects[place].name,
+                    self.fisher.subjects[nearest - 1].name if nearest else None,
                     float(before_chi2[row].min()),
                     float(chi2[row].min()),
                     float(before[row]),
@@ -317,14 +317,14 @@ class _Outlook:
 
     def _power(self, grams: np.ndarray, planned: list[Scene]) -> tuple[np.ndarray, np.ndarray]:
         """(T, 1 + J) margins of the wanted over the scatter, and (T,) chances to be named."""
-        state, subjects = self.asked.state, self.ledger.subjects
-        margins = _tempered(self.ledger, grams)[list(self.wanted)]
+        state, subjects = self.asked.state, self.fisher.subjects
+        margins = _tempered(self.fisher, grams)[list(self.wanted)]
         logs = [(s, f) for s, f in zip(state.scenes, state.floors, strict=True) if s.noise]
         scores = [score(Windows.of(s.measurement.track).errors(s), f) for s, f in logs]
         scenes = [*(s for s, _ in logs), *planned]
         floors = [*(f for _, f in logs), *(logs[0][1] for _ in planned)]
         scores += [max(1.0, self.usual, *scores) for _ in planned]
-        matter = relevance(scenes, floors, scores, self.ledger, grams, self.wanted)
+        matter = relevance(scenes, floors, scores, self.fisher, grams, self.wanted)
         entries = [catalogue()[subjects[i].name] for i in self.wanted]
         return margins, power(
             margins,

@@ -38,7 +38,7 @@ class Subject:
         return self.candidate.effect
 
 
-class Ledger:
+class FisherInformation:
     """Adds up what runs tell.
 
     Columns are those of the shared free quantities, then for each subject its derivatives and its

@@ -7,7 +7,7 @@ import numpy as np
 import twinmill_native as native
 from scipy.stats import norm
 
-from twinmill.experiment.information import Ledger
+from twinmill.experiment.information import FisherInformation
 from twinmill.predict.problem import Scene
 from twinmill.predict.windows import HORIZONS_S, Windows, difference, score
 
@@ -43,7 +43,7 @@ def relevance(
     scenes: list[Scene],
     floors: list[np.ndarray],
     scores: list[float],
-    ledger: Ledger,
+    fisher: FisherInformation,
     grams: np.ndarray,
     richer: dict[int, native.Model],
 ) -> Relevance:
@@ -53,16 +53,16 @@ def relevance(
         scenes: with the model that lacks the effects.
         floors: (H, 3) per scene.
         scores: that the model leaves in each scene with the effect in it.
-        ledger: of all effects.
+        fisher: of all effects.
         grams: (C, C) products of the scenes.
-        richer: by the place of an effect in the ledger the model with it.
+        richer: by the place of an effect in the fisher the model with it.
     """
     windows = [Windows.of(s.measurement.track) for s in scenes]
-    shifts = ledger.shifts(grams)
+    shifts = fisher.shifts(grams)
     added2 = []
     for place, model in richer.items():
         refitted = scenes[0].model.copy()
-        for free, change in zip(ledger.free, shifts[place], strict=True):
+        for free, change in zip(fisher.free, shifts[place], strict=True):
             value = refitted.get(free.name) + change
             refitted.set(free.name, float(np.clip(value, free.min, free.max)))
         parts = [

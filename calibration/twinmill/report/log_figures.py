@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.ticker import MaxNLocator
 
-from twinmill.data.multi_log import TWIN, Actor
+from twinmill.data.multi_log import TWIN, RecordedRobot
 from twinmill.data.track import SILENCE_S
 from twinmill.model.outlines import SEES
 from twinmill.report.canvas import legend_above
@@ -26,32 +26,32 @@ class Drawing:
     """Paints axes with the same robots, colours and time axis.
 
     Args:
-        actors: whom to show; those without poses or telemetry are left out where they have nothing.
+        robots: whom to show; those without poses or telemetry are left out where they have nothing.
     """
 
-    def __init__(self, actors: list[Actor]):
-        self._actors = actors
-        many = colormaps["turbo"](np.linspace(0.05, 0.95, len(actors)))
-        self._colors = COLORS if len(actors) <= len(COLORS) else many
-        ends = [t[-1] for a in actors for t in (a.log.pose_t_s, a.log.command_t_s) if len(t)]
+    def __init__(self, robots: list[RecordedRobot]):
+        self._robots = robots
+        many = colormaps["turbo"](np.linspace(0.05, 0.95, len(robots)))
+        self._colors = COLORS if len(robots) <= len(COLORS) else many
+        ends = [t[-1] for a in robots for t in (a.log.pose_t_s, a.log.command_t_s) if len(t)]
         self.end_s = float(max(ends))
-        self.tracked = [k for k, a in enumerate(actors) if np.count_nonzero(a.log.valid) > SMOOTH]
-        self.telling = [k for k, a in enumerate(actors) if len(a.log.detected)]
-        self.driven = [k for k, a in enumerate(actors) if len(a.log.command_t_s)]
-        self._motion = {k: _motion(actors[k]) for k in self.tracked}
+        self.tracked = [k for k, a in enumerate(robots) if np.count_nonzero(a.log.valid) > SMOOTH]
+        self.telling = [k for k, a in enumerate(robots) if len(a.log.detected)]
+        self.driven = [k for k, a in enumerate(robots) if len(a.log.command_t_s)]
+        self._motion = {k: _motion(robots[k]) for k in self.tracked}
 
     def paths(self, axes: Axes) -> None:
         """From above, dots at the ends with a line to the front; twins dashed."""
         for k in self.tracked:
-            actor, pose = self._actors[k], self._motion[k][1]
-            color, dashed = self._colors[k], actor.prefix == TWIN
+            recorded, pose = self._robots[k], self._motion[k][1]
+            color, dashed = self._colors[k], recorded.prefix == TWIN
             axes.plot(*pose[:, :2].T, color=color, lw=1, alpha=0.75, ls="--" if dashed else "-")
             x, y, theta_rad = pose[np.isfinite(pose[:, 0])][-1]
             axes.plot(x, y, "o", ms=6, color=color, zorder=3)
             front = (np.cos(theta_rad), np.sin(theta_rad))
             axes.quiver(x, y, *front, color=color, width=0.004, scale=18, zorder=3)
             words = {"xytext": (7, 5), "textcoords": "offset points", "fontsize": 8}
-            axes.annotate(actor.name, (x, y), color=color, fontweight="bold", **words)
+            axes.annotate(recorded.name, (x, y), color=color, fontweight="bold", **words)
         axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", adjustable="datalim")
         axes.xaxis.set_major_locator(MaxNLocator(8))
 
@@ -73,31 +73,31 @@ class Drawing:
                 factor * velocity[:, component],
                 color=self._colors[k],
                 lw=0.9,
-                ls="--" if self._actors[k].prefix == TWIN else "-",
-                label=self._actors[k].name,
+                ls="--" if self._robots[k].prefix == TWIN else "-",
+                label=self._robots[k].name,
             )
         axes.set(ylabel=label, xlim=(0, self.end_s))
 
     def bits(self, axes: Axes) -> None:
         """The voted bit, a row per robot: green where it sees a neighbour."""
-        rows = [self._held(k, self._actors[k].log.detected[:, None])[:, 0] for k in self.telling]
+        rows = [self._held(k, self._robots[k].log.detected[:, None])[:, 0] for k in self.telling]
         picture = np.ones((len(rows), len(rows[0]), 3))
         for bit, color in enumerate((NOT_SEEN, SEES)):
             picture[np.array(rows) == bit] = to_rgb(color)
         axes.imshow(picture, **self._strip(len(rows)))
         axes.set_title("green: sees a neighbour", loc="left", color=SEES)
-        self._name_rows(axes, [self._actors[k].name for k in self.telling])
+        self._name_rows(axes, [self._robots[k].name for k in self.telling])
 
     def commands(self, axes: Axes) -> None:
         """A row per wheel, blue back, red forward."""
         rows, names = [], []
         for k in self.driven:
-            log = self._actors[k].log
+            log = self._robots[k].log
             count = len(ROWS.get(log.command_kind, WHEELS))
             scale = 100 if log.command_kind == "duty" else 1
             rows += list(scale * self._held(k, log.command[:, :count]).T)
             names += self._row_names(k, count)
-        kinds = sorted({self._actors[k].log.command_kind for k in self.driven})
+        kinds = sorted({self._robots[k].log.command_kind for k in self.driven})
         largest = 100 if kinds == ["duty"] else float(np.nanmax(np.abs(rows)))
         image = axes.imshow(
             rows, cmap="RdBu_r", vmin=-largest, vmax=largest, **self._strip(len(rows))
@@ -107,17 +107,17 @@ class Drawing:
         axes.figure.colorbar(image, ax=axes, label=label, pad=0.01, aspect=12)
 
     def _row_names(self, k: int, count: int) -> list[str]:
-        name = self._actors[k].name
+        name = self._robots[k].name
         if len(self.driven) > 2:  # one name to a robot's rows
             return [name if row == count // 2 else "" for row in range(count)]
-        return [f"{name} {w}" for w in ROWS.get(self._actors[k].log.command_kind, WHEELS)]
+        return [f"{name} {w}" for w in ROWS.get(self._robots[k].log.command_kind, WHEELS)]
 
     def _held(self, k: int, values: np.ndarray) -> np.ndarray:
         """(T, C) of (M, C) values, each held until the next, NaN where the robot is silent."""
-        stamps_s = self._actors[k].log.command_t_s
+        stamps_s = self._robots[k].log.command_t_s
         t_s = np.arange(CELL_S / 2, max(self.end_s, CELL_S), CELL_S)
         last = np.searchsorted(stamps_s, t_s, side="right") - 1
-        silent_s = SILENCE_S if len(self._actors[k].log.detected) else np.inf
+        silent_s = SILENCE_S if len(self._robots[k].log.detected) else np.inf
         unknown = (last < 0) | (t_s - stamps_s[np.maximum(last, 0)] > silent_s)
         return np.where(unknown[:, None], np.nan, values[np.maximum(last, 0)])
 
@@ -136,10 +136,10 @@ class Drawing:
         axes.tick_params(left=False)
 
 
-def _motion(actor: Actor) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _motion(recorded: RecordedRobot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times, poses and body velocities on a regular grid; NaN where it was lost."""
-    known_s = actor.log.pose_t_s[actor.log.valid]
+    known_s = recorded.log.pose_t_s[recorded.log.valid]
     t_s = np.arange(known_s[0], max(known_s[-1], known_s[0] + SMOOTH * STEP_S), STEP_S)
-    pose, velocity = resample(actor.log, t_s)
+    pose, velocity = resample(recorded.log, t_s)
     velocity[np.isnan(pose[:, 0])] = np.nan
     return t_s, pose, velocity

@@ -42,7 +42,7 @@ def parse_target(text: str) -> Target:
 
 
 @dataclass(frozen=True)
-class Wish:
+class UpdateRequest:
     """What is to be done.
 
     Attributes:
@@ -86,18 +86,20 @@ class Outcome:
         }
 
 
-def update(target: Target, wish: Wish, fleet: Fleet, say: Callable[[str], None]) -> Outcome:
+def update(
+    target: Target, request: UpdateRequest, fleet: Fleet, say: Callable[[str], None]
+) -> Outcome:
     """Does what is wished.
 
     Args:
         target: the robot.
-        wish: what to do.
+        request: what to do.
         fleet: somebody else listens to it meanwhile.
         say: told the step that begins.
     """
     outcome = Outcome(target)
     try:
-        _update(target, wish, fleet, say, outcome)
+        _update(target, request, fleet, say, outcome)
         outcome.ok = True
     except RemoteError as error:
         outcome.kind, outcome.sentence = error.kind, str(error)
@@ -117,16 +119,20 @@ def hand_back(target: Target, ssh_config: Path | None) -> Outcome:
 
 
 def _update(
-    target: Target, wish: Wish, fleet: Fleet, say: Callable[[str], None], outcome: Outcome
+    target: Target,
+    request: UpdateRequest,
+    fleet: Fleet,
+    say: Callable[[str], None],
+    outcome: Outcome,
 ) -> None:
-    remote = Remote(target.host, wish.ssh_config)
+    remote = Remote(target.host, request.ssh_config)
     say("looking")
     found = remote.run("probe")
     outcome.before = found.get("installed", "")
-    package = _choose(wish, found, say)
-    settings = {"robot_id": str(target.robot_id), **wish.settings}
-    if wish.dry_run:
-        outcome.would = _plan(wish, package, found, settings)
+    package = _choose(request, found, say)
+    settings = {"robot_id": str(target.robot_id), **request.settings}
+    if request.dry_run:
+        outcome.would = _plan(request, package, found, settings)
         return
     if found.get("others"):
         say("taking over")
@@ -140,34 +146,36 @@ def _update(
         say("installing")
         remote.run("install", upload, timeout_s=INSTALL_S)
         say("configuring")
-        if wish.behaviors:
-            remote.run("behaviors", _upload(remote, wish.behaviors))
-        _bring_key(remote, of_robot(wish.key, target.robot_id))
+        if request.behaviors:
+            remote.run("behaviors", _upload(remote, request.behaviors))
+        _bring_key(remote, of_robot(request.key, target.robot_id))
         remote.run("configure", *(f"{key}={value}" for key, value in settings.items()))
     say("restarting")
     restarted_s = time.monotonic()
     remote.run("restart")
     say("waiting for telemetry")
     version = package.version if package else found["previous"]
-    _hear(target, version, restarted_s, wish.wait_s, fleet, outcome)
+    _hear(target, version, restarted_s, request.wait_s, fleet, outcome)
 
 
-def _choose(wish: Wish, found: dict[str, str], say: Callable[[str], None]) -> Package | None:
+def _choose(
+    request: UpdateRequest, found: dict[str, str], say: Callable[[str], None]
+) -> Package | None:
     """The package for a robot; None: the one before. All that can be refused is refused here."""
-    if found.get("others") and not wish.take_over:
+    if found.get("others") and not request.take_over:
         raise RemoteError(
             "in use",
             f"these services of it drive the robot: {found['others']}. Give --take-over to stop "
             "and disable them; --hand-back undoes that.",
         )
-    if wish.packages is None:
+    if request.packages is None:
         if "previous" not in found:
             raise RemoteError(
                 "no previous", "no package before is kept on it: give --package FILE."
             )
         return None
     try:
-        package = wish.packages.for_release(found["release"], say)
+        package = request.packages.for_release(found["release"], say)
     except ValueError as error:
         raise RemoteError("no package", str(error)) from error
     if package.architecture != found["architecture"]:
@@ -199,7 +207,7 @@ def _upload(remote: Remote, path: Path) -> str:
 
 
 def _plan(
-    wish: Wish, package: Package | None, found: dict[str, str], settings: dict[str, str]
+    request: UpdateRequest, package: Package | None, found: dict[str, str], settings: dict[str, str]
 ) -> list[str]:
     before = found.get("installed") or "nothing"
     others = [f"stop and disable {name}" for name in found.get("others", "").split()]
@@ -214,7 +222,7 @@ def _plan(
         *others,
         f"copy {package.path.name}, {package.path.stat().st_size // 1024} KB",
         f"install {package.version} over {before}",
-        *([f"put {wish.behaviors} there"] if wish.behaviors else []),
+        *([f"put {request.behaviors} there"] if request.behaviors else []),
         "bring it its key",
         f"set {changed}",
         "restart twinmill-robot.service and wait for telemetry",

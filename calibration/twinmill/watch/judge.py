@@ -9,7 +9,7 @@ import twinmill_native as native
 from twinmill.data.clock import estimate_offset
 from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement
-from twinmill.data.multi_log import Actor
+from twinmill.data.multi_log import RecordedRobot
 from twinmill.data.track import REST_S, Track, make_track
 from twinmill.fitting.floor import NoiseFloor, noise_floor
 from twinmill.fitting.opening import Opened
@@ -47,10 +47,10 @@ class Judge:
     _floor: NoiseFloor | None = None
     _offset_s: float | None = None  # of the clock, where the model predicted best last
 
-    def judge(self, actor: Actor) -> Judgement | None:
+    def judge(self, recorded: RecordedRobot) -> Judgement | None:
         """None while poses and commands are too few, or the robot stands."""
         try:
-            measurement = Measurement.live(make_track(actor.log))
+            measurement = Measurement.live(make_track(recorded.log))
             windows = _settled(measurement.track)
             drives = np.any(measurement.track.command != 0)
             if not drives or not (windows.ends[:, -1] >= 0).any():

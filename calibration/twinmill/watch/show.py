@@ -9,7 +9,7 @@ import numpy as np
 import rerun as rr
 
 from twinmill.data.log import LogError
-from twinmill.data.multi_log import everyone_in
+from twinmill.data.multi_log import multi_log_of
 from twinmill.data.stream import Batch, Window
 from twinmill.model.model_file import ModelFile
 from twinmill.model.outlines import Body
@@ -101,13 +101,13 @@ class Show:
     def _judge(self, now_s: float) -> None:
         """Robots' scores; the twins' where there is no robot."""
         try:
-            actors = everyone_in(self._window.events(), Path("the bus")).actors
+            robots = multi_log_of(self._window.events(), Path("the bus")).robots
         except LogError:
             return  # nobody has said enough
-        robots = [actor for actor in actors if not actor.prefix] or actors
-        for actor in robots:
-            judge = self._judges.setdefault(actor.name, Judge(self._model_file))
-            judgement = judge.judge(actor)
+        robots = [recorded for recorded in robots if not recorded.prefix] or robots
+        for recorded in robots:
+            judge = self._judges.setdefault(recorded.name, Judge(self._model_file))
+            judgement = judge.judge(recorded)
             if judgement is not None:
-                self.scores[actor.name] = judgement.score
-                self.shown[actor.name].judged(now_s, judgement)
+                self.scores[recorded.name] = judgement.score
+                self.shown[recorded.name].judged(now_s, judgement)

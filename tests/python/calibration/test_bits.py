@@ -209,6 +209,6 @@ def test_a_blind_camera_is_told_from_its_sisters(make_scenes):
 def test_without_raw_bits_the_vote_is_not_judged(make_scenes):
     others = set(HIDDEN) - {"view_range", "vote"}
     scenes = make_scenes(90, range_m=0.7, has_raw=False)
-    done = search_bits(scenes, model(), barred={*others, "occlusion"})
+    done = search_bits(scenes, model(), excluded={*others, "occlusion"})
     assert "vote" in dict(done.hidden)
     assert done.found[:1] == ["view_range"]

@@ -16,7 +16,7 @@ from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.experiment.design import Limits, Plan, check, design
 from twinmill.experiment.foresight import Rows, csv_text, rows_of
-from twinmill.experiment.information import CLOCKS, Ledger
+from twinmill.experiment.information import CLOCKS, FisherInformation
 from twinmill.experiment.moves import AXES, family
 from twinmill.experiment.power import ALPHA, told_apart
 from twinmill.experiment.relevance import Relevance
@@ -31,25 +31,25 @@ HALVES = slice(0, None, 2), slice(1, None, 2)
 COMMAND_S = 10 / 480  # of the robot in conftest.py
 
 
-def ledger_of(widths: list[float], sizes: list[int]) -> Ledger:
+def information_of(widths: list[float], sizes: list[int]) -> FisherInformation:
     """Free quantities with priors of these widths, and effects with so many parameters."""
     free = [Parameter("x", "1", 0, -1, 1, 0, width, 0.1) for width in widths]
     subjects = [
         SimpleNamespace(name=str(k), candidate=SimpleNamespace(strength=np.ones(size)))
         for k, size in enumerate(sizes)
     ]
-    return Ledger(free, subjects)
+    return FisherInformation(free, subjects)
 
 
 def test_a_margin_is_what_least_squares_leaves_of_the_trace():
     random = np.random.default_rng(1)
-    ledger = ledger_of([0.5, 2.0], [1, 3, 2])
-    columns = random.normal(size=(200, ledger.shared + CLOCKS))
-    margins = ledger.margins(columns.T @ columns)
-    others = columns[:, [*range(2), ledger.shared, ledger.shared + 1]]
+    fisher = information_of([0.5, 2.0], [1, 3, 2])
+    columns = random.normal(size=(200, fisher.shared + CLOCKS))
+    margins = fisher.margins(columns.T @ columns)
+    others = columns[:, [*range(2), fisher.shared, fisher.shared + 1]]
     others = np.vstack([others, np.diag([2.0, 0.5, 0, 0])])  # 1 / width: a weak prior's rows
-    for i, step in enumerate(ledger.steps):
-        for j, place in enumerate(ledger.places):
+    for i, step in enumerate(fisher.steps):
+        for j, place in enumerate(fisher.places):
             rival = np.vstack([columns[:, place], np.zeros((4, len(place)))])
             prior = np.hstack([np.zeros((len(place), 4)), 0.5 * np.eye(len(place))])
             all_rows = np.vstack([np.hstack([others, rival]), prior])
@@ -61,11 +61,11 @@ def test_a_margin_is_what_least_squares_leaves_of_the_trace():
 
 def test_the_base_shifts_as_least_squares_fits_it_to_the_trace():
     random = np.random.default_rng(5)
-    ledger = ledger_of([0.5, 2.0], [1, 3])
-    columns = random.normal(size=(300, ledger.shared + CLOCKS))
-    free = columns[:, [0, 1, ledger.shared, ledger.shared + 1]]
+    fisher = information_of([0.5, 2.0], [1, 3])
+    columns = random.normal(size=(300, fisher.shared + CLOCKS))
+    free = columns[:, [0, 1, fisher.shared, fisher.shared + 1]]
     free = np.vstack([free, np.diag([2.0, 0.5, 0, 0])])
-    for step, shift in zip(ledger.steps, ledger.shifts(columns.T @ columns), strict=True):
+    for step, shift in zip(fisher.steps, fisher.shifts(columns.T @ columns), strict=True):
         left = np.append(-columns[:, step], np.zeros(4))
         assert shift == pytest.approx(np.linalg.lstsq(free, left)[0][:2], rel=1e-5)
 
@@ -83,10 +83,10 @@ def test_promised_chance_to_matter_is_that_of_simulated_scores(added):
 
 def test_two_runs_tell_more_than_either():
     random = np.random.default_rng(2)
-    ledger = ledger_of([1.0], [2, 1])
-    runs = random.normal(size=(2, 50, ledger.shared + CLOCKS))
+    fisher = information_of([1.0], [2, 1])
+    runs = random.normal(size=(2, 50, fisher.shared + CLOCKS))
     grams = np.einsum("rkc,rkd->rcd", runs, runs)
-    alone, together = ledger.margins(grams), ledger.margins(grams.sum(axis=0))
+    alone, together = fisher.margins(grams), fisher.margins(grams.sum(axis=0))
     finite = np.isfinite(together)
     assert np.all(together[finite] >= alone.sum(axis=0)[finite] - 1e-9)
 

@@ -12,7 +12,7 @@ from twinmill.model.parameters import Estimate, catalogue, effect_names
 from twinmill.predict.detections import BitScene
 
 STAGES = ("view", "decide")
-MOST_FRAMES = 10000  # a fit takes every so-manieth frame beyond
+MOST_FRAMES = 10000  # a fit takes every Nth frame beyond
 STRENGTHS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0)  # times the usual one: where a fit may begin
 FAR = (5.0, 10.0)  # more of them where only one quantity is looked for
 MOST_EXTRA = 20  # frames of a vote beyond the model's
@@ -82,7 +82,7 @@ class Likelihood:
         return self.model
 
     def frames(self, values: np.ndarray, thin: bool = False) -> list[np.ndarray]:
-        """(K,) log likelihoods per robot; of every so-manieth frame if `thin`."""
+        """(K,) log likelihoods per robot; of every Nth frame if `thin`."""
         model = self.set(values)
         return [s.likelihood(model, self.thin if thin else slice(None)) for s in self.scenes]
 

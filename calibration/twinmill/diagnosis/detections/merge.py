@@ -21,7 +21,7 @@ def with_bits(
     scenes: list,
     model_file: ModelFile,
     say: Callable[[str], None],
-    barred: Collection[str] = (),
+    excluded: Collection[str] = (),
 ):
     """The diagnosis with the camera's effects in it; unchanged if no robot reported bits.
 
@@ -30,7 +30,7 @@ def with_bits(
         scenes: measurements with their clocks.
         model_file: the model as given.
         say: told in words what is being done.
-        barred: effects that are not to be thought of.
+        excluded: effects that are not to be thought of.
     """
     seen = bit_scenes(scenes)
     if not seen:
@@ -39,8 +39,8 @@ def with_bits(
     bits = compare_bits(seen, model_file.model)
     out = odd_cameras(seen, model_file.model)
     alike, odd = ([s for s in seen if (s.robot_id in out) == o] for o in (False, True))
-    done = search_bits(alike, model_file.model, say, barred)
-    off = judge_cameras(alike, odd, done.rounds[-1].before.model, say, barred)
+    done = search_bits(alike, model_file.model, say, excluded)
+    off = judge_cameras(alike, odd, done.rounds[-1].before.model, say, excluded)
     group = max((r.group or 0 for r in diagnosis.ranking), default=0)
     ranking = rank_bits(done, group)
     tied = any(r.tied for r in done.rounds)

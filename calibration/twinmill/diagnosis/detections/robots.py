@@ -59,7 +59,7 @@ def judge_cameras(
     odd: list[BitScene],
     model: native.Model,
     say: Callable[[str], None],
-    barred: Collection[str] = (),
+    excluded: Collection[str] = (),
 ) -> list[Outlier]:
     """Says of each odd camera what is different, with the model of the others held.
 
@@ -68,7 +68,7 @@ def judge_cameras(
         odd: frames of the odd ones.
         model: with all effects that were found for the others.
         say: told in words what is being done.
-        barred: effects that are not to be thought of.
+        excluded: effects that are not to be thought of.
     """
     away = camera_outliers([*alike, *odd], model)
     others = float(np.sqrt(np.mean(np.square(_scores(alike, model)))))
@@ -78,19 +78,19 @@ def judge_cameras(
             continue
         say(f"the camera of robot {robot_id} differs: looking for what it is")
         own = [s for s in odd if s.robot_id == robot_id]
-        off.append(_judge_camera(own, model, barred, away, others))
+        off.append(_judge_camera(own, model, excluded, away, others))
     return off
 
 
 def _judge_camera(
     own: list[BitScene],
     model: native.Model,
-    barred: Collection[str],
+    excluded: Collection[str],
     away: dict[int, float],
     others: float,
 ) -> Outlier:
     robot_id, count = own[0].robot_id, len(away)
-    done = search_bits(own, model.for_robot(robot_id), barred=barred)
+    done = search_bits(own, model.for_robot(robot_id), excluded=excluded)
     before, after = done.rounds[0].before, done.rounds[-1].before
     first = done.rounds[0].accepted
     p_value = (

@@ -94,7 +94,7 @@ def search_bits(
     scenes: list[BitScene],
     model: native.Model,
     say: Callable[[str], None] = lambda _: None,
-    barred: Collection[str] = (),
+    excluded: Collection[str] = (),
 ) -> BitSearch:
     """Adds camera effects one by one while they help.
 
@@ -102,9 +102,9 @@ def search_bits(
         scenes: frames with poses; at least one.
         model: of all robots.
         say: told in words what is being done.
-        barred: effects that are not to be thought of.
+        excluded: effects that are not to be thought of.
     """
-    names = [n for n in camera_effects(model) if n not in barred]
+    names = [n for n in camera_effects(model) if n not in excluded]
     raw = all(s.frames.has_raw for s in scenes)
     if not raw:
         names = [n for n in names if n != "vote"]
@@ -120,7 +120,7 @@ def search_bits(
         if len(rounds) == MOST:
             rounds.append(Round(state, [], None, []))
             break
-    if not raw and "vote" not in barred:
+    if not raw and "vote" not in excluded:
         hidden.append(("vote", "the log has no raw bits, only those after the vote"))
     likelihood = Likelihood(scenes, state.model, model_knobs(state.model))
     return BitSearch(rounds, names, hidden, tuple(estimates(likelihood, state.values)))

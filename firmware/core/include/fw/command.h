@@ -58,7 +58,7 @@ struct fw_command
     int32_t link_timeout_ms;
 };
 
-struct fw_inbox
+struct fw_command_filter
 {
     // Of this run of the robot's program; 0: not set, nothing signed is obeyed.
     int64_t session;
@@ -91,11 +91,12 @@ enum fw_verdict
 
 // @param now_utime_us by the robot's clock. @param session_us since the session began.
 // @param running scripts are chosen by robots that stand.
-enum fw_verdict fw_command_judge(const struct fw_inbox *inbox, const struct fw_command *command,
-                                 int64_t now_utime_us, int64_t session_us, bool running);
+enum fw_verdict fw_command_judge(const struct fw_command_filter *filter,
+                                 const struct fw_command *command, int64_t now_utime_us,
+                                 int64_t session_us, bool running);
 
 // To be called for every command that was obeyed. @param session_us as above.
-void fw_command_obeyed(struct fw_inbox *inbox, const struct fw_command *command,
+void fw_command_obeyed(struct fw_command_filter *filter, const struct fw_command *command,
                        int64_t session_us);
 
 // Why a command is refused, as a reason for ack_t; empty if it is not. Never NULL.

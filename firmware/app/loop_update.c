@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "loop_tend.h"
+#include "loop_update.h"
 
 #define BATTERY_PERIOD_US 1000000
 #define BUZZER_HALF_PERIOD_US 500000
@@ -26,7 +26,7 @@ static void press_button(struct loop *loop, bool pressed)
     loop->button_down = down;
 }
 
-void loop_tend_panel(struct loop *loop, bool detected)
+void loop_update_panel(struct loop *loop, bool detected)
 {
     const int64_t now_us = loop_now_us(loop);
     if (loop->lost[LOOP_PANEL] != FW_OK && now_us < loop->retry_us[LOOP_PANEL])
@@ -64,7 +64,7 @@ static void judge_battery(struct loop *loop)
     loop->battery_low = loop->battery_low || low;
 }
 
-void loop_tend_battery(struct loop *loop)
+void loop_update_battery(struct loop *loop)
 {
     const int64_t now_us = loop_now_us(loop);
     if (now_us < loop->battery_next_us)

@@ -27,7 +27,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Contest:
+class Hypotheses:
     """What is in question.
 
     Attributes:
@@ -48,7 +48,7 @@ class Contest:
     fitted: dict[str, dict[str, float]]
 
 
-def contest(diagnosis: Diagnosis, base: list[Parameter]) -> Contest:
+def hypotheses_of(diagnosis: Diagnosis, base: list[Parameter]) -> Hypotheses:
     """What a diagnosis leaves open; `base`: of the model, also what these logs do not tell."""
     ranking = diagnosis.ranking
     top = next((r.group for r in ranking if r.group is not None), None)
@@ -58,11 +58,11 @@ def contest(diagnosis: Diagnosis, base: list[Parameter]) -> Contest:
     closest = [r.effect for r in ranking[:2]]
     state = _without(diagnosis, [*alike, *named], base)
     told = [r for r in ranking if r.effect in (*alike, *named)]
-    return Contest(alike, named, hidden, closest, state, _values(told))
+    return Hypotheses(alike, named, hidden, closest, state, _values(told))
 
 
 def question(
-    asked: Contest, known: list[Subject], margins: np.ndarray, least_chi2: float
+    asked: Hypotheses, known: list[Subject], margins: np.ndarray, least_chi2: float
 ) -> tuple[list[str], str]:
     """Names of the effects in question, and a sentence.
 
@@ -95,7 +95,7 @@ def question(
 
 
 def subjects(
-    scenes: list[Scene], planned: Scene, state: State, asked: Contest, usual: float
+    scenes: list[Scene], planned: Scene, state: State, asked: Hypotheses, usual: float
 ) -> list[Subject]:
     """Every effect that the logs or the planned run show, at its fitted or its usual strength.
 
