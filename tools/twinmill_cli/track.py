@@ -163,7 +163,7 @@ def _track(
     if orders:
         begins_s = align(paths, orders)
         paths = on_clock(paths, begins_s)
-    quality = judge(paths, found.views[0], size_m)
+    quality = judge(paths, found.views[0], tags)
     write_poses(out, paths, height_m, force)
     strangers = sorted(found.numbers & set(ROBOTS) - {p.robot_id for p in paths})
     data = {

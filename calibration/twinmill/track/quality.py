@@ -6,13 +6,14 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from twinmill.track.floor import View
-from twinmill.track.paths import RobotPath
+from twinmill.track.paths import RobotPath, Tags
 
 THIRD = np.array([-1.0, 3.0, -3.0, 1.0])  # takes out a place, a speed and an acceleration
 TO_SIGMA = 1.4826 / np.sqrt(np.sum(THIRD**2))  # from the median size of such a difference
 EVEN = 0.3  # frames are evenly spaced if their steps differ by less than this share
 CORNERS_PX = 0.5  # a sharp tag's miss by 0.1 to 0.3
 SPEED_MPS, WINDOW_S = 0.3, 0.5
+GRID, RIM = 9, 0.05  # places in the picture at which noise is told, within this share of its edge
 LEVER_M = 0.126  # half wheelbase and half track of a TurboPi
 
 
@@ -51,6 +52,8 @@ class Quality:
         rate_hz: of the frames, the median.
         floor_error_px: RMS miss of the floor's points.
         camera_height_m, camera_tilt_rad: as found from them.
+        position_over_floor_m, heading_over_floor_rad: least and largest standard deviation that the
+            corners' misses make, over all that the camera sees.
         weakest_wheel: smallest loss of one wheel's speed that one window shows, as a share.
     """
 
@@ -59,6 +62,8 @@ class Quality:
     floor_error_px: float
     camera_height_m: float
     camera_tilt_rad: float
+    position_over_floor_m: tuple[float, float]
+    heading_over_floor_rad: tuple[float, float]
     weakest_wheel: float
 
     def to_json(self) -> dict:
@@ -81,10 +86,14 @@ class Quality:
         """What it means for a diagnosis."""
         if not np.isfinite(self.weakest_wheel):
             return "Too few frames follow one another to tell how noisy the poses are."
+        near_m, far_m = (1e3 * m for m in self.position_over_floor_m)
+        near_rad, far_rad = np.degrees(self.heading_over_floor_rad)
         words = (
-            f"One pair of poses {WINDOW_S:g} s apart shows a wheel that is weaker by "
-            f"{100 * self.weakest_wheel:.1f} % (TurboPi's wheels at {SPEED_MPS:g} m/s, three "
-            "standard errors of the heading); a log has hundreds of pairs."
+            f"Over the floor noise of {near_m:.2f} to {far_m:.2f} mm and {near_rad:.2f} to "
+            f"{far_rad:.2f}° is to be expected. One pair of poses {WINDOW_S:g} s apart shows a "
+            f"wheel that is weaker by {100 * self.weakest_wheel:.1f} % (TurboPi's wheels at "
+            f"{SPEED_MPS:g} m/s, three standard errors of the heading); a log has hundreds of "
+            "pairs."
         )
         lost = max(robot.lost_share for robot in self.robots)
         if lost > 0.2:
@@ -94,13 +103,17 @@ class Quality:
         return words
 
 
-def judge(paths: list[RobotPath], view: View, size_m: float) -> Quality:
+def judge(paths: list[RobotPath], view: View, tags: Tags) -> Quality:
     """Noise by third differences of neighbouring frames: a smooth drive has next to none.
 
     What stays the same from frame to frame (floor points measured wrongly, a poor lens) is not in
     it; the floor's error tells of that.
     """
-    robots = [_robot(path, size_m) for path in paths]
+    robots = [_robot(path, tags.size_m) for path in paths]
+    seen_px = np.concatenate([path.error_px[path.valid] for path in paths])
+    off_px = _of_one(float(np.sqrt(np.mean(seen_px**2)))) if len(seen_px) else np.nan
+    scale = _metres_per_px(view, tags.height_m)
+    off_m = [off_px * float(end(scale)) for end in (np.nanmin, np.nanmax)]
     # Corners that are off alike for a while are no noise from frame to frame, but an error.
     heading = np.array([max(r.corner_heading_rad, r.heading_noise_rad) for r in robots])
     noise_rad = float(np.nanmedian(heading)) if np.isfinite(heading).any() else np.nan
@@ -112,6 +125,8 @@ def judge(paths: list[RobotPath], view: View, size_m: float) -> Quality:
         view.error_px,
         float(view.position_m[2]),
         view.tilt_rad,
+        tuple(_of_place(m) for m in off_m),
+        tuple(_of_heading(m, tags.size_m) for m in off_m),
         3 * np.sqrt(2) * noise_rad / turn_rad,
     )
 
@@ -122,9 +137,8 @@ def _robot(path: RobotPath, size_m: float) -> RobotQuality:
     heading = path.pose[:, 2].copy()
     heading[valid] = np.unwrap(heading[valid])
     rms_px = float(np.sqrt(np.mean(path.error_px[valid] ** 2))) if valid.any() else np.nan
-    # Eight coordinates less three that were fitted make the misses; four corners make the place.
     scale = np.median(path.scale_px_per_m[valid]) if valid.any() else np.nan
-    one_m = rms_px / np.sqrt(2) * np.sqrt(8 / 5) / scale
+    one_m = _of_one(rms_px) / scale
     return RobotQuality(
         path.robot_id,
         len(valid),
@@ -134,9 +148,39 @@ def _robot(path: RobotPath, size_m: float) -> RobotQuality:
         rms_px,
         float(np.sqrt((x**2 + y**2) / 2)),
         _noise(path.t_s, heading),
-        float(one_m / 2),
-        float(one_m / (np.sqrt(2) * size_m)),
+        _of_place(one_m),
+        _of_heading(one_m, size_m),
     )
+
+
+def _of_one(rms_px: float) -> float:
+    """Standard deviation of one coordinate of a corner from the RMS miss of corners.
+
+    Eight coordinates less three that were fitted make the misses.
+    """
+    return rms_px / np.sqrt(2) * np.sqrt(8 / 5)
+
+
+def _of_place(one_m: float) -> float:
+    """Standard deviation of a tag's place from that of a corner's coordinate: the mean of four."""
+    return float(one_m / 2)
+
+
+def _of_heading(one_m: float, size_m: float) -> float:
+    """That of its heading, rad: four corners, each half a diagonal away."""
+    return float(one_m / (np.sqrt(2) * size_m))
+
+
+def _metres_per_px(view: View, height_m: float) -> np.ndarray:
+    """(GRID^2,) over the picture, on the plane of the tags; NaN where it does not see that."""
+    share = np.linspace(RIM, 1 - RIM, GRID)
+    u, v = np.meshgrid(*(share * side for side in view.camera.size_px))
+    pixels = np.column_stack([u.ravel(), v.ravel()])
+    here, right, below = (
+        view.on_plane(pixels + step, height_m) for step in ([0, 0], [1, 0], [0, 1])
+    )
+    (a, b), (c, d) = (right - here).T, (below - here).T
+    return np.sqrt(np.abs(a * d - b * c))
 
 
 def _noise(t_s: np.ndarray, values: np.ndarray) -> float:

@@ -252,8 +252,27 @@ def test_a_wrong_height_or_lens_bends_corners_and_is_warned_of(height_m, bend, w
     camera = replace(true.camera, distortion=bend * true.camera.distortion)
     view = replace(true, camera=camera)
     seen = Sightings(np.arange(20), np.full(20, 1), corners_of(tag, t_s))
-    quality = judge(follow(t_s, seen, view, Tags(0.2, height_m)), view, 0.2)
+    tags = Tags(0.2, height_m)
+    quality = judge(follow(t_s, seen, view, tags), view, tags)
     assert [w.startswith("the tags' corners miss by") for w in quality.warnings] == [True] * warns
+
+
+@pytest.mark.parametrize("place_m", [(0.1, -0.3), (1.6, 0.7)], ids=["below the camera", "far"])
+def test_noise_over_the_floor_is_that_of_tags_put_there(place_m):
+    """Corners off by 0.3 px at random; the tag stands, so that all that moves is noise."""
+    t_s, tag = np.arange(600) / 30, Tag(1, still(*place_m, 0.7), 0.1)
+    corners = corners_of(tag, t_s) + np.random.default_rng(3).normal(0, 0.3, (600, 4, 2))
+    seen, tags = Sightings(np.arange(600), np.full(600, 1), corners), Tags(0.1, HEIGHT_M)
+    (path,) = follow(t_s, seen, view_of(LENS), tags)
+    quality = judge([path], view_of(LENS), tags)
+    place_m, heading_rad = path.pose[:, :2].std(axis=0), path.pose[:, 2].std()
+    (near_m, far_m), (near_rad, far_rad) = (
+        quality.position_over_floor_m, quality.heading_over_floor_rad,
+    )  # fmt: skip
+    assert 0.9 * near_m < np.sqrt(np.mean(place_m**2)) < 1.1 * far_m < 2.2 * near_m
+    assert 0.9 * near_rad < heading_rad < 1.1 * far_rad < 2.2 * near_rad
+    best = quality.robots[0].corner_position_m
+    assert best == pytest.approx(np.sqrt(np.mean(place_m**2)), rel=0.15)
 
 
 def test_two_robots_of_one_number_are_refused():
