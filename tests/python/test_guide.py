@@ -137,6 +137,8 @@ def test_what_is_missing_or_does_not_go_together_is_one_sentence(folder):
         run(["guide", "--json", "--robot", "other"])
     with pytest.raises(ValueError, match=r"--drive duty: .*twist"):
         run(["guide", *told("ros", "ros", "duty", "mecanum", "one")])
+    with pytest.raises(ValueError, match=r"--poses vicon: .*live"):
+        run(["guide", *told("turbopi", "vicon", "duty", "mecanum", "two")])
     assert list(folder.iterdir()) == []
     (folder / "plan").mkdir()
     with pytest.raises(ValueError, match="plan: exists"):
