@@ -184,8 +184,8 @@ def _have(given: dict[str, StrEnum | None], number: int, asks: bool) -> Have:
             raise ValueError(f"--{name} {known[name]}: what else was said makes it {answer}.")
     if (known["robot"], known["poses"]) == (Robot.TURBOPI, Poses.VICON):
         raise ValueError(
-            "--poses vicon: our robot's drives are recorded with poses live on the bus, and of Vicon "
-            "exports are read alone; bring its poses to ROS or to a table (--poses ros, csv)."
+            "--poses vicon: our robot's drives are recorded with poses live on the bus, and of "
+            "Vicon exports are read alone; bring its poses to ROS or to a table (--poses ros, csv)."
         )
     return Have(**{name: answer.value for name, answer in known.items()}, number=number)
 
