@@ -72,7 +72,7 @@ class _Row:
                     "dense borderless hide-bottom-space"
                 )
                 self.number.on("focus", lambda: self._type(True))
-                self.number.on("keydown.enter", self._typed).on("blur", self._left)
+                self.number.on("keydown.enter", self._left).on("blur", self._left)
                 ui.label("" if knob.unit == "1" else knob.unit).classes("unit")
             with ui.element("div").classes("reach"):
                 self.interval = ui.element("div").classes("interval")

@@ -8,7 +8,7 @@ from nicegui import ui
 
 from twinmill.workbench.hands import Hands
 from twinmill.workbench.tree import Tried
-from twinmill.workbench.words import scored, tone
+from twinmill.workbench.words import check_free, scored, tone
 
 INDENT_PX = 14
 
@@ -72,15 +72,17 @@ class ModelsPanel:
             )
 
     def _save(self) -> None:
-        if not self.path.value:
+        name = (self.path.value or "").strip()
+        if not name:
             ui.notify("Name a file to save the model as.", type="warning")
             return
         try:
-            self.bench.session.save(Path(self.path.value))
+            check_free(Path(name))
+            self.bench.session.save(Path(name))
         except ValueError as error:
             ui.notify(str(error), type="negative")
             return
-        ui.notify(f"Written: {self.path.value}", type="positive")
+        ui.notify(f"Written: {name}", type="positive")
 
 
 def _ordered(tried: list[Tried], current: int) -> list[tuple[Tried, int]]:

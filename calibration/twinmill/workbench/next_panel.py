@@ -9,6 +9,7 @@ from nicegui import ui
 from twinmill.experiment.power import percent
 from twinmill.files import replacing
 from twinmill.workbench.hands import Hands
+from twinmill.workbench.words import check_free
 
 FLOOR_PX = 300  # the longer side of the floor, as drawn
 
@@ -112,8 +113,10 @@ def _number(label: str, value: float, name: str) -> ui.number:
 
 
 def _written(plan: dict, path: str) -> None:
+    path = (path or "").strip() or "script.csv"
     try:
-        with replacing(Path(path or "script.csv"), force=False) as temporary:
+        check_free(Path(path))
+        with replacing(Path(path), force=False) as temporary:
             temporary.write_text(plan["script"])
     except ValueError as error:
         ui.notify(str(error), type="negative")

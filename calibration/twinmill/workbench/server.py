@@ -2,7 +2,6 @@
 """Serves the workbench to browsers of this machine alone; its address holds a secret."""
 
 import asyncio
-import json
 import secrets
 import socket
 import sys
@@ -13,6 +12,7 @@ from pathlib import Path
 
 from fastapi import Request
 from nicegui import app, ui
+from pydantic import BaseModel, FiniteFloat, PositiveFloat, ValidationError
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.responses import PlainTextResponse, Response
 
@@ -27,6 +27,15 @@ SWITCH_S = 5e-4  # threads hand over so often: pages do not wait for the work of
 LISTEN_S = 0.02  # between looks whether the server listens
 TOLD_S = 5.0  # for a page to say why the server ends
 SENT_S = 0.5  # for what it says to be on its way
+
+
+class View(BaseModel):
+    """What a page tells of its stage: cursor, stretch and horizon in s, rate of play."""
+
+    t: FiniteFloat = 0.0
+    span: tuple[FiniteFloat, FiniteFloat] = (0.0, 0.0)
+    ahead_s: PositiveFloat = 2.0
+    rate: PositiveFloat = 1.0
 
 
 def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> None:
@@ -158,9 +167,11 @@ def _add_data(bench: Bench) -> None:
     async def view(request: Request, token: str = "") -> Response:
         if not _right(bench, token):
             return _refused()
-        known = ("t", "span", "ahead_s", "rate")
-        told = json.loads(await request.body())
-        bench.view.update({k: told[k] for k in known if k in told})
+        try:
+            told = View.model_validate_json(await request.body())
+        except ValidationError:
+            return PlainTextResponse("This is no view of the stage.", status_code=400)
+        bench.view.update(told.model_dump(exclude_unset=True))
         return Response(status_code=204)
 
 

@@ -1,9 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers and their tones as the panels say them."""
+"""Numbers, their tones and refusals as the panels say them."""
 
 import math
+from pathlib import Path
 
 from twinmill.fitting.compare import GOOD, MISSING
+
+
+def check_free(path: Path) -> None:
+    """Raises ValueError if a file is there, in words that do for a page: it has no --force."""
+    if path.is_file():
+        raise ValueError(f"{path}: exists; choose another name.")
 
 
 def scored(score: float | None) -> str:
