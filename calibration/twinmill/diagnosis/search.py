@@ -43,7 +43,7 @@ class Settings:
         worth: least share of the first excess that one takes ...
         enough: ... or this fall of the squared score, if that is less.
         below: the same share once the score is below 1, where differences are hardly news ...
-        halves: ... or this share of the squared score, if that is less.
+        least_below, most_below: ... but so much of the squared score at least, and at most.
         fitted: so many candidates are fitted in each round.
         pairs: so many pairs are tried where no single candidate is accepted.
         most: rounds.
@@ -64,7 +64,8 @@ class Settings:
     worth: float = 0.01
     enough: float = 0.1
     below: float = 0.1
-    halves: float = 0.5
+    least_below: float = 0.2
+    most_below: float = 0.5
     fitted: int = 7
     pairs: int = 3
     most: int = 6
@@ -319,7 +320,8 @@ def _best(
 def _least_fall(score: float, first_excess: float, settings: Settings) -> float:
     """Least fall of the squared score that matters."""
     if score < 1.0:
-        return min(settings.below * first_excess, settings.halves * score**2)
+        least, most = settings.least_below * score**2, settings.most_below * score**2
+        return float(np.clip(settings.below * first_excess, least, most))
     return min(settings.worth * first_excess, settings.enough)
 
 
