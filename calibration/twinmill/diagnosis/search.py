@@ -15,8 +15,10 @@ import twinmill_native as native
 
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
+    LAG,
     MOTION_STAGES,
     Parameter,
+    base_lag_is_told,
     base_parameters,
     catalogue,
     catalogue_of,
@@ -338,8 +340,9 @@ def _with_best_lateness(
     gone = []
     for name in [n for n in found if _has(n, "lateness")]:
         base = without(last, name)
-        others = [n for n in candidates(last.state) if _has(n, "lateness")]
-        trials = [attempt(base, (n,)) for n in others] if base else []
+        others = candidates(base.state) if base else []
+        others = [n for n in others if _has(n, "lateness") and n != name]
+        trials = [attempt(base, (n,)) for n in others]
         trials = [t for t in trials if t.fit.held_cost < last.fit.held_cost + settings.tie]
         if not trials:
             continue
@@ -395,6 +398,8 @@ def candidates(state: State) -> list[str]:
     """
     model = state.model
     moved = {p.name.split(".")[0].split("#")[0] for p in state.free}
+    if model.get(LAG) == 0 and base_lag_is_told(model):
+        moved.add("second_order_lag")  # without a first one it is motor_lag
     names = []
     if any(n not in {p.name for p in state.free} for n in state.base):
         names.append(REFIT)
