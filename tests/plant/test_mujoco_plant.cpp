@@ -4,6 +4,7 @@
 #include "plant_mujoco/mujoco_plant.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstring>
@@ -338,7 +339,8 @@ TEST(MujocoPlant, MjcfAgreesWithTheDefaultModel)
 // What the constructor says of an MJCF file with this text.
 std::string Complaint(const std::string &text)
 {
-    const auto path = std::filesystem::path(testing::TempDir()) / "complaint.xml";
+    const auto path = std::filesystem::path(testing::TempDir()) /
+                      ("complaint_" + std::to_string(getpid()) + ".xml");
     std::ofstream(path) << text;
     try
     {

@@ -3,6 +3,7 @@
 // built for reference: ten free rollers with bearings, in stock MuJoCo. Motors are weak here
 // (stall torque over free speed of a gear motor), so that what the rollers lose shows as speed.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
@@ -68,7 +69,7 @@ std::array<double, 3> DriveRollers(const Twist &twist)
 std::string WeakRobot()
 {
     const fs::path from = fs::path(FindModelFile("turbopi.xml")).parent_path();
-    const fs::path to = fs::path(testing::TempDir()) / "weak_turbopi";
+    const fs::path to = fs::path(testing::TempDir()) / ("weak_turbopi_" + std::to_string(getpid()));
     fs::create_directories(to);
     for (const char *name : {"turbopi.xml", "turbopi_chassis.xml", "turbopi_parts.xml"})
     {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // twin/swarm: starts, robots, species, script, bodies
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
@@ -33,7 +34,7 @@ std::string ErrorOf(const std::function<void()> &action)
 
 std::string WriteScript(const std::string &text)
 {
-    const std::string path = ::testing::TempDir() + "script.csv";
+    const std::string path = ::testing::TempDir() + "script_" + std::to_string(getpid()) + ".csv";
     std::ofstream(path) << text;
     return path;
 }
