@@ -329,8 +329,7 @@ def _backlash(rim, v, s):
     low = np.zeros(rim.shape[1])  # of the play: the motor's way is within gap_m above it
     way = np.cumsum(rim, axis=0) * STEP_S
     for k in range(len(rim)):
-        moved = np.maximum(low, way[k] - gap_m)
-        moved = np.minimum(moved, way[k])
+        moved = np.clip(low, way[k] - gap_m, way[k])
         out[k], low = (moved - low) / STEP_S, moved
     return out
 

@@ -151,33 +151,35 @@ def with_stale_numbers(
         lag_std_s: how well the model's lag was known.
         stds: how well other logs told the numbers of the model's effects, by name.
     """
-    stale, rest, parameters = None, [], []
-    for f in found:
-        if f.effect == REFIT:
-            stale = f
-        elif f.effect == MOTOR_LAG and not f.group and _within(f, lag_std_s):
-            extra = f.parameters[0]
-            parameters.append((replace(extra, name=LAG, value=model.get(LAG) + extra.value), f))
-            continue
-        elif f.again and all(_is_error(e, model, stds) for e in f.parameters):
-            parameters += [(e, f) for e in f.parameters]
-            continue
-        rest.append(f)
-    if not parameters:
+    gone: list[Finding] = []
+    own: list[Estimate] = []
+    for finding in found:
+        numbers = _stale_numbers(finding, model, lag_std_s, stds)
+        if numbers:
+            gone.append(finding)
+            own += numbers
+    if not gone:
         return list(found)
-    own, gone = [e for e, _ in parameters], {id(f): f for _, f in parameters}
-    share = sum(f.share for f in gone.values())
+    share = sum(f.share for f in gone)
+    stale = next((f for f in found if f.effect == REFIT), None)
     if stale is None:
-        place = next(k for k, f in enumerate(found) if id(f) in gone)
-        return [*rest[:place], Finding(REFIT, None, own, share, "sure"), *rest[place:]]
-    whole = replace(stale, parameters=[*stale.parameters, *own], share=stale.share + share)
-    return [whole if f is stale else f for f in rest]
+        whole, place = Finding(REFIT, None, own, share, "sure"), gone[0]
+    else:
+        whole = replace(stale, parameters=[*stale.parameters, *own], share=stale.share + share)
+        place = stale
+    return [whole if f is place else f for f in found if f is place or f not in gone]
 
 
-def _within(lag: Finding, std_s: float) -> bool:
-    """Whether a lag is within the error of the one that the model had."""
-    extra = lag.parameters[0]
-    return std_s > 0 and abs(extra.value) <= WITHIN * np.hypot(extra.std, std_s)
+def _stale_numbers(
+    finding: Finding, model: native.Model, lag_std_s: float, stds: Mapping[str, float]
+) -> list[Estimate]:
+    """What a finding changes, if the model may well have all of it by its own error; else none."""
+    if finding.effect == MOTOR_LAG and not finding.group and lag_std_s > 0:
+        extra = finding.parameters[0]
+        if abs(extra.value) <= WITHIN * np.hypot(extra.std, lag_std_s):
+            return [replace(extra, name=LAG, value=model.get(LAG) + extra.value)]
+    known = finding.again and all(_is_error(e, model, stds) for e in finding.parameters)
+    return finding.parameters if known else []
 
 
 def _is_error(own: Estimate, model: native.Model, stds: Mapping[str, float]) -> bool:

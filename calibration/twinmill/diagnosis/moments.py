@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
+from twinmill.fitting.floor import is_far
 from twinmill.fitting.opening import Opened
 from twinmill.predict.datasets import displacement
 from twinmill.predict.windows import HORIZONS_S
@@ -62,8 +63,8 @@ def moments_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> list
 def _of_log(own: Opened, model: native.Model) -> list[Moment]:
     data = own.data
     missed = np.flatnonzero(
-        _is_far(data.errors(model), data.floor)
-        & (_is_far(own.floor.across, data.floor) | ~own.floor.keep)
+        is_far(data.errors(model), data.floor, FAR)
+        & (is_far(own.floor.across, data.floor, FAR) | ~own.floor.keep)
     )
     if not len(missed):
         return []
@@ -82,14 +83,6 @@ def _of_log(own: Opened, model: native.Model) -> list[Moment]:
         )
         for cluster in clusters
     ]
-
-
-def _is_far(errors: np.ndarray, floor: np.ndarray) -> np.ndarray:
-    """(W,) windows whose squared error is far beyond the median."""
-    judged = np.isfinite(floor)
-    square = np.ma.masked_invalid(errors[:, judged] / floor[judged]) ** 2
-    mean = square.mean(axis=1).filled(np.nan)
-    return mean > FAR * np.nanmedian(mean)
 
 
 def _way(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:

@@ -102,12 +102,16 @@ def _of_way(own: Opened, errors: np.ndarray) -> _Ways:
     _, stretch = np.unique(t_s // STRETCH_S, return_inverse=True)
     return _Ways(
         (pose[starts, :2] + pose[ends, :2]) / 2,
-        along / max(float(np.sqrt(np.mean(along**2))), 1e-12) if len(along) else along,
-        length_m / max(float(np.sqrt(np.mean(length_m**2))), 1e-12) if len(along) else length_m,
+        _over_rms(along),
+        _over_rms(length_m),
         t_s,
         block,
         stretch,
     )
+
+
+def _over_rms(values: np.ndarray) -> np.ndarray:
+    return values / max(float(np.sqrt(np.mean(values**2))), 1e-12) if len(values) else values
 
 
 def _without_common(along: np.ndarray, length_m: np.ndarray, block: np.ndarray) -> np.ndarray:

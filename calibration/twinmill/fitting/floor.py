@@ -152,12 +152,24 @@ def _acts(data: Trajectory, name: str) -> bool:
 
 
 def _without_bumps(across: np.ndarray, floor: np.ndarray) -> np.ndarray:
+    keep = ~is_far(across, floor, BUMP)
+    return keep if (~keep).mean() <= MOST_BUMPS else np.ones(len(keep), bool)
+
+
+def is_far(errors: np.ndarray, floor: np.ndarray, times: float) -> np.ndarray:
+    """(W,) windows whose mean squared error over the floor is so many times the median.
+
+    Args:
+        errors: (W, H, 3); NaN where nothing was measured.
+        floor: (H, 3); not judged where it is 0, NaN or infinite.
+        times: the limit.
+    """
+    judged = np.isfinite(floor) & (floor > 1e-9)
     with np.errstate(all="ignore"):
-        over = np.where(floor > 1e-9, (across / floor) ** 2, np.nan)
+        over = np.where(judged, (errors / floor) ** 2, np.nan)
         counts = np.isfinite(over).sum(axis=(1, 2))
         mean = np.nansum(over, axis=(1, 2)) / np.where(counts, counts, np.nan)
-    keep = ~(mean > BUMP * np.nanmedian(mean))
-    return keep if (~keep).mean() <= MOST_BUMPS else np.ones(len(keep), bool)
+    return mean > times * np.nanmedian(mean)
 
 
 def _too_poor(data: Trajectory) -> str:
