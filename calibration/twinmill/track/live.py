@@ -20,10 +20,10 @@ from twinmill.track.detect import ROBOTS, Detector, Sightings, check_single, gat
 from twinmill.track.floor import Floor, View, look
 from twinmill.track.locate import locate
 from twinmill.track.paths import ERROR_PX, SIZE_ODD, Tags, too_far
+from twinmill.track.together import HOLD_S
 
 FLOOR_FRAMES = 30  # from which the floor is found, before the first pose
 FORGET_S = 0.5  # after it a robot may be anywhere
-HOLD_S = 0.1  # as long as a camera may lose its robot before another takes it
 BURST_S = 0.1  # by which frames may come too soon after another, where no driver stamps them
 LOOK_S = 0.02
 AHEAD = 2  # frames that wait for each camera
@@ -139,11 +139,13 @@ def _merged(cameras: Sequence[Frames]) -> Iterator[tuple[int, float, np.ndarray]
     over = threading.Event()
 
     def read(k: int, frames: Frames) -> None:
-        for frame in frames:
-            waiting.put((k, *frame))
-            if over.is_set():
-                return
-        waiting.put(None)
+        try:
+            for frame in frames:
+                waiting.put((k, *frame))
+                if over.is_set():
+                    return
+        finally:  # a camera that breaks has ended, too
+            waiting.put(None)
 
     readers = [threading.Thread(target=read, args=row, daemon=True) for row in enumerate(cameras)]
     for reader in readers:
