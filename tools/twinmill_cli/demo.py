@@ -227,7 +227,7 @@ def _answer_figure(hidden: list[Hidden], result: Explanation) -> Figure:
                 )  # fmt: skip
         axes.set_yticks(range(len(hidden)), [h.name for h in hidden])
         axes.set(xlabel="size over what was hidden", ylim=(len(hidden) - 0.4, -0.6))
-        axes.set_xlim(min(0.0, axes.get_xlim()[0]), max(1.6, axes.get_xlim()[1]))
+        axes.set_xlim(min(0.0, axes.get_xlim()[0]), max(1.7, axes.get_xlim()[1]))
         legend_above(axes, 2)
 
     return Figure(
