@@ -118,26 +118,30 @@ def test_mujoco_sweeps_have_the_same_bytes_on_any_number_of_workers(tmp_path: Pa
 
 KILLED = """
 import sys
+from pathlib import Path
 from twinmill.swarm import request as r
-r.PART_BATCHED = 200000
-from twinmill_cli.twin_sweep import make_request, sweep
-print(sweep(make_request("milling", "paper.toml", ["v_mps=0.1:0.3:40"], seeds=20, duration_s=60.0),
-      __import__("pathlib").Path(sys.argv[1]), workers=1)["parts_kept_before"])
+r.PART_BATCHED, r.PART_MUJOCO = 200_000, 10
+from twinmill.swarm.sweep import make_request, sweep
+plant = sys.argv[2]
+how = {"planar": {"seeds": 20, "duration_s": 60.0}, "mujoco": {"seeds": 1, "duration_s": 1.0}}
+asked = make_request("milling", "paper.toml", ["v_mps=0.1:0.3:40"], plant=plant, **how[plant])
+print(sweep(asked, Path(sys.argv[1]), workers=1)["parts_kept_before"])
 """
 
 
-def test_a_killed_sweep_goes_on_and_ends_the_same(tmp_path: Path):
+@pytest.mark.parametrize("plant", request_module.PLANTS)
+def test_a_killed_sweep_goes_on_and_ends_the_same(tmp_path: Path, plant: str):
     killed, whole = tmp_path / "killed", tmp_path / "whole"
-    run = subprocess.Popen([sys.executable, "-c", KILLED, killed])
+    run = subprocess.Popen([sys.executable, "-c", KILLED, killed, plant])
     while len(list(killed.glob("parts/*.parquet"))) < 3:
         time.sleep(0.005)
     run.send_signal(signal.SIGKILL)
     run.wait()
     kept = {path: path.stat().st_mtime_ns for path in killed.glob("parts/*.parquet")}
     assert not (killed / "sweep.parquet").exists()
-    told = subprocess.check_output([sys.executable, "-c", KILLED, killed], text=True)
+    told = subprocess.check_output([sys.executable, "-c", KILLED, killed, plant], text=True)
     assert int(told) == len(kept) >= 3
-    subprocess.check_call([sys.executable, "-c", KILLED, whole], stdout=subprocess.DEVNULL)
+    subprocess.check_call([sys.executable, "-c", KILLED, whole, plant], stdout=subprocess.DEVNULL)
     assert (killed / "sweep.parquet").read_bytes() == (whole / "sweep.parquet").read_bytes()
 
 
@@ -152,7 +156,9 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(tmp_path: Path, monk
 
     monkeypatch.setattr(request_module, "PART_BATCHED", 400_000)
     asked = request(["v_mps=0.1:0.3:20"], seeds=20, duration_s=60.0)
+    in_mujoco = request(["n=2,3"], plant="mujoco", seeds=1, duration_s=0.3)
     sweep(asked, tmp_path / "here")
+    sweep(in_mujoco, tmp_path / "mujoco here")
     with (
         LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
         Client(cluster) as client,
@@ -170,8 +176,10 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(tmp_path: Path, monk
         monkeypatch.setattr(Store, "keep", keep_and_kill)
         sweep(asked, tmp_path / "there", dask=cluster.scheduler_address)
         assert len(kept) == len(asked.parts()) > 6
-    files = [(tmp_path / name / "sweep.parquet").read_bytes() for name in ("here", "there")]
-    assert files[0] == files[1]
+        sweep(in_mujoco, tmp_path / "mujoco there", dask=cluster.scheduler_address)
+    for kind in ("", "mujoco "):
+        places = (tmp_path / f"{kind}{place}" / "sweep.parquet" for place in ("here", "there"))
+        assert len({place.read_bytes() for place in places}) == 1
 
 
 def test_nobody_at_the_cluster_is_one_sentence(tmp_path: Path, monkeypatch):

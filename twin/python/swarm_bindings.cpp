@@ -100,8 +100,9 @@ std::unique_ptr<Plant> MakeMujoco(const std::vector<Model> &models,
 {
     const WheelKind wheels = models[0].base.wheels;
     const bool installed = wheels == WheelKind::kMecanum || wheels == WheelKind::kNone;
-    return std::make_unique<MujocoPlant>(installed ? FindModelFile("turbopi.xml") : "", models,
-                                         starts, MujocoOptions{.timestep_s = 0.005, .seed = seed});
+    return std::make_unique<MujocoPlant>(
+        installed ? FindModelFile("turbopi.xml") : "", models, starts,
+        MujocoOptions{.timestep_s = 0.005, .seed = seed, .lean = true});
 }
 
 // (W, 10): the metrics, the least diffusion, and since when the class has held.

@@ -184,6 +184,39 @@ void TakeMass(const std::string &mjcf, mjSpec *robot, mjsBody *base, const Model
         ScaleMass(base, factor);
 }
 
+bool IsWheel(const std::vector<Wheel> &wheels, const std::string &name)
+{
+    return std::any_of(wheels.begin(), wheels.end(),
+                       [&](const Wheel &wheel) { return wheel.name == name; });
+}
+
+// All elements of a kind of which `unwanted` is true.
+template <typename Unwanted>
+void DeleteAll(mjSpec *spec, mjtObj kind, Unwanted unwanted)
+{
+    for (mjsElement *e = mjs_firstElement(spec, kind); e;)
+    {
+        mjsElement *next = mjs_nextElement(spec, e);
+        if (unwanted(e))
+            mjs_delete(spec, e);
+        e = next;
+    }
+}
+
+// Leaves the free joint and the wheels: servos stand where they start, sensors and keyframes go.
+void Strip(mjSpec *robot, const std::vector<Wheel> &wheels)
+{
+    const auto any = [](mjsElement *) { return true; };
+    const auto servo = [&](mjsElement *e) {
+        return !IsWheel(wheels, mjs_getString(mjs_getName(e))) &&
+               !(e->elemtype == mjOBJ_JOINT && mjs_asJoint(e)->type == mjJNT_FREE);
+    };
+    DeleteAll(robot, mjOBJ_SENSOR, any);
+    DeleteAll(robot, mjOBJ_KEY, any);
+    DeleteAll(robot, mjOBJ_ACTUATOR, servo);
+    DeleteAll(robot, mjOBJ_JOINT, servo);
+}
+
 void AddRobot(const std::string &mjcf, mjSpec *world, mjSpec *robot, int id, const Pose2 &start,
               const Model &model)
 {
@@ -252,7 +285,10 @@ mjModel *CompileWorld(const std::string &mjcf, const std::vector<Model> &models,
 {
     InstallMecanumCollider();
     const Spec robot = Parse(mjcf, models[0]);
-    FindBase(mjcf, robot.get(), models[0].MakeWheels());
+    const std::vector<Wheel> wheels = models[0].MakeWheels();
+    FindBase(mjcf, robot.get(), wheels);
+    if (options.lean)
+        Strip(robot.get(), wheels);
     const Spec world = MakeSurroundings(mjcf, robot.get(), models[0]);
     CopyRollerDrag(world.get(), robot.get());
     for (size_t i = 0; i < starts.size(); ++i)
@@ -261,6 +297,10 @@ mjModel *CompileWorld(const std::string &mjcf, const std::vector<Model> &models,
         AddWalls(world.get(), *options.arena_half_width_m);
     if (!options.visuals)
         mjs_discardVisual(world.get(), nullptr);
+    if (options.lean)
+        world->compiler.fusestatic = true;
+    if (options.lean && wheels[0].tread != Tread::kPlain)
+        world->option.cone = mjCONE_PYRAMIDAL;
     mjModel *model = mj_compile(world.get(), nullptr);
     if (!model)
         Fail(mjcf,

@@ -22,6 +22,9 @@ struct MujocoOptions
     std::optional<double> arena_half_width_m{};  // walls of a square arena around the origin
     uint64_t seed = 0;                           // of the drive noise
     bool visuals = false;  // keep what is only looked at: for a viewer or a video
+    // For many worlds: servos stand still, sensors of the file read nothing, and wheels with
+    // rollers have pyramids for friction cones, which differ where no such wheel grips.
+    bool lean = false;
 };
 
 // How `name` of the MJCF file is called for one robot of the world: "r03_cam".
