@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,25 @@ HIDDEN = f'\n[[effect]]\nname = "{EFFECT}"\ndeceleration_mps2 = 0.7\n'
 FIRST_VIEW_S, FIRST_ANSWER_S, KNOB_S, FRAMES = 2.0, 0.5, 0.05, 30.0
 PREDICTION_S = 20.0  # from the address to the first prediction of twenty robots of 150 s
 TURNS = 10  # of a knob
+KNOB = "base.motor_lag_s"
+BETWEEN_MS = 400  # turns in the browser
+DRAWN = """() => {
+    window.latency = [];
+    let moved = null;
+    window.addEventListener("mousemove", () => { moved ??= performance.now(); }, true);
+    const draw = twinmill._predicted.bind(twinmill);
+    twinmill._predicted = (found) => {
+        draw(found);
+        requestAnimationFrame(() => {
+            if (moved !== null) latency.push(performance.now() - moved);
+            moved = null;
+        });
+    };
+}"""  # ms from a move of the mouse to the end of the frame that has its prediction
 PLAYED_S = 4.0
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+PREDICTED = "document.body?.dataset?.predicted !== undefined"
+JUDGED = "/^[0-9]/.test(document.querySelector('[data-testid=score]').textContent)"  # no more ≈
 
 
 def measure(build: Path) -> Iterator[Ratio]:
@@ -42,6 +61,7 @@ def measure(build: Path) -> Iterator[Ratio]:
         log = _drive(build, folder, ROBOTS)
         yield from _session(log, given, folder)
         yield from _browser(_drive(build, folder, MANY), folder)
+        yield from _hand(_drive(build, folder, 1), folder)
 
 
 def _drive(build: Path, folder: Path, robots: int) -> Path:
@@ -78,7 +98,7 @@ def _session(log: Path, given: ModelFile, folder: Path) -> Iterator[Ratio]:
 
     def turn() -> None:
         for value in np.linspace(0.05, 0.15, TURNS):
-            session.drag("base.motor_lag_s", float(value))
+            session.drag(KNOB, float(value))
             session.robots[0].predicted(session.shown(0).model)
 
     turned_s, _ = _timed(turn)
@@ -92,39 +112,70 @@ def _timed(work: Callable) -> tuple[float, Any]:
     return time.process_time() - started_s, result
 
 
-def _browser(log: Path, folder: Path) -> Iterator[Ratio]:
-    """By the clock, in Chromium: the paths of twenty robots, and the cursor while it plays."""
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    names = ("first view, 20 robots : 2 s", "first prediction : 20 s", "frames : 30 a second")
-    if chromium is None:
-        yield from (skipped(name, "no Chromium") for name in names)
-        return
+@contextmanager
+def _opened(log: Path, folder: Path) -> Iterator[tuple[Any, str]]:
+    """A page of Chromium and the address of the workbench."""
     from playwright.sync_api import sync_playwright
 
     command = [sys.executable, "-m", "twinmill_cli.main", "open", log, "--no-browser"]
-    command += ["--state", folder / "state.json"]
+    command += ["--state", folder / f"{log.stem}.json"]
     server = subprocess.Popen([str(w) for w in command], stdout=subprocess.PIPE, text=True)
     try:
         url = re.search(r"http\S+", server.stdout.readline())[0]
         with sync_playwright() as playwright:
             # As root there is no sandbox to be had.
-            browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
             page = browser.new_page(viewport={"width": 1366, "height": 768})
-            started_s = time.monotonic()
-            page.goto(url, wait_until="commit")
-            page.wait_for_function("document.body?.dataset?.paths > 0", polling=20)
-            seen_s = time.monotonic() - started_s
-            page.wait_for_function("document.body.dataset.predicted !== undefined", timeout=600_000)
-            predicted_s = time.monotonic() - started_s
-            page.evaluate("twinmill.play(true)")
-            before = page.evaluate("[twinmill.frames, performance.now()]")
-            page.wait_for_timeout(1000 * PLAYED_S)
-            after = page.evaluate("[twinmill.frames, performance.now()]")
+            page.set_default_timeout(600_000)
+            yield page, url
             browser.close()
     finally:
         server.terminate()
         server.wait()
+
+
+def _browser(log: Path, folder: Path) -> Iterator[Ratio]:
+    """By the clock, in Chromium: the paths of twenty robots, and the cursor while it plays."""
+    names = ("first view, 20 robots : 2 s", "first prediction : 20 s", "frames : 30 a second")
+    if CHROMIUM is None:
+        yield from (skipped(name, "no Chromium") for name in names)
+        return
+    with _opened(log, folder) as (page, url):
+        started_s = time.monotonic()
+        page.goto(url, wait_until="commit")
+        page.wait_for_function("document.body?.dataset?.paths > 0", polling=20)
+        seen_s = time.monotonic() - started_s
+        page.wait_for_function(PREDICTED)
+        predicted_s = time.monotonic() - started_s
+        page.evaluate("twinmill.play(true)")
+        before = page.evaluate("[twinmill.frames, performance.now()]")
+        page.wait_for_timeout(1000 * PLAYED_S)
+        after = page.evaluate("[twinmill.frames, performance.now()]")
     rate = 1000 * (after[0] - before[0]) / (after[1] - before[1])
     yield single(names[0], seen_s, FIRST_VIEW_S, "s", at_most=1)
     yield single(names[1], predicted_s, PREDICTION_S, "s", at_most=1)
     yield single(names[2], rate, FRAMES, "1/s", at_least=1)
+
+
+def _hand(log: Path, folder: Path) -> Iterator[Ratio]:
+    """By the clock, in Chromium: from a move of the hand on a knob to its prediction drawn."""
+    name = "knob to drawing : 50 ms"
+    if CHROMIUM is None:
+        yield skipped(name, "no Chromium")
+        return
+    with _opened(log, folder) as (page, url):
+        page.goto(url, wait_until="commit")
+        page.wait_for_function(PREDICTED)
+        track = page.get_by_test_id(f"knob-{KNOB}").locator(".q-slider__track-container")
+        page.wait_for_function(JUDGED)
+        box = track.bounding_box()
+        page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + box["height"] / 2)
+        page.mouse.down()
+        page.wait_for_timeout(BETWEEN_MS)
+        page.evaluate(DRAWN)
+        for k in range(TURNS):
+            at = 0.3 + 0.3 * (k + 1) / TURNS
+            page.mouse.move(box["x"] + at * box["width"], box["y"] + box["height"] / 2)
+            page.wait_for_function(f"latency.length > {k}", polling=BETWEEN_MS)
+        found = page.evaluate("latency")
+    yield single(name, float(np.median(found)) / 1000, KNOB_S, "s")

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a browser draws, as arrays: thinned to what an eye can tell."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import twinmill_native as native
 
@@ -20,6 +22,7 @@ PATH_S = 0.05  # between points of a path
 SPEED_S = 0.04  # between points of a speed
 STEP_S = 0.1  # between points of a prediction, and between their starts
 AHEAD = 20  # points of a prediction: 2 s
+RESTARTS = 5  # starts between those half a second apart, at which paths begin anew
 SPEED_HALF_S = 0.06  # half width of the line that tells a measured speed
 SHORT, LONG = HORIZONS_S.index(0.5), HORIZONS_S.index(2.0)
 WITHIN_95 = 1.96  # standard deviations
@@ -133,26 +136,28 @@ class RobotView:
         band = np.column_stack([HORIZONS_S, WITHIN_95 * self.floor])
         return {**measured_speed(self.track), "band": band}
 
-    def predicted(self, model: native.Model) -> Arrays:
-        """What the model says.
+    def predicted(self, model: native.Model, every: int = 1) -> Arrays:
+        """What the model says; of the places where predictions start, each so many-th.
 
         starts: (S, 4) t_s and pose from which a prediction starts; ahead: (S, AHEAD, 2) places
         after each step, NaN where the track ends; predicted_speed: (T, 4) as the measured one;
         errors: (W, 5) t_s, then position in m and heading in rad, 0.5 s and 2 s ahead.
         """
         played = self.measurement.played
-        ahead = native.windows(model, played, self._starts, self._ends)
-        ahead[self._ends < 0] = np.nan
-        starts = np.column_stack([self.track.pose_t_s[self._starts], self.track.pose[self._starts]])
-        velocity = body_velocity(self.measurement, self.grid, model)
-        every = max(1, round(SPEED_S / self.grid.period_s))
-        errors = self.errors(model)
+        begin, end = self._starts[::every], self._ends[::every]
+        with ThreadPoolExecutor(1) as beside:
+            velocity = beside.submit(body_velocity, self.measurement, self.grid, model.copy())
+            ahead = native.windows(model, played, begin, end)
+            errors = self.errors(model)
+        ahead[end < 0] = np.nan
+        starts = np.column_stack([self.track.pose_t_s[begin], self.track.pose[begin]])
+        stride = max(1, round(SPEED_S / self.grid.period_s))
         start_s = self.track.pose_t_s[self.windows.starts]
         far = [f(errors[:, h]) for h in (SHORT, LONG) for f in (_position_m, _heading_rad)]
         return {
             "starts": starts,
             "ahead": ahead[..., :2],
-            "predicted_speed": np.column_stack([self.grid.t_s, velocity])[::every],
+            "predicted_speed": np.column_stack([self.grid.t_s, velocity.result()])[::stride],
             "errors": np.column_stack([start_s, *far]),
         }
 

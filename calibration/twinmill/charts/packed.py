@@ -71,15 +71,16 @@ def pack_prediction(
     model: native.Model,
     beside: tuple[str, native.Model] | None,
     bits: BitScene | None,
+    every: int = 1,
     **facts: object,
 ) -> bytes:
     """What a model says of one robot; another model's words beside it, with its label.
 
-    `bits`: of its camera, if it has one and others are near.
+    `bits`: of its camera, if it has one and others are near; `every`: see `RobotView.predicted`.
     """
-    arrays = view.predicted(model) | (expected(bits, model) if bits else {})
+    arrays = view.predicted(model, every) | (expected(bits, model) if bits else {})
     if beside:
-        others = view.predicted(beside[1])
+        others = view.predicted(beside[1], every)
         arrays |= {f"{name}_beside": a for name, a in others.items() if name != "starts"}
     label = beside[0] if beside else ""
     clock_s = model.get(CLOCK)

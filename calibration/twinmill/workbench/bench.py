@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from twinmill.charts.arrays import measured_path
+from twinmill.charts.arrays import RESTARTS, measured_path
 from twinmill.charts.packed import pack, pack_log, pack_prediction, pack_robot
 from twinmill.data.camera_frames import frames_of
 from twinmill.data.log import LogError
@@ -246,11 +246,12 @@ class Bench:
         return pack_robot(self.session.robots[index], raw, frames_of(raw), self.session.given.model)
 
     def prediction_bytes(self, index: int) -> bytes:
-        """What the model shown says of one robot."""
+        """What the model shown says of one robot; under a hand of fewer moments, at once."""
         shown, beside = self.session.shown(index).model, self.session.beside_of(index)
         revision = self.changes["prediction"]
         view, bits = self.session.robots[index], self.session.bits(index)
-        return pack_prediction(view, shown, beside, bits, revision=revision)
+        every = RESTARTS if self.session.is_dragged else 1
+        return pack_prediction(view, shown, beside, bits, every, revision=revision)
 
     def swarm_bytes(self) -> bytes:
         """Poses of the twin's swarms."""

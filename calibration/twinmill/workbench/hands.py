@@ -15,9 +15,6 @@ class Hands(Protocol):
 
     bench: Bench
 
-    def drag(self, name: str, value: float) -> None:
-        """A knob is being turned: predictions and score follow at once."""
-
     async def start(self, kind: str, effect: str = "", options: dict | None = None) -> None:
         """A fit, an addition, a diagnosis, a next run or a swarm."""
 
@@ -27,8 +24,8 @@ class Hands(Protocol):
     async def try_beside(self, effect: str) -> None:
         """Draws what an effect would change beside the model; once more takes it away."""
 
-    async def keep(self) -> None:
-        """A knob was let go."""
+    async def keep(self, name: str, value: float) -> None:
+        """A knob was let go at a value."""
 
     async def go(self, number: int) -> None:
         """To a model tried before."""

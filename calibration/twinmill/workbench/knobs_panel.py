@@ -6,8 +6,6 @@ from nicegui import events, ui
 from twinmill.workbench.hands import Hands
 from twinmill.workbench.knobs import Knob
 
-THROTTLE_S = 0.03
-
 
 class KnobsPanel:
     """Draws the knobs of the model where the tree stands."""
@@ -46,83 +44,51 @@ class KnobsPanel:
                 ui.html(f"<div class=group>{group}</div>", sanitize=False)
             self._rows[knob.name] = _Row(knob, self)
 
-    def toggle(self, name: str) -> None:
-        """Holds what was free, frees what was held."""
-        self.bench.session.held ^= {name}
-        self._rows[name].lock(name in self.bench.session.held)
 
-
-class _Row:
+class _Row(ui.element, component="static/knob.js"):
     """One knob."""
 
     def __init__(self, knob: Knob, panel: KnobsPanel) -> None:
-        self.name, self.panel = knob.name, panel
-        self._typing = False
-        with ui.element("div").classes("knob").props(f'data-testid="knob-{knob.name}"'):
-            with ui.element("div").classes("line"):
-                if knob.fitted:
-                    self.icon = ui.icon("lock_open").props("role=button tabindex=0")
-                    self.icon.props.update({"aria-label": f"Hold {knob.name}"})
-                    for event in ("click", "keydown.enter", "keydown.space"):
-                        self.icon.on(event, lambda: panel.toggle(knob.name))
-                    self.lock(knob.name in panel.bench.session.held)
-                label = ui.label(knob.label).classes("what")
-                label.props.update(title=f"{knob.name}: {knob.words}" if knob.words else knob.name)
-                self.number = ui.number(value=knob.value, format="%.4g").props(
-                    "dense borderless hide-bottom-space"
-                )
-                self.number.on("focus", lambda: self._type(True))
-                self.number.on("keydown.enter", self._left).on("blur", self._left)
-                ui.label("" if knob.unit == "1" else knob.unit).classes("unit")
-            with ui.element("div").classes("reach"):
-                self.interval = ui.element("div").classes("interval")
-                self.slider = ui.slider(min=knob.low, max=knob.high, step=knob.step)
-                self.slider.props("dense thumb-size=14px track-size=3px color=blue-9")
-                self.slider.on("update:model-value", self._dragged, throttle=THROTTLE_S)
-                self.slider.on("change", lambda: panel.page.keep())
+        super().__init__()
+        self.panel = panel
+        self.props(f'data-testid="knob-{knob.name}"')
+        self.on("keep", self._keep)
+        self.on("hold", self._toggle)
         self.show(knob)
 
     def show(self, knob: Knob) -> None:
         """Another value, reach or interval."""
         self.knob = knob
-        self.slider.props.update({"min": knob.low, "max": knob.high, "step": knob.step})
-        self.slider.set_value(knob.value)
-        if not self._typing:  # what is half typed is not taken away
-            self.number.set_value(float(f"{knob.value:.6g}"))
-        self.interval.set_visibility(knob.interval is not None)
-        if knob.interval:
-            wide = (knob.high - knob.low) or 1.0
-            ends = [min(max((e - knob.low) / wide, 0), 1) for e in knob.interval]
-            left, width = 100 * ends[0], max(100 * (ends[1] - ends[0]), 0.8)
-            self.interval.style(f"left: {left:.2f}%; width: {width:.2f}%")
+        self.props.update(
+            name=knob.name,
+            label=knob.label,
+            words=f"{knob.name}: {knob.words}" if knob.words else knob.name,
+            unit="" if knob.unit == "1" else knob.unit,
+            value=knob.value,
+            low=knob.low,
+            high=knob.high,
+            least=knob.least,
+            most=knob.most,
+            step=knob.step,
+            interval=knob.interval,
+            fitted=knob.fitted,
+            held=knob.name in self.panel.bench.session.held,
+            drawn=self.props.get("drawn", 0) + 1,
+        )
+        self.update()
 
-    def lock(self, held: bool) -> None:
-        """Shows whether it is held."""
-        self.icon.props(f"name={'lock' if held else 'lock_open'} aria-pressed={str(held).lower()}")
-        self.icon.classes(replace="lock held" if held else "lock")
+    def _toggle(self) -> None:
+        """Holds what was free, frees what was held."""
+        held = self.panel.bench.session.held
+        held ^= {self.knob.name}
+        self.props["held"] = self.knob.name in held
+        self.update()
 
-    def _dragged(self, event: events.GenericEventArguments) -> None:
-        value = float(event.args)
-        self.number.set_value(float(f"{value:.6g}"))
-        self.panel.page.drag(self.name, value)
-
-    def _type(self, typing: bool) -> None:
-        self._typing = typing
-
-    async def _left(self) -> None:
-        self._type(False)
-        await self._typed()
-
-    async def _typed(self) -> None:
-        known, value = float(f"{self.knob.value:.6g}"), self.number.value
-        if value is None or value == known:
-            self.number.set_value(known)
-            return
-        asked, knob = float(value), self.knob
+    async def _keep(self, event: events.GenericEventArguments) -> None:
+        """What a hand let go, or typed."""
+        knob, asked = self.knob, float(event.args)
         value = min(max(asked, knob.least), knob.most)
         if value != asked:
             bounds = f"{knob.least:g} to {knob.most:g}"
             ui.notify(f"{knob.name} = {asked:g}: must be within {bounds}; {value:g} was taken.")
-        self.number.set_value(float(f"{value:.6g}"))
-        self.panel.page.drag(self.name, value)
-        await self.panel.page.keep()
+        await self.panel.page.keep(knob.name, value)

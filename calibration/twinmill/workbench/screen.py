@@ -144,12 +144,6 @@ class Screen:
         await self.bench.act(act, *arguments)
         await self._refresh()
 
-    def drag(self, name: str, value: float) -> None:
-        """A knob is being turned: predictions follow at once, the score at the next refresh."""
-        self.bench.drag(name, value)
-        self._seen["prediction"] = self.bench.changes["prediction"]
-        self.javascript("twinmill.predict()")
-
     async def start(self, kind: str, effect: str = "", options: dict | None = None) -> None:
         """A fit, an addition, a diagnosis, a next run or a swarm."""
         await self.bench.start(kind, effect, options)
@@ -165,9 +159,9 @@ class Screen:
         await self.bench.try_beside(effect)
         await self._refresh()
 
-    async def keep(self) -> None:
+    async def keep(self, name: str, value: float) -> None:
         """A knob was let go."""
-        await self._act(self.bench.session.keep)
+        await self._act(self.bench.session.set, name, value)
 
     async def go(self, number: int) -> None:
         """To a model tried before."""
@@ -204,7 +198,7 @@ class Screen:
         elif new & {"model", "names"}:
             self._name_robots()
         if "prediction" in new and "robots" not in new:
-            self.javascript("twinmill.predict()")
+            self.javascript(f"twinmill.renew({changes['prediction']})")
         if self.bench.failure and self.bench.opening and not self.bench.told.is_set():
             self.javascript(f"twinmill.fail({json.dumps(self.bench.failure)})")
             self.bench.told.set()

@@ -17,6 +17,7 @@ from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.responses import PlainTextResponse, Response
 
 from twinmill.charts.stage import STATIC as CHARTS
+from twinmill.model.model_file import ModelError
 from twinmill.workbench.bench import Bench
 from twinmill.workbench.screen import Screen
 
@@ -97,6 +98,7 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
             tailwind=False,
             show_welcome_message=False,
             reconnect_timeout=10,
+            gzip_middleware_factory=None,  # to the same machine it only takes time
         )
     if failed:
         raise failed[0]
@@ -156,8 +158,15 @@ def _add_data(bench: Bench) -> None:
         return answer(token, bench.robot_bytes, index)
 
     @app.get("/data/prediction")
-    def prediction(index: int, token: str = "") -> Response:
-        return answer(token, bench.prediction_bytes, index)
+    async def prediction(
+        index: int, name: str = "", value: float = 0.0, token: str = ""
+    ) -> Response:
+        if name and _right(bench, token):
+            try:
+                bench.drag(name, value)
+            except ModelError as error:
+                return PlainTextResponse(str(error), status_code=400)
+        return await asyncio.to_thread(answer, token, bench.prediction_bytes, index)
 
     @app.get("/data/swarm")
     def swarm(token: str = "") -> Response:

@@ -10,6 +10,7 @@ import hashlib
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -33,9 +34,10 @@ from twinmill.model.parameters import (
     effect_names,
     effect_parameters,
 )
-from twinmill.predict.datasets import total_score
+from twinmill.predict.datasets import Trajectory, total_score
 from twinmill.predict.detections import BitScene, bit_scene
 from twinmill.predict.regimes import Regime, where_it_fails
+from twinmill.predict.windows import Windows
 from twinmill.workbench.knobs import Knob, knobs
 from twinmill.workbench.next_run import next_command, then_commands
 from twinmill.workbench.swarm import swarm_commands
@@ -44,7 +46,9 @@ from twinmill.workbench.worker import Done, Work
 
 FORESEEN_ROUNDS = 2  # of the fit that gives a first answer
 FORESEEN_WINDOWS = 1500  # of the robots that it is about
-DRAGGED_ROUNDS = 1  # of the search for the clock while a knob is turned
+DRAGGED_EVERY = 2  # windows: while a knob is turned one in so many tells the clock
+DRAGGED_STEP_S = 0.004  # of the clock, by which the slope of the errors is found
+DRAGGED_MOST_S = 0.1  # that the clock moves at once
 
 
 class OpenedView(RobotView):
@@ -53,6 +57,14 @@ class OpenedView(RobotView):
     def __init__(self, opened: Opened) -> None:
         super().__init__(opened.measurement, opened.floor, not opened.same_clock)
         self.opened = opened
+
+    @cached_property
+    def sparse(self) -> Trajectory:
+        """Few windows of one that has a floor: they tell the clock at once and nearly as well."""
+        data, every = self.opened.data, DRAGGED_EVERY
+        windows = Windows(self.windows.starts[::every], self.windows.ends[::every])
+        few = Trajectory.at(self.measurement, windows)
+        return few.over(data.floor, data.keep[::every])
 
 
 @dataclass(frozen=True)
@@ -191,6 +203,11 @@ class Session:
         if number not in self._files:
             self._files[number] = self.tree.model_file(number)
         return self._files[number]
+
+    @property
+    def is_dragged(self) -> bool:
+        """Whether a hand holds a knob."""
+        return bool(self._dragged)
 
     @property
     def is_passing(self) -> bool:
@@ -353,10 +370,21 @@ class Session:
             model = self.model_file.model.copy()
             for name, value in dragged.items():
                 model.set(name, value)
-            from_s = self._clocks.get(index, settled.model.get(CLOCK))
-            passing[index] = settled.aligned(model, from_s, DRAGGED_ROUNDS)
-            self._clocks[index] = passing[index].model.get(CLOCK)
+            passing[index] = self._on_clock(index, settled.with_model(model))
         return passing[index]
+
+    def _on_clock(self, index: int, dragged: Opened) -> Opened:
+        """One under a hand, its clock's offset one step of Gauss and Newton nearer to the best."""
+        if dragged.same_clock or dragged.data is None:
+            return dragged
+        at_s = self._clocks.get(index, dragged.model.get(CLOCK))
+        few = self.robots[index].sparse
+        here, there = few.rows(dragged.model, [CLOCK], np.array([[at_s], [at_s + DRAGGED_STEP_S]]))
+        slope = (there - here) / DRAGGED_STEP_S
+        step_s = -(slope @ here) / max(slope @ slope, 1e-12)
+        self._clocks[index] = at_s + float(np.clip(step_s, -DRAGGED_MOST_S, DRAGGED_MOST_S))
+        dragged.model.set(CLOCK, self._clocks[index])
+        return dragged
 
     def passing_score(self, index: int) -> float:
         """About that of the model shown, from as many robots as can be asked at once."""

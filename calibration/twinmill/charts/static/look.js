@@ -33,11 +33,12 @@ export function worded(value, step) {
   return Number(words) === 0 ? (0).toFixed(digits) : words;
 }
 
-/** A canvas as large as its box, and a second one that keeps what does not move. */
+/** A canvas as large as its box; one that keeps what does not move, and one for what lies under that. */
 export class Sheet {
   constructor(canvas) {
     this.canvas = canvas;
     this.still = document.createElement("canvas");
+    this.under = document.createElement("canvas");
     this.width = 0;
     this.height = 0;
   }
@@ -48,7 +49,7 @@ export class Sheet {
     const ratio = window.devicePixelRatio || 1;
     const [w, h] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
     if (!w || !h || (this.canvas.width === w && this.canvas.height === h)) return false;
-    for (const canvas of [this.canvas, this.still]) {
+    for (const canvas of [this.canvas, this.still, this.under]) {
       canvas.width = w;
       canvas.height = h;
       canvas.getContext("2d").setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -57,21 +58,25 @@ export class Sheet {
     return true;
   }
 
-  /** The kept one, cleared. */
-  base() {
-    const g = this.still.getContext("2d");
+  /** A kept one, cleared. */
+  base(canvas = this.still) {
+    const g = canvas.getContext("2d");
     g.clearRect(0, 0, this.width, this.height);
     return g;
   }
 
   /** The shown one, with what is kept on it. */
   top() {
-    const g = this.canvas.getContext("2d");
+    const g = this.base(this.canvas);
+    this.copy(this.still, g);
+    return g;
+  }
+
+  /** One of the canvases on another. */
+  copy(canvas, g) {
     g.save();
     g.setTransform(1, 0, 0, 1, 0, 0);
-    g.clearRect(0, 0, this.canvas.width, this.canvas.height);
-    g.drawImage(this.still, 0, 0);
+    g.drawImage(canvas, 0, 0);
     g.restore();
-    return g;
   }
 }

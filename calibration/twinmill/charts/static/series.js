@@ -12,6 +12,8 @@ const FOOT_PX = 18;
 const HEAD_PX = 17;
 const DEGREES = 180 / Math.PI;
 const LOST_S = 0.6; // without a value a line is broken
+const GRAINS = 5; // to a power of ten: ends of axes
+const SHIFT_S = 0.005; // of a clock, that is seen
 
 /** Rows of a robot: each a quantity with its lines (array, column, factor). */
 export function rowsOf(robot, prediction, band, ahead_s) {
@@ -20,11 +22,11 @@ export function rowsOf(robot, prediction, band, ahead_s) {
     const lines = [{ of: speed, column, factor, color: MEASURED, width: 2.2, alpha: 0.5, name: "measured" }];
     if (prediction?.beside) {
       const of = prediction.arrays.predicted_speed_beside;
-      lines.push({ of, column, factor, color: BEFORE, width: 1.1, alpha: 0.9, name: prediction.beside });
+      lines.push({ of, column, factor, color: BEFORE, width: 1, alpha: 0.9, name: prediction.beside, ofModel: true });
     }
     if (prediction) {
       const of = prediction.arrays.predicted_speed;
-      lines.push({ of, column, factor, color: PREDICTED, width: 1.3, alpha: 1, name: "predicted" });
+      lines.push({ of, column, factor, color: PREDICTED, width: 1, alpha: 1, name: "predicted", ofModel: true });
     }
     return lines;
   };
@@ -48,7 +50,8 @@ export function rowsOf(robot, prediction, band, ahead_s) {
       { ...line, of: robot.arrays.seen, color: MEASURED, alpha: 0.6, name: "bit", held: true },
     ];
     const of = prediction?.arrays.expected;
-    if (of) lines.push({ ...line, of, color: PREDICTED, alpha: 1, name: "its chance by the model" });
+    const named = { color: PREDICTED, alpha: 1, name: "its chance by the model", ofModel: true };
+    if (of) lines.push({ ...line, ...named, of });
     rows.push({ title: "camera", unit: "1: sees another robot", least: 1, from: 0, lines });
   }
   if (prediction) {
@@ -56,7 +59,7 @@ export function rowsOf(robot, prediction, band, ahead_s) {
     const of = prediction.arrays.errors;
     const [forward, left, heading] = band;
     const errors = (column, factor) => {
-      const line = { column, factor, alpha: 1, width: 1.3 };
+      const line = { column, factor, alpha: 1, width: 1, ofModel: true };
       const lines = [{ ...line, of, color: PREDICTED, name: "error" }];
       const beside = prediction.arrays.errors_beside;
       if (beside) lines.unshift({ ...line, of: beside, color: BEFORE, name: prediction.beside });
@@ -76,11 +79,49 @@ export function rowsOf(robot, prediction, band, ahead_s) {
   return rows;
 }
 
+/** Draws a line of many points; of those within one pixel of the axis only the lowest and highest. */
+class Pen {
+  constructor(g) {
+    this.g = g;
+    this.x = null;
+  }
+
+  begin(x, y) {
+    this.end();
+    this.g.moveTo(x, y);
+    this._hold(x, y);
+  }
+
+  add(x, y) {
+    if (x - this.x >= 1 || x < this.x) {
+      this.end();
+      this.g.lineTo(x, y);
+      this._hold(x, y);
+    } else {
+      this.low = Math.min(this.low, y);
+      this.high = Math.max(this.high, y);
+      this.last = y;
+    }
+  }
+
+  /** What is held back of the pixel. */
+  end() {
+    if (this.low === this.high) return;
+    for (const y of [this.low, this.high, this.last]) this.g.lineTo(this.x, y);
+    this.low = this.high;
+  }
+
+  _hold(x, y) {
+    [this.x, this.low, this.high, this.last] = [x, y, y, y];
+  }
+}
+
 export class Series {
   constructor(canvas, stage) {
     this.sheet = new Sheet(canvas);
     this.stage = stage;
     this.rows = [];
+    this._drawn = [];
     this._listen(canvas);
   }
 
@@ -97,41 +138,73 @@ export class Series {
   // -- what stays -------------------------------------------------------------------------------
 
   drawStill() {
-    this.sheet.fit();
+    if (this.sheet.fit()) this._drawn = [];
     if (!this.sheet.width) return;
-    const g = this.sheet.base();
     const height = (this.sheet.height - FOOT_PX) / Math.max(this.rows.length, 1);
     this.rows.forEach((row, i) => {
       row.top = i * height + HEAD_PX;
       row.foot = (i + 1) * height - 5;
       this._scale(row);
+    });
+    this._drawMeasured();
+    const g = this.sheet.base();
+    this.sheet.copy(this.sheet.under, g);
+    for (const row of this.rows) {
+      this._within(g, row, () => this._lines(g, row, true));
+    }
+  }
+
+  /** What no model changes is kept while a row's axes stay: a knob's turn draws the rest alone. */
+  _drawMeasured() {
+    const { span, marks, robot } = this.stage;
+    const g = this.sheet.under.getContext("2d");
+    this.rows.forEach((row, i) => {
+      const shift = Math.round((row.lines[0]?.shift ?? 0) / SHIFT_S);
+      const { title, top, foot, low, high } = row;
+      const drawn = [...span, marks, robot, shift, title, top, foot, low, high];
+      if (this._drawn[i]?.every((v, k) => v === drawn[k])) return;
+      this._drawn[i] = drawn;
+      g.clearRect(0, top - HEAD_PX, this.sheet.width, foot - top + HEAD_PX + 5);
       this._frame(g, row);
-      g.save();
-      g.beginPath();
-      g.rect(LEFT_PX, row.top - 1, this.sheet.width - LEFT_PX - RIGHT_PX, row.foot - row.top + 2);
-      g.clip();
-      this._marks(g, row);
-      this._limits(g, row);
-      for (const line of row.lines) this._line(g, row, line);
-      g.restore();
+      this._within(g, row, () => {
+        this._marks(g, row);
+        this._limits(g, row);
+        this._lines(g, row, false);
+      });
     });
     this._times(g);
+  }
+
+  /** Draws nothing outside a row. */
+  _within(g, row, draw) {
+    g.save();
+    g.beginPath();
+    g.rect(LEFT_PX, row.top - 1, this.sheet.width - LEFT_PX - RIGHT_PX, row.foot - row.top + 2);
+    g.clip();
+    draw();
+    g.restore();
+  }
+
+  _lines(g, row, ofModel) {
+    for (const line of row.lines) {
+      if (Boolean(line.ofModel) === ofModel) this._line(g, row, line);
+    }
   }
 
   /** From what is seen, with a little room; a few wild values do not flatten the rest. */
   _scale(row) {
     const [a, b] = this.stage.span;
-    const seen = [];
+    const found = [];
     for (const { of, column, factor, shift = 0 } of row.lines) {
       const first = Math.max(rowAt(of, a - shift), 0);
       const last = rowAt(of, b - shift);
       const every = Math.max(1, Math.floor((last - first) / 2000));
       for (let k = first; k <= last; k += every) {
         const v = of.data[k * of.width + column] * factor;
-        if (!Number.isNaN(v)) seen.push(v);
+        if (!Number.isNaN(v)) found.push(v);
       }
     }
-    seen.sort((x, y) => x - y);
+    const seen = Float64Array.from(found).sort();
     let low = seen[Math.floor(0.002 * seen.length)] ?? 0;
     let high = seen[Math.ceil(0.998 * seen.length) - 1] ?? 1;
     for (const limit of row.limits ?? []) {
@@ -146,8 +219,9 @@ export class Series {
       low -= row.from === undefined ? lacking / 2 : 0;
     }
     const room = 0.06 * (high - low);
-    row.high = high + room;
-    row.low = row.from === undefined ? low - room : low;
+    const grain = 10 ** Math.floor(Math.log10(high - low)) / GRAINS; // small changes move no axis
+    row.high = Math.ceil((high + room) / grain) * grain;
+    row.low = row.from === undefined ? Math.floor((low - room) / grain) * grain : low;
   }
 
   _y(row, v) {
@@ -184,6 +258,7 @@ export class Series {
 
   _times(g) {
     const [a, b] = this.stage.span;
+    g.clearRect(0, this.sheet.height - FOOT_PX, this.sheet.width, FOOT_PX);
     const marks = ticks(a, b, this.sheet.width / 80);
     g.font = SMALL;
     g.fillStyle = WORDS;
@@ -220,29 +295,34 @@ export class Series {
     g.globalAlpha = alpha;
     g.strokeStyle = color;
     g.lineWidth = width;
-    g.lineJoin = "round";
+    g.lineJoin = "bevel";
     g.beginPath();
     let broken = true;
     let before = 0;
     let since = -Infinity;
+    const pen = new Pen(g);
+    const [x0, perSecond] = [this.x(shift), this.x(1) - this.x(0)];
+    const [y0, perUnit] = [this._y(row, 0), this._y(row, factor) - this._y(row, 0)];
     for (let k = first; k <= last; k++) {
       const t = of.data[k * of.width];
-      const v = of.data[k * of.width + column] * factor;
+      const v = of.data[k * of.width + column];
       if (Number.isNaN(v)) {
         broken = true;
         continue;
       }
       if (!held && t - since > LOST_S) broken = true;
       since = t;
-      const [x, y] = [this.x(t + shift), this._y(row, v)];
-      if (broken) g.moveTo(x, y);
+      const x = x0 + perSecond * t;
+      const y = y0 + perUnit * v;
+      if (broken) pen.begin(x, y);
       else {
-        if (held) g.lineTo(x, before);
-        g.lineTo(x, y);
+        if (held) pen.add(x, before);
+        pen.add(x, y);
       }
       before = y;
       broken = false;
     }
+    pen.end();
     g.stroke();
     g.globalAlpha = 1;
   }

@@ -84,17 +84,26 @@ export class Stage {
   }
 
   /** The model changed. Of several changes at once the last is drawn. */
-  async predict() {
+  predict() {
     this._stale = true;
-    if (this._asking) return;
-    this._asking = true;
+    this._asking ??= this._ask();
+    return this._asking;
+  }
+
+  /** Once all is drawn that was asked for. */
+  async predicted() {
+    await this._asking;
+  }
+
+  async _ask() {
+    await null; // `_asking` is this before it ends
     while (this._stale && this.robot) {
       this._stale = false;
       const robot = this.robot;
       const found = await this.source.prediction(robot.index);
       if (found && robot === this.robot) this._predicted(found);
     }
-    this._asking = false;
+    this._asking = null;
   }
 
   _predicted(found) {

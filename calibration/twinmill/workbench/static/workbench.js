@@ -25,8 +25,11 @@ class Server {
     return this.get(`robot?index=${index}`);
   }
 
+  /** What a hand moved meanwhile goes along. */
   prediction(index) {
-    return this.get(`prediction?index=${index}`);
+    const { name = "", value = 0 } = this.moved ?? {};
+    this.moved = null;
+    return this.get(`prediction?index=${index}&name=${encodeURIComponent(name)}&value=${value}`);
   }
 
   ask(label) {
@@ -49,6 +52,18 @@ class Server {
 }
 
 class Workbench extends Stage {
+  /** A hand turns a knob. */
+  turn(name, value) {
+    this.source.moved = { name, value };
+    this.predict();
+  }
+
+  /** The server has predictions of that revision: what this page asked for itself is not asked again. */
+  async renew(revision) {
+    await this.predicted();
+    if (!(this.prediction?.revision >= revision)) this.predict();
+  }
+
   /** Why nothing can be opened; it stays when the server has gone. */
   fail(words) {
     const card = document.createElement("div");
