@@ -21,6 +21,7 @@ if working():  # not for --help
     from rich.console import Group
     from rich.text import Text
 
+    from twinmill.claims.bodies import bodies, run_layers
     from twinmill.claims.claims import CLAIMS, ODD_TURNS
     from twinmill.claims.paper import Answer, answers
     from twinmill.claims.rows import Claim, Row
@@ -28,6 +29,7 @@ if working():  # not for --help
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import Provenance, Section, show, write_report
     from twinmill.report.tables import Cell, Table, number
+    from twinmill.swarm.sweep import progress_bar
 
 NOTE = (
     "Claims of Vega et al. 2024 (arXiv 2410.16444). The reference is an independent C program of "
@@ -57,13 +59,21 @@ def _claims(
             "--odd-turn", help="Of the bull's-eye's odd robot, over the ring's turn rate."
         ),
     ] = None,
+    mujoco_seeds: Annotated[
+        int,
+        typer.Option(
+            "--mujoco-seeds",
+            min=0,
+            help="Runs of each of 56 cells in MuJoCo, of three kinds; kept in DIR/mujoco.",
+        ),
+    ] = 0,
     as_json: AsJson = False,
     out: Out = None,
 ) -> int:
     """Check what was published of these swarms, with a figure of each claim.
 
     Exit code 1 if a number differs and it is not known why. DIR also gets claims.json and every
-    figure as SVG.
+    figure as SVG. Stopped in MuJoCo, the same command goes on where it was.
 
     Example: twinmill claims --out claims
     """
@@ -72,6 +82,8 @@ def _claims(
         raise ValueError(f"--only {unknown[0]}: must be one of {', '.join(CLAIMS)}.")
     if strange := [turn for turn in odd_turn or [] if not abs(turn) <= MOST_TURN]:
         raise ValueError(f"--odd-turn {strange[0]:g}: must be from -{MOST_TURN} to {MOST_TURN}.")
+    if mujoco_seeds and not out:
+        raise ValueError("--mujoco-seeds needs --out DIR, where its runs are kept.")
     if out:
         check_new_folder(out)
     found = []
@@ -80,8 +92,10 @@ def _claims(
             say(name)
             more = {"turns": tuple(odd_turn or ODD_TURNS)} if name == "bullseye" else {}
             found.append(CLAIMS[name](seeds, **more))
+    if mujoco_seeds:
+        found.append(_in_mujoco(mujoco_seeds, out / "mujoco"))
     source = Provenance(
-        _command_line(only, seeds, odd_turn),
+        _command_line(only, seeds, odd_turn, mujoco_seeds),
         f"twinmill {version('twinmill')}",
         hashlib.sha256(ModelFile.load("paper.toml").text.encode()).hexdigest(),
     )
@@ -104,9 +118,20 @@ def _claims(
     return 0 if agree else 1
 
 
-def _command_line(only: list[str] | None, seeds: int, odd_turn: list[float] | None) -> str:
+def _in_mujoco(seeds: int, folder: Path) -> Claim:
+    """Runs what is missing, with progress, and draws what is there."""
+    with progress_bar() as progress:
+        task = progress.add_task("worlds in MuJoCo", total=None)
+        run_layers(seeds, folder, lambda n, of: progress.update(task, completed=n, total=of))
+    return bodies(seeds, folder)
+
+
+def _command_line(
+    only: list[str] | None, seeds: int, odd_turn: list[float] | None, mujoco_seeds: int
+) -> str:
     words = ["twinmill claims", *(f"--only {name}" for name in only or [])]
     words += [f"--seeds {seeds}", *(f"--odd-turn {turn:g}" for turn in odd_turn or [])]
+    words += [f"--mujoco-seeds {mujoco_seeds}"] if mujoco_seeds else []
     return " ".join(words)
 
 

@@ -105,12 +105,17 @@ std::unique_ptr<Plant> MakeMujoco(const std::vector<Model> &models,
         MujocoOptions{.timestep_s = 0.005, .seed = seed, .lean = true});
 }
 
+void CheckPlant(const std::string &plant)
+{
+    if (plant != "planar" && plant != "mujoco")
+        throw std::invalid_argument("plant '" + plant + "' must be 'planar' or 'mujoco'");
+}
+
 // (W, 10): the metrics, the least diffusion, and since when the class has held.
 Array Run(const std::vector<const Cell *> &cells, Indices cell, Seeds seeds, double duration_s,
           bool full, const std::string &plant)
 {
-    if (plant != "planar" && plant != "mujoco")
-        throw std::invalid_argument("plant '" + plant + "' must be 'planar' or 'mujoco'");
+    CheckPlant(plant);
     if (cell.size() != seeds.size())
         throw std::invalid_argument("cell and seeds must be as long as each other");
     std::vector<World> worlds;
@@ -130,13 +135,16 @@ Array Run(const std::vector<const Cell *> &cells, Indices cell, Seeds seeds, dou
     return ToNumpy(std::move(rows), {worlds.size(), kMetrics + 2});
 }
 
-Array Trace(const Cell &cell, uint64_t seed, double duration_s, double every_s)
+Array Trace(const Cell &cell, uint64_t seed, double duration_s, double every_s,
+            const std::string &plant)
 {
+    CheckPlant(plant);
     std::vector<double> poses;
     size_t times = 0;
     {
         nb::gil_scoped_release unlocked;
-        for (const auto &at_once : TraceWorld({&cell, seed}, duration_s, every_s))
+        for (const auto &at_once : TraceWorld(plant == "mujoco" ? MakeMujoco : MakePlanarBodies,
+                                              {&cell, seed}, duration_s, every_s))
         {
             ++times;
             for (const Pose2 &pose : at_once)
@@ -217,7 +225,7 @@ void BindSwarms(nb::module_ &m)
         "(W, 10) OUTCOMES of worlds of cell and seed: METRICS and their least diffusion over the last "
         "10 s; since when the class has held, NaN of the batched kernel.");
     m.def("trace_world", &Trace, "cell"_a, "seed"_a, "duration_s"_a, "every_s"_a,
-          "(T, n, 3) poses of one world, the start first.");
+          "plant"_a = "planar", "(T, n, 3) poses of one world, the start first.");
     m.def("measure", &MeasureAll, "pose"_a, "velocity"_a, "ring_size"_a, "range_m"_a,
           "body_radius_m"_a,
           "(T, 8) METRICS of (T, n, 3) poses and body velocities (vx, vy, omega).");

@@ -132,9 +132,10 @@ std::vector<Outcome> RunWorldsIn(const PlantMaker &make, std::span<const World> 
     return outcomes;
 }
 
-std::vector<std::vector<Pose2>> TraceWorld(const World &world, double duration_s, double every_s)
+std::vector<std::vector<Pose2>> TraceWorld(const PlantMaker &make, const World &world,
+                                           double duration_s, double every_s)
 {
-    Swarm swarm = MakeSwarm(world, MakePlanarBodies);
+    Swarm swarm = MakeSwarm(world, make);
     const int steps = CountSteps(swarm.PeriodS(), duration_s).steps;
     const int stride = std::max(1, static_cast<int>(std::lround(every_s / swarm.PeriodS())));
     std::vector<std::vector<Pose2>> trace;

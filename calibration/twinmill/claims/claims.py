@@ -8,9 +8,11 @@ import numpy as np
 from scipy.stats import mannwhitneyu
 
 from twinmill.claims import figures
+from twinmill.claims.cuts import sensor, steps
+from twinmill.claims.pivot import pivot
 from twinmill.claims.published import Points
 from twinmill.claims.rows import Claim, Row, length, mean, median, share
-from twinmill.claims.swarms import KINDS, ROUND, Runs, run
+from twinmill.claims.swarms import KINDS, MAP, ROUND, Runs, run
 
 V_MPS = (0.10, 0.15, 0.20, 0.25, 0.30, 0.35)
 RING_RANGE = 2.534  # mean range of six standard normal numbers (Tippett 1925)
@@ -215,8 +217,7 @@ def region(seeds: int) -> Claim:
             curve = f"{kind}, {omega_degps} deg/s"
             where = {"kind": curve, "omega": omega_degps, "at": v_mps}
             rows.append(share(f"{curve}, {v_mps:g} m/s", hits, expected, **where))
-    grid = ["v_mps=0.1:0.35:7", "omega_degps=20:90:8"]
-    maps = {kind: run([*grid, *KINDS[kind]], seeds=max(10, seeds // 2)) for kind in KINDS}
+    maps = {kind: run([*MAP, *KINDS[kind]], seeds=max(10, seeds // 2)) for kind in KINDS}
     for name in FOUR_CLASSES:
         hits = maps["point"]["class"].ravel() == name
         rows.append(share(f"{name}, of all runs, point", hits, (0.002, 1.0)))
@@ -271,6 +272,9 @@ CLAIMS: dict[str, Callable[..., Claim]] = {
     "more_robots": more_robots,
     "region": region,
     "alike": alike,
+    "sensor": sensor,
+    "steps": steps,
+    "pivot": pivot,
 }
 
 

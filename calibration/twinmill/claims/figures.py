@@ -128,6 +128,34 @@ def curves(rows: list[Row], label: str, what: str) -> Figure:
     return Figure(draw(3.4 if len(kinds) < 4 else 4.2, paint), what.capitalize(), LEGEND)
 
 
+def cuts(rows: list[Row]) -> Figure:
+    """Shares by what is varied: a panel for each quantity."""
+    labels = list(dict.fromkeys(row.by["kind"] for row in rows))
+
+    def paint(panels) -> None:
+        for axes, label in zip(np.ravel(panels), labels, strict=False):
+            of = [row for row in rows if row.by["kind"] == label]
+            at = np.array([row.by["at"] for row in of])
+            ends = np.array([[row.value - row.low, row.high - row.value] for row in of]).T
+            axes.errorbar(at, [row.value for row in of], ends, fmt="o-", ms=3.5, color=FLOOR)
+            known = [row for row in of if row.reference]
+            axes.plot(
+                [row.by["at"] for row in known],
+                [row.reference[0] for row in known],
+                "D",
+                ms=8,
+                mfc="none",
+                mec=MEASURED,
+            )
+            axes.set_title(label, fontsize=8)
+            axes.set(ylim=(-0.06, 1.08))
+        for axes in np.ravel(panels)[len(labels) :]:
+            axes.set_axis_off()
+
+    lines = -(-len(labels) // 2)
+    return Figure(draw(1.5 * lines + 0.3, paint, nrows=lines, ncols=2), "Share that mills", LEGEND)
+
+
 def maps(runs_of: dict[str, Runs]) -> list[Figure]:
     """The phase diagram of each kind of robot."""
     made = []

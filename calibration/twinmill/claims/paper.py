@@ -66,20 +66,23 @@ PARTS = (
     ),
     Part(
         "Circliness and diffusion tell the behaviours",
-        ("alike", "diffusing"),
+        ("alike", "diffusing", "pivot"),
         open="About which middle circliness is taken: the centroid in the text, the middle of the "
         "bounding box in the authors' public model.",
     ),
-    Part("Four classes over 56 pairs of speed and turn rate", ("region",), open="Runs of a cell."),
+    Part(
+        "Four classes over 56 pairs of speed and turn rate",
+        ("region", "steps", "bodies"),
+        open="Runs of a cell, and how a run is classed that ends between two classes.",
+    ),
     Part(
         "A mill with one odd robot",
-        ("bullseye",),
+        ("bullseye", "bodies"),
         open="The sign of its turn: -3 in the text; with +3 it comes nearer to the middle.",
     ),
     Part(
         "How many robots, how alike, how fast, how good a sensor",
-        ("more_robots", "alike", "region"),
-        elsewhere="As curves: twinmill ask.",
+        ("more_robots", "alike", "region", "sensor"),
     ),
     Part(
         "Measured speeds and turns of the robots",

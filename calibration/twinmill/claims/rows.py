@@ -124,13 +124,15 @@ def share(
 def mean(
     what: str,
     values: np.ndarray,
-    reference: float | tuple[float, float],
+    reference: float | tuple[float, float] | None,
     rounding: float = 0.0,
     **by,
 ) -> Row:
     """A mean over runs, against one over as many that was rounded."""
     value, error = float(values.mean()), float(values.std(ddof=1) / np.sqrt(values.size))
     low, high = value - 1.96 * error, value + 1.96 * error
+    if reference is None:
+        return Row(what, value, low, high, None, None, by=by)
     bounds = _bounds(reference)
     off = value - float(np.clip(value, *bounds))
     off /= np.hypot(np.sqrt(2) * error, rounding / np.sqrt(12))

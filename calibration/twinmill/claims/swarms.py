@@ -20,6 +20,7 @@ KINDS = {
     "disc": [*BODIES, "target_radius_m=0.1", "range_m=1.2"],
     "robot": [*BODIES, "miss_rate=0.04", "false_rate=0.1", "vote=10"],
 }
+MAP = ["v_mps=0.1:0.35:7", "omega_degps=20:90:8"]  # 56 cells, as published
 ROUND = 0.2  # circliness below which the reference calls it a mill
 
 
@@ -42,7 +43,14 @@ class Runs:
     def trace(self, duration_s: float, seed: int = 1) -> np.ndarray:
         """(T, n, 3) poses of one run of the first cell, ten a second."""
         cell = self.request.cell(self.request.points[0])
-        return native.trace_world(cell, seed, duration_s, 0.1)
+        return native.trace_world(cell, seed, duration_s, 0.1, self.request.plant)
+
+    def end(self, seed: int, every_s: float, length_s: float = 8.0) -> np.ndarray:
+        """(T, n, 3) poses of the end of a run of the first cell."""
+        request = self.request
+        cell = request.cell(request.points[0])
+        trace = native.trace_world(cell, seed, request.duration_s, every_s, request.plant)
+        return trace[-round(length_s / every_s) :]
 
 
 def run(axes: list[str], behavior: str = "milling", **rest) -> Runs:

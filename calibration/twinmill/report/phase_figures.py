@@ -261,9 +261,8 @@ def _typical(phase: Phase, cell: int, k: int) -> np.ndarray:
     rows = slice(cell * phase.seeds, (cell + 1) * phase.seeds)
     ended = phase.table["class"].to_pylist()[rows]
     seed = phase.table["seed"].to_pylist()[rows][ended.index(CLASSES[k])]
-    trace = native.trace_world(
-        request.cell(request.points[cell]), seed, request.duration_s, TRACE_EVERY_S
-    )
+    swarm = request.cell(request.points[cell])
+    trace = native.trace_world(swarm, seed, request.duration_s, TRACE_EVERY_S, request.plant)
     return trace[-int(TRACE_S / TRACE_EVERY_S) :]
 
 

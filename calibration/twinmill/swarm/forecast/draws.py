@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Probabilities of the classes in each cell of a sweep, by models drawn from the uncertainty."""
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 import pyarrow as pa
@@ -86,16 +89,21 @@ def forecast(
 
     def advance(worlds: int) -> None:
         nonlocal done
-        done += worlds
-        tell(done, planned)
+        with lock:
+            done += worlds
+            tell(done, planned)
 
-    counts = []
-    for k, text in enumerate(drawn_models(request, count, seed)):
-        first = request.first_seed + request.world_count + k * len(points) * seeds
+    def counts_of(number: int, text: str) -> np.ndarray:
+        first = request.first_seed + request.world_count + number * len(points) * seeds
         asked = replace(request, model_text=text, seeds=seeds, first_seed=first)
         place = folder / asked.sha256[:16]
-        run_missing(asked, place, advance)
-        counts.append(_counts(read_sweep(place)[1], len(points)))
+        run_missing(asked, place, advance, workers=1)
+        return _counts(read_sweep(place)[1], len(points))
+
+    # A model's runs are one part or a few: models, not parts, go side by side.
+    lock, texts = Lock(), drawn_models(request, count, seed)
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        counts = list(pool.map(counts_of, range(count), texts))
     return Forecast(points, swept, _shrunk(np.array(counts)))
 
 

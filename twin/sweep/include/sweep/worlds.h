@@ -36,7 +36,8 @@ std::vector<Outcome> RunWorldsIn(const PlantMaker &make, std::span<const World> 
                                  double duration_s);
 
 // Poses of one world by the full path, every `every_s`, the start first: robots within times.
-std::vector<std::vector<Pose2>> TraceWorld(const World &world, double duration_s, double every_s);
+std::vector<std::vector<Pose2>> TraceWorld(const PlantMaker &make, const World &world,
+                                           double duration_s, double every_s);
 
 }  // namespace twin
 
