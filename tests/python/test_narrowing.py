@@ -6,9 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import twinmill_native as native
+from scipy.optimize import least_squares
 
 from twinmill.data.measurement import load_measurements
 from twinmill.experiment.design import Limits
+from twinmill.experiment.foresight import Played
+from twinmill.experiment.moves import family
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill.swarm import narrowing
@@ -119,3 +123,57 @@ def test_where_all_draws_end_alike_there_is_nothing_to_narrow(planted, monkeypat
     )
     with pytest.raises(ValueError, match=r"end alike \(100% to 100%"):
         run([*planted, "--draws", "6"])
+
+
+def refit(scene, moves, gains, seed):
+    """Both gains from one drive of a robot that has `gains`: by ways over a quarter of a second.
+
+    Nothing of the design's: the twin drives with its noise, SciPy fits the ways that it went.
+    """
+    played = Played.of([moves], scene)
+    stride = round(0.25 / scene.measurement.track.timing.pose_period_s)
+
+    def ways(pose):
+        d = pose[stride:] - pose[:-stride]
+        c, s = np.cos(pose[:-stride, 2]), np.sin(pose[:-stride, 2])
+        return np.stack([c * d[:, 0] + s * d[:, 1], c * d[:, 1] - s * d[:, 0], 0.1 * d[:, 2]], 1)
+
+    def model(values):
+        made = scene.model.copy()
+        for name, value in zip(NAMES, values, strict=False):
+            made.set(name, float(value))
+        return made
+
+    start = np.zeros((len(played.part), 3))
+    seen = ways(native.replica(model(gains), played._track(start), seed))
+    prior = STDS[:2]
+
+    def off(values):
+        ways_off = (ways(played.path(model(values), start[0])) - seen).ravel() / 1e-3
+        return np.concatenate([ways_off, (values - 1) / prior])
+
+    return least_squares(off, np.ones(2), diff_step=1e-3).x
+
+
+def test_a_refit_knows_the_outcome_best_after_the_run_that_was_designed_for_it(scene):
+    """Of runs as long: that for the other gain, and moves at random. The outcome is planted."""
+    random = np.random.default_rng(3)
+    truths = 1 + STDS[:2] * random.normal(size=(40, 2))
+    slope = np.array([0.3, 3.0])
+    limits = Limits(8.0, (3.0, 3.0), 1.0)
+    own = design_for(spread([*slope, 0]), "milling", scene, limits, 1.0)
+    other = design_for(spread([3, 0, 0]), "milling", scene, limits, 1.0)
+    moves = family(1.0)
+    runs = {"own": own.moves, "other": other.moves}
+    for k in range(3):
+        order = [moves[i] for i in random.permutation(len(moves))]
+        ends_s = np.cumsum([m.duration_s for m in order])
+        runs[f"random {k}"] = order[: int(np.searchsorted(ends_s, 6.0))]
+    left = {
+        name: np.sqrt(
+            np.mean([(slope @ (refit(scene, run, t, k) - t)) ** 2 for k, t in enumerate(truths)])
+        )
+        for name, run in runs.items()
+    }
+    assert left["own"] == min(left.values())
+    assert left["own"] < 0.2 * own.stds[0]
