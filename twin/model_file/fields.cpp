@@ -42,6 +42,7 @@ static const Field kFields[] = {
     {"idiosyncrasy", "theta_a2_std", "1", 0, 1, AT(idiosyncrasy.theta_a2_std), false},
     {"clock", "offset_s", "s", -10, 10, AT(clock.offset_s), false, 0, "observe"},
     {"clock", "rate_ppm", "ppm", -1e6, 1e6, AT(clock.rate_ppm), false, 0, "observe"},
+    {"frame", "heading_rad", "rad", -3.1416, 3.1416, AT(frame.heading_rad), false, 0, "observe"},
     {"", "theta_a1", "1", 0.05, 5, AT(theta_a1), true, 0, "ground"},
     {"", "theta_a2", "1", 0.05, 5, AT(theta_a2), true, 0, "ground"},
 };

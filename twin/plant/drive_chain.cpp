@@ -122,6 +122,7 @@ DriveChain::DriveChain(const Model &model)
     : base_(model.base),
       noise_(model.noise),
       clock_(model.clock),
+      frame_(model.frame),
       theta_a1_(model.theta_a1),
       theta_a2_(model.theta_a2),
       robot_(FactsOf(model)),
@@ -309,12 +310,14 @@ void DriveChain::Observe(Pose2 &pose, double &t_s) const
         pose = {seen.x_m, seen.y_m, seen.theta_rad};
         t_s = seen.t_s;
     }
+    pose.theta_rad -= frame_.heading_rad;
     t_s = t_s * (1 + clock_.rate_ppm * 1e-6) + clock_.offset_s;
 }
 
 void DriveChain::Invert(Pose2 &pose, double &t_s) const
 {
     t_s = (t_s - clock_.offset_s) / (1 + clock_.rate_ppm * 1e-6);
+    pose.theta_rad += frame_.heading_rad;
     if (observe_.empty())
         return;
     ObservedPose seen{pose.x_m, pose.y_m, pose.theta_rad, t_s};

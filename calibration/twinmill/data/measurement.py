@@ -231,9 +231,7 @@ def _played(track: Track) -> native.Track:
         t_s = np.insert(t_s, silent + 1, t_s[silent] + SILENCE_S)
         command = np.insert(command, silent + 1, 0.0, axis=0)
         battery_V = np.insert(battery_V, silent + 1, battery_V[silent])
-    pose = track.pose.copy()
-    if not track.has_heading:  # taken to be held: body and world are one frame
-        pose[:, 2] = 0.0
+    pose = np.column_stack([track.pose[:, :2], track.heading_rad])
     return native.Track(
         *(np.ascontiguousarray(a, float) for a in (t_s, command, battery_V, track.pose_t_s, pose)),
         np.ascontiguousarray(track.segment, np.int64),

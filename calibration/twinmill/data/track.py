@@ -75,6 +75,11 @@ class Track:
     same_clock: bool = False
     astray_rad: float = 0.0
 
+    @property
+    def heading_rad(self) -> np.ndarray:
+        """(N,) of `pose`; zero where the heading was not recorded."""
+        return self.pose[:, 2] if self.has_heading else np.zeros(len(self.pose))
+
 
 def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.0) -> Track:
     """Cleans one robot's series.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is left over once the found effects are in the model: how much, how firm, depending on what.
 
-How much: the squared score above 1. How firm: whether the smooth response of the noise floor
+How much: the squared error over the floor, above 1. How firm: whether the smooth response of the noise floor
 predicts left-out parts better than the model does, block by block. On what: ridge regression of
 the errors on groups of velocity terms without physics names, each judged on parts that it was not
 fitted to.
@@ -45,7 +45,7 @@ class Rest:
     """What is left over.
 
     Attributes:
-        share: of the squared score above 1 that the model as given had.
+        share: of the squared error above the floor that the model as given had.
         firm: the smooth response predicts left-out parts better, beyond doubt.
         depends_on: groups, the strongest first.
         term, coefficient: the best single formula, in its unit; None if no group helps.
@@ -134,8 +134,7 @@ def formulas_of(opened: Sequence[Opened], fit: ScoreFit) -> Formulas | None:
 def rest_of(
     formulas: Formulas | None,
     fit: ScoreFit,
-    first_score: float,
-    last_score: float,
+    first: ScoreFit,
     known: Mapping[str, float],
 ) -> Rest:
     """Tests what a fit leaves.
@@ -143,12 +142,11 @@ def rest_of(
     Args:
         formulas: over the fit's logs, as the final model moves.
         fit: of the final model.
-        first_score: held out, of the model as given.
-        last_score: held out, of the fit.
+        first: of the model as given.
         known: what the model left in other logs already, as `left_over`.
     """
-    excess = max(first_score**2 - 1, last_score**2 - 1, 1e-9)
-    share = float(max(last_score**2 - 1, 0.0) / excess)
+    left = max(fit.held_square - 1, 0.0)
+    share = left / max(first.held_square - 1, left, 1e-9)
     if formulas is None:
         return Rest(share, False, [])
     logs = formulas.logs

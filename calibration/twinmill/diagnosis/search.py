@@ -15,6 +15,7 @@ import twinmill_native as native
 
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
+    GAINS,
     LAG,
     MOTION_STAGES,
     Parameter,
@@ -28,6 +29,7 @@ from twinmill.model.parameters import (
 from twinmill.predict.datasets import Dataset, Trajectory, total_score
 
 STRICTEST = 3.0
+COMMON = 1.01  # times a score: no worse
 NEWS = 1.1  # times the known score: less is no news
 REFIT = "refit"  # the base's numbers were stale: a candidate like any effect
 
@@ -302,6 +304,9 @@ def _best(
     """
     good = []
     for trial in trials:
+        if trial.names == (REFIT,) and _is_common(before, trial, settings):
+            good.append(trial)
+            continue
         fall = before.held_score**2 - trial.held_score**2
         if fall <= 0:
             continue
@@ -317,6 +322,21 @@ def _best(
         if t.names == (REFIT,) and t.fit.held_cost - best.fit.held_cost < settings.tie
     ]
     return stale[0] if stale else best
+
+
+def _is_common(before: Trial, refit: Trial, settings: Settings) -> bool:
+    """Whether the base's numbers take what each robot's own gains took, and all took alike.
+
+    That makes no prediction better; it is far more likely than as many robots that are no usual
+    ones.
+    """
+    as_good = refit.held_score < COMMON * before.held_score
+    return as_good and refit.evidence > settings.evidence and bool(_own_gains(before))
+
+
+def _own_gains(trial: Trial) -> set[str]:
+    """Gains that robots have of their own."""
+    return {p.name for d in trial.state.datasets for p in d.own} & set(GAINS)
 
 
 def _least_fall(score: float, first_excess: float, settings: Settings) -> float:
@@ -696,7 +716,10 @@ def _imitators(
     base: Trial, before: Trial, trials: Sequence[Trial], settings: Settings
 ) -> list[Trial]:
     """Trials of one effect of the levels that do what other numbers of the base do."""
-    least = settings.imitates * (before.held_score**2 - base.held_score**2)
+    fall = before.held_score**2 - base.held_score**2
+    if fall < settings.worth * before.held_score**2:  # robots' own gains took it all
+        return []
+    least = settings.imitates * fall
     levels = of_levels()
     alike = [
         t

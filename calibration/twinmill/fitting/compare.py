@@ -11,7 +11,7 @@ from twinmill.data.steady_table import Sheet
 from twinmill.fitting.floor import NoiseFloor
 from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import CLOCK
+from twinmill.model.parameters import CLOCK, HEADING
 from twinmill.predict.datasets import total_score
 from twinmill.predict.detection_errors import BitComparison, compare_bits
 from twinmill.predict.detections import bit_scenes
@@ -162,7 +162,17 @@ def comparison(model_file: ModelFile, opened: Sequence[Opened]) -> Comparison:
     """Of measurements as they stand."""
     warnings = [f"{o.measurement.label}: {w}" for o in opened for w in o.measurement.warnings]
     warnings += [f"{o.floor.reason}." for o in opened if o.floor and o.floor.reason]
+    warnings += [_held_heading(o) for o in opened if o.data is not None and o.heading_held]
     return Comparison(model_file.path.name, [compare_robot(o) for o in opened], warnings)
+
+
+def _held_heading(own: Opened) -> str:
+    """At which angle a robot seems to hold a heading that was not recorded."""
+    angle_deg = np.degrees(own.model.get(HEADING))
+    return (
+        f"{own.measurement.label}: its motion fits its commands best if it holds its heading at "
+        f"{angle_deg:.0f} degrees to the axes of the poses."
+    )
 
 
 def compare(measurements: Sequence[Measurement | Sheet], model_file: ModelFile) -> Comparison:

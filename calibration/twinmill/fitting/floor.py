@@ -15,6 +15,7 @@ from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     BASE_GAINS,
     CLOCK,
+    HEADING,
     LAG,
     base_parameters,
     duty_table,
@@ -40,6 +41,7 @@ class NoiseFloor:
         kind: "response"; None if the log cannot give a floor.
         reason: why it cannot; empty otherwise.
         offset_s: capture's clock less the robot's, with which it was found.
+        heading_rad: that the robot holds where it was not recorded; else 0.
         lateness_s: lag and delay of the base refitted to the log; NaN where the clocks are two.
         across: (W, H, 3) errors of the response on parts that it was not fitted to.
         response: itself.
@@ -50,6 +52,7 @@ class NoiseFloor:
     kind: str | None
     reason: str
     offset_s: float
+    heading_rad: float
     lateness_s: float
     across: np.ndarray
     response: Response | None
@@ -84,6 +87,7 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
         "response",
         "",
         offset_s,
+        base.get(HEADING),
         base.get(LAG) + (base.get("input_delay.delay_s") if same_clock else np.nan),
         response.across,
         response,
@@ -108,6 +112,9 @@ def base_response(
     else:
         base.set(CLOCK, coarse_offset_s(data, base))
         late = base_parameters(base, [CLOCK])
+    if not data.measurement.track.has_heading:
+        base.set(HEADING, coarse_heading_rad(data, base))
+        late += base_parameters(base, [HEADING])
     for _ in range(3):
         own = data.over(rms(data.errors(base)))
         free = [p.at(base.get(p.name)) for p in base_parameters(base, names) + late]
@@ -125,7 +132,7 @@ def body_velocity_at(
     predicted = native.one_step(model, data.measurement.played)
     track = data.measurement.track
     step_s = np.diff(track.pose_t_s, prepend=track.pose_t_s[0] - 1.0)
-    before = np.roll(track.pose, 1, axis=0)
+    before = np.roll(np.column_stack([track.pose[:, :2], track.heading_rad]), 1, axis=0)
     step = predicted - before
     middle = before[:, 2] + step[:, 2] / 2
     c, s = np.cos(middle), np.sin(middle)
@@ -140,6 +147,14 @@ def coarse_offset_s(data: Trajectory, base: native.Model) -> float:
     grid = np.arange(-REACH_S, REACH_S + 0.01, 0.05) + base.get(CLOCK)
     own = data.over(rms(data.measured))
     squares = (own.rows(base, [CLOCK], grid[:, None]) ** 2).sum(axis=1)
+    return float(grid[np.argmin(squares)])
+
+
+def coarse_heading_rad(data: Trajectory, base: native.Model) -> float:
+    """Heading at which the base predicts best, of a whole turn in steps of 15 degrees."""
+    grid = np.radians(np.arange(-180.0, 180.0, 15.0))
+    own = data.over(rms(data.measured))
+    squares = (own.rows(base, [HEADING], grid[:, None]) ** 2).sum(axis=1)
     return float(grid[np.argmin(squares)])
 
 
@@ -191,4 +206,4 @@ def _none(data: Trajectory, reason: str) -> NoiseFloor:
     nothing = np.full(data.floor.shape, np.nan)
     empty = np.full(data.measured.shape, np.nan)
     everything = np.ones(len(data.measured), bool)
-    return NoiseFloor(nothing, everything, None, reason, 0.0, np.nan, empty, None)
+    return NoiseFloor(nothing, everything, None, reason, 0.0, 0.0, np.nan, empty, None)

@@ -13,7 +13,15 @@ from twinmill.data.steady_table import Sheet
 from twinmill.fitting.floor import NoiseFloor, noise_floor
 from twinmill.fitting.score_fit import ROUNDS, ScoreFit
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import CLOCK, CLOCK_RATE, GAINS, Parameter, base_parameters
+from twinmill.model.parameters import (
+    ALIGNMENT,
+    CLOCK,
+    CLOCK_RATE,
+    GAINS,
+    HEADING,
+    Parameter,
+    base_parameters,
+)
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.problem import Scene
 from twinmill.steady.scene import SteadyScene
@@ -51,6 +59,11 @@ class Opened:
         """Whether the log or the model file declares that one clock stamped all."""
         return self.floor is not None and (self.measurement.same_clock or self.model.clock_same)
 
+    @property
+    def heading_held(self) -> bool:
+        """Whether the heading was not recorded, so that the robot is taken to hold one."""
+        return self.floor is not None and not self.measurement.track.has_heading
+
     def scene(self) -> Scene | SteadyScene:
         """What reports and other tests look at: measurement, model, noise."""
         if isinstance(self.data, SteadyScene):
@@ -60,20 +73,27 @@ class Opened:
     def aligned(
         self, model: native.Model, offset_s: float | None = None, rounds: int = ROUNDS
     ) -> "Opened":
-        """The same with another model, on the clock with which that predicts best.
+        """The same with another model, on the clock and heading with which that predicts best.
 
-        One clock for commands and poses is kept, and that of a measurement without a floor.
+        One clock for commands and poses is kept, a heading that was recorded, and both of a
+        measurement without a floor.
 
         Args:
             model: of all robots.
             offset_s: where the search begins; by default where the floor was found.
             rounds: of the search.
         """
-        if self.same_clock or self.data is None:
+        if self.data is None or (self.same_clock and not self.heading_held):
             return self.with_model(model)
-        own = model.for_robot(self.measurement.track.robot_id)
-        own.set(CLOCK, self.floor.offset_s if offset_s is None else offset_s)
-        data = replace(self.data, own=_clock(own))
+        own = self.with_model(model).model
+        unknown = []
+        if not self.same_clock:
+            own.set(CLOCK, self.floor.offset_s if offset_s is None else offset_s)
+            unknown += _clock(own)
+        if self.heading_held:
+            own.set(HEADING, self.floor.heading_rad)
+            unknown += base_parameters(own, [HEADING])
+        data = replace(self.data, own=tuple(unknown))
         fit = ScoreFit([data], [own], []).fit(rounds)
         return replace(self, data=data, model=fit.models[0])
 
@@ -85,7 +105,7 @@ class Opened:
         """The same with another model, on the same clock."""
         own = model.for_robot(self.measurement.track.robot_id) if self.floor else model
         if self.floor:
-            for name in (CLOCK, CLOCK_RATE):
+            for name in ALIGNMENT:
                 own.set(name, self.model.get(name))
         else:
             own = model.for_robot(self.measurement.robot_id)
@@ -120,19 +140,17 @@ def _open(measurement: Measurement | Sheet, model_file: ModelFile) -> Opened:
     if floor.kind is None:
         return Opened(measurement, None, model, floor, told or declared)
     data = data.over(floor.rms, floor.keep)
-    if told or declared:
-        return Opened(measurement, data, model, floor, True)
-    return Opened(measurement, data, model, floor, False).aligned(model)
+    return Opened(measurement, data, model, floor, told or declared).aligned(model)
 
 
-def _clock(model: native.Model) -> tuple[Parameter, ...]:
+def _clock(model: native.Model) -> list[Parameter]:
     """Offset and rate of one measurement's clock."""
     offset, rate = base_parameters(model, [CLOCK, CLOCK_RATE])
     at = offset.value
-    return (
+    return [
         replace(offset, min=at - CLOCK_REACH_S, max=at + CLOCK_REACH_S),
         replace(rate, usual=0.0, min=-RATE_REACH_PPM, max=RATE_REACH_PPM),
-    )
+    ]
 
 
 def on_clock_of_others(own: Opened, opened: Sequence[Opened]) -> Opened:
@@ -177,8 +195,9 @@ def with_own_gains(opened: Sequence[Opened]) -> list[Opened]:
 
 
 def _with_gains(own: Opened) -> Opened:
+    names = GAINS if own.measurement.track.has_heading else GAINS[:1]  # else it is never turned
     gains = []
-    for p in base_parameters(own.model, GAINS):
+    for p in base_parameters(own.model, names):
         spread = own.model.get(f"idiosyncrasy.{p.name}_std") or SPREAD
         gains.append(replace(p, usual=1.0, std=spread))
     return replace(own, data=replace(own.data, own=(*own.data.own, *gains)))

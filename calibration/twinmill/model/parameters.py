@@ -10,14 +10,16 @@ import twinmill_native as native
 
 MOTION_STAGES = ("duty", "wheel", "ground", "observe")  # what the path of one robot shows
 CLOCK, CLOCK_RATE = "clock.offset_s", "clock.rate_ppm"
+HEADING = "frame.heading_rad"  # that a robot holds in a log that does not record it
+ALIGNMENT = (CLOCK, CLOCK_RATE, HEADING)  # of one log, not of a robot
 GAINS = ("theta_a1", "theta_a2")  # of one robot: speed, and rate of turn
 BASE_GAINS = ("base.forward_gain", "base.sideways_gain", "base.yaw_gain")
 LAG = "base.motor_lag_s"
 
 # Standard deviations of the base's priors: as robots differ from their data sheets.
-USUAL_STD = {LAG: 0.3, CLOCK: 0.3, CLOCK_RATE: 30.0}
+USUAL_STD = {LAG: 0.3, CLOCK: 0.3, CLOCK_RATE: 30.0, HEADING: 1.0}
 GAIN_STD = 0.15
-BASE_STEP = {LAG: 0.004, CLOCK: 0.006, CLOCK_RATE: 5.0}
+BASE_STEP = {LAG: 0.004, CLOCK: 0.006, CLOCK_RATE: 5.0, HEADING: 0.005}
 GAIN_STEP = 0.004
 EFFECT_STEP = 0.05  # times the distance of an effect's default from its neutral value
 

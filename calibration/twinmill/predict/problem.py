@@ -8,7 +8,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import command_at
-from twinmill.model.parameters import CLOCK, CLOCK_RATE, stated_names
+from twinmill.model.parameters import ALIGNMENT, CLOCK, stated_names
 from twinmill.predict.flexible import unexplained
 from twinmill.predict.noise import Noise, fit_noise
 from twinmill.predict.residual import StepGrid
@@ -46,7 +46,7 @@ class Scene:
     def with_model(self, model: native.Model) -> "Scene":
         """The same measurement, clock and noise with another model."""
         model = model.for_robot(self.measurement.track.robot_id)
-        for name in (CLOCK, CLOCK_RATE):
+        for name in ALIGNMENT:
             model.set(name, self.model.get(name))
         return replace(self, model=model)
 

@@ -74,9 +74,11 @@ def body_velocity(measurement: Measurement, grid: StepGrid, model: native.Model)
     """
     track = measurement.track
     predicted = native.one_step(model, measurement.played)
-    step = predicted[grid.source] - track.pose[grid.origin]
-    middle_rad = track.pose[grid.origin, 2] + step[:, 2] / 2
-    body = np.column_stack([*rotate(step[:, 0], step[:, 1], -middle_rad), step[:, 2]])
+    from_rad = track.heading_rad[grid.origin]
+    turn_rad = predicted[grid.source, 2] - from_rad
+    step = predicted[grid.source, :2] - track.pose[grid.origin, :2]
+    middle_rad = from_rad + turn_rad / 2
+    body = np.column_stack([*rotate(step[:, 0], step[:, 1], -middle_rad), turn_rad])
     return body * (grid.share / grid.period_s)[:, None]
 
 

@@ -6,6 +6,7 @@ import gzip
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from twinmill.data import measurement
 from twinmill.data.importers.import_log import ImportOptions, import_log
@@ -28,6 +29,16 @@ body_radius_m = 0.2
 drive = "wheel_speed"
 wheels = "mecanum"
 control_period_s = 0.01
+"""
+OMNI = """
+name = "omni"
+[robot]
+body_radius_m = 0.15
+[base]
+drive = "twist"
+wheels = "none"
+motor_lag_s = 0
+control_period_s = 0.05
 """
 CART = """
 name = "cart"
@@ -164,6 +175,41 @@ def test_a_top_speed_of_the_controller_is_no_slip(tmp_path):
     assert found.findings[0].effect == "speed_limit"
     (pace,) = found.findings[0].parameters
     assert 1 / pace.value == pytest.approx(limit_mps, abs=0.005)
+
+
+def test_a_heading_that_a_robot_holds_and_nobody_recorded_is_found(tmp_path):
+    """Three robots at 30, -150 and 5 degrees, 0.8 of what they are told, a lag of 0.2 s."""
+    random = np.random.default_rng(11)
+    held_rad = np.radians((30, -150, 5))
+    logs = [strafing_log(tmp_path, k, angle, random) for k, angle in enumerate(held_rad, 1)]
+    found = diagnose(load_measurements(logs), model_file(tmp_path, OMNI))
+    headings_rad = [o.model.get("frame.heading_rad") for o in found.opened]
+    assert headings_rad == pytest.approx(held_rad, abs=0.01)
+    assert found.late.sum_s == pytest.approx(0.2, abs=0.01)
+    model = found.search.last.state.model
+    assert model.get("base.forward_gain") == pytest.approx(0.8, abs=0.01)
+    assert {"refit", "motor_lag"} == {f.effect for f in found.findings}
+    assert found.search.last.held_score == pytest.approx(1, abs=0.1)
+    assert "heading_bias" in dict(found.not_identifiable)
+
+
+def strafing_log(folder, number, held_rad, random, period_s=0.05):
+    """A robot that drives along any direction and never turns; its poses are positions alone."""
+    told = np.repeat(random.uniform(-0.3, 0.3, (50, 2)), 20, axis=0)
+    parts = 20  # of a period
+    step = 1 - np.exp(-period_s / parts / 0.2)
+    driven = lfilter([step], [1, step - 1], 0.8 * np.repeat(told, parts, axis=0), axis=0)
+    c, s = np.cos(held_rad), np.sin(held_rad)
+    xy = (np.cumsum(driven @ [[c, s], [-s, c]], axis=0) * period_s / parts)[parts - 1 :: parts]
+    t_s = period_s * np.arange(len(told))
+    pose = np.column_stack([t_s + period_s, xy + 5e-4 * random.normal(size=xy.shape)])
+    command = np.column_stack([t_s, told, 0 * t_s])
+    poses, commands = folder / f"p{number}.csv", folder / f"c{number}.csv"
+    write_csv(poses, "t_s,x_m,y_m", pose)
+    write_csv(commands, "t_s,vx_mps,vy_mps,omega_radps", command)
+    log = folder / f"run{number}.lcmlog"
+    import_log(poses, commands, log, options=ImportOptions(robot_id=number, same_clock=True))
+    return log
 
 
 def diagnosed_cart(folder, told, driven, random, period_s=0.02):

@@ -156,18 +156,22 @@ def hera(imported, model_of):
 
 
 def test_robots_told_velocities_are_slow_and_late(hera):
-    """README: gain 0.72 of all (0.6 to 0.75 with robot 1), lag and delay 0.33 s in all."""
+    """README: gain 0.72 of all, lag and delay 0.33 s in all, under one turn of the frame.
+
+    Regressions with a turn for each robot and run, by quarters of the runs: gain 0.74 to 0.82, lag
+    and delay 0.20 to 0.34 s.
+    """
     assert hera.verdict in ("effect_missing", "ambiguous", "refit_enough")
-    assert 0.3 <= hera.late.sum_s <= 0.5
+    assert 0.2 <= hera.late.sum_s <= 0.4
     assert {"motor_lag", "input_delay"} & set(hera.found)
     gains = [hera.model.get(f"base.{k}_gain") for k in ("forward", "sideways")]
-    assert all(0.55 < g < 0.8 for g in gains)
+    assert all(0.6 < g < 0.85 for g in gains)
     assert hera.findings[0].share > 0.2
 
 
 def test_what_no_effect_takes_is_said_to_be_left(hera):
-    """README: 27 to 29 % stay open, mostly in fast moves."""
-    assert 0.10 < hera.rest.share < 0.40
+    """README: 27 to 29 % stay open; with a turn for each robot and run 7 to 11 %."""
+    assert 0.05 < hera.rest.share < 0.40
     assert "left" in hera.sentence
 
 

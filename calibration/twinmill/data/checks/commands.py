@@ -89,6 +89,9 @@ def check_commands(subject: Subject) -> tuple[list[InputFinding], Search | None,
     body = subject.body if track.has_heading else subject.body * np.array([[1], [1], [0]])
     search = Search(motion, body)
     own = search.own()
+    if not track.has_heading:  # held at an angle that nobody recorded, which is no mistake
+        held = [a for a in pose_alternatives() if a.turned and not a.mirrored and a.heading_sign > 0]
+        own = min([own, *search.best(held)], key=lambda e: e.left)
     speed_mps = float(np.sqrt(np.mean(np.abs(motion.world_mps) ** 2)))
     if speed_mps < LEAST_MPS and np.abs(motion.turn_radps).max() < 0.2:
         return [], search, own
@@ -99,9 +102,7 @@ def check_commands(subject: Subject) -> tuple[list[InputFinding], Search | None,
 
 def _mistakes(subject: Subject, search: Search, own: Explained) -> list[InputFinding]:
     track = subject.track
-    poses = pose_alternatives()
-    if not track.has_heading:
-        poses = [a for a in poses if a.turned and not a.mirrored and a.heading_sign > 0]
+    poses = pose_alternatives() if track.has_heading else []
     found = search.best(wheel_alternatives(columns_in_use(subject.body)) + poses)
     found = [e for e in found if not _is_bias(e)]
     best = min(found, key=lambda e: e.left)

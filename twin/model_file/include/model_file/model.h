@@ -74,6 +74,12 @@ struct Clock
     double offset_s = 0, rate_ppm = 0;
 };
 
+// Where a robot heads in the frame of poses whose heading is zero because none was recorded.
+struct Frame
+{
+    double heading_rad = 0;
+};
+
 struct EffectInstance
 {
     const EffectSpec *spec;
@@ -139,6 +145,7 @@ public:
     Noise noise;
     Idiosyncrasy idiosyncrasy;
     Clock clock;
+    Frame frame;
     double theta_a1 = 1, theta_a2 = 1;  // this robot's factors on speed and turn rate
     std::vector<EffectInstance> effects;
     // By robot: "range_m" and the like for fields, "wheel_gain.front_left" for effects.

@@ -62,6 +62,7 @@ private:
     Base base_;
     Noise noise_;
     Clock clock_;
+    Frame frame_;
     double theta_a1_, theta_a2_;
     RobotFacts robot_;
     Kinematics kinematics_;
