@@ -152,7 +152,9 @@ def _unseen(opened: Sequence[Opened]) -> dict[str, str]:
                 "(twinmill import --same-clock), or fit a calibration log on the same clocks first"
             )
         if all(o.heading_held for o in opened if o.floor):
-            found["heading_bias"] = "the heading was not recorded, and what the robot holds is found"
+            found["heading_bias"] = (
+                "the heading was not recorded, and what the robot holds is found"
+            )
         if len({_robot_of(o) for o in opened}) > 1:
             found["collision"] = CONTACTS
     return found
@@ -176,9 +178,7 @@ def _concluded(
     findings = with_stale_numbers(
         findings, last.state.model, model_file.lag_std_s(hashes), model_file.effect_stds
     )
-    rest = rest_of(
-        formulas, last.fit, start.fit, model_file.left_over(hashes)
-    )
+    rest = rest_of(formulas, last.fit, start.fit, model_file.left_over(hashes))
     models = zip(known, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]

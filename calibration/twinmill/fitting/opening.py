@@ -122,11 +122,11 @@ def open_measurements(
     nobody all the while has one command) takes that of the others in its log.
 
     """
-    opened = [_open(m, model_file) for m in measurements]
+    opened = [_open(m, model_file, k) for k, m in enumerate(measurements)]
     return [on_clock_of_others(o, opened) for o in opened]
 
 
-def _open(measurement: Measurement | Sheet, model_file: ModelFile) -> Opened:
+def _open(measurement: Measurement | Sheet, model_file: ModelFile, number: int) -> Opened:
     if isinstance(measurement, Sheet):
         table = SteadyScene.of(measurement, model_file.model)
         return Opened(measurement, table, table.model, None, True)
@@ -139,7 +139,7 @@ def _open(measurement: Measurement | Sheet, model_file: ModelFile) -> Opened:
     floor = noise_floor(data, model, told or declared)
     if floor.kind is None:
         return Opened(measurement, None, model, floor, told or declared)
-    data = data.over(floor.rms, floor.keep)
+    data = replace(data.over(floor.rms, floor.keep), first_part=number)
     return Opened(measurement, data, model, floor, told or declared).aligned(model)
 
 

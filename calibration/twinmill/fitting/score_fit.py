@@ -75,8 +75,6 @@ class ScoreFit:
         self.by_channel = by_channel
         self.scales = [d.channel if by_channel else np.zeros_like(d.channel) for d in datasets]
         self.datasets, self.shared = list(datasets), list(shared)
-        # Logs are often alike in time: all begin with the same drive, which must not go as a whole.
-        self.parts = [(d.part + i) % PARTS for i, d in enumerate(self.datasets)]
         self.models = [m.copy() for m in models]
         self.unknowns = self._unknowns()
         parts = [u.parameter for u in self.unknowns]
@@ -227,7 +225,7 @@ class ScoreFit:
 
     def _without_part(self, part: int, begin: np.ndarray) -> np.ndarray:
         """A whole fit without one part: where rows are few, one step is not enough."""
-        datasets = [_LeftOut(d, p != part) for d, p in zip(self.datasets, self.parts, strict=True)]
+        datasets = [_LeftOut(d, d.part != part) for d in self.datasets]
         fit = ScoreFit(datasets, self.models, self.shared, self.by_channel)
         fit.x = begin
         return fit.fit().x
@@ -324,7 +322,7 @@ class ScoreFit:
         for k in range(PARTS):
             g, p = gram.copy(), pull.copy()
             for i, (r, j) in enumerate(zip(rows, slopes, strict=True)):
-                out = self.parts[i] == k
+                out = self.datasets[i].part == k
                 weighted, own = j[out] * self.weight(i, r)[out, None], self.columns[i]
                 g[np.ix_(own, own)] -= weighted.T @ j[out]
                 p[own] -= weighted.T @ r[out]
@@ -334,7 +332,7 @@ class ScoreFit:
         held = []
         for i in range(len(rows)):
             each = self.batch(i, np.array(points))
-            held.append(each[self.parts[i], np.arange(each.shape[1])])
+            held.append(each[self.datasets[i].part, np.arange(each.shape[1])])
         return held
 
     @cached_property

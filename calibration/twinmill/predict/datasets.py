@@ -62,6 +62,8 @@ class Trajectory:
         floor: (H, 3) errors that count as one; infinite where a channel is not judged.
         keep: (W,) bool: windows that are judged.
         own: see Dataset.
+        first_part: part that the log begins with. Logs often begin alike, so that of several each
+            begins with another one: else a drive of all of them is left out at once.
     """
 
     measurement: Measurement
@@ -70,6 +72,7 @@ class Trajectory:
     floor: np.ndarray
     keep: np.ndarray
     own: tuple[Parameter, ...] = ()
+    first_part: int = 0
     weight: np.ndarray = field(init=False, repr=False)
     block: np.ndarray = field(init=False, repr=False)
     part: np.ndarray = field(init=False, repr=False)
@@ -84,7 +87,7 @@ class Trajectory:
         object.__setattr__(self, "weight", np.where(counted, 1 / scale, 0.0))
         block = np.floor((self.start_s - self.start_s[0]) / self.block_s).astype(int)
         object.__setattr__(self, "block", np.repeat(block, self.measured[0].size))
-        object.__setattr__(self, "part", self.block % PARTS)
+        object.__setattr__(self, "part", (self.block + self.first_part) % PARTS)
         object.__setattr__(self, "channel", np.arange(self.measured.size) % 3)
         # Each horizon of a channel counts alike, however many windows it has.
         share = counted / (np.maximum(count, 1) * max(judged.sum(), 1)) * judged

@@ -90,7 +90,9 @@ def check_commands(subject: Subject) -> tuple[list[InputFinding], Search | None,
     search = Search(motion, body)
     own = search.own()
     if not track.has_heading:  # held at an angle that nobody recorded, which is no mistake
-        held = [a for a in pose_alternatives() if a.turned and not a.mirrored and a.heading_sign > 0]
+        held = [
+            a for a in pose_alternatives() if a.turned and not a.mirrored and a.heading_sign > 0
+        ]
         own = min([own, *search.best(held)], key=lambda e: e.left)
     speed_mps = float(np.sqrt(np.mean(np.abs(motion.world_mps) ** 2)))
     if speed_mps < LEAST_MPS and np.abs(motion.turn_radps).max() < 0.2:
