@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is left over once the found effects are in the model: how much, how firm, depending on what.
 
-How much: the squared error over the floor, above 1. How firm: whether the smooth response of the noise floor
-predicts left-out parts better than the model does, block by block. On what: ridge regression of
-the errors on groups of velocity terms without physics names, each judged on parts that it was not
-fitted to.
+How much: the squared error over the floor, above 1. How firm: whether the smooth response of the
+noise floor predicts left-out parts better than the model does, block by block. On what: ridge
+regression of the errors on groups of velocity terms without physics names, each judged on parts
+that it was not fitted to.
 """
 
 from collections.abc import Mapping, Sequence
