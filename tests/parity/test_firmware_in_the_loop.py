@@ -47,6 +47,20 @@ def test_program_gives_the_duties_of_the_built_in_firmware(tmp_path, n, argument
     assert len({tuple(t.wheel_duty_pct) for t in telemetry(alone)}) > 1
 
 
+def test_a_table_of_the_users_own_drives_the_odd_robot_of_a_mix(tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text('spin_and_chase = "0,-1.5,100,0.125"\n')
+    mix = ["--plant", "planar", "--behaviors", own, "--behavior", "milling:2,spin_and_chase:1"]
+    alone, looped = tmp_path / "alone.lcmlog", tmp_path / "looped.lcmlog"
+    assert run(alone, *mix, n=3).returncode == 0
+    done = run(looped, *mix, "--hil", 3, n=3)
+    assert done.returncode == 0, done.stderr
+    assert read(looped) == read(alone)
+    odd = {tuple(t.wheel_duty_pct) for t in telemetry(looped) if t.robot_id == 2}
+    # Turn inputs -1.5 and 0.125 at full speed: the vendor's mixing cuts what is beyond 100.
+    assert (100, -100, 100, -100) in odd and len(odd) > 1
+
+
 def test_effects_of_the_sensor_act_on_the_program_alike(tmp_path):
     model = tmp_path / "poor.toml"
     installed = Path(__file__).parents[2] / "twin/models/turbopi/turbopi.toml"

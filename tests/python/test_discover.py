@@ -13,7 +13,7 @@ import pytest
 
 from twinmill.model.model_file import ModelFile
 from twinmill.swarm.behaviors import find_table
-from twinmill.swarm.discover.entries import Entry, confirm
+from twinmill.swarm.discover.entries import Entry, confirm, confirm_in_mujoco, offer
 from twinmill.swarm.discover.genes import Mix, decode
 from twinmill.swarm.discover.kinds import COLUMNS, MEASURES, kinds, measures
 from twinmill.swarm.discover.search import Hunt
@@ -22,7 +22,7 @@ from twinmill_cli.main import run
 
 BODIES = ["--set", "robot.body_radius_m=0.1", "--set", "target_radius_m=0.1"]
 # 14 generations of 108 swarms; three kinds of published behaviour and one odd-robot ring.
-BUDGET = ["--generations", "14", "--show", "2", "--confirm", "10"]
+BUDGET = ["--generations", "14", "--show", "2", "--confirm", "10", "--mujoco", "0"]
 
 
 @pytest.fixture(scope="module")
@@ -90,10 +90,31 @@ def test_a_name_that_the_model_is_not_sure_of_is_taken_back(tmp_path):
     assert told[0.01] > 0.8 > told[0.8] + 0.15
 
 
+def test_a_name_that_bodies_do_not_allow_is_taken_back():
+    """Points meet in one place; six hulls of 0.19 by 0.16 m have a scatter of 0.02 m2 at least.
+
+    Robots that part never touch: there both plants agree.
+    """
+    request = make_request(
+        "milling", "paper.toml", [], n=6, seeds=8, duration_s=40, start="square", spread_m=0.6
+    )
+    hunt, start_m2 = Hunt(request, 6, 1), 0.6**2 / 6
+    meet, part = ([-20, 1500, 30, 0], [0, -2000, -100, 0])
+    found = [
+        Entry("", kind, Mix(table, [0] * 4, 6, 0), 1.0, [0.0] * 5, 1.0)
+        for kind, table in (("aggregation", meet), ("diffusion", part))
+    ]
+    confirm(hunt, found, start_m2, 10)
+    assert {entry.kind for entry in offer(found, False)} == {"aggregation", "diffusion"}
+    confirm_in_mujoco(hunt, found, start_m2, 2, 1)
+    assert found[0].mujoco == 0 and found[1].mujoco > 0.5
+    assert offer(found, True) == [found[1]]
+
+
 def test_the_same_search_gives_the_same_bytes_and_goes_on_where_it_was(archive, tmp_path):
     folder, _ = archive
     again = tmp_path / "again"
-    short = [*BODIES, "--show", "2", "--confirm", "10", "--out", str(again)]
+    short = [*BODIES, "--show", "2", "--confirm", "10", "--mujoco", "0", "--out", str(again)]
     run(["discover", *short, "--generations", "3"])
     first = sorted(again.glob("generations/*"))
     ages = [path.stat().st_mtime_ns for path in first]

@@ -22,7 +22,14 @@ if working():  # not for --help
     from twinmill.report import Provenance, write_report
     from twinmill.report.discover import section
     from twinmill.swarm.discover.changes import with_changes
-    from twinmill.swarm.discover.entries import Entry, confirm, entries, offer, write_entries
+    from twinmill.swarm.discover.entries import (
+        Entry,
+        confirm,
+        confirm_in_mujoco,
+        entries,
+        offer,
+        write_entries,
+    )
     from twinmill.swarm.discover.kinds import KIND_COLORS
     from twinmill.swarm.discover.search import Hunt, search
     from twinmill.swarm.sweep import make_request, progress_bar
@@ -55,10 +62,18 @@ def _discover(
     duration_s: Annotated[float, typer.Option("--duration-s", min=1)] = 120,
     start: Annotated[str, typer.Option("--start")] = "square",
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the search.")] = 1,
-    show: Annotated[int, typer.Option("--show", min=1, help="Pictures of each kind.")] = 6,
+    show: Annotated[
+        int, typer.Option("--show", min=1, help="Of each kind, drawn and tried in MuJoCo.")
+    ] = 6,
     confirm_runs: Annotated[
         int, typer.Option("--confirm", min=1, help="Fresh runs of each, and with models drawn.")
     ] = 50,
+    mujoco_runs: Annotated[
+        int,
+        typer.Option(
+            "--mujoco", min=0, help="Runs in MuJoCo of each that is to be offered; 0: none."
+        ),
+    ] = 5,
     as_json: AsJson = False,
 ) -> list[Entry]:
     """Search tables and mixes of two tables for behaviours that differ, and name what is known.
@@ -85,8 +100,19 @@ def _discover(
             confirm_runs,
             lambda done, planned: progress.update(task, completed=done, total=planned),
         )
+    if mujoco_runs:
+        with progress_bar() as progress:
+            task = progress.add_task("behaviours tried in MuJoCo", total=None)
+            confirm_in_mujoco(
+                hunt,
+                found,
+                start_m2,
+                mujoco_runs,
+                show,
+                lambda tried: progress.update(task, completed=tried),
+            )
     with busy("drawing"):
-        offered = offer(found)
+        offered = offer(found, mujoco_runs > 0)
         if not offered:
             raise ValueError(
                 f"none of {len(found)} behaviours held when it was run again; search longer "

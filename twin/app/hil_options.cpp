@@ -49,7 +49,8 @@ void UseFirmware(Swarm &swarm, const HilOptions &options, const CameraWorld &wor
     {
         const size_t k = static_cast<size_t>(i);
         const Sight sight = CameraSight(robots[k], world);
-        const FirmwareOptions firmware{program, behaviors[k]->name, !options.free_run};
+        const FirmwareOptions firmware{program, behaviors[k]->name, behaviors[k]->table,
+                                       !options.free_run};
         swarm.SetSensor(i, std::make_unique<FirmwareSensor>(firmware, world, i, sight, seed));
     }
 }

@@ -25,6 +25,7 @@ FirmwareSensor::~FirmwareSensor() = default;
 void FirmwareSensor::Select(const fw_behavior &behavior)
 {
     options_.behavior = behavior.name;
+    options_.table = behavior.table;
     process_.reset();
     process_ = std::make_unique<Process>(options_, camera_, robot_, vote_frames_);
     for (const std::vector<uint8_t> &frame : recent_)

@@ -13,6 +13,7 @@
 #include <csignal>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -27,7 +28,8 @@ constexpr int kPatience_ms = 10000, kEndPatience_ms = 2000, kPoll_ms = 10;
 constexpr size_t kAnswerBytes = 8;
 
 std::vector<std::string> CommandLine(const FirmwareOptions &options, const CameraSettings &camera,
-                                     int robot, int vote_frames, const std::string &socket)
+                                     int robot, int vote_frames, const std::string &socket,
+                                     const std::string &behaviors)
 {
     const auto set = [](const std::string &key, int value) {
         return key + "=" + std::to_string(value);
@@ -49,12 +51,25 @@ std::vector<std::string> CommandLine(const FirmwareOptions &options, const Camer
          {set("robot_id", robot), set("width_px", camera.width_px),
           set("height_px", camera.height_px), set("vote_frames", vote_frames),
           set("vote_window_ms", 0), set("frame_timeout_ms", kPatience_ms),
-          set("watchdog_ms", kPatience_ms), set("restart_ms", -1), std::string("panel=none")})
+          set("watchdog_ms", kPatience_ms), set("restart_ms", -1), std::string("panel=none"),
+          "behaviors=" + behaviors})
     {
         words.push_back("--set");
         words.push_back(pair);
     }
     return words;
+}
+
+// A file of the one table, as robots have of the user's own: inputs in thousandths are exact.
+void WriteBehavior(const std::string &path, const FirmwareOptions &options)
+{
+    const auto input = [](const fw_input &in) {
+        return std::to_string(in.speed_input_pct) + "," +
+               std::to_string(in.turn_input_milli / 1000.0);
+    };
+    std::ofstream file(path);
+    file << options.behavior << " = \"" << input(options.table.unseen) << ","
+         << input(options.table.seen) << "\"\n";
 }
 
 }  // namespace
@@ -104,7 +119,10 @@ void FirmwareSensor::Process::Start(const FirmwareOptions &options, const Camera
         listen(listener_, 1) != 0)
         Fail("no socket at " + path + ": " + std::strerror(errno));
 
-    std::vector<std::string> words = CommandLine(options, camera, robot, vote_frames, path);
+    const std::string behaviors = folder_ + "/behaviors.toml";
+    WriteBehavior(behaviors, options);
+    std::vector<std::string> words =
+        CommandLine(options, camera, robot, vote_frames, path, behaviors);
     std::vector<char *> arguments;
     for (std::string &word : words)
         arguments.push_back(word.data());

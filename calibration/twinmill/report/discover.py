@@ -31,6 +31,7 @@ def section(
     count = {kind: sum(entry.kind == kind for entry in offered) for kind in present}
     listed = ", ".join(f"{kind} {count[kind]}" for kind in present)
     twins = ", and so in twins drawn from the model's errors" if shown[0].drawn is not None else ""
+    twins += " and in MuJoCo" if shown[0].mujoco is not None else ""
     return Section(
         title="Behaviours that were found",
         score=[
@@ -112,6 +113,7 @@ def _table(shown: list[Entry]) -> Table:
             Cell(entry.kind),
             Cell(f"{100 * entry.share:.0f}"),
             Cell("-" if entry.drawn is None else f"{100 * entry.drawn:.0f}"),
+            Cell("-" if entry.mujoco is None else f"{100 * entry.mujoco:.0f}"),
             Cell(number(entry.alike, 2)),
             *(Cell(number(value, 2)) for value in entry.measures),
             Cell(entry.mix.behavior(entry.name)),
@@ -121,10 +123,19 @@ def _table(shown: list[Entry]) -> Table:
     runs = shown[0].confirmed
     return Table(
         "The most repeatable of each kind",
-        ["name", "kind", "% of its kind", "% in twins drawn", "alike", *MEASURES, "behaviour"],
+        [
+            "name",
+            "kind",
+            "% of its kind",
+            "% in twins drawn",
+            "% in MuJoCo",
+            "alike",
+            *MEASURES,
+            "behaviour",
+        ],
         rows,
         f"Shares are of {runs} runs with fresh seeds, and of as many in twins drawn from the "
         "model's errors, if it knows them. Alike: 1 is the same whatever the seed. "
         "Circliness and scatter are powers of 10. The last column goes after --behavior.",
-        words=(0, 1, 5 + len(MEASURES)),
+        words=(0, 1, 6 + len(MEASURES)),
     )

@@ -20,6 +20,8 @@ from twinmill.swarm.forecast.draws import drawn_models, knows_errors
 
 MODEL = "model.toml"
 DRAWS = 10  # models drawn from the uncertainty
+MUJOCO_ROUNDS = 2
+MUJOCO_SEEDS_FROM = 1_000_000  # beyond those of all other runs
 SLUGS = {"bull's-eye": "bullseye"}
 
 
@@ -35,6 +37,7 @@ class Entry:
         share: of fresh runs that are of its kind.
         drawn: the same of runs with models drawn from the uncertainty; None: the model knows none.
         confirmed: fresh runs behind each share; 0: it was not run again.
+        mujoco: share in MuJoCo; None: it was not run there.
     """
 
     name: str
@@ -45,11 +48,18 @@ class Entry:
     share: float
     drawn: float | None = None
     confirmed: int = 0
+    mujoco: float | None = None
 
     @property
     def holds(self) -> bool:
-        """Whether most runs are of its kind, again and in all twins that the model leaves open."""
-        return min(self.share, 1.0 if self.drawn is None else self.drawn) > 0.5
+        """Whether most runs are of its kind: again, in twins drawn, and in MuJoCo if it ran."""
+        return self.least > 0.5
+
+    @property
+    def least(self) -> float:
+        """Of its shares."""
+        shares = (self.share, self.drawn, self.mujoco)
+        return min(share for share in shares if share is not None)
 
     @property
     def command(self) -> str:
@@ -69,6 +79,7 @@ class Entry:
             "alike": self.alike,
             "share": self.share,
             "share_drawn": self.drawn,
+            "share_mujoco": self.mujoco,
             "confirmed_runs": self.confirmed,
             "offered": bool(self.name),
             **dict(zip(MEASURES, self.measures, strict=True)),
@@ -129,6 +140,48 @@ def confirm(
         entry.drawn = float(share)
 
 
+def confirm_in_mujoco(
+    hunt: Hunt,
+    found: list[Entry],
+    start_m2: float,
+    runs: int,
+    enough: int,
+    tell: Callable[[int], None] = lambda tried: None,
+) -> None:
+    """Runs the surest of each kind in MuJoCo, until enough of them hold there.
+
+    What a planar twin lets bodies do, as standing in one another, is an artefact and falls away.
+
+    Args:
+        hunt: what was searched.
+        found: entries that were confirmed; of those that ran, `mujoco` is set.
+        start_m2: mean scatter of the start.
+        runs: of each, with seeds that it has not had.
+        enough: of each kind; twice as many are tried at most.
+        tell: is given how many were tried.
+    """
+    first = hunt.request.first_seed + MUJOCO_SEEDS_FROM
+    waiting = {kind: [e for e in _surest(found) if e.kind == kind] for kind in KIND_COLORS}
+    tried = 0
+    for _ in range(MUJOCO_ROUNDS):
+        batch = []
+        for entries_of in waiting.values():
+            lacking = enough - sum(e.holds for e in entries_of if e.mujoco is not None)
+            batch += [e for e in entries_of if e.mujoco is None][:lacking]
+        if not batch:
+            return
+        rows = hunt.run([e.mix for e in batch], range(first, first + runs), "mujoco")
+        for entry, share in zip(batch, _shares(hunt, batch, rows, start_m2), strict=True):
+            entry.mujoco = float(share)
+        tried += len(batch)
+        tell(tried)
+
+
+def _surest(found: list[Entry]) -> list[Entry]:
+    """Those that hold, the surest first."""
+    return sorted((e for e in found if e.holds), key=lambda e: -e.least)
+
+
 def _shares(hunt: Hunt, found: list[Entry], rows: np.ndarray, start_m2: float) -> np.ndarray:
     """(E,) of each entry's runs that are of its kind."""
     range_m = hunt.request.model.get("sensor.range_m")
@@ -138,17 +191,19 @@ def _shares(hunt: Hunt, found: list[Entry], rows: np.ndarray, start_m2: float) -
     )
 
 
-def offer(found: list[Entry]) -> list[Entry]:
+def offer(found: list[Entry], in_mujoco: bool) -> list[Entry]:
     """Names those that hold; by kind, the surest first.
+
+    Args:
+        found: all entries.
+        in_mujoco: whether only what ran there is offered.
 
     Returns:
         Them alone. What does not hold keeps no name.
     """
     order = list(KIND_COLORS)
-    offered = [entry for entry in found if entry.holds]
-    offered.sort(
-        key=lambda e: (order.index(e.kind), -min(e.share, e.share if e.drawn is None else e.drawn))
-    )
+    ran = [entry for entry in found if not in_mujoco or entry.mujoco is not None]
+    offered = sorted(_surest(ran), key=lambda e: order.index(e.kind))
     numbers: Counter = Counter()
     for entry in offered:
         numbers[entry.kind] += 1

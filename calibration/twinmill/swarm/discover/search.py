@@ -53,17 +53,19 @@ class Hunt:
         named = replace(self.request, behavior=mix.behavior("mix"), n=self.n, tables=tables)
         return named.cell(())
 
-    def run(self, mixes: list[Mix], seeds: range) -> np.ndarray:
+    def run(self, mixes: list[Mix], seeds: range, plant: str = "planar") -> np.ndarray:
         """(mixes, seeds, COLUMNS) metrics of the last 10 s."""
         count = len(os.sched_getaffinity(0))
         chunks = [mixes[k::count] for k in range(min(count, len(mixes)))]
         rows = np.empty((len(mixes), len(seeds), len(COLUMNS)))
         with ThreadPoolExecutor(count) as pool:
-            for k, part in enumerate(pool.map(lambda chunk: self._run(chunk, seeds), chunks)):
+            for k, part in enumerate(
+                pool.map(lambda chunk: self._run(chunk, seeds, plant), chunks)
+            ):
                 rows[k::count] = part
         return rows
 
-    def _run(self, mixes: list[Mix], seeds: range) -> np.ndarray:
+    def _run(self, mixes: list[Mix], seeds: range, plant: str) -> np.ndarray:
         cells = [self.cell(mix) for mix in mixes]
         flat = native.run_worlds(
             cells,
@@ -71,6 +73,7 @@ class Hunt:
             np.tile(np.array(seeds, dtype=np.uint64), len(cells)),
             self.request.duration_s,
             self.request.full,
+            plant,
         )
         return flat.reshape(len(mixes), len(seeds), len(COLUMNS))
 

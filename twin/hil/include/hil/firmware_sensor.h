@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "fw/table.h"
 #include "swarm/camera_sensor.h"
 
 namespace twin
@@ -20,6 +21,7 @@ struct FirmwareOptions
 {
     std::string program;  // turbopi
     std::string behavior;
+    fw_table table;  // of that behaviour, which the program need not have built in
     // Waits for the answer to each frame: same seed, same run. Else takes the newest answer there
     // is, as the wheels of a robot would.
     bool lockstep = true;
