@@ -10,39 +10,14 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from twinmill.claims.published import Points
+from twinmill.claims.prediction import AXES, LABS, MODEL, SECONDS, STD, reliability, trial
 from twinmill.programs import find_program
 from twinmill.swarm.forecast.choose import choose
-from twinmill.swarm.forecast.draws import OUTCOMES, Forecast, forecast, out_of_bounds
+from twinmill.swarm.forecast.draws import OUTCOMES, Forecast, out_of_bounds
 from twinmill.swarm.forecast.plan import read_plan
 from twinmill.swarm.forecast.score import score
-from twinmill.swarm.store import read_sweep
 from twinmill.swarm.sweep import make_request, sweep
 from twinmill_cli.main import run
-
-STD, SPREAD, SECONDS, LABS = 0.2, 0.02, 45.0, 100
-MODEL = f"""
-name = "known_to_a_fifth"
-[robot]
-body_radius_m = 0
-[base]
-drive = "twist"
-wheels = "none"
-speed_per_input_mps = 0.0025
-turn_per_input_radps = 1.5707963267949
-control_period_s = 0.022
-[base.std]
-forward_gain = {STD}
-yaw_gain = {STD}
-[sensor]
-range_m = 1.2
-cone_rad = 0.8552113334772
-target_radius_m = 0.1
-[idiosyncrasy]
-theta_a1_std = {SPREAD}
-theta_a2_std = {SPREAD}
-"""
-AXES = ["cone_deg=40:80:5", "range_m=0.5,0.8,1.2"]
 
 
 @pytest.fixture(scope="module")
@@ -68,31 +43,10 @@ def test_draws_that_bounds_refuse_are_counted(swept):
     assert names == ["base.forward_gain"]
 
 
-def laboratories(cells: np.ndarray) -> np.ndarray:
-    """(LABS, cells) what each saw: points by forward Euler, gains drawn by N(1, STD)."""
-    random = np.random.default_rng(7)
-    gain = np.clip(1 + STD * random.standard_normal((2, LABS)), 0.2, 2)
-    v, omega = (np.repeat(g, len(cells)) for g in (0.25 * gain[0], np.radians(45) * gain[1]))
-    cone, range_m = (np.tile(column, LABS) for column in cells.T)
-    points = Points(
-        v_mps=v,
-        omega_radps=omega,
-        cone_rad=np.radians(cone),
-        range_m=range_m,
-        target_radius_m=0.1,
-        spread=SPREAD,
-    )
-    ended = points.run(LABS * len(cells), seed=3, duration_s=SECONDS).classes
-    return np.vectorize(OUTCOMES.index)(ended).reshape(LABS, len(cells))
-
-
 def test_calibrated_on_a_hundred_laboratories_of_another_plant(swept: Path):
     """Each class comes as often as was said, and scores are no worse than was said either."""
-    request, table = read_sweep(swept / "sweep")
-    whole = forecast(request, table, 60, 6, 1, swept / "draws")
-    chosen = [cell for cell, _ in choose(whole, 9, 1, seed=1)]
-    said = whole.cells(chosen)
-    saw = laboratories(said.points)
+    found = trial(swept)  # whose sweep is there
+    said, saw = found.said, found.saw
     # How often each class came, in each cell, against what was said: chance of 100 laboratories,
     # and of 100 models drawn.
     share, seen = said.share, np.stack([(saw == k).mean(axis=0) for k in range(len(OUTCOMES))], 1)
@@ -100,7 +54,10 @@ def test_calibrated_on_a_hundred_laboratories_of_another_plant(swept: Path):
     variance = share * (1 - share) / LABS + said.draws.var(axis=0) / len(said.draws)
     off = ((seen - share) ** 2 / variance)[told]
     assert told.sum() > 10 and off.sum() < chi2.ppf(0.999, told.sum())
-    cell = np.arange(len(chosen))
+    claim = reliability(found)
+    assert claim.agrees and claim.count == (len(claim.rows) - 1,) * 2 and len(claim.rows) > 4
+    assert claim.rows[-1].low > 0  # more is known than how often each class comes
+    cell = np.arange(len(said.points))
     p = np.array([score(said, cell, ended, ["cone_deg", "range_m"], 1).p_value for ended in saw])
     assert np.mean(p < 0.05) < 0.05 + 3.5 * np.sqrt(0.05 * 0.95 / LABS)
 

@@ -15,16 +15,19 @@ from twinmill_cli.output import AsJson, deliver, telling
 
 if working():  # not for --help
     import hashlib
+    import shlex
     from importlib.metadata import version
 
     import numpy as np
     from rich.console import Group
     from rich.text import Text
 
+    from twinmill.claims.actuation import actuation
     from twinmill.claims.bodies import bodies, run_layers
     from twinmill.claims.claims import CLAIMS, ODD_TURNS
     from twinmill.claims.paper import Answer, answers
     from twinmill.claims.rows import Claim, Row
+    from twinmill.data.steady_table import read_sheets
     from twinmill.files import check_new_folder, plain
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import Provenance, Section, show, write_report
@@ -67,6 +70,10 @@ def _claims(
             help="Runs of each of 56 cells in MuJoCo, of three kinds; kept in DIR/mujoco.",
         ),
     ] = 0,
+    actuation_table: Annotated[
+        Path | None,
+        typer.Option("--actuation", metavar="TABLE", help="Measured steady speeds of robots."),
+    ] = None,
     as_json: AsJson = False,
     out: Out = None,
 ) -> int:
@@ -82,6 +89,7 @@ def _claims(
         raise ValueError(f"--only {unknown[0]}: must be one of {', '.join(CLAIMS)}.")
     if strange := [turn for turn in odd_turn or [] if not abs(turn) <= MOST_TURN]:
         raise ValueError(f"--odd-turn {strange[0]:g}: must be from -{MOST_TURN} to {MOST_TURN}.")
+    sheets = read_sheets(actuation_table) if actuation_table else []
     if mujoco_seeds and not out:
         raise ValueError("--mujoco-seeds needs --out DIR, where its runs are kept.")
     if out:
@@ -92,10 +100,14 @@ def _claims(
             say(name)
             more = {"turns": tuple(odd_turn or ODD_TURNS)} if name == "bullseye" else {}
             found.append(CLAIMS[name](seeds, **more))
+    if actuation_table:
+        found.append(actuation(sheets))
     if mujoco_seeds:
         found.append(_in_mujoco(mujoco_seeds, out / "mujoco"))
+    more = [f"--mujoco-seeds {mujoco_seeds}"] if mujoco_seeds else []
+    more += [f"--actuation {shlex.quote(str(actuation_table))}"] if actuation_table else []
     source = Provenance(
-        _command_line(only, seeds, odd_turn, mujoco_seeds),
+        " ".join([_command_line(only, seeds, odd_turn), *more]),
         f"twinmill {version('twinmill')}",
         hashlib.sha256(ModelFile.load("paper.toml").text.encode()).hexdigest(),
     )
@@ -126,12 +138,9 @@ def _in_mujoco(seeds: int, folder: Path) -> Claim:
     return bodies(seeds, folder)
 
 
-def _command_line(
-    only: list[str] | None, seeds: int, odd_turn: list[float] | None, mujoco_seeds: int
-) -> str:
+def _command_line(only: list[str] | None, seeds: int, odd_turn: list[float] | None) -> str:
     words = ["twinmill claims", *(f"--only {name}" for name in only or [])]
     words += [f"--seeds {seeds}", *(f"--odd-turn {turn:g}" for turn in odd_turn or [])]
-    words += [f"--mujoco-seeds {mujoco_seeds}"] if mujoco_seeds else []
     return " ".join(words)
 
 

@@ -10,6 +10,7 @@ from scipy.stats import mannwhitneyu
 from twinmill.claims import figures
 from twinmill.claims.cuts import sensor, steps
 from twinmill.claims.pivot import pivot
+from twinmill.claims.prediction import prediction
 from twinmill.claims.published import Points
 from twinmill.claims.rows import Claim, Row, length, mean, median, share
 from twinmill.claims.swarms import KINDS, MAP, ROUND, Runs, run
@@ -275,6 +276,7 @@ CLAIMS: dict[str, Callable[..., Claim]] = {
     "sensor": sensor,
     "steps": steps,
     "pivot": pivot,
+    "prediction": prediction,
 }
 
 

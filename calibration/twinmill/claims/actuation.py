@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measured speeds and turn rates: means and spread of the paper's table, beside a public one.
+
+The paper gives each robot's mean over the mean of all at two inputs, to 0.01; their spread is the
+theta_a of all runs here. A steady-state table has more robots and operating points.
+"""
+
+import numpy as np
+
+from twinmill.claims.rows import Claim, Row
+from twinmill.data.steady_table import Sheet
+
+# Of the paper: each robot's mean speed over the group's, by speed input; facts recomputed from it.
+PUBLISHED = {50: (1.00, 1.03, 0.97), 100: (1.05, 0.95, 1.00)}
+THETA_STD = 0.04
+FEWEST = 2  # robots of which a spread is told
+CHANNELS = ("speed", "turn rate")
+
+
+def actuation(sheets: list[Sheet]) -> Claim:
+    """The paper's factors, and the spread over robots at each input of a table."""
+    factors = np.concatenate([np.array(values) for values in PUBLISHED.values()])
+    spread = float(factors.std(ddof=1))
+    rows = [
+        Row(
+            f"mean of the factors at input {at}",
+            float(np.mean(values)),
+            float(np.mean(values)),
+            float(np.mean(values)),
+            (1.0, 1.0),
+            bool(abs(np.mean(values) - 1) < 0.005),
+            "they are over their own mean",
+        )
+        for at, values in PUBLISHED.items()
+    ]
+    agrees = bool(abs(spread - THETA_STD) < 0.005)
+    rule = "0.04 is their standard deviation; as a variance it would be 0.2"
+    reference = (THETA_STD, THETA_STD)
+    rows.append(Row("spread of all six factors", spread, spread, spread, reference, agrees, rule))
+    measured = _spreads(sheets)
+    rows += measured
+    straight, turning = (
+        [row.value for row in measured if row.by["turns"] is turns] for turns in (False, True)
+    )
+    return Claim(
+        "actuation",
+        "Measured speeds and turns of the robots",
+        "Robots differ: each one's mean speed over the group's, N(1, 0.04).",
+        agrees,
+        f"The published factors vary by {spread:.3f}. In the measured table of "
+        f"{len({s.robot_id for s in sheets})} robots the spread hangs on the operating point: "
+        f"{_range(straight)} straight, {_range(turning)} where they turn. One number for all "
+        "points is not what was measured.",
+        rows,
+        [],
+    )
+
+
+def _spreads(sheets: list[Sheet]) -> list[Row]:
+    """Relative standard deviation over robots, by input and channel."""
+    by_input: dict[tuple, list[np.ndarray]] = {}
+    for sheet in sheets:
+        for at, value in zip(sheet.inputs.tolist(), sheet.value, strict=True):
+            by_input.setdefault(tuple(at), []).append(value)
+    rows = []
+    for (speed, direction, turn), values in by_input.items():
+        for name, of in zip(CHANNELS, np.abs(np.array(values)).T, strict=True):
+            known = of[np.isfinite(of)]
+            if len(known) < FEWEST or known.mean() < 0.05:
+                continue
+            spread = float(known.std(ddof=1) / known.mean())
+            half = 1.96 * spread / np.sqrt(2 * (len(known) - 1))
+            what = f"spread of {name}, {len(known)} robots: input {speed:g}, {direction:g} degrees"
+            what += f", turn {turn:g}" if turn else ""
+            low, high = max(spread - half, 0.0), spread + half
+            by = {"turns": turn != 0}
+            mean = f"mean {known.mean():.3g} {'m/s' if name == 'speed' else 'rad/s'}"
+            rows.append(Row(what, spread, low, high, None, None, mean, "%", by))
+    return rows
+
+
+def _range(values: list[float]) -> str:
+    if not values:
+        return "nothing measured"
+    return f"{100 * min(values):.0f} to {100 * max(values):.0f} %"

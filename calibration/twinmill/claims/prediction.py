@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sealed predictions against a hundred simulated laboratories whose robots are another plant's.
+
+What is predicted comes from a model whose gains are known to a fifth, by `predict-floor`'s steps. A
+laboratory's robots have gains of its own, drawn from the same errors, and are points that move by
+forward Euler, in NumPy.
+"""
+
+import tempfile
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from twinmill.claims.published import Points
+from twinmill.claims.rows import Claim, Row, mean
+from twinmill.report import Figure
+from twinmill.report.canvas import FLOOR, MEASURED, draw
+from twinmill.swarm.forecast.choose import choose
+from twinmill.swarm.forecast.draws import OUTCOMES, Forecast, forecast
+from twinmill.swarm.store import read_sweep
+from twinmill.swarm.sweep import make_request, run_missing
+
+STD, SPREAD, SECONDS, LABS, CELLS = 0.2, 0.02, 45.0, 100, 9
+MODEL = f"""
+name = "known_to_a_fifth"
+[robot]
+body_radius_m = 0
+[base]
+drive = "twist"
+wheels = "none"
+speed_per_input_mps = 0.0025
+turn_per_input_radps = 1.5707963267949
+control_period_s = 0.022
+[base.std]
+forward_gain = {STD}
+yaw_gain = {STD}
+[sensor]
+range_m = 1.2
+cone_rad = 0.8552113334772
+target_radius_m = 0.1
+[idiosyncrasy]
+theta_a1_std = {SPREAD}
+theta_a2_std = {SPREAD}
+"""
+AXES = ["cone_deg=40:80:5", "range_m=0.5,0.8,1.2"]
+EDGES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)  # of what was said
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What was said, and what came.
+
+    Attributes:
+        said: of the chosen cells.
+        saw: (LABS, cells) places in OUTCOMES.
+    """
+
+    said: Forecast
+    saw: np.ndarray
+
+
+def laboratories(cells: np.ndarray) -> np.ndarray:
+    """(LABS, cells) what each saw: points by forward Euler, gains drawn by N(1, STD)."""
+    random = np.random.default_rng(7)
+    gain = np.clip(1 + STD * random.standard_normal((2, LABS)), 0.2, 2)
+    v, omega = (np.repeat(g, len(cells)) for g in (0.25 * gain[0], np.radians(45) * gain[1]))
+    cone, range_m = (np.tile(column, LABS) for column in cells.T)
+    points = Points(
+        v_mps=v,
+        omega_radps=omega,
+        cone_rad=np.radians(cone),
+        range_m=range_m,
+        target_radius_m=0.1,
+        spread=SPREAD,
+    )
+    ended = points.run(LABS * len(cells), seed=3, duration_s=SECONDS).classes
+    return np.vectorize(OUTCOMES.index)(ended).reshape(LABS, len(cells))
+
+
+def trial(folder: Path) -> Trial:
+    """Sweeps, predicts and lets all laboratories run, in a folder of its own."""
+    (folder / "m.toml").write_text(MODEL)
+    request = make_request("milling", str(folder / "m.toml"), AXES, seeds=40, duration_s=SECONDS)
+    run_missing(request, folder / "sweep", lambda worlds: None)
+    request, table = read_sweep(folder / "sweep")
+    whole = forecast(request, table, 60, 6, 1, folder / "draws")
+    said = whole.cells([cell for cell, _ in choose(whole, CELLS, 1, seed=1)])
+    return Trial(said, laboratories(said.points))
+
+
+def prediction(_seeds: int) -> Claim:
+    """How often each class came, against how probable it was said to be."""
+    with tempfile.TemporaryDirectory(prefix="twinmill.") as folder:
+        return reliability(trial(Path(folder)))
+
+
+def reliability(found: Trial) -> Claim:
+    """By bins of what was said; intervals from the scatter of laboratories."""
+    said = found.said.share  # (C, K)
+    came = found.saw[:, :, None] == np.arange(said.shape[1])  # (LABS, C, K)
+    rows = []
+    for low, high in pairwise(EDGES):
+        inside = (said > low) & (said <= high)
+        if not inside.any():
+            continue
+        told = float(said[inside].mean())
+        what = f"came, said with {100 * low:.0f} to {100 * high:.0f} %"
+        rows.append(mean(what, came[:, inside].mean(axis=1), told, at=told))
+    gain = np.log(said[np.arange(CELLS), found.saw]).mean(axis=1)
+    gain -= np.log(found.said.base_rate[found.saw]).mean(axis=1)
+    rows.append(mean("log score above the base rate's", gain, None))
+    told, seen = (
+        ", ".join(f"{100 * value:.0f}" for value in values)
+        for values in zip(*((row.reference[0], row.value) for row in rows[:-1]), strict=True)
+    )
+    return Claim(
+        "prediction",
+        "A prediction that can fail",
+        "A calibrated model predicts what becomes of a swarm before it is run.",
+        None,
+        f"In {LABS} laboratories of another plant, {CELLS} runs each, what was said with {told} % "
+        f"came in {seen} %. The log score is {rows[-1].value:.2f} above that of the base rate "
+        f"({rows[-1].low:.2f} to {rows[-1].high:.2f}).",
+        rows,
+        [_figure(rows[:-1])],
+    )
+
+
+def _figure(rows: list[Row]) -> Figure:
+    def paint(axes: Axes) -> None:
+        at = [row.by["at"] for row in rows]
+        ends = np.array([[row.value - row.low, row.high - row.value] for row in rows]).T
+        axes.plot([0, 1], [0, 1], color=MEASURED, lw=0.8)
+        axes.errorbar(at, [row.value for row in rows], ends, fmt="o", ms=5, color=FLOOR)
+        axes.set(xlim=(0, 1), ylim=(0, 1), aspect="equal")
+        axes.set(xlabel="probability that was said", ylabel="share that came")
+
+    return Figure(
+        draw(3.6, paint),
+        "Reliability",
+        f"Classes of {CELLS} cells in {LABS} laboratories, by what was said; bars are 95 % "
+        "intervals over laboratories. On the line each came as often as was said.",
+    )
