@@ -23,7 +23,6 @@ if working():  # not for --help
     from twinmill.diagnosis.result import Diagnosis
     from twinmill.report import diagnosis as present
     from twinmill.swarm.metrics import swarm_metrics
-    from twinmill_cli.compare_swarm import LOOK, compare_swarm
     from twinmill_cli.frame import (
         check_output,
         command_line,
@@ -92,6 +91,9 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
     log, model = read_log(path), result.model
     if not all((robot.mode == TABLE).any() for robot in log.robots.values()):
         return "Each robot was judged by itself: not all play a table, as a swarm does.", None
+    # Slow to import, and `make demo` does without what it needs.
+    from twinmill_cli.compare_swarm import LOOK, compare_swarm
+
     scale = model.get("sensor.range_m"), model.get("robot.body_radius_m")
     try:
         series = swarm_metrics(log, *scale)

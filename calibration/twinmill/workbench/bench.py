@@ -234,6 +234,8 @@ class Bench:
 
     def log_bytes(self, place: int) -> bytes:
         """Paths of all robots of one log."""
+        if place not in range(len(self.session.logs)):
+            raise LookupError("no such log")
         log = self.session.logs[place]
         paths = {n: measured_path(r.pose_t_s, r.pose, r.valid) for n, r in log.robots.items()}
         headings = {n: r.has_heading for n, r in log.robots.items()}

@@ -2,6 +2,7 @@
 """Serves the workbench to browsers of this machine alone; its address holds a secret."""
 
 import asyncio
+import logging
 import secrets
 import socket
 import sys
@@ -19,6 +20,7 @@ from starlette.responses import PlainTextResponse, Response
 from twinmill.charts.stage import STATIC as CHARTS
 from twinmill.model.model_file import ModelError
 from twinmill.workbench.bench import Bench
+from twinmill.workbench.guard import REFUSED, Guard
 from twinmill.workbench.screen import Screen
 
 HOST = "127.0.0.1"
@@ -54,7 +56,9 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
     sys.setswitchinterval(SWITCH_S)
     port = _free_port(port)
     url = f"http://{HOST}:{port}/?token={bench.state.token}"
+    app.add_middleware(Guard, token=bench.state.token, port=port)
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
+    logging.getLogger("uvicorn.error").addFilter(_is_no_farewell)
     app.add_static_files("/look", STATIC, max_cache_age=0)
     app.add_static_files("/charts", CHARTS, max_cache_age=0)
     _add_data(bench)
@@ -189,7 +193,10 @@ def _right(bench: Bench, token: str) -> bool:
 
 
 def _refused() -> Response:
-    return PlainTextResponse(
-        "The address lacks the session's token; take the whole address that twinmill printed.",
-        status_code=403,
-    )
+    return PlainTextResponse(REFUSED, status_code=403)
+
+
+def _is_no_farewell(record: logging.LogRecord) -> bool:
+    """False of what Starlette reports when a page is left before it is whole."""
+    error = record.exc_info[1] if record.exc_info else None
+    return str(error) != "No response returned."

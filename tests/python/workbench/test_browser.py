@@ -104,6 +104,8 @@ def test_the_whole_conversation(import_turbopi, page):
     with workbench() as url:
         assert page.request.get(url.split("?")[0]).status == 403
         assert page.request.get(f"{url.split('?')[0]}data/log?log=0&token=wrong").status == 403
+        socket = "_nicegui_ws/socket.io/?EIO=4&transport=polling"
+        assert page.request.get(url.split("?")[0] + socket).status == 403
         page.goto(url)
         is_predicted(page)
         shown = page.get_by_test_id("score")
@@ -170,7 +172,11 @@ def turn_a_knob_and_back(page, given: str) -> None:
     expect(shown).to_have_text(re.compile(re.escape(turned.strip("≈ "))))
     page.get_by_test_id("undo").click()
     expect(shown).to_have_text(given)
-    page.get_by_test_id("knob-base.sideways_gain").locator(".lock").click()
+    for name, clicks in (("sideways_gain", 1), ("yaw_gain", 2)):  # held; held and freed again
+        lock = page.get_by_test_id(f"knob-base.{name}").locator(".lock")
+        for k in range(clicks):
+            lock.click()
+            expect(lock).to_have_attribute("aria-pressed", "false" if k else "true")
 
 
 def find_where_it_fails(page) -> None:
@@ -204,8 +210,16 @@ def name_coasting(page) -> None:
 
 
 def add_coasting(page) -> None:
+    """After a change of mind: cancelled, all is as before."""
     page.get_by_test_id("tab-missing").click()
+    shown = page.get_by_test_id("score")
+    before = shown.text_content()
     page.get_by_test_id("add-coasting").click()
+    page.wait_for_function("document.body.dataset.beside === 'before'")  # the first answer
+    page.get_by_test_id("cancel").click()
+    page.wait_for_function("document.body.dataset.beside === ''")
+    expect(shown).to_have_text(before)
+    page.get_by_test_id("add-coasting").and_(page.locator(":enabled")).click()
     page.get_by_test_id("tab-models").click()
     page.get_by_test_id("model-2").wait_for()
 
@@ -251,7 +265,7 @@ def save_and_repeat(page, given: str) -> str:
     os.remove("mine.toml")
     results = [cli.run(shlex.split(command)[1:]) for command in commands]
     assert Path("mine.toml").read_bytes() == mine
-    assert "--hold base.sideways_gain" in commands[-1]
+    assert re.findall(r"--hold (\S+)", commands[-1]) == ["base.sideways_gain"]
     assert added == number(results[-1].after.score)
     assert given == number(results[-1].before.score)
     return added
@@ -276,9 +290,36 @@ def test_the_weak_robot_is_named(fleet, page):
     with workbench() as url:
         page.goto(url)
         is_predicted(page)
+        type_a_number(page)
         page.get_by_test_id("tab-missing").click()
         page.get_by_test_id("diagnose").and_(page.locator(":enabled")).click()
         expect(page.get_by_test_id("findings")).to_contain_text("R03: left wheels 8 % weak")
         page.get_by_test_id("robot").click()
         page.get_by_role("option", name=re.compile("^R03")).click()
         page.wait_for_function("twinmill.robot.name === 'R03'")
+
+
+def type_a_number(page) -> None:
+    """Typed numbers are taken, also after an undo, within their bounds; Escape takes nothing."""
+    shown = page.get_by_test_id("score")
+    expect(shown).to_have_text(re.compile(r"^\d"))
+    given = shown.text_content()
+    number = page.get_by_test_id("knob-base.motor_lag_s").locator("input.number")
+    before = number.input_value()
+    for _ in range(2):
+        number.fill("0.1")
+        number.press("Enter")
+        expect(shown).not_to_have_text(given)
+        number.blur()
+        page.keyboard.press("z")
+        expect(number).to_have_value(before)
+        expect(shown).to_have_text(given)
+    number.fill("99")
+    number.press("Enter")
+    page.get_by_text("99: must be within").wait_for()
+    page.get_by_test_id("undo").click()
+    expect(number).to_have_value(before)
+    number.fill("0.1")
+    number.press("Escape")
+    expect(number).to_have_value(before)
+    expect(shown).to_have_text(given)

@@ -122,6 +122,7 @@ export class Series {
     this.stage = stage;
     this.rows = [];
     this._drawn = [];
+    this._words_px = []; // where values stand beside a row's title
     this._listen(canvas);
   }
 
@@ -165,7 +166,7 @@ export class Series {
       if (this._drawn[i]?.every((v, k) => v === drawn[k])) return;
       this._drawn[i] = drawn;
       g.clearRect(0, top - HEAD_PX, this.sheet.width, foot - top + HEAD_PX + 5);
-      this._frame(g, row);
+      this._words_px[i] = this._frame(g, row);
       this._within(g, row, () => {
         this._marks(g, row);
         this._limits(g, row);
@@ -253,7 +254,7 @@ export class Series {
     g.font = SMALL;
     g.fillStyle = WORDS;
     g.fillText(row.unit, LEFT_PX + wide + 6, row.top - 3);
-    row.words_px = LEFT_PX + wide + g.measureText(row.unit).width + 20;
+    return LEFT_PX + wide + g.measureText(row.unit).width + 20;
   }
 
   _times(g) {
@@ -344,21 +345,21 @@ export class Series {
     }
     g.font = SMALL;
     g.textBaseline = "bottom";
-    for (const row of this.rows) this._read(g, row, t);
+    this.rows.forEach((row, i) => this._read(g, row, this._words_px[i], t));
   }
 
   /** Values at the cursor, beside the row's title; without their names where these do not fit. */
-  _read(g, row, t) {
+  _read(g, row, from_px, t) {
     const told = row.lines.map(({ of, column, factor, color, name, held, shift = 0 }) => {
       const k = rowAt(of, t - shift);
       const lost = k < 0 || (!held && t - shift - of.data[k * of.width] > LOST_S);
       const v = lost ? NaN : of.data[k * of.width + column] * factor;
       return { name, color, value: Number.isNaN(v) ? "–" : worded(v, row.least / 10) };
     });
-    const room = this.sheet.width - RIGHT_PX - row.words_px;
+    const room = this.sheet.width - RIGHT_PX - from_px;
     const named = told.map(({ name, value }) => `${name} ${value}`);
     const wide = named.reduce((sum, words) => sum + g.measureText(words).width + 12, 0);
-    let at = row.words_px;
+    let at = from_px;
     g.textAlign = "left";
     told.forEach(({ value, color }, i) => {
       const words = wide <= room ? named[i] : value;
