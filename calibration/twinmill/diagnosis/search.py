@@ -48,6 +48,7 @@ class Settings:
         enough: ... or this fall of the squared score, if that is less.
         below: the same share once the score is below 1, where differences are hardly news ...
         least_below, most_below: ... but so much of the squared score at least, and at most.
+        strong, least_strong: times the evidence with which less than that is enough there.
         fitted: so many candidates are fitted in each round.
         pairs: so many pairs are tried where no single candidate is accepted.
         most: rounds.
@@ -70,6 +71,8 @@ class Settings:
     below: float = 0.1
     least_below: float = 0.2
     most_below: float = 0.5
+    strong: float = 1.5
+    least_strong: float = 0.08
     fitted: int = 7
     pairs: int = 3
     most: int = 6
@@ -310,9 +313,9 @@ def _best(
         fall = before.held_score**2 - trial.held_score**2
         if fall <= 0:
             continue
-        matters = fall >= _least_fall(before.held_score, first_excess, settings) * len(trial.names)
+        matters = fall >= _least_fall(before, trial, first_excess, settings) * len(trial.names)
         at_nothing = all(_is_neutral(trial, n) for n in trial.names)
-        if matters and not at_nothing and _proven(trial, settings):
+        if matters and not at_nothing and _proven(trial, before.held_score, settings):
             good.append(trial)
     best = min(good, key=lambda t: t.fit.held_cost + settings.each * len(t.fit.x), default=None)
     # Stale numbers of the base are more likely than an effect that does the same.
@@ -339,12 +342,15 @@ def _own_gains(trial: Trial) -> set[str]:
     return {p.name for d in trial.state.datasets for p in d.own} & set(GAINS)
 
 
-def _least_fall(score: float, first_excess: float, settings: Settings) -> float:
+def _least_fall(before: Trial, trial: Trial, first_excess: float, settings: Settings) -> float:
     """Least fall of the squared score that matters."""
-    if score < 1.0:
-        least, most = settings.least_below * score**2, settings.most_below * score**2
-        return float(np.clip(settings.below * first_excess, least, most))
-    return min(settings.worth * first_excess, settings.enough)
+    score = before.held_score
+    if score >= 1.0:
+        return min(settings.worth * first_excess, settings.enough)
+    if _proven(trial, score, settings.stricter(settings.strong)):
+        return settings.least_strong * score**2
+    least, most = settings.least_below * score**2, settings.most_below * score**2
+    return float(np.clip(settings.below * first_excess, least, most))
 
 
 def _with_best_lateness(
@@ -381,15 +387,17 @@ def _with_best_lateness(
     return last, gone
 
 
-def _proven(trial: Trial, settings: Settings) -> bool:
-    """Enough evidence, and blocks that agree."""
+def _proven(trial: Trial, score: float, settings: Settings) -> bool:
+    """Enough evidence, and blocks that agree; below the noise agreement alone is not enough."""
     count = len(trial.names)
     loud = trial.evidence >= settings.evidence * count
     somewhere = count == 1 and _has(trial.names[0], "place")
     least = settings.without_visit if somewhere else settings.without_best
     spread = trial.without_best >= least * count
     agreed = (
-        trial.evidence >= settings.less_evidence * count and trial.blocks_t >= settings.blocks_t
+        score >= 1.0
+        and trial.evidence >= settings.less_evidence * count
+        and trial.blocks_t >= settings.blocks_t
     )
     return (loud and spread) or agreed
 

@@ -240,8 +240,8 @@ def _named(finding: Finding) -> str:
             f"{e.name.split('.', 1)[1]} {e.value:.3g}" for e in finding.parameters[:3]
         )
         instead = f", or {' or '.join(finding.group[1:])} instead" if finding.group else ""
-        alike = takes if finding.share >= 0.005 else "all robots alike"
-        return f"stale numbers of the base ({values}; {alike}){instead}"
+        share = f"; {takes}" if finding.share >= 0.005 else ""  # else robots' own gains took it
+        return f"stale numbers of the base ({values}{share}){instead}"
     name = f"{finding.effect} beside the model's own" if finding.again else finding.effect
     if finding.group:
         name = f"one of {' or '.join(finding.group)}, which these logs cannot tell apart"
