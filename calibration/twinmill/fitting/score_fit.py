@@ -388,12 +388,7 @@ class ScoreFit:
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """(P, P) by leaving out a block at a time, and by what the priors' centres are unsure of.
-
-        The jackknife (Efron and Stein 1981) tells how far the data move the minimum of the cost;
-        H^-1 P H^-1, with H the curvature and P that of the priors, how far their centres do. What
-        the data leave undetermined is as wide as its prior.
-        """
+        """(P, P) by leaving out a block at a time; no less than the curvature of the cost says."""
         rows, slopes = self.state
         gram, _ = self._normal(rows, slopes, self.x)
         inverse = np.linalg.pinv(gram)
@@ -412,7 +407,9 @@ class ScoreFit:
                     moved = inverse @ push
                 spread += np.outer(moved, moved)
         blocks = self.blocks
-        return spread * (blocks - 1) / max(blocks, 1) + inverse @ np.diag(1 / self.std**2) @ inverse
+        spread *= (blocks - 1) / max(blocks, 1)
+        # What the data leave undetermined is as wide as the curvature, and so the prior, says.
+        return spread + np.diag(np.maximum(np.diag(inverse) - np.diag(spread), 0.0))
 
     @property
     def blocks(self) -> int:
