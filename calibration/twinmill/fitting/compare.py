@@ -56,6 +56,12 @@ class RobotComparison:
         """Capture's clock less the robot's."""
         return self.scene.model.get(CLOCK)
 
+    @property
+    def held_heading_rad(self) -> float | None:
+        """Where the robot heads in a log that does not record it; None where it was recorded."""
+        recorded = self.scene.measurement.track.has_heading
+        return None if recorded else self.scene.model.get(HEADING)
+
     def error_rows(self) -> list[dict]:
         """errors[] of the interface: one row per channel and horizon."""
         found = rms(self.errors)
@@ -83,6 +89,7 @@ class RobotComparison:
             "errors": self.error_rows(),
             "where": [r.to_json() for r in self.where],
             "time_offset_s": self.time_offset_s,
+            "held_heading_rad": self.held_heading_rad,
             "time_base": base.to_json() if (base := self.scene.measurement.time_base) else None,
         }
 
@@ -162,17 +169,7 @@ def comparison(model_file: ModelFile, opened: Sequence[Opened]) -> Comparison:
     """Of measurements as they stand."""
     warnings = [f"{o.measurement.label}: {w}" for o in opened for w in o.measurement.warnings]
     warnings += [f"{o.floor.reason}." for o in opened if o.floor and o.floor.reason]
-    warnings += [_held_heading(o) for o in opened if o.data is not None and o.heading_held]
     return Comparison(model_file.path.name, [compare_robot(o) for o in opened], warnings)
-
-
-def _held_heading(own: Opened) -> str:
-    """At which angle a robot seems to hold a heading that was not recorded."""
-    angle_deg = np.degrees(own.model.get(HEADING))
-    return (
-        f"{own.measurement.label}: its motion fits its commands best if it holds its heading at "
-        f"{angle_deg:.0f} degrees to the axes of the poses."
-    )
 
 
 def compare(measurements: Sequence[Measurement | Sheet], model_file: ModelFile) -> Comparison:

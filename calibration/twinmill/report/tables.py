@@ -85,19 +85,35 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
             f"{len(track.pose)} poses, driven by {track.command_kind.replace('_', ' ')}",
         ),
         ("model", comparison.model_name),
-        ("noise", _noise(noise)),
+        ("noise", _noise(noise, track.has_heading)),
         ("floor", f"from {FLOOR_KINDS.get(robot.floor.kind, robot.floor.kind)}"),
         (
             "clock",
             f"motion capture {number(1000 * abs(robot.time_offset_s))} ms "
             f"{'ahead of' if robot.time_offset_s >= 0 else 'behind'} the robot",
         ),
+        *_held_heading(robot),
     ]
 
 
-def _noise(noise: Noise) -> str:
+def _held_heading(robot: RobotComparison) -> list[tuple[str, str]]:
+    """At which angle a robot seems to hold a heading that was not recorded."""
+    if robot.held_heading_rad is None:
+        return []
+    angle_deg = np.degrees(robot.held_heading_rad)
+    said = f"not recorded; held at {angle_deg:.0f}°, where the motion fits the commands best"
+    return [("heading", said)]
+
+
+def _noise(noise: Noise, has_heading: bool) -> str:
     """In words: what the sensor adds to a pose, and how the robot itself wavers."""
-    at, heading = noise.position, noise.heading
+    at = noise.position
+    if not has_heading:
+        return (
+            f"each measured place is off by {number(1000 * at.sensor, 2)} mm; the robot's speed "
+            f"wavers by {number(1000 * at.drive, 2)} mm/s for {number(at.memory_s, 2)} s at a time"
+        )
+    heading = noise.heading
     mm, degrees = number(1000 * at.sensor, 2), number(np.degrees(heading.sensor), 2)
     mm_s, degrees_s = number(1000 * at.drive, 2), number(np.degrees(heading.drive), 2)
     return (
