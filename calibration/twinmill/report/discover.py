@@ -32,6 +32,10 @@ def section(
     listed = ", ".join(f"{kind} {count[kind]}" for kind in present)
     twins = ", and so in twins drawn from the model's errors" if shown[0].drawn is not None else ""
     twins += " and in MuJoCo" if shown[0].mujoco is not None else ""
+    waiting = sum(entry.holds and not entry.name for entry in found)
+    untried = (
+        f"; {waiting} were not run in MuJoCo, more of which --show asks for" if waiting else ""
+    )
     return Section(
         title="Behaviours that were found",
         score=[
@@ -42,7 +46,7 @@ def section(
         ],
         verdict=f"Of {tried} swarms, {len(found)} differ. {len(offered)} were what they are called "
         f"in most of {shown[0].confirmed} fresh runs{twins}, and are offered: {listed}. The names "
-        f"of the other {len(found) - len(offered)} were taken back.",
+        f"of {sum(not entry.holds for entry in found)} others were taken back{untried}.",
         facts=[
             ("model", hunt.request.model_name),
             ("robots", str(hunt.n)),
