@@ -2,13 +2,14 @@
 """The published claims against their references, and that a wrong number would be found."""
 
 import json
+from collections import Counter
 from functools import cache
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from twinmill.claims import bodies, claims, paper, rows
+from twinmill.claims import bodies, claims, fidelity, paper, rows
 from twinmill.claims.actuation import actuation
 from twinmill.claims.claims import CLAIMS
 from twinmill.claims.swarms import KINDS, run
@@ -33,7 +34,10 @@ def published_once():
         yield
 
 
-@pytest.mark.parametrize("name", [name for name in CLAIMS if name != "prediction"])  # has its own
+ELSEWHERE = ("prediction", "fidelity")  # tested with their own sizes
+
+
+@pytest.mark.parametrize("name", [name for name in CLAIMS if name not in ELSEWHERE])
 def test_numbers_agree_and_only_what_was_seen_is_said_to_be(name):
     claim = CLAIMS[name](SEEDS)
     for row in claim.rows:
@@ -98,6 +102,12 @@ def test_every_claim_stands_for_a_part_of_the_paper():
     assert {name for part in paper.PARTS for name in part.claims} == {
         *CLAIMS, "bodies", "actuation"}  # fmt: skip
     assert all(part.claims or part.elsewhere for part in paper.PARTS)
+
+
+def test_what_distributions_have_in_common():
+    """1 less the total variation; by hand: six runs and three in common."""
+    seen = [Counter(milling=9, cluster=3)]
+    assert fidelity._alike(seen, [Counter(milling=6, cluster=6)]) * fidelity.SEEDS == [9]
 
 
 def test_spread_of_measured_robots_is_told_at_each_input(tmp_path):

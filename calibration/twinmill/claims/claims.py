@@ -9,6 +9,7 @@ from scipy.stats import mannwhitneyu
 
 from twinmill.claims import figures
 from twinmill.claims.cuts import sensor, steps
+from twinmill.claims.fidelity import fidelity
 from twinmill.claims.pivot import pivot
 from twinmill.claims.prediction import prediction
 from twinmill.claims.published import Points
@@ -277,6 +278,7 @@ CLAIMS: dict[str, Callable[..., Claim]] = {
     "steps": steps,
     "pivot": pivot,
     "prediction": prediction,
+    "fidelity": fidelity,
 }
 
 

@@ -47,9 +47,9 @@ class Answer:
 PARTS = (
     Part(
         "Cost against fidelity of models",
-        (),
-        elsewhere="Not set side by side here. For one robot: docs/accuracy.md, error on runs that "
-        "were not fitted to against effects added; for the swarm: twinmill matters.",
+        ("fidelity",),
+        open="How cost is counted; here by what must be measured.",
+        elsewhere="For one real robot: docs/accuracy.md; for a model of yours: twinmill matters.",
     ),
     Part(
         "Two rules of one bit and their behaviours: milling, diffusing",
