@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every command that a page, a help text or a result prints can be typed as it stands."""
 
+import html
 import io
 import json
 import re
@@ -9,12 +10,16 @@ import subprocess
 from collections.abc import Iterator
 from contextlib import redirect_stdout
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from typer.core import TyperGroup
 
 from twinmill.programs import find_program
+from twinmill.workbench.next_run import then_commands
 from twinmill_cli import main as cli
+from twinmill_cli import next as next_command
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -120,6 +125,48 @@ def test_the_command_that_a_result_names_makes_it_again(swarm, line, monkeypatch
         " --out second" if " --out " in line else " --force" if line.startswith("plot") else ""
     ))  # fmt: skip
     assert without_place(first) == without_place(again)
+
+
+@pytest.mark.parametrize("line", ["metrics s.lcmlog", "compare s.lcmlog"])
+def test_what_a_report_says_that_made_it_makes_it_again(swarm, line, monkeypatch):
+    """Byte for byte, in another folder."""
+    monkeypatch.chdir(swarm)
+    said(f"{line} --out page-{line[:4]}")
+    page = Path(f"page-{line[:4]}/index.html").read_text()
+    (made_by,) = re.findall(r"Made by <code>(twinmill .*?)</code>", page)
+    said(f"{html.unescape(made_by).removeprefix('twinmill ')} --out again-{line[:4]}")
+    assert Path(f"again-{line[:4]}/index.html").read_text() == page
+
+
+def test_the_command_that_the_twin_names_makes_the_log_again(swarm):
+    run = {"cwd": swarm, "check": True, "capture_output": True, "text": True}
+    twin, words = str(find_program("twin_run")), ["--plant", "planar", "--n", "3", "--seed", "7"]
+    words += ["--duration-s", "2", "--spread-m", "1.5", "--json"]
+    told = json.loads(subprocess.run([twin, *words, "--log", "a.lcmlog"], **run).stdout)
+    again = shlex.split(told["command_line"])[1:]
+    subprocess.run([twin, *again, "--log", "b.lcmlog"], **run)
+    assert (swarm / "a.lcmlog").read_bytes() == (swarm / "b.lcmlog").read_bytes()
+
+
+@pytest.mark.parametrize("robot_id", [0, 3])
+def test_what_next_says_to_do_with_its_script_can_be_done(swarm, monkeypatch, robot_id):
+    """Those of the command and of the workbench; the twin drives the script."""
+    monkeypatch.chdir(swarm)
+    script = Path("a script.csv")
+    script.write_text("t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,40,40,40,40\n1,0,0,0,0\n")
+    duty = np.array([[0.4, 0.4, 0.4, 0.4], [0.0, 0.0, 0.0, 0.0]])
+    plan = SimpleNamespace(robot_id=robot_id, rows=SimpleNamespace(duty=duty))
+    logs = [Path("s.lcmlog")]
+    (_, robot), (_, twin), (_, then) = next_command._how(
+        plan, logs, "turbopi.toml", script
+    ).commands
+    told = {"robot_id": robot_id, "cap_pct": 40}
+    for line in (robot, then, *then_commands(logs, "turbopi.toml", told)):
+        check(line)
+    program, *words = shlex.split(twin)
+    subprocess.run([str(find_program(program)), *words], check=True, capture_output=True)
+    assert Path("next.lcmlog").stat().st_size > 0
+    Path("next.lcmlog").unlink()
 
 
 def said(line: str) -> dict:
