@@ -50,6 +50,7 @@ class Bench:
         self._reading, self._read = False, asyncio.Event()
         self._checks: Done | None = None
         self.told = asyncio.Event()
+        self._acting = asyncio.Lock()
         session.restore(state.read("session", {}))
 
     # -- opening --------------------------------------------------------------------------------
@@ -118,8 +119,9 @@ class Bench:
         self.changed("score", "prediction")
 
     async def act(self, act: Callable[..., None], *arguments: Any) -> None:
-        """Does what moves the session to another model."""
-        await asyncio.to_thread(act, *arguments)
+        """Does what moves the session to another model; one after another."""
+        async with self._acting:
+            await asyncio.to_thread(act, *arguments)
         await self._settled()
 
     # -- long work ------------------------------------------------------------------------------

@@ -291,6 +291,7 @@ def test_the_weak_robot_is_named(fleet, page):
         page.goto(url)
         is_predicted(page)
         type_a_number(page)
+        turn_by_keys(page)
         page.get_by_test_id("tab-missing").click()
         page.get_by_test_id("diagnose").and_(page.locator(":enabled")).click()
         expect(page.get_by_test_id("findings")).to_contain_text("R03: left wheels 8 % weak")
@@ -323,3 +324,16 @@ def type_a_number(page) -> None:
     number.press("Escape")
     expect(number).to_have_value(before)
     expect(shown).to_have_text(given)
+
+
+def turn_by_keys(page) -> None:
+    """Several keys in a row make one model: one undo takes them back."""
+    knob = page.get_by_test_id("knob-base.yaw_gain")
+    number = knob.locator("input.number")
+    before = number.input_value()
+    knob.locator("[tabindex].q-slider__track-container").focus()
+    for _ in range(4):
+        page.keyboard.press("ArrowRight")
+    expect(number).not_to_have_value(before)
+    page.get_by_test_id("undo").and_(page.locator(":enabled")).click()
+    expect(number).to_have_value(before)

@@ -230,7 +230,7 @@ export class Series {
   }
 
   _frame(g, row) {
-    const marks = ticks(row.low, row.high, Math.max(3, (row.foot - row.top) / 24));
+    const marks = ticks(row.low, row.high, Math.max(4, (row.foot - row.top) / 24));
     g.font = SMALL;
     g.lineWidth = 1;
     g.textAlign = "right";

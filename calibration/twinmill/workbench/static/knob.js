@@ -2,6 +2,8 @@
 // One quantity of the model: a number, and a slider over its interval. While a hand turns it the stage
 // draws what comes of it; the server is told what is kept, as `keep`, and `hold` of the lock.
 
+const REST_MS = 300; // after a key, before what it moved is a model
+
 /** Six digits, as a model file has them. */
 const worded = (value) => String(Number(Number(value).toPrecision(6)));
 
@@ -19,7 +21,7 @@ export default {
           @keydown.enter="$emit('hold')" @keydown.space.prevent="$emit('hold')" />
         <span class="what" :title="words">{{ label }}</span>
         <input class="number" inputmode="decimal" v-model="typed" :aria-label="name"
-          @focus="typing = true" @keydown.enter="type" @keydown.esc="leave" @blur="type">
+          @input="typing = true" @keydown.enter="type" @keydown.esc="leave" @blur="type">
         <span class="unit">{{ unit }}</span>
       </div>
       <div class="reach">
@@ -57,10 +59,13 @@ export default {
       window.twinmill.turn(this.name, value);
     },
 
-    /** Once the last move was drawn: nothing of it comes to the server later than this. */
-    async keep(value) {
-      await window.twinmill.predicted();
-      this.$emit("keep", value);
+    /** Once keys rest, and the last move was drawn: nothing of it comes to the server later. */
+    keep(value) {
+      clearTimeout(this.due);
+      this.due = setTimeout(async () => {
+        await window.twinmill.predicted();
+        this.$emit("keep", value);
+      }, REST_MS);
     },
 
     type() {
