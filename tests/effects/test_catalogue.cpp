@@ -98,7 +98,7 @@ TEST_P(EveryEffect, NeedsFramesIfItIsOfTheCamera)
     const Card &card = GetParam()->card;
     const bool of_camera = IsOfSight(GetParam()->act);
     EXPECT_EQ(card.family == Family::kCamera, of_camera);
-    EXPECT_EQ(card.needs == Needs::kFrames, of_camera);
+    EXPECT_EQ(card.needs == Needs::kFrames || card.needs == Needs::kRawFrames, of_camera);
 }
 
 // Where only steady speeds are known, an effect on what follows a change must not be looked for.

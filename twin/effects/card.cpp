@@ -47,12 +47,14 @@ const char *NeedsName(Needs needs)
         case Needs::kChanges: return "changes";
         case Needs::kClocks: return "clocks";
         case Needs::kPoses: return "poses";
+        case Needs::kHeading: return "heading";
         case Needs::kRoom: return "room";
         case Needs::kBattery: return "battery";
         case Needs::kHistory: return "history";
         case Needs::kWheelAngle: return "wheel_angle";
         case Needs::kContacts: return "contacts";
         case Needs::kFrames: return "frames";
+        case Needs::kRawFrames: return "raw_frames";
     }
     return "";
 }

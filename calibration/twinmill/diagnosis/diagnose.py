@@ -38,6 +38,8 @@ from twinmill.model.parameters import (
     all_effect_parameters,
     base_parameters,
     catalogue,
+    making_late,
+    needing,
 )
 
 DRIFT_STD = 0.04  # gains of a calibrated robot wander so much with battery and heat
@@ -46,11 +48,17 @@ LACKS = {
     "changes": "acts only while the speed changes, and a steady table has no starts and stops",
     "clocks": "a steady table has no clocks",
     "poses": "a steady table has no poses",
+    "heading": "a steady table has no poses",
     "room": "a steady table does not say where and in which direction of the room the robot drove",
     "battery": "a steady table does not say how full the battery was",
     "history": "a steady table does not say how long the robot had been driving",
     "wheel_angle": "a steady table gives means over many turns of the wheels",
 }
+TWO_CLOCKS = (
+    "the clocks are two, and their offset hides a delay; say that they are one (twinmill import "
+    "--same-clock), or fit a calibration log on the same clocks first"
+)
+NO_HEADING = "the heading was not recorded, and what the robot holds is found"
 CONTACTS = "predictions of one robot have no contacts; twinmill compare-swarm looks at whole swarms"
 
 
@@ -129,8 +137,8 @@ def _by_clocks(opened: Sequence[Opened]) -> set[str]:
     """Effects that the clocks make meaningless: offsets are fitted, or known to be none."""
     logs = [o for o in opened if o.floor]
     if any(not o.same_clock for o in logs):
-        return {"clock_offset", "clock_rate", "input_delay"}
-    return {"clock_offset"} if any(o.one_clock for o in logs) else set()
+        return {*needing("clocks"), *making_late("delay")}
+    return set(making_late("clock")) if any(o.one_clock for o in logs) else set()
 
 
 def _robot_of(own: Opened) -> int:
@@ -147,16 +155,11 @@ def _unseen(opened: Sequence[Opened]) -> dict[str, str]:
     if not tables:
         shared = any(not o.same_clock for o in opened if o.floor)
         if shared:
-            found["input_delay"] = (
-                "the clocks are two, and their offset hides a delay; say that they are one "
-                "(twinmill import --same-clock), or fit a calibration log on the same clocks first"
-            )
+            found |= dict.fromkeys(making_late("delay"), TWO_CLOCKS)
         if all(o.heading_held for o in opened if o.floor):
-            found["heading_bias"] = (
-                "the heading was not recorded, and what the robot holds is found"
-            )
+            found |= dict.fromkeys(needing("heading"), NO_HEADING)
         if len({_robot_of(o) for o in opened}) > 1:
-            found["collision"] = CONTACTS
+            found |= dict.fromkeys(needing("contacts"), CONTACTS)
     return found
 
 

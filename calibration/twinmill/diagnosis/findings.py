@@ -9,7 +9,14 @@ import twinmill_native as native
 
 from twinmill.diagnosis.constancy import Change, changes_of
 from twinmill.diagnosis.search import REFIT, Round, Search, State, Trial, fitted, grown
-from twinmill.model.parameters import LAG, Estimate, catalogue_of, effect_names
+from twinmill.model.parameters import (
+    LAG,
+    LAG_EFFECT,
+    Estimate,
+    catalogue_of,
+    effect_names,
+    late_part,
+)
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
@@ -18,14 +25,6 @@ MISSES = 1.5  # score of a final model whose errors are not noise
 WITHIN = 2.0  # standard deviations: a lag that differs by less is the model's own error
 BEYOND = 3.0  # usual sizes: a larger value is doubtful
 NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
-DELAY, CLOCK_OFF, MOTOR_LAG = "input_delay", "clock_offset", "motor_lag"
-# What makes a robot late: the part of lateness, and the parameter.
-LATE = {
-    MOTOR_LAG: ("lag", "extra_s"),
-    "second_order_lag": ("lag", "second_s"),
-    DELAY: ("delay", "delay_s"),
-    CLOCK_OFF: ("clock", "offset_s"),
-}
 
 
 @dataclass(frozen=True)
@@ -174,7 +173,7 @@ def _stale_numbers(
     finding: Finding, model: native.Model, lag_std_s: float, stds: Mapping[str, float]
 ) -> list[Estimate]:
     """What a finding changes, if the model may well have all of it by its own error; else none."""
-    if finding.effect == MOTOR_LAG and not finding.group and lag_std_s > 0:
+    if finding.effect == LAG_EFFECT and not finding.group and lag_std_s > 0:
         extra = finding.parameters[0]
         if abs(extra.value) <= WITHIN * np.hypot(extra.std, lag_std_s):
             return [replace(extra, name=LAG, value=model.get(LAG) + extra.value)]
@@ -333,8 +332,8 @@ def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:
     names = [u.parameter.name for u in fit.unknowns]
     parts = {"lag": [LAG], "delay": [], "clock": []}
     for instance in effect_names(model):
-        if instance.split("#")[0] in LATE:
-            kind, key = LATE[instance.split("#")[0]]
+        if late := late_part(instance.split("#")[0]):
+            kind, key = late
             parts[kind].append(f"{instance}.{key}")
     value = {k: sum(model.get(n) for n in own) for k, own in parts.items()}
     every = [n for own in parts.values() for n in own]
@@ -345,7 +344,7 @@ def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:
     mask = np.array([n in every for n in names], float)
     free = bool(mask.any())
     std = float(np.sqrt(mask @ fit.covariance @ mask)) if free else None
-    kinds = [{LATE[n][0] for n in f.group or () if n in LATE} for f in found]
+    kinds = [{late[0] for n in f.group or () if (late := late_part(n))} for f in found]
     tied = any(len(k) > 1 for k in kinds)
     lag_tied = any(len(k) > 1 and "lag" in k for k in kinds)
     parted = same_clock and not tied

@@ -17,6 +17,7 @@ from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     GAINS,
     LAG,
+    LAG_EFFECT,
     MOTION_STAGES,
     Parameter,
     base_lag_is_told,
@@ -25,6 +26,7 @@ from twinmill.model.parameters import (
     catalogue_of,
     effect_names,
     effect_parameters,
+    making_late,
 )
 from twinmill.predict.datasets import Dataset, Trajectory, total_score
 
@@ -427,7 +429,8 @@ def candidates(state: State) -> list[str]:
     model = state.model
     moved = {p.name.split(".")[0].split("#")[0] for p in state.free}
     if model.get(LAG) == 0 and base_lag_is_told(model):
-        moved.add("second_order_lag")  # without a first one it is motor_lag
+        # Without a first lag, a second one is no other than the first.
+        moved |= {n for n in making_late("lag") if n != LAG_EFFECT}
     names = []
     if any(n not in {p.name for p in state.free} for n in state.base):
         names.append(REFIT)

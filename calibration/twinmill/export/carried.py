@@ -16,7 +16,7 @@ from twinmill.model.parameters import catalogue_of, effect_names
 HULL_HEIGHT_M = 0.08  # of the body: no model file states it
 WHEEL_SHARE = 0.03  # of the robot's mass, each, as in the twin's own MuJoCo robots
 WHEEL_WIDTH = 0.8  # of its radius
-OF_A_LOG = ("clock_offset", "clock_rate")  # say nothing of the robot
+OF_A_LOG = "clock"  # family of effects that say nothing of the robot
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class RobotModel:
                 continue
             why = (
                 "belongs to a recording's clocks, not to the robot"
-                if name in OF_A_LOG
+                if card["family"] == OF_A_LOG
                 else f"{target} has nothing for {card['equation']}"
             )
             share, others = self.share_of(instance)

@@ -16,7 +16,7 @@ import tomlkit
 import twinmill_native as native
 
 from twinmill.model.covariance import Covariance
-from twinmill.model.parameters import Estimate, catalogue_of, effect_names
+from twinmill.model.parameters import LAG_EFFECT, Estimate, catalogue_of, effect_names
 
 
 class ModelError(ValueError):
@@ -82,7 +82,7 @@ class ModelFile:
         parts += [
             e.get("std", {}).get("extra_s", 0.0)
             for e in document.get("effect", [])
-            if e["name"] == "motor_lag"
+            if e["name"] == LAG_EFFECT
         ]
         return math.hypot(*map(float, parts))
 

@@ -15,12 +15,15 @@ ALIGNMENT = (CLOCK, CLOCK_RATE, HEADING)  # of one log, not of a robot
 GAINS = ("theta_a1", "theta_a2")  # of one robot: speed, and rate of turn
 BASE_GAINS = ("base.forward_gain", "base.sideways_gain", "base.yaw_gain")
 LAG = "base.motor_lag_s"
+LAG_EFFECT = "motor_lag"  # adds to LAG: beside it only their sum can be told
 
 # Standard deviations of the base's priors: as robots differ from their data sheets.
 USUAL_STD = {LAG: 0.3, CLOCK: 0.3, CLOCK_RATE: 30.0, HEADING: 1.0}
 GAIN_STD = 0.15
 BASE_STEP = {LAG: 0.004, CLOCK: 0.006, CLOCK_RATE: 5.0, HEADING: 0.005}
 GAIN_STEP = 0.004
+# Which part of a robot's lateness an effect changes, by its stage; "lag" at the others.
+LATE_PARTS = {"duty": "delay", "observe": "clock"}
 EFFECT_STEP = 0.05  # times the distance of an effect's default from its neutral value
 
 
@@ -81,6 +84,27 @@ class Estimate:
 def catalogue() -> dict[str, dict]:
     """The twin's effects by name."""
     return {entry["name"]: entry for entry in native.catalogue()}
+
+
+def needing(need: str) -> list[str]:
+    """Effects that show only in data that hold this, as `needs` on their cards says."""
+    return [name for name, entry in catalogue().items() if entry["needs"] == need]
+
+
+def late_part(effect: str) -> tuple[str, str] | None:
+    """What an effect makes late and by which of its parameters; None if it makes nothing late.
+
+    Returns:
+        "lag", "delay" or "clock", and the parameter of role "lateness".
+    """
+    entry = catalogue().get(effect, {"stage": "", "parameters": ()})
+    own = [p["name"] for p in entry["parameters"] if p["role"] == "lateness"]
+    return (LATE_PARTS.get(entry["stage"], "lag"), own[0]) if own else None
+
+
+def making_late(part: str) -> list[str]:
+    """Effects whose `late_part` this is."""
+    return [name for name in catalogue() if (late := late_part(name)) and late[0] == part]
 
 
 _of_kind: dict[tuple[str, str], dict[str, dict]] = {}
@@ -149,8 +173,8 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
 
 
 def base_lag_is_told(model: native.Model) -> bool:
-    """Whether data can tell the base's lag: beside the effect motor_lag only their sum."""
-    return "motor_lag" not in model.effects
+    """Whether data can tell the base's lag, and not only its sum with an effect's."""
+    return LAG_EFFECT not in model.effects
 
 
 def all_effect_parameters(model: native.Model) -> list[Parameter]:

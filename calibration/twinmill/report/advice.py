@@ -2,19 +2,17 @@
 """What to do after a comparison, in a sentence."""
 
 from twinmill.fitting.compare import GOOD, SUSPECT, Comparison
+from twinmill.model.parameters import catalogue_of
 from twinmill.report.tables import number
 from twinmill.steady.compare import SteadyComparison
 
-# By what the robot was doing: what is wrong, and effects that act there.
-HINTS = {
-    "standing": ("it is predicted to move while it stands", ("dead_zone",)),
-    "steady": ("steady speeds are wrong", ("speed_curve", "wheel_gain", "reverse_asymmetry")),
-    "starting": ("starts are wrong", ("motor_lag", "lag_by_duty", "input_delay")),
-    "stopping": ("stops are wrong", ("coasting", "motor_lag")),
-    "changing": (
-        "changes of command are followed wrongly",
-        ("motor_lag", "lag_by_duty", "input_delay"),
-    ),
+# By what the robot was doing; the cards of effects say which to think of first.
+WRONG = {
+    "standing": "it is predicted to move while it stands",
+    "steady": "steady speeds are wrong",
+    "starting": "starts are wrong",
+    "stopping": "stops are wrong",
+    "changing": "changes of command are followed wrongly",
 }
 
 
@@ -31,14 +29,18 @@ def advice(comparison: Comparison) -> str:
     if not phases:
         return "record a longer log with starts, stops and turns, then compare again."
     worst = max(phases, key=lambda r: r.share)
-    wrong, effects = HINTS[worst.regime]
-    fresh = [name for name in effects if name not in robot.scene.model.effects]
+    model = robot.scene.model
+    fresh = [
+        name
+        for name, card in catalogue_of(model).items()
+        if worst.regime in card["suspect_when"] and name not in model.effects
+    ]
     try_next = (
         f"fit if you have not, then add {' or '.join(fresh)}" if fresh else "look at where it fails"
     )
     return (
         f"{100 * worst.share:.0f} % of the error comes while the robot is {worst.regime} "
-        f"({number(worst.ratio)} times the floor): {wrong}; {try_next}."
+        f"({number(worst.ratio)} times the floor): {WRONG[worst.regime]}; {try_next}."
     )
 
 

@@ -15,7 +15,7 @@ constexpr Card kCard = {
     .measure = "straight drives forward and sideways: without the latter it looks like wheel_gain",
     .reference = "rigid-body transform",
     .family = Family::kFrame,
-    .needs = Needs::kPoses,
+    .needs = Needs::kHeading,
     .phrase = "the tracked heading is turned against the robot",
     .identify = kStraight | kStrafe,
 };

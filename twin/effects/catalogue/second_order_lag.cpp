@@ -24,7 +24,6 @@ constexpr Card kCard = {
     .needs = Needs::kChanges,
     .phrase = "wheels follow slowly at first, as behind a filter",
     .identify = kSteps,
-    .suspect_when = kStarting | kStopping | kChanging,
 };
 
 constexpr ParameterSpec kParameters[] = {

@@ -19,7 +19,7 @@ constexpr Card kCard = {
     .measure = "any run with raw and voted bits in its telemetry",
     .reference = "majority decoding of a repetition code; MacKay 2003, Information Theory, ch. 1.2",
     .family = Family::kCamera,
-    .needs = Needs::kFrames,
+    .needs = Needs::kRawFrames,
     .phrase = "another number of frames votes",
     .identify = kWatch,
 };

@@ -23,7 +23,6 @@ constexpr Card kCard = {
     .needs = Needs::kChanges,
     .phrase = "turning follows its command sooner or later than driving",
     .identify = kSteps | kSpin | kStraight,
-    .suspect_when = kStarting | kStopping | kChanging,
 };
 
 constexpr ParameterSpec kParameters[] = {

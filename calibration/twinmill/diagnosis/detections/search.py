@@ -21,7 +21,7 @@ from twinmill.diagnosis.detections.fit import (
     model_knobs,
     start,
 )
-from twinmill.model.parameters import Estimate
+from twinmill.model.parameters import Estimate, needing
 from twinmill.predict.detection_errors import brier_ratio
 from twinmill.predict.detections import BitScene
 
@@ -107,7 +107,7 @@ def search_bits(
     names = [n for n in camera_effects(model) if n not in excluded]
     raw = all(s.frames.has_raw for s in scenes)
     if not raw:
-        names = [n for n in names if n != "vote"]
+        names = [n for n in names if n not in needing("raw_frames")]
     rounds: list[Round] = []
     state = attempt(scenes, model, None)
     hidden = _hidden(scenes, state.model, names)
@@ -120,8 +120,9 @@ def search_bits(
         if len(rounds) == MOST:
             rounds.append(Round(state, [], None, []))
             break
-    if not raw and "vote" not in excluded:
-        hidden.append(("vote", "the log has no raw bits, only those after the vote"))
+    if not raw:
+        why = "the log has no raw bits, only those after the vote"
+        hidden += [(n, why) for n in needing("raw_frames") if n not in excluded]
     likelihood = Likelihood(scenes, state.model, model_knobs(state.model))
     return BitSearch(rounds, names, hidden, tuple(estimates(likelihood, state.values)))
 

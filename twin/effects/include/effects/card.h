@@ -42,12 +42,14 @@ enum class Needs
     kChanges,      // starts, stops and other changes of the command
     kClocks,       // time stamps of commands and of poses
     kPoses,        // the pose of the tracked body
+    kHeading,      // its heading, recorded and not found by the fit
     kRoom,         // where in the room the robot was, and its heading
     kBattery,      // the pack voltage
     kHistory,      // how long the robot had been driving
     kWheelAngle,   // motion within a turn of the wheels
     kContacts,     // bodies that touch
     kFrames,       // the camera's bits
+    kRawFrames,    // these, before any vote
 };
 
 // Kinds of drives, for Card::identify.
