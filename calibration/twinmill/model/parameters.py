@@ -40,6 +40,7 @@ class Parameter:
         step: of finite differences.
         central: differences are taken to both sides, where times make one-sided ones crude.
         role: "size", "place" (where in the room) or "lateness", as on the effect's card.
+        strength: an effect's default less its neutral value.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Parameter:
     step: float
     central: bool = False
     role: str = "size"
+    strength: float = 0.0
 
     def at(self, value: float) -> "Parameter":
         """The same, begun elsewhere; no place is usual, so the prior of one goes with it."""
@@ -155,6 +157,7 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
             continue
         full = f"{instance}.{p['name']}"
         low, high = bounds[full]
+        strength = p["default"] - p["neutral"]
         found.append(
             Parameter(
                 full,
@@ -164,9 +167,10 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
                 high,
                 p["neutral"],
                 high - low if texts else p["usual_size"],
-                EFFECT_STEP * abs(p["default"] - p["neutral"]),
+                EFFECT_STEP * abs(strength),
                 p["unit"] == "s",
                 p["role"],
+                strength,
             )
         )
     return found

@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits quantities of the camera to reported bits by maximum likelihood."""
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 import twinmill_native as native
 from scipy.optimize import minimize
 
-from twinmill.model.parameters import Estimate, catalogue, effect_names
+from twinmill.model.parameters import (
+    Estimate,
+    Parameter,
+    catalogue,
+    effect_names,
+    effect_parameters,
+)
 from twinmill.predict.detections import BitScene
 
 STAGES = ("view", "decide")
@@ -21,53 +26,22 @@ FALL = 1.0  # of the log likelihood on both sides together: less may be the grai
 REACH = 0.5  # times the usual strength: how far a fit goes from where it begins
 
 
-@dataclass(frozen=True)
-class Knob:
-    """One free quantity: its place in the model and how far it usually is from neutral."""
-
-    name: str
-    unit: str
-    neutral: float
-    strength: float
-    min: float
-    max: float
-
-    def grid(self, far: bool) -> list[float]:
-        """Neutral and values on both sides of it, within bounds."""
-        if self.name.endswith("_frames"):  # whole numbers
-            return [float(n) for n in range(-MOST_EXTRA, MOST_EXTRA + 1)]
-        steps = [*STRENGTHS, *(FAR if far else ())]
-        values = {self.neutral + s * self.strength for s in [0.0, *steps, *(-s for s in steps)]}
-        return sorted({float(np.clip(v, self.min, self.max)) for v in values})
-
-
 def camera_effects(model: native.Model) -> list[str]:
     """Effects of the camera that a model could lack, in the catalogue's order."""
     return [n for n, e in catalogue().items() if e["stage"] in STAGES and n not in model.effects]
 
 
-def knobs(model: native.Model, instance: str) -> list[Knob]:
-    """Free quantities of one of the model's effects."""
-    bounds = {v["name"]: (v["min"], v["max"]) for v in model.values()}
-    made = []
-    for p in catalogue()[instance.split("#")[0]]["parameters"]:
-        name = f"{instance}.{p['name']}"
-        strength = p["default"] - p["neutral"]
-        made.append(Knob(name, p["unit"], p["neutral"], strength, *bounds[name]))
-    return made
-
-
-def model_knobs(model: native.Model) -> list[Knob]:
-    """Those of all camera effects that the model has."""
+def camera_parameters(model: native.Model) -> list[Parameter]:
+    """Free quantities of all camera effects that the model has."""
     entries = catalogue()
     own = [n for n in effect_names(model) if entries[n.split("#")[0]]["stage"] in STAGES]
-    return [k for name in own for k in knobs(model, name)]
+    return [p for name in own for p in effect_parameters(model, name)]
 
 
 class Likelihood:
-    """Of bits, given values of some knobs."""
+    """Of bits, given values of some parameters."""
 
-    def __init__(self, scenes: list[BitScene], model: native.Model, free: list[Knob]):
+    def __init__(self, scenes: list[BitScene], model: native.Model, free: list[Parameter]):
         """Takes frames of all robots; the model is copied."""
         self.scenes, self.free = scenes, free
         self.model = model.copy()
@@ -77,8 +51,8 @@ class Likelihood:
 
     def set(self, values: np.ndarray) -> native.Model:
         """The model with these values."""
-        for knob, value in zip(self.free, values, strict=True):
-            self.model.set(knob.name, float(np.clip(value, knob.min, knob.max)))
+        for p, value in zip(self.free, values, strict=True):
+            self.model.set(p.name, float(np.clip(value, p.min, p.max)))
         return self.model
 
     def frames(self, values: np.ndarray, thin: bool = False) -> list[np.ndarray]:
@@ -95,10 +69,20 @@ class Likelihood:
         return float(total) * (self.thin.step if thin else 1)
 
 
-def start(likelihood: Likelihood, fresh: list[Knob], values: np.ndarray) -> np.ndarray:
-    """The best of a grid of values of `fresh`, the last of the free knobs; the rest as given."""
+def grid(parameter: Parameter, far: bool) -> list[float]:
+    """Neutral and values on both sides of it, within bounds."""
+    p = parameter
+    if p.name.endswith("_frames"):  # whole numbers
+        return [float(n) for n in range(-MOST_EXTRA, MOST_EXTRA + 1)]
+    steps = [*STRENGTHS, *(FAR if far else ())]
+    values = {p.usual + s * p.strength for s in [0.0, *steps, *(-s for s in steps)]}
+    return sorted({float(np.clip(v, p.min, p.max)) for v in values})
+
+
+def start(likelihood: Likelihood, fresh: list[Parameter], values: np.ndarray) -> np.ndarray:
+    """The best of a grid of values of `fresh`, the last ones; the rest as given."""
     head = values[: len(values) - len(fresh)]
-    grids = [k.grid(far=len(fresh) == 1) for k in fresh]
+    grids = [grid(p, far=len(fresh) == 1) for p in fresh]
     rows = [np.concatenate([head, row]) for row in product(*grids)]
     return max(rows, key=likelihood.total)
 
@@ -128,21 +112,21 @@ def estimates(likelihood: Likelihood, values: np.ndarray) -> list[Estimate]:
     """Values with standard errors from the curvature of the likelihood, one by one."""
     made = []
     middle = likelihood.total(values, thin=False)
-    for i, knob in enumerate(likelihood.free):
+    for i, p in enumerate(likelihood.free):
         std = _std(likelihood, values, i, middle)
-        at_bound = bool(values[i] in (knob.min, knob.max))
+        at_bound = bool(values[i] in (p.min, p.max))
         known = bool(np.isfinite(std))
-        made.append(Estimate(knob.name, float(values[i]), std, knob.unit, at_bound, known))
+        made.append(Estimate(p.name, float(values[i]), std, p.unit, at_bound, known))
     likelihood.set(values)
     return made
 
 
 def _std(likelihood: Likelihood, values: np.ndarray, i: int, middle: float) -> float:
     """Of one value: from the shortest steps to both sides that fall by more than the grain."""
-    knob = likelihood.free[i]
+    p = likelihood.free[i]
     for k in range(WIDER):
-        step = 0.1 * abs(knob.strength) * 2**k
-        sides = np.clip(values[i] + np.array([-step, step]), knob.min, knob.max)
+        step = 0.1 * abs(p.strength) * 2**k
+        sides = np.clip(values[i] + np.array([-step, step]), p.min, p.max)
         fall = 2 * middle
         for side in sides:
             moved = values.copy()

@@ -15,13 +15,12 @@ from twinmill.diagnosis.detections.evidence import ALPHA, Evidence, HeldOut, wei
 from twinmill.diagnosis.detections.fit import (
     Likelihood,
     camera_effects,
+    camera_parameters,
     climb,
     estimates,
-    knobs,
-    model_knobs,
     start,
 )
-from twinmill.model.parameters import Estimate, needing
+from twinmill.model.parameters import Estimate, effect_parameters, needing
 from twinmill.predict.detection_errors import brier_ratio
 from twinmill.predict.detections import BitScene
 
@@ -40,7 +39,7 @@ class Trial:
     Attributes:
         effect: what was added; None if nothing.
         model: fitted to all frames.
-        values: of all camera knobs.
+        values: of all camera parameters.
         heldout: what fits to either half say of the other.
         score: of these.
         own: estimates of the added effect's quantities.
@@ -123,7 +122,7 @@ def search_bits(
     if not raw:
         why = "the log has no raw bits, only those after the vote"
         hidden += [(n, why) for n in needing("raw_frames") if n not in excluded]
-    likelihood = Likelihood(scenes, state.model, model_knobs(state.model))
+    likelihood = Likelihood(scenes, state.model, camera_parameters(state.model))
     return BitSearch(rounds, names, hidden, tuple(estimates(likelihood, state.values)))
 
 
@@ -133,8 +132,8 @@ def attempt(scenes: list[BitScene], model: native.Model, effect: str | None) -> 
     fresh = []
     if effect:
         richer.add_effect(effect)
-        fresh = knobs(richer, effect)
-    free = model_knobs(richer)
+        fresh = effect_parameters(richer, effect)
+    free = camera_parameters(richer)
     likelihood = Likelihood(scenes, richer, free)
     values = np.array([richer.get(k.name) for k in free])
     if fresh:
@@ -181,9 +180,9 @@ def _promise(scenes: list[BitScene], model: native.Model, effect: str) -> float:
     """What the best of a grid of the effect's values gains, in log likelihood."""
     richer = model.copy()
     richer.add_effect(effect)
-    fresh = knobs(richer, effect)
+    fresh = effect_parameters(richer, effect)
     likelihood = Likelihood(scenes, richer, fresh)
-    neutral = np.array([k.neutral for k in fresh])
+    neutral = np.array([p.usual for p in fresh])
     return likelihood.total(start(likelihood, fresh, neutral)) - likelihood.total(neutral)
 
 
@@ -241,12 +240,12 @@ def _hidden(scenes: list[BitScene], model: native.Model, names: list[str]) -> li
     for name in names:
         richer = model.copy()
         richer.add_effect(name)
-        fresh = knobs(richer, name)
+        fresh = effect_parameters(richer, name)
         told = 0.0
         for sign in (-1, 1):
-            for knob in fresh:
-                far = knob.neutral + 3 * sign * knob.strength
-                richer.set(knob.name, float(np.clip(far, knob.min, knob.max)))
+            for p in fresh:
+                far = p.usual + 3 * sign * p.strength
+                richer.set(p.name, float(np.clip(far, p.min, p.max)))
             told = max(told, _divergence(scenes, model, richer))
         if told < limit:
             hidden.append((name, "three times its usual strength would not show in these bits"))
