@@ -151,9 +151,13 @@ class Screen:
             stdout=subprocess.PIPE,
             text=True,
         )
-        wait_until(self.window)
 
     def __enter__(self):
+        try:
+            wait_until(self.window)
+        except BaseException:
+            self.__exit__()
+            raise
         return self
 
     def __exit__(self, *_):
