@@ -25,10 +25,10 @@ from twinmill import report
 from twinmill.data.log import read_log
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.multi_log import read_multi_log
-from twinmill.data.steady_table import is_sheet
+from twinmill.data.steady_table import is_steady_table
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill.diagnosis import diagnose as _diagnose
-from twinmill.diagnosis.detections.add import BitAddition, add_to_camera, is_of_camera
+from twinmill.diagnosis.detections.add import DetectionAddition, add_to_camera, is_of_camera
 from twinmill.diagnosis.findings import Ranked
 from twinmill.files import plain, replacing
 from twinmill.fitting import add as _add
@@ -90,7 +90,7 @@ class Log(_Shown):
         self.paths = [Path(path) for path in paths]
         self._folder = folder  # removed with the last reference to a simulated run
         self._measurements: dict[str, Measurements] = {}  # by the model's hash
-        self._logs = [read_log(path) for path in self.paths if not is_sheet(path)]
+        self._logs = [read_log(path) for path in self.paths if not is_steady_table(path)]
 
     def measurements(self, model: "Model | None" = None) -> Measurements:
         """Cleaned runs, one for each robot in each log.
@@ -417,7 +417,7 @@ class Addition(_Shown):
             effect, all else refitted.
     """
 
-    def __init__(self, result: _add.AddResult | BitAddition, model: Model):
+    def __init__(self, result: _add.AddResult | DetectionAddition, model: Model):
         self._result, self.model = result, model
         self.effect = result.effect
         told = result.to_json()
@@ -430,12 +430,12 @@ class Addition(_Shown):
 
     def plot(self) -> Figure:
         """Errors before and after; of an effect of the camera, what it sees."""
-        if isinstance(self._result, BitAddition):
+        if isinstance(self._result, DetectionAddition):
             return detections.field_of_view(self._result.after).svg.picture
         return _errors_drawn([("before", self._result.before), ("after", self._result.after)])
 
     def _text(self) -> RenderableType:
-        camera = isinstance(self._result, BitAddition)
+        camera = isinstance(self._result, DetectionAddition)
         return detections.addition(self._result) if camera else show.added(self._result)
 
     def __repr__(self) -> str:
@@ -721,7 +721,7 @@ def _commands(log: Any) -> pd.DataFrame:
 
 def _errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
     last = results[-1][1]
-    if last.main in (tables := views.sheets(last)):
+    if last.main in (tables := views.steady_comparisons(last)):
         return steady_figures.steady_values(tables).svg.picture
     mains = [(label, result.main) for label, result in results]
     return error_figures.error_growth(mains).svg.picture

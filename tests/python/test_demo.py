@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from twinmill.model.parameters import Estimate
+from twinmill.model.parameters import ParameterEstimate
 from twinmill_cli.demo import Hidden, judged
 
 HIDDEN = [
@@ -19,7 +19,7 @@ def explained(*found, groups=None, coasting=0.7):
     groups = groups or {}
     values = {"coasting.deceleration_mps2": coasting, "wheel_gain.fl": -0.1}
     parameters = [
-        Estimate(name, value, 0.05 * abs(value), "1", at_bound=False, seen=True)
+        ParameterEstimate(name, value, 0.05 * abs(value), "1", at_bound=False, seen=True)
         for name, value in values.items()
         if name.split(".")[0] in found
     ]

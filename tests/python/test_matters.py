@@ -11,7 +11,7 @@ import twinmill_native as native
 
 from twinmill.claims.published import Points
 from twinmill.model.model_file import ModelFile
-from twinmill.swarm.matters.changes import Change, Subject, subjects
+from twinmill.swarm.matters.changes import Change, Factor, factors
 from twinmill.swarm.matters.differences import median_difference, share_difference
 from twinmill.swarm.matters.judge import MATTERS, NOTHING, Matters, judge
 from twinmill.swarm.matters.sentences import sentence
@@ -78,7 +78,7 @@ def planted(tmp_path_factory) -> Matters:
     (folder / "planted.toml").write_text(planted_text())
     name = str(folder / "planted.toml")
     request = make_request("milling", name, [], seeds=SEEDS, duration_s=SECONDS, full=True)
-    asked, left = subjects(ModelFile.load(name), [], 0, 1)
+    asked, left = factors(ModelFile.load(name), [], 0, 1)
     only = [s for s in asked if s.kind == "effect"]
     return judge(request, only, left, "milling", 0.1, folder)
 
@@ -87,7 +87,7 @@ def test_of_six_effects_the_one_that_decides_comes_first_and_five_do_not_matter(
     truth = {name: independent(name) for name in (None, *EFFECTS)}
     moved = {name: abs(truth[name].mean() - truth[None].mean()) for name in EFFECTS}
     assert moved.pop("view_angle") > 0.8 and max(moved.values()) < 0.06  # the case is as planted
-    names = [judged.subject.name for judged in planted.ranked]
+    names = [judged.factor.name for judged in planted.ranked]
     assert names[0] == "view_angle" and set(names) == set(EFFECTS)
     verdicts = [judged.verdict for judged in planted.ranked]
     assert verdicts == [MATTERS] + [NOTHING] * 5
@@ -116,7 +116,7 @@ def test_an_effect_that_does_nothing_changes_no_run(tmp_path: Path):
     )
     request = replace(request, n=3)
     neutral = bare + '[[effect]]\nname = "speed_slip"\nloss_s_per_m = 0.0\n'
-    asked = [Subject("speed_slip", "effect", "", [Change("nothing", neutral, {})])]
+    asked = [Factor("speed_slip", "effect", "", [Change("nothing", neutral, {})])]
     found = judge(request, asked, [], "milling", 0.1, tmp_path / "out")
     outcome = found.ranked[0].worst
     assert outcome.share.change == 0
@@ -189,7 +189,7 @@ def test_what_goes_together_moves_along(tmp_path: Path):
         "values = [[0.0004, -0.00016], [-0.00016, 0.0001]]\n"
     )
     (tmp_path / "m.toml").write_text(text)
-    asked, _ = subjects(ModelFile.load(str(tmp_path / "m.toml")), [], 0, 1)
+    asked, _ = factors(ModelFile.load(str(tmp_path / "m.toml")), [], 0, 1)
     forward = next(s for s in asked if s.name == "base.forward_gain")
     high = native.Model.from_toml(forward.changes[1].text, "high")
     assert high.get("base.forward_gain") == pytest.approx(1 + 1.96 * 0.02)

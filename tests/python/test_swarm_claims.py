@@ -13,7 +13,7 @@ from twinmill.claims import bodies, claims, fidelity, paper, rows
 from twinmill.claims.actuation import actuation
 from twinmill.claims.claims import CLAIMS
 from twinmill.claims.swarms import KINDS, run
-from twinmill.data.steady_table import read_sheets
+from twinmill.data.steady_table import read_steady_tables
 from twinmill_cli import main as cli
 
 SEEDS = 100
@@ -116,7 +116,7 @@ def test_spread_of_measured_robots_is_told_at_each_input(tmp_path):
     for robot, off in enumerate((-0.3, -0.1, 0.1, 0.3), 1):
         lines += [f"{robot},100,90,0,1,0.36,0,", f"{robot},100,90,0.5,1,{0.3 * (1 + off)},-0.5,"]
     (tmp_path / "sheet.csv").write_text("\n".join(lines) + "\n")
-    claim = actuation(read_sheets(tmp_path / "sheet.csv"))
+    claim = actuation(read_steady_tables(tmp_path / "sheet.csv"))
     spread = {row.what.partition(": ")[2]: row for row in claim.rows if "speed, 4" in row.what}
     assert spread["input 100, 90 degrees"].value == pytest.approx(0, abs=1e-9)
     expected = np.std([-0.3, -0.1, 0.1, 0.3], ddof=1)

@@ -107,7 +107,7 @@ def test_loose_limits_take_the_teal_that_fitted_ones_leave_out():
     pictures, balls, _ = scenes(distractor=TEAL)
     fitted = fit_box(pictures, balls, MIN_BLOB_PX)
     old = native.largest_blob_px(native.inside(pictures[1].yuyv, (40, 235, 0, 160, 0, 108)))
-    assert old > 2000 and fitted.looks[1].false_blob_px < 10
+    assert old > 2000 and fitted.results[1].false_blob_px < 10
 
 
 def test_same_colour_elsewhere_cannot_be_told_apart():

@@ -15,7 +15,7 @@ from twinmill_cli.options import Force, Hold, Logs, Model, NewModel, Out
 from twinmill_cli.output import AsJson, busy
 
 if working():  # not for --help
-    from twinmill.diagnosis.detections.add import BitAddition, add_to_camera, is_of_camera
+    from twinmill.diagnosis.detections.add import DetectionAddition, add_to_camera, is_of_camera
     from twinmill.fitting.add import AddResult, add
     from twinmill.fitting.compare import Comparison, compare
     from twinmill.fitting.fit import FitResult, fit
@@ -115,7 +115,7 @@ def _add(
     hold: Hold = None,
     as_json: AsJson = False,
     out: Out = None,
-) -> AddResult | BitAddition:
+) -> AddResult | DetectionAddition:
     """Add an effect to a model, fit it with all the rest, and judge it on data not fitted to.
 
     Example: twinmill add coasting run.lcmlog --model fitted.toml -o better.toml

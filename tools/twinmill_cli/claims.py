@@ -27,7 +27,7 @@ if working():  # not for --help
     from twinmill.claims.claims import CLAIMS, ODD_TURNS
     from twinmill.claims.paper import Answer, answers
     from twinmill.claims.rows import Claim, Row
-    from twinmill.data.steady_table import read_sheets
+    from twinmill.data.steady_table import read_steady_tables
     from twinmill.files import check_new_folder, plain
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import Provenance, Section, show, write_report
@@ -89,7 +89,7 @@ def _claims(
         raise ValueError(f"--only {unknown[0]}: must be one of {', '.join(CLAIMS)}.")
     if strange := [turn for turn in odd_turn or [] if not abs(turn) <= MOST_TURN]:
         raise ValueError(f"--odd-turn {strange[0]:g}: must be from -{MOST_TURN} to {MOST_TURN}.")
-    sheets = read_sheets(actuation_table) if actuation_table else []
+    sheets = read_steady_tables(actuation_table) if actuation_table else []
     if mujoco_seeds and not out:
         raise ValueError("--mujoco-seeds needs --out DIR, where its runs are kept.")
     if out:

@@ -23,7 +23,7 @@ from rich.text import Text
 from twinmill.challenge.script import write_rich_script
 from twinmill.diagnosis.explain import Explanation
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import Estimate
+from twinmill.model.parameters import ParameterEstimate
 from twinmill.report import Figure, Section, show, write_report
 from twinmill.report import diagnosis as present
 from twinmill.report.canvas import FLOOR, PREDICTED, draw, legend_above
@@ -176,11 +176,11 @@ def _sizes(hidden: list[Hidden], result: Explanation) -> str:
     return f"{count} lie{'' if len(held) == 2 else 's'} within the 95 % interval that was told."
 
 
-def _estimate(hidden: Hidden, result: Explanation) -> Estimate | None:
+def _estimate(hidden: Hidden, result: Explanation) -> ParameterEstimate | None:
     return next((e for e in result.parameters if e.name == hidden.name), None)
 
 
-def _holds(estimate: Estimate, hidden: Hidden) -> bool:
+def _holds(estimate: ParameterEstimate, hidden: Hidden) -> bool:
     return abs(estimate.value - hidden.value) <= max(
         WITHIN_95 * estimate.std, 0.1 * abs(hidden.value)
     )

@@ -17,7 +17,7 @@ from twinmill_cli.output import AsJson, telling
 if working():  # not for --help
     from twinmill.data.log import read_log
     from twinmill.data.measurement import Measurements
-    from twinmill.data.steady_table import is_sheet
+    from twinmill.data.steady_table import is_steady_table
     from twinmill.diagnosis.diagnose import diagnose
     from twinmill.diagnosis.explain import Explanation, explain
     from twinmill.diagnosis.result import Diagnosis
@@ -72,7 +72,7 @@ def _diagnose(
 
 def robots_recorded(path: Path, measurements: Measurements) -> int:
     """How many robots drove together in this log; none in a table of separate drives."""
-    if is_sheet(path):
+    if is_steady_table(path):
         return 0
     return len({m.label for m in measurements if m.log_name == path.name})
 

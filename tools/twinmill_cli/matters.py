@@ -33,7 +33,7 @@ if working():  # not for --help
     from twinmill.report import matters as present
     from twinmill.report import write_report
     from twinmill.swarm.classes import check_goal, goal_of
-    from twinmill.swarm.matters.changes import subjects
+    from twinmill.swarm.matters.changes import factors
     from twinmill.swarm.matters.hidden import Hidden, hidden_effects, unseen_effects
     from twinmill.swarm.matters.judge import MATTERS, NOTHING, UNSURE, Matters, folder_of, judge
     from twinmill.swarm.matters.maps import map_requests
@@ -119,7 +119,7 @@ def _matters(
         folder = out or Path(scratch)
         hidden = _hidden(logs or [], model_file, folder, as_json)
         with busy("writing the changed models"):
-            asked, left = subjects(model_file, hidden, draws, first_seed, only or [])
+            asked, left = factors(model_file, hidden, draws, first_seed, only or [])
         with progress_bar() as progress:
             task = progress.add_task("runs", total=None)
             found = judge(

@@ -17,7 +17,7 @@ if working():  # not for --help
 
     from twinmill.files import plain
     from twinmill.swarm.classes import COLORS, WORDS
-    from twinmill.swarm.live_metrics import Look, Question, look_around
+    from twinmill.swarm.live_metrics import Question, SwarmSnapshot, look_around
     from twinmill.swarm.metrics import WINDOW_S, SwarmSeries
 
 ROWS = {  # name: what people read, format
@@ -47,12 +47,12 @@ def follow(url: str, duration_s: float, question: Question, source: dict, as_jso
         nullcontext() if as_json else Live(Text(f"Listening on {url}"), auto_refresh=False) as live
     ):
         try:
-            for now_us, looks, note in look_around(url, duration_s, question):
-                anybody |= bool(looks)
+            for now_us, snapshots, note in look_around(url, duration_s, question):
+                anybody |= bool(snapshots)
                 if live:
-                    live.update(screen(looks, note), refresh=True)
+                    live.update(screen(snapshots, note), refresh=True)
                     continue
-                swarms = [look.to_json() for look in looks]
+                swarms = [snapshot.to_json() for snapshot in snapshots]
                 data = {"utime_us": now_us, "swarms": swarms, "note": note or None, **source}
                 print(json.dumps(plain(data), allow_nan=False), flush=True)
         except KeyboardInterrupt:
@@ -62,22 +62,22 @@ def follow(url: str, duration_s: float, question: Question, source: dict, as_jso
     return 0 if anybody else 1
 
 
-def screen(looks: list[Look], note: str) -> RenderableType:
+def screen(snapshots: list[SwarmSnapshot], note: str) -> RenderableType:
     """A column for each swarm, or the sentence that there is none."""
-    if not looks:
+    if not snapshots:
         return Text(note, "yellow")
-    names = [name for name in ROWS if name != "odd_ratio" or any(_has_odd(k) for k in looks)]
+    names = [name for name in ROWS if name != "odd_ratio" or any(_has_odd(k) for k in snapshots)]
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("")
     columns = []
-    for look in looks:
-        table.add_column(f"{look.prefix}R..", justify="right")
-        table.add_column(look.source, justify="right", style="dim")
-        columns.append(_column(look.series, names))
+    for snapshot in snapshots:
+        table.add_column(f"{snapshot.prefix}R..", justify="right")
+        table.add_column(snapshot.source, justify="right", style="dim")
+        columns.append(_column(snapshot.series, names))
     labels = ["mean over the last", "class", *(ROWS[name][0] for name in names), "robots"]
     for label, *cells in zip(labels, *columns, strict=True):
         table.add_row(label, *(cell for pair in cells for cell in pair))
-    return Group(table, *(Text(line, style) for line, style in _remarks(looks)))
+    return Group(table, *(Text(line, style) for line, style in _remarks(snapshots)))
 
 
 def _column(series: SwarmSeries | None, names: list[str]) -> list[tuple[str | Text, str]]:
@@ -92,22 +92,22 @@ def _column(series: SwarmSeries | None, names: list[str]) -> list[tuple[str | Te
     return [*cells, (str(len(series.robots)), "")]
 
 
-def _has_odd(look: Look) -> bool:
-    return look.series is not None and bool(look.series.odd)
+def _has_odd(snapshot: SwarmSnapshot) -> bool:
+    return snapshot.series is not None and bool(snapshot.series.odd)
 
 
-def _remarks(looks: list[Look]) -> list[tuple[str, str]]:
+def _remarks(snapshots: list[SwarmSnapshot]) -> list[tuple[str, str]]:
     """Sentences below the table, and their style."""
     lines = []
-    for look in looks:
-        name = f"{look.prefix}R.."
-        if look.series:
-            odd = ", ".join(f"R{i:02d}" for i in look.series.odd)
-            words = WORDS[look.series.final] + (f"; odd: {odd}" if odd else "")
+    for snapshot in snapshots:
+        name = f"{snapshot.prefix}R.."
+        if snapshot.series:
+            odd = ", ".join(f"R{i:02d}" for i in snapshot.series.odd)
+            words = WORDS[snapshot.series.final] + (f"; odd: {odd}" if odd else "")
             lines.append((f"{name} {words}", "dim"))
-        if look.note:
-            lines.append((f"{name} {look.note}", "yellow"))
-        if look.lost:
-            lost = ", ".join(f"R{i:02d}" for i in look.lost)
+        if snapshot.note:
+            lines.append((f"{name} {snapshot.note}", "yellow"))
+        if snapshot.lost:
+            lost = ", ".join(f"R{i:02d}" for i in snapshot.lost)
             lines.append((f"{name} without poses, so left out: {lost}", "yellow"))
     return lines

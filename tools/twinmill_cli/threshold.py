@@ -25,7 +25,7 @@ if working():  # not for --help
     from twinmill.report.show import Fitting
     from twinmill.robots.remote import Remote
     from twinmill.threshold import pictures as source
-    from twinmill.threshold.box import KEYS, Ball, Box, Fitted, find_ball, fit_box, look
+    from twinmill.threshold.box import KEYS, Ball, Box, Fitted, evaluate, find_ball, fit_box
     from twinmill.threshold.pictures import Picture
     from twinmill.threshold.show import draw
 
@@ -92,9 +92,9 @@ def _threshold(
         taken = _take(images or [], camera, remote, count, size_px)
         balls = _balls(taken, ball or [])
         fitted = fit_box(taken, balls, min_blob_px)
-        before = [look(*both, native.green_box()) for both in zip(taken, balls, strict=True)]
+        before = [evaluate(*both, native.green_box()) for both in zip(taken, balls, strict=True)]
         if picture:
-            draw(picture, taken, balls, before, fitted.looks)
+            draw(picture, taken, balls, before, fitted.results)
     settings = dict(zip(KEYS, fitted.box, strict=True))
     if not fitted.problem:
         if config:
@@ -172,7 +172,7 @@ def _tell(
             "false_blob_px": after.false_blob_px,
             "false_px_before": old.false_px,
         }
-        for picture, ball, after, old in zip(pictures, balls, fitted.looks, before, strict=True)
+        for picture, ball, after, old in zip(pictures, balls, fitted.results, before, strict=True)
     ]
     data = {
         "separable": not fitted.problem,

@@ -12,7 +12,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.track import Track, local_line
 from twinmill.fitting.floor import NoiseFloor
 from twinmill.predict.datasets import displacement
-from twinmill.predict.detections import BitScene
+from twinmill.predict.detections import Detections
 from twinmill.predict.problem import Scene
 from twinmill.predict.regimes import HORIZON, regime_masks
 from twinmill.predict.residual import StepGrid, body_velocity, rotate
@@ -64,7 +64,7 @@ def seen(frames: Frames | None) -> Arrays:
     return {"seen": np.column_stack([frames.t_s, bit])[kept]}
 
 
-def expected(bits: BitScene, model: native.Model) -> Arrays:
+def expected(bits: Detections, model: native.Model) -> Arrays:
     """(K, 2) robot's clock and how likely a model has the bit that `seen` tells; NaN if unknown."""
     frames = bits.frames
     chance = np.where(bits.usable, bits.reported(model, raw=not frames.has_vote), np.nan)

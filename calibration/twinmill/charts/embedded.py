@@ -15,7 +15,7 @@ import twinmill_native as native
 from twinmill.charts.arrays import RobotView, measured_path
 from twinmill.charts.packed import pack_log, pack_prediction, pack_robot
 from twinmill.charts.stage import STATIC, stage_html
-from twinmill.predict.detections import BitScene
+from twinmill.predict.detections import Detections
 from twinmill.predict.regimes import Regime
 
 MODULES = ("look", "packed", "floor", "series", "stage", "embedded")  # each uses those before it
@@ -46,7 +46,7 @@ class Shown:
     model: native.Model
     regimes: Sequence[Regime]
     beside: tuple[str, native.Model] | None = None
-    bits: BitScene | None = None
+    bits: Detections | None = None
 
 
 def embedded(robots: Sequence[Shown], first: int, span_s: tuple[float, float]) -> str:

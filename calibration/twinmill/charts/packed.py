@@ -13,7 +13,7 @@ from twinmill.data.camera_frames import Frames
 from twinmill.data.log import RobotLog
 from twinmill.data.track import Track
 from twinmill.model.parameters import CLOCK
-from twinmill.predict.detections import BitScene
+from twinmill.predict.detections import Detections
 
 COMMAND_WORDS = {
     "duty": (("FL", "FR", "RL", "RR"), "%"),
@@ -70,7 +70,7 @@ def pack_prediction(
     view: RobotView,
     model: native.Model,
     beside: tuple[str, native.Model] | None,
-    bits: BitScene | None,
+    bits: Detections | None,
     every: int = 1,
     **facts: object,
 ) -> bytes:

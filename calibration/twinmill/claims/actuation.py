@@ -8,7 +8,7 @@ theta_a of all runs here. A steady-state table has more robots and operating poi
 import numpy as np
 
 from twinmill.claims.rows import Claim, Row
-from twinmill.data.steady_table import Sheet
+from twinmill.data.steady_table import SteadyTable
 
 # Of the paper: each robot's mean speed over the group's, by speed input; facts recomputed from it.
 PUBLISHED = {50: (1.00, 1.03, 0.97), 100: (1.05, 0.95, 1.00)}
@@ -17,7 +17,7 @@ FEWEST = 2  # robots of which a spread is told
 CHANNELS = ("speed", "turn rate")
 
 
-def actuation(sheets: list[Sheet]) -> Claim:
+def actuation(sheets: list[SteadyTable]) -> Claim:
     """The paper's factors, and the spread over robots at each input of a table."""
     factors = np.concatenate([np.array(values) for values in PUBLISHED.values()])
     spread = float(factors.std(ddof=1))
@@ -56,7 +56,7 @@ def actuation(sheets: list[Sheet]) -> Claim:
     )
 
 
-def _spreads(sheets: list[Sheet]) -> list[Row]:
+def _spreads(sheets: list[SteadyTable]) -> list[Row]:
     """Relative standard deviation over robots, by input and channel."""
     by_input: dict[tuple, list[np.ndarray]] = {}
     for sheet in sheets:

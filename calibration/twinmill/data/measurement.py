@@ -11,7 +11,7 @@ import twinmill_native as native
 from twinmill.data.camera_frames import Frames, frames_of
 from twinmill.data.checks import InputFinding, check_driven, check_poses, check_recorded
 from twinmill.data.log import Log, LogError, RobotLog, read_log
-from twinmill.data.steady_table import Sheet, is_sheet, read_sheets
+from twinmill.data.steady_table import SteadyTable, is_steady_table, read_steady_tables
 from twinmill.data.time_base import TimeBase, find_time_base, retimed
 from twinmill.data.track import SILENCE_S, SMOOTH_S, Track, local_line, make_track
 
@@ -82,7 +82,7 @@ class Measurement:
         return replace(self, track=track, played=_played(track), warnings=[*self.warnings, why])
 
 
-class Measurements(list[Measurement | Sheet]):
+class Measurements(list[Measurement | SteadyTable]):
     """What can be judged, and what is to be said of the input.
 
     Attributes:
@@ -92,7 +92,7 @@ class Measurements(list[Measurement | Sheet]):
 
     def __init__(
         self,
-        judged: list[Measurement | Sheet],
+        judged: list[Measurement | SteadyTable],
         excluded: list[str],
         findings: list[InputFinding],
     ) -> None:
@@ -113,7 +113,9 @@ class Measurements(list[Measurement | Sheet]):
         found = [*self.findings, *findings]
         bad = {(f.log_name, f.robot_id) for f in found if f.fatal}
         left = [
-            m for m in self if isinstance(m, Sheet) or (m.log_name, m.track.robot_id) not in bad
+            m
+            for m in self
+            if isinstance(m, SteadyTable) or (m.log_name, m.track.robot_id) not in bad
         ]
         if bad and not left:
             raise BadInputError([f for f in found if f.fatal])
@@ -153,13 +155,13 @@ def clean_measurements(
     paths: Sequence[Path | Log], model: native.Model | None = None
 ) -> Measurements:
     """The same, but commands are not yet checked against the motion, which takes longest."""
-    judged: list[Measurement | Sheet] = []
+    judged: list[Measurement | SteadyTable] = []
     excluded: list[LogError] = []
     findings: list[InputFinding] = []
     for path in paths:
         try:
-            if isinstance(path, Path) and is_sheet(path):
-                judged += read_sheets(path)
+            if isinstance(path, Path) and is_steady_table(path):
+                judged += read_steady_tables(path)
                 continue
             log = path if isinstance(path, Log) else read_log(path)
         except LogError as error:

@@ -40,7 +40,7 @@ class Spread:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class SteadyTable:
     """One robot in one table; U inputs in their order of appearance.
 
     Attributes:
@@ -75,12 +75,12 @@ class Sheet:
         return f"{self.log_name} R{self.robot_id:02d}"
 
 
-def is_sheet(path: Path) -> bool:
+def is_steady_table(path: Path) -> bool:
     """Whether a file is such a table, by its name."""
     return Path(path).name.endswith((".csv", ".csv.gz"))
 
 
-def read_sheets(path: Path) -> list[Sheet]:
+def read_steady_tables(path: Path) -> list[SteadyTable]:
     """Reads a table: one sheet per robot.
 
     Raises:
@@ -103,7 +103,7 @@ def read_sheets(path: Path) -> list[Sheet]:
         keys = [key for key in cells if key[0] == robot]
         own = [np.array([channel[0][key] for key in keys]) for channel in channels]
         sheets.append(
-            Sheet(
+            SteadyTable(
                 path.name,
                 sha256,
                 robot,
@@ -191,6 +191,6 @@ def _scatter(groups: Iterable[list[float]]) -> float:
     return float(np.median(found)) if found else np.nan
 
 
-def _check(path: Path, sheets: list[Sheet]) -> None:
+def _check(path: Path, sheets: list[SteadyTable]) -> None:
     if not any(np.isfinite(s.value).any() for s in sheets):
         raise LogError(f"{path}: no speed and no turn rate was measured; fill in the table.")

@@ -7,8 +7,8 @@ from dataclasses import replace
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
-from twinmill.data.steady_table import Sheet
-from twinmill.diagnosis.detections.merge import with_bits
+from twinmill.data.steady_table import SteadyTable
+from twinmill.diagnosis.detections.merge import with_detections
 from twinmill.diagnosis.encoders import geometry_notes, time_base_notes
 from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_numbers
 from twinmill.diagnosis.irregularity import notes_on
@@ -63,7 +63,7 @@ CONTACTS = "predictions of one robot have no contacts; twinmill compare-swarm lo
 
 
 def diagnose(
-    measurements: Sequence[Measurement | Sheet],
+    measurements: Sequence[Measurement | SteadyTable],
     model_file: ModelFile,
     progress: Callable[[str], None] = lambda _: None,
     excluded: Collection[str] = (),
@@ -99,7 +99,7 @@ def diagnose(
         known = alike
     progress("looking for what no effect explains")
     found = _concluded(opened, known, first, done, model_file, before, unseen, off)
-    whole = with_bits(found, [r.scene for r in before.robots], model_file, progress, excluded)
+    whole = with_detections(found, [r.scene for r in before.robots], model_file, progress, excluded)
     return replace(whole, sentence=" ".join([whole.sentence, *map(sentence, whole.robots_off)]))
 
 
@@ -114,7 +114,7 @@ def first_state(
     """
     model = model_file.model
     hashes = [o.measurement.log_sha256 for o in opened]
-    told = model_file.told_by_others(hashes)
+    told = model_file.known_from_other_logs(hashes)
     names = base_names(model, opened, told)
     free = []
     if told and model.drive == "duty":
@@ -223,7 +223,7 @@ def _concluded(
         next_experiment=_next(findings, faint, _shown(done, faint), weighed.verdict),
         robots_off=tuple(off),
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
-        base_names=tuple(base_names(first.model, known, model_file.told_by_others(hashes))),
+        base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),
     )
 
 

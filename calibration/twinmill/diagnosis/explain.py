@@ -6,14 +6,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from twinmill.data.measurement import Measurement
-from twinmill.data.steady_table import Sheet
+from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.fit import common_clock
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import Fitted, ModelFile, write_child
-from twinmill.model.parameters import GAINS, LAG, Estimate, base_lag_is_told, base_parameters
+from twinmill.model.parameters import (
+    GAINS,
+    LAG,
+    ParameterEstimate,
+    base_lag_is_identifiable,
+    base_parameters,
+)
 from twinmill.predict.datasets import total_score
 
 
@@ -30,7 +36,7 @@ class Explanation:
 
     diagnosis: Diagnosis
     after: Comparison
-    parameters: list[Estimate]
+    parameters: list[ParameterEstimate]
     path: Path
 
     def to_json(self) -> dict:
@@ -50,7 +56,7 @@ def steps(diagnosis: Diagnosis) -> list[dict]:
 
 
 def explain(
-    measurements: Sequence[Measurement | Sheet],
+    measurements: Sequence[Measurement | SteadyTable],
     model_file: ModelFile,
     out: Path,
     command: str,
@@ -70,7 +76,7 @@ def explain(
     moved = diagnosis.model.effects[len(model.effects) :]
     for effect in dict.fromkeys([*moved, *diagnosis.camera, *own_effects]):
         model.add_effect(effect.split("#")[0])
-    estimates = [*fit.shared_estimates(), *diagnosis.bit_estimates]
+    estimates = [*fit.shared_estimates(), *diagnosis.detection_estimates]
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
     logs = {m.log_name: m.log_sha256 for m in measurements}
@@ -83,7 +89,7 @@ def explain(
         total_score(fit.held_scores),
         noise,
         common_clock(fit),
-        bool(model_file.told_by_others(logs.values())),
+        bool(model_file.known_from_other_logs(logs.values())),
         dict(diagnosis.rest.left_over or {}),
         _own_values(diagnosis, fit),
         fit.shared_covariance(),
@@ -102,7 +108,7 @@ def _polished(diagnosis: Diagnosis) -> ScoreFit:
     last = diagnosis.search.last
     state = last.state
     known = {p.name for p in state.free}
-    held = set() if base_lag_is_told(state.model) else {LAG}
+    held = set() if base_lag_is_identifiable(state.model) else {LAG}
     base = [n for n in diagnosis.base_names if n not in known | held]
     free = [*state.begun(), *base_parameters(state.model, base)]
     whole = ScoreFit(state.datasets, state.models, free).fit()
@@ -113,9 +119,9 @@ def _polished(diagnosis: Diagnosis) -> ScoreFit:
     return as_found
 
 
-def _own_values(diagnosis: Diagnosis, fit: ScoreFit) -> dict[int, list[Estimate]]:
+def _own_values(diagnosis: Diagnosis, fit: ScoreFit) -> dict[int, list[ParameterEstimate]]:
     """By robot, what [robots.Rnn] states: its gains, and the effects that only it has."""
-    values: dict[int, dict[str, Estimate]] = {}
+    values: dict[int, dict[str, ParameterEstimate]] = {}
     for i, data in enumerate(fit.datasets):
         gains = {n: e for n, e in fit.own_estimates(i).items() if n in GAINS}
         if gains:

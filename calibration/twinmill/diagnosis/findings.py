@@ -12,7 +12,7 @@ from twinmill.diagnosis.search import REFIT, Round, Search, State, Trial, fitted
 from twinmill.model.parameters import (
     LAG,
     LAG_EFFECT,
-    Estimate,
+    ParameterEstimate,
     catalogue_of,
     effect_names,
     late_part,
@@ -42,7 +42,7 @@ class Finding:
 
     effect: str
     group: tuple[str, ...] | None
-    parameters: list[Estimate]
+    parameters: list[ParameterEstimate]
     share: float
     certainty: str
     why: str = ""
@@ -77,7 +77,7 @@ class Ranked:
     share_explained: float
     p_value: float
     evidence: float
-    parameters: list[Estimate]
+    parameters: list[ParameterEstimate]
     group: int | None
 
     def to_json(self) -> dict:
@@ -151,7 +151,7 @@ def with_stale_numbers(
         stds: how well other logs told the numbers of the model's effects, by name.
     """
     gone: list[Finding] = []
-    own: list[Estimate] = []
+    own: list[ParameterEstimate] = []
     for finding in found:
         numbers = _stale_numbers(finding, model, lag_std_s, stds)
         if numbers:
@@ -171,7 +171,7 @@ def with_stale_numbers(
 
 def _stale_numbers(
     finding: Finding, model: native.Model, lag_std_s: float, stds: Mapping[str, float]
-) -> list[Estimate]:
+) -> list[ParameterEstimate]:
     """What a finding changes, if the model may well have all of it by its own error; else none."""
     if finding.effect == LAG_EFFECT and not finding.group and lag_std_s > 0:
         extra = finding.parameters[0]
@@ -181,7 +181,7 @@ def _stale_numbers(
     return finding.parameters if known else []
 
 
-def _is_error(own: Estimate, model: native.Model, stds: Mapping[str, float]) -> bool:
+def _is_error(own: ParameterEstimate, model: native.Model, stds: Mapping[str, float]) -> bool:
     """Whether a number that changed did so within the error of the one that the model had."""
     instance, key = own.name.split(".", 1)
     name = instance.split("#")[0]
@@ -276,7 +276,7 @@ def _finding(done: Search, name: str, share: float, changes: Mapping[str, Change
     return Finding(name, group, own, share, certainty, doubt, "#" in instance)
 
 
-def _doubt(card: dict, own: Sequence[Estimate]) -> str:
+def _doubt(card: dict, own: Sequence[ParameterEstimate]) -> str:
     """Why an estimate is no usual one; empty if it is."""
     entry = {p["name"]: p for p in card["parameters"]}
     for e in own:

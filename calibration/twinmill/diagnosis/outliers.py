@@ -20,8 +20,8 @@ from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     GAINS,
-    Estimate,
     Parameter,
+    ParameterEstimate,
     base_parameters,
     catalogue,
 )
@@ -58,14 +58,14 @@ class Outlier:
 
     robot_id: int
     effect: str | None
-    parameters: list[Estimate]
+    parameters: list[ParameterEstimate]
     score_before: float
     score_after: float
     p_value: float
     sentence: str
     why: str
     smallest_shown: dict[str, float]
-    gains: list[Estimate]
+    gains: list[ParameterEstimate]
 
     @property
     def label(self) -> str:
@@ -258,7 +258,7 @@ def _smallest(own: _Alone) -> dict[str, float]:
 # -- plain words --------------------------------------------------------------------------------
 
 
-def _plain(robot_id: int, parameters: Sequence[Estimate]) -> str:
+def _plain(robot_id: int, parameters: Sequence[ParameterEstimate]) -> str:
     label = f"R{robot_id:02d}"
     told = [e for e in parameters if abs(_away(e)) > max(2 * e.std, _least(e))]
     told = told or sorted(parameters, key=lambda e: -abs(_away(e)) / max(e.std, 1e-9))[:1]
@@ -271,7 +271,7 @@ def _plain(robot_id: int, parameters: Sequence[Estimate]) -> str:
     return f"{label}: {'; '.join(_effect_words(e) for e in told)}."
 
 
-def _away(estimate: Estimate) -> float:
+def _away(estimate: ParameterEstimate) -> float:
     """From where nothing happens."""
     if estimate.name in GAINS:
         return estimate.value - 1
@@ -285,7 +285,7 @@ def _entry(effect: str, key: str) -> dict:
     return next((p for p in catalogue()[effect]["parameters"] if p["name"] == key), plain)
 
 
-def _least(estimate: Estimate) -> float:
+def _least(estimate: ParameterEstimate) -> float:
     """Less is not worth a word."""
     return 2 * SPREAD if estimate.name in GAINS or estimate.name.startswith("wheel_gain.") else 0.0
 
@@ -313,7 +313,7 @@ def _wheel_words(wheels: dict[str, float]) -> str:
     )
 
 
-def _effect_words(estimate: Estimate) -> str:
+def _effect_words(estimate: ParameterEstimate) -> str:
     effect, key = estimate.name.split("#")[0].split(".")[0], estimate.name.split(".")[1]
     p = _entry(effect, key)
     words = p["above" if _away(estimate) > 0 else "below"] or catalogue()[effect]["phrase"]

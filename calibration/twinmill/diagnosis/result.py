@@ -13,8 +13,8 @@ from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import REFIT, Search
 from twinmill.fitting.compare import Comparison
 from twinmill.fitting.opening import Opened
-from twinmill.model.parameters import Estimate
-from twinmill.predict.detection_errors import BitComparison
+from twinmill.model.parameters import ParameterEstimate
+from twinmill.predict.detection_errors import DetectionComparison
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Diagnosis:
         bits_after: with the effects of the camera that were found; None if there are none.
         bit_steps: the camera's effects as found, each with the bits' score on held-out frames; the
             first is the model without them.
-        bit_estimates: of all effects of the camera, with what was found.
+        detection_estimates: of all effects of the camera, with what was found.
         camera: effects of the camera that were found.
         robots: how small a difference of each robot would have been seen.
         base_names: quantities of the base that these measurements move.
@@ -64,10 +64,10 @@ class Diagnosis:
     notes: list[str]
     next_experiment: dict | None
     robots_off: tuple[Outlier, ...] = ()
-    bits: BitComparison | None = None
-    bits_after: BitComparison | None = None
+    bits: DetectionComparison | None = None
+    bits_after: DetectionComparison | None = None
     bit_steps: Sequence[tuple[str | None, float]] = ()
-    bit_estimates: tuple[Estimate, ...] = ()
+    detection_estimates: tuple[ParameterEstimate, ...] = ()
     camera: tuple[str, ...] = ()
     base_names: tuple[str, ...] = ()
     robots: tuple[Resolution, ...] = ()

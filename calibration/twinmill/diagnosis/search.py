@@ -20,7 +20,7 @@ from twinmill.model.parameters import (
     LAG_EFFECT,
     MOTION_STAGES,
     Parameter,
-    base_lag_is_told,
+    base_lag_is_identifiable,
     base_parameters,
     catalogue,
     catalogue_of,
@@ -428,7 +428,7 @@ def candidates(state: State) -> list[str]:
     """
     model = state.model
     moved = {p.name.split(".")[0].split("#")[0] for p in state.free}
-    if model.get(LAG) == 0 and base_lag_is_told(model):
+    if model.get(LAG) == 0 and base_lag_is_identifiable(model):
         # Without a first lag, a second one is no other than the first.
         moved |= {n for n in making_late("lag") if n != LAG_EFFECT}
     names = []

@@ -9,11 +9,11 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import SHORTEST_LOG_S, Measurement
-from twinmill.data.steady_table import Sheet
+from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.experiment.foresight import LEAD_S, Played, Rows, rows_of
-from twinmill.experiment.hypotheses import Hypotheses, hypotheses_of, question, subjects
-from twinmill.experiment.information import FisherInformation, Subject
+from twinmill.experiment.hypotheses import Hypotheses, candidate_effects, hypotheses_of, question
+from twinmill.experiment.information import CandidateEffect, FisherInformation
 from twinmill.experiment.moves import Move, family
 from twinmill.experiment.power import power
 from twinmill.experiment.relevance import relevance
@@ -135,11 +135,11 @@ def design(
     usual = model_file.usual_score(hashes)
     moves = family(limits.max_duty)
     say("playing the moves in the twin")
-    names = base_names(model_file.model, logs, model_file.told_by_others(hashes))
+    names = base_names(model_file.model, logs, model_file.known_from_other_logs(hashes))
     asked = hypotheses_of(diagnosis, base_parameters(model_file.model, names))
     scene = log_of(asked.state.scenes)
     foreseen = Played.of([[m] for m in moves], scene).scene(scene, CENTRE)
-    known = subjects(asked.state.scenes, foreseen, asked.state, asked, usual)
+    known = candidate_effects(asked.state.scenes, foreseen, asked.state, asked, usual)
     fisher = FisherInformation(asked.state.free, known)
     told = np.sum([fisher.told(s) for s in asked.state.scenes], axis=0)
     names, why = question(asked, known, _tempered(fisher, told), ENOUGH_CHI2)
@@ -181,7 +181,7 @@ def log_of(scenes: list[Scene]) -> Scene:
 
 
 def check(
-    measurements: Sequence[Measurement | Sheet], model_file: ModelFile, limits: Limits
+    measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile, limits: Limits
 ) -> None:
     """Raises ValueError, before the long work, where no script can be."""
     logs = [m for m in measurements if isinstance(m, Measurement)]
@@ -227,7 +227,7 @@ class Floor:
         )
 
 
-def with_effect(model: native.Model, effect: Subject) -> native.Model:
+def with_effect(model: native.Model, effect: CandidateEffect) -> native.Model:
     """The model with the effect at its strength."""
     richer = model.copy()
     richer.add_effect(effect.name)
@@ -277,7 +277,7 @@ def _worth(fisher: FisherInformation, grams: np.ndarray, wanted: list[int]) -> n
 
 def _tempered(fisher: FisherInformation, grams: np.ndarray) -> np.ndarray:
     """(..., T, 1 + J) margins over the scatter of the log."""
-    excess = np.array([s.excess for s in fisher.subjects])
+    excess = np.array([s.excess for s in fisher.candidate_effects])
     return fisher.margins(grams) / excess[:, None]
 
 
@@ -305,8 +305,8 @@ class _Outlook:
             nearest = int(chi2[row].argmin())
             chances.append(
                 Chance(
-                    self.fisher.subjects[place].name,
-                    self.fisher.subjects[nearest - 1].name if nearest else None,
+                    self.fisher.candidate_effects[place].name,
+                    self.fisher.candidate_effects[nearest - 1].name if nearest else None,
                     float(before_chi2[row].min()),
                     float(chi2[row].min()),
                     float(before[row]),
@@ -317,7 +317,7 @@ class _Outlook:
 
     def _power(self, grams: np.ndarray, planned: list[Scene]) -> tuple[np.ndarray, np.ndarray]:
         """(T, 1 + J) margins of the wanted over the scatter, and (T,) chances to be named."""
-        state, subjects = self.asked.state, self.fisher.subjects
+        state, candidate_effects = self.asked.state, self.fisher.candidate_effects
         margins = _tempered(self.fisher, grams)[list(self.wanted)]
         logs = [(s, f) for s, f in zip(state.scenes, state.floors, strict=True) if s.noise]
         scores = [score(Windows.of(s.measurement.track).errors(s), f) for s, f in logs]
@@ -325,11 +325,11 @@ class _Outlook:
         floors = [*(f for _, f in logs), *(logs[0][1] for _ in planned)]
         scores += [max(1.0, self.usual, *scores) for _ in planned]
         matter = relevance(scenes, floors, scores, self.fisher, grams, self.wanted)
-        entries = [catalogue()[subjects[i].name] for i in self.wanted]
+        entries = [catalogue()[candidate_effects[i].name] for i in self.wanted]
         return margins, power(
             margins,
             np.array([len(e["parameters"]) for e in entries]),
-            len(subjects),
+            len(candidate_effects),
             matter,
             np.array([e["name"] in self.asked.fitted for e in entries]),
         )

@@ -9,7 +9,7 @@ from twinmill.diagnosis.findings import Ranked
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.search import without
 from twinmill.experiment.candidates import Candidate, candidates
-from twinmill.experiment.information import Subject
+from twinmill.experiment.information import CandidateEffect
 from twinmill.experiment.screen import screen
 from twinmill.model.parameters import Parameter, all_effect_parameters, catalogue
 from twinmill.predict.problem import Scene
@@ -62,7 +62,7 @@ def hypotheses_of(diagnosis: Diagnosis, base: list[Parameter]) -> Hypotheses:
 
 
 def question(
-    asked: Hypotheses, known: list[Subject], margins: np.ndarray, least_chi2: float
+    asked: Hypotheses, known: list[CandidateEffect], margins: np.ndarray, least_chi2: float
 ) -> tuple[list[str], str]:
     """Names of the effects in question, and a sentence.
 
@@ -94,9 +94,9 @@ def question(
     return weakest, f"These logs tell all effects apart; least {', '.join(weakest)}."
 
 
-def subjects(
+def candidate_effects(
     scenes: list[Scene], planned: Scene, state: State, asked: Hypotheses, usual: float
-) -> list[Subject]:
+) -> list[CandidateEffect]:
     """Every effect that the logs or the planned run show, at its fitted or its usual strength.
 
     Errors of the next run scatter no less over their noise than the score `usual` says.
@@ -106,7 +106,9 @@ def subjects(
     found = [(candidate, candidate.columns(scenes, without)) for candidate, _ in shown]
     tested = screen(scenes, state.free, found).found
     return [
-        Subject(t.candidate, _whole(t.candidate.effect, asked.fitted), max(t.excess, usual**2))
+        CandidateEffect(
+            t.candidate, _whole(t.candidate.effect, asked.fitted), max(t.excess, usual**2)
+        )
         for t in tested
     ]
 

@@ -19,7 +19,7 @@ CLOCKS = 2  # offset and rate of a run
 
 
 @dataclass(frozen=True)
-class Subject:
+class CandidateEffect:
     """An effect that could be the missing one.
 
     Attributes:
@@ -41,13 +41,13 @@ class Subject:
 class FisherInformation:
     """Adds up what runs tell.
 
-    Columns are those of the shared free quantities, then for each subject its derivatives and its
+    Columns are those of the shared free quantities, then for each candidate its derivatives and its
     whole step, then the clock of the planned run.
     """
 
-    def __init__(self, free: list[Parameter], subjects: list[Subject]) -> None:
-        self.free, self.subjects = free, subjects
-        counts = [len(s.candidate.strength) + 1 for s in subjects]
+    def __init__(self, free: list[Parameter], candidate_effects: list[CandidateEffect]) -> None:
+        self.free, self.candidate_effects = free, candidate_effects
+        counts = [len(s.candidate.strength) + 1 for s in candidate_effects]
         ends = len(free) + np.cumsum(counts)
         # A rival imitates with its derivatives; its whole step is no freedom more.
         self.places = [np.arange(e - c, e - 1) for e, c in zip(ends, counts, strict=True)]
@@ -72,16 +72,16 @@ class FisherInformation:
         return np.array([columns[p].T @ columns[p] for p in parts])
 
     def margins(self, grams: np.ndarray) -> np.ndarray:
-        """(..., C, C) to (..., T, 1 + J): what of each subject's whole step is left.
+        """(..., C, C) to (..., T, 1 + J): what of each candidate's whole step is left.
 
-        First with the free quantities alone to imitate it, then with each other subject besides; a
-        subject is no rival of its own: infinity.
+        First with the free quantities alone to imitate it, then with each other candidate besides;
+        none is a rival of its own: infinity.
         """
         left = self._without_nuisance(grams)
         whole = np.diagonal(left, axis1=-2, axis2=-1)[..., self.steps]
         margins = [whole]
         for j, place in enumerate(self.places):
-            strength = self.subjects[j].candidate.strength
+            strength = self.candidate_effects[j].candidate.strength
             prior = np.diag(1 / (EFFECT_PRIOR * strength) ** 2)
             rival = left[..., place[:, None], place] + prior
             cross = left[..., place[:, None], self.steps]
@@ -118,7 +118,9 @@ class FisherInformation:
             clock = jacobian[:, -CLOCKS:]
         without = [scene.white_errors()]
         effects = [
-            c.columns([scene], without) for s in self.subjects for c in (s.candidate, s.whole)
+            c.columns([scene], without)
+            for s in self.candidate_effects
+            for c in (s.candidate, s.whole)
         ]
         prior = 1 / system.prior[-CLOCKS:] ** 2 if scene.clock_free else np.ones(CLOCKS)
         return np.hstack([jacobian[:, : len(self.free)], *effects, clock]), prior

@@ -36,13 +36,13 @@ def power(
         (T,) 0..1.
     """
     of_strength = {
-        s: np.minimum(told_apart(s**2 * margins, parameters, candidates), relevance.chance(s))
+        s: np.minimum(named_apart(s**2 * margins, parameters, candidates), relevance.chance(s))
         for s in STRENGTHS
     }
     return np.where(fitted, of_strength[1.0], np.mean(list(of_strength.values()), axis=0))
 
 
-def told_apart(margins: np.ndarray, parameters: np.ndarray, candidates: int) -> np.ndarray:
+def named_apart(margins: np.ndarray, parameters: np.ndarray, candidates: int) -> np.ndarray:
     """(T,) chance that each effect is accepted and told from its nearest rival.
 
     Fitted to one half of the data and judged on the other, an effect's fall of chi2 is short by

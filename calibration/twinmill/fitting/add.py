@@ -19,7 +19,7 @@ from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import judged, open_measurements
 from twinmill.model.model_file import Fitted, ModelFile, write_child
 from twinmill.model.parameters import (
-    Estimate,
+    ParameterEstimate,
     all_effect_parameters,
     base_parameters,
     effect_names,
@@ -41,7 +41,7 @@ class AddResult:
     effect: str
     before: Comparison
     after: Comparison
-    parameters: list[Estimate]
+    parameters: list[ParameterEstimate]
     heldout_before: HeldOut
     heldout_refit: HeldOut
     heldout_after: HeldOut
@@ -92,7 +92,7 @@ def add(
     name = effect_names(richer)[-1]
     opened = open_measurements(measurements, model_file)
     logs = {m.log_name: m.log_sha256 for m in measurements}
-    told = model_file.told_by_others(logs.values())
+    told = model_file.known_from_other_logs(logs.values())
     base = base_parameters(model_file.model, base_names(model_file.model, judged(opened), told))
     old = without_held([*base, *all_effect_parameters(model_file.model)], held)
     fresh = effect_parameters(richer, name, fresh=True)

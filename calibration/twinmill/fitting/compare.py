@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twinmill.data.measurement import Measurement
-from twinmill.data.steady_table import Sheet
+from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.floor import NoiseFloor
 from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import CLOCK, HEADING
 from twinmill.predict.datasets import total_score
-from twinmill.predict.detection_errors import BitComparison, compare_bits
-from twinmill.predict.detections import bit_scenes
+from twinmill.predict.detection_errors import DetectionComparison, compare_detections
+from twinmill.predict.detections import all_detections
 from twinmill.predict.problem import Scene
 from twinmill.predict.regimes import Regime, where_it_fails
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, Windows, rms
@@ -101,7 +101,7 @@ class Comparison:
     model_name: str
     robots: list[RobotComparison | SteadyComparison]
     warnings: list[str]
-    bits: BitComparison | None = None
+    bits: DetectionComparison | None = None
 
     @property
     def score(self) -> float:
@@ -172,12 +172,12 @@ def comparison(model_file: ModelFile, opened: Sequence[Opened]) -> Comparison:
     return Comparison(model_file.path.name, [compare_robot(o) for o in opened], warnings)
 
 
-def compare(measurements: Sequence[Measurement | Sheet], model_file: ModelFile) -> Comparison:
+def compare(measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile) -> Comparison:
     """Compares a model with every robot of every log.
 
     A clock offset that the model knows or the log declares is used; else each log's own is found.
     """
     opened = open_measurements(measurements, model_file)
     found = comparison(model_file, opened)
-    bits = compare_bits(bit_scenes([r.scene for r in found.robots]), model_file.model)
+    bits = compare_detections(all_detections([r.scene for r in found.robots]), model_file.model)
     return replace(found, bits=bits)

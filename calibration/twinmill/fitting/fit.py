@@ -19,10 +19,10 @@ from twinmill.model.parameters import (
     CLOCK,
     CLOCK_RATE,
     LAG,
-    Estimate,
     Parameter,
+    ParameterEstimate,
     all_effect_parameters,
-    base_lag_is_told,
+    base_lag_is_identifiable,
     base_parameters,
     duty_table,
 )
@@ -46,8 +46,8 @@ class FitResult:
     before: Comparison
     after: Comparison
     heldout: HeldOut
-    parameters: list[Estimate]
-    clock: Estimate | None
+    parameters: list[ParameterEstimate]
+    clock: ParameterEstimate | None
     path: Path
 
     def to_json(self) -> dict:
@@ -93,7 +93,7 @@ def base_names(
     if len(table) > 1:
         gains = [*table, *(n for n in gains if n != BASE_GAINS[0])]
     changes = any(o.floor for o in opened) and LAG not in told
-    return [*gains, LAG] if changes and base_lag_is_told(model) else gains
+    return [*gains, LAG] if changes and base_lag_is_identifiable(model) else gains
 
 
 def _moves(own: Opened, gain: str) -> bool:
@@ -181,7 +181,7 @@ def noise_of(after: Comparison):
     )
 
 
-def with_estimates(model: native.Model, estimates: Sequence[Estimate]) -> native.Model:
+def with_estimates(model: native.Model, estimates: Sequence[ParameterEstimate]) -> native.Model:
     """The model with estimates put in."""
     model = model.copy()
     for estimate in estimates:
@@ -189,7 +189,7 @@ def with_estimates(model: native.Model, estimates: Sequence[Estimate]) -> native
     return model
 
 
-def common_clock(fit: ScoreFit) -> dict[str, Estimate]:
+def common_clock(fit: ScoreFit) -> dict[str, ParameterEstimate]:
     """Offset and rate that the logs share; empty if they differ, or were known before."""
     own = [fit.own_estimates(i) for i in range(len(fit.datasets))]
     if not own or not all(CLOCK in e for e in own):
@@ -203,5 +203,5 @@ def common_clock(fit: ScoreFit) -> dict[str, Estimate]:
         if np.any(np.abs(values - mean) > AGREE_SIGMA * np.hypot(stds, least)):
             return {}
         std = float(1 / np.sqrt(weights.sum()))
-        common[name] = Estimate(name, mean, std, own[0][name].unit, False, True)
+        common[name] = ParameterEstimate(name, mean, std, own[0][name].unit, False, True)
     return common

@@ -9,7 +9,7 @@ import twinmill_native as native
 
 from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement
-from twinmill.data.steady_table import Sheet
+from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.floor import NoiseFloor, noise_floor
 from twinmill.fitting.score_fit import ROUNDS, ScoreFit
 from twinmill.model.model_file import ModelFile
@@ -43,7 +43,7 @@ class Opened:
         same_clock: commands and poses are stamped by one clock.
     """
 
-    measurement: Measurement | Sheet
+    measurement: Measurement | SteadyTable
     data: Trajectory | SteadyScene | None
     model: native.Model
     floor: NoiseFloor | None
@@ -113,7 +113,7 @@ class Opened:
 
 
 def open_measurements(
-    measurements: Sequence[Measurement | Sheet], model_file: ModelFile
+    measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile
 ) -> list[Opened]:
     """Floors of all, and clocks aligned to the model as given.
 
@@ -126,8 +126,8 @@ def open_measurements(
     return [on_clock_of_others(o, opened) for o in opened]
 
 
-def _open(measurement: Measurement | Sheet, model_file: ModelFile, number: int) -> Opened:
-    if isinstance(measurement, Sheet):
+def _open(measurement: Measurement | SteadyTable, model_file: ModelFile, number: int) -> Opened:
+    if isinstance(measurement, SteadyTable):
         table = SteadyScene.of(measurement, model_file.model)
         return Opened(measurement, table, table.model, None, True)
     model = model_file.model.for_robot(measurement.track.robot_id)

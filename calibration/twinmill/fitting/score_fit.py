@@ -18,7 +18,7 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from twinmill.model.covariance import Covariance
-from twinmill.model.parameters import GAINS, Estimate, Parameter, stated_names
+from twinmill.model.parameters import GAINS, Parameter, ParameterEstimate, stated_names
 from twinmill.predict.datasets import PARTS, Dataset
 
 ROUNDS = 12
@@ -445,7 +445,7 @@ class ScoreFit:
         return float(fisher.sf(square / len(own), len(own), max(self.blocks - 1, 1)))
 
     @cached_property
-    def estimates(self) -> list[Estimate]:
+    def estimates(self) -> list[ParameterEstimate]:
         """Of all unknowns, shared ones first."""
         found = []
         for u, value, std in zip(self.unknowns, self.x, self.stds, strict=True):
@@ -453,7 +453,7 @@ class ScoreFit:
             near = AT_BOUND * (p.max - p.min)
             at_bound = bool(value - p.min < near or p.max - value < near)
             found.append(
-                Estimate(
+                ParameterEstimate(
                     p.name, float(value), float(std), p.unit, at_bound, bool(std < SEEN * p.std)
                 )
             )
@@ -467,7 +467,7 @@ class ScoreFit:
             u.parameter.at(float(v)) for u, v in zip(self.unknowns[:count], self.x, strict=False)
         ]
 
-    def shared_estimates(self) -> list[Estimate]:
+    def shared_estimates(self) -> list[ParameterEstimate]:
         """Of the quantities that all data sets share."""
         return self.estimates[: sum(1 for u in self.unknowns if u.parameter in self.shared)]
 
@@ -477,7 +477,7 @@ class ScoreFit:
         values = self._widening**2 * self.covariance[np.ix_(told, told)]
         return Covariance(tuple(self.estimates[c].name for c in told), values)
 
-    def own_estimates(self, i: int) -> dict[str, Estimate]:
+    def own_estimates(self, i: int) -> dict[str, ParameterEstimate]:
         """Of data set i alone: its clock and its robot's gains."""
         count = len(self.shared_estimates())
         return {self.estimates[c].name: self.estimates[c] for c in self.columns[i] if c >= count}

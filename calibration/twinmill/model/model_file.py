@@ -16,7 +16,7 @@ import tomlkit
 import twinmill_native as native
 
 from twinmill.model.covariance import Covariance
-from twinmill.model.parameters import LAG_EFFECT, Estimate, catalogue_of, effect_names
+from twinmill.model.parameters import LAG_EFFECT, ParameterEstimate, catalogue_of, effect_names
 
 
 class ModelError(ValueError):
@@ -59,7 +59,7 @@ class ModelFile:
         """Hashes (sha256) of the logs that told the clock offset."""
         return list(self._document.get("clock", {}).get("fitted_on", []))
 
-    def told_by_others(self, log_sha256: Collection[str]) -> set[str]:
+    def known_from_other_logs(self, log_sha256: Collection[str]) -> set[str]:
         """Names of the base quantities that were fitted, and on none of these logs."""
         base = self._document.get("base", {})
         if not base.get("fitted_on") or set(base["fitted_on"]) & set(log_sha256):
@@ -75,7 +75,7 @@ class ModelFile:
 
     def lag_std_s(self, log_sha256: Collection[str]) -> float:
         """How well other logs told the lag; 0 where none did."""
-        if not self.told_by_others(log_sha256):
+        if not self.known_from_other_logs(log_sha256):
             return 0.0
         document = self._document
         parts = [document["base"].get("std", {}).get("motor_lag_s", 0.0)]
@@ -103,7 +103,7 @@ class ModelFile:
         No less than 1: on its own log a fit can look better than it is.
         """
         score = self._document.get("fit", {}).get("score_after")
-        if score is None or not self.told_by_others(log_sha256):
+        if score is None or not self.known_from_other_logs(log_sha256):
             return 1.0
         return max(1.0, float(score))
 
@@ -172,15 +172,15 @@ class Fitted:
     """
 
     model: native.Model
-    estimates: list[Estimate]
+    estimates: list[ParameterEstimate]
     logs: dict[str, str]
     score_before: float
     score_after: float
     noise: NoiseTable | None = None
-    clock: dict[str, Estimate] = field(default_factory=dict)
+    clock: dict[str, ParameterEstimate] = field(default_factory=dict)
     base_told: bool = False
     left_over: dict[str, float] | None = None
-    robots: dict[int, list[Estimate]] = field(default_factory=dict)
+    robots: dict[int, list[ParameterEstimate]] = field(default_factory=dict)
     covariance: Covariance | None = None
 
 

@@ -61,7 +61,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class ParameterEstimate:
     """A fitted quantity.
 
     Attributes:
@@ -176,7 +176,7 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
     return found
 
 
-def base_lag_is_told(model: native.Model) -> bool:
+def base_lag_is_identifiable(model: native.Model) -> bool:
     """Whether data can tell the base's lag, and not only its sum with an effect's."""
     return LAG_EFFECT not in model.effects
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
-from twinmill.predict.detections import BitScene
+from twinmill.predict.detections import Detections
 
 RANGE_BINS, BEARING_BINS = 8, 24
 SHOWN = 1.6  # ranges up to so many times the model's are shown
@@ -44,7 +44,7 @@ class Confusion:
 
 
 @dataclass(frozen=True)
-class BitComparison:
+class DetectionComparison:
     """All robots of all logs that reported bits.
 
     Attributes:
@@ -135,7 +135,7 @@ def brier_ratio(chance: np.ndarray, bit: np.ndarray) -> float:
     return float(np.sqrt(np.sum((bit - chance) ** 2) / np.sum(chance * (1 - chance))))
 
 
-def compare_bits(scenes: list[BitScene], model: native.Model) -> BitComparison | None:
+def compare_detections(scenes: list[Detections], model: native.Model) -> DetectionComparison | None:
     """Compares a model's bits with those of all robots; None if no robot reported any.
 
     Raw bits are compared where every log has them, else voted ones with the vote predicted.
@@ -152,7 +152,7 @@ def compare_bits(scenes: list[BitScene], model: native.Model) -> BitComparison |
     robot = np.concatenate([np.full(len(p[0]), i) for i, p in enumerate(parts)])
     sight = model.sight()
     votes = np.concatenate([p[5] for p in parts])
-    return BitComparison(
+    return DetectionComparison(
         [s.label for s in scenes],
         *columns[:3],
         robot,
@@ -164,7 +164,7 @@ def compare_bits(scenes: list[BitScene], model: native.Model) -> BitComparison |
     )
 
 
-def _of_robot(scene: BitScene, model: native.Model, raw: bool) -> tuple[np.ndarray, ...]:
+def _of_robot(scene: Detections, model: native.Model, raw: bool) -> tuple[np.ndarray, ...]:
     """Predicted, in view, measured, range and bearing; and whether each vote follows, if `raw`."""
     use, frames = scene.usable, int(model.sight()["vote_frames"])
     poses = scene.poses(0.0)

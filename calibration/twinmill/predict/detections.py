@@ -20,7 +20,7 @@ UNSEEN_FRAMES = 64  # at the start: the vote may remember frames from before the
 
 
 @dataclass
-class BitScene:
+class Detections:
     """One robot in one log.
 
     Attributes:
@@ -152,7 +152,7 @@ def pose_at(track: Track, t_s: np.ndarray) -> np.ndarray:
     return np.where(whole[:, None], pose, np.nan)
 
 
-def bit_scenes(scenes: list) -> list[BitScene]:
+def all_detections(scenes: list) -> list[Detections]:
     """Robots that reported bits while at least one other was tracked.
 
     Args:
@@ -166,18 +166,18 @@ def bit_scenes(scenes: list) -> list[BitScene]:
     for together in logs.values():
         for own, scene in enumerate(together):
             if len(together) > 1 and scene.measurement.frames is not None:
-                made = bit_scene(together, own)
+                made = detections_of(together, own)
                 if made.usable.any():
                     found.append(made)
     return found
 
 
-def bit_scene(together: list[Scene], own: int) -> BitScene:
+def detections_of(together: list[Scene], own: int) -> Detections:
     """Of one robot of a log that has frames; of the others the tracks alone are used."""
     scene = together[own]
     noise, frames = scene.noise.to_json(), scene.measurement.frames
     block = ((frames.t_s - frames.t_s[0]) // BLOCK_S).astype(int)
-    made = BitScene(
+    made = Detections(
         scene.measurement.label,
         scene.measurement.track.robot_id,
         scene.measurement.log_sha256,

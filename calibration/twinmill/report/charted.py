@@ -10,7 +10,7 @@ import twinmill_native as native
 from twinmill.charts.arrays import RobotView
 from twinmill.charts.embedded import Shown, embedded
 from twinmill.fitting.compare import Comparison, RobotComparison
-from twinmill.predict.detections import bit_scenes
+from twinmill.predict.detections import all_detections
 from twinmill.predict.regimes import HORIZON
 from twinmill.report.tables import number
 
@@ -36,7 +36,7 @@ def charts(
 def _drawn(
     worst: RobotComparison, robots: list[RobotComparison], label: str, others: list[native.Model]
 ) -> str:
-    bits = {b.label: b for b in bit_scenes([r.scene for r in robots])}
+    bits = {b.label: b for b in all_detections([r.scene for r in robots])}
     shown = []
     for k, robot in enumerate(robots):
         scene = robot.scene

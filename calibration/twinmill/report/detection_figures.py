@@ -3,14 +3,14 @@
 
 import numpy as np
 
-from twinmill.predict.detection_errors import BitComparison
+from twinmill.predict.detection_errors import DetectionComparison
 from twinmill.report.canvas import draw
 from twinmill.report.html import Figure
 
 FEWEST = 10  # frames of a place that tell a share
 
 
-def field_of_view(bits: BitComparison, title: str = "What the camera sees") -> Figure:
+def field_of_view(bits: DetectionComparison, title: str = "What the camera sees") -> Figure:
     """Share of frames that see, over range and bearing of the nearest robot."""
     cells = bits.cells()
     ranges = sorted({r for c in cells for r in c["range_m"]})

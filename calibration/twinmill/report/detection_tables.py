@@ -6,14 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from twinmill.predict.detection_errors import SHOWN, BitComparison, Confusion
+from twinmill.predict.detection_errors import SHOWN, Confusion, DetectionComparison
 from twinmill.report.tables import Cell, Table, number, tone
 
 BINS = 6
 COLUMNS = ["seen\nboth", "missed", "false", "unseen\nboth", "agree"]
 
 
-def bit_steps(steps: Sequence[tuple[str | None, float]]) -> Table:
+def detection_steps(steps: Sequence[tuple[str | None, float]]) -> Table:
     """The camera's effects as they were found, on frames that were not fitted to."""
     rows = [
         [Cell(f"+ {effect}" if effect else "as given"), Cell(number(score, 4), tone(score))]
@@ -28,12 +28,12 @@ def bit_steps(steps: Sequence[tuple[str | None, float]]) -> Table:
     )
 
 
-def bit_tables(bits: BitComparison) -> list[Table]:
+def detection_tables(bits: DetectionComparison) -> list[Table]:
     """By robot, and by range and bearing of the nearest robot."""
     return [_by_robot(bits), _by_place(bits)]
 
 
-def _by_robot(bits: BitComparison) -> Table:
+def _by_robot(bits: DetectionComparison) -> Table:
     rows = [
         [Cell(label), *_counts(confusion), Cell(number(score), tone(score))]
         for label, confusion, score in bits.by_robot()
@@ -56,7 +56,7 @@ def _by_robot(bits: BitComparison) -> Table:
     )
 
 
-def _by_place(bits: BitComparison) -> Table:
+def _by_place(bits: DetectionComparison) -> Table:
     rows = []
     edges = np.linspace(0, SHOWN * bits.reach_m, BINS + 1)
     inside = np.abs(bits.bearing_rad) < bits.half_rad

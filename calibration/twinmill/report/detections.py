@@ -4,15 +4,15 @@
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from twinmill.diagnosis.detections.add import BitAddition
+from twinmill.diagnosis.detections.add import DetectionAddition
 from twinmill.report import show, tables
 from twinmill.report.detection_figures import field_of_view
-from twinmill.report.detection_tables import bit_tables
+from twinmill.report.detection_tables import detection_tables
 from twinmill.report.html import Section
 from twinmill.report.tables import number, tone
 
 
-def addition(result: BitAddition) -> RenderableType:
+def addition(result: DetectionAddition) -> RenderableType:
     """What a person reads of an added effect."""
     return Group(
         Text(
@@ -21,12 +21,12 @@ def addition(result: BitAddition) -> RenderableType:
         ),
         Text(),
         show.table(tables.parameters(result.parameters)),
-        *(show.table(t) for t in bit_tables(result.after)),
+        *(show.table(t) for t in detection_tables(result.after)),
         Text(f"Written: {result.path}"),
     )
 
 
-def addition_section(result: BitAddition, model_name: str) -> Section:
+def addition_section(result: DetectionAddition, model_name: str) -> Section:
     """Of a report."""
     scores = [
         ("bits before", number(result.before.score), tone(result.before.score)),
@@ -37,5 +37,5 @@ def addition_section(result: BitAddition, model_name: str) -> Section:
         scores,
         f"Held out: {number(result.heldout_before)} without, {number(result.heldout_after)} with.",
         figures=[field_of_view(result.after)],
-        tables=[tables.parameters(result.parameters), *bit_tables(result.after)],
+        tables=[tables.parameters(result.parameters), *detection_tables(result.after)],
     )

@@ -8,11 +8,11 @@ from rich.text import Text
 
 from twinmill.diagnosis.explain import Explanation, steps
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.model.parameters import Estimate
+from twinmill.model.parameters import ParameterEstimate
 from twinmill.report import Figure, Section, show, tables, views
 from twinmill.report.charted import charts
 from twinmill.report.detection_figures import field_of_view
-from twinmill.report.detection_tables import bit_steps, bit_tables
+from twinmill.report.detection_tables import detection_steps, detection_tables
 from twinmill.report.error_figures import waterfall
 from twinmill.report.sections import robot_pictures
 from twinmill.report.tables import Cell, Table, Tone, number, tone
@@ -216,7 +216,7 @@ def terminal(diagnosis: Diagnosis) -> RenderableType:
         ),
         Text(),
     ]
-    parts += [show.table(t) for t in (*_tables(diagnosis), *_bit_steps(diagnosis))]
+    parts += [show.table(t) for t in (*_tables(diagnosis), *_detection_steps(diagnosis))]
     parts += [Text(line) for line in lines(diagnosis)]
     if step := next_run(diagnosis):
         parts.append(Text(f"Next run: {step}"))
@@ -245,8 +245,8 @@ def section(diagnosis: Diagnosis) -> Section:
         [(label, number(value), tone(value)) for label, value in scores],
         diagnosis.sentence,
         views.facts(before),
-        [*_bit_figures(diagnosis), waterfall(_labelled(diagnosis)), *robot_pictures(before)],
-        [*_tables(diagnosis), *_bit_steps(diagnosis), *_bit_tables(diagnosis)],
+        [*_detection_figures(diagnosis), waterfall(_labelled(diagnosis)), *robot_pictures(before)],
+        [*_tables(diagnosis), *_detection_steps(diagnosis), *_detection_tables(diagnosis)],
         charts=charts(before, *_found(diagnosis)),
         next_step=next_run(diagnosis),
         notes=lines(diagnosis),
@@ -275,17 +275,17 @@ def _tables(diagnosis: Diagnosis) -> list[Table]:
     return [t for t in made if t.rows]
 
 
-def _bit_steps(diagnosis: Diagnosis) -> list[Table]:
-    return [bit_steps(diagnosis.bit_steps)] if len(diagnosis.bit_steps) > 1 else []
+def _detection_steps(diagnosis: Diagnosis) -> list[Table]:
+    return [detection_steps(diagnosis.bit_steps)] if len(diagnosis.bit_steps) > 1 else []
 
 
-def _bit_tables(diagnosis: Diagnosis) -> list[Table]:
+def _detection_tables(diagnosis: Diagnosis) -> list[Table]:
     """Predicted and measured bits, with the effects that were found if there are any."""
     bits = diagnosis.bits_after or diagnosis.bits
-    return bit_tables(bits) if bits else []
+    return detection_tables(bits) if bits else []
 
 
-def _bit_figures(diagnosis: Diagnosis) -> list[Figure]:
+def _detection_figures(diagnosis: Diagnosis) -> list[Figure]:
     """What the camera sees, with the model as given and with what was found."""
     if not diagnosis.bits:
         return []
@@ -302,7 +302,7 @@ def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
     ]
 
 
-def _estimate(estimate: Estimate) -> str:
+def _estimate(estimate: ParameterEstimate) -> str:
     name = estimate.name.split(".", 1)[-1]
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
     spread = f" ± {estimate.std:.1g}" if np.isfinite(estimate.std) else ""

@@ -163,7 +163,7 @@ def _maps_figure(maps: dict[str, Phase]) -> list[Figure]:
 def _tables(found: Matters) -> list[Table]:
     made = []
     for kind, title in KINDS.items():
-        rows = [_row(judged) for judged in found.ranked if judged.subject.kind == kind]
+        rows = [_row(judged) for judged in found.ranked if judged.factor.kind == kind]
         if rows:
             made.append(Table(title.capitalize(), COLUMNS, rows, words=(0, 1)))
     if found.left:

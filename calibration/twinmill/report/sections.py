@@ -98,7 +98,7 @@ def _same_robot(result: FitResult | AddResult) -> tuple[RobotComparison, RobotCo
 
 def robot_pictures(result: Comparison) -> list[Figure]:
     """When the model fails the robot that is missed most, and where."""
-    robot, steady = result.worst, views.sheets(result)
+    robot, steady = result.worst, views.steady_comparisons(result)
     own = []
     if robot not in steady:
         own = [*([regimes(robot)] if robot.where else []), floor_map(robot)]
@@ -112,7 +112,7 @@ def robot_pictures(result: Comparison) -> list[Figure]:
 
 def _pictures(result: Comparison, models: list[tuple]) -> list[Figure]:
     """The same, with errors over time if there is a log."""
-    growth = [] if result.worst in views.sheets(result) else [error_growth(models)]
+    growth = [] if result.worst in views.steady_comparisons(result) else [error_growth(models)]
     return robot_pictures(result) + growth
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import GOOD, MISSING, Comparison, RobotComparison
-from twinmill.model.parameters import Estimate
+from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.noise import Noise
 from twinmill.predict.regimes import HORIZON, Regime
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
@@ -174,7 +174,7 @@ def where(robot: RobotComparison) -> Table:
     )
 
 
-def parameters(estimates: list[Estimate]) -> Table:
+def parameters(estimates: list[ParameterEstimate]) -> Table:
     """Fitted quantities with their uncertainty."""
     rows = []
     for e in estimates:

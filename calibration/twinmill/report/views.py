@@ -4,12 +4,12 @@
 from twinmill.fitting.compare import Comparison
 from twinmill.report import steady as present
 from twinmill.report import tables
-from twinmill.report.detection_tables import bit_tables
+from twinmill.report.detection_tables import detection_tables
 from twinmill.report.tables import Table
 from twinmill.steady.compare import SteadyComparison
 
 
-def sheets(comparison: Comparison) -> list[SteadyComparison]:
+def steady_comparisons(comparison: Comparison) -> list[SteadyComparison]:
     """The robots known from tables."""
     return [r for r in comparison.robots if isinstance(r, SteadyComparison)]
 
@@ -17,7 +17,7 @@ def sheets(comparison: Comparison) -> list[SteadyComparison]:
 def facts(comparison: Comparison) -> list[tuple[str, str]]:
     """What was compared with what: label and text."""
     if isinstance(comparison.worst, SteadyComparison):
-        return present.facts(sheets(comparison), comparison.model_name)
+        return present.facts(steady_comparisons(comparison), comparison.model_name)
     return tables.facts(comparison)
 
 
@@ -26,8 +26,8 @@ def robot_tables(comparison: Comparison) -> list[Table]:
     made = []
     if not isinstance(comparison.worst, SteadyComparison):
         made += [tables.errors(comparison.worst), tables.where(comparison.worst)]
-    if steady := sheets(comparison):
+    if steady := steady_comparisons(comparison):
         made += [present.errors(steady), present.cells(steady)]
     if comparison.bits:
-        made += bit_tables(comparison.bits)
+        made += detection_tables(comparison.bits)
     return made

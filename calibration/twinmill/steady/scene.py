@@ -7,7 +7,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.log import LogError
-from twinmill.data.steady_table import STILL_MPS, Sheet
+from twinmill.data.steady_table import STILL_MPS, SteadyTable
 from twinmill.model.mixing import duties_from_vendor_move
 from twinmill.predict.datasets import PARTS
 
@@ -24,7 +24,7 @@ class SteadyScene:
     that could not be measured tells something, too. NaN is not measured.
     """
 
-    measurement: Sheet
+    measurement: SteadyTable
     model: native.Model
     commands: np.ndarray
     own: tuple = ()
@@ -32,7 +32,7 @@ class SteadyScene:
     clock_free: bool = False
 
     @classmethod
-    def of(cls, sheet: Sheet, model: native.Model) -> "SteadyScene":
+    def of(cls, sheet: SteadyTable, model: native.Model) -> "SteadyScene":
         """A sheet with a model of its kind of robot.
 
         Raises:
@@ -146,7 +146,7 @@ def _direction(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return sign * np.sin(angle), -sign * np.cos(angle)
 
 
-def _commands(sheet: Sheet, model: native.Model) -> np.ndarray:
+def _commands(sheet: SteadyTable, model: native.Model) -> np.ndarray:
     """(U, 4) commands in the unit of the model's drive."""
     if model.drive == "duty":
         return np.array([duties_from_vendor_move(*row) for row in sheet.inputs]) / 100.0

@@ -37,7 +37,7 @@ class Question:
 
 
 @dataclass(frozen=True)
-class Look:
+class SwarmSnapshot:
     """One swarm, all channels of a prefix, in its last seconds.
 
     Attributes:
@@ -77,7 +77,7 @@ class Look:
 
 def look_around(
     url: str, duration_s: float, question: Question
-) -> Iterator[tuple[int, list[Look], str]]:
+) -> Iterator[tuple[int, list[SwarmSnapshot], str]]:
     """(now in us, swarms by prefix, sentence if there is none) about once a second."""
     window, due_us, heard_us = Window(HEARD_S), None, None
     for now_us, batch in from_bus(url, duration_s):
@@ -89,13 +89,13 @@ def look_around(
             continue
         step_us = round(1e6 * EVERY_S)
         due_us += (1 + (now_us - due_us) // step_us) * step_us
-        looks = looks_at(window.events(), now_us, question)
-        heard_us = now_us if looks else heard_us
+        snapshots = snapshots_of(window.events(), now_us, question)
+        heard_us = now_us if snapshots else heard_us
         silent_s = (now_us - heard_us) / 1e6
-        yield now_us, looks, "" if looks else _nobody(url, silent_s, question.prefix)
+        yield now_us, snapshots, "" if snapshots else _nobody(url, silent_s, question.prefix)
 
 
-def looks_at(events: Events, now_us: int, question: Question) -> list[Look]:
+def snapshots_of(events: Events, now_us: int, question: Question) -> list[SwarmSnapshot]:
     """Swarms that spoke just now, by prefix."""
     prefixes = {
         match[1]
@@ -104,22 +104,22 @@ def looks_at(events: Events, now_us: int, question: Question) -> list[Look]:
     }
     if question.prefix is not None:
         prefixes &= {question.prefix}
-    return [_look(events, prefix, question) for prefix in sorted(prefixes)]
+    return [_snapshot(events, prefix, question) for prefix in sorted(prefixes)]
 
 
-def _look(events: Events, prefix: str, question: Question) -> Look:
+def _snapshot(events: Events, prefix: str, question: Question) -> SwarmSnapshot:
     try:
         log = decode_log(events, Path("the bus"), "", prefix)
     except LogError as error:
-        return Look(prefix, "", [], 0, None, str(error))
+        return SwarmSnapshot(prefix, "", [], 0, None, str(error))
     tracked, lost = _tracked(log)
     source = " and ".join(sorted({robot.source for robot in log.robots.values()} - {""}))
     odd = question.odd and [i for i in question.odd if i in tracked.robots]
     try:
         series = swarm_metrics(tracked, question.range_m, question.body_radius_m, odd)
     except LogError as error:
-        return Look(prefix, source, lost, log.t0_utime_us, None, str(error))
-    return Look(prefix, source, lost, log.t0_utime_us, series, "")
+        return SwarmSnapshot(prefix, source, lost, log.t0_utime_us, None, str(error))
+    return SwarmSnapshot(prefix, source, lost, log.t0_utime_us, series, "")
 
 
 def _tracked(log: Log) -> tuple[Log, list[int]]:

@@ -45,7 +45,7 @@ class Ball:
 
 
 @dataclass(frozen=True)
-class Look:
+class PictureResult:
     """What the firmware makes of one picture.
 
     Attributes:
@@ -109,12 +109,12 @@ def _where(blob: tuple[slice, slice, np.ndarray]) -> str:
     return f"{(columns.start + columns.stop) // 2},{(rows.start + rows.stop) // 2}"
 
 
-def look(picture: Picture, ball: Ball, box: Box) -> Look:
+def evaluate(picture: Picture, ball: Ball, box: Box) -> PictureResult:
     """Judges limits on one picture, by the firmware's own code."""
     mask = native.inside(picture.yuyv, box)
     distance = ball.distance(mask.shape)
     inside, outside = distance < SURE_INSIDE, distance > SURE_OUTSIDE
-    return Look(
+    return PictureResult(
         mask,
         float(mask[inside].mean()),
         native.largest_blob_px(mask & ~outside),
@@ -129,12 +129,12 @@ class Fitted:
 
     Attributes:
         box: the best limits found.
-        looks: what the firmware makes of each picture with them.
+        results: what the firmware makes of each picture with them.
         problem: why they do not do, as a sentence; empty if they do.
     """
 
     box: Box
-    looks: list[Look]
+    results: list[PictureResult]
     problem: str
 
 
@@ -162,8 +162,8 @@ def fit_box(pictures: list[Picture], balls: list[Ball], min_blob_px: int) -> Fit
     target, rest = np.concatenate(inside).astype(int), np.concatenate(outside).astype(int)
     for trim in TRIMS:
         box = _widen(_tight(target, trim), rest, FALSE_FRAC * len(rest))
-        looks = [look(*both, box) for both in zip(shown, at, strict=True)]
-        fitted = Fitted(box, looks[: len(pictures)], _problem(shown, looks, min_blob_px))
+        results = [evaluate(*both, box) for both in zip(shown, at, strict=True)]
+        fitted = Fitted(box, results[: len(pictures)], _problem(shown, results, min_blob_px))
         if not fitted.problem:
             return fitted
     return replace(fitted, problem=_other_colour(pictures, balls) or fitted.problem)
@@ -222,8 +222,8 @@ def _widen(limits: np.ndarray, rest: np.ndarray, allowed: float) -> Box:
     return tuple(int(number) for number in np.clip(limits, 0, 255).ravel())
 
 
-def _problem(pictures: list[Picture], looks: list[Look], min_blob_px: int) -> str:
-    for picture, seen in zip(pictures, looks, strict=True):
+def _problem(pictures: list[Picture], results: list[PictureResult], min_blob_px: int) -> str:
+    for picture, seen in zip(pictures, results, strict=True):
         if seen.hit_frac < 0.7:
             return (
                 f"{picture.name}: only {100 * seen.hit_frac:.0f} % of the ball is inside limits "

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
-from twinmill.threshold.box import SURE_OUTSIDE, Ball, Look
+from twinmill.threshold.box import SURE_OUTSIDE, Ball, PictureResult
 from twinmill.threshold.pictures import Picture
 
 SHOWN = 4
@@ -16,7 +16,11 @@ HIT, MISS, FALSE = (60, 190, 75), (0, 110, 220), (230, 30, 30)
 
 
 def draw(
-    path: Path, pictures: list[Picture], balls: list[Ball], before: list[Look], after: list[Look]
+    path: Path,
+    pictures: list[Picture],
+    balls: list[Ball],
+    before: list[PictureResult],
+    after: list[PictureResult],
 ) -> None:
     """Writes one row a picture: itself with the ball marked, and what both limits make of it."""
     rows = range(min(SHOWN, len(pictures)))
@@ -40,7 +44,7 @@ def draw(
     figure.savefig(path, dpi=90)
 
 
-def _coloured(picture: Picture, ball: Ball, seen: Look) -> np.ndarray:
+def _coloured(picture: Picture, ball: Ball, seen: PictureResult) -> np.ndarray:
     shown = np.repeat(picture.yuv[..., :1] // 2 + 80, 3, axis=2)
     distance = ball.distance(seen.mask.shape)
     shown[(distance < 1) & ~seen.mask] = MISS

@@ -33,7 +33,7 @@ Found = tuple[np.ndarray, np.ndarray]  # of Detector.find
 
 
 @dataclass(frozen=True)
-class Sight:
+class FrameDetections:
     """What one picture showed.
 
     Attributes:
@@ -66,7 +66,7 @@ class LiveCount:
 
     frames: int = 0
     poses: dict[int, int] = field(default_factory=dict)
-    sight: Sight | None = None
+    sight: FrameDetections | None = None
 
 
 @dataclass
@@ -126,7 +126,7 @@ def publish(
         count.frames += 1
         poses = {n: held.pose for n, held in seen.items()}
         lost = [n for n in mine if n not in seen]
-        count.sight = Sight(k, stamp_s, picture, numbers, corners, poses, lost)
+        count.sight = FrameDetections(k, stamp_s, picture, numbers, corners, poses, lost)
         yield count
 
 

@@ -20,7 +20,7 @@ from starlette.responses import HTMLResponse, JSONResponse, StreamingResponse
 from starlette.routing import Mount, Route
 
 from twinmill.track.detect import ROBOTS
-from twinmill.track.live import Sight
+from twinmill.track.live import FrameDetections
 
 HOST = "127.0.0.1"
 WIDEST_PX = 1280
@@ -78,8 +78,8 @@ class Page:
         Raises:
             ValueError: the port is taken.
         """
-        self._last: dict[int, Sight] = {}
-        self._robots: dict[int, Sight] = {}  # the last sight of each
+        self._last: dict[int, FrameDetections] = {}
+        self._robots: dict[int, FrameDetections] = {}  # the last sight of each
         self._times: dict[tuple[str, int], deque[float]] = {}
         self._lock = threading.Lock()
         self._cameras = cameras
@@ -105,7 +105,7 @@ class Page:
         )
         self._thread.start()
 
-    def show(self, sight: Sight) -> None:
+    def show(self, sight: FrameDetections) -> None:
         """The newest picture of a camera."""
         now_s = time.monotonic()
         with self._lock:
@@ -160,7 +160,7 @@ class Page:
             await asyncio.sleep(SHOWN_S)
 
 
-def _told(robot_id: int, sight: Sight, rate_hz: float) -> dict:
+def _told(robot_id: int, sight: FrameDetections, rate_hz: float) -> dict:
     x_m, y_m, theta_rad = sight.poses[robot_id].tolist()
     return {
         "robot_id": robot_id,
@@ -173,7 +173,7 @@ def _told(robot_id: int, sight: Sight, rate_hz: float) -> dict:
     }
 
 
-def drawn(sight: Sight, rate_hz: float) -> bytes:
+def drawn(sight: FrameDetections, rate_hz: float) -> bytes:
     """A JPEG: robots green with an arrow to their front, pale if another camera has them.
 
     Floor tags are blue.

@@ -20,7 +20,7 @@ from twinmill.charts.arrays import RobotView
 from twinmill.data.checks import InputFinding
 from twinmill.data.log import Log, RobotLog, read_log
 from twinmill.data.measurement import Measurements, clean_measurements
-from twinmill.data.steady_table import is_sheet
+from twinmill.data.steady_table import is_steady_table
 from twinmill.files import replacing
 from twinmill.fitting.fit import base_names
 from twinmill.fitting.opening import Opened, on_clock_of_others, open_measurements
@@ -35,7 +35,7 @@ from twinmill.model.parameters import (
     effect_parameters,
 )
 from twinmill.predict.datasets import Trajectory, total_score
-from twinmill.predict.detections import BitScene, bit_scene
+from twinmill.predict.detections import Detections, detections_of
 from twinmill.predict.regimes import Regime, where_it_fails
 from twinmill.predict.windows import Windows
 from twinmill.workbench.knobs import Knob, knobs
@@ -102,7 +102,7 @@ class Session:
 
     def __init__(self, logs: Sequence[Path], model: str) -> None:
         for path in logs:
-            if is_sheet(path):
+            if is_steady_table(path):
                 raise ModelError(
                     f"{path}: is a steady-state table; the workbench shows logs. "
                     "`twinmill compare` reads it."
@@ -120,7 +120,7 @@ class Session:
         self.swarm: dict | None = None
         self.beside: Beside | None = None
         self._files = {0: self.given}
-        self._bits: dict[int, BitScene | None] = {}
+        self._bits: dict[int, Detections | None] = {}
         self._dragged: dict[str, float] = {}
         self._foreseen: dict[int, Opened] = {}
         self._passing: dict[int, Opened] = {}
@@ -401,13 +401,13 @@ class Session:
             return None
         return self.beside.label, self.beside.opened[index].model
 
-    def bits(self, index: int) -> BitScene | None:
+    def bits(self, index: int) -> Detections | None:
         """What its camera told, with the paths of its log's other robots; None without them."""
         if index not in self._bits and not self.unjudged:
-            self._bits[index] = self._bit_scene(index)
+            self._bits[index] = self._detections_of(index)
         return self._bits.get(index)
 
-    def _bit_scene(self, index: int) -> BitScene | None:
+    def _detections_of(self, index: int) -> Detections | None:
         log = self.measurements[index].log_sha256
         members = [k for k in self.robots if self.measurements[k].log_sha256 == log]
         if len(members) < 2 or self.measurements[index].frames is None:
@@ -415,7 +415,7 @@ class Session:
         scenes = [self.robots[k].scene(self.robots[k].opened.model) for k in members]
         own = members.index(index)
         scenes[own] = self.robots[index].opened.scene()
-        made = bit_scene(scenes, own)
+        made = detections_of(scenes, own)
         return made if made.usable.any() else None
 
     def own_scores(self) -> dict[int, float]:

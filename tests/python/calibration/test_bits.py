@@ -11,9 +11,9 @@ import twinmill_native as native
 from twinmill.data.camera_frames import Frames, frames_of
 from twinmill.data.track import make_track
 from twinmill.diagnosis.detections.robots import odd_cameras
-from twinmill.diagnosis.detections.search import search_bits
-from twinmill.predict.detection_errors import compare_bits
-from twinmill.predict.detections import BLOCK_S, BitScene, majority, thue_morse
+from twinmill.diagnosis.detections.search import search_detections
+from twinmill.predict.detection_errors import compare_detections
+from twinmill.predict.detections import BLOCK_S, Detections, majority, thue_morse
 
 RANGE_M, CONE_RAD, MISS, FALSE = 1.1, 0.855, 0.05, 0.1
 MODEL = f"""
@@ -73,7 +73,7 @@ def make_scenes(driven):
     """Scenes of all robots with bits drawn by a camera of the numbers given."""
 
     def make(seed, range_m=RANGE_M, cone_rad=CONE_RAD, pan_rad=0.0, miss=MISS, false=FALSE,
-             delay_s=0.0, frames=10, has_raw=True) -> list[BitScene]:  # fmt: skip
+             delay_s=0.0, frames=10, has_raw=True) -> list[Detections]:  # fmt: skip
         random = np.random.default_rng(seed + 1000)
         t_s, poses = paths(seed)
         late = round(delay_s * POSE_HZ)
@@ -91,7 +91,7 @@ def make_scenes(driven):
             frame = Frames(t_s[pick], True, raw if has_raw else raw & False, has_raw, voted)
             block = (frame.t_s // BLOCK_S).astype(int)
             scenes.append(
-                BitScene(f"R{own:02d}", own, "log", own, tracks, frame, np.ones(len(raw), bool),
+                Detections(f"R{own:02d}", own, "log", own, tracks, frame, np.ones(len(raw), bool),
                          0.0, 0.0, False, (1e-6, 1e-6), block, thue_morse(block))
             )  # fmt: skip
         return scenes
@@ -100,7 +100,7 @@ def make_scenes(driven):
 
 
 def test_a_perfect_camera_has_a_diagonal_confusion_matrix(make_scenes):
-    result = compare_bits(make_scenes(1, miss=0, false=0), model())
+    result = compare_detections(make_scenes(1, miss=0, false=0), model())
     c = result.confusion
     assert c.false_negative == c.false_positive == 0
     assert c.true_positive > 100
@@ -110,7 +110,7 @@ def test_a_perfect_camera_has_a_diagonal_confusion_matrix(make_scenes):
 
 def test_missed_and_false_frames_are_counted_where_they_were_drawn(make_scenes):
     clean, noisy = make_scenes(2, miss=0, false=0), make_scenes(2, miss=0.2, false=0.1)
-    c = compare_bits(noisy, model()).confusion
+    c = compare_detections(noisy, model()).confusion
     before = np.concatenate([s.frames.raw for s in clean])
     after = np.concatenate([s.frames.raw for s in noisy])
     # The model says seen where the noisy camera missed: its answer was a false positive.
@@ -119,9 +119,9 @@ def test_missed_and_false_frames_are_counted_where_they_were_drawn(make_scenes):
 
 
 def test_score_is_one_if_the_rates_are_right_and_above_if_not(make_scenes):
-    right = compare_bits(make_scenes(3), model()).score
+    right = compare_detections(make_scenes(3), model()).score
     assert right == pytest.approx(1, abs=0.1)
-    assert compare_bits(make_scenes(3, miss=0.4, false=0.3), model()).score > 1.5 * right
+    assert compare_detections(make_scenes(3, miss=0.4, false=0.3), model()).score > 1.5 * right
 
 
 def test_majority_is_the_sum_over_all_outcomes():
@@ -175,7 +175,9 @@ TRUE = {
 
 @pytest.mark.parametrize("effect", HIDDEN)
 def test_a_hidden_effect_is_named_with_its_value(effect, make_scenes):
-    done = search_bits(make_scenes(50 + list(HIDDEN).index(effect), **HIDDEN[effect]), model())
+    done = search_detections(
+        make_scenes(50 + list(HIDDEN).index(effect), **HIDDEN[effect]), model()
+    )
     assert done.found == [effect]
     first = done.rounds[0].accepted.own[0]
     true, sampling = TRUE[first.name], 4 * first.std if np.isfinite(first.std) else 0.0
@@ -187,14 +189,14 @@ def test_a_hidden_effect_is_named_with_its_value(effect, make_scenes):
                                                ("missed_detection", "miss")])  # fmt: skip
 def test_a_camera_better_than_the_model_is_named_too(effect, clean, make_scenes):
     worse = native.Model.from_toml(MODEL.replace("rate = 0.05", "rate = 0.15"), "test")
-    done = search_bits(make_scenes(64, **{"miss": 0.15, clean: 0.0}), worse)
+    done = search_detections(make_scenes(64, **{"miss": 0.15, clean: 0.0}), worse)
     assert done.found == [effect]
     assert done.rounds[0].accepted.own[0].value == pytest.approx(-1, abs=0.05)
 
 
 def test_nothing_is_named_where_nothing_is_hidden(make_scenes):
     """Each log may name something with a chance of 5 %: 2 of 5 would be one case in 45."""
-    named = [search_bits(make_scenes(seed), model()).found for seed in range(70, 75)]
+    named = [search_detections(make_scenes(seed), model()).found for seed in range(70, 75)]
     assert sum(bool(n) for n in named) < 2
 
 
@@ -209,6 +211,6 @@ def test_a_blind_camera_is_told_from_its_sisters(make_scenes):
 def test_without_raw_bits_the_vote_is_not_judged(make_scenes):
     others = set(HIDDEN) - {"view_range", "vote"}
     scenes = make_scenes(90, range_m=0.7, has_raw=False)
-    done = search_bits(scenes, model(), excluded={*others, "occlusion"})
+    done = search_detections(scenes, model(), excluded={*others, "occlusion"})
     assert "vote" in dict(done.hidden)
     assert done.found[:1] == ["view_range"]

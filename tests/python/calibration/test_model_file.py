@@ -11,7 +11,7 @@ import pytest
 
 from twinmill.model.covariance import Covariance
 from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child, write_whole
-from twinmill.model.parameters import Estimate
+from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.noise import ChannelNoise, Noise
 
 NOISE = Noise(ChannelNoise(1e-4, 2e-3, 0.1), ChannelNoise(1e-3, 2e-2, 0.2))
@@ -37,8 +37,8 @@ def fitted(parent):
     }
     for name, (value, _) in values.items():
         model.set(name, value)
-    estimates = [Estimate(n, v, s, "", False, True) for n, (v, s) in values.items()]
-    clock = Estimate("clock.offset_s", 0.06, 0.001, "s", False, True)
+    estimates = [ParameterEstimate(n, v, s, "", False, True) for n, (v, s) in values.items()]
+    clock = ParameterEstimate("clock.offset_s", 0.06, 0.001, "s", False, True)
     return Fitted(model, estimates, {"run.lcmlog": "ab12"}, 4.5, 1.1, NOISE, {clock.name: clock})
 
 
@@ -84,9 +84,9 @@ def test_standard_errors_of_a_table_stand_at_their_own_speeds(child):
     std = data["base"]["std"]["wheel_speed_mps"]
     assert len(std) == len(data["base"]["wheel_speed_mps"]) == 5
     assert std[2] == 0.002 and std[4] == 0.004
-    told = ModelFile.load(str(child)).told_by_others(["another"])
+    told = ModelFile.load(str(child)).known_from_other_logs(["another"])
     assert set(told) == {"base.wheel_speed_mps.2", "base.wheel_speed_mps.4", "base.motor_lag_s"}
-    assert not ModelFile.load(str(child)).told_by_others(["ab12"])
+    assert not ModelFile.load(str(child)).known_from_other_logs(["ab12"])
 
 
 def test_parent_stays_as_it_is(parent, fitted, tmp_path):

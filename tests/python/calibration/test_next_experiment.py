@@ -18,7 +18,7 @@ from twinmill.experiment.design import Limits, Plan, check, design
 from twinmill.experiment.foresight import Rows, csv_text, rows_of
 from twinmill.experiment.information import CLOCKS, FisherInformation
 from twinmill.experiment.moves import AXES, family
-from twinmill.experiment.power import ALPHA, told_apart
+from twinmill.experiment.power import ALPHA, named_apart
 from twinmill.experiment.relevance import Relevance
 from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
@@ -34,11 +34,11 @@ COMMAND_S = 10 / 480  # of the robot in conftest.py
 def information_of(widths: list[float], sizes: list[int]) -> FisherInformation:
     """Free quantities with priors of these widths, and effects with so many parameters."""
     free = [Parameter("x", "1", 0, -1, 1, 0, width, 0.1) for width in widths]
-    subjects = [
+    candidate_effects = [
         SimpleNamespace(name=str(k), candidate=SimpleNamespace(strength=np.ones(size)))
         for k, size in enumerate(sizes)
     ]
-    return FisherInformation(free, subjects)
+    return FisherInformation(free, candidate_effects)
 
 
 def test_a_margin_is_what_least_squares_leaves_of_the_trace():
@@ -109,7 +109,7 @@ def test_promised_chance_is_that_of_a_simulated_trial(energy, alike):
         lead = 6.0 if alike > 0.9 or energy * (1 - alike) < 12 else 0.0
         named += enough and left["rival"] - left["true"] > lead
     margins = np.array([[energy, np.inf, energy * (1 - alike)]])
-    assert told_apart(margins, np.array([1]), 28)[0] == pytest.approx(named / trials, abs=0.08)
+    assert named_apart(margins, np.array([1]), 28)[0] == pytest.approx(named / trials, abs=0.08)
 
 
 def test_each_move_comes_to_rest_and_keeps_the_duty_cap():

@@ -14,7 +14,7 @@ from twinmill.diagnosis.place import HORIZON, comes_again
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import REFIT
 from twinmill.diagnosis.verdict import Weighed
-from twinmill.model.parameters import Estimate
+from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S
 
@@ -113,7 +113,7 @@ def test_each_wheel_with_a_command_of_its_own_has_its_formulas():
 @pytest.mark.parametrize(("known_s", "effect"), [(0.0133, REFIT), (0.001, "motor_lag")])
 def test_a_lag_within_the_models_own_error_is_a_stale_number(known_s, effect):
     model = native.Model.load("turbopi.toml")
-    extra = Estimate("motor_lag.extra_s", -0.0108, 0.0028, "s", False, True)
+    extra = ParameterEstimate("motor_lag.extra_s", -0.0108, 0.0028, "s", False, True)
     lag = Finding("motor_lag", None, [extra], 0.6, "sure")
     found = with_stale_numbers([lag], model, known_s, {})
     assert [f.effect for f in found] == [effect]
@@ -126,7 +126,7 @@ def test_a_lag_within_the_models_own_error_is_a_stale_number(known_s, effect):
 @pytest.mark.parametrize(("known", "effect"), [(0.05, REFIT), (0.01, "heading_bias")])
 def test_an_effect_that_changed_within_the_models_own_error_is_a_stale_number(known, effect):
     model = native.Model.load("turbopi.toml")
-    own = Estimate("heading_bias#2.bias_rad", 0.05, 0.01, "rad", False, True)
+    own = ParameterEstimate("heading_bias#2.bias_rad", 0.05, 0.01, "rad", False, True)
     again = Finding("heading_bias", None, [own], 0.6, "sure", again=True)
     found = with_stale_numbers([again], model, 0.0, {"heading_bias.bias_rad": known})
     assert [f.effect for f in found] == [effect]

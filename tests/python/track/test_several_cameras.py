@@ -15,7 +15,7 @@ import turbopi
 
 from twinmill.track.camera import Camera
 from twinmill.track.floor import View
-from twinmill.track.live import Sight, publish
+from twinmill.track.live import FrameDetections, publish
 from twinmill.track.page import Page, drawn
 from twinmill.track.paths import RobotPath, Tags
 from twinmill.track.together import clocks, compared, merged, on_clock
@@ -126,7 +126,9 @@ def test_live_each_robot_is_one_cameras_and_the_other_takes_it_when_that_loses_i
 def test_a_page_shows_each_cameras_picture_with_what_was_found():
     picture = np.full((360, 640, 3), 120, np.uint8)
     corners = np.array([[[100, 100], [140, 100], [140, 140], [100, 140]]], float)
-    sight = Sight(0, 1000.0, picture, np.array([7]), corners, {7: np.array([0.5, -1, 1])}, [9])
+    sight = FrameDetections(
+        0, 1000.0, picture, np.array([7]), corners, {7: np.array([0.5, -1, 1])}, [9]
+    )
     page = Page(2)
     try:
         page.show(sight)

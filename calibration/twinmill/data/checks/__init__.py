@@ -8,7 +8,7 @@ or a heading that is a few degrees off are left to the diagnosis.
 
 import twinmill_native as native
 
-from twinmill.data.checks.commands import Subject, check_commands, check_drift, check_drive
+from twinmill.data.checks.commands import CheckedTrack, check_commands, check_drift, check_drive
 from twinmill.data.checks.exchange import check_exchange
 from twinmill.data.checks.finding import InputFinding
 from twinmill.data.checks.geometry import body_by_command
@@ -57,19 +57,19 @@ def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFindin
         body = body_by_command(model, track.command_kind)
         if body is None:
             continue
-        subject = Subject(label, track, body)
-        wrong, search, explained = check_commands(subject)
+        checked = CheckedTrack(label, track, body)
+        wrong, search, explained = check_commands(checked)
         if explained is None:
             found += wrong
         else:
-            by_log.setdefault(label, []).append((subject, search, explained, wrong))
+            by_log.setdefault(label, []).append((checked, search, explained, wrong))
     for judged in by_log.values():
         exchanged, who = check_exchange([row[:3] for row in judged])
         found += exchanged
-        for subject, search, explained, wrong in judged:
-            if subject.track.robot_id in who:
+        for checked, search, explained, wrong in judged:
+            if checked.track.robot_id in who:
                 continue
             found += wrong
-            if not any(f.fatal for f in wrong) and not subject.track.same_clock:
-                found += check_drift(subject, search, explained)
+            if not any(f.fatal for f in wrong) and not checked.track.same_clock:
+                found += check_drift(checked, search, explained)
     return found

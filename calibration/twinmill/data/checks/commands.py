@@ -48,7 +48,7 @@ WHEEL_UNITS = (
 
 
 @dataclass(frozen=True)
-class Subject:
+class CheckedTrack:
     """One robot's track and what its commands do by the model's wheels, (3, 4)."""
 
     label: str
@@ -78,15 +78,17 @@ def check_drive(track: Track, model: native.Model, label: str) -> list[InputFind
     ]
 
 
-def check_commands(subject: Subject) -> tuple[list[InputFinding], Search | None, Explained | None]:
+def check_commands(
+    checked: CheckedTrack,
+) -> tuple[list[InputFinding], Search | None, Explained | None]:
     """Findings of one robot, and how well its commands explain its motion; None if too short."""
-    track = subject.track
-    if not track.has_heading and (turns := _turning_share(subject)) > 0.05:
-        return [_no_heading(subject, turns)], None, None
+    track = checked.track
+    if not track.has_heading and (turns := _turning_share(checked)) > 0.05:
+        return [_no_heading(checked, turns)], None, None
     motion = Motion.of(track)
     if len(motion.t_s) < 20 or motion.block.max() + 1 < FEWEST_BLOCKS:
         return [], None, None
-    body = subject.body if track.has_heading else subject.body * np.array([[1], [1], [0]])
+    body = checked.body if track.has_heading else checked.body * np.array([[1], [1], [0]])
     search = Search(motion, body)
     own = search.own()
     if not track.has_heading:  # held at an angle that nobody recorded, which is no mistake
@@ -98,33 +100,33 @@ def check_commands(subject: Subject) -> tuple[list[InputFinding], Search | None,
     if speed_mps < LEAST_MPS and np.abs(motion.turn_radps).max() < 0.2:
         return [], search, own
     if own.left < GOOD:
-        return _units(subject, own), search, own
-    return _mistakes(subject, search, own), search, own
+        return _units(checked, own), search, own
+    return _mistakes(checked, search, own), search, own
 
 
-def _mistakes(subject: Subject, search: Search, own: Explained) -> list[InputFinding]:
-    track = subject.track
+def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
+    track = checked.track
     poses = pose_alternatives() if track.has_heading else []
-    found = search.best(wheel_alternatives(columns_in_use(subject.body)) + poses)
+    found = search.best(wheel_alternatives(columns_in_use(checked.body)) + poses)
     found = [e for e in found if not _is_bias(e)]
     best = min(found, key=lambda e: e.left)
     if not far_better(best, own):
         if min(own.left, best.left) > UNRELATED:
-            return [_unrelated(subject, min(own.left, best.left))]
-        return _units(subject, own) if own.left < 0.5 else []
+            return [_unrelated(checked, min(own.left, best.left))]
+        return _units(checked, own) if own.left < 0.5 else []
     alike = [e for e in found if e.left < ALIKE * best.left + ALIKE_LEFT]
     alike.sort(key=lambda e: (e.alternative.steps, e.left))
     simplest = [e for e in alike if e.alternative.steps < alike[0].alternative.steps + 0.6][:3]
     words = [described(e.alternative, track.command_kind, e.turned_rad) for e in simplest]
     return [
-        subject.finding(
+        checked.finding(
             ", or ".join(dict.fromkeys(what for what, _ in words)),
             f"the commands explain {1 - own.left:.0%} of the motion as it is, and "
             f"{1 - simplest[0].left:.0%} without that mistake",
             "correct it where the log is made, or import anew with "
             + ", or ".join(dict.fromkeys(options for _, options in words)),
         ),
-        *_units(subject, simplest[0]),
+        *_units(checked, simplest[0]),
     ]
 
 
@@ -143,8 +145,8 @@ def _is_bias(e: Explained) -> bool:
     return plain and abs(e.turned_rad) < TURNED_RAD
 
 
-def _unrelated(subject: Subject, left: float) -> InputFinding:
-    return subject.finding(
+def _unrelated(checked: CheckedTrack, left: float) -> InputFinding:
+    return checked.finding(
         "the commands do not explain the motion",
         f"under no order and sign of the columns and no turn of the axes more than {1 - left:.0%}",
         "check that commands and poses are of the same robot and run, and shifted by less than a "
@@ -152,37 +154,37 @@ def _unrelated(subject: Subject, left: float) -> InputFinding:
     )
 
 
-def _turning_share(subject: Subject) -> float:
+def _turning_share(checked: CheckedTrack) -> float:
     """Share of the time in which the commands turn the robot."""
-    t_s, command = subject.track.command_t_s, subject.track.command
+    t_s, command = checked.track.command_t_s, checked.track.command
     if len(t_s) < 2:
         return 0.0
-    moving = np.abs(command @ subject.body.T)
+    moving = np.abs(command @ checked.body.T)
     turning = (moving[:, 2] > 0.05)[:-1]
     return float(np.sum(np.diff(t_s)[turning]) / (t_s[-1] - t_s[0]))
 
 
-def _no_heading(subject: Subject, share: float) -> InputFinding:
-    return subject.finding(
+def _no_heading(checked: CheckedTrack, share: float) -> InputFinding:
+    return checked.finding(
         "the heading is not recorded, and the commands turn the robot",
         f"in {share:.0%} of the time",
         "record the heading, since positions alone tell only of a robot that holds it",
     )
 
 
-def _units(subject: Subject, e: Explained) -> list[InputFinding]:
+def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
     """Speeds that are off by what a unit makes, where the commands explain the motion well."""
     if e.left > 0.5:
         return []
     speed = float(e.gain[:2].max())
-    turn = float(e.gain[2]) if subject.track.has_heading else 0.0
-    kind = subject.track.command_kind
+    turn = float(e.gain[2]) if checked.track.has_heading else 0.0
+    kind = checked.track.command_kind
     tried = [(speed, unit) for unit in UNITS[: 3 if kind == "twist" else 2]]
     tried += [(turn, unit) for unit in TURN_UNITS[: 2 if kind == "twist" else 1]]
     if kind == "wheel_speed":
         tried += [(speed, unit) for unit in WHEEL_UNITS]
     return [
-        subject.finding(
+        checked.finding(
             what,
             f"the robot is {ratio:.3g} times as fast as its commands and its model say",
             f"{remedy} and import anew",
@@ -197,12 +199,12 @@ LEAST_PPM = 870.0  # less is for fits of the clock, and slow changes of a robot 
 DRIFT_SURE = 7.0
 
 
-def check_drift(subject: Subject, search: Search, own: Explained) -> list[InputFinding]:
+def check_drift(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
     """Clocks that run apart, by the rate at which the commands explain the motion best.
 
     Rows of encoder logs are often counted, not timed: of them `time_base.py` judges.
     """
-    if subject.track.command_kind == "wheel_speed":
+    if checked.track.command_kind == "wheel_speed":
         return []
     span_s = float(np.ptp(search.motion.t_s))
     if own.left > 0.3 or span_s < 30:
@@ -217,7 +219,7 @@ def check_drift(subject: Subject, search: Search, own: Explained) -> list[InputF
     if not (np.isfinite(std) and abs(rate) > max(LEAST_PPM, DRIFT_SURE * std)):
         return []
     return [
-        subject.finding(
+        checked.finding(
             "the two clocks run apart",
             f"by {rate:.0f} +- {std:.0f} ppm, {abs(rate) * span_s / 1000:.0f} ms over the log",
             "stamp both with one clock or keep them in step (chrony, NTP), or import anew with "

@@ -5,12 +5,12 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from twinmill.data.checks.alternatives import Explained, Search
-from twinmill.data.checks.commands import Subject, far_better
+from twinmill.data.checks.commands import CheckedTrack, far_better
 from twinmill.data.checks.finding import InputFinding
 
 
 def check_exchange(
-    judged: list[tuple[Subject, Search, Explained]],
+    judged: list[tuple[CheckedTrack, Search, Explained]],
 ) -> tuple[list[InputFinding], set[int]]:
     """Findings about the robots of one log, and who is exchanged.
 
@@ -27,10 +27,10 @@ def check_exchange(
     for p, c in zip(poses, commands, strict=True):
         if p == c or not far_better(table[p][c], table[p][p]):
             continue
-        subject, other = judged[p][0], judged[c][0]
-        who.add(subject.track.robot_id)
+        checked, other = judged[p][0], judged[c][0]
+        who.add(checked.track.robot_id)
         found.append(
-            subject.finding(
+            checked.finding(
                 f"its name is exchanged with that of robot {other.track.robot_id}",
                 f"the commands of robot {other.track.robot_id} explain {1 - left[p, c]:.0%} of its "
                 f"motion, its own {1 - left[p, p]:.0%}",
@@ -42,8 +42,8 @@ def check_exchange(
 
 
 def _explained(
-    of_commands: tuple[Subject, Search, Explained],
-    of_poses: tuple[Subject, Search, Explained],
+    of_commands: tuple[CheckedTrack, Search, Explained],
+    of_poses: tuple[CheckedTrack, Search, Explained],
     lates_s: list[float],
 ) -> Explained:
     """How well the commands of one explain the poses of another."""

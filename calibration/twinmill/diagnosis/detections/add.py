@@ -9,21 +9,21 @@ from twinmill.diagnosis.detections.fit import STAGES
 from twinmill.diagnosis.detections.search import attempt
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import Fitted, ModelFile, write_child
-from twinmill.model.parameters import Estimate, catalogue
-from twinmill.predict.detection_errors import BitComparison, compare_bits
-from twinmill.predict.detections import bit_scenes
+from twinmill.model.parameters import ParameterEstimate, catalogue
+from twinmill.predict.detection_errors import DetectionComparison, compare_detections
+from twinmill.predict.detections import all_detections
 
 
 @dataclass(frozen=True)
-class BitAddition:
+class DetectionAddition:
     """What adding an effect did: bits before and after, and scores on frames not fitted to."""
 
     effect: str
-    before: BitComparison
-    after: BitComparison
+    before: DetectionComparison
+    after: DetectionComparison
     heldout_before: float
     heldout_after: float
-    parameters: list[Estimate]
+    parameters: list[ParameterEstimate]
     path: Path
 
     def to_json(self) -> dict:
@@ -47,7 +47,7 @@ def is_of_camera(effect: str) -> bool:
 
 def add_to_camera(
     effect: str, measurements: list[Measurement], model_file: ModelFile, out: Path, command: str
-) -> BitAddition:
+) -> DetectionAddition:
     """Adds an effect and writes the new model.
 
     Raises:
@@ -58,15 +58,17 @@ def add_to_camera(
         raise ValueError(
             f"effect '{effect}': {model_file.path.name} has it already; remove its [[effect]]."
         )
-    scenes = bit_scenes([o.scene() for o in open_measurements(measurements, model_file)])
+    scenes = all_detections([o.scene() for o in open_measurements(measurements, model_file)])
     if not scenes:
         raise ValueError(
             f"effect '{effect}': acts on the camera's bit, and no log has bits of a robot and the "
             "poses of another one beside it; record telemetry and poses of two robots or more."
         )
     before, after = (attempt(scenes, model_file.model, name) for name in (None, effect))
-    given, grown = (compare_bits(scenes, m) for m in (model_file.model, after.model))
+    given, grown = (compare_detections(scenes, m) for m in (model_file.model, after.model))
     logs = {m.log_name: m.log_sha256 for m in measurements}
     fitted = Fitted(after.model, list(after.own), logs, given.score, grown.score)
     write_child(model_file, fitted, out, command)
-    return BitAddition(effect, given, grown, before.score, after.score, list(after.own), Path(out))
+    return DetectionAddition(
+        effect, given, grown, before.score, after.score, list(after.own), Path(out)
+    )

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
-from twinmill.predict.detections import SURE, UNSEEN_FRAMES, VOTE_ERROR, BitScene
+from twinmill.predict.detections import SURE, UNSEEN_FRAMES, VOTE_ERROR, Detections
 
 ALPHA = 0.05
 VOTE_WEIGHT = np.log(1 / VOTE_ERROR - 1)  # of one voted bit that two models tell differently
@@ -35,7 +35,7 @@ class HeldOut:
     voted: list[np.ndarray]
 
     @classmethod
-    def of(cls, scenes: list[BitScene], models: tuple[native.Model, native.Model]) -> "HeldOut":
+    def of(cls, scenes: list[Detections], models: tuple[native.Model, native.Model]) -> "HeldOut":
         """Each half of the frames by the model in its place."""
         rows = []
         for scene in scenes:
@@ -45,7 +45,7 @@ class HeldOut:
         return cls(*(list(column) for column in zip(*rows, strict=True)))
 
 
-def _of_robot(scene: BitScene, own: native.Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _of_robot(scene: Detections, own: native.Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     chance = np.clip(scene.reported(own, scene.frames.has_raw), SURE, 1 - SURE)
     return scene.likelihood(own), chance, scene.voted(int(own.sight()["vote_frames"]))
 
@@ -76,7 +76,7 @@ class Evidence:
         return float(min(1.0, candidates * np.exp(-self.worth)))
 
 
-def weigh(scenes: list[BitScene], one: HeldOut, other: HeldOut) -> Evidence:
+def weigh(scenes: list[Detections], one: HeldOut, other: HeldOut) -> Evidence:
     """Evidence for `one` against `other`."""
     halves, surprise, variance = np.zeros(2), 0.0, 0.0
     best, half_of_best = 0.0, 0
@@ -98,7 +98,7 @@ def weigh(scenes: list[BitScene], one: HeldOut, other: HeldOut) -> Evidence:
 
 
 def _expected(
-    scene: BitScene, one: HeldOut, other: HeldOut, i: int
+    scene: Detections, one: HeldOut, other: HeldOut, i: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """(K,) gain of each frame of robot i if `one` were true, and its variance."""
     p, q = one.chance[i], other.chance[i]

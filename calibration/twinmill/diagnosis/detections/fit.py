@@ -8,13 +8,13 @@ import twinmill_native as native
 from scipy.optimize import minimize
 
 from twinmill.model.parameters import (
-    Estimate,
     Parameter,
+    ParameterEstimate,
     catalogue,
     effect_names,
     effect_parameters,
 )
-from twinmill.predict.detections import BitScene
+from twinmill.predict.detections import Detections
 
 STAGES = ("view", "decide")
 MOST_FRAMES = 10000  # a fit takes every Nth frame beyond
@@ -41,7 +41,7 @@ def camera_parameters(model: native.Model) -> list[Parameter]:
 class Likelihood:
     """Of bits, given values of some parameters."""
 
-    def __init__(self, scenes: list[BitScene], model: native.Model, free: list[Parameter]):
+    def __init__(self, scenes: list[Detections], model: native.Model, free: list[Parameter]):
         """Takes frames of all robots; the model is copied."""
         self.scenes, self.free = scenes, free
         self.model = model.copy()
@@ -108,7 +108,7 @@ def climb(likelihood: Likelihood, begin: np.ndarray, half: int | None = None) ->
     return values if likelihood.total(values, half) > likelihood.total(begin, half) else begin
 
 
-def estimates(likelihood: Likelihood, values: np.ndarray) -> list[Estimate]:
+def estimates(likelihood: Likelihood, values: np.ndarray) -> list[ParameterEstimate]:
     """Values with standard errors from the curvature of the likelihood, one by one."""
     made = []
     middle = likelihood.total(values, thin=False)
@@ -116,7 +116,7 @@ def estimates(likelihood: Likelihood, values: np.ndarray) -> list[Estimate]:
         std = _std(likelihood, values, i, middle)
         at_bound = bool(values[i] in (p.min, p.max))
         known = bool(np.isfinite(std))
-        made.append(Estimate(p.name, float(values[i]), std, p.unit, at_bound, known))
+        made.append(ParameterEstimate(p.name, float(values[i]), std, p.unit, at_bound, known))
     likelihood.set(values)
     return made
 

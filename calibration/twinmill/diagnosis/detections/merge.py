@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from twinmill.diagnosis.detections.robots import judge_cameras, odd_cameras
-from twinmill.diagnosis.detections.search import BitSearch, Round, Trial, search_bits
+from twinmill.diagnosis.detections.search import DetectionSearch, Round, Trial, search_detections
 from twinmill.diagnosis.findings import Ranked
 from twinmill.model.model_file import ModelFile
-from twinmill.predict.detection_errors import BitComparison, compare_bits
-from twinmill.predict.detections import bit_scenes
+from twinmill.predict.detection_errors import DetectionComparison, compare_detections
+from twinmill.predict.detections import all_detections
 
 ADEQUATE = ("model_adequate", "refit_enough", "cannot_tell")
 
 
-def with_bits(
+def with_detections(
     diagnosis,
     scenes: list,
     model_file: ModelFile,
@@ -32,14 +32,14 @@ def with_bits(
         say: told in words what is being done.
         excluded: effects that are not to be thought of.
     """
-    seen = bit_scenes(scenes)
+    seen = all_detections(scenes)
     if not seen:
         return diagnosis
     say("comparing the camera's bits")
-    bits = compare_bits(seen, model_file.model)
+    bits = compare_detections(seen, model_file.model)
     out = odd_cameras(seen, model_file.model)
     alike, odd = ([s for s in seen if (s.robot_id in out) == o] for o in (False, True))
-    done = search_bits(alike, model_file.model, say, excluded)
+    done = search_detections(alike, model_file.model, say, excluded)
     off = judge_cameras(alike, odd, done.rounds[-1].before.model, say, excluded)
     group = max((r.group or 0 for r in diagnosis.ranking), default=0)
     ranking = rank_bits(done, group)
@@ -56,19 +56,19 @@ def with_bits(
         not_identifiable=[*diagnosis.not_identifiable, *done.hidden],
         notes=[*diagnosis.notes, *_notes(bits)],
         bits=bits,
-        bits_after=compare_bits(alike, done.rounds[-1].before.model) if done.found else None,
+        bits_after=compare_detections(alike, done.rounds[-1].before.model) if done.found else None,
         bit_steps=[(None, done.rounds[0].before.score), *_steps(done)],
-        bit_estimates=done.estimates,
+        detection_estimates=done.estimates,
         robots_off=(*diagnosis.robots_off, *off),
     )
 
 
-def _steps(done: BitSearch) -> list[tuple[str | None, float]]:
+def _steps(done: DetectionSearch) -> list[tuple[str | None, float]]:
     """Each accepted effect and the bits' held-out score with it."""
     return [(r.accepted.effect, r.accepted.score) for r in done.rounds if r.accepted]
 
 
-def rank_bits(done: BitSearch, group: int) -> list[Ranked]:
+def rank_bits(done: DetectionSearch, group: int) -> list[Ranked]:
     """Accepted effects with those that do as well, then the first round's rest."""
     total = sum(r.accepted.evidence.gain for r in done.rounds if r.accepted)
     ranking = []
@@ -85,7 +85,7 @@ def rank_bits(done: BitSearch, group: int) -> list[Ranked]:
     return ranking + [_entry(t, done, total, None) for t in rest]
 
 
-def _entry(trial: Trial, done: BitSearch, total: float, group: int | None) -> Ranked:
+def _entry(trial: Trial, done: DetectionSearch, total: float, group: int | None) -> Ranked:
     return Ranked(
         trial.effect or "",
         trial.score,
@@ -97,7 +97,7 @@ def _entry(trial: Trial, done: BitSearch, total: float, group: int | None) -> Ra
     )
 
 
-def _sentence(diagnosis, done: BitSearch) -> str:
+def _sentence(diagnosis, done: DetectionSearch) -> str:
     if not done.found:
         return diagnosis.sentence
     told = " ".join(_of_round(r) for r in done.rounds if r.accepted)
@@ -121,7 +121,7 @@ def _value(estimate) -> str:
     return f"{estimate.name.split('.')[1]} {estimate.value:.3g}{spread}{unit}"
 
 
-def _notes(bits: BitComparison | None) -> list[str]:
+def _notes(bits: DetectionComparison | None) -> list[str]:
     if bits and not bits.raw:
         return [
             "The logs keep the voted bits alone: misses blur into the vote, and what is named "

@@ -7,30 +7,30 @@ import numpy as np
 import twinmill_native as native
 from scipy.stats import t
 
-from twinmill.diagnosis.detections.search import search_bits
+from twinmill.diagnosis.detections.search import search_detections
 from twinmill.diagnosis.odd import ODD, middle_and_scale, odd_ones
 from twinmill.diagnosis.outliers import Outlier
-from twinmill.model.parameters import Estimate
-from twinmill.predict.detection_errors import BitComparison, compare_bits
-from twinmill.predict.detections import BitScene
+from twinmill.model.parameters import ParameterEstimate
+from twinmill.predict.detection_errors import DetectionComparison, compare_detections
+from twinmill.predict.detections import Detections
 
 # Scatter of the logarithm of errors among cameras that are alike: over all frames, and over those
 # in which another robot is in view, which are few and come in passages.
 SPREAD, SPREAD_IN_VIEW = 0.1, 0.2
 
 
-def odd_cameras(scenes: list[BitScene], model: native.Model) -> set[int]:
+def odd_cameras(scenes: list[Detections], model: native.Model) -> set[int]:
     """Numbers of the robots whose bits fit the model much worse than the others'; never half."""
     return odd_ones(camera_outliers(scenes, model))
 
 
-def camera_outliers(scenes: list[BitScene], model: native.Model) -> dict[int, float]:
+def camera_outliers(scenes: list[Detections], model: native.Model) -> dict[int, float]:
     """By robot: how many scales its bits' errors are above the median robot's.
 
     Over all frames, or over those with a robot in view if they say more: a camera that sees nothing
     is right in all the others.
     """
-    found = compare_bits(scenes, model)
+    found = compare_detections(scenes, model)
     if found is None:
         return {}
     robots = np.array([s.robot_id for s in scenes])[found.robot]
@@ -40,7 +40,7 @@ def camera_outliers(scenes: list[BitScene], model: native.Model) -> dict[int, fl
 
 
 def _apart(
-    found: BitComparison, robots: np.ndarray, which: np.ndarray, spread: float
+    found: DetectionComparison, robots: np.ndarray, which: np.ndarray, spread: float
 ) -> dict[int, float]:
     """By robot: scales from the median, of the errors of its frames among (K,) bool `which`."""
     squares = (found.measured - found.predicted) ** 2
@@ -55,8 +55,8 @@ def _apart(
 
 
 def judge_cameras(
-    alike: list[BitScene],
-    odd: list[BitScene],
+    alike: list[Detections],
+    odd: list[Detections],
     model: native.Model,
     say: Callable[[str], None],
     excluded: Collection[str] = (),
@@ -83,14 +83,14 @@ def judge_cameras(
 
 
 def _judge_camera(
-    own: list[BitScene],
+    own: list[Detections],
     model: native.Model,
     excluded: Collection[str],
     away: dict[int, float],
     others: float,
 ) -> Outlier:
     robot_id, count = own[0].robot_id, len(away)
-    done = search_bits(own, model.for_robot(robot_id), excluded=excluded)
+    done = search_detections(own, model.for_robot(robot_id), excluded=excluded)
     before, after = done.rounds[0].before, done.rounds[-1].before
     first = done.rounds[0].accepted
     p_value = (
@@ -98,7 +98,9 @@ def _judge_camera(
         if first
         else count * t.sf(away[robot_id], count - 1)
     )
-    parameters: list[Estimate] = [e for e in done.estimates if e.name.split(".")[0] in done.found]
+    parameters: list[ParameterEstimate] = [
+        e for e in done.estimates if e.name.split(".")[0] in done.found
+    ]
     told = f"the bits of its camera err {before.score:.2f} times as much as they should with the "
     told += f"model of all, those of the others {others:.2f} times; "
     told += (
@@ -121,14 +123,14 @@ def _judge_camera(
     )
 
 
-def _plain(robot_id: int, parameters: list[Estimate]) -> str:
+def _plain(robot_id: int, parameters: list[ParameterEstimate]) -> str:
     label = f"R{robot_id:02d}"
     if not parameters:
         return f"The camera of {label} differs, and no effect of the catalogue explains how."
     return f"{label}: {', '.join(f'{e.name} {e.value:.3g}' for e in parameters)}."
 
 
-def _scores(scenes: list[BitScene], model: native.Model) -> list[float]:
+def _scores(scenes: list[Detections], model: native.Model) -> list[float]:
     """Of each scene."""
-    found = compare_bits(scenes, model)
+    found = compare_detections(scenes, model)
     return [score for *_, score in found.by_robot()] if found else []

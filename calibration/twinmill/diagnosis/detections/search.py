@@ -20,9 +20,9 @@ from twinmill.diagnosis.detections.fit import (
     estimates,
     start,
 )
-from twinmill.model.parameters import Estimate, effect_parameters, needing
+from twinmill.model.parameters import ParameterEstimate, effect_parameters, needing
 from twinmill.predict.detection_errors import brier_ratio
-from twinmill.predict.detections import BitScene
+from twinmill.predict.detections import Detections
 
 MATTERS = 0.005  # share of the bits that an effect must change,
 RARE = 0.02  # or of the frames with a robot in view (or without), if that is less
@@ -52,7 +52,7 @@ class Trial:
     values: np.ndarray
     heldout: HeldOut
     score: float
-    own: tuple[Estimate, ...]
+    own: tuple[ParameterEstimate, ...]
     evidence: Evidence = field(default_factory=Evidence)
     changed: float = 0.0
 
@@ -68,7 +68,7 @@ class Round:
 
 
 @dataclass(frozen=True)
-class BitSearch:
+class DetectionSearch:
     """What was found.
 
     Attributes:
@@ -81,7 +81,7 @@ class BitSearch:
     rounds: list[Round]
     candidates: list[str]
     hidden: list[tuple[str, str]]
-    estimates: tuple[Estimate, ...]
+    estimates: tuple[ParameterEstimate, ...]
 
     @property
     def found(self) -> list[str]:
@@ -89,12 +89,12 @@ class BitSearch:
         return [r.accepted.effect for r in self.rounds if r.accepted]
 
 
-def search_bits(
-    scenes: list[BitScene],
+def search_detections(
+    scenes: list[Detections],
     model: native.Model,
     say: Callable[[str], None] = lambda _: None,
     excluded: Collection[str] = (),
-) -> BitSearch:
+) -> DetectionSearch:
     """Adds camera effects one by one while they help.
 
     Args:
@@ -123,10 +123,10 @@ def search_bits(
         why = "the log has no raw bits, only those after the vote"
         hidden += [(n, why) for n in needing("raw_frames") if n not in excluded]
     likelihood = Likelihood(scenes, state.model, camera_parameters(state.model))
-    return BitSearch(rounds, names, hidden, tuple(estimates(likelihood, state.values)))
+    return DetectionSearch(rounds, names, hidden, tuple(estimates(likelihood, state.values)))
 
 
-def attempt(scenes: list[BitScene], model: native.Model, effect: str | None) -> Trial:
+def attempt(scenes: list[Detections], model: native.Model, effect: str | None) -> Trial:
     """Fits the model's camera effects and `effect`, which it has not; then judges it both ways."""
     richer = model.copy()
     fresh = []
@@ -146,7 +146,7 @@ def attempt(scenes: list[BitScene], model: native.Model, effect: str | None) -> 
     return Trial(effect, model, values, heldout, _score(scenes, heldout), tuple(own))
 
 
-def _score(scenes: list[BitScene], heldout: HeldOut) -> float:
+def _score(scenes: list[Detections], heldout: HeldOut) -> float:
     """Of the bits of all frames that count."""
     chance = [c[s.usable] for s, c in zip(scenes, heldout.chance, strict=True)]
     bits = [(s.frames.raw if s.frames.has_raw else s.frames.voted)[s.usable] for s in scenes]
@@ -154,7 +154,7 @@ def _score(scenes: list[BitScene], heldout: HeldOut) -> float:
 
 
 def _round(
-    scenes: list[BitScene],
+    scenes: list[Detections],
     state: Trial,
     names: list[str],
     count: int,
@@ -176,7 +176,7 @@ def _round(
     return Round(state, trials, accepted, tied)
 
 
-def _promise(scenes: list[BitScene], model: native.Model, effect: str) -> float:
+def _promise(scenes: list[Detections], model: native.Model, effect: str) -> float:
     """What the best of a grid of the effect's values gains, in log likelihood."""
     richer = model.copy()
     richer.add_effect(effect)
@@ -186,7 +186,7 @@ def _promise(scenes: list[BitScene], model: native.Model, effect: str) -> float:
     return likelihood.total(start(likelihood, fresh, neutral)) - likelihood.total(neutral)
 
 
-def _judged(scenes: list[BitScene], before: Trial, trial: Trial) -> Trial:
+def _judged(scenes: list[Detections], before: Trial, trial: Trial) -> Trial:
     return replace(
         trial,
         evidence=weigh(scenes, trial.heldout, before.heldout),
@@ -194,7 +194,7 @@ def _judged(scenes: list[BitScene], before: Trial, trial: Trial) -> Trial:
     )
 
 
-def _changed(scenes: list[BitScene], before: native.Model, after: native.Model) -> float:
+def _changed(scenes: list[Detections], before: native.Model, after: native.Model) -> float:
     """Share of the bits, raw or voted, that the models' difference changes."""
     raw, voted, count = 0.0, 0.0, 0
     for scene in scenes:
@@ -207,7 +207,7 @@ def _changed(scenes: list[BitScene], before: native.Model, after: native.Model) 
     return max(raw, voted) / count
 
 
-def _passes(scenes: list[BitScene], trial: Trial, count: int, least: float) -> bool:
+def _passes(scenes: list[Detections], trial: Trial, count: int, least: float) -> bool:
     late_s = next((abs(e.value) for e in trial.own if e.name == "sensor_delay.delay_s"), np.inf)
     return (
         trial.evidence.p_value(count) < ALPHA
@@ -216,7 +216,7 @@ def _passes(scenes: list[BitScene], trial: Trial, count: int, least: float) -> b
     )
 
 
-def _least(scenes: list[BitScene], model: native.Model) -> float:
+def _least(scenes: list[Detections], model: native.Model) -> float:
     """Share of the bits that an effect must change.
 
     Half a percent, or where few frames have a robot in view 2 % of those: poses, blurred as
@@ -227,13 +227,15 @@ def _least(scenes: list[BitScene], model: native.Model) -> float:
     return min(MATTERS, RARE * min(share, 1 - share))
 
 
-def _ties(scenes: list[BitScene], best: Trial, other: Trial) -> bool:
+def _ties(scenes: list[Detections], best: Trial, other: Trial) -> bool:
     """Whether the frames do not tell which of two effects is the better."""
     between = weigh(scenes, best.heldout, other.heldout)
     return between.apart < TIE * between.excess
 
 
-def _hidden(scenes: list[BitScene], model: native.Model, names: list[str]) -> list[tuple[str, str]]:
+def _hidden(
+    scenes: list[Detections], model: native.Model, names: list[str]
+) -> list[tuple[str, str]]:
     """Effects of three times their usual strength that these bits would not show."""
     limit = 2 * np.log(max(len(names), 1) / ALPHA)
     hidden = []
@@ -252,7 +254,7 @@ def _hidden(scenes: list[BitScene], model: native.Model, names: list[str]) -> li
     return hidden
 
 
-def _divergence(scenes: list[BitScene], model: native.Model, other: native.Model) -> float:
+def _divergence(scenes: list[Detections], model: native.Model, other: native.Model) -> float:
     """Expected log likelihood ratio were the other true (Kullback and Leibler 1951)."""
     told = 0.0
     for scene in scenes:

@@ -41,7 +41,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Subject:
+class Factor:
     """What is asked about, with all changes that answer.
 
     Attributes:
@@ -57,13 +57,13 @@ class Subject:
     changes: list[Change]
 
 
-def subjects(
+def factors(
     file: ModelFile,
     hidden: Sequence[Hidden],
     drawn: int,
     seed: int,
     only: Collection[str] = (),
-) -> tuple[list[Subject], list[tuple[str, str]]]:
+) -> tuple[list[Factor], list[tuple[str, str]]]:
     """All that is asked about a model.
 
     Args:
@@ -82,7 +82,7 @@ def subjects(
     found = [*_effects(file), *_parameters(file), *_robots(file), *_together(file, drawn, seed)]
     for one in hidden:
         found += _hidden(file, one)
-    names = {subject.name for subject in found}
+    names = {factor.name for factor in found}
     for name in only:
         if name not in names:
             near = difflib.get_close_matches(name, sorted(names), n=1, cutoff=0)
@@ -99,7 +99,7 @@ def neutral(model: native.Model, instance: str) -> dict[str, float]:
     return {p["name"]: p["neutral"] for p in card["parameters"] if p["role"] != "place"}
 
 
-def _effects(file: ModelFile) -> list[Subject]:
+def _effects(file: ModelFile) -> list[Factor]:
     found = []
     for instance in effect_names(file.model):
         if catalogue_of(file.model)[instance.split("#")[0]]["stage"] == "observe":
@@ -109,8 +109,8 @@ def _effects(file: ModelFile) -> list[Subject]:
         text = with_values(for_all_robots(file.text, instance), file.model, named)
         own = with_robot(file.text, 0, instance, off)
         found += [
-            Subject(instance, "effect", "of the model", [Change("it left out", text, named)]),
-            Subject(
+            Factor(instance, "effect", "of the model", [Change("it left out", text, named)]),
+            Factor(
                 instance,
                 "one_robot",
                 "one robot without it",
@@ -120,7 +120,7 @@ def _effects(file: ModelFile) -> list[Subject]:
     return found
 
 
-def _parameters(file: ModelFile) -> list[Subject]:
+def _parameters(file: ModelFile) -> list[Factor]:
     """Each quantity at both ends of its 95 % interval; what goes together with it goes along."""
     try:
         known = ranges(file, file.model, 1, 0)
@@ -138,7 +138,7 @@ def _parameters(file: ModelFile) -> list[Subject]:
             changes.append(Change(f"{q.name} = {_short(end)}{_unit(q.unit)}", text, values))
         low, high = map(_short, q.interval)
         about = f"within its interval {low} to {high}{_unit(q.unit)}"
-        found.append(Subject(q.name, "parameter", about, changes))
+        found.append(Factor(q.name, "parameter", about, changes))
     return found
 
 
@@ -150,7 +150,7 @@ def _moved(known: Sequence[Quantity], along: np.ndarray) -> dict[str, float]:
     }
 
 
-def _together(file: ModelFile, drawn: int, seed: int) -> list[Subject]:
+def _together(file: ModelFile, drawn: int, seed: int) -> list[Factor]:
     """All quantities drawn at once from what the fits leave open."""
     try:
         known = ranges(file, file.model, drawn, seed)
@@ -162,10 +162,10 @@ def _together(file: ModelFile, drawn: int, seed: int) -> list[Subject]:
         values = {name: float(sample[i]) for i, name in names}
         changes.append(Change(f"draw {k}", with_values(file.text, file.model, values), values))
     about = f"{len(names)} numbers drawn from what the fits leave open"
-    return [Subject("together", "together", about, changes)] if names and drawn else []
+    return [Factor("together", "together", about, changes)] if names and drawn else []
 
 
-def _robots(file: ModelFile) -> list[Subject]:
+def _robots(file: ModelFile) -> list[Factor]:
     """Robots all alike, and one that drives or turns otherwise."""
     stds = {name: file.model.get(name) for name in SPREADS}
     found = []
@@ -173,7 +173,7 @@ def _robots(file: ModelFile) -> list[Subject]:
         alike = dict.fromkeys(stds, 0.0)
         text = with_values(file.text, file.model, alike)
         found.append(
-            Subject("robots", "robots", "differences of robots", [Change("all alike", text, alike)])
+            Factor("robots", "robots", "differences of robots", [Change("all alike", text, alike)])
         )
     words = {"theta_a1": ("faster", "slower"), "theta_a2": ("quicker to turn", "slower to turn")}
     for gain, (more, less) in words.items():
@@ -186,11 +186,11 @@ def _robots(file: ModelFile) -> list[Subject]:
             )
             for sign in (1, -1)
         ]
-        found.append(Subject(gain, "one_robot", "one robot apart from the others", changes))
+        found.append(Factor(gain, "one_robot", "one robot apart from the others", changes))
     return found
 
 
-def _hidden(file: ModelFile, hidden: Hidden) -> list[Subject]:
+def _hidden(file: ModelFile, hidden: Hidden) -> list[Factor]:
     """An effect that the model lacks: of all robots as strong as it may be, of one as it is usual.
 
     The log tells of the robot that was recorded; another may have what that one has not.
@@ -208,8 +208,8 @@ def _hidden(file: ModelFile, hidden: Hidden) -> list[Subject]:
             values = {f"R00.{k}": v for k, v in _named(hidden.effect, usual).items()}
             one.append(Change(f"one robot with {_words(card, usual)}", text, values))
     return [
-        Subject(hidden.effect, "hidden", hidden.why, everyone),
-        Subject(hidden.effect, "one_robot", "one robot with it, as strong as is usual", one),
+        Factor(hidden.effect, "hidden", hidden.why, everyone),
+        Factor(hidden.effect, "one_robot", "one robot with it, as strong as is usual", one),
     ]
 
 
@@ -233,18 +233,18 @@ def _acts(card: Mapping, values: Mapping[str, float]) -> bool:
     )
 
 
-def _acting(found: Sequence[Subject]) -> tuple[list[Subject], list[tuple[str, str]]]:
+def _acting(found: Sequence[Factor]) -> tuple[list[Factor], list[tuple[str, str]]]:
     """Without what the plant cannot show; which, and why."""
     kept, left = [], {}
-    for subject in found:
+    for factor in found:
         why = ""
-        for change in subject.changes:
+        for change in factor.changes:
             inert = dict(native.Model.from_toml(change.text, "changed").inert(PLANT))
-            why = next((w for n, w in inert.items() if n.partition(".")[0] == subject.name), "")
+            why = next((w for n, w in inert.items() if n.partition(".")[0] == factor.name), "")
         if why:
-            left[subject.name] = f"{why} (it does not act in this plant)"
-        elif subject.changes:
-            kept.append(subject)
+            left[factor.name] = f"{why} (it does not act in this plant)"
+        elif factor.changes:
+            kept.append(factor)
     return kept, list(left.items())
 
 

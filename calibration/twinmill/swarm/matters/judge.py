@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from twinmill.swarm.classes import interval, reached
-from twinmill.swarm.matters.changes import Change, Subject
+from twinmill.swarm.matters.changes import Change, Factor
 from twinmill.swarm.matters.differences import Difference, median_difference, share_difference
 from twinmill.swarm.request import Request
 from twinmill.swarm.store import read_sweep
@@ -63,7 +63,7 @@ class Judged:
         verdict: MATTERS, UNSURE or NOTHING.
     """
 
-    subject: Subject
+    factor: Factor
     outcomes: list[Outcome]
     verdict: str
 
@@ -108,7 +108,7 @@ class Matters:
         return [
             j
             for j in self.ranked
-            if j.verdict in verdicts and (not kinds or j.subject.kind in kinds)
+            if j.verdict in verdicts and (not kinds or j.factor.kind in kinds)
         ]
 
 
@@ -119,7 +119,7 @@ def folder_of(request: Request, folder: Path) -> Path:
 
 def judge(
     request: Request,
-    subjects: Sequence[Subject],
+    factors: Sequence[Factor],
     left: list[tuple[str, str]],
     goal: str,
     margin: float,
@@ -132,7 +132,7 @@ def judge(
 
     Args:
         request: of the model as it is, without axes, by the full kernel; with the most seeds.
-        subjects: what is asked about.
+        factors: what is asked about.
         left: what is not, and why.
         goal: class that is wanted.
         margin: change of the share that would not matter.
@@ -140,23 +140,23 @@ def judge(
         tell: is given how many worlds are done and how many are planned.
     """
     bench = _Bench(request, folder, tell)
-    asked = sum(len(s.changes) for s in subjects if s.kind != "together")
+    asked = sum(len(s.changes) for s in factors if s.kind != "together")
     level = 1 - SURE / max(asked, 1) / len(LOOKS)
     judged: dict[int, Judged] = {}
     for look, most in enumerate(LOOKS):
         going = [
             k
-            for k, s in enumerate(subjects)
+            for k, s in enumerate(factors)
             if k not in judged or (judged[k].verdict == UNSURE and s.kind != "together")
         ]
-        bench.plan(look, [subjects[k] for k in going])
+        bench.plan(look, [factors[k] for k in going])
         before = bench.runs(request.model_text, look)
         for k in going:
             outcomes = [
                 _outcome(before, bench.runs(change.text, look), change, goal, level)
-                for change in subjects[k].changes
+                for change in factors[k].changes
             ]
-            judged[k] = Judged(subjects[k], outcomes, _verdict(outcomes, margin))
+            judged[k] = Judged(factors[k], outcomes, _verdict(outcomes, margin))
         if most == LOOKS[-1] or not any(judged[k].verdict == UNSURE for k in going):
             break
     before = bench.runs(request.model_text, len(LOOKS) - 1)
@@ -171,8 +171,8 @@ def judge(
         margin,
         (float(hits.mean()), *interval(hits.sum(), len(hits))),
         {name: _median(_values(before, name, hits)) for name in METRICS},
-        [j for j in ranked if j.subject.kind != "together"],
-        next((j for j in ranked if j.subject.kind == "together"), None),
+        [j for j in ranked if j.factor.kind != "together"],
+        next((j for j in ranked if j.factor.kind == "together"), None),
         left,
     )
 
@@ -193,9 +193,9 @@ class _Bench:
         seeds = {"first_seed": self.request.first_seed + first, "seeds": last - first}
         return replace(self.request, model_text=text, **seeds)
 
-    def plan(self, look: int, subjects: Sequence[Subject]) -> None:
+    def plan(self, look: int, factors: Sequence[Factor]) -> None:
         """Says how many runs a look adds."""
-        changes = 1 + sum(len(s.changes) for s in subjects)
+        changes = 1 + sum(len(s.changes) for s in factors)
         self.planned += changes * self._part("", look).seeds
         self.tell(self.done, self.planned)
 

@@ -24,8 +24,8 @@ def map_requests(found: Matters, axes: list[Axis], seeds: int) -> dict[str, Requ
     """
     if not seeds:
         return {}
-    own = [j for j in found.ranked if j.subject.kind == "effect"]
-    others = [j for j in found.ranked if j.subject.kind in KINDS and j not in own]
+    own = [j for j in found.ranked if j.factor.kind == "effect"]
+    others = [j for j in found.ranked if j.factor.kind in KINDS and j not in own]
     chosen: list[Judged] = [*own, *others][:MOST]
     base = replace(found.request, axes=axes, seeds=seeds, n=None, same_seeds=True)
     if all(axis.name != "n" for axis in axes):

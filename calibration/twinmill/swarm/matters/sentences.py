@@ -18,40 +18,40 @@ NAMED = 4  # of a list in a sentence
 
 def sentence(judged: Judged) -> str:
     """One answer."""
-    subject, worst = judged.subject, judged.worst
+    factor, worst = judged.factor, judged.worst
     verb = VERBS[judged.verdict]
     low, high = judged.shares
     before, after = percent(worst.share.before), percent(worst.share.after)
-    if subject.kind == "effect":
-        text = f"{subject.name} {verb}: {before} with it, {after} without"
-    elif subject.kind == "parameter":
+    if factor.kind == "effect":
+        text = f"{factor.name} {verb}: {before} with it, {after} without"
+    elif factor.kind == "parameter":
         span = f"{100 * low:.0f} to {percent(high)}"
-        text = f"{subject.name} {verb} {subject.about}: {span}"
-    elif subject.kind == "hidden":
+        text = f"{factor.name} {verb} {factor.about}: {span}"
+    elif factor.kind == "hidden":
         even = " even" if judged.verdict == NOTHING else ""
-        text = f"{subject.name} {verb},{even} at {_inside(worst)}: {before} become {after}"
-    elif subject.kind == "robots":
+        text = f"{factor.name} {verb},{even} at {_inside(worst)}: {before} become {after}"
+    elif factor.kind == "robots":
         text = f"That robots differ {verb}: {before} as they are, {after} were they alike"
     else:
         text = f"{_capital(worst.change.what)} {verb}: {before} become {after}"
-        if subject.about == "one robot without it":
-            text = f"One robot without {subject.name} {verb}: {before} become {after}"
+        if factor.about == "one robot without it":
+            text = f"One robot without {factor.name} {verb}: {before} become {after}"
     return f"{text} ({points(worst.share)}, {worst.seeds} runs{_besides(worst)})."
 
 
 def label(judged: Judged) -> str:
     """What was changed, in few words."""
-    subject = judged.subject
-    if subject.kind == "effect":
-        return f"{subject.name} left out"
-    if subject.kind == "hidden":
-        return f"{subject.name}, not excluded"
-    if subject.kind == "robots":
+    factor = judged.factor
+    if factor.kind == "effect":
+        return f"{factor.name} left out"
+    if factor.kind == "hidden":
+        return f"{factor.name}, not excluded"
+    if factor.kind == "robots":
         return "robots all alike"
-    if subject.about == "one robot without it":
-        return f"one robot without {subject.name}"
+    if factor.about == "one robot without it":
+        return f"one robot without {factor.name}"
     what = judged.worst.change.what
-    return what if subject.kind == "parameter" else what.partition(" (")[0]
+    return what if factor.kind == "parameter" else what.partition(" (")[0]
 
 
 def headline(found: Matters) -> str:
@@ -121,7 +121,7 @@ def _besides(worst: Outcome) -> str:
 
 
 def _list(judged: Sequence[Judged]) -> str:
-    names = list(dict.fromkeys(j.subject.name for j in judged))
+    names = list(dict.fromkeys(j.factor.name for j in judged))
     shown = names[:NAMED]
     rest = len(names) - len(shown)
     more = [f"{rest} more"] if rest else []
@@ -157,13 +157,13 @@ def to_json(found: Matters) -> dict:
 
 
 def _judged_json(judged: Judged) -> dict:
-    subject = judged.subject
+    factor = judged.factor
     return {
-        "name": subject.name,
-        "kind": subject.kind,
-        "about": subject.about,
+        "name": factor.name,
+        "kind": factor.kind,
+        "about": factor.about,
         "verdict": judged.verdict,
-        "sentence": sentence(judged) if subject.kind != "together" else None,
+        "sentence": sentence(judged) if factor.kind != "together" else None,
         "change": judged.worst.share.change,
         "changes": [outcome.to_json() for outcome in judged.outcomes],
     }
