@@ -7,9 +7,9 @@ from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
-from twinmill.data.importers.camera_plane import on_floor
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.importers.ros_bag import guess_pairs, list_topics
+from twinmill.data.importers.ros_frames import on_floor
 from twinmill.data.log import LogError, heading_rad, read_log
 
 START_S = 1_700_000_000

@@ -11,7 +11,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.checks import InputFinding, check_tracks
-from twinmill.data.checks.geometry import body_by_command
+from twinmill.data.checks.commands import body_by_command
 from twinmill.data.checks.motion import Motion
 from twinmill.data.checks.words import COLUMNS
 from twinmill.data.log import CommandKind, LogError, RobotLog

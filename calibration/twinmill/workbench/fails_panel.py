@@ -7,8 +7,7 @@ from nicegui import events, ui
 
 from twinmill.fitting.compare import GOOD, MISSING
 from twinmill.predict.regimes import Regime
-from twinmill.workbench.hands import Hands
-from twinmill.workbench.words import scored
+from twinmill.workbench.panel import Hands, scored
 
 ROW_PX = 21
 TONES = ("#009e73", "#e69f00", "#d55e00")  # good, warn, bad

@@ -3,8 +3,8 @@
 
 from nicegui import events, ui
 
-from twinmill.workbench.hands import Hands
 from twinmill.workbench.knobs import Knob
+from twinmill.workbench.panel import Hands
 
 
 class KnobsPanel:

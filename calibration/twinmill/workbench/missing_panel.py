@@ -7,9 +7,8 @@ from nicegui import ui
 
 from twinmill.diagnosis.detections.add import is_of_camera
 from twinmill.model.parameters import catalogue
-from twinmill.workbench.hands import Hands
+from twinmill.workbench.panel import Hands, estimate, scored, tone
 from twinmill.workbench.typeset import typeset
-from twinmill.workbench.words import estimate, scored, tone
 
 REFIT = "refit"
 OTHERS = 8  # effects of the ranking that are shown beside the findings

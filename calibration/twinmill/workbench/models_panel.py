@@ -6,9 +6,8 @@ from pathlib import Path
 
 from nicegui import ui
 
-from twinmill.workbench.hands import Hands
+from twinmill.workbench.panel import Hands, check_free, scored, tone
 from twinmill.workbench.tree import Tried
-from twinmill.workbench.words import check_free, scored, tone
 
 INDENT_PX = 14
 

@@ -8,8 +8,7 @@ from nicegui import ui
 
 from twinmill.experiment.power import percent
 from twinmill.files import replacing
-from twinmill.workbench.hands import Hands
-from twinmill.workbench.words import check_free
+from twinmill.workbench.panel import Hands, check_free
 
 FLOOR_PX = 300  # the longer side of the floor, as drawn
 

@@ -14,8 +14,8 @@ from twinmill.workbench.knobs_panel import KnobsPanel
 from twinmill.workbench.missing_panel import MissingPanel
 from twinmill.workbench.models_panel import ModelsPanel
 from twinmill.workbench.next_panel import NextPanel
+from twinmill.workbench.panel import scored, tone
 from twinmill.workbench.swarm_panel import SwarmPanel
-from twinmill.workbench.words import scored, tone
 
 REFRESH_S = 0.15
 HINT_MS = 900  # over a tab, before its hint covers what is below

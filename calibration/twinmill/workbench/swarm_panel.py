@@ -6,9 +6,8 @@ import html
 from nicegui import ui
 
 from twinmill.swarm.classes import COLORS
-from twinmill.workbench.hands import Hands
+from twinmill.workbench.panel import Hands, scored
 from twinmill.workbench.swarm import STARTS
-from twinmill.workbench.words import scored
 
 AXIS = {"nameLocation": "middle", "splitLine": {"show": False}, "axisLabel": {"fontSize": 11}}
 CELL_PX = (31, 21)

@@ -8,10 +8,15 @@ or a heading that is a few degrees off are left to the diagnosis.
 
 import twinmill_native as native
 
-from twinmill.data.checks.commands import CheckedTrack, check_commands, check_drift, check_drive
-from twinmill.data.checks.exchange import check_exchange
+from twinmill.data.checks.commands import (
+    CheckedTrack,
+    body_by_command,
+    check_commands,
+    check_drift,
+    check_drive,
+    check_exchange,
+)
 from twinmill.data.checks.finding import InputFinding
-from twinmill.data.checks.geometry import body_by_command
 from twinmill.data.checks.series import check_length, check_poses, check_track
 from twinmill.data.track import Track
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands against poses of one robot: kind, signs, columns, axes, units, drift of the clocks."""
+"""Commands against poses: kind, signs, columns, axes, units, drifting clocks, exchanged names."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
+from scipy.optimize import linear_sum_assignment
 
 from twinmill.data.checks.alternatives import (
     Explained,
@@ -13,10 +14,9 @@ from twinmill.data.checks.alternatives import (
     wheel_alternatives,
 )
 from twinmill.data.checks.finding import InputFinding
-from twinmill.data.checks.geometry import columns_in_use
 from twinmill.data.checks.motion import Motion
 from twinmill.data.checks.words import described
-from twinmill.data.log import KINDS
+from twinmill.data.log import KINDS, CommandKind
 from twinmill.data.track import Track
 
 GOOD = 0.03  # share of the motion left unexplained at which no mistake is looked for
@@ -45,6 +45,28 @@ WHEEL_UNITS = (
     ((0.08, 0.13), "the wheel speeds are in rounds per minute", "name the columns w1_rpm ..."),
     ((0.012, 0.025), "the wheel speeds are in degrees per second", "name the columns w1_degps ..."),
 )
+
+
+DUTY, WHEEL_RADPS = 1.0, 5.0  # at which one wheel alone is tried
+
+
+def body_by_command(model: native.Model | None, kind: CommandKind) -> np.ndarray | None:
+    """(3, 4) forward m/s, left m/s, turn rad/s by unit of each column of a log's commands.
+
+    Velocity commands need no wheels. None where the model is for another kind of command.
+    """
+    if kind == "twist":
+        return np.eye(3, 4)
+    if model is None or model.drive != kind:
+        return None
+    size = DUTY if kind == "duty" else WHEEL_RADPS
+    steady = native.steady(model, np.ascontiguousarray(size * np.eye(4)), [], np.empty((0, 0)))
+    return steady.reshape(4, -1)[:, :3].T / size
+
+
+def columns_in_use(body: np.ndarray) -> int:
+    """How many columns move the robot: four wheels, or three where the fourth is unused."""
+    return 3 if not np.any(body[:, 3]) else 4
 
 
 @dataclass(frozen=True)
@@ -233,3 +255,45 @@ def _vertex(x: tuple, y: np.ndarray) -> float:
     """Place of the least value by the parabola through three points; NaN if it has none."""
     square, slope, _ = np.polyfit(x, y, 2)
     return float(-slope / (2 * square)) if square > 0 else np.nan
+
+
+def check_exchange(
+    judged: list[tuple[CheckedTrack, Search, Explained]],
+) -> tuple[list[InputFinding], set[int]]:
+    """Findings about the robots of one log, and who is exchanged.
+
+    Only shifts in time near those at which a robot's own commands fit best are tried.
+    """
+    n = len(judged)
+    if n < 2 or all(own.left < 0.03 for _, _, own in judged):
+        return [], set()
+    lates_s = sorted({round(own.late_s, 3) for _, _, own in judged} | {0.0, 0.06, 0.12})
+    table = [[_explained(j, i, lates_s) for j in judged] for i in judged]
+    left = np.array([[e.left for e in row] for row in table])
+    poses, commands = linear_sum_assignment(left)
+    found, who = [], set()
+    for p, c in zip(poses, commands, strict=True):
+        if p == c or not far_better(table[p][c], table[p][p]):
+            continue
+        checked, other = judged[p][0], judged[c][0]
+        who.add(checked.track.robot_id)
+        found.append(
+            checked.finding(
+                f"its name is exchanged with that of robot {other.track.robot_id}",
+                f"the commands of robot {other.track.robot_id} explain {1 - left[p, c]:.0%} of its "
+                f"motion, its own {1 - left[p, p]:.0%}",
+                "give the poses or the commands the other number (column robot_id, or "
+                "--robot NAME=ID)",
+            )
+        )
+    return found, who
+
+
+def _explained(
+    of_commands: tuple[CheckedTrack, Search, Explained],
+    of_poses: tuple[CheckedTrack, Search, Explained],
+    lates_s: list[float],
+) -> Explained:
+    """How well the commands of one explain the poses of another."""
+    commands, motion = of_commands[1], of_poses[1].motion
+    return Search(motion, commands.wheels, commands.felt, np.array(lates_s)).own()

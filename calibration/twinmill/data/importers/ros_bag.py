@@ -22,9 +22,8 @@ import turbopi
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from twinmill.data.importers.camera_plane import on_floor
 from twinmill.data.importers.ros_cut import is_cut, write_whole
-from twinmill.data.importers.ros_frames import Frames
+from twinmill.data.importers.ros_frames import Frames, on_floor
 from twinmill.data.importers.ros_messages import (
     COMMANDS,
     CORNERS,
