@@ -99,7 +99,8 @@ def add(
     grown = [o.with_model(richer) for o in opened]
     moved, found = fitted(grown, [*old, *fresh], fresh=len(fresh))
     held = [HeldOut.of(f) for f in (fitted(opened, [])[1], fitted(opened, old)[1], found)]
-    before, after = comparison(model_file, opened), comparison(model_file, moved)
+    before = comparison(model_file, opened)
+    after = comparison(model_file, [o.realigned() for o in moved])
     estimates = found.shared_estimates()
     write_child(
         model_file,

@@ -152,7 +152,8 @@ def fit(
     base = base_parameters(model, base_names(model, judged(opened)))
     free = without_held([*base, *all_effect_parameters(model)], held)
     moved, found = fitted(opened, free)
-    before, after = comparison(model_file, opened), comparison(model_file, moved)
+    before = comparison(model_file, opened)
+    after = comparison(model_file, [o.realigned() for o in moved])
     estimates = found.shared_estimates()
     clock = common_clock(found)
     write_child(

@@ -97,6 +97,10 @@ class Opened:
         fit = ScoreFit([data], [own], []).fit(rounds)
         return replace(self, data=data, model=fit.models[0])
 
+    def realigned(self) -> "Opened":
+        """The same on the clock and heading that would be found for its model anew."""
+        return self.aligned(self.model)
+
     def with_fitted(self, model: native.Model) -> "Opened":
         """The same with a model of its own robot, its clock included."""
         return replace(self, model=model)
