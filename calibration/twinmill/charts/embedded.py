@@ -101,7 +101,7 @@ def _log(robot: Shown) -> tuple[str, str]:
 
 
 def _log_bytes(robots: Sequence[Shown]) -> bytes:
-    """Of those of one log."""
+    """Poses of all robots of one log, packed for the page."""
     tracks = {r.view.track.robot_id: r.view.track for r in robots}
     paths = {n: measured_path(t.pose_t_s, t.pose, t.segment >= 0) for n, t in tracks.items()}
     headings = {n: t.has_heading for n, t in tracks.items()}

@@ -124,7 +124,7 @@ class Ends:
 
 
 def _column(value: Each) -> np.ndarray:
-    """(W, 1) or (1, 1)."""
+    """One value, or one per world, as a column: (1, 1) or (W, 1)."""
     return np.atleast_1d(value)[:, None]
 
 

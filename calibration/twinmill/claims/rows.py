@@ -160,7 +160,7 @@ def median(
 
 
 def length(what: str, values_m: np.ndarray, reference_m: float, **by) -> Row:
-    """A median length."""
+    """Median of lengths against a reference, with a fixed share of it as tolerance."""
     return median(what, values_m, reference_m, LENGTH_OFF * reference_m, "m", **by)
 
 

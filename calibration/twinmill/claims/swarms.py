@@ -26,7 +26,7 @@ ROUND = 0.2  # circliness below which the reference calls it a mill
 
 @dataclass(frozen=True)
 class Runs:
-    """All runs of a request."""
+    """Runs of a request, by cell and seed."""
 
     request: Request
     table: pa.Table

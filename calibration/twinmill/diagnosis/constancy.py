@@ -40,7 +40,7 @@ class Change:
 
     @property
     def why(self) -> str:
-        """For people."""
+        """What the change means, as a clause for reports."""
         way = "changes" if self.on == "heading" else "grows" if self.relative > 0 else "falls"
         return (
             f"{self.parameter} {way} with {self.on} (by {100 * abs(self.relative):.0f} % for a "

@@ -70,7 +70,7 @@ class Rest:
 
     @property
     def formula(self) -> str | None:
-        """For people."""
+        """The best term as `signal += p0 * formula`; None if there is none."""
         return f"{self.term.adds_to} += p0 * {self.term.formula}" if self.term else None
 
     @property

@@ -34,7 +34,7 @@ class CandidateEffect:
 
     @property
     def name(self) -> str:
-        """Of the effect."""
+        """Name of the effect."""
         return self.candidate.effect
 
 

@@ -74,7 +74,7 @@ class RobotModel:
 
     @property
     def wheel_mass_kg(self) -> float:
-        """Of one wheel."""
+        """Mass of one wheel, a fixed share of the robot's: no model file states it."""
         return WHEEL_SHARE * self.get("robot.mass_kg")
 
     @property

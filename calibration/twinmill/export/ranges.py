@@ -17,7 +17,7 @@ def as_yaml(data: dict[str, Any]) -> str:
 
 
 def as_json(data: dict[str, Any]) -> str:
-    """The same."""
+    """The ranges as one line of JSON."""
     return json.dumps(data, allow_nan=False) + "\n"
 
 

@@ -118,7 +118,7 @@ class Speaker:
         yield f"/{robot}/seen", self._make("std_msgs/Bool", bool(m.seen))
 
     def run(self, robot: str, m: turbopi.run_t) -> Iterator[Said]:
-        """Its configuration."""
+        """The run's model and settings, as TOML."""
         yield f"/{robot}/run", self._make("std_msgs/String", m.config_toml)
 
     def _make(self, kind: str, *values: Any) -> Any:

@@ -148,7 +148,7 @@ class Response:
 
     @cached_property
     def edges_s(self) -> np.ndarray:
-        """Of the averages."""
+        """Edges of the intervals that velocity is averaged over: wider where poses are rare."""
         slow = self.data.measurement.track.timing.pose_period_s >= SLOW_POSES_S
         return COARSE_S if slow else EDGES_S
 

@@ -26,7 +26,7 @@ class Body:
 
     @classmethod
     def of(cls, model: native.Model) -> "Body":
-        """As the model says."""
+        """The model's body and field of view."""
         sight = model.sight()
         return cls(
             model.get("robot.body_radius_m"),

@@ -132,7 +132,7 @@ class Trajectory:
 
     @property
     def block_s(self) -> float:
-        """Length of a block."""
+        """Within which errors count as correlated: shorter where the log is short."""
         span_s = float(np.ptp(self.start_s))
         return min(BLOCK_S, max(span_s / FEWEST_BLOCKS, 1e-3))
 

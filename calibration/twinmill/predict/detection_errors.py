@@ -30,7 +30,7 @@ class Confusion:
 
     @property
     def frames(self) -> int:
-        """All of them."""
+        """How many frames were counted."""
         return sum(vars(self).values())
 
     @property

@@ -15,7 +15,7 @@ from twinmill.report.tables import Cell, Table
 
 
 def shown(found: dict, times_s: list[float]) -> RenderableType:
-    """For the terminal."""
+    """Tables of rates and of missed cases."""
     return Group(*(show.table(t) for t in (_rates(found, times_s), _lost(found))))
 
 

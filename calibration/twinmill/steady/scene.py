@@ -64,7 +64,7 @@ class SteadyScene:
 
     @property
     def channel(self) -> np.ndarray:
-        """(R,) as CHANNELS."""
+        """(R,) which of CHANNELS each row is."""
         return np.tile(np.arange(len(CHANNELS)), len(self.commands))
 
     @property

@@ -59,7 +59,7 @@ class Axis:
 
     @property
     def label(self) -> str:
-        """For people."""
+        """What the axis varies, in words; its name where there are none."""
         return QUANTITIES[self.name].label if self.name in QUANTITIES else self.name
 
     @property

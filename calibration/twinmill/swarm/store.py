@@ -58,7 +58,7 @@ class Store:
         return [number for number in range(count) if not self._part(number).exists()]
 
     def keep(self, number: int, columns: dict[str, list]) -> None:
-        """Keeps one part."""
+        """Writes one part of the table, so that a sweep that is cut off can go on."""
         self._write(self._part(number), pa.table(columns))
 
     def finish(self, request: Request, count: int) -> None:

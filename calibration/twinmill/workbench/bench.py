@@ -134,7 +134,7 @@ class Bench:
 
     @property
     def progress(self) -> str:
-        """Of it, in words."""
+        """What the worker is doing and for how long, in words."""
         if self._waiting:
             return "waiting for the logs"
         return f"{self.worker.words} · {self.worker.for_s:.0f} s"

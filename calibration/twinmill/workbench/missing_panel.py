@@ -57,7 +57,7 @@ class MissingPanel:
             self.beside.set_text(f"Drawn in blue: {beside.label}, score ≈ {score}. Not added yet.")
 
     def draw(self) -> None:
-        """All of it."""
+        """Draws the panel anew from the session's diagnosis."""
         self.body.clear()
         self._adding.clear()
         self._trying.clear()

@@ -51,7 +51,7 @@ class Motion:
 
     @classmethod
     def of(cls, track: Track) -> "Motion":
-        """Measures a track."""
+        """Speeds and headings of a track, from straight lines through its nearby poses."""
         half_s = max(HALF_S, 1.5 * track.timing.pose_period_s)
         line = [
             local_line(track.pose_t_s, track.pose[:, k], track.segment, half_s) for k in range(3)

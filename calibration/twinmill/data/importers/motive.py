@@ -39,7 +39,7 @@ class _Header:
 
     @property
     def rotation(self) -> str:
-        """One of ROTATIONS."""
+        """How the file writes rotations: one of ROTATIONS; quaternions if it does not say."""
         return self.fields.get("Rotation Type", QUATERNION)
 
 

@@ -131,6 +131,6 @@ def _plain(robot_id: int, parameters: list[ParameterEstimate]) -> str:
 
 
 def _scores(scenes: list[Detections], model: native.Model) -> list[float]:
-    """Of each scene."""
+    """Brier score over its expectation, of each robot that could be judged."""
     found = compare_detections(scenes, model)
     return [score for *_, score in found.by_robot()] if found else []

@@ -57,7 +57,7 @@ class Entry:
 
     @property
     def least(self) -> float:
-        """Of its shares."""
+        """Smallest share of runs of its kind: again, in twins drawn, in MuJoCo if it ran."""
         shares = (self.share, self.drawn, self.mujoco)
         return min(share for share in shares if share is not None)
 

@@ -44,7 +44,7 @@ class Hunt:
 
     @property
     def sha256(self) -> str:
-        """Of all in it."""
+        """Of the whole question: a stored search goes on only with the same one."""
         return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
 
     def cell(self, mix: Mix) -> native.Cell:

@@ -48,7 +48,7 @@ class Forecast:
         return self.swept.mean(axis=0)
 
     def cells(self, chosen: list[int]) -> "Forecast":
-        """Of some cells."""
+        """The forecast of these cells alone, by their numbers."""
         return Forecast(self.points[chosen], self.swept[chosen], self.draws[:, chosen])
 
 

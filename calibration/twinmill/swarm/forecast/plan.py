@@ -62,7 +62,7 @@ class Plan:
 
     @property
     def names(self) -> list[str]:
-        """Of the axes."""
+        """Names of the axes, in the order of the columns."""
         return [axis.name for axis in self.request.axes]
 
     def to_bytes(self) -> bytes:
@@ -257,7 +257,7 @@ def _starts(plan: Plan) -> str:
 
 
 def _text(plan: Plan, digest: str, folder: Path) -> str:
-    """plan.md."""
+    """plan.md: the runs in the order to make them, and what to do; no prediction is in it."""
     request = plan.request
     runs = "\n".join(
         f"| {number} | {' | '.join(f'{v:g}' for v in plan.expected.points[cell])} |"

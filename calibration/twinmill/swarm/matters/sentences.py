@@ -94,7 +94,7 @@ def next_step(found: Matters) -> str:
 
 
 def percent(share: float) -> str:
-    """A share for people."""
+    """A share as `12 %`."""
     return f"{100 * share:.0f} %"
 
 
