@@ -2,6 +2,7 @@
 """The page's socket is for who loaded the page with its token, and for no other server's page."""
 
 import asyncio
+from concurrent.futures import ThreadPoolExecutor
 
 from starlette.datastructures import Headers
 from starlette.requests import Request
@@ -35,7 +36,8 @@ def first_answer(kind: str, path: str, query: str = "", **headers: str) -> dict:
     pairs = [(k.encode(), v.encode()) for k, v in {"host": HOST, **headers}.items()]
     scope = {"type": kind, "method": "GET", "path": path, "headers": pairs}
     scope |= {"query_string": query.encode()}
-    asyncio.run(Guard(served, TOKEN, 8080)(scope, receive, send))
+    with ThreadPoolExecutor(1) as own:  # Playwright leaves this thread's loop running
+        own.submit(asyncio.run, Guard(served, TOKEN, 8080)(scope, receive, send)).result()
     return told[0]
 
 
