@@ -135,18 +135,7 @@ def cuts(rows: list[Row]) -> Figure:
     def paint(panels) -> None:
         for axes, label in zip(np.ravel(panels), labels, strict=False):
             of = [row for row in rows if row.by["kind"] == label]
-            at = np.array([row.by["at"] for row in of])
-            ends = np.array([[row.value - row.low, row.high - row.value] for row in of]).T
-            axes.errorbar(at, [row.value for row in of], ends, fmt="o-", ms=3.5, color=FLOOR)
-            known = [row for row in of if row.reference]
-            axes.plot(
-                [row.by["at"] for row in known],
-                [row.reference[0] for row in known],
-                "D",
-                ms=8,
-                mfc="none",
-                mec=MEASURED,
-            )
+            _beside_references(axes, of, dict(fmt="o-", ms=3.5), dict(ms=8))
             axes.set_title(label, fontsize=8)
             axes.set(ylim=(-0.06, 1.08))
         for axes in np.ravel(panels)[len(labels) :]:
@@ -154,6 +143,22 @@ def cuts(rows: list[Row]) -> Figure:
 
     lines = -(-len(labels) // 2)
     return Figure(draw(1.5 * lines + 0.3, paint, nrows=lines, ncols=2), "Share that mills", LEGEND)
+
+
+def _beside_references(axes: Axes, rows: list[Row], ours: dict, reference: dict) -> None:
+    """Values with their intervals over `at`, and open diamonds where a number was published."""
+    at = np.array([row.by["at"] for row in rows])
+    ends = np.array([[row.value - row.low, row.high - row.value] for row in rows]).T
+    axes.errorbar(at, [row.value for row in rows], ends, color=FLOOR, **ours)
+    known = [row for row in rows if row.reference]
+    axes.plot(
+        [row.by["at"] for row in known],
+        [row.reference[0] for row in known],
+        "D",
+        mfc="none",
+        mec=MEASURED,
+        **reference,
+    )
 
 
 def maps(runs_of: dict[str, Runs]) -> list[Figure]:
@@ -169,21 +174,8 @@ def spread(rows: list[Row], slope: float) -> Figure:
     """Circliness over the spread of robots, and theory."""
 
     def paint(axes: Axes) -> None:
-        at = np.array([row.by["at"] for row in rows])
-        ends = np.array([[row.value - row.low, row.high - row.value] for row in rows]).T
-        axes.errorbar(
-            at, [row.value for row in rows], ends, fmt="o", ms=4, color=FLOOR, label="ours"
-        )
-        known = [row for row in rows if row.reference]
-        axes.plot(
-            [row.by["at"] for row in known],
-            [row.reference[0] for row in known],
-            "D",
-            ms=9,
-            mfc="none",
-            mec=MEASURED,
-            label="reference",
-        )
+        ours, reference = dict(fmt="o", ms=4, label="ours"), dict(ms=9, label="reference")
+        _beside_references(axes, rows, ours, reference)
         line = np.array([0, 0.2])
         axes.plot(line, slope * line, color=MEASURED, lw=1, label=f"{slope:.2f} times the spread")
         axes.axhline(ROUND, color=PREDICTED, lw=0.9)

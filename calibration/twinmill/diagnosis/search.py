@@ -335,13 +335,9 @@ def _is_common(before: Trial, refit: Trial, settings: Settings) -> bool:
     That makes no prediction better; it is far more likely than as many robots that are no usual
     ones.
     """
+    own = any(p.name in GAINS for d in before.state.datasets for p in d.own)
     as_good = refit.held_score < COMMON * before.held_score
-    return as_good and refit.evidence > settings.evidence and bool(_own_gains(before))
-
-
-def _own_gains(trial: Trial) -> set[str]:
-    """Gains that robots have of their own."""
-    return {p.name for d in trial.state.datasets for p in d.own} & set(GAINS)
+    return own and as_good and refit.evidence > settings.evidence
 
 
 def _least_fall(before: Trial, trial: Trial, first_excess: float, settings: Settings) -> float:

@@ -51,6 +51,11 @@ class Alternative:
         return self.turned or self.mirrored or self.heading_sign < 0
 
     @property
+    def is_turn(self) -> bool:
+        """Whether the heading is off by a constant, and nothing else is wrong with the poses."""
+        return self.turned and self.heading_sign > 0 and not self.mirrored
+
+    @property
     def steps(self) -> float:
         """How many simple mistakes it takes: of two that explain as much, the simpler is true."""
         moved = sum(k != p for k, p in enumerate(self.place))

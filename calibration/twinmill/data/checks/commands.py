@@ -114,9 +114,7 @@ def check_commands(
     search = Search(motion, body)
     own = search.own()
     if not track.has_heading:  # held at an angle that nobody recorded, which is no mistake
-        held = [
-            a for a in pose_alternatives() if a.turned and not a.mirrored and a.heading_sign > 0
-        ]
+        held = [a for a in pose_alternatives() if a.is_turn]
         own = min([own, *search.best(held)], key=lambda e: e.left)
     speed_mps = float(np.sqrt(np.mean(np.abs(motion.world_mps) ** 2)))
     if speed_mps < LEAST_MPS and np.abs(motion.turn_radps).max() < 0.2:
@@ -162,9 +160,7 @@ def far_better(best: Explained, own: Explained) -> bool:
 
 def _is_bias(e: Explained) -> bool:
     """A heading that is off by no more than an effect of physics makes it."""
-    a = e.alternative
-    plain = a.turned and a.heading_sign > 0 and not a.mirrored
-    return plain and abs(e.turned_rad) < TURNED_RAD
+    return e.alternative.is_turn and abs(e.turned_rad) < TURNED_RAD
 
 
 def _unrelated(checked: CheckedTrack, left: float) -> InputFinding:
