@@ -7,7 +7,7 @@ import re
 import shlex
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -29,11 +29,12 @@ if working():  # not for --help
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import next_run as present
     from twinmill.swarm.classes import goal_of
-    from twinmill.swarm.narrowing import Narrowing, design_for, spread_of
-    from twinmill.swarm.request import Request
-    from twinmill.swarm.sweep import make_request, progress_bar
     from twinmill_cli.frame import command_line, finish, load, open_model, provenance
     from twinmill_cli.ros_script import check_new_script, ros_path, write_script
+
+if TYPE_CHECKING:
+    from twinmill.swarm.narrowing import Narrowing
+    from twinmill.swarm.request import Request
 
 
 def register(app: typer.Typer) -> None:
@@ -93,6 +94,8 @@ def _next(
     if script_as:
         check_new_script(script_as, ros_path(script_as, output), force)
     if behavior:
+        from twinmill.swarm.sweep import make_request  # needs more packages than `make demo` has
+
         swarm = make_request(behavior, model, [], n=n, seeds=seeds, duration_s=swarm_s, full=True)
         narrowing = _narrowing(load(logs, model_file, as_json), model_file, limits, swarm, draws)
         write_whole(output, csv_text(narrowing.rows))
@@ -120,6 +123,9 @@ def _narrowing(
     measurements: Measurements, model_file: ModelFile, limits: Limits, swarm: Request, draws: int
 ) -> Narrowing:
     """Runs the swarms, then designs the drive."""
+    from twinmill.swarm.narrowing import design_for, spread_of
+    from twinmill.swarm.sweep import progress_bar
+
     check(measurements, model_file, limits)
     with progress_bar() as progress:
         task = progress.add_task("swarms of models drawn", total=draws)

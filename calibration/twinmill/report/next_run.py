@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A planned run for people: terminal and report."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 from rich.console import Group, RenderableType
 from rich.text import Text
@@ -13,7 +16,9 @@ from twinmill.model.parameters import catalogue
 from twinmill.report import Section, show
 from twinmill.report import next_run_figures as figures
 from twinmill.report.tables import Cell, Table, Tone, number
-from twinmill.swarm.narrowing import Narrowing
+
+if TYPE_CHECKING:  # needs more packages than a run that tells effects apart
+    from twinmill.swarm.narrowing import Narrowing
 
 MOST_NAMED = 4  # quantities of a narrowing run
 SMALL_SHARE = 0.05  # of the variance

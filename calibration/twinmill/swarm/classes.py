@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """What becomes of a swarm: the classes, their colours, and what a behaviour is meant to do."""
 
+from __future__ import annotations
+
 import difflib
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pyarrow as pa
 from scipy.stats import binomtest
 
 from twinmill.swarm.request import Request
+
+if TYPE_CHECKING:  # `metrics` works where only sweeps' tables lack
+    import pyarrow as pa
 
 # Colours of Okabe and Ito (2008), told apart by colour-blind readers.
 COLORS = {
