@@ -34,6 +34,7 @@ if working():  # not for --help
         update,
     )
     from twinmill.swarm.behaviors import find_file, read_tables
+    from twinmill.terminal import Fitting
 
 AT_ONCE = 16
 
@@ -210,4 +211,4 @@ def _table(outcomes: list[Outcome]) -> Group:
         for outcome in outcomes
         if not outcome.ok
     ]
-    return Group(table, *failed)
+    return Group(Fitting(table), *failed)

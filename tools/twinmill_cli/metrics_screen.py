@@ -19,6 +19,7 @@ if working():  # not for --help
     from twinmill.swarm.classes import COLORS, WORDS
     from twinmill.swarm.live_metrics import Question, SwarmSnapshot, look_around
     from twinmill.swarm.metrics import WINDOW_S, SwarmSeries
+    from twinmill.terminal import Fitting
 
 ROWS = {  # name: what people read, format
     "circliness": ("circliness", ".3f"),
@@ -77,7 +78,7 @@ def screen(snapshots: list[SwarmSnapshot], note: str) -> RenderableType:
     labels = ["mean over the last", "class", *(ROWS[name][0] for name in names), "robots"]
     for label, *cells in zip(labels, *columns, strict=True):
         table.add_row(label, *(cell for pair in cells for cell in pair))
-    return Group(table, *(Text(line, style) for line, style in _remarks(snapshots)))
+    return Group(Fitting(table), *(Text(line, style) for line, style in _remarks(snapshots)))
 
 
 def _column(series: SwarmSeries | None, names: list[str]) -> list[tuple[str | Text, str]]:

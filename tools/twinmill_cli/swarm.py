@@ -32,6 +32,7 @@ if working():  # not for --help
     from twinmill.robots import tell
     from twinmill.robots.fleet import RUN_PERIOD_S, Fleet, Robot
     from twinmill.robots.key import load
+    from twinmill.terminal import Fitting
 
 CLOCK_WARN_S = 0.05
 
@@ -350,7 +351,7 @@ def _finish(
         now = Text("; ".join([answer.mode or "?", *answer.alarms]), "red" if answer.alarms else "")
         table.add_row(f"R{answer.robot_id:02d}", said, now)
     data = {"verb": verb, "ok": ok, **data, "robots": [a.to_json() for a in given]}
-    deliver(data, Group(*([table] if given else []), words), as_json)
+    deliver(data, Group(*([Fitting(table)] if given else []), words), as_json)
     return 0 if ok else 1
 
 
@@ -386,7 +387,7 @@ def _status(
         return 0
 
 
-def status_table(robots: list[Robot]) -> Table | Text:
+def status_table(robots: list[Robot]) -> Fitting | Text:
     """One row a robot."""
     if not robots:
         return Text("No robot is heard.")
@@ -415,7 +416,7 @@ def status_table(robots: list[Robot]) -> Table | Text:
             _link(robot),
             Text("; ".join(robot.alarms), "bold red"),
         )
-    return table
+    return Fitting(table)
 
 
 def _link(robot: Robot) -> Text:

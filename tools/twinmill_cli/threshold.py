@@ -22,8 +22,8 @@ if working():  # not for --help
     from rich.text import Text
 
     from twinmill.files import check_new_file
-    from twinmill.report.show import Fitting
     from twinmill.robots.remote import Remote
+    from twinmill.terminal import Fitting
     from twinmill.threshold import pictures as source
     from twinmill.threshold.box import KEYS, Ball, Box, Fitted, evaluate, find_ball, fit_box
     from twinmill.threshold.pictures import Picture

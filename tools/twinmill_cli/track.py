@@ -26,6 +26,7 @@ if working():  # not for --help
     from twinmill.data.bus import open_bus
     from twinmill.data.importers.plain import Columns, read_commands
     from twinmill.files import check_new_file
+    from twinmill.terminal import Fitting
     from twinmill.track.align import align
     from twinmill.track.boards import Board
     from twinmill.track.camera import Camera, read_camera
@@ -359,7 +360,7 @@ def _text(out: Path, paths: list[RobotPath], quality: Quality, notes: list[str])
             f"{np.degrees(robot.heading_noise_rad):.2f}°",
         )
     head = f"{out}: {len(paths)} robots, {len(paths[0].t_s)} frames at {quality.rate_hz:.1f} Hz"
-    return Group(Text(head), table, *map(Text, [*notes, quality.sentence]))
+    return Group(Text(head), Fitting(table), *map(Text, [*notes, quality.sentence]))
 
 
 def _live(

@@ -2,9 +2,7 @@
 """What a person reads in the terminal."""
 
 from rich import box
-from rich.cells import cell_len
-from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
-from rich.measure import Measurement
+from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table as RichTable
 from rich.text import Text
@@ -15,10 +13,10 @@ from twinmill.fitting.fit import FitResult
 from twinmill.report import tables, views
 from twinmill.report.advice import advice
 from twinmill.report.tables import Cell, Table, number, tone
+from twinmill.terminal import Fitting
 
 STYLES = {"": "", "good": "bold green", "warn": "yellow", "bad": "bold red", "dim": "dim"}
 BAR = 10  # characters
-MOST_WIDE = 1000  # columns that no terminal has
 WARNINGS = 3  # in the terminal; --json has all
 
 
@@ -97,40 +95,6 @@ def effect(entry: dict) -> RenderableType:
         Text(),
         table(tables.effect_parameters(entry)),
     )
-
-
-class Fitting:
-    """A table, or where the terminal is too narrow for it, each of its rows in running text.
-
-    Args:
-        made: the table; its columns are as wide as their longest word, or cell if they do not wrap.
-    """
-
-    def __init__(self, made: RichTable) -> None:
-        self.made = made
-        for column in made.columns:
-            if column.no_wrap:
-                column.min_width = max(_width(cell) for cell in (column.header, *column.cells))
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        needed = Measurement.get(console, options.update(max_width=MOST_WIDE), self.made).minimum
-        if needed <= options.max_width:
-            yield self.made
-            return
-        if self.made.title:
-            yield Text(str(self.made.title), "bold")
-        heads = [" ".join(str(column.header).split()) for column in self.made.columns]
-        for row in zip(*(column.cells for column in self.made.columns), strict=True):
-            named = zip(heads, row, strict=True)
-            told = [Text.assemble((f"{head} ", "dim"), c) for head, c in named if str(c).strip()]
-            yield Text("; ").join(told)
-        if self.made.caption:
-            yield Text(str(self.made.caption), "dim")
-        yield Text()
-
-
-def _width(cell: str | Text) -> int:
-    return max(map(cell_len, str(cell).splitlines()), default=0)
 
 
 def table(data: Table) -> RenderableType:

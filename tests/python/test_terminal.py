@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of commands lose no word in a terminal of any width."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+import turbopi
+from PIL import Image
+from rich.console import Console
+from rich.table import Table
+
+from twinmill.robots.fleet import Robot
+from twinmill.terminal import Fitting
+from twinmill_cli import main as cli
+from twinmill_cli.swarm import status_table
+
+WIDTHS = [40, 48, 80, 200]
+
+
+def printed(what, columns) -> str:
+    console = Console(width=columns, file=io.StringIO())
+    console.print(what)
+    return console.file.getvalue()
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_a_long_name_is_not_cut_for_the_sake_of_a_cell_that_can_wrap(columns):
+    table = Table("picture", "pixels")
+    table.add_row("a_rather_long_name.png", "31279 (before 32768), and some words more to wrap")
+    told = printed(Fitting(table), columns)
+    for word in ("a_rather_long_name.png", "31279", "32768"):
+        assert word in told
+    assert max(map(len, told.splitlines())) <= columns
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_the_state_of_robots_is_told_whole(columns):
+    robot = Robot(7, telemetry=turbopi.telemetry_t(), run=turbopi.run_t())
+    robot.telemetry.battery_V = 7.43
+    robot.run.source, robot.run.version, robot.run.behavior = "robot", "0.1.0", "milling_cmaes"
+    told = printed(status_table([robot]), columns)
+    for word in ("R07", "0.1.0", "milling_cmaes", "7.43", "stopped"):
+        assert word in told
+    assert "…" not in told
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_limits_of_colour_are_told_with_the_names_of_the_pictures(
+    tmp_path, monkeypatch, capsys, columns
+):
+    y, x = np.mgrid[:120, :160]
+    green = np.hypot(x - 80, y - 60)[..., None] < 30
+    path = tmp_path / "a_picture_with_a_long_name.png"
+    Image.fromarray(np.where(green, [60, 170, 70], [170, 165, 160]).astype(np.uint8)).save(path)
+    monkeypatch.setenv("COLUMNS", str(columns))
+    cli.run(["threshold", str(path)])
+    told = capsys.readouterr().out
+    cli.run(["threshold", str(path), "--json"])
+    (row,) = json.loads(capsys.readouterr().out)["pictures"]
+    for word in (path.name, str(row["ball_blob_px"]), str(row["false_px_before"])):
+        assert word in told
