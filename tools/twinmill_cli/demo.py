@@ -181,9 +181,7 @@ def _estimate(hidden: Hidden, result: Explanation) -> ParameterEstimate | None:
 
 
 def _holds(estimate: ParameterEstimate, hidden: Hidden) -> bool:
-    return abs(estimate.value - hidden.value) <= max(
-        WITHIN_95 * estimate.std, 0.1 * abs(hidden.value)
-    )
+    return abs(estimate.value - hidden.value) <= WITHIN_95 * estimate.std
 
 
 def _table(hidden: list[Hidden], result: Explanation) -> Table:

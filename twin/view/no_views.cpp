@@ -14,8 +14,9 @@ struct Views::Parts
 Views::Views(const ViewOptions &options)
 {
     if (options.window || !options.picture.empty() || !options.video.empty())
-        throw std::runtime_error("--view, --picture and --video: this twin_run was built without "
-                                 "graphics, as `make demo` does; `make build` adds them");
+        throw std::runtime_error(
+            "--view, --picture and --video: this twin_run was built without "
+            "graphics, as `make demo` does; `make build` adds them");
 }
 
 Views::~Views() = default;
