@@ -15,8 +15,14 @@ HIDDEN = [
 
 
 def explained(*found, groups=None, coasting=0.7, std=0.05):
-    """A result that names these effects; `groups`: names that one cannot be parted from; `std`:
-    of the sizes, as a share of them."""
+    """A result that names these effects.
+
+    Args:
+        found: names.
+        groups: names that one cannot be parted from.
+        coasting: its size.
+        std: of the sizes, as a share of them.
+    """
     groups = groups or {}
     values = {"coasting.deceleration_mps2": coasting, "wheel_gain.fl": -0.1}
     parameters = [

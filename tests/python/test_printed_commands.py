@@ -16,27 +16,51 @@ import numpy as np
 import pytest
 from typer.core import TyperGroup
 
+from twinmill.challenge.script import write_rich_script
 from twinmill.programs import find_program
 from twinmill.workbench.next_run import then_commands
 from twinmill_cli import main as cli
 from twinmill_cli import next as next_command
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PARTS = (
+    "benchmarks",
+    "calibration",
+    "docs",
+    "examples",
+    "firmware",
+    "scripts",
+    "tests",
+    "tools",
+    "twin",
+)
+# All but the history, which names what once was.
+PAGES = [
+    *(path for path in sorted(ROOT.glob("*.md")) if path.name != "CHANGELOG.md"),
+    *(path for part in PARTS for path in sorted((ROOT / part).rglob("*.md"))),
+]
+KINDS = {".py", ".j2", ".js", ".sh", ".in", ".c", ".cpp", ".h", ""}  # the last: scripts
 SOURCES = [
     path
-    for folder in ("calibration/twinmill", "tools/twinmill_cli")
-    for path in sorted((ROOT / folder).rglob("*.py"))
+    for part in ("calibration/twinmill", "tools", "twin", "firmware", "scripts")
+    for path in sorted((ROOT / part).rglob("*"))
+    if path.is_file() and path.suffix in KINDS and "__pycache__" not in path.parts
 ]
 COMMANDS = {name: cli.LazyCommand(name, f"twinmill_cli.{m}", "") for name, m, _ in cli.COMMANDS}
-LINE = re.compile(r"^(?:    |\$ )(?:build/bin/)?((?:twinmill|twin_run|twin_sweep|make) .*)", re.M)
+PROGRAM = r"(?:build/bin/|\.venv/bin/)?((?:twinmill|twin_run|twin_sweep|make) "
+LINE = re.compile(rf"^(?:    |\$ ){PROGRAM}.*)", re.M)
+FENCED = re.compile(r"^```\w*\n(.*?)^```", re.M | re.S)
+IN_FENCE = re.compile(rf"^{PROGRAM}.*)", re.M)
 EXAMPLE = re.compile(r"^ +Example: (twinmill .*)$", re.M)
-QUOTED = re.compile(r"`(twinmill [a-z][^`]*)`")
+QUOTED = re.compile(r"`((?:twinmill|twin_run|twin_sweep|make) [a-z-][^`]*)`")
 
 
 def lines_of(page: Path) -> Iterator[str]:
     """Commands in blocks of a page, with lines that go on joined, without what a shell adds."""
-    yield from LINE.findall(page.read_text().replace("\\\n", " "))
+    text = page.read_text().replace("\\\n", " ")
+    yield from LINE.findall(text)
+    for block in FENCED.findall(text):
+        yield from IN_FENCE.findall(block)
 
 
 def words_of(line: str) -> list[str]:
@@ -67,7 +91,7 @@ def check(line: str) -> None:
         assert {w.partition("=")[0] for w in words if w.startswith("--")} <= known
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_commands_on_a_page_can_be_typed(page):
     for line in lines_of(page):
         check(line)
@@ -80,18 +104,36 @@ def test_examples_in_help_can_be_typed():
         check(line)
 
 
-def test_commands_named_in_messages_exist_with_their_options():
+def check_named(line: str) -> None:
     """What stands between back quotes may leave files out, so options alone are looked at."""
-    found = {line for path in SOURCES for line in QUOTED.findall(path.read_text())}
-    assert len(found) > 20
-    for line in found:
-        name, *words = line.split()[1:]
+    program, *words = line.split()
+    given = {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)}
+    if program == "twinmill" and words[0] in ("--help", "--install-completion"):
+        return
+    if program == "twinmill" and not words[0].startswith("<"):
+        name, *words = words
         command = COMMANDS[name].command()
         if isinstance(command, TyperGroup) and words and not words[0].startswith("-"):
             command = command.commands[words[0]]
         known = {option for p in command.params for option in (*p.opts, *p.secondary_opts)}
-        known.add("--help")
-        assert {w.partition("=")[0] for w in words if re.match(r"--?[a-z]", w)} <= known, line
+        assert given <= known | {"--help"}, line
+    elif program != "twinmill":
+        check(line)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_named_on_a_page_exist_with_their_options(page):
+    for line in QUOTED.findall(page.read_text()):
+        check_named(line)
+
+
+def test_commands_named_in_messages_exist_with_their_options():
+    """Of the programs in Python, C and C++, of pages that they write, and of scripts."""
+    found = {line for path in SOURCES for line in QUOTED.findall(path.read_text())}
+    assert len(found) > 30
+    for line in found:
+        if "{" not in line:  # filled in when it is printed
+            check_named(line)
 
 
 # -- results: what made them makes them again -----------------------------------------------------
@@ -125,6 +167,39 @@ def test_the_command_that_a_result_names_makes_it_again(swarm, line, monkeypatch
         " --out second" if " --out " in line else " --force" if line.startswith("plot") else ""
     ))  # fmt: skip
     assert without_place(first) == without_place(again)
+
+
+@pytest.fixture(scope="module")
+def drive(swarm) -> Path:
+    """A folder with the log of one robot that drives in all ways for half a minute."""
+    write_rich_script(swarm / "rich.csv", 30.0, 1)
+    words = ["--plant", "planar", "--n", "1", "--script", "rich.csv", "--log", "r.lcmlog"]
+    subprocess.run(
+        [str(find_program("twin_run")), *words], cwd=swarm, check=True, capture_output=True
+    )
+    return swarm
+
+
+@pytest.mark.parametrize("line", [
+    "fit r.lcmlog -o fitted.toml --hold base.yaw_gain",
+    "add coasting r.lcmlog -o added.toml",
+    "diagnose r.lcmlog",
+    "next r.lcmlog --duration-s 10 -o next.csv",
+    "set base.yaw_gain=0.9 -o set.toml",
+    "wheels -o wheels.csv",
+    "export s.lcmlog --to csv --channel-prefix TWIN_TRUTH_ -o tables",
+    "export-model turbopi.toml --to json -o model.json",
+    "predict-floor sweep -o plan",
+    "claims --only pivot --seeds 20",
+])  # fmt: skip
+def test_the_command_that_a_result_names_can_be_typed(drive, line, monkeypatch):
+    """Those that take long are not run again."""
+    monkeypatch.chdir(drive)
+    told = said(line)
+    check(told["command"])
+    assert told["command"].split()[1] == line.split()[0]
+    if "next_experiment" in told:
+        check(told["next_experiment"]["command"])
 
 
 @pytest.mark.parametrize("line", ["metrics s.lcmlog", "compare s.lcmlog"])

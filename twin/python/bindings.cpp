@@ -337,6 +337,7 @@ Array Steady(const Model &model, Matrix commands, const std::vector<std::string>
 
 NB_MODULE(twinmill_native, m)
 {
+    nb::set_leak_warnings(false);  // threads of a program that was stopped still hold some
     m.doc() = "Effects, model files, short predictions and swarms of the twin's planar plant.";
     m.def("catalogue", &CatalogueList,
           "All effects: cards and parameter tables, in alphabetical order.");

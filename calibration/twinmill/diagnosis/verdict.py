@@ -151,7 +151,7 @@ class Weighed:
                 "No effect is missing; the base model's numbers were stale, and a refit is enough."
             )
         if verdict in ("effect_missing", "ambiguous"):
-            return f"Missing: {' and '.join(_named(f) for f in self.findings)}.{self._left}"
+            return f"Missing: {_in_turn([_named(f) for f in self.findings])}.{self._left}"
         return self._outside_sentence
 
     @property
@@ -230,6 +230,13 @@ def drifted(score: float, last: float, known: float) -> bool:
         known: that is no news.
     """
     return score > GOOD * known and last < DRIFTED * score
+
+
+def _in_turn(names: list[str]) -> str:
+    """`a`, `a and b`, or `a; b; and c`: names may hold commas."""
+    if len(names) < 3:
+        return " and ".join(names)
+    return "; ".join([*names[:-1], f"and {names[-1]}"])
 
 
 def _named(finding: Finding) -> str:

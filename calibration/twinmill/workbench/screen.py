@@ -18,7 +18,7 @@ from twinmill.workbench.panel import scored, tone
 from twinmill.workbench.swarm_panel import SwarmPanel
 
 REFRESH_S = 0.15
-HINT_MS = 900  # over a tab, before its hint covers what is below
+HINT_MS = 900  # over a tab, before its hint shows
 HINTS = {
     "knobs": "Every quantity of the model, with its interval",
     "missing": "What is missing in the model",
@@ -123,7 +123,8 @@ class Screen:
             self.tabs.props("dense no-caps inline-label align=justify")
             for key, label in TABS.items():
                 with ui.tab(key, label=label).props(f'data-testid="tab-{key}"'):
-                    ui.tooltip(HINTS[key]).props(f"delay={HINT_MS}")
+                    above = 'anchor="top middle" self="bottom middle"'  # below is the panel's head
+                    ui.tooltip(HINTS[key]).props(f"delay={HINT_MS} {above}")
         with ui.tab_panels(self.tabs, value=chosen).props("animated=false keep-alive"):
             with ui.tab_panel("knobs"):
                 self.knobs = KnobsPanel(self)

@@ -30,6 +30,7 @@ SWITCH_S = 5e-4  # threads hand over so often: pages do not wait for the work of
 LISTEN_S = 0.02  # between looks whether the server listens
 TOLD_S = 5.0  # for a page to say why the server ends
 SENT_S = 0.5  # for what it says to be on its way
+NOTHING_HERE = "There is no page at this address; take the whole address that twinmill printed."
 
 
 class View(BaseModel):
@@ -139,6 +140,10 @@ def _add_page(bench: Bench) -> None:
             return _refused()
         await Screen(bench).build()
         return None
+
+    @app.exception_handler(404)
+    async def elsewhere(request: Request, error: Exception) -> Response:
+        return PlainTextResponse(NOTHING_HERE, status_code=404)
 
 
 def _add_data(bench: Bench) -> None:

@@ -106,8 +106,12 @@ def test_the_whole_conversation(import_turbopi, page):
         assert page.request.get(f"{url.split('?')[0]}data/log?log=0&token=wrong").status == 403
         socket = "_nicegui_ws/socket.io/?EIO=4&transport=polling"
         assert page.request.get(url.split("?")[0] + socket).status == 403
+        nowhere = page.request.get(url.replace("/?", "/nowhere?"))
+        assert nowhere.status == 404
+        assert "address" in nowhere.text() and "NiceGUI" not in nowhere.text()
         page.goto(url)
         is_predicted(page)
+        a_hint_leaves_the_panel_free(page)
         shown = page.get_by_test_id("score")
         expect(shown).to_have_text(re.compile(r"^\d"))  # the checks of the commands are made
         given = shown.text_content()
@@ -126,6 +130,7 @@ def test_the_whole_conversation(import_turbopi, page):
         page.reload()
         page.get_by_test_id("tab-models").click()
         expect(page.get_by_test_id("model-2")).to_have_class(re.compile("now"))
+    expect(page.get_by_text("The same command goes on where you were")).to_be_visible()
     keep_a_group()
     with workbench() as url:
         page.goto(url)
@@ -155,6 +160,15 @@ def ask_for_the_drive_that_parts(page) -> None:
     page.get_by_test_id("cancel").focus()
     page.keyboard.press(" ")
     expect(page.get_by_test_id("cancel")).not_to_be_visible()
+
+
+def a_hint_leaves_the_panel_free(page) -> None:
+    page.get_by_test_id("tab-models").hover()
+    page.locator(".q-tooltip").wait_for()
+    hint, tabs = (page.locator(at).bounding_box() for at in (".q-tooltip", ".q-tabs"))
+    assert hint["y"] + hint["height"] <= tabs["y"] + tabs["height"]
+    page.mouse.move(0, 0)
+    page.locator(".q-tooltip").wait_for(state="detached")
 
 
 def turn_a_knob_and_back(page, given: str) -> None:

@@ -81,7 +81,14 @@ class Workbench extends Stage {
   }
 }
 
+const GONE = [
+  "The workbench does not answer.",
+  "Was it stopped? The same command goes on where you were: nothing is lost.",
+];
+
 export function start({ token, view, log }) {
+  const words = document.querySelectorAll("#popup > span"); // NiceGUI shows it
+  words.forEach((span, k) => (span.textContent = GONE[k]));
   window.twinmill = new Workbench({ source: new Server(token), view });
   window.twinmill.showLog(log);
 }
