@@ -6,7 +6,7 @@ PYTHON := .venv/bin/python
 CTEST := ctest --test-dir build --output-on-failure --no-tests=error \
 	    --parallel $(shell expr $$(nproc) + 1)
 
-.PHONY: bench build check check-long demo docs format lint clean paper wheel
+.PHONY: bench build check check-long demo docs format lint clean paper rivals wheel
 
 # The native module into the environment.
 INSTALL = cmake --install build --component python --prefix "$$($(PYTHON) -c \
@@ -46,6 +46,16 @@ bench: build
 	@cmake --build build --target bench bench_plant bench_sweep >/dev/null
 	@status=0; OPENBLAS_NUM_THREADS=1 PYTHONPATH=.deps/bench $(PYTHON) benchmarks/run.py || status=1; \
 	    build/bin/bench_sweep || status=1; build/bin/bench_plant || status=1; exit $$status
+
+# Twinmill's diagnosis beside other ways to find what a model lacks, on the same sealed cases; about a
+# minute a case. It goes on where it was. RIVALS="--n 20 --json" and the like.
+rivals: build
+	@cmp -s benchmarks/rivals/requirements.txt .deps/rivals/requirements.txt || { \
+	    rm -rf .deps/rivals && $(PYTHON) -m pip install --quiet --no-deps --target .deps/rivals \
+	    --requirement benchmarks/rivals/requirements.txt && \
+	    cp benchmarks/rivals/requirements.txt .deps/rivals; }
+	@OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 PYTHONPATH=benchmarks:.deps/rivals $(PYTHON) -m rivals \
+	    $(RIVALS)
 
 format: build
 	@scripts/lint --fix

@@ -102,7 +102,7 @@ def _from_rest(run: Measurement, base: ModelFile) -> list[tuple]:
     since = t_s - np.maximum.accumulate(np.where(moving, t_s, -np.inf))
     starts = np.flatnonzero(moving[1:] & (since[:-1] > REST_S))
     return [
-        (t_s[a:b] - t_s[a], rims[a:b], pose[a:b])
+        (t_s[a:b] - t_s[a], rims[a:b], pose[a:b], np.zeros(4))
         for a, b in zip(starts, [*starts[1:], len(t_s)], strict=True)
     ]
 
@@ -117,4 +117,5 @@ def _sysid(runs: list[tuple], base: ModelFile) -> dict:
         "lag_s": get("base.motor_lag_s"),
     }
     lever_m = get("robot.half_wheelbase_m") + get("robot.half_track_m")
-    return sysid_fit.fit(runs, start, lever_m, get("noise.sensor_m") / get("noise.sensor_rad"))
+    rad_in_m = get("noise.sensor_m") / get("noise.sensor_rad")
+    return sysid_fit.fit(runs, start, sysid_fit.mecanum(lever_m), rad_in_m)
