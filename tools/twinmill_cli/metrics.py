@@ -71,8 +71,8 @@ def _metrics(
     With --live the same of the last 10 s of the bus, robots and twins (channels
     TWIN_...), once a second until Ctrl-C; --json then prints an object a line.
 
-    View range and body size are the model's. The sums that lead to circliness,
-    diffusion and class are those of twin_run and twin_sweep.
+    View range and body size are the model's. Velocities are fitted to the poses;
+    twin_run says the same of its own run, from the poses that it publishes.
 
     Example: twinmill metrics run.lcmlog --out report
 

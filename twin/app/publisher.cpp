@@ -30,7 +30,8 @@ Publisher::Publisher(Outlet &outlet, const Swarm &swarm, const std::vector<Model
     : outlet_(outlet),
       start_utime_us_(swarm.UtimeUs()),
       next_run_utime_us_(swarm.UtimeUs()),
-      pose_rate_hz_(pose_rate_hz)
+      pose_rate_hz_(pose_rate_hz),
+      recent_(swarm.Size())
 {
     for (int id = 0; id < swarm.Size(); ++id)
     {
@@ -142,6 +143,7 @@ void Publisher::PublishPose(int id, double t_s, const Pose2 &pose)
     message.orientation_wxyz[0] = std::cos(seen.theta_rad / 2);
     message.orientation_wxyz[3] = std::sin(seen.theta_rad / 2);
     outlet_.Send(Utime(t_s), member.pose, message);
+    recent_.Add(id, static_cast<double>(message.utime_us - start_utime_us_) / 1e6, seen);
 }
 
 void Publisher::PublishTruth(int id, double t_s, const Pose2 &pose, const RobotState &state)

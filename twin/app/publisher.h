@@ -9,6 +9,7 @@
 #include "outlet.h"
 #include "plant/drive_chain.h"
 #include "plant/random.h"
+#include "swarm/recent_poses.h"
 #include "swarm/swarm.h"
 
 namespace twin
@@ -35,6 +36,9 @@ public:
     {
         members_[static_cast<size_t>(robot)].robot.behavior = name;
     }
+
+    // What was published of poses, newest ones.
+    const RecentPoses &recent() const { return recent_; }
 
     // After Swarm::Decide(): R<nn>_TELEMETRY, and R<nn>_RUN every 5 s.
     void PublishDecisions(const Swarm &swarm);
@@ -64,6 +68,7 @@ private:
     int64_t start_utime_us_, next_run_utime_us_;
     double pose_rate_hz_, last_t_s_ = 0;
     int32_t pose_seq_ = 0;
+    RecentPoses recent_;
 };
 
 }  // namespace twin

@@ -29,7 +29,6 @@ namespace
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kWindow_s = 10;
 // Poses between steps are interpolated: right to 0.02 mm even while a robot starts.
 constexpr double kMaxStep_s = 0.0055;
 // Distractors lie this many spreads of the start away.
@@ -194,18 +193,21 @@ public:
     }
 
     double WallS() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
-    Metrics Mean() const { return window_.Mean(); }
+    // Of the poses as they were published: what `twinmill metrics` says of the log.
+    Metrics Mean(const Publisher &publisher) const
+    {
+        return publisher.recent().Mean(ring_size_, scale_);
+    }
 
 private:
     void Observe(const Swarm &swarm)
     {
+        if (!show_ || !progress_.IsDue(WallS()))
+            return;
         states_.clear();
         for (int i = 0; i < swarm.Size(); ++i)
             states_.push_back(swarm.State(i));
-        const Metrics now = Measure(states_, ring_size_, scale_);
-        window_.Add(swarm.TimeS(), now);
-        if (show_)
-            progress_.Show(swarm.TimeS(), duration_s_, WallS(), now);
+        progress_.Show(swarm.TimeS(), duration_s_, WallS(), Measure(states_, ring_size_, scale_));
     }
 
     void KeepPace(double t_s)
@@ -226,7 +228,6 @@ private:
     size_t ring_size_;
     MetricScale scale_;
     bool show_;
-    MetricWindow window_{kWindow_s};
     std::vector<RobotState> states_;
     Progress progress_;
 };
@@ -271,7 +272,7 @@ void Run(const Options &options)
     views.Finish(swarm);
     outlet.Finish();
     PrintSummary(options, {setup.command_line, swarm.Size(), swarm.PeriodS(), swarm.TimeS(), wall_s,
-                           g_stop != 0, loop.Mean()});
+                           g_stop != 0, loop.Mean(publisher)});
 }
 
 }  // namespace twin

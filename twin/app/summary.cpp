@@ -66,15 +66,17 @@ void PrintHeader(const Options &options, const Swarm &swarm, bool on_bus, double
     std::fflush(out);
 }
 
-void Progress::Show(double t_s, std::optional<double> duration_s, double wall_s,
-                    const Metrics &mean)
+bool Progress::IsDue(double wall_s) const
 {
     static const bool person = isatty(STDERR_FILENO);
-    if (!person || wall_s < shown_wall_s_ + kShowEvery_s)
-        return;
+    return person && wall_s >= shown_wall_s_ + kShowEvery_s;
+}
+
+void Progress::Show(double t_s, std::optional<double> duration_s, double wall_s, const Metrics &now)
+{
     shown_wall_s_ = wall_s;
     std::fprintf(stderr, "\r%.1f s, %.1f times real time, circliness %.3f", t_s, t_s / wall_s,
-                 mean.circliness);
+                 now.circliness);
     if (duration_s && t_s > 0)
         std::fprintf(stderr, ", %.0f s left", (*duration_s - t_s) * wall_s / t_s);
     std::fprintf(stderr, "\x1b[K");

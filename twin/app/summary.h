@@ -18,7 +18,7 @@ struct Result
     int robots;
     double period_s, simulated_s, wall_s;
     bool interrupted;
-    Metrics mean;  // over the last 10 s
+    Metrics mean;  // over the last 10 s, of the poses as they were published
 };
 
 void PrintHeader(const Options &options, const Swarm &swarm, bool on_bus, double realtime_factor);
@@ -27,7 +27,8 @@ void PrintHeader(const Options &options, const Swarm &swarm, bool on_bus, double
 class Progress
 {
 public:
-    void Show(double t_s, std::optional<double> duration_s, double wall_s, const Metrics &mean);
+    bool IsDue(double wall_s) const;
+    void Show(double t_s, std::optional<double> duration_s, double wall_s, const Metrics &now);
     void Clear();
 
 private:

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a swarm in a log does over time, in the metrics that the twin uses for its own swarms."""
+"""What a swarm in a log does over time, in the metrics that the twin uses for its own swarms.
+
+`twin_run` samples and fits the poses that it publishes in the same way (recent_poses.cpp), so that
+both say the same of a run.
+"""
 
 from dataclasses import dataclass
 
@@ -96,8 +100,8 @@ def swarm_metrics(
 
 
 def _odd(robots: dict[int, RobotLog]) -> list[int]:
-    names = [robot.behavior for robot in robots.values() if robot.behavior]
-    usual = max(set(names), key=lambda name: (names.count(name), name), default="")
+    names = [robots[i].behavior for i in sorted(robots) if robots[i].behavior]
+    usual = max(names, key=names.count, default="")  # of equally many the first
     return [i for i, robot in robots.items() if robot.behavior not in ("", usual)]
 
 
