@@ -2,6 +2,7 @@
 """Values that the library uses and that the help of its commands states. Imports nothing heavy."""
 
 import math
+from enum import StrEnum
 
 DEFAULT_MODEL = "turbopi.toml"
 FOREVER_S = 1e9  # how long a bus is listened to where nothing else is said
@@ -16,6 +17,15 @@ FALSE_ALARMS = 0.05
 BATCH = 36
 EMITTERS = 3
 PER_GENERATION = BATCH * EMITTERS
+
+
+class Question(StrEnum):
+    """What is asked of a design."""
+
+    HOW_MANY = "how-many"
+    HOW_FAST = "how-fast"
+    HOW_GOOD = "how-good"
+    HOW_ALIKE = "how-alike"
 
 
 def least_seeds() -> int:

@@ -22,7 +22,6 @@ from twinmill.swarm.phase import CLASSES, Phase, phase_of
 from twinmill.swarm.request import Request
 from twinmill.swarm.sweep import make_request, sweep
 from twinmill_cli import main as cli
-from twinmill_cli.ask import Curve, Question, axes_for, curve_of
 
 SEEDS = 4
 

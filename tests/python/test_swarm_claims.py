@@ -125,15 +125,15 @@ def test_spread_of_measured_robots_is_told_at_each_input(tmp_path):
     assert claim.agrees and any(row.value == pytest.approx(0.037, abs=5e-4) for row in claim.rows)
 
 
-def test_maps_in_mujoco_are_kept_and_no_two_layers_share_seeds(tmp_path, monkeypatch):
+def test_maps_in_mujoco_are_kept_and_no_two_of_their_runs_share_a_seed(tmp_path, monkeypatch):
     monkeypatch.setattr(bodies, "MAP", ["v_mps=0.2,0.3"])
     monkeypatch.setattr(bodies, "SECONDS", 0.5)
     monkeypatch.setattr(bodies, "LAST", bodies.LAST[:1])
     asked = bodies.layers(5)
     assert [(kind, request.seeds) for kind, request in asked[::3]] == [
         ("robot", 2), ("robot", 2), ("robot", 1)]  # fmt: skip
-    seeds = [s for _, r in asked[::3] for s in r.seed_of(np.arange(r.world_count))]
-    assert sorted(seeds) == list(range(1, 11))
+    seeds = [s for _, r in asked for s in r.seed_of(np.arange(r.world_count))]
+    assert sorted(seeds) == list(range(1, 31))  # 2 cells, 3 kinds, 5 seeds: each seed once
     told = []
     for count in (1, 1, 3):
         bodies.run_layers(count, tmp_path, lambda done, of: told.append((done, of)))

@@ -4,132 +4,30 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from twinmill.defaults import Question
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Out
 from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
     import hashlib
-    import tempfile
 
-    from matplotlib.axes import Axes
     from rich.console import Group
 
     from twinmill.files import check_new_folder
     from twinmill.model.model_file import ModelFile
-    from twinmill.report import Figure, Provenance, Section, write_report
-    from twinmill.report.canvas import FLOOR, MEASURED, draw
-    from twinmill.swarm.axes import Axis
-    from twinmill.swarm.classes import check_goal, goal_of, interval, reached
-    from twinmill.swarm.request import Request
-    from twinmill.swarm.store import read_sweep
-    from twinmill.swarm.sweep import make_request, sweep
+    from twinmill.report import Provenance, Section, write_report
+    from twinmill.report.questions import curve_figure
+    from twinmill.swarm.classes import check_goal, goal_of
+    from twinmill.swarm.questions import Curve, axes_for, curve_of
+    from twinmill.swarm.sweep import make_request
 
-
-class Question(StrEnum):
-    """What is asked."""
-
-    HOW_MANY = "how-many"
-    HOW_FAST = "how-fast"
-    HOW_GOOD = "how-good"
-    HOW_ALIKE = "how-alike"
-
-
-SENSOR_AXES = [
-    "range_m=0.3:1.7:8",
-    "cone_deg=10:100:10",
-    "miss_rate=0:0.9:10",
-    "false_rate=0:0.45:10",
-    "delay_s=0:0.15:7",
-]
 NOTE = "Each point is many simulated runs from random starts; the band is the 95 % interval."
-
-
-@dataclass(frozen=True)
-class Curve:
-    """The probability of the goal along one quantity, with 95 % intervals (Wilson 1927)."""
-
-    axis: Axis
-    probability: list[float]
-    low: list[float]
-    high: list[float]
-    seeds: int
-
-    def sentence(self, goal: str, at_least: float) -> str:
-        """Which values serve, and which serves best."""
-        values = self.axis.values
-        best = max(range(len(values)), key=lambda k: (self.low[k], -k))
-        tell = (
-            f"best at {values[best]:g} ({100 * self.probability[best]:.0f} %, interval "
-            f"{100 * self.low[best]:.0f} to {100 * self.high[best]:.0f} %)"
-        )
-        good = [k for k in range(len(values)) if self.probability[k] >= at_least]
-        wanted = f"'{goal}' in at least {100 * at_least:.0f} % of runs"
-        if not good:
-            return f"{self.axis.label}: no value tried gives {wanted}; {tell}."
-        runs = _spans(good)
-        spans = " and ".join(
-            f"{values[a]:g}" if a == b else f"{values[a]:g} to {values[b]:g}" for a, b in runs
-        )
-        outside = [k for k in (runs[-1][1] + 1, runs[0][0] - 1) if 0 <= k < len(values)]
-        edge = "".join(
-            f"; at {values[k]:g} it is {100 * self.probability[k]:.0f} %" for k in outside
-        )
-        return f"{self.axis.label}: {spans} gives {wanted}, {tell}{edge}."
-
-    def to_json(self) -> dict:
-        """Plain numbers."""
-        return {
-            "axis": self.axis.name,
-            "label": self.axis.label,
-            "values": list(self.axis.values),
-            "probability": self.probability,
-            "low": self.low,
-            "high": self.high,
-        }
-
-
-def _spans(places: list[int]) -> list[tuple[int, int]]:
-    """Runs of neighbours."""
-    spans = [(places[0], places[0])]
-    for k in places[1:]:
-        if k == spans[-1][1] + 1:
-            spans[-1] = (spans[-1][0], k)
-        else:
-            spans.append((k, k))
-    return spans
-
-
-def axes_for(question: Question, drive: str) -> list[str]:
-    """What is varied to answer."""
-    if question is Question.HOW_MANY:
-        return ["n=3:14:12"]
-    if question is Question.HOW_FAST:
-        return ["v_mps=0.05:0.5:10"] if drive == "twist" else ["base.forward_gain=0.2:2:10"]
-    return SENSOR_AXES if question is Question.HOW_GOOD else ["theta_a=0:0.2:11"]
-
-
-def curve_of(request: Request, goal: str) -> Curve:
-    """Simulates along the request's only axis."""
-    with tempfile.TemporaryDirectory(prefix="twinmill.") as folder:
-        sweep(request, Path(folder) / "sweep")
-        _, table = read_sweep(Path(folder) / "sweep")
-    hits = reached(table, goal).reshape(-1, request.seeds).sum(axis=1)
-    bounds = [interval(hit, request.seeds) for hit in hits]
-    return Curve(
-        request.axes[0],
-        (hits / request.seeds).tolist(),
-        [low for low, _ in bounds],
-        [high for _, high in bounds],
-        request.seeds,
-    )
 
 
 def register(app: typer.Typer) -> None:
@@ -188,7 +86,7 @@ def _ask(
         else f"What each of these {len(sentences)} allows stands under its figure.",
         facts=[("model", model), ("runs", f"{seeds} of {duration_s:g} s at each value")],
         figures=[
-            _figure(curve, wanted, _capital(sentence) if len(curves) > 1 else "", at_least)
+            curve_figure(curve, wanted, _capital(sentence) if len(curves) > 1 else "", at_least)
             for curve, sentence in zip(curves, sentences, strict=True)
         ],
     )
@@ -205,18 +103,6 @@ def _ask(
     }
     deliver(data, Group(*sentences, *([f"Report: {report}"] if report else [])), as_json)
     return curves
-
-
-def _figure(curve: Curve, goal: str, sentence: str, at_least: float) -> Figure:
-    def paint(axes: Axes) -> None:
-        values = curve.axis.values
-        axes.fill_between(values, curve.low, curve.high, color=FLOOR, alpha=0.25, lw=0)
-        axes.plot(values, curve.probability, "o-", ms=4, color=FLOOR)
-        axes.axhline(at_least, color=MEASURED, lw=0.8, ls="--")
-        axes.set(ylim=(0, 1.03), xlabel=curve.axis.label, ylabel=f"share that ends '{goal}'")
-
-    dashed = f" Dashed: {100 * at_least:.0f} %."
-    return Figure(draw(2.8, paint), _capital(curve.axis.label), sentence + dashed)
 
 
 def _capital(text: str) -> str:

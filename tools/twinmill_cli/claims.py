@@ -33,6 +33,9 @@ if working():  # not for --help
     from twinmill.report import Provenance, Section, show, write_report
     from twinmill.report.tables import Cell, Table, number
     from twinmill.swarm.sweep import progress_bar
+    from twinmill_cli.process import process
+
+    CHECKED = {**CLAIMS, "process": process}
 
 NOTE = (
     "Claims of Vega et al. 2024 (arXiv 2410.16444). The reference is an independent C program of "
@@ -84,9 +87,9 @@ def _claims(
 
     Example: twinmill claims --out claims
     """
-    names = only or list(CLAIMS)
-    if unknown := [name for name in names if name not in CLAIMS]:
-        raise ValueError(f"--only {unknown[0]}: must be one of {', '.join(CLAIMS)}.")
+    names = only or list(CHECKED)
+    if unknown := [name for name in names if name not in CHECKED]:
+        raise ValueError(f"--only {unknown[0]}: must be one of {', '.join(CHECKED)}.")
     if strange := [turn for turn in odd_turn or [] if not abs(turn) <= MOST_TURN]:
         raise ValueError(f"--odd-turn {strange[0]:g}: must be from -{MOST_TURN} to {MOST_TURN}.")
     sheets = read_steady_tables(actuation_table) if actuation_table else []
@@ -99,7 +102,7 @@ def _claims(
         for name in names:
             say(name)
             more = {"turns": tuple(odd_turn or ODD_TURNS)} if name == "bullseye" else {}
-            found.append(CLAIMS[name](seeds, **more))
+            found.append(CHECKED[name](seeds, **more))
     if actuation_table:
         found.append(actuation(sheets))
     if mujoco_seeds:
@@ -221,6 +224,7 @@ def _sections(found: list[Claim]) -> list[Section]:
             ],
             verdict=claim.finding,
             facts=[("claim", claim.sentence)],
+            transcript=claim.transcript,
             figures=claim.figures,
             tables=[_table(claim, claim.rows)],
         )

@@ -38,11 +38,11 @@ TARGET = ["target_radius_m=0.1", "range_m=1.2", "theta_a=0", *BODIES]
 
 
 def layers(seeds: int) -> list[tuple[str, Request]]:
-    """Requests of all maps, a layer of seeds after the other; no two layers share seeds."""
+    """Requests of all maps, a layer of seeds after the other; no two share seeds."""
     asked = []
     for first in range(0, seeds, LAYER):
         count = min(LAYER, seeds - first)
-        for kind in TOLD:
+        for k, kind in enumerate(TOLD):
             request = make_request(
                 "milling",
                 "paper.toml",
@@ -51,7 +51,8 @@ def layers(seeds: int) -> list[tuple[str, Request]]:
                 seeds=count,
                 duration_s=SECONDS,
             )
-            asked.append((kind, replace(request, first_seed=1 + first * len(request.points))))
+            before = len(TOLD) * first + k * count  # seeds of a cell, those of other kinds included
+            asked.append((kind, replace(request, first_seed=1 + before * len(request.points))))
     return asked
 
 

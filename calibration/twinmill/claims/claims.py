@@ -13,6 +13,7 @@ from twinmill.claims.fidelity import fidelity
 from twinmill.claims.pivot import pivot
 from twinmill.claims.prediction import prediction
 from twinmill.claims.published import Points
+from twinmill.claims.questions import questions
 from twinmill.claims.rows import Claim, Row, length, mean, median, share
 from twinmill.claims.swarms import KINDS, MAP, ROUND, Runs, run
 
@@ -275,6 +276,7 @@ CLAIMS: dict[str, Callable[..., Claim]] = {
     "region": region,
     "alike": alike,
     "sensor": sensor,
+    "questions": questions,
     "steps": steps,
     "pivot": pivot,
     "prediction": prediction,

@@ -60,9 +60,7 @@ PARTS = (
     ),
     Part(
         "The four steps from robot to swarm and back",
-        ("prediction",),
-        elsewhere="Commands: import; compare, diagnose and explain; twin_sweep and phase; "
-        "predict-floor and score-floor.",
+        ("process", "prediction"),
     ),
     Part(
         "Circliness and diffusion tell the behaviours",
@@ -82,7 +80,7 @@ PARTS = (
     ),
     Part(
         "How many robots, how alike, how fast, how good a sensor",
-        ("more_robots", "alike", "region", "sensor"),
+        ("more_robots", "alike", "region", "sensor", "questions"),
     ),
     Part(
         "Measured speeds and turns of the robots",

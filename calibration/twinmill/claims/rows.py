@@ -60,6 +60,7 @@ class Claim:
         sentence: the claim.
         seen: whether our runs do what it says; None of a question, which claims nothing.
         finding: ours, in words.
+        transcript: titles, each with commands and what they printed.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Claim:
     finding: str
     rows: list[Row]
     figures: list[Figure]
+    transcript: list[tuple[str, str]] = field(default_factory=list)
 
     @property
     def outcome(self) -> str:

@@ -47,6 +47,7 @@ class Section:
             that has any; None without.
         next_step: a sentence.
         commands: where or when, and the command line to type there; below next_step.
+        transcript: titles, each with commands and what they printed, below the facts.
         notes: sentences on the result, below the verdict.
         warnings: sentences.
     """
@@ -61,6 +62,7 @@ class Section:
     charts: Callable[[], str] | None = None
     next_step: str = ""
     commands: list[tuple[str, str]] = field(default_factory=list)
+    transcript: list[tuple[str, str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
