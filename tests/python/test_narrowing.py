@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 import twinmill_native as native
 from scipy.optimize import least_squares
+from scipy.stats import chi2
 
 from twinmill.data.measurement import load_measurements
 from twinmill.experiment.design import Limits
 from twinmill.experiment.foresight import Played
 from twinmill.experiment.moves import family
+from twinmill.fitting.fit import fitted
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import base_parameters
 from twinmill.swarm import narrowing
 from twinmill.swarm.narrowing import Spread, _without_clock, design_for
 from twinmill_cli.main import run
@@ -32,9 +35,14 @@ LIMITS = Limits(20.0, (3.0, 3.0), 1.0)
 
 
 @pytest.fixture(scope="module")
-def scene(brief_coasting_robot):
+def file(brief_coasting_robot):
+    """The model that the log was made with."""
+    return ModelFile.load(str(brief_coasting_robot.true_model))
+
+
+@pytest.fixture(scope="module")
+def scene(brief_coasting_robot, file):
     """Of a log and the model that it was made with."""
-    file = ModelFile.load(str(brief_coasting_robot.true_model))
     (opened,) = open_measurements(load_measurements([brief_coasting_robot.log], file.model), file)
     return opened.scene()
 
@@ -74,23 +82,24 @@ def test_a_clock_that_must_be_found_takes_away_what_the_inverse_says():
     np.testing.assert_allclose(np.linalg.inv(told), np.linalg.inv(gram)[:3, :3], rtol=1e-6)
 
 
-def test_the_run_tells_the_number_that_decides(scene):
-    forward = design_for(spread([3, 0, 0]), "milling", scene, LIMITS, 1.0)
-    yaw = design_for(spread([0, 3, 0]), "milling", scene, LIMITS, 1.0)
+def test_the_run_tells_the_number_that_decides(scene, file):
+    forward = design_for(spread([3, 0, 0]), "milling", file, scene, LIMITS, 1.0)
+    yaw = design_for(spread([0, 3, 0]), "milling", file, scene, LIMITS, 1.0)
     assert turning(yaw) > 0.6 > 0.4 > turning(forward)
     assert forward.untold == 0 and forward.rows.end_s <= LIMITS.duration_s
     for own, other in ((forward, yaw), (yaw, forward)):
         before, after = own.stds
         assert before == pytest.approx(0.3)
         assert after < 0.2 * before and after <= own.spread.std(other.covariance)
+        assert own.spread.std(own.bound) < after
 
 
-def test_what_no_drive_shows_is_said(scene):
-    found = design_for(spread([3, 0, 6]), "milling", scene, LIMITS, 1.0)
+def test_what_no_drive_shows_is_said(scene, file):
+    found = design_for(spread([3, 0, 6]), "milling", file, scene, LIMITS, 1.0)
     assert found.untold == pytest.approx(0.5)
     assert found.stds[1] == pytest.approx(0.3, rel=0.05)  # what the range leaves open stays
     with pytest.raises(ValueError, match=r"sensor.range_m.*no drive of one robot shows"):
-        design_for(spread([0, 0, 6]), "milling", scene, LIMITS, 1.0)
+        design_for(spread([0, 0, 6]), "milling", file, scene, LIMITS, 1.0)
 
 
 @pytest.fixture
@@ -155,20 +164,20 @@ def refit(scene, moves, gains, seed):
     return least_squares(off, np.ones(2), diff_step=1e-3).x
 
 
-def test_a_refit_knows_the_outcome_best_after_the_run_that_was_designed_for_it(scene):
+def test_a_refit_knows_the_outcome_best_after_the_run_that_was_designed_for_it(scene, file):
     """Of runs as long: that for the other gain, and moves at random. The outcome is planted."""
     random = np.random.default_rng(3)
     truths = 1 + STDS[:2] * random.normal(size=(40, 2))
     slope = np.array([0.3, 3.0])
-    limits = Limits(8.0, (3.0, 3.0), 1.0)
-    own = design_for(spread([*slope, 0]), "milling", scene, limits, 1.0)
-    other = design_for(spread([3, 0, 0]), "milling", scene, limits, 1.0)
+    limits = Limits(13.0, (3.0, 3.0), 1.0)
+    own = design_for(spread([*slope, 0]), "milling", file, scene, limits, 1.0)
+    other = design_for(spread([3, 0, 0]), "milling", file, scene, limits, 1.0)
     moves = family(1.0)
     runs = {"own": own.moves, "other": other.moves}
     for k in range(3):
         order = [moves[i] for i in random.permutation(len(moves))]
         ends_s = np.cumsum([m.duration_s for m in order])
-        runs[f"random {k}"] = order[: int(np.searchsorted(ends_s, 6.0))]
+        runs[f"random {k}"] = order[: int(np.searchsorted(ends_s, 11.0))]
     left = {
         name: np.sqrt(
             np.mean([(slope @ (refit(scene, run, t, k) - t)) ** 2 for k, t in enumerate(truths)])
@@ -177,3 +186,26 @@ def test_a_refit_knows_the_outcome_best_after_the_run_that_was_designed_for_it(s
     }
     assert left["own"] == min(left.values())
     assert left["own"] < 0.2 * own.stds[0]
+
+
+def test_fits_to_the_run_come_as_near_as_was_promised(scene, file):
+    """Robots with gains drawn from the errors drive it, and the tool's own fit is asked.
+
+    Errors are squared over what was promised: chi squared, if the promise is no better than true.
+    """
+    slope = np.array([0.3, 3.0])
+    own = design_for(spread([*slope, 0]), "milling", file, scene, LIMITS, 1.0)
+    planned = narrowing.driven(own.moves, scene)
+    truths = 1 + STDS[:2] * np.random.default_rng(5).normal(size=(6, 2))
+    off = []
+    for k, truth in enumerate(truths):
+        made = scene.model.copy()
+        for name, value in zip(NAMES, truth, strict=False):
+            made.set(name, float(value))
+        seen = planned.with_pose(native.replica(made, planned.played, 100 + k))
+        opened = open_measurements([seen], file)
+        _, found = fitted(opened, base_parameters(file.model, NAMES[:2]))
+        told = {e.name: e.value for e in found.shared_estimates()}
+        off.append(np.dot(slope, [told[n] - v for n, v in zip(NAMES, truth, strict=False)]))
+    print("promised", own.stds, "bound", own.spread.std(own.bound), "came", np.std(off))
+    assert np.sum(np.square(off)) / own.stds[1] ** 2 < chi2.ppf(0.999, len(off))

@@ -158,7 +158,7 @@ def _narrowed(found: Narrowing) -> list[str]:
         f"{share:.0%} of runs end as {found.goal}; what the fits leave open makes that +- "
         f"{before:.0%} ({len(shares)} models drawn, {shares.min():.0%} to {shares.max():.0%}).",
         f"That hangs on {named}.",
-        f"After this run of {found.rows.end_s:.0f} s it would be +- {after:.0%}: {drive}.",
+        f"After a fit to this run of {found.rows.end_s:.0f} s it would be +- {after:.1%}: {drive}.",
     ]
     if found.untold > SMALL_SHARE:
         said.append(

@@ -6,6 +6,10 @@ the goal by the numbers drawn, and their covariance S, make its variance g' S g.
 one-step errors have the Fisher information F leaves (S^-1 + F)^-1 of S. Moves are chosen one by one
 so that g sees least of what is left, then exchanged one for another while that helps: c-optimal
 design (Atkinson, Donev and Tobias 2007, ch. 10 and 12).
+
+No fit does better than that F, and ours, which is robust and of predictions over whole horizons,
+tells less. What is promised is therefore what the fit itself would say of the run, as it may be
+seen.
 """
 
 import os
@@ -17,10 +21,16 @@ import numpy as np
 import pyarrow as pa
 import twinmill_native as native
 
+from twinmill.data.measurement import Measurement
+from twinmill.data.track import command_at
 from twinmill.experiment.design import CENTRE, Floor, Limits, choose
 from twinmill.experiment.foresight import LEAD_S, Played, Rows, rows_of
 from twinmill.experiment.moves import Move, family
 from twinmill.experiment.one_step_fit import System
+from twinmill.fitting.fit import base_names, fitted, judged
+from twinmill.fitting.opening import open_measurements
+from twinmill.model.covariance import Covariance
+from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
     BASE_GAINS,
     LAG,
@@ -38,6 +48,7 @@ from twinmill.swarm.request import Request, run_part
 CLOCKS = 2  # offset and rate of a run
 LEAST_GAIN = 0.01  # of the variance: less is not worth another move
 LEAST_STD = 0.01  # of the share: less is nothing to narrow
+REPLICAS = 3  # of the run, with noise, that are fitted to
 
 
 @dataclass(frozen=True)
@@ -122,7 +133,8 @@ class Narrowing:
         spread: before it.
         goal: class that is wanted.
         moves, rows: the script.
-        covariance: (P, P) of what it would leave.
+        covariance: (P, P) of what a fit to it would leave.
+        bound: (P, P) of what no fit could go below.
         untold: part of the variance by numbers that no drive of one robot shows.
         robot_id: of the log.
     """
@@ -132,6 +144,7 @@ class Narrowing:
     moves: list[Move]
     rows: Rows
     covariance: np.ndarray
+    bound: np.ndarray
     untold: float
     robot_id: int
 
@@ -148,6 +161,7 @@ class Narrowing:
             "share": float(self.spread.shares.mean()),
             "std_before": before,
             "std_after": after,
+            "std_bound": self.spread.std(self.bound),
             "parts": self.spread.parts(),
             "untold": self.untold,
             "draws": len(self.spread.shares),
@@ -156,12 +170,15 @@ class Narrowing:
         }
 
 
-def design_for(spread: Spread, goal: str, scene: Scene, limits: Limits, excess: float) -> Narrowing:
+def design_for(
+    spread: Spread, goal: str, file: ModelFile, scene: Scene, limits: Limits, excess: float
+) -> Narrowing:
     """Designs the run.
 
     Args:
         spread: of the share over the numbers.
         goal: class that is wanted.
+        file: of the model, as it will be fitted to the run.
         scene: a log's, whose clock, noise and rate of poses the next run is taken to have.
         limits: time, floor, duty; as `check` let them pass.
         excess: how much more errors scatter than the noise alone: the square of the usual score.
@@ -199,8 +216,56 @@ def design_for(spread: Spread, goal: str, scene: Scene, limits: Limits, excess: 
         choose(moves, worth, nothing, foreseen, floor), moves, worth, foreseen, floor
     )
     (whole,) = _products(Played.of([chosen], scene).scene(scene, CENTRE), free)
+    fits = _left_by_fits(spread, file, scene, chosen, excess)
     robot_id = scene.measurement.track.robot_id
-    return Narrowing(spread, goal, chosen, rows_of(chosen), left(whole), untold, robot_id)
+    return Narrowing(spread, goal, chosen, rows_of(chosen), fits, left(whole), untold, robot_id)
+
+
+def _left_by_fits(
+    spread: Spread, file: ModelFile, scene: Scene, moves: list[Move], excess: float
+) -> np.ndarray:
+    """(P, P) covariance that fits to the run leave, mean over REPLICAS of it with noise."""
+    planned = driven(moves, scene)
+    prior, noisy = np.linalg.inv(spread.covariance), scene.model.copy()
+    for name, value in scene.noise.to_json().items():
+        noisy.set(f"noise.{name}", value)
+    left = []
+    for seed in range(1, REPLICAS + 1):
+        seen = planned.with_pose(native.replica(noisy, planned.played, seed))
+        told = _fit_to(seen, file, spread.names)
+        known = [name for name in told.names if name in spread.names]
+        at = [told.names.index(name) for name in known]
+        information = prior.copy()
+        rows, columns = np.ix_(*[[spread.names.index(name) for name in known]] * 2)
+        information[rows, columns] += np.linalg.inv(told.values[np.ix_(at, at)]) / excess
+        left.append(np.linalg.inv(information))
+    return np.mean(left, axis=0)
+
+
+def driven(moves: list[Move], scene: Scene) -> Measurement:
+    """The run as the scene's robot would drive it, its telemetry as dense as in the log before."""
+    planned = Played.of([moves], scene).scene(scene, CENTRE).measurement
+    track, period_s = planned.track, scene.measurement.track.timing.command_period_s
+    t_s = np.arange(track.command_t_s[0], track.pose_t_s[-1], period_s)
+    dense = replace(
+        track,
+        command_t_s=t_s,
+        command=command_at(t_s, track.command_t_s, track.command),
+        battery_V=np.full(len(t_s), track.battery_V[0]),
+    )
+    return replace(planned, track=dense).with_pose(track.pose)
+
+
+def _fit_to(seen: Measurement, file: ModelFile, names: list[str]) -> Covariance:
+    """What a fit of all quantities to a measurement would say of their errors."""
+    opened = judged(open_measurements([seen], file))
+    model = file.model
+    # One number stands for all speeds of the duty table, or they stand for it.
+    rivals = duty_table(model) if BASE_GAINS[0] in names else [BASE_GAINS[0]]
+    own = [name for name in base_names(model, opened) if name not in rivals]
+    base = base_parameters(model, dict.fromkeys([*own, *(n for n in BASE_GAINS if n in names)]))
+    _, fit = fitted(opened, [*base, *all_effect_parameters(model)])
+    return fit.shared_covariance()
 
 
 def _exchanged(
