@@ -9,6 +9,7 @@ import pyarrow as pa
 import pytest
 import twinmill_native as native
 
+from twinmill.defaults import Question
 from twinmill.swarm.axes import Axis
 from twinmill.swarm.experiments import (
     agreement,
@@ -19,6 +20,7 @@ from twinmill.swarm.experiments import (
     read_experiments,
 )
 from twinmill.swarm.phase import CLASSES, Phase, phase_of
+from twinmill.swarm.questions import Curve, axes_for, curve_of
 from twinmill.swarm.request import Request
 from twinmill.swarm.sweep import make_request, sweep
 from twinmill_cli import main as cli

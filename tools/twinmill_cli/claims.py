@@ -26,6 +26,7 @@ if working():  # not for --help
     from twinmill.claims.bodies import bodies, run_layers
     from twinmill.claims.claims import CLAIMS, ODD_TURNS
     from twinmill.claims.paper import Answer, answers
+    from twinmill.claims.prediction import prediction_in_mujoco
     from twinmill.claims.rows import Claim, Row
     from twinmill.data.steady_table import read_steady_tables
     from twinmill.files import check_new_folder, plain
@@ -106,7 +107,7 @@ def _claims(
     if actuation_table:
         found.append(actuation(sheets))
     if mujoco_seeds:
-        found.append(_in_mujoco(mujoco_seeds, out / "mujoco"))
+        found += _in_mujoco(mujoco_seeds, out / "mujoco")
     more = [f"--mujoco-seeds {mujoco_seeds}"] if mujoco_seeds else []
     more += [f"--actuation {shlex.quote(str(actuation_table))}"] if actuation_table else []
     source = Provenance(
@@ -133,12 +134,16 @@ def _claims(
     return 0 if agree else 1
 
 
-def _in_mujoco(seeds: int, folder: Path) -> Claim:
+def _in_mujoco(seeds: int, folder: Path) -> list[Claim]:
     """Runs what is missing, with progress, and draws what is there."""
     with progress_bar() as progress:
+        labs = progress.add_task("laboratories in MuJoCo", total=None)
+        predicted = prediction_in_mujoco(
+            folder / "laboratories", lambda n, of: progress.update(labs, completed=n, total=of)
+        )
         task = progress.add_task("worlds in MuJoCo", total=None)
         run_layers(seeds, folder, lambda n, of: progress.update(task, completed=n, total=of))
-    return bodies(seeds, folder)
+    return [predicted, bodies(seeds, folder)]
 
 
 def _command_line(only: list[str] | None, seeds: int, odd_turn: list[float] | None) -> str:

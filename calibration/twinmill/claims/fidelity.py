@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cost against fidelity: what each thing that is added to a model buys, for robot and swarm.
+"""Cost against fidelity: what each thing that is added to a model costs and buys.
 
 The true robot is a twin of the published measurements. From its data sheet on, one thing is added
 after the other: numbers and effects by fits to one drive, the camera's errors and the differences
-of robots as they were measured. Each is judged on the half that it was not fitted to, and by
-swarms.
+of robots as they were measured. Its cost is in numbers that somebody must measure. Each is judged
+on the half that it was not fitted to, and by swarms.
 """
 
 import subprocess
@@ -44,11 +44,13 @@ class Level:
 
     Attributes:
         added: what it has that the one before lacks.
+        numbers: of it that were measured.
         score: of predictions on the half of the drive that was not fitted, over their floor.
         alike: (cells,) how far shares of classes agree with the true robots', 1 is wholly.
     """
 
     added: str
+    numbers: int
     score: float
     alike: np.ndarray
 
@@ -63,14 +65,16 @@ def fidelity(_seeds: int) -> Claim:
     return Claim(
         "fidelity",
         "Cost against fidelity of models",
-        "A model of more detail costs more; what it buys is to be seen in what robots do.",
+        "A model of more detail costs more; it comes nearer to one robot; and what swarms do may "
+        "be told by one that is far from it.",
         None,
-        f"From the data sheet on, {len(levels) - 1} things are added. The error on the half of a "
-        f"drive that was not fitted falls from {first.score:.1f} to {last.score:.1f} times "
-        f"its floor. What swarms do agrees by {_percent(first.alike)} at first and by "
-        f"{_percent(last.alike)} at the end, where true robots agree with themselves by "
-        f"{_percent(again)}. What no drive of one robot shows, its camera's errors and how robots "
-        "differ, is part of that.",
+        f"Three curves. Cost: from the data sheet on, {len(levels) - 1} things are added, which "
+        f"are {last.numbers} numbers to measure. One robot: the error on the half of a drive that "
+        f"was not fitted falls from {first.score:.1f} to {last.score:.1f} times its floor. Swarms: "
+        f"what they do agrees by {_percent(first.alike)} at first and by {_percent(last.alike)} at "
+        f"the end, where true robots agree with themselves by {_percent(again)}. What no drive of "
+        "one robot shows, its camera's errors and how robots differ, is part of that: there the "
+        "curve of one robot is flat, and that of swarms is not.",
         rows,
         [_figure(levels, again)],
     )
@@ -84,25 +88,27 @@ def _levels(folder: Path) -> tuple[list[Level], np.ndarray]:
     drive = load_measurements([_drive(folder, truth)], file.model)
     levels: list[Level] = []
 
-    def judge(added: str, score: float) -> None:
+    def judge(added: str, more: int, score: float) -> None:
         path = folder / f"level{len(levels)}.toml"
         path.write_text(file.text)
-        levels.append(Level(added, score, _alike(_shares(path, 1), true_shares)))
+        numbers = more + (levels[-1].numbers if levels else 0)
+        levels.append(Level(added, numbers, score, _alike(_shares(path, 1), true_shares)))
 
     added = add(EFFECTS[0], drive, file, folder / "first.toml", COMMAND)
-    judge("data sheet", added.heldout_before.score)
-    fit(drive, file, folder / "fitted.toml", COMMAND)
+    judge("data sheet", 0, added.heldout_before.score)
+    base = fit(drive, file, folder / "fitted.toml", COMMAND)
     file = ModelFile.load(str(folder / "fitted.toml"))
-    judge("numbers fitted", added.heldout_refit.score)
+    judge("numbers fitted", len(base.parameters), added.heldout_refit.score)
     for effect in EFFECTS:
         added = add(effect, drive, file, folder / f"{effect}.toml", COMMAND)
         file = ModelFile.load(str(folder / f"{effect}.toml"))
-        judge(effect, added.heldout_after.score)
+        own = sum(p.name.startswith(f"{effect}.") for p in added.parameters)
+        judge(effect, own, added.heldout_after.score)
     for words, values in (("camera's errors", CAMERA), ("robots differ", DIFFERENCES)):
         path = folder / "measured.toml"
         path.write_text(with_values(file.text, file.model, values))
         file = ModelFile.load(str(path))
-        judge(words, added.heldout_after.score)
+        judge(words, len(values), added.heldout_after.score)
     return levels, _alike(again, true_shares)
 
 
@@ -147,8 +153,9 @@ def _alike(shares: list[Counter], truth: list[Counter]) -> np.ndarray:
 
 def _rows(k: int, level: Level) -> list[Row]:
     what = f"{k}: {level.added}"
+    cost = Row(f"numbers measured, {what}", *[level.numbers] * 3, None, None)
     error = Row(f"error over its floor, {what}", *[level.score] * 3, None, None)
-    return [error, mean(f"classes alike, {what}", level.alike, None)]
+    return [cost, error, mean(f"classes alike, {what}", level.alike, None)]
 
 
 def _percent(alike: np.ndarray) -> str:
@@ -159,7 +166,9 @@ def _figure(levels: list[Level], again: np.ndarray) -> Figure:
     at = np.arange(len(levels))
 
     def paint(panels: list[Axes]) -> None:
-        error, alike = panels
+        cost, error, alike = panels
+        cost.plot(at, [level.numbers for level in levels], "o-", ms=4, color=MEASURED)
+        cost.set(ylabel="numbers measured", ylim=(0, None))
         error.plot(at, [level.score for level in levels], "o-", ms=4, color=PREDICTED)
         error.axhline(1, color=MEASURED, lw=0.8, ls="--")
         error.set(ylabel="error over its floor", yscale="log", xticks=at, xticklabels=[])
@@ -171,10 +180,10 @@ def _figure(levels: list[Level], again: np.ndarray) -> Figure:
         alike.set_xticklabels([level.added for level in levels], rotation=30, ha="right")
 
     return Figure(
-        draw(4.2, paint, nrows=2, sharex=True),
-        "Error and agreement against what was added",
-        "Above: predictions on the half that was not fitted; dashed is the log's own floor. Below: "
-        "how far shares of classes agree with the true robots', mean over "
-        f"{len(again)} sorts of swarm of {SEEDS} runs, with its 95 % interval; dashed is how far "
-        "true robots agree with themselves.",
+        draw(5.6, paint, nrows=3, sharex=True),
+        "Cost, error and agreement against what was added",
+        "Above: numbers that somebody must measure. In the middle: predictions on the half that "
+        "was not fitted; dashed is the log's own floor. Below: how far shares of classes agree "
+        f"with the true robots', mean over {len(again)} sorts of swarm of {SEEDS} runs, with its "
+        "95 % interval; dashed is how far true robots agree with themselves.",
     )

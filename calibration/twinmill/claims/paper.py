@@ -60,7 +60,7 @@ PARTS = (
     ),
     Part(
         "The four steps from robot to swarm and back",
-        ("process", "prediction"),
+        ("process", "prediction", "prediction_in_mujoco"),
     ),
     Part(
         "Circliness and diffusion tell the behaviours",

@@ -2,12 +2,16 @@
 """Sealed predictions against a hundred simulated laboratories whose robots are another plant's.
 
 What is predicted comes from a model whose gains are known to a fifth, by `predict-floor`'s steps. A
-laboratory's robots have gains of its own, drawn from the same errors, and are points that move by
-forward Euler, in NumPy.
+laboratory's robots have gains of its own, drawn from the same errors. They are points that move by
+forward Euler, in NumPy; or bodies in MuJoCo, with mass, wheels that slip and hulls.
 """
 
+import hashlib
+import os
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,9 +22,12 @@ from twinmill.claims.published import Points
 from twinmill.claims.rows import Claim, Row, mean
 from twinmill.report import Figure
 from twinmill.report.canvas import FLOOR, MEASURED, draw
+from twinmill.swarm.axes import Axis
 from twinmill.swarm.forecast.choose import choose
 from twinmill.swarm.forecast.draws import OUTCOMES, Forecast, forecast
-from twinmill.swarm.store import read_sweep
+from twinmill.swarm.model_text import with_values
+from twinmill.swarm.request import Request, run_part
+from twinmill.swarm.store import Store, read_sweep
 from twinmill.swarm.sweep import make_request, run_missing
 
 STD, SPREAD, SECONDS, LABS, CELLS = 0.2, 0.02, 45.0, 100, 9
@@ -45,7 +52,9 @@ target_radius_m = 0.1
 theta_a1_std = {SPREAD}
 theta_a2_std = {SPREAD}
 """
+BODIED = MODEL.replace("body_radius_m = 0", "body_radius_m = 0.1")
 AXES = ["cone_deg=40:80:5", "range_m=0.5,0.8,1.2"]
+HULLS = "in MuJoCo hulls catch on each other where planar discs slide off"
 EDGES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)  # of what was said
 
 
@@ -62,10 +71,14 @@ class Trial:
     saw: np.ndarray
 
 
+def gains() -> np.ndarray:
+    """(2, LABS) on speed and on turn rate, drawn by N(1, STD)."""
+    return np.clip(1 + STD * np.random.default_rng(7).standard_normal((2, LABS)), 0.2, 2)
+
+
 def laboratories(cells: np.ndarray) -> np.ndarray:
-    """(LABS, cells) what each saw: points by forward Euler, gains drawn by N(1, STD)."""
-    random = np.random.default_rng(7)
-    gain = np.clip(1 + STD * random.standard_normal((2, LABS)), 0.2, 2)
+    """(LABS, cells) what each saw: points by forward Euler."""
+    gain = gains()
     v, omega = (np.repeat(g, len(cells)) for g in (0.25 * gain[0], np.radians(45) * gain[1]))
     cone, range_m = (np.tile(column, LABS) for column in cells.T)
     points = Points(
@@ -80,14 +93,60 @@ def laboratories(cells: np.ndarray) -> np.ndarray:
     return np.vectorize(OUTCOMES.index)(ended).reshape(LABS, len(cells))
 
 
-def trial(folder: Path) -> Trial:
-    """Sweeps, predicts and lets all laboratories run, in a folder of its own."""
-    (folder / "m.toml").write_text(MODEL)
+def laboratories_in_mujoco(
+    request: Request, cells: np.ndarray, folder: Path, tell: Callable[[int, int], None]
+) -> np.ndarray:
+    """(LABS, cells) what each saw: bodies in MuJoCo. Each laboratory is kept as it ends.
+
+    Args:
+        request: of the sweep, whose robots those of the laboratories are but for their gains.
+        cells: (C, axes) that they run.
+        folder: of all runs; stopped half way, they go on where they were.
+        tell: is given how many laboratories are done, and how many there are.
+    """
+    asked = replace(request, plant="mujoco", seeds=1)
+    known = hashlib.sha256(asked.to_json().encode() + cells.tobytes()).hexdigest()
+    store = Store(folder / known[:16])
+    store.open(asked)
+    todo = [] if store.result.exists() else store.missing(LABS)
+
+    def ends(lab: int) -> tuple[int, list[str]]:
+        names = ("base.forward_gain", "base.yaw_gain")
+        own = dict(zip(names, gains()[:, lab], strict=True))
+        text = with_values(asked.model_text, asked.model, own)
+        ended = []
+        for k, cell in enumerate(cells):
+            at = zip(asked.axes, cell, strict=True)
+            axes = [Axis(axis.name, (float(value),)) for axis, value in at]
+            seed = 1_000_000 + lab * len(cells) + k
+            one = replace(asked, model_text=text, axes=axes, first_seed=seed)
+            ended += run_part(one, range(1))["class"]
+        return lab, ended
+
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        for done, future in enumerate(as_completed([pool.submit(ends, lab) for lab in todo]), 1):
+            lab, ended = future.result()
+            store.keep(lab, {"lab": [lab] * len(ended), "class": ended})
+            tell(LABS - len(todo) + done, LABS)
+    if not store.result.exists():
+        store.finish(asked, LABS)
+    _, table = read_sweep(store.folder)
+    return np.vectorize(OUTCOMES.index)(table["class"].to_pylist()).reshape(LABS, len(cells))
+
+
+def said_before(folder: Path, model: str = MODEL) -> tuple[Request, Forecast]:
+    """Sweeps and predicts in a folder of its own, by predict-floor's steps."""
+    (folder / "m.toml").write_text(model)
     request = make_request("milling", str(folder / "m.toml"), AXES, seeds=40, duration_s=SECONDS)
     run_missing(request, folder / "sweep", lambda worlds: None)
     request, table = read_sweep(folder / "sweep")
     whole = forecast(request, table, 60, 6, 1, folder / "draws")
-    said = whole.cells([cell for cell, _ in choose(whole, CELLS, 1, seed=1)])
+    return request, whole.cells([cell for cell, _ in choose(whole, CELLS, 1, seed=1)])
+
+
+def trial(folder: Path) -> Trial:
+    """Predicts, and lets all laboratories run."""
+    _, said = said_before(folder)
     return Trial(said, laboratories(said.points))
 
 
@@ -95,6 +154,19 @@ def prediction(_seeds: int) -> Claim:
     """How often each class came, against how probable it was said to be."""
     with tempfile.TemporaryDirectory(prefix="twinmill.") as folder:
         return reliability(trial(Path(folder)))
+
+
+def prediction_in_mujoco(folder: Path, tell: Callable[[int, int], None]) -> Claim:
+    """The same of laboratories whose robots are bodies in MuJoCo, by a planar model with bodies."""
+    with tempfile.TemporaryDirectory(prefix="twinmill.") as swept:
+        request, said = said_before(Path(swept), BODIED)
+    found = reliability(Trial(said, laboratories_in_mujoco(request, said.points, folder, tell)))
+    return replace(
+        found,
+        name="prediction_in_mujoco",
+        title="The same, of robots in MuJoCo",
+        rows=[replace(row, known="" if row.agrees else HULLS) for row in found.rows],
+    )
 
 
 def reliability(found: Trial) -> Claim:

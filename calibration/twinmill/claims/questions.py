@@ -27,7 +27,9 @@ def questions(seeds: int) -> Claim:
             rows.append(Row(what, curve.probability[best], *ends, None, None, unit="%"))
             figures.append(curve_figure(curve, GOAL, "", WANTED))
         command = f"$ twinmill ask {question} --target-radius-m {RADIUS_M:g} --seeds {seeds}"
-        transcript.append((f"{question.replace('-', ' ').capitalize()}?", "\n".join([command, *said])))
+        transcript.append(
+            (f"{question.replace('-', ' ').capitalize()}?", "\n".join([command, *said]))
+        )
         told.append(said[0])
     return Claim(
         "questions",
