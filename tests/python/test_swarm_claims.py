@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from twinmill.claims import bodies, claims, fidelity, paper, rows
+from twinmill.claims import bodies, claims, fidelity, paper, prediction, rows
 from twinmill.claims.actuation import actuation
 from twinmill.claims.claims import CLAIMS
 from twinmill.claims.swarms import KINDS, run
 from twinmill.data.steady_table import read_steady_tables
 from twinmill.model.model_file import ModelFile
 from twinmill_cli import main as cli
+from twinmill_cli import process
 
 SEEDS = 100
 
@@ -149,6 +150,44 @@ def test_true_robots_agree_with_themselves_as_samples_of_one_distribution_do(tmp
         expected.append(np.minimum(one, other).sum(axis=1) / fidelity.SEEDS)
     ours, sums = fidelity._alike(a, b).mean(), np.mean(expected, axis=0)
     assert abs(ours - sums.mean()) < 3.5 * sums.std()
+
+
+def test_the_four_steps_run_as_typed_and_find_what_was_planted():
+    claim = process.process(0)
+    assert claim.agrees and claim.count == (1, 1)
+    assert [title for title, _ in claim.transcript] == list(process.STEPS)
+    for (_, printed), lines in zip(claim.transcript, process.STEPS.values(), strict=True):
+        blocks = [block for block in printed.split("$ ") if block]
+        assert [block.partition("\n")[0] for block in blocks] == lines
+        assert all(block.partition("\n")[2].strip() for block in blocks)
+
+
+def test_laboratories_in_mujoco_go_on_where_they_were(tmp_path, monkeypatch):
+    monkeypatch.setattr(prediction, "SECONDS", 2.0)
+    monkeypatch.setattr(prediction, "CELLS", 2)
+    monkeypatch.setattr(prediction, "LABS", 3)
+    request, said = prediction.said_before(tmp_path, prediction.BODIED)
+    told, run_once = [], prediction.run_part
+
+    def stops(*words):
+        if len(told) == 1:
+            raise KeyboardInterrupt
+        return run_once(*words)
+
+    def saw(tell=lambda done, of: told.append((done, of))):
+        return prediction.laboratories_in_mujoco(request, said.points, tmp_path / "labs", tell)
+
+    monkeypatch.setattr(prediction.os, "sched_getaffinity", lambda _: {0})
+    monkeypatch.setattr(prediction, "run_part", stops)
+    with pytest.raises(KeyboardInterrupt):
+        saw()
+    monkeypatch.setattr(prediction, "run_part", run_once)
+    broken_off = saw()
+    assert told == [(1, 3), (2, 3), (3, 3)] and broken_off.shape == (3, 2)
+    whole = prediction.laboratories_in_mujoco(
+        request, said.points, tmp_path / "new", lambda done, of: None
+    )
+    np.testing.assert_array_equal(broken_off, whole)
 
 
 def test_spread_of_measured_robots_is_told_at_each_input(tmp_path):
