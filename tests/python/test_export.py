@@ -101,6 +101,26 @@ def test_foxglove_sees_the_robot_where_and_as_it_stood(log, tmp_path):
     assert all(s.frame_id == "R01" for s in bodies)
 
 
+@pytest.mark.parametrize(("frame_utime_us", "lines"), [(0, 2), (T0_US, 3)])
+def test_foxglove_draws_a_view_where_a_camera_was_recorded(
+    write_log, message, tmp_path, frame_utime_us, lines
+):
+    """Outline and nose in any case."""
+    events = []
+    for k in range(30):
+        utime_us = T0_US + 10_000 * k
+        said = message("telemetry", utime_us=utime_us, robot_id=1, detected=0)
+        said.frame_utime_us = frame_utime_us
+        pose = message("pose", utime_us=utime_us, robot_id=1)
+        pose.orientation_wxyz = [1.0, 0.0, 0.0, 0.0]
+        events += [("R01_POSE", pose), ("R01_TELEMETRY", said)]
+    run(["export", str(write_log(*events)), "--to", "mcap", "-o", str(tmp_path / "o.mcap")])
+    found = mcap_messages(tmp_path / "o.mcap")
+    scenes = [m.decoded_message.entities[0] for m in found if m.channel.topic == "/scene"]
+    bodies = [s for s in scenes if s.id == "R01 robot"]
+    assert bodies and {len(s.lines) for s in bodies} == {lines}
+
+
 def test_import_reads_poses_and_commands_back(log, tmp_path):
     run(["export", str(log), "--to", "csv", "-o", str(tmp_path / "tables")])
     import_log(

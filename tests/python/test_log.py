@@ -154,3 +154,9 @@ def test_layouts_are_those_that_lcm_writes(name):
     assert row.dtype.names[1:] == tuple(kind.__slots__)
     for k, field in enumerate(kind.__slots__):
         assert np.all(row[field] == k), field
+
+
+def test_a_log_of_detections_alone_says_what_it_lacks(write_log, message):
+    path = write_log(("R07_DETECTION", message("detection", robot_id=7)))
+    with pytest.raises(LogError, match=r"what cameras saw.*import the poses and commands"):
+        read_log(path)

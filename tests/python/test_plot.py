@@ -66,6 +66,21 @@ def test_bits_are_green_from_when_it_sees_and_commands_have_their_signs(log):
     assert np.array(duties.get_array())[:, 5].tolist() == [-50, 100, -50, 100]
 
 
+def test_where_no_camera_was_recorded_nobody_is_said_to_see_nobody(driven):
+    """As in logs of imported commands: telemetry with neither frames nor detections."""
+    robot = driven()
+    none = np.zeros_like(robot.detected)
+    blind = replace(robot, detected=none, frame_t_s=np.full(len(none), np.nan))
+    other = replace(blind, seen_t_s=np.arange(0, 4, 0.1), seen=np.arange(40) >= 20)
+    drawing = Drawing([RecordedRobot("", blind), RecordedRobot("", other)])
+    assert drawing.telling == [1]
+    axes = Figure().subplots()
+    drawing.bits(axes)
+    (row,) = axes.images[0].get_array()
+    assert (row[50] == matplotlib.colors.to_rgb("#009e73")).all()
+    assert not (row[10] == row[50]).all()
+
+
 def test_a_robot_that_fell_silent_is_neither_blind_nor_driven(driven):
     robot = driven()
     speaks = robot.command_t_s < 5

@@ -10,6 +10,7 @@ from pathlib import Path
 import lcm
 import numpy as np
 import pytest
+import turbopi
 
 from twinmill.data.lcm_log import split_events
 from twinmill.data.log import read_log
@@ -40,6 +41,7 @@ def log(write_log, message):
             pose.orientation_wxyz = [math.cos(0.3), 0.0, 0.0, math.sin(0.3)]
             said = message("telemetry", utime_us=utime_us, robot_id=1)
             said.detected, said.wheel_duty_pct = int(k >= SEEN_FROM), [50, 50, 50, 50]
+            said.frame_utime_us = utime_us
             writer.write_event(utime_us, f"{prefix}R01_POSE", pose.encode())
             writer.write_event(utime_us, f"{prefix}R01_TELEMETRY", said.encode())
     writer.close()
@@ -55,7 +57,7 @@ def read_back(path, entity, component):
         batch = chunk.to_record_batch()
         names = [n for n in batch.schema.names if n.split("/")[-1].endswith(component)]
         if chunk.entity_path == entity and names and "time" in batch.schema.names:
-            at_s = batch["time"].multi_log("int64").to_numpy() / 1e9
+            at_s = batch["time"].view("int64").to_numpy() / 1e9
             rows += zip(at_s.tolist(), batch[names[0]].to_pylist(), strict=True)
     rows.sort(key=lambda row: row[0])
     return np.array([at_s for at_s, _ in rows]), [value[0] for _, value in rows]
@@ -76,6 +78,25 @@ def test_poses_bits_and_headings_come_back_from_the_recording(log, tmp_path, cap
     at_s, states = read_back(out, "/bits/R01", "state")
     assert states == ["none", "sees"]
     np.testing.assert_allclose(at_s, [0, 0.01 * SEEN_FROM])
+
+
+@needs_viewer
+def test_no_view_is_drawn_of_a_robot_whose_camera_was_not_recorded(log, tmp_path):
+    """Its commands were: as in logs of imported tables."""
+    blind = tmp_path / "blind.lcmlog"
+    writer = lcm.EventLog(str(blind), "w", overwrite=True)
+    for event in lcm.EventLog(str(log), "r"):
+        data = event.data
+        if event.channel == "R01_TELEMETRY":
+            said = turbopi.telemetry_t.decode(data)
+            said.detected = said.frame_utime_us = 0
+            data = said.encode()
+        writer.write_event(event.timestamp, event.channel, data)
+    writer.close()
+    run(["watch", str(blind), "--save", str(tmp_path / "o.rrd")])
+    for entity, count in (("/robots/R01/view", 0), ("/twins/R01/view", 2)):
+        assert len(read_back(tmp_path / "o.rrd", entity, "colors")[0]) == count
+    assert len(read_back(tmp_path / "o.rrd", "/bits/R01", "state")[0]) == 0
 
 
 @needs_viewer

@@ -123,6 +123,13 @@ def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = ""
     channels = _robot_channels(events.by_channel, channel_prefix, warnings)
     if not channels:
         names = ", ".join(sorted(events.by_channel)[:5])
+        kinds = _match_channels(events.by_channel, channel_prefix).values()
+        if any("DETECTION" in own for own in kinds):
+            raise LogError(
+                f"{path.name}: tells what cameras saw ({names}), and nothing of where the robots "
+                "were or what they were told; import the poses and commands of the same time with "
+                "it: twinmill import --poses P --commands C --detections D."
+            )
         raise LogError(
             f"{path.name}: no channel {channel_prefix}R<nn>_TELEMETRY, _DRIVE or _POSE "
             f"(the log has {names}); name the prefix that the log uses."

@@ -39,7 +39,7 @@ class RobotScene:
     body: Body
     _sees: int | None = None
     _path: deque = field(default_factory=deque)
-    _drawn_us: int = 0
+    _drawn_us: float = -np.inf
 
     def on_pose(self, pose: Any, stamp_us: int) -> Iterator[tuple[str, Any]]:
         """(topic, message): the robot's frame, and its path from time to time."""
@@ -67,17 +67,18 @@ class RobotScene:
 
     def on_telemetry(self, telemetry: Any, stamp_us: int) -> Iterator[tuple[str, Any]]:
         """(topic, message): body and view, whenever the bit changes."""
-        if telemetry.detected != self._sees:
+        recorded = telemetry.detected or telemetry.frame_utime_us > 0  # else no camera was
+        if recorded and telemetry.detected != self._sees:
             self._sees = telemetry.detected
             yield "/scene", self._body(stamp_us)
 
     def _body(self, stamp_us: int) -> SceneUpdate:
-        seen = SEES if self._sees else BLIND
         lines = [
             _line(self.body.outline(), self.color, 3),
             _line(self.body.nose(), self.color, 3),
-            _line(self.body.view(), seen, 1.5),
         ]
+        if self._sees is not None:
+            lines.append(_line(self.body.view(), SEES if self._sees else BLIND, 1.5))
         update = self._scene(stamp_us, "robot", self.name, lines)
         text = update.entities[0].texts.add(
             text=self.name, billboard=True, font_size=12, scale_invariant=True

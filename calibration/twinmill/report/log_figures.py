@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.ticker import MaxNLocator
 
+from twinmill.data.camera_frames import frames_of
 from twinmill.data.multi_log import TWIN, RecordedRobot
 from twinmill.data.track import SILENCE_S
 from twinmill.model.outlines import SEES
@@ -36,7 +37,9 @@ class Drawing:
         ends = [t[-1] for a in robots for t in (a.log.pose_t_s, a.log.command_t_s) if len(t)]
         self.end_s = float(max(ends))
         self.tracked = [k for k, a in enumerate(robots) if np.count_nonzero(a.log.valid) > SMOOTH]
-        self.telling = [k for k, a in enumerate(robots) if len(a.log.detected)]
+        frames = {k: frames_of(recorded.log) for k, recorded in enumerate(robots)}
+        self._frames = {k: seen for k, seen in frames.items() if seen is not None}
+        self.telling = list(self._frames)
         self.driven = [k for k, a in enumerate(robots) if len(a.log.command_t_s)]
         self._motion = {k: _motion(robots[k]) for k in self.tracked}
 
@@ -79,8 +82,11 @@ class Drawing:
         axes.set(ylabel=label, xlim=(0, self.end_s))
 
     def bits(self, axes: Axes) -> None:
-        """The voted bit, a row per robot: green where it sees a neighbour."""
-        rows = [self._held(k, self._robots[k].log.detected[:, None])[:, 0] for k in self.telling]
+        """The voted bit, a row per robot whose camera was recorded: green where it sees another."""
+        rows = []
+        for k, seen in self._frames.items():
+            bit = seen.voted if seen.has_vote else seen.raw
+            rows.append(self._held(k, seen.t_s, bit[:, None])[:, 0])
         picture = np.ones((len(rows), len(rows[0]), 3))
         for bit, color in enumerate((NOT_SEEN, SEES)):
             picture[np.array(rows) == bit] = to_rgb(color)
@@ -95,7 +101,7 @@ class Drawing:
             log = self._robots[k].log
             count = len(ROWS.get(log.command_kind, WHEELS))
             scale = 100 if log.command_kind == "duty" else 1
-            rows += list(scale * self._held(k, log.command[:, :count]).T)
+            rows += list(scale * self._held(k, log.command_t_s, log.command[:, :count]).T)
             names += self._row_names(k, count)
         kinds = sorted({self._robots[k].log.command_kind for k in self.driven})
         largest = 100 if kinds == ["duty"] else float(np.nanmax(np.abs(rows)))
@@ -112,9 +118,8 @@ class Drawing:
             return [name if row == count // 2 else "" for row in range(count)]
         return [f"{name} {w}" for w in ROWS.get(self._robots[k].log.command_kind, WHEELS)]
 
-    def _held(self, k: int, values: np.ndarray) -> np.ndarray:
-        """(T, C) of (M, C) values, each held until the next, NaN where the robot is silent."""
-        stamps_s = self._robots[k].log.command_t_s
+    def _held(self, k: int, stamps_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """(T, C) of (M, C) values at (M,), each held until the next, NaN where it is silent."""
         t_s = np.arange(CELL_S / 2, max(self.end_s, CELL_S), CELL_S)
         last = np.searchsorted(stamps_s, t_s, side="right") - 1
         silent_s = SILENCE_S if len(self._robots[k].log.detected) else np.inf

@@ -48,8 +48,6 @@ class Shown:
         strips = [_flat(points) for points in outlines]
         lines = rr.LineStrips3D(strips, colors=self.color, radii=WIDE)
         self.to.log(f"{self.entity}/body", lines, static=True)
-        view = rr.LineStrips3D([_flat(self.body.view())], radii=THIN, colors=_rgb(BLIND))
-        self.to.log(f"{self.entity}/view", view, static=True)
         label = rr.Points3D([[0, 0, 0]], labels=self.label, colors=self.color, radii=-4)
         self.to.log(f"{self.entity}/name", label, static=True)
         colors = [_rgb(BLIND), _rgb(SEES)]
@@ -97,13 +95,17 @@ class Shown:
             self._log(f"{GROUPS[self.prefix]}/paths/{self.name}", now_s, line)
 
     def telemetry(self, t_s: np.ndarray, payloads: list[bytes]) -> None:
-        """Colours the view, and marks when the bit changes."""
-        detected = decode(payloads, turbopi.telemetry_t, f"{self.label}_TELEMETRY")["detected"]
-        for at_s, bit in zip(t_s.tolist(), detected.tolist(), strict=True):
+        """Draws the view once there is a bit, colours it, and marks when the bit changes."""
+        said = decode(payloads, turbopi.telemetry_t, f"{self.label}_TELEMETRY")
+        recorded = (said["frame_utime_us"] > 0) | (said["detected"] != 0)  # else no camera was
+        bits = said["detected"][recorded].tolist()
+        for at_s, bit in zip(t_s[recorded].tolist(), bits, strict=True):
             if bit != self._bit:
                 self._bit = bit
-                color = rr.LineStrips3D.from_fields(colors=_rgb(SEES if bit else BLIND))
-                self._log(f"{self.entity}/view", at_s, color)
+                view = rr.LineStrips3D(
+                    [_flat(self.body.view())], radii=THIN, colors=_rgb(SEES if bit else BLIND)
+                )
+                self._log(f"{self.entity}/view", at_s, view)
                 self._log(f"bits/{self.label}", at_s, rr.StateChange(state=WORDS[bit != 0]))
 
     def judged(self, now_s: float, judgement: Judgement) -> None:
