@@ -156,7 +156,7 @@ def _narrowed(found: Narrowing) -> list[str]:
     drive = ", ".join(f"{count} x {name}" if count > 1 else name for name, count in moves)
     said = [
         f"{share:.0%} of runs end as {found.goal}; what the fits leave open makes that +- "
-        f"{before:.0%} ({len(shares)} models drawn, {shares.min():.0%} to {shares.max():.0%}).",
+        f"{before:.1%} ({len(shares)} models drawn, {shares.min():.0%} to {shares.max():.0%}).",
         f"That hangs on {named}.",
         f"After a fit to this run of {found.rows.end_s:.0f} s it would be +- {after:.1%}: {drive}.",
     ]

@@ -180,7 +180,10 @@ def read_outcomes(path: Path, plan: Plan) -> tuple[np.ndarray, np.ndarray, list[
             except ValueError as error:
                 raise ValueError(f"{path}, line {reader.line_num}: {error}") from None
     if not seen:
-        raise ValueError(f"{path}: no run has a class or a log.")
+        raise ValueError(
+            f"{path}: no run has a class or a log; write one of them into the row of each run that "
+            "was made."
+        )
     missing = [k for k in range(1, len(plan.order) + 1) if k not in seen]
     numbers = sorted(seen)
     cells = np.array([plan.order[k - 1] for k in numbers])
