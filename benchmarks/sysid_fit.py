@@ -54,7 +54,8 @@ def fit(
     Args:
         runs: each (N,) s on an even grid, (N, A) speeds asked of the actuators, (N, 3) poses (m, m,
             rad), and (A,) speeds that the actuators have at the start.
-        start: where forward, sideways, yaw (gains) and lag_s begin.
+        start: where forward, sideways, yaw (gains) and lag_s begin, and <actuator>_lag_s of those
+            that have their own.
         pushes: A actuators, each with the forward and left speed (m/s) and turn (rad/s) that a unit
             of its own speed makes.
         rad_in_m: how many m an error of 1 rad weighs.
@@ -110,12 +111,11 @@ def _xml(t_s: np.ndarray, lag_s: float, pushes: Pushes) -> str:
 
 
 def _compiled(values: sysid.ParameterDict, spec: MjSpec, pushes: Pushes):
-    forward, sideways, yaw, lag_s = (
-        values[name].value[0] for name in ("forward", "sideways", "yaw", "lag_s")
-    )
+    forward, sideways, yaw = (values[name].value[0] for name in ("forward", "sideways", "yaw"))
     gains = DAMPING * np.array([forward, sideways, yaw])
     for actuator in spec.actuators:
         x, y, turn = gains * pushes[actuator.name]
         actuator.gear = [x, y, 0, 0, 0, turn]
-        actuator.dynprm[0] = lag_s
+        own = f"{actuator.name}_lag_s"
+        actuator.dynprm[0] = values[own if own in values else "lag_s"].value[0]
     return spec.compile()

@@ -13,6 +13,7 @@ import sys
 import time
 from pathlib import Path
 
+import sysid_fit
 from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TimeRemainingColumn
 
@@ -47,7 +48,7 @@ UNCHANGED = Rival(
     "as its owner has it",
     {DOCUMENTED: "predicts, and says nothing"},
     lambda problem: {DOCUMENTED: Answer(False, 0.0, predicted_by(problem.model))},
-    dict.fromkeys(("told", "alarm", "name", "depends"), "it is only a model"),
+    dict.fromkeys(("told", "alarm", "name", "depends", "wrong"), "it is only a model"),
 )
 MODULES = (twinmill_diagnosis, mujoco_sysid, sindy, trees, stepwise, lisdd)
 RIVALS = (*(module.RIVAL for module in MODULES), UNCHANGED)
@@ -63,6 +64,7 @@ SHARED = _texts(
     *sorted(Path(twinmill.__file__).parent.rglob("*.py")),
 )
 OWN = {m.RIVAL.name: _texts(Path(m.__file__)) for m in MODULES} | {UNCHANGED.name: ""}
+OWN[mujoco_sysid.RIVAL.name] += _texts(Path(sysid_fit.__file__))
 
 
 def main() -> int:

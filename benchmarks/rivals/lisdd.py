@@ -253,6 +253,6 @@ RIVAL = Rival(
         TUNED: "steps of 0.5 s, whose noise is independent; the whole space is a region, too; "
         "false discoveries 1e-6",
     },
-    lacks={"name": "a term of its library is no effect of a catalogue"},
+    lacks=dict.fromkeys(("name", "wrong"), "a term of its library is no effect of a catalogue"),
     answers=answers,
 )

@@ -17,6 +17,7 @@ LEAST_LAG_S = 0.01  # that a filter is started from: of none there is no multipl
 LARGE = 1.7  # times the RMS error that the base's own noise makes; see README
 LATE_S = 0.02
 ADDED = f"{LAG_EFFECT}.extra_s"
+YAW_LAG, YAW_EXTRA = "yaw_lag", "yaw_lag.extra_s"
 ALL_WELL = "No Issues Detected"
 AXES = {"forward": (1.0, 0.0, 0.0), "left": (0.0, 1.0, 0.0), "turn": (0.0, 0.0, 1.0)}
 
@@ -25,20 +26,22 @@ def answers(problem: Problem) -> dict[str, Answer]:
     """By its report, and by its residual."""
     runs = stretches(problem.measurement, problem.model)
     noise = problem.noise
-    start = {
-        "forward": 1.0,
-        "sideways": 1.0,
-        "yaw": 1.0,
-        "lag_s": max(_lag_s(problem.model), LEAST_LAG_S),
-    }
+    lag_s, turn_lag_s = _lags_s(problem.model)
+    start = {"forward": 1.0, "sideways": 1.0, "yaw": 1.0, "lag_s": lag_s}
+    if YAW_LAG in problem.model.effects:
+        start["turn_lag_s"] = turn_lag_s
     rad_in_m = noise["sensor_m"] / noise["sensor_rad"]
     found = sysid_fit.fit(runs, start, AXES, rad_in_m)
     model = problem.model.copy()
     for name, key in zip(BASE_GAINS, ("forward", "sideways", "yaw"), strict=True):
         model.set(name, model.get(name) * found["values"][key])
-    late = found["values"]["lag_s"] > start["lag_s"] + LATE_S
-    if _lag_s(model) > 0 or late:
-        model.set(LAG, model.get(LAG) + found["values"]["lag_s"] - _lag_s(model))
+    later_s = found["values"]["lag_s"] - lag_s
+    late = later_s > LATE_S
+    if lag_s > LEAST_LAG_S or late:
+        model.set(LAG, model.get(LAG) + later_s)
+    if YAW_LAG in model.effects:
+        turn_later_s = found["values"]["turn_lag_s"] - turn_lag_s
+        model.set(YAW_EXTRA, model.get(YAW_EXTRA) + turn_later_s - later_s)
     large = found["rms_m"] / _expected_m(noise)
     issue = found["insights"] != [ALL_WELL]
     names = ("motor_lag",) if late else ()
@@ -52,8 +55,9 @@ def answers(problem: Problem) -> dict[str, Answer]:
 def stretches(measurement: Measurement, model: native.Model) -> list[tuple]:
     """Runs of STRETCH_S on an even grid: s, body velocity asked for, poses, and what it has."""
     track = measurement.track
-    lag_s, bare = _lag_s(model), model.copy()
-    for name in [LAG, *([ADDED] if LAG_EFFECT in model.effects else [])]:
+    bare = model.copy()
+    lag_s, turn_lag_s = _lags_s(model)
+    for name in _lag_names(model):
         bare.set(name, 0.0)
     runs = []
     for number in np.unique(track.segment[track.segment >= 0]):
@@ -62,8 +66,10 @@ def stretches(measurement: Measurement, model: native.Model) -> list[tuple]:
         measured = track.pose[index].T
         pose = np.column_stack([np.interp(t_s, track.pose_t_s[index], p) for p in measured])
         asked = _asked(measurement, bare, index, t_s)
-        keep = np.exp(-STEP_S / max(lag_s, LEAST_LAG_S))
-        has = lfilter([1 - keep], [1, -keep], asked, axis=0)
+        keep = np.exp(-STEP_S / np.array([lag_s, lag_s, turn_lag_s]))
+        has = np.column_stack(
+            [lfilter([1 - k], [1, -k], c) for k, c in zip(keep, asked.T, strict=True)]
+        )
         count = round(STRETCH_S / STEP_S)
         runs += [
             (t_s[a : a + count] - t_s[a], asked[a : a + count], pose[a : a + count], has[a - 1])
@@ -90,9 +96,18 @@ def _asked(
     return np.column_stack([np.interp(t_s + STEP_S, middle_s, c) for c in body.T])
 
 
-def _lag_s(model: native.Model) -> float:
-    """Of the base, with the effect that adds to it."""
-    return model.get(LAG) + (model.get(ADDED) if LAG_EFFECT in model.effects else 0.0)
+def _lag_names(model: native.Model) -> list[str]:
+    """The base's lag and what effects add to it, to the lag of turns last."""
+    own = {LAG_EFFECT: ADDED, YAW_LAG: YAW_EXTRA}
+    return [LAG, *(name for effect, name in own.items() if effect in model.effects)]
+
+
+def _lags_s(model: native.Model) -> tuple[float, float]:
+    """Of travel and of turns."""
+    lags_s = {name: model.get(name) for name in _lag_names(model)}
+    turn_s = sum(lags_s.values())
+    travel_s = turn_s - lags_s.get(YAW_EXTRA, 0.0)
+    return max(travel_s, LEAST_LAG_S), max(turn_s, LEAST_LAG_S)
 
 
 def _expected_m(noise: dict[str, float]) -> float:
@@ -107,7 +122,7 @@ RIVAL = Rival(
     name="mujoco.sysid",
     source=f"mujoco {mujoco.__version__}",
     settings={
-        DOCUMENTED: "gains and lag by sysid.optimize; told if its report's insights are not "
+        DOCUMENTED: "gains and lags by sysid.optimize; told if its report's insights are not "
         f'"{ALL_WELL}"',
         TUNED: f"told if the rest is {LARGE:g} times what the base's noise makes, or the lag "
         f"moved by {1000 * LATE_S:g} ms, which it then names",

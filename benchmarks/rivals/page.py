@@ -15,6 +15,7 @@ HEADS = {
     "alarm": "false\nalarms",
     "name": "right\nname",
     "depends": "right\ndependence",
+    "wrong": "surely named\nwrongly",
     "same_0.5": "same drive\n0.5 s",
     "same_2": "same drive\n2 s",
     "other_0.5": "other drive\n0.5 s",
@@ -68,6 +69,11 @@ def _right(found: dict) -> Table:
     return Table("Recordings whose answer is known", heads, rows)
 
 
+def _heads(found: dict) -> list[tuple[str, str]]:
+    """A column for each rival that says anything, in the setting that was tuned if there is one."""
+    return list({r["rival"]: _key(r) for r in found["rows"][:-1]}.values())
+
+
 def _key(r: dict) -> tuple[str, str]:
     return r["rival"], r["setting"]
 
@@ -79,7 +85,7 @@ def _rates(found: dict, times_s: dict) -> Table:
         time_s = times_s[r["rival"]]["median"]
         rows.append([_who(r), *(_share(r, c, found) for c in RATES), Cell(f"{time_s:.1f}")])
     note = (
-        "Below each share its 95 % interval. Green: no row is better. Dependence is asked where "
+        "In brackets 95 % intervals. Green: no row is better. Dependence is asked where "
         "what is hidden is outside the catalogue, a name where one effect or its cousin is. "
         "Time: median processor time of one log in one setting. " + _why_not(found)
     )
@@ -103,8 +109,8 @@ def _errors(found: dict) -> Table:
     rows = [[_who(r), *(_ratio(r, c, found) for c in ERRORS)] for r in found["rows"]]
     note = (
         "RMS error of predictions on logs that were not fitted to, over that of the truth itself; "
-        "1 is all that can be known. Medians of the cases in which something is hidden, and below "
-        "them 95 % intervals. Who tells of nothing keeps the base model."
+        "1 is all that can be known. Medians of the cases in which something is hidden, in "
+        "brackets their 95 % intervals. Who tells of nothing keeps the base model."
     )
     return Table("What it predicts", ["rival", *(HEADS[c.key] for c in ERRORS)], rows, note)
 
@@ -119,7 +125,7 @@ def _share(r: dict, column: Column, found: dict) -> Cell:
     own = r[column.key]
     if not own["of"]:
         return Cell("no case", "dim")
-    text = f"{own['hits']} of {own['of']}\n{100 * own['low']:.0f}..{100 * own['high']:.0f} %"
+    text = f"{own['hits']} of {own['of']}\n({100 * own['low']:.0f} to {100 * own['high']:.0f} %)"
     rivals = [o for o in found["rows"] if column.key not in o["lacks"] or o[column.key]["hits"]]
     hits = [o[column.key]["hits"] for o in rivals]
     return Cell(text, "good" if own["hits"] == (max(hits) if column.more else min(hits)) else "")
@@ -129,14 +135,14 @@ def _ratio(r: dict, column: Column, found: dict) -> Cell:
     own = r[column.key]
     if own["median"] is None:
         return Cell("no case", "dim")
-    text = f"{own['median']:.2f}\n{own['low']:.2f}..{own['high']:.2f}"
+    text = f"{own['median']:.2f}\n({own['low']:.2f} to {own['high']:.2f})"
     least = min(o[column.key]["median"] for o in found["rows"])
     return Cell(text, "good" if own["median"] == least else "")
 
 
 def _real(found: dict) -> Table:
     """Recordings: a row for each, a column for each rival."""
-    heads = [_key(r) for r in found["rows"][:-1]]
+    heads = _heads(found)
     logs = dict.fromkeys((r["log"], r["missing"]) for r in found["recordings"])
     said = {(r["log"], r["rival"], r["setting"]): r for r in found["recordings"]}
     rows = [
@@ -167,13 +173,16 @@ def _how(found: dict) -> Table:
 
 def _cases(found: dict) -> Table:
     """Every case and what each rival said of it, lost ones included."""
-    heads = [_key(r) for r in found["rows"][:-1]]
+    heads = _heads(found)
     rows = [
         [Cell(str(c["case"])), Cell(_hidden(c)), *(_said(c, *head) for head in heads)]
         for c in found["cases"]
     ]
     names = [_named(*head) for head in heads]
-    note = "In brackets the error at 2 s on the same kind of drive, over the truth's."
+    note = (
+        "In brackets the error at 2 s on the same kind of drive, over the truth's. Rivals as they "
+        "were tuned; results.json has them as documented, too."
+    )
     return Table(
         "Every case", ["case", "hidden", *names], rows, note, tuple(range(1, len(heads) + 2))
     )

@@ -31,6 +31,7 @@ RATES = (
     Column("alarm", "false alarms", False),
     Column("name", "right name or family", True),
     Column("depends", "right dependence", True),
+    Column("wrong", "named wrongly, and surely", False),
 )
 ERRORS = tuple(
     Column(f"{label}_{ahead_s:g}", f"error at {ahead_s:g} s over the truth's, {words}", False)
@@ -58,8 +59,24 @@ def judged(case: Case, answer: Answer, logs: Mapping[str, Unseen]) -> dict:
         "told": outcome["alarm"],
         "first": outcome["first"],
         "depends": outcome["told"] and outcome["depends"],
+        "wrong": wrong(case, result["said"]),
         **errors,
     }
+
+
+def wrong(case: Case, said: list[list[str]]) -> bool:
+    """Whether a name that stands alone is neither hidden nor of the same kin.
+
+    Args:
+        case: with its answer.
+        said: findings, each the names that it cannot be parted from.
+    """
+    findings = [
+        {"effect": names[0], "group": names, "certainty": "sure" if len(names) == 1 else "group"}
+        for names in said
+    ]
+    found = {"verdict": "effect_missing", "findings": findings}
+    return scored(case, found)["outcome"]["wrong_and_sure"]
 
 
 def _said(answer: Answer) -> dict:
@@ -85,6 +102,7 @@ def row(cases: Iterable[dict]) -> dict:
         "alarm": rate([c["told"] for c in cases if c["kind"] == "none"]),
         "name": rate([c["first"] for c in cases if c["kind"] in ("one", "cousin")]),
         "depends": rate([c["depends"] for c in cases if c["kind"] == "outside"]),
+        "wrong": rate([c["wrong"] for c in cases]),
     }
     return rates | {c.key: middle([case[c.key] for case in there]) for c in ERRORS}
 

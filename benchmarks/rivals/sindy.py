@@ -131,6 +131,6 @@ RIVAL = Rival(
         "STLSQ(alpha=1, unbias=False), threshold by left-out blocks; "
         f"told if these lose {100 * LEAST_GAIN:g} % of the squared residual",
     },
-    lacks={"name": "a formula is no effect of a catalogue"},
+    lacks=dict.fromkeys(("name", "wrong"), "a formula is no effect of a catalogue"),
     answers=answers,
 )

@@ -77,6 +77,6 @@ RIVAL = Rival(
         TUNED: f"80 trees of 8 leaves with 40 steps each, rate 0.05; told from "
         f"{100 * LEAST_GAIN:g} %",
     },
-    lacks={"name": "trees have no names"},
+    lacks=dict.fromkeys(("name", "wrong"), "trees have no names"),
     answers=answers,
 )

@@ -122,6 +122,36 @@ def test_sindy_finds_a_planted_linear_law(random):
     assert max(weight, key=weight.__getitem__) == PLACE
 
 
+def test_sysid_finds_gains_and_lag_of_a_known_robot(random):
+    """Runs of a first-order robot, integrated here at a twentieth of the step."""
+    pytest.importorskip("plotly", reason="make rivals installs what mujoco.sysid needs")
+    sysid = pytest.importorskip("rivals.mujoco_sysid")
+    gains, lag_s = np.array([0.9, 0.8, 1.1]), 0.11
+    runs = [_first_order(random, gains, lag_s, sysid.STEP_S) for _ in range(15)]
+    start = {"forward": 1.0, "sideways": 1.0, "yaw": 1.0, "lag_s": 0.08}
+    found = sysid.sysid_fit.fit(runs, start, sysid.AXES, 0.4)["values"]
+    assert [found[k] for k in ("forward", "sideways", "yaw")] == pytest.approx(gains, rel=0.02)
+    assert found["lag_s"] == pytest.approx(lag_s, rel=0.03)
+
+
+def _first_order(random, gains, lag_s, step_s, steps=200, parts=20):
+    """A run as mujoco_sysid.stretches gives: s, speeds half a step ahead, poses, first speeds."""
+    asked = np.repeat(random.uniform(-1, 1, (5, 3)) * [0.4, 0.4, 1.5], steps // 5 + 1, axis=0)
+    fine = np.repeat(asked, parts, axis=0)
+    dt, speed, rows = step_s / parts, random.uniform(-0.3, 0.3, 3), []
+    for u in fine:
+        speed = speed + (1 - np.exp(-dt / lag_s)) * (u - speed)
+        rows.append(speed)
+    v = np.array(rows) * gains
+    heading = np.cumsum(v[:, 2]) * dt - v[:, 2] * dt / 2
+    c, s = np.cos(heading), np.sin(heading)
+    way = [c * v[:, 0] - s * v[:, 1], s * v[:, 0] + c * v[:, 1], v[:, 2]]
+    pose = np.vstack([np.zeros(3), np.cumsum(np.column_stack(way), axis=0) * dt])
+    ahead = fine[parts // 2 :][: steps * parts].reshape(steps, parts, 3).mean(axis=1)
+    first = rows[parts // 2 - 1]
+    return np.arange(steps) * step_s, ahead, pose[: steps * parts : parts], first
+
+
 def test_trees_lose_most_without_what_was_planted(random):
     steps = planted(random, TIME, lambda x: np.where(x > 0, 0.5, 0.0))
     gain, lost = _held_out(steps, steps.features, steps.missed, OPTIONS[DOCUMENTED])
@@ -165,8 +195,8 @@ def test_answers_are_judged_by_the_rules_of_the_challenge(quiet, tmp_path):
         judged(case, Answer(told, 1.0, predicted_by(problem.model), names), {})
         for told, names in ((True, ("lateral_slip", "backlash")), (False, ()))
     )
-    assert (right["told"], right["first"]) == (True, True)
-    assert (silent["told"], silent["first"]) == (False, False)
+    assert (right["told"], right["first"], right["wrong"]) == (True, True, True)  # no backlash
+    assert (silent["told"], silent["first"], silent["wrong"]) == (False, False, False)
     empty = dict.fromkeys(("same_0.5", "same_2", "other_0.5", "other_2"), 1.0)
     table = row([{"kind": "one", **right, **empty}, {"kind": "none", **silent, **empty}])
     assert (table["told"]["hits"], table["alarm"]["hits"], table["name"]["of"]) == (1, 0, 1)
