@@ -129,4 +129,5 @@ RIVAL = Rival(
     },
     lacks={"depends": "its residual is a number", "name": "it has the lag alone to name"},
     answers=answers,
+    once=True,
 )

@@ -79,6 +79,7 @@ class Rival:
         settings: for people: what is done as documented, and how it was tuned.
         answers: an answer for each of `settings`.
         lacks: columns that it cannot answer, and why.
+        once: one computation serves all settings.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Rival:
     settings: Mapping[str, str]
     answers: Callable[[Problem], dict[str, Answer]]
     lacks: Mapping[str, str] = field(default_factory=dict)
+    once: bool = False
 
 
 def predicted_by(model: native.Model) -> Predict:

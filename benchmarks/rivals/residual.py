@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Velocity that the base model misses, step by step, beside all that it could depend on."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,13 +89,15 @@ class Steps:
         return np.array([g == group for g in self.groups])
 
 
-def corrected(model: native.Model, step_s: float, missed) -> Predict:
+def corrected(
+    model: native.Model, step_s: float, missed: Callable[[np.ndarray], np.ndarray]
+) -> Predict:
     """Predictions of the base, with the velocity that it misses put in step by step.
 
     Args:
         model: the base.
-        step_s: of the steps that `missed` was learnt from; horizons are multiples of it, or it is
-            a multiple of 0.1 s, which then is the step.
+        step_s: of the steps that `missed` was learnt from; predictions go in steps of the shortest
+            horizon.
         missed: (M, F) features to (M, 3) velocities.
     """
 
@@ -104,19 +107,16 @@ def corrected(model: native.Model, step_s: float, missed) -> Predict:
         count = round(HORIZONS_S[-1] / fine_s)
         base = _fine(measurement, model, windows, fine_s, count)
         t_s = measurement.track.pose_t_s[windows.starts]
-        at = measurement.track.pose[windows.starts].copy()
         first_rad = measurement.track.heading_smooth[windows.starts]
-        at[:, 2] = first_rad
-        begin, seen = at.copy(), {}
+        begin = np.column_stack([measurement.track.pose[windows.starts, :2], first_rad])
+        at, seen = begin.copy(), {}
         for k in range(count):
             known = np.column_stack(
                 [np.interp(t_s + (k + 0.5) * fine_s, steps.t_s, c) for c in steps.known.T]
             )
             moved = base[:, k] + fine_s * missed(_with_pose(known, at))
             middle = at[:, 2] + moved[:, 2] / 2
-            at[:, 0] += rotate(moved[:, 0], moved[:, 1], middle)[0]
-            at[:, 1] += rotate(moved[:, 0], moved[:, 1], middle)[1]
-            at[:, 2] += moved[:, 2]
+            at += np.column_stack([*rotate(moved[:, 0], moved[:, 1], middle), moved[:, 2]])
             seen[k + 1] = _seen(begin, at, first_rad)
         found = np.stack([seen[round(h / fine_s)] for h in HORIZONS_S], axis=1)
         found[windows.ends < 0] = np.nan

@@ -250,4 +250,5 @@ RIVAL = Rival(
         TUNED: f"enters at p < {ALPHA[TUNED]:g}",
     },
     answers=answers,
+    once=True,
 )
