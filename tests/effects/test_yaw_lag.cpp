@@ -58,5 +58,35 @@ TEST(YawLag, TurnsAsFarAsItsTimeConstantSays)
     EXPECT_NEAR(player.state.pose.theta_rad, rate_radps * (1 - 0.04), 1e-3 * rate_radps);
 }
 
+// The wheels' lag is a sum, whatever stands first in the model file.
+TEST(YawLag, SplitsTheLagThatAllOthersLeave)
+{
+    const Model before = With("motor_lag", {0.04}, With("yaw_lag", {-0.05}, Lagging(kLag_s)));
+    const Model after = With("yaw_lag", {-0.05}, With("motor_lag", {0.04}, Lagging(kLag_s)));
+    for (const Model &model : {before, after})
+    {
+        Player player(model, 0.02);
+        player.Play(kTurnLeft, 0.1);
+        EXPECT_NEAR(player.state.rim_mps[1], kFull_mps * (1 - std::exp(-0.1 / 0.07)), 1e-12);
+    }
+}
+
+// Two lags in a row, a and b, answer a step by 1 - (a exp(-t/a) - b exp(-t/b)) / (a - b).
+TEST(YawLag, ComesBehindAFilterBeforeTheMotors)
+{
+    constexpr double kFilter_s = 0.03, kTurn_s = kLag_s - 0.03, dt_s = 1e-4, t_s = 0.1;
+    for (const Model &model :
+         {With("second_order_lag", {kFilter_s}, With("yaw_lag", {-0.03}, Lagging(kLag_s))),
+          With("yaw_lag", {-0.03}, With("second_order_lag", {kFilter_s}, Lagging(kLag_s)))})
+    {
+        Player player(model, dt_s);
+        player.Play(kTurnLeft, t_s);
+        const double left =
+            kTurn_s * std::exp(-t_s / kTurn_s) - kFilter_s * std::exp(-t_s / kFilter_s);
+        const double part = 1 - left / (kTurn_s - kFilter_s);
+        EXPECT_NEAR(player.state.rim_mps[1], kFull_mps * part, 1e-3 * kFull_mps);
+    }
+}
+
 }  // namespace
 }  // namespace twin::test

@@ -139,9 +139,9 @@ void DriveChain::Bind(const EffectInstance &instance)
     const int offset = state_size_;
     state_size_ += effect.StateSize();
     const auto put = [&]<class On>(std::vector<Bound<On>> &stage) {
-        const bool first = effect.spec().acts_first;
-        const auto at = first ? std::ranges::find(stage, false, &Bound<On>::first) : stage.end();
-        stage.insert(at, {std::get<On>(effect.act()), effect.numbers(), offset, first});
+        const Turn turn = effect.spec().turn;
+        const auto at = std::ranges::upper_bound(stage, turn, {}, &Bound<On>::turn);
+        stage.insert(at, {std::get<On>(effect.act()), effect.numbers(), offset, turn});
     };
     std::visit(
         [&]<class On>(const On &) {

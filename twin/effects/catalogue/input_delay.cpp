@@ -92,7 +92,7 @@ EFFECT(input_delay) = {
     .state_size = StateSize,
     // On commands as they were given, which change at times and not all the time: each change cuts
     // the step, and a ramp would be cut into pieces as short as the delay.
-    .acts_first = true,
+    .turn = Turn::kFirst,
 };
 
 }  // namespace twin

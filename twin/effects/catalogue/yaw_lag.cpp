@@ -63,6 +63,8 @@ EFFECT(yaw_lag) = {
     .card = kCard,
     .parameters = kParameters,
     .act = OnWheels{Step},
+    // On the speeds and time constants that all others leave: it splits that lag in two.
+    .turn = Turn::kLast,
 };
 
 }  // namespace twin

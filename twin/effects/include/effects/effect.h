@@ -3,8 +3,9 @@
 // stage. catalogue/ holds one file per effect; the list of all is generated from its folder.
 //
 // One step of one robot passes its signals through the stages in the order of `Act`; within a stage
-// the effects act in the order of the model file. What an effect remembers of one robot lies in
-// `state`, plain doubles owned by the plant, so that a robot can be copied and restarted.
+// the effects act by their turn, those of one turn in the order of the model file. What an effect
+// remembers of one robot lies in `state`, plain doubles owned by the plant, so that a robot can be
+// copied and restarted.
 #ifndef EFFECTS_EFFECT_H
 #define EFFECTS_EFFECT_H
 
@@ -84,6 +85,14 @@ struct TextParameter
     const char *doc;
 };
 
+// When an effect acts within its stage.
+enum class Turn
+{
+    kFirst,
+    kUsual,
+    kLast,
+};
+
 struct EffectSpec
 {
     // An effect with texts: where it acts with these, and its formula.
@@ -97,7 +106,7 @@ struct EffectSpec
     std::span<const ParameterSpec> parameters;
     Act act;
     int (*state_size)(const Numbers &) = nullptr;  // doubles that it remembers; nullptr: none
-    bool acts_first = false;   // before the others of its stage, wherever the model file has it
+    Turn turn = Turn::kUsual;  // within its stage, wherever the model file has it
     bool needs_sides = false;  // of robots with left and right wheels alone
     std::span<const TextParameter> texts = {};
     // Of `values` and `texts` in their order. Throws std::invalid_argument in one sentence if a

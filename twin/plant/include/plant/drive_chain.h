@@ -48,7 +48,7 @@ private:
         On act;
         Numbers numbers;
         int state_offset;
-        bool first;  // acts before the others of its stage
+        Turn turn;
     };
     void Bind(const EffectInstance &instance);
     template <class On, class S>
