@@ -9,9 +9,11 @@ import pytest
 import twinmill_native as native
 
 from twinmill.challenge.cases import CASES, LEAST, Floors, draw, draw_robots, seal
+from twinmill.challenge.drives import drive
 from twinmill.challenge.intervals import SETS, coverage, draw_known, errors
 from twinmill.challenge.physics import STEP_S, Signals, catalogue_forms, outside_forms
 from twinmill.challenge.robots import KINDS
+from twinmill.challenge.rollers import drive_by_forces
 from twinmill.challenge.run import Plan, play
 from twinmill.challenge.scoring import BARS, rate, scored, summary
 from twinmill.model.parameters import catalogue
@@ -228,3 +230,46 @@ def test_coverage_of_right_and_wrong_standard_errors_is_the_normals(wide, share)
     assert quantity["name"] == "base.yaw_gain" and quantity["of"] == 4000
     assert quantity["hits"] / 4000 == pytest.approx(share, abs=4 * np.sqrt(0.25 / 4000))
     assert quantity["rms"] == pytest.approx(1 / wide, rel=0.05)
+
+
+@pytest.mark.parametrize("number", range(len(KINDS)))
+def test_every_form_can_be_played_by_every_robot_that_can_have_it(number):
+    robot, random = ROBOTS[number], np.random.default_rng(2)
+    legs = drive("mixed", 20, robot.sideways, random)
+    plan = Plan(robot, legs, 1)
+    for h in catalogue_forms(robot, random) + outside_forms(robot, random):
+        moved = play(plan, [h], calm=True).pose
+        assert np.isfinite(moved).all() and np.ptp(moved[:, 2]) > 0.1, h.name
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "rollers"])
+@pytest.mark.parametrize("name", ["second_order_lag", "yaw_lag"])
+def test_a_lag_hidden_in_a_robot_of_forces_comes_to_its_own_once(plant, name):
+    """A first-order lag answers a ramp late by its time constant, before whatever comes next."""
+    robot = next(r for r in ROBOTS if r.plant == plant)
+    slow = next(h for h in catalogue_forms(robot, np.random.default_rng(1)) if h.name == name)
+    axis = 2 if name == "yaw_lag" else 0
+    legs = [(0.05, 0.01 * k * np.eye(3)[axis]) for k in range(60)]
+    (late_s,) = slow.scaled(3).values.values()
+    usual, late = (
+        np.diff(play(Plan(robot, legs, 1), hidden, forces=True, calm=True).pose[:, axis]) / STEP_S
+        for hidden in ((), (slow.scaled(3),))
+    )
+    end = slice(int(1.5 / STEP_S), int(2.9 / STEP_S))
+    slope = np.polyfit(np.arange(len(usual))[end] * STEP_S, usual[end], 1)[0]
+    assert np.mean(usual[end] - late[end]) / slope == pytest.approx(late_s, rel=0.15)
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "rollers"])
+def test_a_robot_of_forces_drifts_outward_in_arcs_as_its_mass_asks(plant):
+    """So a lateral slip that is named there is no mistake."""
+    robot = next(r for r in ROBOTS if r.plant == plant)
+    lever_m = robot.half_wheelbase_m + robot.half_track_m
+    ahead, turn = 0.5, 0.2 * robot.top_mps / lever_m
+    rims = [robot.to_wheels @ [ahead * robot.top_mps, 0, k * turn] for k in (-1, 0, 1)]
+    right, straight, left = (
+        drive_by_forces(robot, np.tile(rim, (1500, 1)))[1000:].mean(axis=0) for rim in rims
+    )
+    outward = (left[1] - right[1]) / 2
+    assert abs(straight[1]) < 1e-3
+    assert outward < -0.01 * left[0] * left[2]  # s times the centripetal acceleration

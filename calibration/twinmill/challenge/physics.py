@@ -24,7 +24,7 @@ class Signals:
     """What a form may look at, one row for each step of STEP_S.
 
     Attributes:
-        robot: that drives.
+        robot: that drives; where forces give it its lag, the forms of a lag see one without.
         duty: (N, W) in -1..1.
         battery_V: (N,)
         pose: (N, 3) x, y, heading in W as far as they are known.
@@ -152,7 +152,8 @@ def _second_order(rim, v, s):
 
 
 def _turning_lags(rim, v, s):
-    spin = s.robot.to_wheels[:, 2] / np.linalg.norm(s.robot.to_wheels[:, 2])
+    spin = np.eye(3)[2] if s.robot.drive == "twist" else s.robot.to_wheels[:, 2]
+    spin = spin / np.linalg.norm(spin)
     turning = np.outer(rim @ spin, spin)
     lag_s = s.robot.lag_s
     return slow(rim - turning, lag_s) + slow(turning, lag_s + v["extra_s"])
@@ -368,7 +369,8 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
         form("lag_by_duty", "plain", "lag", _lag_by_duty, extra_s=0.08)
         form("coasting", "plain", "lag", _coasting, (), deceleration_mps2=0.6, viscous_per_s=0.4)
     if robot.drive != "wheel_speed":
-        form("motor_lag", "plain", "lag", _lag, extra_s=0.03)
+        if robot.plant == "planar":  # before motors with a lag of their own it is a second one
+            form("motor_lag", "plain", "lag", _lag, extra_s=0.03)
         form("motor_lag", "cousin", "lag", _second_order, second_s=0.03)
         form("second_order_lag", "plain", "lag", _second_order, second_s=0.03)
         form("yaw_lag", "plain", "lag", _turning_lags, extra_s=0.04)

@@ -2,7 +2,7 @@
 """One drive of a drawn robot with something hidden, and the log that is made of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -70,10 +70,10 @@ def play(plan: Plan, hidden: Sequence[Hidden] = (), forces: bool = False, calm: 
     seen = Signals(robot, duty, battery_V, np.zeros((len(t_s), 3)), random)
     rim = duty if robot.drive == "twist" else robot.speed_mps(duty)
     rim = _acted("target", rim, hidden, seen)
-    lags = [h for h in hidden if h.stage == "lag"]
     by_forces = forces and robot.plant != "planar"
-    if lags:
-        rim = _acted("lag", rim, hidden, seen)
+    if any(h.stage == "lag" for h in hidden):
+        own = replace(robot, lag_s=STEP_S) if by_forces else robot
+        rim = _acted("lag", rim, hidden, replace(seen, robot=own))
     elif not by_forces:
         rim = slow(rim, robot.lag_s)
     rolls = _acted("rolls", rim, hidden, seen)

@@ -20,6 +20,7 @@ WITHIN = 1.96  # standard errors: 95 %
 TOLD_REST = 0.1  # share of the squared error from which a rest counts as told
 BINS = (1.0, 1.5, 2.5, 4.0)  # lower ends of sizes, in floors
 NAMED = ("effect_missing", "ambiguous")  # verdicts that name something
+OF_FORCES = frozenset({"yaw_lag", "lateral_slip"})  # what every robot made of forces has
 
 
 @dataclass(frozen=True)
@@ -96,10 +97,10 @@ def scored(case: Case, found: dict) -> dict:
         case: with its answer.
         found: the object of `twinmill diagnose --json`.
     """
-    every = said(found)
-    findings = [f for f in every if f.effect not in _there(case)]
+    every, there = said(found), _there(case)
+    findings = [f for f in every if f.effect not in there]
     right = [_accepted(h, case) for h in case.hidden if h.kind != "outside"]
-    allowed = frozenset().union(*right, *(h.kin for h in case.hidden))
+    allowed = there.union(*right, *(h.kin for h in case.hidden))
     others = [f.effect for f in findings if not (f.names or {f.effect}) & allowed]
     verdict = found["verdict"]
     told = _rest(found)
@@ -109,7 +110,7 @@ def scored(case: Case, found: dict) -> dict:
         "verdict_right": first and verdict in NAMED,
         "clean": first and verdict in NAMED and not others,
         "all": bool(right) and all(any(f.names & r for f in findings) for r in right),
-        "alarm": bool(findings)
+        "alarm": any(not f.names & there for f in findings)
         or verdict in ("outside_catalogue", "bad_input")
         or (verdict in NAMED and not every),
         "told": verdict == "outside_catalogue" or told["share"] >= TOLD_REST,
@@ -191,9 +192,13 @@ def _accepted(hidden: Hidden, case: Case) -> frozenset[str]:
 
 
 def _there(case: Case) -> frozenset[str]:
-    """What is there besides: by forces a robot turns with another lag than it drives."""
+    """What is there besides in a robot made of forces, in the base or not.
+
+    It turns with another lag than it drives, and its mass drifts outward in arcs.
+    """
+    by_forces = case.plan.robot.plant != "planar"
     hidden = {h.name for h in case.hidden}
-    return frozenset({"yaw_lag"} - hidden) if case.plan.robot.plant != "planar" else frozenset()
+    return frozenset(OF_FORCES - hidden) if by_forces else frozenset()
 
 
 def _rest(found: dict) -> dict:
