@@ -10,7 +10,13 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.detections.merge import with_detections
 from twinmill.diagnosis.encoders import geometry_notes, time_base_notes
-from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_numbers
+from twinmill.diagnosis.findings import (
+    findings_of,
+    lateness,
+    of_another_form,
+    ranking_of,
+    with_stale_numbers,
+)
 from twinmill.diagnosis.irregularity import notes_on
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
 from twinmill.diagnosis.resolution import resolutions
@@ -182,6 +188,7 @@ def _concluded(
         findings, last.state.model, model_file.lag_std_s(hashes), model_file.effect_stds
     )
     rest = rest_of(formulas, last.fit, start.fit, model_file.left_over(hashes))
+    findings = of_another_form(findings, rest.depends_on)
     models = zip(known, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]

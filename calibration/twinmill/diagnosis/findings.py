@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Findings of a diagnosis: what each effect takes away, how sure it is, and its rivals."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,10 +9,12 @@ import twinmill_native as native
 
 from twinmill.diagnosis.constancy import Change, changes_of
 from twinmill.diagnosis.search import REFIT, Round, Search, State, Trial, fitted, grown
+from twinmill.fitting.compare import GOOD
 from twinmill.model.parameters import (
     LAG,
     LAG_EFFECT,
     ParameterEstimate,
+    catalogue,
     catalogue_of,
     effect_names,
     late_part,
@@ -23,7 +25,14 @@ from twinmill.predict.windows import HORIZONS_S
 HORIZON = HORIZONS_S.index(0.5)
 MISSES = 1.5  # score of a final model whose errors are not noise
 WITHIN = 2.0  # standard deviations: a lag that differs by less is the model's own error
-BEYOND = 3.0  # usual sizes: a larger value is doubtful
+BEYOND = 3.0  # usual sizes, or standard deviations from it at a bound: doubtful beyond ...
+NEAR = (
+    0.5  # ... if another effect leaves no more of the squared score besides, or something is left
+)
+STAY_S = 2.0  # at a place or away from it: less is passing by
+STAYS = 3  # fewer are one change at one moment
+# Groups of a rest, and what the cards of effects that act by them need or are shown by.
+BY = {"place": {"places"}, "heading": {"headings", "heading"}}
 NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
 
 
@@ -137,6 +146,27 @@ def findings_of(
         share = float(np.clip((errors[k] - errors[k + 1]) / excess, 0.0, 1.0))
         found.append(_finding(done, name, share, changes))
     return found, [(n, t.held_score) for n, t in zip(names, chain[1:], strict=True)]
+
+
+def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list[Finding]:
+    """Findings, doubtful where what is left still depends on what they act by: their form is wrong.
+
+    Args:
+        found: in the order of worth.
+        depends_on: groups that what is left depends on.
+    """
+    cards = catalogue()
+
+    def judged(finding: Finding) -> Finding:
+        card = cards.get(finding.effect, {"identify": (), "needs": ""})  # a refit has none
+        acts_by = {*card["identify"], card["needs"]}
+        on = next((group for group in depends_on if BY.get(group, set()) & acts_by), None)
+        if on is None:
+            return finding
+        why = f"what is left still depends on {on}, so that it may have another form"
+        return replace(finding, certainty="doubtful", why=why)
+
+    return [f if f.why else judged(f) for f in found]
 
 
 def with_stale_numbers(
@@ -267,7 +297,10 @@ def _finding(done: Search, name: str, share: float, changes: Mapping[str, Change
     own = [e for e in estimates if e.name.startswith(f"{instance}.")]
     tied = [n for t in _rivals(done, name) for n in t.names]
     group = (name, *tied) if tied else None
-    doubt = _doubt(catalogue_of(done.last.state.model)[name], own)
+    card = catalogue_of(done.last.state.model)[name]
+    doubt = _at_bound(card, own) or ("" if _stands_alone(done, name) else _unusual(card, own))
+    if not doubt and 0 < _stays(done.last, instance) < STAYS:
+        doubt = f"the robot came to the place of {name} once or left it once: it may be a moment"
     if not doubt and instance in changes:
         doubt = changes[instance].why
     if not doubt and done.last.fit.chance_of_none(instance) > NOTHING:
@@ -276,20 +309,66 @@ def _finding(done: Search, name: str, share: float, changes: Mapping[str, Change
     return Finding(name, group, own, share, certainty, doubt, "#" in instance)
 
 
-def _doubt(card: dict, own: Sequence[ParameterEstimate]) -> str:
-    """Why an estimate is no usual one; empty if it is."""
+def _sizes(
+    card: dict, own: Sequence[ParameterEstimate]
+) -> Iterator[tuple[ParameterEstimate, dict, float]]:
+    """Each estimate with its entry of the card and its distance from neutral."""
     entry = {p["name"]: p for p in card["parameters"]}
     for e in own:
         p = entry[e.name.split(".", 1)[1]]
-        away = abs(e.value - p["neutral"])
-        if e.at_bound and away > 1e-3:
+        yield e, p, abs(e.value - p["neutral"])
+
+
+def _at_bound(card: dict, own: Sequence[ParameterEstimate]) -> str:
+    """A doubt where an estimate ended at its bound, and a usual one is excluded; else empty."""
+    for e, p, away in _sizes(card, own):
+        excluded = e.std is None or abs(e.value - p["default"]) > BEYOND * e.std
+        if e.at_bound and away > 1e-3 and excluded:
             return f"{e.name} is at its bound ({e.value:.3g}): another effect may be behind it"
+    return ""
+
+
+def _unusual(card: dict, own: Sequence[ParameterEstimate]) -> str:
+    """A doubt where an estimate is far larger than is usual; else empty."""
+    for e, p, away in _sizes(card, own):
         if p["role"] == "size" and away > BEYOND * p["usual_size"]:
             return (
                 f"{e.name} = {e.value:.3g} is far beyond what is usual: another effect may be "
                 "behind it"
             )
     return ""
+
+
+def _stays(last: Trial, instance: str) -> int:
+    """How often in all logs a robot was at an effect's place or away from it for a while.
+
+    0 for an effect without a place.
+    """
+    fit = last.fit
+    if f"{instance}.radius_m" not in {v["name"] for v in last.state.model.values()}:
+        return 0
+    stays = 0
+    for data, model in zip(fit.datasets, fit.models, strict=True):
+        if isinstance(data, Trajectory):
+            x_m, y_m, radius_m = (model.get(f"{instance}.{k}") for k in ("x_m", "y_m", "radius_m"))
+            pose = data.measurement.track.pose[data.windows.starts]
+            inside = np.hypot(pose[:, 0] - x_m, pose[:, 1] - y_m) < radius_m
+            edges = np.flatnonzero(np.diff(inside)) + 1
+            parts = zip(np.split(data.start_s, edges), np.split(inside, edges), strict=True)
+            long = [at[0] for t_s, at in parts if t_s[-1] - t_s[0] > STAY_S]
+            stays += 1 + int(np.count_nonzero(np.diff(long)))
+    return stays
+
+
+def _stands_alone(done: Search, name: str) -> bool:
+    """Whether nothing is left beside an effect, and no other comes near to what it takes.
+
+    Then it is right though its size is none that is usual.
+    """
+    this = _round_of(done, name)
+    most = this.accepted.held_score**2 + NEAR
+    near = [t for t in this.trials if t is not this.accepted and t.held_score**2 < most]
+    return done.last.held_score < GOOD and not near
 
 
 def ranking_of(done: Search, found: Sequence[Finding]) -> list[Ranked]:

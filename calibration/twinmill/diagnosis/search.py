@@ -44,8 +44,8 @@ class Settings:
         evidence: least fall of the held-out cost (twice a log likelihood ratio) of one addition ...
         without_best: ... and without the block that speaks loudest for it.
         without_visit: the same for an effect of a place, which speaks where the robot comes by.
-        less_evidence, blocks_t: the same where what the model lacks besides drowns the evidence,
-            and blocks agree: t of the relative fall over blocks.
+        drowned, less_evidence, blocks_t: the same from this score on, where what the model lacks
+            besides drowns the evidence, and blocks agree: t of the relative fall over blocks.
         worth: least share of the first excess that one takes ...
         enough: ... or this fall of the squared score, if that is less.
         below: the same share once the score is below 1, where differences are hardly news ...
@@ -66,6 +66,7 @@ class Settings:
     evidence: float = 16.0
     without_best: float = 8.0
     without_visit: float = 4.0
+    drowned: float = 1.15
     less_evidence: float = 9.0
     blocks_t: float = 3.7
     worth: float = 0.01
@@ -386,14 +387,14 @@ def _with_best_lateness(
 
 
 def _proven(trial: Trial, score: float, settings: Settings) -> bool:
-    """Enough evidence, and blocks that agree; below the noise agreement alone is not enough."""
+    """Enough evidence, and blocks that agree; near the noise agreement alone is not enough."""
     count = len(trial.names)
     loud = trial.evidence >= settings.evidence * count
     somewhere = count == 1 and _has(trial.names[0], "place")
     least = settings.without_visit if somewhere else settings.without_best
     spread = trial.without_best >= least * count
     agreed = (
-        score >= 1.0
+        score >= settings.drowned
         and trial.evidence >= settings.less_evidence * count
         and trial.blocks_t >= settings.blocks_t
     )

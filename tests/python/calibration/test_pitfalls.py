@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 from twinmill.diagnosis.diagnose import diagnose, first_state
 from twinmill.diagnosis.explain import explain
+from twinmill.diagnosis.findings import Finding, of_another_form
 from twinmill.diagnosis.search import Settings, attempt
 from twinmill.diagnosis.search import fitted as fitted_state
 from twinmill.fitting.compare import GOOD, compare
@@ -145,7 +146,7 @@ def test_a_delay_of_half_a_second_is_found(tanh_robot, measure, on_own_clock):
 
 def test_an_estimate_at_its_bound_is_said_to_be_doubtful(tanh_robot, measure, fitted):
     """The robot rolls on with 0.02 m/s^2; the catalogue's coasting ends at 0.05."""
-    found = diagnose([measure(tanh_robot(coast_mps2=0.02), 13, 30.0)], fitted)
+    found = diagnose([measure(tanh_robot(coast_mps2=0.02), 13, 90.0)], fitted)
     assert "coasting" in found.found
     (doubt,) = (f for f in found.findings if f.effect == "coasting")
     drag = next(e for e in doubt.parameters if e.name == "coasting.deceleration_mps2")
@@ -470,3 +471,37 @@ def test_a_chaotic_swarm_is_judged_by_short_predictions(tanh_robot, measure, fit
     script_pct = np.rint(100 * duties[24:-24, 0]).astype(int)
     run = measure(robot, 7, script_pct=script_pct, spoil=filmed)
     assert compare([run], fitted).score == pytest.approx(1, abs=0.3)
+
+
+def test_a_wheel_that_is_far_weaker_than_is_usual_is_named_beyond_doubt(
+    tanh_robot, measure, fitted
+):
+    """A quarter less is more than motors of a kind differ by, but nothing else does the same."""
+
+    class Weak(tanh_robot):
+        def wheels_mps(self, duty):
+            return super().wheels_mps(duty) * (0.75, 1, 1, 1)
+
+    (weak, *others) = diagnose([measure(Weak(), 23, 40.0)], fitted).findings
+    assert weak.effect == "wheel_gain" and weak.certainty == "sure"
+    assert not others
+    size = next(e for e in weak.parameters if e.name == "wheel_gain.fl")
+    assert size.value < -0.15
+
+
+@pytest.mark.parametrize(
+    ("effect", "depends_on", "certainty"),
+    [
+        ("gain_slope", ["place"], "doubtful"),
+        ("gain_slope", ["speed"], "sure"),
+        ("carpet_grain", ["heading"], "doubtful"),
+        ("heading_bias", ["heading"], "doubtful"),
+        ("speed_curve", ["place"], "sure"),
+        ("refit", ["place"], "sure"),
+    ],
+)
+def test_what_leaves_a_rest_of_its_own_kind_has_another_form(effect, depends_on, certainty):
+    found = Finding(effect, None, [], 0.9, "sure")
+    (judged,) = of_another_form([found], depends_on)
+    assert judged.certainty == certainty
+    assert bool(judged.why) == (certainty == "doubtful")
