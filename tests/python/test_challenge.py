@@ -136,6 +136,16 @@ def test_the_right_name_alone_is_right():
     assert result["outcome"]["clean"] and not result["outcome"]["wrong_and_sure"]
 
 
+def test_a_doubtful_name_is_right_but_not_beyond_doubt():
+    case = case_of("one")
+    answer = found(case.hidden[0].name)
+    answer["findings"][0]["certainty"] = "doubtful"
+    outcome = scored(case, answer)["outcome"]
+    assert outcome["first"] and not outcome["verdict_right"] and not outcome["clean"]
+    nothing = scored(case_of("none"), answer)["outcome"]
+    assert nothing["alarm"] and not nothing["wrong_and_sure"]
+
+
 def test_all_names_in_one_group_are_wrong():
     case = case_of("one")
     outcome = scored(case, found(case.hidden[0].name, groups=[NAMES], verdict="ambiguous"))[

@@ -2,7 +2,8 @@
 """Whether what was said of a case is right, and the figures over all cases.
 
 Only what `twinmill diagnose --json` prints is looked at. A group of more than four names is as
-wrong as a wrong name, and every name beside the right one that is not there is counted.
+wrong as a wrong name, and every name beside the right one that is not there is counted. A doubtful
+finding is right if its name is; beyond doubt is a row of its own.
 """
 
 from collections import Counter
@@ -35,7 +36,7 @@ class Bar:
 
 BARS = (
     Bar("right_first", "one effect hidden: right first, or in its group", 0.95, True),
-    Bar("verdict_right", "the verdict right as well", 0.95, True),
+    Bar("verdict_right", "beyond doubt, and the verdict right as well", 0.95, True),
     Bar("clean", "and no other name", 0.95, True),
     Bar("rollers_first", "rollers: right first", 0.90, True),
     Bar("false_alarm", "nothing hidden: false alarms", 0.03, False),
@@ -49,12 +50,17 @@ BARS = (
 
 @dataclass(frozen=True)
 class Said:
-    """One finding: its name, the names it cannot be parted from, whether it is sure of it."""
+    """One finding: its name, the names it cannot be parted from, and how certain it is."""
 
     effect: str
     group: frozenset[str]
-    sure: bool
+    certainty: str
     parameters: tuple[dict, ...]
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is said to be this and nothing else."""
+        return self.certainty == "sure"
 
     @property
     def names(self) -> frozenset[str]:
@@ -84,9 +90,9 @@ def said(found: dict) -> list[Said]:
             if e in ranked
         ]
     return [
-        Said(effect, frozenset(group), certainty == "sure", tuple(parameters))
+        Said(effect, frozenset(group), certainty, tuple(parameters))
         for effect, group, certainty, parameters in rows
-        if effect in known and certainty != "doubtful"
+        if effect in known
     ]
 
 
@@ -99,20 +105,22 @@ def scored(case: Case, found: dict) -> dict:
     """
     every, there = said(found), _there(case)
     findings = [f for f in every if f.effect not in there]
+    firm = [f for f in findings if f.certainty != "doubtful"]
     right = [_accepted(h, case) for h in case.hidden if h.kind != "outside"]
     allowed = there.union(*right, *(h.kin for h in case.hidden))
-    others = [f.effect for f in findings if not (f.names or {f.effect}) & allowed]
+    others = [f.effect for f in firm if not (f.names or {f.effect}) & allowed]
     verdict = found["verdict"]
     told = _rest(found)
-    first = bool(findings) and bool(right) and bool(findings[0].names & frozenset().union(*right))
+    names = frozenset().union(*right)
+    beyond_doubt = bool(firm and firm[0].names & names) and verdict in NAMED
     outcome = {
-        "first": first,
-        "verdict_right": first and verdict in NAMED,
-        "clean": first and verdict in NAMED and not others,
+        "first": bool(findings and findings[0].names & names),
+        "verdict_right": beyond_doubt,
+        "clean": beyond_doubt and not others,
         "all": bool(right) and all(any(f.names & r for f in findings) for r in right),
-        "alarm": any(not f.names & there for f in findings)
+        "alarm": any(not f.names & there for f in firm)
         or verdict in ("outside_catalogue", "bad_input")
-        or (verdict in NAMED and not every),
+        or (verdict in NAMED and all(f.certainty == "doubtful" for f in every)),
         "told": verdict == "outside_catalogue" or told["share"] >= TOLD_REST,
         "depends": _depends(case.hidden, told),
         "others": others,
@@ -123,7 +131,7 @@ def scored(case: Case, found: dict) -> dict:
         "said": [sorted(f.group | {f.effect}) for f in findings],
         "rest": told,
         "outcome": outcome,
-        "estimates": [e for h in case.hidden for e in _estimates(h, findings)],
+        "estimates": [e for h in case.hidden for e in _estimates(h, firm)],
     }
 
 
