@@ -149,15 +149,23 @@ def findings_of(
 
 
 def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list[Finding]:
-    """Findings, doubtful where what is left still depends on what they act by: their form is wrong.
+    """Findings, doubtful where their form is wrong.
+
+    So it is where what is left still depends on what they act by, and where one makes the robot
+    later and another sooner: a lag below its own and a delay imitate a body that swings.
 
     Args:
         found: in the order of worth.
         depends_on: groups that what is left depends on.
     """
     cards = catalogue()
+    late_s = [_lateness_s(f) for f in found]
+    swings = min(late_s, default=0.0) < 0 < max(late_s, default=0.0)
 
     def judged(finding: Finding) -> Finding:
+        if swings and _lateness_s(finding):
+            why = "sooner by one lag and later by another is what a body does that swings"
+            return replace(finding, certainty="doubtful", why=why)
         card = cards.get(finding.effect, {"identify": (), "needs": ""})  # a refit has none
         acts_by = {*card["identify"], card["needs"]}
         on = next((group for group in depends_on if BY.get(group, set()) & acts_by), None)
@@ -167,6 +175,14 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
         return replace(finding, certainty="doubtful", why=why)
 
     return [f if f.why else judged(f) for f in found]
+
+
+def _lateness_s(finding: Finding) -> float:
+    """By how much a finding makes the motion later; 0 where it makes nothing late."""
+    part = late_part(finding.effect)
+    return next(
+        (e.value for e in finding.parameters if part and e.name.split(".", 1)[1] == part[1]), 0.0
+    )
 
 
 def with_stale_numbers(

@@ -18,7 +18,7 @@ from twinmill.fitting.fit import base_names, fit
 from twinmill.fitting.opening import open_measurements
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import base_parameters, effect_parameters
+from twinmill.model.parameters import ParameterEstimate, base_parameters, effect_parameters
 
 
 @pytest.fixture(scope="module")
@@ -505,3 +505,20 @@ def test_what_leaves_a_rest_of_its_own_kind_has_another_form(effect, depends_on,
     (judged,) = of_another_form([found], depends_on)
     assert judged.certainty == certainty
     assert bool(judged.why) == (certainty == "doubtful")
+
+
+@pytest.mark.parametrize(("extra_s", "certainty"), [(-0.06, "doubtful"), (0.06, "sure")])
+def test_sooner_by_one_lag_and_later_by_another_is_no_lag(extra_s, certainty):
+    """A body on a spring answers late and then fast; two lags in a row only answer later."""
+    sizes = {"input_delay.delay_s": 0.07, "motor_lag.extra_s": extra_s}
+    found = [
+        Finding(
+            name.split(".")[0],
+            None,
+            [ParameterEstimate(name, value, 0.01, "s", False, True)],
+            0.4,
+            "sure",
+        )
+        for name, value in sizes.items()
+    ]
+    assert [f.certainty for f in of_another_form(found, [])] == [certainty] * 2
