@@ -26,9 +26,7 @@ HORIZON = HORIZONS_S.index(0.5)
 MISSES = 1.5  # score of a final model whose errors are not noise
 WITHIN = 2.0  # standard deviations: a lag that differs by less is the model's own error
 BEYOND = 3.0  # usual sizes, or standard deviations from it at a bound: doubtful beyond ...
-NEAR = (
-    0.5  # ... if another effect leaves no more of the squared score besides, or something is left
-)
+NEAR = 0.5  # ... if another leaves less than this more of the squared score, or a rest is left
 STAY_S = 2.0  # at a place or away from it: less is passing by
 STAYS = 3  # fewer are one change at one moment
 # Groups of a rest, and what the cards of effects that act by them need or are shown by.
