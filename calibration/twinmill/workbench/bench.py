@@ -82,6 +82,7 @@ class Bench:
         await self._read.wait()
         self._heed()
         await asyncio.to_thread(self.session.conclude)
+        self._show_worst()
         self.opening = ""
         self.changed("work", "model", "score", "prediction")
 
@@ -94,8 +95,16 @@ class Bench:
         picked = self.session.measurements[self.picked]
         self.session.heed(self._checks.result["findings"])
         places = [k for k, m in enumerate(self.session.measurements) if m is picked]
-        self.view["robot"] = places[0] if places else 0
+        if "robot" in self.view:
+            self.view["robot"] = places[0] if places else 0
         self.changed("robots", "names", "model", "findings")
+
+    def _show_worst(self) -> None:
+        """The robot that the model misses most, unless the user has begun to look elsewhere."""
+        known = {k: score for k, score in self.session.own_scores().items() if score > 0}
+        if known and not self.view.keys() & {"robot", "t"}:
+            self.view["robot"] = max(known, key=known.get)
+            self.changed("robots")
 
     def changed(self, *what: str) -> None:
         """Notes what a screen must draw anew."""

@@ -95,9 +95,15 @@ def _chart(regimes: list[Regime]) -> dict:
                 "data": bars,
                 "barWidth": "66%",
                 "cursor": "pointer",
-                "label": {"show": True, "position": "right", "fontSize": 11},
+                "label": {
+                    "show": True,
+                    "position": "right",
+                    "fontSize": 11,
+                    "backgroundColor": "#ffffff",
+                },
                 "markLine": {
                     "silent": True,
+                    "z": 1,  # below the words
                     "symbol": "none",
                     "label": {"show": False},
                     "lineStyle": {"color": "#3c3c3c", "type": "dashed"},

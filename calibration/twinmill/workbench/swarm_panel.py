@@ -9,7 +9,16 @@ from twinmill.swarm.classes import COLORS
 from twinmill.workbench.panel import Hands, scored
 from twinmill.workbench.swarm import STARTS
 
-AXIS = {"nameLocation": "middle", "splitLine": {"show": False}, "axisLabel": {"fontSize": 11}}
+AXIS = {
+    "nameLocation": "middle",
+    "splitLine": {"show": False},
+    "axisLabel": {"fontSize": 11, "showMinLabel": False, "showMaxLabel": False},
+}
+WAITING = (
+    "Shown then: the swarm with the model as given and with the model now, from above, side by "
+    "side; how many of {} starts end in which behaviour; and where both models lie on the phase "
+    "diagram of speed and turn rate."
+)
 CELL_PX = (31, 21)
 LEAST = 1e-3  # m/s or rad/s, below which nothing moves
 SHOWN = ("circliness", "radius_m", "rotation", "groups", "contacts")
@@ -36,7 +45,9 @@ class SwarmPanel:
             self.button.props('dense unelevated no-caps padding="2px 16px" data-testid="run-twin"')
             self.progress = ui.label().classes("soft").style("flex: 1")
         self.failure = ui.label().classes("note wrong")
-        ui.html('<canvas id="swarm"></canvas>', sanitize=False).classes("sheet swarm")
+        self.waiting = ui.label(WAITING.format(STARTS)).classes("soft")
+        self.sheet = ui.html('<canvas id="swarm"></canvas>', sanitize=False)
+        self.sheet.classes("sheet swarm")
         self.body = ui.element("div").classes("stack").props('data-testid="swarm-table"')
         self.draw_progress()
 
@@ -66,6 +77,8 @@ class SwarmPanel:
         self.draw_progress()
         self.body.clear()
         swarm = self.bench.session.swarm
+        self.waiting.set_visibility(swarm is None)
+        self.sheet.set_visibility(swarm is not None)
         if swarm is None:
             return
         labels = list(swarm["swarms"])

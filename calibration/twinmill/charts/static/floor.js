@@ -101,15 +101,22 @@ export class Floor {
     g.textAlign = "left";
     g.textBaseline = "middle";
     const low = (this.foot - h) / this.scale;
-    for (const y of ticks(low, low + h / this.scale, (w / 90) * (h / w)).at) {
+    const up = ticks(low, low + h / this.scale, (w / 90) * (h / w));
+    for (const y of up.at) {
       this._stroke(g, 0, this._y(y), w, this._y(y));
-      if (this._y(y) > 14 && this._y(y) < h - 18) {
-        g.fillText(worded(y, across.step), 4, this._y(y) - 7);
+      if (this._y(y) > this._keyPx() && this._y(y) < h - 18) {
+        g.fillText(worded(y, up.step), 4, this._y(y) - 7);
       }
     }
     g.textAlign = "right";
     g.textBaseline = "bottom";
     g.fillText("x, y in m", w - 5, h - 3);
+  }
+
+  /** What the key covers at the top, with half a line of numbers. */
+  _keyPx() {
+    const key = this.sheet.canvas.parentElement.querySelector(".key");
+    return 14 + (key ? key.offsetTop + key.offsetHeight : 0);
   }
 
   _stroke(g, x0, y0, x1, y1) {
