@@ -89,6 +89,7 @@ def test_one_robot_is_no_swarm(write_log, message):
     ("--plant planar --behavior milling --n 6 --duration-s 40", "paper.toml"),
     ("--plant planar --behavior diffusing --n 9 --duration-s 12 --seed 5", "turbopi.toml"),
     ("--plant planar --behavior milling:2,self_centering:2 --n 4 --duration-s 4", "turbopi.toml"),
+    ("--plant planar --behavior self_centering:1,milling:4 --n 5 --duration-s 4", "turbopi.toml"),
     ("--plant mujoco --n 10 --start disc --spread-m 1.2 --duration-s 3", "turbopi.toml"),
     ("--plant planar --n 4 --duration-s 15 --pose-rate-hz 27", "turbopi.toml"),
 ])  # fmt: skip

@@ -227,6 +227,12 @@ def test_the_first_species_takes_up_the_rest():
         assert len(tables) == point[0] and ring == point[0] - 1
 
 
+def test_the_ring_is_of_the_most_frequent_species_as_twin_run_and_metrics_have_it():
+    tables, ring = request(behavior="self_centering:1,milling:4").species(None)
+    assert ring == 4
+    assert tables == request(behavior="milling:4,self_centering:1").species(None)[0]
+
+
 def test_effects_take_the_full_path_and_say_so(tmp_path: Path):
     asked = request(
         ["spread_m=1,2"], model="turbopi.toml", seeds=1, duration_s=0.5, start="facing-out"

@@ -107,6 +107,16 @@ TEST(ParseSpecies, CountsMustAddUpAndNamesBeKnown)
     EXPECT_NE(ErrorOf([] { ParseSpecies("miling", 6); }).find("milling"), std::string::npos);
 }
 
+TEST(RingOf, IsOfTheMostFrequentBehaviour)
+{
+    const auto ring_of = [](const char *text) { return RingOf(ParseSpecies(text, std::nullopt)); };
+    EXPECT_EQ(ring_of("milling:1,diffusing:3").order, (std::vector<size_t>{1, 2, 3, 0}));
+    EXPECT_EQ(ring_of("milling:1,diffusing:3").size, 3u);
+    EXPECT_EQ(ring_of("diffusing:2,milling:2").order, (std::vector<size_t>{0, 1, 2, 3}));
+    EXPECT_EQ(ring_of("diffusing:2,milling:2").size, 2u);
+    EXPECT_EQ(ring_of("milling:1,diffusing:1,milling:1").order, (std::vector<size_t>{0, 2, 1}));
+}
+
 TEST(Script, HoldsEachRowUntilTheNext)
 {
     const auto script =

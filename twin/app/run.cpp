@@ -148,14 +148,6 @@ bool OpenOutlet(const Options &options, Outlet &outlet)
     }
 }
 
-size_t RingSize(const Setup &setup)
-{
-    size_t size = 0;
-    while (size < setup.behaviors.size() && setup.behaviors[size] == setup.behaviors.front())
-        ++size;
-    return size;
-}
-
 // Steps, publishes and measures until the time is over or a signal comes.
 class Loop
 {
@@ -164,7 +156,7 @@ public:
          double realtime_factor)
         : duration_s_(duration_s),
           realtime_factor_(realtime_factor),
-          ring_size_(RingSize(setup)),
+          ring_(RingOf(setup.behaviors)),
           scale_{setup.model.sensor.range_m, setup.model.robot.body_radius_m},
           show_(!options.json)
     {
@@ -196,7 +188,7 @@ public:
     // Of the poses as they were published: what `twinmill metrics` says of the log.
     Metrics Mean(const Publisher &publisher) const
     {
-        return publisher.recent().Mean(ring_size_, scale_);
+        return publisher.recent().Mean(ring_, scale_);
     }
 
 private:
@@ -205,9 +197,9 @@ private:
         if (!show_ || !progress_.IsDue(WallS()))
             return;
         states_.clear();
-        for (int i = 0; i < swarm.Size(); ++i)
-            states_.push_back(swarm.State(i));
-        progress_.Show(swarm.TimeS(), duration_s_, WallS(), Measure(states_, ring_size_, scale_));
+        for (const size_t robot : ring_.order)
+            states_.push_back(swarm.State(static_cast<int>(robot)));
+        progress_.Show(swarm.TimeS(), duration_s_, WallS(), Measure(states_, ring_.size, scale_));
     }
 
     void KeepPace(double t_s)
@@ -225,7 +217,7 @@ private:
     Clock::time_point begin_ = Clock::now();
     std::optional<double> duration_s_;
     double realtime_factor_;
-    size_t ring_size_;
+    Ring ring_;
     MetricScale scale_;
     bool show_;
     std::vector<RobotState> states_;

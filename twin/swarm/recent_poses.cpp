@@ -84,7 +84,7 @@ void RecentPoses::Add(int robot, double t_s, const Pose2 &pose)
         track.samples.pop_front();
 }
 
-Metrics RecentPoses::Mean(size_t ring_size, const MetricScale &scale) const
+Metrics RecentPoses::Mean(const Ring &ring, const MetricScale &scale) const
 {
     double first_s = -std::numeric_limits<double>::infinity(), last_s = -first_s;
     for (const Track &track : tracks_)
@@ -101,13 +101,13 @@ Metrics RecentPoses::Mean(size_t ring_size, const MetricScale &scale) const
     std::vector<std::vector<Pose2>> poses(tracks_.size());
     for (size_t i = 0; i < tracks_.size(); ++i)
         for (int k = from; k < count; ++k)
-            poses[i].push_back(Between(tracks_[i].samples, first_s + k * kGrid_s));
+            poses[i].push_back(Between(tracks_[ring.order[i]].samples, first_s + k * kGrid_s));
     std::vector<RobotState> states(tracks_.size());
     for (int k = begin; k < count; ++k)
     {
         for (size_t i = 0; i < states.size(); ++i)
             states[i] = StateAt(poses[i], static_cast<size_t>(k - from));
-        window.Add(k * kGrid_s, Measure(states, ring_size, scale));
+        window.Add(k * kGrid_s, Measure(states, ring.size, scale));
     }
     return window.Mean();
 }

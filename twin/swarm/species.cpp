@@ -81,4 +81,16 @@ std::vector<const fw_behavior *> ParseSpecies(const std::string &text, std::opti
     return robots;
 }
 
+Ring RingOf(std::span<const fw_behavior *const> robots)
+{
+    const auto count = [&](const fw_behavior *of) { return std::ranges::count(robots, of); };
+    const fw_behavior *usual = *std::ranges::max_element(robots, {}, count);
+    Ring ring{{}, static_cast<size_t>(count(usual))};
+    for (const bool of_ring : {true, false})
+        for (size_t i = 0; i < robots.size(); ++i)
+            if ((robots[i] == usual) == of_ring)
+                ring.order.push_back(i);
+    return ring;
+}
+
 }  // namespace twin

@@ -5,6 +5,7 @@ import hashlib
 import itertools
 import json
 import math
+from collections import Counter
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
@@ -90,21 +91,24 @@ class Request:
         return self.first_seed + (worlds % self.seeds if self.same_seeds else worlds)
 
     def species(self, n: int | None) -> tuple[list[list[int]], int]:
-        """Tables of all robots, and how many of the first species make the ring.
+        """Tables of all robots, the ring's first, and how many of these there are.
 
-        Where a mix is given and `n` differs from its sum, the first species takes up the rest.
+        The ring is of the most frequent species, of equally many the first. Where a mix is given
+        and `n` differs from its sum, the first species takes up the rest.
         """
         mixed = ":" in self.behavior
         robots = native.species(self.behavior, None if mixed else n, self.tables)
-        ring = sum(name == robots[0][0] for name, _ in robots)
+        counts, rows = Counter(name for name, _ in robots), dict(robots)
+        first = robots[0][0]
         wanted = len(robots) if n is None else n
-        if not 1 <= wanted <= MAX_ROBOTS or wanted <= len(robots) - ring:
+        others = len(robots) - counts[first]
+        if not 1 <= wanted <= MAX_ROBOTS or wanted <= others:
             raise ValueError(
-                f"{wanted} robots: from {len(robots) - ring + 1} to {MAX_ROBOTS} can run "
-                f"'{self.behavior}'."
+                f"{wanted} robots: from {others + 1} to {MAX_ROBOTS} can run '{self.behavior}'."
             )
-        ring += wanted - len(robots)
-        return [robots[0][1]] * ring + [row for name, row in robots if name != robots[0][0]], ring
+        counts[first] = wanted - others
+        order = counts.most_common()  # of equally many the first
+        return [rows[name] for name, count in order for _ in range(count)], order[0][1]
 
     def cell(self, point: tuple[float, ...]) -> native.Cell:
         """The swarm at these axis values.

@@ -6,6 +6,7 @@
 #include <array>
 #include <deque>
 #include <span>
+#include <vector>
 
 #include "plant/plant.h"
 
@@ -43,6 +44,13 @@ struct MetricScale
 // How a robot with this velocity in its own frame moves, see CourseColumn.
 using Course = std::array<double, 4>;
 Course CourseOf(double vx_mps, double vy_mps, double omega_radps);
+
+// Which robots make the ring: the first `size` of `order`, which has all robots.
+struct Ring
+{
+    std::vector<size_t> order;
+    size_t size;
+};
 
 // The first `ring_size` robots make the ring; those after them are odd.
 Metrics Measure(std::span<const RobotState> robots, size_t ring_size, const MetricScale &scale);

@@ -29,7 +29,7 @@ public:
     // Over the newest 10 s, at times 50 ms apart, velocities fitted to the poses (Savitzky and
     // Golay 1964, 9 points, second order), as calibration/twinmill/swarm/metrics.py does. NaN while
     // there are fewer times than that.
-    Metrics Mean(size_t ring_size, const MetricScale &scale) const;
+    Metrics Mean(const Ring &ring, const MetricScale &scale) const;
 
 private:
     struct Track

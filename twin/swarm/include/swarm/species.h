@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fw/behavior.h"
+#include "swarm/metrics.h"
 
 namespace twin
 {
@@ -21,6 +22,9 @@ const fw_behavior *FindBehavior(const std::string &name, std::span<const fw_beha
 // is neither the firmware's nor one of `own`, or the counts do not add up to n.
 std::vector<const fw_behavior *> ParseSpecies(const std::string &text, std::optional<int> n,
                                               std::span<const fw_behavior> own = {});
+
+// The robots of the most frequent behaviour, of equally many that of the first robot among them.
+Ring RingOf(std::span<const fw_behavior *const> robots);
 
 }  // namespace twin
 
