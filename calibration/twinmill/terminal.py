@@ -1,13 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables in terminals of any width: no word of them is cut."""
+"""Tables and progress in terminals of any width: no word or number of them is cut."""
 
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderResult
 from rich.measure import Measurement
-from rich.table import Table
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Column, Table
 from rich.text import Text
 
 MOST_WIDE = 1000  # columns that no terminal has
+BAR_FROM = 60  # columns of a terminal that has room for more than words and numbers
 
 
 class Fitting:
@@ -39,3 +51,43 @@ class Fitting:
         if self.made.caption:
             yield Text(str(self.made.caption), "dim")
         yield Text()
+
+
+def progress_bar(counted: bool = True) -> Progress:
+    """Work done and time left, on stderr if that is a terminal; gone when the work is done.
+
+    Args:
+        counted: says how many are done of how many; else per cent.
+    """
+    done = MofNCompleteColumn if counted else TaskProgressColumn
+    columns = [SpinnerColumn(), _words(), done(table_column=_whole())]
+    if Console(stderr=True).width >= BAR_FROM:
+        columns.insert(2, BarColumn(bar_width=None, table_column=Column(max_width=40)))
+        columns.append(TimeElapsedColumn(table_column=_whole()))
+    left = TextColumn("left", table_column=_whole())
+    return _shown([*columns, left, TimeRemainingColumn(table_column=_whole())])
+
+
+def progress_words(transient: bool = True) -> Progress:
+    """What is being done and for how long, on stderr if that is a terminal.
+
+    Args:
+        transient: it is gone when the work is done.
+    """
+    columns = [SpinnerColumn(), _words(), TimeElapsedColumn(table_column=_whole())]
+    return _shown(columns, transient)
+
+
+def _shown(columns: list[ProgressColumn], transient: bool = True) -> Progress:
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=transient, disable=not console.is_terminal)
+
+
+def _words() -> TextColumn:
+    """What is being done; it wraps."""
+    return TextColumn("{task.description}", table_column=Column(overflow="fold"))
+
+
+def _whole() -> Column:
+    """Of numbers, which do not wrap."""
+    return Column(no_wrap=True)

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from twinmill.robots.fleet import Robot
-from twinmill.terminal import Fitting
+from twinmill.terminal import Fitting, progress_bar, progress_words
 from twinmill_cli import main as cli
 from twinmill_cli.swarm import status_table
 
@@ -33,6 +33,21 @@ def test_a_long_name_is_not_cut_for_the_sake_of_a_cell_that_can_wrap(columns):
     for word in ("a_rather_long_name.png", "31279", "32768"):
         assert word in told
     assert max(map(len, told.splitlines())) <= columns
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_progress_keeps_its_words_and_numbers(columns, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    words = "running all again, seeds and models fresh"
+    for made, numbers in (
+        (progress_bar(), ["12345/67890", "left -:--:--"]),
+        (progress_bar(counted=False), ["18%", "left -:--:--"]),
+        (progress_words(), ["0:00:00"]),
+    ):
+        made.add_task(words, total=67890, completed=12345)
+        shown = printed(made.get_renderable(), columns)
+        assert [word for word in (*words.split(), *numbers) if word not in shown] == []
+        assert max(map(len, shown.splitlines())) <= columns
 
 
 @pytest.mark.parametrize("columns", WIDTHS)

@@ -26,7 +26,6 @@ if working():  # not for --help
 
     import numpy as np
     from rich.console import Console
-    from rich.progress import MofNCompleteColumn, Progress, TimeRemainingColumn
 
     import twinmill as tm
     from twinmill.challenge.cases import Case, calibration, draw, draw_robots, make_log, seal
@@ -37,6 +36,7 @@ if working():  # not for --help
     from twinmill.files import check_new_folder
     from twinmill.model.model_file import write_whole
     from twinmill.report import challenge as page
+    from twinmill.terminal import progress_bar
     from twinmill_cli.main import run
 
 DONE = "done"  # folder of the cases that are done, while others are not
@@ -83,17 +83,18 @@ def _challenge(
     """
     check_new_folder(out)
     (out / DONE).mkdir(parents=True, exist_ok=True)
-    console, workers = Console(stderr=True), workers or os.cpu_count() or 1
+    workers = workers or os.cpu_count() or 1
     if intervals:
-        return _intervals(out, intervals, seed, duration_s, workers, console, as_json)
+        return _intervals(out, intervals, seed, duration_s, workers, as_json)
     robots = draw_robots(seed)
     cases = [draw(number, seed, robots, duration_s) for number in range(count)]
     answers = seal(cases)
-    console.print(f"sealed answers: sha256 {hashlib.sha256(answers.encode()).hexdigest()}")
+    digest = hashlib.sha256(answers.encode()).hexdigest()
+    Console(stderr=True).print(f"sealed answers: sha256 {digest}", soft_wrap=True)
     driven = sorted({case.robot for case in cases})
     bases = {k: base_of(out, k, robots[k], seed, duration_s) for k in driven}
     results, times_s = {}, {}
-    for number, result, time_s in _all(out, bases, cases, workers, console):
+    for number, result, time_s in _all(out, bases, cases, workers):
         results[number], times_s[number] = result, time_s
     ordered = [results[case.number] for case in cases]
     found = {"seed": seed, "duration_s": duration_s, **summary(ordered), "cases": ordered}
@@ -156,12 +157,11 @@ def _intervals(
     seed: int,
     duration_s: float,
     workers: int,
-    console: Console,
     as_json: bool,
 ) -> dict:
     """Fits drives whose numbers are known, and counts how often intervals cover them."""
     calls = [(_fitted, out, number, seed, duration_s) for number in range(count)]
-    rows = dict(_done(calls, "fitting", workers, console))
+    rows = dict(_done(calls, "fitting", workers))
     found = {
         "seed": seed,
         "duration_s": duration_s,
@@ -192,21 +192,17 @@ def _fitted(folder: Path, number: int, seed: int, duration_s: float) -> tuple[in
 
 
 def _all(
-    folder: Path, bases: dict[int, Path], cases: Sequence[Case], workers: int, console: Console
+    folder: Path, bases: dict[int, Path], cases: Sequence[Case], workers: int
 ) -> Iterator[tuple[int, dict, float]]:
     """Every case as it is done: number, result, time."""
     calls = [(_one, folder, bases[case.robot], case) for case in cases]
-    yield from _done(calls, "diagnosing", workers, console)
+    yield from _done(calls, "diagnosing", workers)
 
 
-def _done(calls: Sequence[tuple], what: str, workers: int, console: Console) -> Iterator:
+def _done(calls: Sequence[tuple], what: str, workers: int) -> Iterator:
     """What functions with their arguments return, as each is done; shows progress and time left."""
-    columns = (*Progress.get_default_columns()[:-1], MofNCompleteColumn(), TimeRemainingColumn())
     pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
-    with (
-        Progress(*columns, console=console, disable=not console.is_terminal) as progress,
-        pool as running,
-    ):
+    with progress_bar() as progress, pool as running:
         waiting = [running.submit(*call) for call in calls]
         for done in progress.track(as_completed(waiting), len(calls), description=what):
             yield done.result()

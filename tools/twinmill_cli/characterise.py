@@ -31,8 +31,6 @@ from twinmill_cli.output import AsJson, deliver
 if working():  # not for --help
     import numpy as np
     import turbopi
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     from twinmill.data.log import LogError
     from twinmill.data.measurement_table import read_header, read_table
@@ -45,6 +43,7 @@ if working():  # not for --help
     from twinmill.robots.fleet import RUN_PERIOD_S, Fleet
     from twinmill.robots.key import load
     from twinmill.robots.remote import Remote
+    from twinmill.terminal import progress_bar
     from twinmill_cli.keyboard import any_key
     from twinmill_cli.ros_script import write_script
     from twinmill_cli.swarm import refuse_doubles, warn_of_clocks
@@ -309,11 +308,7 @@ class Run:
         self, what: str, duration_s: float | None, pressed: Callable[[], bool]
     ) -> Iterator[None]:
         """Shows how long something takes on stderr, and ends it by Abort if it must not go on."""
-        console = Console(stderr=True)
-        columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-        with Progress(
-            *columns, console=console, transient=True, disable=not console.is_terminal
-        ) as progress:
+        with progress_bar(counted=False) as progress:
             task, begin_s = progress.add_task(what, total=duration_s), time.monotonic()
 
             def watch() -> None:

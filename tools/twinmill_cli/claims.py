@@ -33,7 +33,7 @@ if working():  # not for --help
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import Provenance, Section, show, write_report
     from twinmill.report.tables import Cell, Table, number
-    from twinmill.swarm.sweep import progress_bar
+    from twinmill.terminal import progress_bar
     from twinmill_cli.process import process
 
     CHECKED = {**CLAIMS, "process": process}

@@ -41,7 +41,8 @@ if working():  # not for --help
         twin_values,
     )
     from twinmill.swarm.metrics import STEP_S, SwarmSeries, swarm_metrics
-    from twinmill.swarm.sweep import parse_table, progress_bar
+    from twinmill.swarm.sweep import parse_table
+    from twinmill.terminal import progress_bar
     from twinmill_cli.frame import command_line, open_model, provenance
     from twinmill_cli.metrics import robot_ids
 

@@ -32,7 +32,8 @@ if working():  # not for --help
     )
     from twinmill.swarm.discover.kinds import KIND_COLORS
     from twinmill.swarm.discover.search import Hunt, search
-    from twinmill.swarm.sweep import make_request, progress_bar
+    from twinmill.swarm.sweep import make_request
+    from twinmill.terminal import progress_bar
 
 NOTE = (
     "A search by quality and diversity: of each sort of swarm it keeps the one that does the same "

@@ -17,8 +17,7 @@ if working():  # not for --help
     from concurrent.futures import Future, ThreadPoolExecutor
 
     from rich import box
-    from rich.console import Console, Group
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.console import Group
     from rich.table import Table
     from rich.text import Text
 
@@ -34,7 +33,7 @@ if working():  # not for --help
         update,
     )
     from twinmill.swarm.behaviors import find_file, read_tables
-    from twinmill.terminal import Fitting
+    from twinmill.terminal import Fitting, progress_words
 
 AT_ONCE = 16
 
@@ -163,12 +162,7 @@ def _parse_settings(pairs: list[str]) -> dict[str, str]:
 
 def _update_all(targets: list[Target], request: UpdateRequest, fleet: Fleet) -> list[Outcome]:
     """All at once, one line of progress each on stderr, while this thread hears the bus."""
-    console = Console(stderr=True)
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with (
-        Progress(*columns, console=console, disable=not console.is_terminal) as progress,
-        ThreadPoolExecutor(AT_ONCE) as pool,
-    ):
+    with progress_words(transient=False) as progress, ThreadPoolExecutor(AT_ONCE) as pool:
         futures: list[Future[Outcome]] = []
         for target in targets:
             line = progress.add_task(f"{target.host}: waits", total=1)

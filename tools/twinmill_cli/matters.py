@@ -41,7 +41,8 @@ if working():  # not for --help
     from twinmill.swarm.phase import phase_of
     from twinmill.swarm.request import Request
     from twinmill.swarm.store import read_sweep
-    from twinmill.swarm.sweep import make_request, progress_bar, run_missing
+    from twinmill.swarm.sweep import make_request, run_missing
+    from twinmill.terminal import progress_bar
     from twinmill_cli.frame import load, provenance
 
 SHOWN = 12  # sentences in the terminal

@@ -29,6 +29,7 @@ if working():  # not for --help
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import next_run as present
     from twinmill.swarm.classes import goal_of
+    from twinmill.terminal import progress_bar
     from twinmill_cli.frame import command_line, finish, load, open_model, provenance
     from twinmill_cli.ros_script import check_new_script, ros_path, write_script
 
@@ -124,7 +125,6 @@ def _narrowing(
 ) -> Narrowing:
     """Runs the swarms, then designs the drive."""
     from twinmill.swarm.narrowing import design_for, spread_of
-    from twinmill.swarm.sweep import progress_bar
 
     check(measurements, model_file, limits)
     with progress_bar() as progress:

@@ -14,9 +14,9 @@ from twinmill_cli.lazy import working
 
 if working():  # not for --help
     from rich.console import Console, RenderableType
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     from twinmill.files import plain
+    from twinmill.terminal import progress_words
 
 AsJson = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on stdout, nothing else.")
@@ -41,10 +41,6 @@ def busy(what: str) -> Iterator[None]:
 @contextmanager
 def telling(what: str) -> Iterator[Callable[[str], None]]:
     """The same, with a function that tells in words where the work has got to."""
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    console = Console(stderr=True)
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
+    with progress_words() as progress:
         task = progress.add_task(what, total=None)
         yield lambda words: progress.update(task, description=f"{what}: {words}")

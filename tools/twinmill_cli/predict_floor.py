@@ -17,7 +17,7 @@ if working():  # not for --help
     from twinmill.swarm.forecast.draws import forecast, knows_errors, out_of_bounds
     from twinmill.swarm.forecast.plan import PLAN, SEALED, Plan, in_random_order, write_plan
     from twinmill.swarm.store import read_sweep
-    from twinmill.swarm.sweep import progress_bar
+    from twinmill.terminal import progress_bar
 
 RUNS = "draws"  # folder in the plan's
 

@@ -19,14 +19,13 @@ if working():  # not for --help
     import numpy as np
     from rich import box as frame
     from rich.console import Console, Group
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
     from rich.table import Table
     from rich.text import Text
 
     from twinmill.data.bus import open_bus
     from twinmill.data.importers.plain import Columns, read_commands
     from twinmill.files import check_new_file
-    from twinmill.terminal import Fitting
+    from twinmill.terminal import Fitting, progress_bar
     from twinmill.track.align import align
     from twinmill.track.boards import Board
     from twinmill.track.camera import Camera, read_camera
@@ -337,11 +336,7 @@ def _check_size(who: str, size_px: tuple[int, int], camera: Camera) -> None:
 
 def _shown(what: str, film: Film) -> Iterator[tuple[float, np.ndarray]]:
     """The film's frames, with progress and time left on stderr if that is a terminal."""
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
+    with progress_bar(counted=False) as progress:
         yield from progress.track(film.frames(), total=film.count or None, description=what)
 
 

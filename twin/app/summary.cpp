@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "summary.h"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 namespace twin
 {
@@ -12,6 +14,30 @@ namespace
 {
 
 constexpr double kShowEvery_s = 0.5;
+
+std::string Format(const char *format, double value)
+{
+    char text[64];
+    std::snprintf(text, sizeof text, format, value);
+    return text;
+}
+
+// Of the terminal that stderr is.
+size_t Columns()
+{
+    winsize size{};
+    return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col ? size.ws_col : 80;
+}
+
+// As many of the parts as stand in one line, which could not be written over otherwise.
+std::string Joined(const std::vector<std::string> &parts, size_t columns)
+{
+    std::string line = parts.front();
+    for (size_t i = 1; i < parts.size(); ++i)
+        if (line.size() + 2 + parts[i].size() < columns)
+            line += ", " + parts[i];
+    return line;
+}
 
 void PrintText(const Options &options, const Result &result)
 {
@@ -75,11 +101,12 @@ bool Progress::IsDue(double wall_s) const
 void Progress::Show(double t_s, std::optional<double> duration_s, double wall_s, const Metrics &now)
 {
     shown_wall_s_ = wall_s;
-    std::fprintf(stderr, "\r%.1f s, %.1f times real time, circliness %.3f", t_s, t_s / wall_s,
-                 now.circliness);
+    std::vector<std::string> parts{Format("%.1f s", t_s)};
     if (duration_s && t_s > 0)
-        std::fprintf(stderr, ", %.0f s left", (*duration_s - t_s) * wall_s / t_s);
-    std::fprintf(stderr, "\x1b[K");
+        parts.push_back(Format("%.0f s left", (*duration_s - t_s) * wall_s / t_s));
+    parts.push_back(Format("circliness %.3f", now.circliness));
+    parts.push_back(Format("%.1f times real time", t_s / wall_s));
+    std::fprintf(stderr, "\r%s\x1b[K", Joined(parts, Columns()).c_str());
     std::fflush(stderr);
 }
 

@@ -7,7 +7,6 @@ import difflib
 import gzip
 import io
 import re
-import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -16,11 +15,10 @@ from pathlib import Path
 from typing import TextIO
 
 import numpy as np
-import rich.progress
-from rich.console import Console
 
 from twinmill.data.log import LogError
 from twinmill.data.units import UNITS, split_unit
+from twinmill.terminal import progress_bar
 
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
@@ -41,14 +39,10 @@ def open_text(path: Path) -> Iterator[TextIO]:
         LogError: it cannot be read, is no text, or ends in `.gz` and is not gzip.
     """
     try:
-        with rich.progress.open(
-            path,
-            "rb",
-            description=path.name,
-            transient=True,
-            console=Console(stderr=True),
-            disable=not sys.stderr.isatty(),
-        ) as raw:
+        with (
+            progress_bar(counted=False) as progress,
+            progress.open(path, "rb", description=path.name) as raw,
+        ):
             binary = gzip.GzipFile(fileobj=raw) if path.suffix == ".gz" else raw
             buffered = io.BufferedReader(binary, BEGINNING_BYTES)
             yield io.TextIOWrapper(buffered, _encoding(buffered), newline="")

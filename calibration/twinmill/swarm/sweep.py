@@ -7,23 +7,13 @@ from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-
 from twinmill.files import check_new_folder
 from twinmill.model.model_file import ModelFile
 from twinmill.swarm.axes import parse_axis
 from twinmill.swarm.request import PLANTS, Request
 from twinmill.swarm.store import Store, read_sweep
 from twinmill.swarm.workers import run_here, run_on_dask
+from twinmill.terminal import progress_bar
 
 
 def make_request(
@@ -146,23 +136,3 @@ def _summary(request: Request, folder: Path, begin_s: float) -> dict:
         "plant": request.plant,
         "wall_s": wall_s,
     }
-
-
-def progress_bar() -> Progress:
-    """Work done and time left, on stderr if that is a terminal."""
-    console = Console(stderr=True)
-    columns = (
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-    )
-    return Progress(
-        *columns,
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )

@@ -19,8 +19,6 @@ from typing import Any
 
 import numpy as np
 import turbopi
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from twinmill.data.importers.ros_cut import is_cut, write_whole
 from twinmill.data.importers.ros_frames import Frames, on_floor
@@ -40,6 +38,7 @@ from twinmill.data.importers.ros_messages import (
 )
 from twinmill.data.importers.series import CommandSeries, PoseSeries
 from twinmill.data.log import LogError
+from twinmill.terminal import progress_bar
 
 WIDTH = 4  # wheels; velocity commands have a zero in the last place
 LONGEST_REASON = 200  # letters of what the library says
@@ -469,11 +468,7 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
 
 def _shown(path: Path, count: int, messages: Iterator) -> Iterator:
     """The messages, with progress and time left on stderr if that is a terminal."""
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
+    with progress_bar(counted=False) as progress:
         yield from progress.track(messages, total=count, description=path.name)
 
 
