@@ -22,23 +22,39 @@ MOST_WIDE = 1000  # columns that no terminal has
 BAR_FROM = 60  # columns of a terminal that has room for more than words and numbers
 
 
+def whole(command: str) -> Text:
+    """A command line that does not wrap, to be copied."""
+    return Text(f"  {command}", no_wrap=True, overflow="ignore")
+
+
 class Fitting:
     """A table, or where the terminal is too narrow for it, each of its rows in running text.
 
     Args:
         made: the table; its columns are as wide as their longest word, or cell if they do not wrap.
+            Where that is too wide, columns that stand left wrap.
     """
 
     def __init__(self, made: Table) -> None:
         self.made = made
-        for column in made.columns:
+        self._set_least()
+
+    def _set_least(self) -> None:
+        for column in self.made.columns:
             parts = str.splitlines if column.no_wrap else str.split
             cells = (str(cell) for cell in (column.header, *column.cells))
             column.min_width = max((cell_len(part) for c in cells for part in parts(c)), default=0)
 
+    def _fits(self, console: Console, options: ConsoleOptions) -> bool:
+        wide = options.update(max_width=MOST_WIDE)
+        return Measurement.get(console, wide, self.made).minimum <= options.max_width
+
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        needed = Measurement.get(console, options.update(max_width=MOST_WIDE), self.made).minimum
-        if needed <= options.max_width:
+        if not self._fits(console, options):
+            for column in self.made.columns:
+                column.no_wrap &= column.justify != "left"
+            self._set_least()
+        if self._fits(console, options):
             yield self.made
             return
         if self.made.title:

@@ -50,6 +50,7 @@ COMMANDS = {name: cli.LazyCommand(name, f"twinmill_cli.{m}", "") for name, m, _ 
 PROGRAM = r"(?:build/bin/|\.venv/bin/)?((?:twinmill|twin_run|twin_sweep|make) "
 LINE = re.compile(rf"^(?:    |\$ ){PROGRAM}.*)", re.M)
 FENCED = re.compile(r"^```\w*\n(.*?)^```", re.M | re.S)
+ON_A_LINE = re.compile(rf"^  (?:cd \S+ && )?{PROGRAM}.*)", re.M)  # of what a command prints
 IN_FENCE = re.compile(rf"^{PROGRAM}.*)", re.M)
 EXAMPLE = re.compile(r"^ +Example: (twinmill .*)$", re.M)
 QUOTED = re.compile(r"`((?:twinmill|twin_run|twin_sweep|make) [a-z-][^`]*)`")
@@ -181,6 +182,32 @@ def drive(swarm) -> Path:
 
 
 @pytest.mark.parametrize("line", [
+    "explain r.lcmlog -o explained.toml",
+    "discover --generations 2 --seeds 5 --duration-s 20 --confirm 5 --mujoco 0 --out found",
+    "matters --seeds 40 --duration-s 10 --draws 0 --only coasting",
+    "guide --robot twin -o plan-twin",
+    "guide --robot turbopi --poses camera -o plan-turbopi",
+    "diagnose r.lcmlog",
+])  # fmt: skip
+def test_what_a_command_prints_to_be_typed_next_can_be_typed(drive, line, monkeypatch, capsys):
+    """In a terminal of 80 columns; lines that are commands are whole, as they are copied."""
+    monkeypatch.chdir(drive)
+    monkeypatch.setenv("COLUMNS", "80")
+    cli.run(shlex.split(line))
+    told = capsys.readouterr().out
+    for command in QUOTED.findall(told.replace("\n", " ")):
+        check_named(command)
+    typed = [*LINE.findall(told), *IN_FENCE.findall(told), *ON_A_LINE.findall(told)]
+    for command in typed:
+        check(command)
+    assert typed or line.split()[0] == "matters"  # which names none
+
+
+@pytest.mark.parametrize("line", [
+    "explain r.lcmlog -o explained.toml --force",
+    "discover --generations 2 --seeds 5 --duration-s 20 --confirm 5 --mujoco 0 --out found",
+    "matters --seeds 40 --duration-s 10 --draws 0 --only coasting",
+    "challenge --n 1 --duration-s 30 --workers 1 --out told",
     "fit r.lcmlog -o fitted.toml --hold base.yaw_gain",
     "add coasting r.lcmlog -o added.toml",
     "diagnose r.lcmlog",

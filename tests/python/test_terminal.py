@@ -35,6 +35,16 @@ def test_a_long_name_is_not_cut_for_the_sake_of_a_cell_that_can_wrap(columns):
     assert max(map(len, told.splitlines())) <= columns
 
 
+def test_a_table_whose_first_column_need_not_wrap_wraps_it_before_it_stops_being_a_table():
+    table = Table(box=None)
+    table.add_column("", no_wrap=True)
+    table.add_column("share", justify="right", no_wrap=True)
+    table.add_row("a name of several words", "45 to 81 %")
+    assert "45 to 81 %" in printed(Fitting(table), 40)
+    narrow = printed(Fitting(table), 24)
+    assert "45 to 81 %" in narrow and "share 45" not in narrow
+
+
 @pytest.mark.parametrize("columns", WIDTHS)
 def test_progress_keeps_its_words_and_numbers(columns, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(columns))

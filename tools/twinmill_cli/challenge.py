@@ -84,8 +84,10 @@ def _challenge(
     check_new_folder(out)
     (out / DONE).mkdir(parents=True, exist_ok=True)
     workers = workers or os.cpu_count() or 1
+    command = f"twinmill challenge --n {count} --seed {seed} --duration-s {duration_s:g}"
     if intervals:
-        return _intervals(out, intervals, seed, duration_s, workers, as_json)
+        command += f" --intervals {intervals}"
+        return _intervals(out, intervals, seed, duration_s, workers, command, as_json)
     robots = draw_robots(seed)
     cases = [draw(number, seed, robots, duration_s) for number in range(count)]
     answers = seal(cases)
@@ -97,7 +99,8 @@ def _challenge(
     for number, result, time_s in _all(out, bases, cases, workers):
         results[number], times_s[number] = result, time_s
     ordered = [results[case.number] for case in cases]
-    found = {"seed": seed, "duration_s": duration_s, **summary(ordered), "cases": ordered}
+    found = {"command": command, "seed": seed, "duration_s": duration_s}
+    found |= {**summary(ordered), "cases": ordered}
     write_whole(out / "answers.json", answers)
     write_whole(out / "results.json", json.dumps(found, indent=1))
     write_whole(out / "times.json", json.dumps([times_s[case.number] for case in cases]))
@@ -157,12 +160,14 @@ def _intervals(
     seed: int,
     duration_s: float,
     workers: int,
+    command: str,
     as_json: bool,
 ) -> dict:
     """Fits drives whose numbers are known, and counts how often intervals cover them."""
     calls = [(_fitted, out, number, seed, duration_s) for number in range(count)]
     rows = dict(_done(calls, "fitting", workers))
     found = {
+        "command": command,
         "seed": seed,
         "duration_s": duration_s,
         "cases": count,

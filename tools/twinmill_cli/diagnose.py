@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -63,11 +64,35 @@ def _diagnose(
             note, swarm = _judge_swarm(logs[0], result)
             result = replace(result, notes=[*result.notes, note])
     data = {**result.to_json(), **told(measurements), "swarm": swarm}
-    if data["next_experiment"]:  # the script comes from a command of its own
-        data["next_experiment"]["command"] = command_line("next", logs, model)
-    section = partial(present.section, result)
-    finish(data, present.terminal(result), source, section, as_json, out)
+    then = [*_mending(result, logs, model), *_settling(result, logs, model)]
+    if data["next_experiment"]:
+        data["next_experiment"]["command"] = then[-1][1]
+    section = partial(present.section, result, then)
+    finish(data, present.terminal(result, then), source, section, as_json, out)
     return result
+
+
+def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str, str]]:
+    """What takes what was found into the model: why, and the command."""
+    stem, told = Path(model).stem, []
+    if result.found:
+        to = Path(f"{stem}_explained.toml")
+        told.append(("To add what was found", command_line("explain", logs, model, to)))
+    elif result.verdict == "refit_enough":
+        to = Path(f"{stem}_fitted.toml")
+        told.append(("To refit the base", command_line("fit", logs, model, to)))
+    if (equation := result.rest.equation) and result.rest.takes >= present.LEAST_TAKES:
+        verb = ["add", "equation", "--adds-to", equation["adds_to"], "--formula"]
+        verb = shlex.join([*verb, equation["formula"]])
+        to = Path(f"{stem}_equation.toml")
+        told.append(("To add the formula", command_line(verb, logs, model, to)))
+    return told
+
+
+def _settling(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str, str]]:
+    """What designs the run that settles what is open; nothing if nothing is."""
+    command = command_line("next", logs, model, Path("next.csv"))
+    return [("To design that run", command)] if result.next_experiment else []
 
 
 def robots_recorded(path: Path, measurements: Measurements) -> int:
@@ -125,7 +150,10 @@ def _explain(
     with telling(f"explaining with {model}") as say:
         measurements = load(logs, model_file, as_json)
         result = explain(measurements, model_file, output, source.command, say)
-    section = partial(present.section, result.diagnosis)
+    then = _settling(result.diagnosis, logs, str(output))
+    section = partial(present.section, result.diagnosis, then)
     data = {**result.to_json(), **told(measurements)}
-    finish(data, present.terminal_explanation(result), source, section, as_json, out)
+    if then:
+        data["next_experiment"]["command"] = then[-1][1]
+    finish(data, present.terminal_explanation(result, then), source, section, as_json, out)
     return result

@@ -18,6 +18,8 @@ from twinmill_cli.output import AsJson, busy, deliver
 if working():  # not for --help
     import hashlib
 
+    from rich.console import Group
+
     from twinmill.files import check_new_folder
     from twinmill.report import Provenance, write_report
     from twinmill.report.discover import section
@@ -33,7 +35,7 @@ if working():  # not for --help
     from twinmill.swarm.discover.kinds import KIND_COLORS
     from twinmill.swarm.discover.search import Hunt, search
     from twinmill.swarm.sweep import make_request
-    from twinmill.terminal import progress_bar
+    from twinmill.terminal import progress_bar, whole
 
 NOTE = (
     "A search by quality and diversity: of each sort of swarm it keeps the one that does the same "
@@ -123,7 +125,9 @@ def _discover(
         write_entries(out, hunt, found)
         tried = generations * PER_GENERATION
         page = section(hunt, found, offered, shown, tried, elites.cells)
-        source = _source(hunt, model, change or [], generations, out)
+        limits = {"generations": generations, "show": show, "confirm": confirm_runs}
+        limits["mujoco"] = mujoco_runs
+        source = _source(hunt, model, change or [], limits, out)
         report = write_report(out, page.title, source, [page], NOTE)
     data = {
         "tried": tried,
@@ -137,8 +141,9 @@ def _discover(
         "behaviors": str(out / "behaviors.toml"),
         "report": str(report),
     }
-    words = f"{page.verdict}\nReport: {report}\nRun one: cd {out} && {shown[0].command}"
-    deliver(data, words, as_json)
+    words = f"{page.verdict}\nReport: {report}\nRun one:"
+    run_one = whole(f"cd {shlex.quote(str(out))} && {shown[0].command}")
+    deliver(data, Group(words, run_one), as_json)
     return found
 
 
@@ -150,11 +155,14 @@ def _best(found: list[Entry], show: int) -> list[Entry]:
     ]
 
 
-def _source(hunt: Hunt, model: str, change: list[str], generations: int, out: Path) -> Provenance:
+def _source(
+    hunt: Hunt, model: str, change: list[str], limits: dict[str, int], out: Path
+) -> Provenance:
     request = hunt.request
     words = ["twinmill", "discover", "--model", model]
     words += [word for text in change for word in ("--set", text)]
-    words += ["--n", str(hunt.n), "--generations", str(generations), "--seeds", str(request.seeds)]
+    words += [word for name, limit in limits.items() for word in (f"--{name}", str(limit))]
+    words += ["--n", str(hunt.n), "--seeds", str(request.seeds)]
     words += ["--duration-s", f"{request.duration_s:g}", "--start", request.start]
     words += ["--seed", str(hunt.seed), "--out", str(out)]
     return Provenance(

@@ -207,7 +207,7 @@ def _terminal(found: Matters, report: Path | None) -> RenderableType:
     styles = {MATTERS: "bold red", UNSURE: "yellow", NOTHING: ""}
     lines = [Text(headline(found)), Text()]
     lines += [Text(sentence(j), styles[j.verdict]) for j in found.ranked[:SHOWN]]
-    if more := len(found.ranked) - SHOWN:
+    if (more := len(found.ranked) - SHOWN) > 0:
         lines.append(Text(f"... and {more} more; --json and --out have all.", "dim"))
     lines += [Text(), Text(f"Next: {next_step(found)}")] if next_step(found) else []
     return Group(*lines, *([Text(f"Report: {report}")] if report else []))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The program twin_sweep. Python drives it, for tables, clusters and progress; C++ simulates."""
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -26,7 +27,7 @@ def _text(data: dict) -> str:
     lines = [f"{data['worlds']} worlds in {data['cells']} cells, {data['wall_s']:.1f} s: {classes}"]
     if data["why_full"]:
         lines.append(f"Every robot ran its firmware and plant, slowly: {data['why_full']}.")
-    lines.append(f"{data['file']}\nPicture: twinmill phase {data['out']}")
+    lines.append(f"{data['file']}\nPicture: twinmill phase {shlex.quote(str(data['out']))}")
     return "\n".join(lines)
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The outcome of a challenge for people: terminal and HTML."""
 
+from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from twinmill.report.tables import Cell, Table
 
 def shown(found: dict, times_s: list[float]) -> RenderableType:
     """Tables of rates and of missed cases."""
-    return Group(*(show.table(t) for t in (_rates(found, times_s), _lost(found))))
+    return Group(*(show.table(t) for t in (_rates(found, times_s), *_lost(found))))
 
 
 def intervals(found: dict) -> RenderableType:
@@ -54,9 +55,9 @@ def write(folder: Path, found: dict, times_s: list[float]) -> None:
         "each hidden effect adds more than the floor to the error at 2 s. A group of more than "
         f"{LARGEST_GROUP} names is wrong.",
         figures=[_power(found)],
-        tables=[_rates(found, times_s), _lost(found), _confusion(found)],
+        tables=[_rates(found, times_s), *_lost(found), _confusion(found)],
     )
-    source = Provenance(f"twinmill challenge --seed {found['seed']}", "twinmill", "")
+    source = Provenance(found["command"], f"twinmill {version('twinmill')}", "")
     write_report(folder, "Blind test of diagnosis", source, [section])
 
 
@@ -83,7 +84,8 @@ def _rates(found: dict, times_s: list[float]) -> Table:
     return Table("Right or wrong", ["", "cases", "share", "95 % interval", "goal"], rows, note)
 
 
-def _lost(found: dict) -> Table:
+def _lost(found: dict) -> list[Table]:
+    """None where no case is lost."""
     rows = [
         [
             Cell(str(r["case"])),
@@ -95,7 +97,7 @@ def _lost(found: dict) -> Table:
         for r in found["lost"]
     ]
     head = ["case", "robot and drive", "hidden", "said", "the rest depends on"]
-    return Table("Lost cases", head, rows, words=(1, 2, 3, 4))
+    return [Table("Lost cases", head, rows, words=(1, 2, 3, 4))] if rows else []
 
 
 def _hidden(result: dict) -> str:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A diagnosis as tables, for the terminal and as a section of a report."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import twinmill_native as native
 from rich.console import Group, RenderableType
@@ -16,8 +18,11 @@ from twinmill.report.detection_tables import detection_steps, detection_tables
 from twinmill.report.error_figures import waterfall
 from twinmill.report.sections import robot_pictures
 from twinmill.report.tables import Cell, Table, Tone, number, tone
+from twinmill.terminal import whole
 
 LEAST_TAKES = 0.05  # share of what is left that a formula must take to be worth a word
+
+Commands = Sequence[tuple[str, str]]  # what for, and the line to type
 
 TONES: dict[str, Tone] = {
     "cannot_tell": "warn",
@@ -174,22 +179,14 @@ def lines(diagnosis: Diagnosis) -> list[str]:
             f"The best formula for what is left takes {100 * rest.takes:.0f} % of it: "
             f"{rest.term.adds_to} += {rest.coefficient:.3g} * {rest.term.formula}."
         )
-        if equation := rest.equation:
-            told.append(
-                f"To add it: twinmill add equation LOG --adds-to {equation['adds_to']} --formula "
-                f"'{equation['formula']}', with the same logs and model."
-            )
     if diagnosis.late and (late := _late(diagnosis)):
         told.append(late)
     return told
 
 
 def next_run(diagnosis: Diagnosis) -> str:
-    """The next step in one sentence; empty if the logs leave nothing open."""
-    if not diagnosis.next_experiment:
-        return ""
-    why = diagnosis.next_experiment["why"]
-    return f"{why}; `twinmill next`, given the same logs and model, writes the script."
+    """What another run would settle, in one sentence; empty if the logs leave nothing open."""
+    return f"{diagnosis.next_experiment['why']}." if diagnosis.next_experiment else ""
 
 
 def _late(diagnosis: Diagnosis) -> str:
@@ -201,13 +198,17 @@ def _late(diagnosis: Diagnosis) -> str:
     if late.parted:
         return f"Late by {total}: {late.lag_s:.2f} s lag, {late.delay_s:.2f} s delay."
     if late.lag_s is not None:
-        rest_s = late.sum_s - late.lag_s
+        rest_s = round(late.sum_s - late.lag_s, 2) + 0.0  # no minus before nothing
         return f"Late by {total}: {late.lag_s:.2f} s lag; {rest_s:.2f} s delay or clocks."
     return f"Late by {total}: these logs cannot part lag and delay."
 
 
-def terminal(diagnosis: Diagnosis) -> RenderableType:
-    """What a person reads of a diagnosis."""
+def terminal(diagnosis: Diagnosis, commands: Commands = ()) -> RenderableType:
+    """What a person reads of a diagnosis, and what to type then."""
+    return Group(*_said(diagnosis), *_next(diagnosis, commands))
+
+
+def _said(diagnosis: Diagnosis) -> list[RenderableType]:
     parts: list[RenderableType] = [
         Text(f"{diagnosis.sentence}", show.STYLES[TONES[diagnosis.verdict]]),
         Text(
@@ -217,24 +218,28 @@ def terminal(diagnosis: Diagnosis) -> RenderableType:
         Text(),
     ]
     parts += [show.table(t) for t in (*_tables(diagnosis), *_detection_steps(diagnosis))]
-    parts += [Text(line) for line in lines(diagnosis)]
-    if step := next_run(diagnosis):
-        parts.append(Text(f"Next run: {step}"))
-    return Group(*parts)
+    return parts + [Text(line) for line in lines(diagnosis)]
 
 
-def terminal_explanation(result: Explanation) -> RenderableType:
-    """What a person reads of the whole loop."""
+def _next(diagnosis: Diagnosis, commands: Commands) -> list[Text]:
+    step = next_run(diagnosis)
+    told = [Text(f"Next run: {step}")] if step else []
+    return told + [part for why, command in commands for part in (Text(f"{why}:"), whole(command))]
+
+
+def terminal_explanation(result: Explanation, commands: Commands = ()) -> RenderableType:
+    """What a person reads of the whole loop, and what to type then."""
     return Group(
-        terminal(result.diagnosis),
+        *_said(result.diagnosis),
         Text(),
         show.table(tables.steps(_labelled(result.diagnosis))),
         show.table(tables.parameters(result.parameters)),
         Text(f"Written: {result.path}"),
+        *_next(result.diagnosis, commands),
     )
 
 
-def section(diagnosis: Diagnosis) -> Section:
+def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
     """Of a report."""
     before = diagnosis.before
     scores = [("as given", before.score), ("base refitted", diagnosis.score_refit)]
@@ -249,6 +254,7 @@ def section(diagnosis: Diagnosis) -> Section:
         [*_tables(diagnosis), *_detection_steps(diagnosis), *_detection_tables(diagnosis)],
         charts=charts(before, *_found(diagnosis)),
         next_step=next_run(diagnosis),
+        commands=[(f"{why}:", command) for why, command in commands],
         notes=lines(diagnosis),
         warnings=before.warnings,
     )

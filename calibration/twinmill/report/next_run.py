@@ -16,6 +16,7 @@ from twinmill.model.parameters import catalogue
 from twinmill.report import Section, show
 from twinmill.report import next_run_figures as figures
 from twinmill.report.tables import Cell, Table, Tone, number
+from twinmill.terminal import whole
 
 if TYPE_CHECKING:  # needs more packages than a run that tells effects apart
     from twinmill.swarm.narrowing import Narrowing
@@ -39,7 +40,7 @@ class How:
 
 def terminal(plan: Plan, how: How) -> RenderableType:
     """What a person reads; command lines stay whole, to be copied."""
-    steps = [part for where, command in how.commands for part in (Text(where), _whole(command))]
+    steps = [part for where, command in how.commands for part in (Text(where), whole(command))]
     return Group(
         Text(plan.why),
         Text(_outlook(plan), show.STYLES[_tone(plan.predicted_power)]),
@@ -50,10 +51,6 @@ def terminal(plan: Plan, how: How) -> RenderableType:
         *(Text(line) for line in (*_hidden(plan), how.first)),
         *steps,
     )
-
-
-def _whole(command: str) -> Text:
-    return Text(f"  {command}", no_wrap=True, overflow="ignore")
 
 
 def section(plan: Plan, how: How) -> Section:
@@ -142,7 +139,7 @@ def _tone(power: float) -> Tone:
 
 def narrowing_terminal(found: Narrowing, how: How) -> RenderableType:
     """What a person reads of a run that narrows what a swarm is predicted to do."""
-    steps = [part for where, command in how.commands for part in (Text(where), _whole(command))]
+    steps = [part for where, command in how.commands for part in (Text(where), whole(command))]
     return Group(*map(Text, [*_narrowed(found), how.first]), *steps)
 
 

@@ -83,7 +83,7 @@ def next_step(found: Matters) -> str:
     if worth:
         text += f"measure {_list(worth)}: there lies what the log leaves open and the swarm feels. "
     if idle:
-        text += f"Not worth another run for this: {_list(idle)}. "
+        text += f"{'not' if not worth else 'Not'} worth another run for this: {_list(idle)}. "
     unsure = found.of(UNSURE)
     if unsure:
         text += (
