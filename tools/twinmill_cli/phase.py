@@ -104,7 +104,8 @@ def _phase(
         **source.to_json(),
         "report": str(report),
     }
-    lines = [section.verdict, section.next_step, f"Report: {report}"]
+    step = f"Next: {section.next_step}" if section.next_step else ""
+    lines = [section.verdict, step, f"Report: {report}"]
     deliver(data, "\n".join(filter(None, lines)), as_json)
     return data
 
@@ -140,8 +141,10 @@ def _section(
     score = [(f"best '{phase.goal}'", f"{100 * share:.0f} %", "")]
     verdict = (
         f"'{phase.goal}' is most probable at {phase.where(best)}: {100 * share:.0f} % of "
-        f"{phase.seeds} runs (95 % interval {100 * low:.0f} to {100 * high:.0f} %)."
+        f"{phase.seeds} runs (95 % interval {100 * low:.0f} to {100 * high:.0f} %)"
     )
+    others = int((phase.hits == phase.hits[best]).sum()) - 1
+    verdict += f", as in {others} other cell{'s' if others > 1 else ''}." if others else "."
     tables = [_next_table(phase, worth, has_rival)] if worth else []
     if match:
         score.append(("experiments as predicted", f"{match['agree']} of {match['of']}", ""))
@@ -152,7 +155,7 @@ def _section(
         tables.insert(0, _run_table(phase, runs))
     figures = [map_figure(phase, place, runs, worth), probability_figure(phase, place)]
     figures += [thumbnail_figure(phase, place), slider_figure(phase)]
-    first = f"Run {phase.where(worth[0]['cell'])} next: " if worth else ""
+    first = f"run {phase.where(worth[0]['cell'])}: " if worth else ""
     why = "there the two models disagree most." if has_rival else "there it is least sure."
     return Section(
         title=f"Phase diagram of {phase.request.behavior}",

@@ -13,6 +13,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import tomlkit
 
 from twinmill.challenge.script import write_rich_script
@@ -68,9 +69,9 @@ def process(_seeds: int) -> Claim:
         "Robots are measured, a simulation is made of it, behaviours are looked for in that, and "
         "robots do them.",
         None,
-        f"{sum(map(len, STEPS.values()))} commands. A drive of {DRIVE_S:g} s tells that the robots "
-        f"coast, and how long; {ran} runs in MuJoCo, which stands for the laboratory, are set "
-        "against what was said before.",
+        f"{sum(map(len, STEPS.values()))} commands. From a drive of {DRIVE_S:g} s the deceleration "
+        f"of coasting robots is {_words(found)} ({DECELERATION_MPS2:g} is true); {ran} runs in "
+        "MuJoCo, which stands for the laboratory, are set against what was said before.",
         [found],
         [],
         transcript,
@@ -123,6 +124,12 @@ def _typed(line: str, folder: Path) -> str:
     if ended.returncode:
         raise ValueError(f"{line}: {ended.stderr.strip() or ended.stdout.strip()}")
     return "\n".join(text.rstrip() for text in ended.stdout.splitlines())
+
+
+def _words(found: Row) -> str:
+    if np.isnan(found.value):
+        return "not found"
+    return f"{found.value:.2f} ({found.low:.2f} to {found.high:.2f}) m/s²"
 
 
 def _found(model: Path) -> Row:

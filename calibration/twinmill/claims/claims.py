@@ -93,7 +93,10 @@ def milling(seeds: int) -> Claim:
         steps[step] = share(what, hits, percent, reference_seeds)
     rows += steps.values()
     euler, arcs = (_percent(row) for row in steps.values())
-    best = next(row for row in rows if row.by == {"kind": "disc", "spread": 0.04})
+    best, same, apart = (
+        next(row for row in rows if row.by == {"kind": kind, "spread": spread})
+        for kind, spread in (("disc", 0.04), ("point", 0.0), ("point", 0.04))
+    )
     return Claim(
         "milling",
         "Six robots mill",
@@ -101,9 +104,9 @@ def milling(seeds: int) -> Claim:
         "the other for seen, end on one circle: circliness below 0.2.",
         best.value > MOST,
         f"{_percent(best)} of runs, if any part of the neighbour's body is seen. If only its "
-        "centre counts, as the text has it, the circle holds just as long as all robots are alike, "
-        f"and the step of the simulation is an effect of its own: {euler} by forward Euler, as "
-        f"published, and {arcs} along exact arcs.",
+        f"centre counts, as the text has it, {_percent(apart)}, and {_percent(same)} where all "
+        f"robots are alike; the step of the simulation is an effect of its own there: {euler} by "
+        f"forward Euler, as published, and {arcs} along exact arcs, both in NumPy.",
         rows,
         [figures.shares(rows), figures.paths({f"{k}, spread 0.04": r for k, r in rings.items()})],
     )
@@ -135,7 +138,7 @@ def diffusing(seeds: int) -> Claim:
         "centre is within another's view: delta above 1, which tells diffusing from mere scatter.",
         rows[5].value > MOST and rows[-3].value < 1 - MOST,
         f"{_percent(rows[3])} after 30 s, {_percent(rows[5])} after 120 s. Robots strewn at random "
-        f"over {side_m:.1f} m have the same scatter, but never delta above 1.",
+        f"over {side_m:.1f} m, which have the same mean scatter, have it in {_percent(rows[-3])}.",
         rows,
         [figures.delta_and_scatter(spread_out, strewn), figures.paths({"diffusing": spread_out})],
     )
@@ -182,8 +185,8 @@ def bullseye(seeds: int, turns: tuple[float, ...] = ODD_TURNS) -> Claim:
         "One robot that spins at -3 times the others' turn rate while it sees nothing comes to the "
         "middle of the mill.",
         six[PUBLISHED_TURN].value < MIDDLE if PUBLISHED_TURN in six else None,
-        f"Its distance from the middle is {words} (six robots, whole bodies seen). The published "
-        f"sign is -3; where the paper's figure has it in the middle, +3 is nearer.",
+        f"Its distance from the middle is {words} (six robots, whole bodies seen). "
+        + _nearest({turn: row.value for turn, row in six.items()}),
         rows,
         [figures.odd_ratios(runs_of), figures.paths(typical, odd=1)],
     )
@@ -224,15 +227,19 @@ def region(seeds: int) -> Claim:
     for name in FOUR_CLASSES:
         hits = maps["point"]["class"].ravel() == name
         rows.append(share(f"{name}, of all runs, point", hits, (0.002, 1.0)))
+    slow = [r.value for r in rows if r.by.get("kind") == "disc, 20 deg/s"]
+    fast = [r.value for r in rows if r.by.get("omega", 0) >= 60 and "disc" in r.by["kind"]]
+    free_m = V_MPS[-1] / np.radians(20)
     return Claim(
         "region",
         "The mill's region of speed and turn rate, and four classes",
         "Over 56 pairs of speed and turn rate swarms end as a stable mill (circliness below 0.2), "
         "an ellipsoidal one (up to 1), a colliding cluster or separated groups (above 1).",
         all(row.value > 0 for row in rows[-len(FOUR_CLASSES) :]),
-        f"{_occurring(rows[-len(FOUR_CLASSES) :])} Slow turns at high speed part the swarm, as the "
-        "free circle comes near the view range; from 40 deg/s nearly all mill, if whole bodies are "
-        "seen.",
+        f"{_occurring(rows[-len(FOUR_CLASSES) :])} If whole bodies are seen, at 20 deg/s "
+        f"{100 * slow[0]:.0f} % mill at {V_MPS[0]:g} m/s and {100 * slow[-1]:.0f} % at "
+        f"{V_MPS[-1]:g} m/s, where a lone robot circles {free_m:.1f} m about its centre; at 60 and "
+        f"90 deg/s at least {100 * min(fast):.0f} % mill at any speed.",
         rows,
         [
             *figures.maps(maps),
@@ -262,7 +269,8 @@ def alike(seeds: int) -> Claim:
         "Each robot's speed is off by its own factor; how homogeneous must they be for a mill?",
         None,
         f"A locked ring has radii in proportion to speeds: circliness is {slope.value:.2f} times "
-        f"the spread (theory {RING_RANGE:g}), so that 0.2 needs a spread below 0.08.",
+        f"the spread (theory {RING_RANGE:g}), by which 0.2 needs a spread below "
+        f"{ROUND / RING_RANGE:.2f}.",
         [slope, *rows],
         [figures.spread(rows, RING_RANGE)],
     )
@@ -287,6 +295,14 @@ CLAIMS: dict[str, Callable[..., Claim]] = {
 def _occurring(classes: list[Row]) -> str:
     lacking = [row.what.partition(",")[0] for row in classes if row.value == 0]
     return f"Not one run is {' or '.join(lacking)}." if lacking else "All four occur."
+
+
+def _nearest(ratios: dict[float, float]) -> str:
+    """Which turn brings the odd robot nearest to the middle, where several were tried."""
+    if len(ratios) < 2:
+        return ""
+    turn = min(ratios, key=ratios.get)
+    return f"Nearest to the middle it comes at {turn:+g} times; the text has {PUBLISHED_TURN:g}."
 
 
 def _kind(kind: str, spread: float) -> str:

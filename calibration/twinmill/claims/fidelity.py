@@ -72,9 +72,10 @@ def fidelity(_seeds: int) -> Claim:
         f"are {last.numbers} numbers to measure. One robot: the error on the half of a drive that "
         f"was not fitted falls from {first.score:.1f} to {last.score:.1f} times its floor. Swarms: "
         f"what they do agrees by {_percent(first.alike)} at first and by {_percent(last.alike)} at "
-        f"the end, where true robots agree with themselves by {_percent(again)}. What no drive of "
-        "one robot shows, its camera's errors and how robots differ, is part of that: there the "
-        "curve of one robot is flat, and that of swarms is not.",
+        f"the end, where true robots agree with themselves by {_percent(again)}. The last two "
+        "things, the camera's errors and how robots differ, no drive of one robot shows: they "
+        f"leave its error as it is, and take the swarms from {_percent(levels[-3].alike)} to "
+        f"{_percent(last.alike)}.",
         rows,
         [_figure(levels, again)],
     )

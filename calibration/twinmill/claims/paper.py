@@ -55,8 +55,8 @@ PARTS = (
         "Two rules of one bit and their behaviours: milling, diffusing",
         ("milling", "diffusing"),
         open="Whether a neighbour's centre or any part of it is seen, the step of the simulation, "
-        "and whether 0.04 is a standard deviation or a variance: with the first the share that "
-        "mills goes from 5 to 98 %, and as a variance hardly a run mills.",
+        "and whether 0.04 is a standard deviation or a variance: with the first the "
+        "reference's share that mills goes from 5 to 98 %.",
     ),
     Part(
         "The four steps from robot to swarm and back",
@@ -76,7 +76,7 @@ PARTS = (
     Part(
         "A mill with one odd robot",
         ("bullseye", "bodies"),
-        open="The sign of its turn: -3 in the text; with +3 it comes nearer to the middle.",
+        open="Whether its turn has the sign of the text, -3 times; +3 is measured beside it.",
     ),
     Part(
         "How many robots, how alike, how fast, how good a sensor",

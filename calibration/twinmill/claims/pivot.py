@@ -46,8 +46,10 @@ def pivot(_seeds: int) -> Claim:
             deltas = np.array([_delta(end, period_s, sign) for end in ends])
             rows.append(mean(f"delta, {behavior}, {name}", deltas, None))
         snapshots[behavior] = (runs, ends[0], period_s)
-    right, printed = (
-        next(r.value for r in rows if r.what == f"delta, milling, {s}") for s in SIGNS
+    right, printed, spun, spun_printed = (
+        next(r.value for r in rows if r.what == f"delta, {behavior}, {sign}")
+        for behavior in SNAPSHOTS
+        for sign in SIGNS
     )
     return Claim(
         "pivot",
@@ -57,8 +59,8 @@ def pivot(_seeds: int) -> Claim:
         None,
         f"By the equations it is z + (v/w)(-sin, cos): as printed it wanders by {4 * radius_m:.2f} "
         f"m while the robot drives one circle. A mill of six has delta {right:.2f}, {printed:.2f} "
-        "as printed; diffused robots spin where they stand, so that there both are the same, and "
-        "above 1 only there.",
+        f"as printed. Diffused robots spin where they stand: delta {spun:.2f} by the one and "
+        f"{spun_printed:.2f} by the other.",
         rows,
         [_figure(snapshots)],
     )

@@ -91,7 +91,8 @@ def ranking(diagnosis: Diagnosis) -> Table:
         rows,
         "Found effects are coloured. The score is of drives that were not fitted to; explains: "
         "share of what anything could explain; p: chance of such a fit if nothing were missing, "
-        "for all effects together; effects of one group look alike in this log.",
+        "for all effects together; effects of one group look alike in this log. Estimates are "
+        "those of the step that tried an effect, before what came later was fitted beside it.",
         words=(0, 5),
     )
 

@@ -136,6 +136,7 @@ def waterfall(scores: list[tuple[str, float]]) -> Figure:
     return Figure(
         draw(0.9 + 0.36 * max(len(scores), 3), paint),
         "What each step gained",
-        "The score after each step. Green is what the step took away (red: added); the dashed "
+        "The score after each step, on parts of the data that were not fitted to, without robots "
+        "that differ from the others. Green is what the step took away (red: added); the dashed "
         "line at 1 is as good as this log can tell.",
     )

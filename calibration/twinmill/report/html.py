@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sections of text, tables and figures to one HTML file."""
 
+import re
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 
 from twinmill.model.model_file import write_whole
 from twinmill.report.tables import Table, Tone
@@ -97,6 +99,11 @@ def write_report(
     return path
 
 
+def coded(text: str) -> Markup:
+    """HTML of a text in which commands stand between back quotes."""
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
 def render_page(title: str, source: Provenance, sections: list[Section], note: str) -> str:
     """The HTML text; the same input gives the same."""
     environment = Environment(
@@ -106,6 +113,7 @@ def render_page(title: str, source: Provenance, sections: list[Section], note: s
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["coded"] = coded
     charted = next((s for s in reversed(sections) if s.charts), None)
     return environment.get_template("report.html.j2").render(
         title=title, source=source, sections=sections, note=note, charted=charted

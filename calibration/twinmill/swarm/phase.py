@@ -71,7 +71,7 @@ class Phase:
     def where(self, cell: int, axes: int | None = None) -> str:
         """A cell in words, of the first so many axes; what is the same in all cells is left out."""
         pairs = list(zip(self.axes, self.points[cell], strict=True))[:axes]
-        varied = [f"{axis.name} {value:g}" for axis, value in pairs if len(axis.values) > 1]
+        varied = [f"{axis.name} {value:.4g}" for axis, value in pairs if len(axis.values) > 1]
         return ", ".join(varied) or "the only cell"
 
     def slice(self, at: dict[str, float]) -> np.ndarray:
