@@ -18,6 +18,7 @@ from twinmill.diagnosis.detections.add import is_of_camera
 from twinmill.files import plain
 from twinmill.workbench.session import Session
 from twinmill.workbench.state_file import StateFile
+from twinmill.workbench.swarm import has_poses
 from twinmill.workbench.worker import Done, Work, Worker
 
 AWAITED = ("fit", "add", "diagnose", "next", "swarm")  # work that the user waits for
@@ -268,7 +269,7 @@ class Bench:
 
     def swarm_bytes(self) -> bytes:
         """Poses of the twin's swarms."""
-        if self.session.swarm is None:
+        if self.session.swarm is None or not has_poses(self.session.swarm):
             raise LookupError("no swarm")
         swarms = self.session.swarm["swarms"]
         poses = {

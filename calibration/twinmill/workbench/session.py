@@ -40,7 +40,7 @@ from twinmill.predict.regimes import Regime, where_it_fails
 from twinmill.predict.windows import Windows
 from twinmill.workbench.knobs import Knob, knobs
 from twinmill.workbench.next_run import next_command, then_commands
-from twinmill.workbench.swarm import swarm_commands
+from twinmill.workbench.swarm import swarm_commands, without_poses
 from twinmill.workbench.tree import Score, Tree
 from twinmill.workbench.worker import Done, Work
 
@@ -498,12 +498,13 @@ class Session:
     # -- state ----------------------------------------------------------------------------------
 
     def to_json(self) -> dict:
-        """What must not be lost: models, what is held, findings."""
+        """What must not be lost: models, what is held, findings, of swarms all but poses."""
         return {
             "tree": self.tree.to_json(),
             "held": sorted(self.held),
             "diagnosis": self.diagnosis,
             "plan": self.plan,
+            "swarm": without_poses(self.swarm) if self.swarm else None,
             "key": self.key,
         }
 
@@ -530,6 +531,7 @@ class Session:
         self.held = set(data["held"])
         self.diagnosis = data["diagnosis"]
         self.plan = data.get("plan")
+        self.swarm = data.get("swarm")
 
 
 def _from_here(opened: Opened) -> Opened:

@@ -83,6 +83,20 @@ def run_swarms(
     return found
 
 
+def has_poses(told: Mapping[str, Any]) -> bool:
+    """Whether what the worker told of swarms can be played; what was kept in a file cannot."""
+    return all("pose" in swarm for swarm in told["swarms"].values())
+
+
+def without_poses(told: Mapping[str, Any]) -> dict[str, Any]:
+    """What the worker told of swarms, less what is too much to be kept."""
+    swarms = {
+        label: {name: value for name, value in swarm.items() if name not in ("t_s", "pose")}
+        for label, swarm in told["swarms"].items()
+    }
+    return {**told, "swarms": swarms}
+
+
 def phase_diagram(text: str, options: Mapping[str, Any], say: Callable[[str], None]) -> list[dict]:
     """What becomes of the swarm of a model whose robots are faster or turn faster by a factor.
 

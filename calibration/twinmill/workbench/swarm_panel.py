@@ -7,7 +7,7 @@ from nicegui import ui
 
 from twinmill.swarm.classes import COLORS
 from twinmill.workbench.panel import Hands, scored
-from twinmill.workbench.swarm import STARTS
+from twinmill.workbench.swarm import STARTS, has_poses
 
 AXIS = {
     "nameLocation": "middle",
@@ -22,6 +22,7 @@ WAITING = (
 CELL_PX = (31, 21)
 LEAST = 1e-3  # m/s or rad/s, below which nothing moves
 SHOWN = ("circliness", "radius_m", "rotation", "groups", "contacts")
+KEPT = "Run the twin once more to see the swarms from above; their numbers were kept."
 
 
 class SwarmPanel:
@@ -77,8 +78,10 @@ class SwarmPanel:
         self.draw_progress()
         self.body.clear()
         swarm = self.bench.session.swarm
-        self.waiting.set_visibility(swarm is None)
-        self.sheet.set_visibility(swarm is not None)
+        played = swarm is not None and has_poses(swarm)
+        self.waiting.set_visibility(not played)
+        self.waiting.set_text(WAITING.format(STARTS) if swarm is None else KEPT)
+        self.sheet.set_visibility(played)
         if swarm is None:
             return
         labels = list(swarm["swarms"])

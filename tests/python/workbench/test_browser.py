@@ -137,6 +137,9 @@ def test_the_whole_conversation(import_turbopi, page):
         page.get_by_test_id("tab-models").click()
         expect(page.get_by_test_id("model-2")).to_have_class(re.compile("now"))
         assert exact(page, 2) == added
+        page.get_by_test_id("tab-swarm").click()
+        expect(page.get_by_test_id("swarm-table")).to_contain_text("circliness")
+        expect(page.locator("#swarm")).not_to_be_visible()  # poses are not kept
         ask_for_the_drive_that_parts(page)
 
 
