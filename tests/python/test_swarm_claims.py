@@ -229,7 +229,7 @@ def test_a_number_that_differs_is_named_with_why():
     good = rows.Row("a", 1, 1, 1, (1, 1), True)
     known = rows.Row("b", 1, 1, 1, (2, 2), False, "+9 standard deviations", known="a reason")
     strange = rows.Row("c", 1, 1, 1, (2, 2), False, "+9 standard deviations")
-    claim = rows.Claim("bullseye", "", "", False, "so", [good, known, strange], [])
+    claim = rows.Claim("bullseye", "so", "", False, "", [good, known, strange], [])
     (answer,) = [a for a in paper.answers([claim]) if a.of]
     assert (answer.agree, answer.of, answer.found) == (1, 3, "not seen: so")
     assert answer.differs == ["b: a reason", "c: not known why (+9 standard deviations)"]

@@ -166,6 +166,8 @@ def _line(claim: Claim) -> Text:
 
 def _numbers(claim: Claim) -> str:
     good, of = claim.count
+    if not of:
+        return "No number has a reference"
     known = "" if good == of or not claim.agrees else ", and why the others do not is known"
     return f"{good} of {of} numbers agree with the reference{known}"
 
@@ -204,7 +206,7 @@ def _paper(found: list[Claim]) -> Section:
     return Section(
         title="The paper, part by part",
         score=[],
-        verdict="Beside the paper, in its order; the sections below have each number.",
+        verdict="Beside the paper, in its order; what was measured stands in the sections below.",
         tables=[Table("Parts", columns, rows, words=(0, 2, 3, 4))],
     )
 

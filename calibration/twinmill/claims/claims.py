@@ -105,8 +105,8 @@ def milling(seeds: int) -> Claim:
         best.value > MOST,
         f"{_percent(best)} of runs, if any part of the neighbour's body is seen. If only its "
         f"centre counts, as the text has it, {_percent(apart)}, and {_percent(same)} where all "
-        f"robots are alike; the step of the simulation is an effect of its own there: {euler} by "
-        f"forward Euler, as published, and {arcs} along exact arcs, both in NumPy.",
+        f"robots are alike. The same points in NumPy, all alike, {seeds} runs of each: {euler} by "
+        f"forward Euler, as published, {arcs} along exact arcs.",
         rows,
         [figures.shares(rows), figures.paths({f"{k}, spread 0.04": r for k, r in rings.items()})],
     )
@@ -137,8 +137,9 @@ def diffusing(seeds: int) -> Claim:
         "Eight robots with speed 0.3 m/s and turn rate 150 deg/s part until nobody's turning "
         "centre is within another's view: delta above 1, which tells diffusing from mere scatter.",
         rows[5].value > MOST and rows[-3].value < 1 - MOST,
-        f"{_percent(rows[3])} after 30 s, {_percent(rows[5])} after 120 s. Robots strewn at random "
-        f"over {side_m:.1f} m, which have the same mean scatter, have it in {_percent(rows[-3])}.",
+        f"Delta is above 1 in {_percent(rows[3])} of runs after 30 s and in {_percent(rows[5])} "
+        f"after 120 s; of robots strewn at random over {side_m:.1f} m, which have the same mean "
+        f"scatter, in {_percent(rows[-3])}.",
         rows,
         [figures.delta_and_scatter(spread_out, strewn), figures.paths({"diffusing": spread_out})],
     )
@@ -206,8 +207,9 @@ def more_robots(seeds: int) -> Claim:
         "More robots are not always better",
         "How many robots mill has an upper edge too: beyond it, more of them spoil the mill.",
         all(n[14].value < MOST < max(row.value for row in n.values()) for n in shown.values()),
-        f"Whole bodies seen: {_percent(shown['disc'][6])} at 6, {_percent(shown['disc'][8])} at 8. "
-        f"Centres alone: {_percent(shown['point'][7])} at 7, {_percent(shown['point'][10])} at 10.",
+        f"Whole bodies seen: {_percent(shown['disc'][6])} mill at 6 robots, "
+        f"{_percent(shown['disc'][8])} at 8. Centres alone: {_percent(shown['point'][7])} at 7, "
+        f"{_percent(shown['point'][10])} at 10.",
         rows,
         [figures.curves(rows, "robots", MILL)],
     )

@@ -48,9 +48,9 @@ def sensor(seeds: int) -> Claim:
         "How far and how wide a robot must see, and how often",
         "Sensing noise, view range, angle and sampling decide whether a behaviour comes about.",
         None,
-        f"Whole bodies seen: {_percent(near)} at 0.5 m, {_percent(far)} at 1.1 m. Of centres alone "
-        f"{_percent(narrow)} mill with a full cone of 49 degrees and {_percent(wide)} with 60: the "
-        f"next robot of six is 30 degrees beside the heading. Of whole bodies, {_percent(none)} "
+        f"Whole bodies seen: {_percent(near)} mill at 0.5 m, {_percent(far)} at 1.1 m. Of "
+        f"centres alone {_percent(narrow)} mill with a full cone of 49 degrees and "
+        f"{_percent(wide)} with 60: the next robot of six is 30 degrees beside the heading. Of whole bodies, {_percent(none)} "
         f"without errors, {_percent(missed)} with half of all frames missed, {_percent(false)} "
         f"with 30 % false ones, {_percent(voted)} by a vote of 31 frames, which are 0.7 s.",
         rows,
@@ -80,7 +80,7 @@ def steps(seeds: int) -> Claim:
     lost = [a.value - b.value for a, b in zip(rows[: len(cells)], rows[len(cells) :], strict=False)]
     return Claim(
         "steps",
-        "The step of the simulation is an effect of its own",
+        "What the step of the simulation does",
         "Robots move by x + v cos(theta) T and so on, forward Euler at T = 22 ms.",
         None,
         f"By forward Euler the share of points that mill is {100 * np.mean(lost):+.0f} percentage "

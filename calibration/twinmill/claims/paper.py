@@ -34,7 +34,7 @@ class Answer:
     Attributes:
         agree, of: numbers that agree with the reference, of those that have one.
         differs: those that do not, each with why.
-        found: in words.
+        found: what became of each claim, by its title.
     """
 
     part: Part
@@ -101,13 +101,14 @@ def answers(found: Sequence[Claim]) -> list[Answer]:
         if part.claims and not ran and not part.elsewhere:
             continue
         rows = [row for claim in ran for row in claim.rows if row.agrees is not None]
+        became = [f"{claim.outcome}: {claim.title}" for claim in ran]
         told.append(
             Answer(
                 part,
                 sum(row.agrees for row in rows),
                 len(rows),
                 [_difference(row) for row in rows if not row.agrees],
-                " ".join([*(f"{c.outcome}: {c.finding}" for c in ran), part.elsewhere]).strip(),
+                "; ".join(filter(None, [*became, part.elsewhere])),
             )
         )
     return told
