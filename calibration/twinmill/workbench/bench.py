@@ -78,12 +78,12 @@ class Bench:
                 self._reading = True
                 self.worker.start(self.session.work("read"))
             self._heed()
+        self._show_worst()
         self.opening = "checking the commands against the motion"
         self.changed("work")
         await self._read.wait()
         self._heed()
         await asyncio.to_thread(self.session.conclude)
-        self._show_worst()
         self.opening = ""
         self.changed("work", "model", "score", "prediction")
 
@@ -101,9 +101,10 @@ class Bench:
         self.changed("robots", "names", "model", "findings")
 
     def _show_worst(self) -> None:
-        """The robot that the model misses most, unless the user has begun to look elsewhere."""
+        """The robot that the model misses most, unless the user has begun to do something."""
         known = {k: score for k, score in self.session.own_scores().items() if score > 0}
-        if known and not self.view.keys() & {"robot", "t"}:
+        begun = self.view.keys() & {"robot", "t"} or self.session.tree.current.number
+        if known and not (begun or self.session.is_passing):
             self.view["robot"] = max(known, key=known.get)
             self.changed("robots")
 
