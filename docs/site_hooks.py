@@ -15,6 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r"^`{3,}", re.MULTILINE)
 ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 PICTURES = {".svg", ".png", ".html"}
 MARK = "<!-- catalogue -->"
@@ -38,7 +39,7 @@ def run(command: str, folder: Path) -> str:
     """
     scripts = f"{Path(sys.executable).parent}{os.pathsep}{ROOT / 'build' / 'bin'}"
     environment = {**os.environ, "PATH": f"{scripts}{os.pathsep}{os.environ['PATH']}"}
-    environment |= {"EXAMPLES": str(ROOT / "examples"), "COLUMNS": "92"}
+    environment |= {"EXAMPLES": str(ROOT / "examples"), "COLUMNS": "80"}
     done = subprocess.run(
         ["bash", "-c", command],
         cwd=folder,
@@ -61,7 +62,9 @@ def with_outputs(page: str, folder: Path) -> str:
             lines.append(line)
             if line.startswith("$ "):
                 lines += [text.rstrip() for text in run(line[2:], folder).splitlines()]
-        return "\n".join(["```console", *lines, "```"])
+        longest = max((len(line) for line in FENCE.findall("\n".join(lines))), default=2)
+        fence = "`" * (longest + 1)  # a shorter one does not end the block
+        return "\n".join([f"{fence}console", *lines, fence])
 
     return BLOCK.sub(replaced, page)
 

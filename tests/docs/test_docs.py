@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
-from site_hooks import catalogue, commands_of, run  # noqa: E402
+from site_hooks import catalogue, commands_of, run, with_outputs  # noqa: E402
 
 PAGES = sorted((ROOT / "docs").glob("*.md"))
 LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]+)?\)")
@@ -26,6 +26,14 @@ def outputs(folder) -> dict[str, str]:
     """What each command of the tutorial prints; it fails if one does."""
     page = (ROOT / "docs/tutorial.md").read_text()
     return {command: run(command, folder) for command in commands_of(page)}
+
+
+def test_fences_that_a_command_prints_do_not_end_its_block(tmp_path):
+    """By CommonMark a block ends at a fence that is no shorter than its own."""
+    page = "```console\n$ printf '```\\ntwinmill\\n```\\n'\n```"
+    assert with_outputs(page, tmp_path).splitlines()[1:] == [
+        "$ printf '```\\ntwinmill\\n```\\n'", "```", "twinmill", "```", "````"
+    ]  # fmt: skip
 
 
 def test_the_tutorial_names_the_effect_that_the_recording_has(outputs, folder):

@@ -45,10 +45,11 @@ void PrintText(const Options &options, const Result &result)
     std::printf("%s after %.2f s in %.2f s: %.1f times real time\n",
                 result.interrupted ? "stopped" : "done", result.simulated_s, result.wall_s,
                 result.simulated_s / result.wall_s);
-    std::printf(
-        "last 10 s: %s; circliness %.3f, radius %.3f m, rotation %+.2f, groups %.1f, "
-        "contacts %.1f\n",
-        Classify(m), m.circliness, m.radius_m, m.rotation, m.groups, m.contacts);
+    if (result.robots > 1)
+        std::printf(
+            "last 10 s: %s; circliness %.3f, radius %.3f m, rotation %+.2f, groups %.1f, "
+            "contacts %.1f\n",
+            Classify(m), m.circliness, m.radius_m, m.rotation, m.groups, m.contacts);
     if (!options.log.empty())
         std::printf("log: %s\n", options.log.c_str());
 }
