@@ -16,7 +16,7 @@ class KnobsPanel:
         with ui.element("div").classes("buttons"):
             self.fit = ui.button("Fit", on_click=lambda: page.start("fit"))
             self.fit.props('dense unelevated no-caps padding="2px 16px" data-testid="fit"')
-            self.fit.tooltip("Fits all quantities that are free to the logs, as `twinmill fit`")
+            self.fit.tooltip("Fits all quantities that are free, as the command twinmill fit does")
             ui.label("Locked ones are held.").classes("soft")
         self.body = ui.element("div").classes("stack")
 
