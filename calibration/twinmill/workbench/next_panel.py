@@ -19,8 +19,8 @@ class NextPanel:
     def __init__(self, page: Hands) -> None:
         self.page, self.bench = page, page.bench
         ui.label(
-            "The run that best tells apart what these logs leave open, as the command twinmill next "
-            "designs it."
+            "The run that best tells apart what these logs leave open, as the command twinmill "
+            "next designs it."
         ).classes("soft")
         with ui.element("div").classes("buttons"):
             asked = self.bench.view.get("next", {})
