@@ -82,8 +82,9 @@ void PrintJson(const Options &options, const Result &result)
 void PrintHeader(const Options &options, const Swarm &swarm, bool on_bus, double realtime_factor)
 {
     std::FILE *out = options.json ? stderr : stdout;
-    std::fprintf(out, "%d robots, %s plant, model %s, %s, seed %llu, control period %.1f ms\n",
-                 swarm.Size(), PlantName(options.plant), options.model.c_str(),
+    std::fprintf(out, "%d robot%s, %s plant, model %s, %s, seed %llu, control period %.1f ms\n",
+                 swarm.Size(), swarm.Size() == 1 ? "" : "s", PlantName(options.plant),
+                 options.model.c_str(),
                  options.script.empty() ? options.behavior.c_str() : options.script.c_str(),
                  static_cast<unsigned long long>(options.seed), swarm.PeriodS() * 1000);
     std::fprintf(out, "publishing %s%s%s, %s\n", on_bus ? "on the LCM bus" : "",
