@@ -19,6 +19,7 @@ const char *RoleName(Role role)
     {
         case Role::kSize: return "size";
         case Role::kPlace: return "place";
+        case Role::kMoment: return "moment";
         case Role::kLateness: return "lateness";
         case Role::kLimit: return "limit";
     }

@@ -304,8 +304,19 @@ def _tiles(twist, v, s):
 
 
 def _from_a_moment(rim, v, _):
+    rim, left = rim.copy(), np.tile([1, -1], 2)
+    rim[int(v["moment"] * len(rim)) :] *= 1 - v["loss"] - v["side"] * left[: rim.shape[1]]
+    return rim
+
+
+def _over_seconds(rim, v, _):
+    since_s = (np.arange(len(rim)) - v["moment"] * len(rim)) * STEP_S
+    return rim * (1 - v["loss"] * np.clip(since_s / v["takes_s"], 0, 1))[:, None]
+
+
+def _for_a_while(rim, v, _):
     rim = rim.copy()
-    rim[int(v["moment"] * len(rim)) :] *= 1 - v["loss"]
+    rim[int(v["moment"] * len(rim)) : int((v["moment"] + 0.2) * len(rim))] *= 1 - v["loss"]
     return rim
 
 
@@ -369,6 +380,12 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
         form("lag_by_duty", "plain", "lag", _lag_by_duty, extra_s=0.08)
         form("coasting", "plain", "lag", _coasting, (), deceleration_mps2=0.6, viscous_per_s=0.4)
     if robot.drive != "wheel_speed":
+        at = {"moment": float(u(0.3, 0.7)), "loss": 0.05}
+        both, slowly = at | {"side": 0.0}, at | {"takes_s": 6.0}
+        if robot.drive == "duty":
+            both["side"] = 0.05 * float(random.choice([-1, 0, 1]))
+        form("abrupt_loss", "plain", "target", _from_a_moment, ("loss", "side"), **both)
+        form("abrupt_loss", "cousin", "target", _over_seconds, ("loss",), **slowly)
         if robot.plant == "planar":  # before motors with a lag of their own it is a second one
             form("motor_lag", "plain", "lag", _lag, extra_s=0.03)
         form("motor_lag", "cousin", "lag", _second_order, second_s=0.03)
@@ -456,7 +473,14 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
         swing = {"share": 0.4, "hz": hz}
         found += [
             Hidden(
-                "from a moment on", "outside", "target", _from_a_moment, step, ("loss",), 5, time
+                "for a while",
+                "outside",
+                "target",
+                _for_a_while,
+                step,
+                ("loss",),
+                5,
+                time,
             ),
             Hidden("drop-outs", "outside", "target", _drop_outs, drops, (), 1, time),
         ]

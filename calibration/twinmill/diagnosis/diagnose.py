@@ -11,6 +11,7 @@ from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.detections.merge import with_detections
 from twinmill.diagnosis.encoders import geometry_notes, time_base_notes
 from twinmill.diagnosis.findings import (
+    SWINGS,
     findings_of,
     lateness,
     of_another_form,
@@ -18,6 +19,7 @@ from twinmill.diagnosis.findings import (
     with_stale_numbers,
 )
 from twinmill.diagnosis.irregularity import notes_on
+from twinmill.diagnosis.library import CHANGE
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
 from twinmill.diagnosis.resolution import resolutions
 from twinmill.diagnosis.rest import rest_of
@@ -43,6 +45,7 @@ from twinmill.model.parameters import (
     LAG,
     all_effect_parameters,
     base_parameters,
+    beginning_at_a_moment,
     catalogue,
     making_late,
     needing,
@@ -65,6 +68,7 @@ TWO_CLOCKS = (
     "--same-clock), or fit a calibration log on the same clocks first"
 )
 NO_HEADING = "the heading was not recorded, and what the robot holds is found"
+ONE_LOG = "a moment of one log is none of another; give each log by itself"
 CONTACTS = "predictions of one robot have no contacts; twinmill compare-swarm looks at whole swarms"
 
 
@@ -164,6 +168,8 @@ def _unseen(opened: Sequence[Opened]) -> dict[str, str]:
             found |= dict.fromkeys(making_late("delay"), TWO_CLOCKS)
         if all(o.heading_held for o in opened if o.floor):
             found |= dict.fromkeys(needing("heading"), NO_HEADING)
+        if sum(o.floor is not None for o in opened) > 1:
+            found |= dict.fromkeys(beginning_at_a_moment(), ONE_LOG)
         if len({_robot_of(o) for o in opened}) > 1:
             found |= dict.fromkeys(needing("contacts"), CONTACTS)
     return found
@@ -189,6 +195,8 @@ def _concluded(
     )
     rest = rest_of(formulas, last.fit, start.fit, model_file.left_over(hashes))
     findings = of_another_form(findings, rest.depends_on)
+    if any(f.why == SWINGS for f in findings):
+        rest = replace(rest, depends_on=[*dict.fromkeys([CHANGE, *rest.depends_on])])
     models = zip(known, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]

@@ -27,8 +27,7 @@ MISSES = 1.5  # score of a final model whose errors are not noise
 WITHIN = 2.0  # standard deviations: a lag that differs by less is the model's own error
 BEYOND = 3.0  # usual sizes, or standard deviations from it at a bound: doubtful beyond ...
 NEAR = 0.5  # ... if another leaves less than this more of the squared score, or a rest is left
-STAY_S = 2.0  # at a place or away from it: less is passing by
-STAYS = 3  # fewer are one change at one moment
+SWINGS = "sooner by one lag and later by another is what a body does that swings"
 # Groups of a rest, and what the cards of effects that act by them need or are shown by.
 BY = {"place": {"places"}, "heading": {"headings", "heading"}}
 NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
@@ -162,8 +161,7 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
 
     def judged(finding: Finding) -> Finding:
         if swings and _lateness_s(finding):
-            why = "sooner by one lag and later by another is what a body does that swings"
-            return replace(finding, certainty="doubtful", why=why)
+            return replace(finding, certainty="doubtful", why=SWINGS)
         card = cards.get(finding.effect, {"identify": (), "needs": ""})  # a refit has none
         acts_by = {*card["identify"], card["needs"]}
         on = next((group for group in depends_on if BY.get(group, set()) & acts_by), None)
@@ -313,8 +311,6 @@ def _finding(done: Search, name: str, share: float, changes: Mapping[str, Change
     group = (name, *tied) if tied else None
     card = catalogue_of(done.last.state.model)[name]
     doubt = _at_bound(card, own) or ("" if _stands_alone(done, name) else _unusual(card, own))
-    if not doubt and 0 < _stays(done.last, instance) < STAYS:
-        doubt = f"the robot came to the place of {name} once or left it once: it may be a moment"
     if not doubt and instance in changes:
         doubt = changes[instance].why
     if not doubt and done.last.fit.chance_of_none(instance) > NOTHING:
@@ -351,27 +347,6 @@ def _unusual(card: dict, own: Sequence[ParameterEstimate]) -> str:
                 "behind it"
             )
     return ""
-
-
-def _stays(last: Trial, instance: str) -> int:
-    """How often in all logs a robot was at an effect's place or away from it for a while.
-
-    0 for an effect without a place.
-    """
-    fit = last.fit
-    if f"{instance}.radius_m" not in {v["name"] for v in last.state.model.values()}:
-        return 0
-    stays = 0
-    for data, model in zip(fit.datasets, fit.models, strict=True):
-        if isinstance(data, Trajectory):
-            x_m, y_m, radius_m = (model.get(f"{instance}.{k}") for k in ("x_m", "y_m", "radius_m"))
-            pose = data.measurement.track.pose[data.windows.starts]
-            inside = np.hypot(pose[:, 0] - x_m, pose[:, 1] - y_m) < radius_m
-            edges = np.flatnonzero(np.diff(inside)) + 1
-            parts = zip(np.split(data.start_s, edges), np.split(inside, edges), strict=True)
-            long = [at[0] for t_s, at in parts if t_s[-1] - t_s[0] > STAY_S]
-            stays += 1 + int(np.count_nonzero(np.diff(long)))
-    return stays
 
 
 def _stands_alone(done: Search, name: str) -> bool:

@@ -19,6 +19,7 @@ from twinmill.model.parameters import (
     LAG,
     LAG_EFFECT,
     MOTION_STAGES,
+    WHERE_OR_WHEN,
     Parameter,
     base_lag_is_identifiable,
     base_parameters,
@@ -60,6 +61,8 @@ class Settings:
         imitates: share of the squared score taken by other numbers of the base that an effect must
             take to be as good an answer.
         group: most members of a group, the most alike: more is no answer.
+        usual: times the evidence where the score is no worse than on the logs that the model was
+            fitted to: what it misses there it misses here, too.
         faint: a candidate of less expected evidence at three times its usual size is not shown.
     """
 
@@ -84,6 +87,7 @@ class Settings:
     each: float = 2.0
     imitates: float = 0.95
     group: int = 4
+    usual: float = 1.5
     faint: float = 16.0
 
     def stricter(self, times: float) -> "Settings":
@@ -157,7 +161,7 @@ class Screened:
         columns: (R, k) of all data sets, weighted, what is free projected out.
         gain: expected fall of the cost.
         size: expected fall of the cost if it had its usual strength.
-        start: values that the fit begins at, by name; those of a place or limit are searched.
+        start: values that the fit begins at, by name; a place, moment or limit is searched.
     """
 
     name: str
@@ -213,12 +217,12 @@ def search(
         progress: told in words what is being done.
         settings: numbers that decide.
         known: score that the model has on the logs that it was fitted to. What it missed there it
-            misses here, too, and in the same way over and over: where the score is no worse than
-            that, evidence must be so many times as strong.
+            misses here, too, and in the same way over and over, so that evidence must be stronger
+            where the score is no worse than that.
     """
     before = fitted(state)
     if before.held_score < NEWS * known:
-        settings = settings.stricter(known)
+        settings = settings.stricter(settings.usual * known)
     rounds: list[Round] = []
     dropped: list[str] = []
     ways: Ways = {}
@@ -317,7 +321,7 @@ def _best(
         if fall <= 0:
             continue
         matters = fall >= _least_fall(before, trial, first_excess, settings) * len(trial.names)
-        at_nothing = all(_is_neutral(trial, n) for n in trial.names)
+        at_nothing = all(_is_neutral(trial, n) or _began_before(trial, n) for n in trial.names)
         if matters and not at_nothing and _proven(trial, before.held_score, settings):
             good.append(trial)
     best = min(good, key=lambda t: t.fit.held_cost + settings.each * len(t.fit.x), default=None)
@@ -328,6 +332,16 @@ def _best(
         if t.names == (REFIT,) and t.fit.held_cost - best.fit.held_cost < settings.tie
     ]
     return stale[0] if stale else best
+
+
+def _began_before(trial: Trial, name: str) -> bool:
+    """An effect of a moment that is hardly within the logs: it is there all the time, or never."""
+    if not _has(name, "moment"):
+        return False
+    instance = [n for n in effect_names(trial.state.model) if n.split("#")[0] == name][-1]
+    at_s = [trial.state.model.get(f"{instance}.{key}") for key in _moments_of(name)]
+    low_s, high_s = np.quantile(_times_s(trial.state), (MARGIN, 1 - MARGIN))
+    return not all(low_s < t_s < high_s for t_s in at_s)
 
 
 def _is_common(before: Trial, refit: Trial, settings: Settings) -> bool:
@@ -407,7 +421,7 @@ def _is_neutral(trial: Trial, name: str) -> bool:
         return False
     instance = [n for n in effect_names(trial.state.model) if n.split("#")[0] == name][-1]
     for p in catalogue_of(trial.state.model)[name]["parameters"]:
-        if p["role"] == "place":
+        if p["role"] in WHERE_OR_WHEN:
             continue
         value = trial.state.model.get(f"{instance}.{p['name']}")
         if abs(value - p["neutral"]) > 1e-3 * abs(p["default"] - p["neutral"]):
@@ -462,7 +476,7 @@ def screen(before: Trial, ways: Ways | None = None) -> list[Screened]:
     rest = padded - basis @ (basis.T @ padded)
     found = []
     for name in candidates(state):
-        searched = _has(name, "place") or _has(name, "limit")
+        searched = any(_has(name, role) for role in STARTS)
         if searched and name not in ways:
             ways[name] = _ways(name, state, rows)
         start = _best_start(*ways[name], weights, rest) if searched else {}
@@ -492,8 +506,8 @@ def _has(name: str, role: str) -> bool:
 def _ways(
     name: str, state: State, rows: list[np.ndarray]
 ) -> tuple[list[dict[str, float]], list[np.ndarray]]:
-    """Starts of an effect of a place or limit, and the change of the rows from each, see Ways."""
-    starts = _places(name, state) if _has(name, "place") else _limits(name, state)
+    """Starts of an effect that has several, and the change of the rows from each, see Ways."""
+    starts = next(of(name, state) for role, of in STARTS.items() if _has(name, role))
     if len(starts) < 2:
         return starts, []
     changes = []
@@ -511,7 +525,7 @@ def _best_start(
     weights: list[np.ndarray],
     rest: np.ndarray,
 ) -> dict[str, float]:
-    """Of several places or limits the one that explains most at the usual strength."""
+    """Of several starts the one that explains most at the usual strength."""
     if not changes:
         return {}
     columns = np.concatenate([w * c for w, c in zip(weights, changes, strict=True)], axis=1)
@@ -636,6 +650,26 @@ def _next_instance(name: str, state: State) -> str:
     return f"{name}#{count + 1}" if count else name
 
 
+MOMENTS = 16  # over the time of the log
+MARGIN = 0.05  # share of it at each end, within which a moment is none
+
+
+def _moments(name: str, state: State) -> list[dict[str, float]]:
+    """Starts of an effect that begins at a moment."""
+    instance = _next_instance(name, state)
+    at_s = np.quantile(_times_s(state), (np.arange(MOMENTS) + 0.5) / MOMENTS)
+    return [{f"{instance}.{key}": float(t_s) for key in _moments_of(name)} for t_s in at_s]
+
+
+def _moments_of(name: str) -> list[str]:
+    return [p["name"] for p in catalogue()[name]["parameters"] if p["role"] == "moment"]
+
+
+def _times_s(state: State) -> np.ndarray:
+    """Starts of all windows of all logs."""
+    return np.concatenate([d.start_s for d in state.datasets if isinstance(d, Trajectory)])
+
+
 LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual one
 
 
@@ -644,6 +678,10 @@ def _limits(name: str, state: State) -> list[dict[str, float]]:
     instance = _next_instance(name, state)
     limits = [p for p in catalogue()[name]["parameters"] if p["role"] == "limit"]
     return [{f"{instance}.{p['name']}": k * p["default"] for p in limits} for k in LIMITS]
+
+
+# Where a search starts, by the role of the parameter that it is for.
+STARTS = {"place": _places, "moment": _moments, "limit": _limits}
 
 
 def _promising(screened: list[Screened], settings: Settings) -> list[Screened]:
@@ -701,6 +739,8 @@ def _tied(this: Round, settings: Settings) -> list[Trial]:
     tied = []
     for trial in this.trials:
         if trial is accepted or len(trial.names) > 1 or trial.names[0] == REFIT:
+            continue
+        if _began_before(trial, trial.names[0]):
             continue
         apart = trial.fit.held_cost - accepted.fit.held_cost
         *_, blocks_t = _against(trial.fit, accepted.fit)

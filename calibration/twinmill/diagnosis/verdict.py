@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from twinmill.diagnosis import moments
-from twinmill.diagnosis.findings import Finding
+from twinmill.diagnosis.findings import SWINGS, Finding
 from twinmill.diagnosis.rest import MOMENTS, Rest
 from twinmill.diagnosis.search import NEWS, REFIT, of_levels
 from twinmill.fitting.compare import GOOD, MISSING
@@ -47,7 +47,8 @@ class Weighed:
     @property
     def verdict(self) -> str:
         """As in Diagnosis."""
-        if self.effects and not self._noise_outweighs and not self._rest_outweighs:
+        outweighed = self._noise_outweighs or self._rest_outweighs or self._swings
+        if self.effects and not outweighed:
             top = self.effects[0]
             return "ambiguous" if top.group else "effect_missing"
         if self._outside or self.rest.moments or self.effects:
@@ -103,6 +104,11 @@ class Weighed:
         if not self.noises:
             return False
         return self._taken < 0.5
+
+    @property
+    def _swings(self) -> bool:
+        """What was found stands for a body that swings, which no effect describes."""
+        return any(f.why == SWINGS for f in self.effects)
 
     @property
     def _rest_outweighs(self) -> bool:

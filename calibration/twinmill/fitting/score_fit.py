@@ -18,7 +18,13 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from twinmill.model.covariance import Covariance
-from twinmill.model.parameters import GAINS, Parameter, ParameterEstimate, stated_names
+from twinmill.model.parameters import (
+    GAINS,
+    WHERE_OR_WHEN,
+    Parameter,
+    ParameterEstimate,
+    stated_names,
+)
 from twinmill.predict.datasets import PARTS, Dataset
 
 ROUNDS = 12
@@ -232,7 +238,8 @@ class ScoreFit:
 
     def begin_at_best(self, fresh: int) -> None:
         """Begins with the last `fresh` shared parameters at the best of several strengths."""
-        names = {p.name for p in self.shared[len(self.shared) - fresh :] if p.role != "place"}
+        added = self.shared[len(self.shared) - fresh :]
+        names = {p.name for p in added if p.role not in WHERE_OR_WHEN}
         new = np.array([u.parameter.name in names for u in self.unknowns], bool)
         points = [np.where(new, self.usual + s * (self.x - self.usual), self.x) for s in STARTS]
         points = np.clip(np.array(points), self.low, self.high)
@@ -393,6 +400,9 @@ class ScoreFit:
         gram, _ = self._normal(rows, slopes, self.x)
         inverse = np.linalg.pinv(gram)
         spread = np.zeros_like(gram)
+        # Without the block around a moment, only the prior says where in it the moment was.
+        parameters = [u.parameter for u in self.unknowns]
+        reach = np.array([p.std if p.role == "moment" else np.inf for p in parameters])
         for i, (r, j) in enumerate(zip(rows, slopes, strict=True)):
             weight, own, block = self.weight(i, r), self.columns[i], self.datasets[i].block
             for b in np.unique(block):
@@ -405,6 +415,7 @@ class ScoreFit:
                     moved = np.linalg.solve(less, push)
                 except np.linalg.LinAlgError:
                     moved = inverse @ push
+                moved = np.clip(moved, -reach, reach)
                 spread += np.outer(moved, moved)
         blocks = self.blocks
         spread *= (blocks - 1) / max(blocks, 1)
@@ -451,7 +462,8 @@ class ScoreFit:
         for u, value, std in zip(self.unknowns, self.x, self.stds, strict=True):
             p = u.parameter
             near = AT_BOUND * (p.max - p.min)
-            at_bound = bool(value - p.min < near or p.max - value < near)
+            bounded = p.role != "moment"  # the end of time is none
+            at_bound = bounded and bool(value - p.min < near or p.max - value < near)
             found.append(
                 ParameterEstimate(
                     p.name, float(value), float(std), p.unit, at_bound, bool(std < SEEN * p.std)

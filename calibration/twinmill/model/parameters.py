@@ -24,6 +24,7 @@ BASE_STEP = {LAG: 0.004, CLOCK: 0.006, CLOCK_RATE: 5.0, HEADING: 0.005}
 GAIN_STEP = 0.004
 # Which part of a robot's lateness an effect changes, by its stage; "lag" at the others.
 LATE_PARTS = {"duty": "delay", "observe": "clock"}
+WHERE_OR_WHEN = ("place", "moment")  # roles of what says nothing of how strong an effect is
 EFFECT_STEP = 0.05  # times the distance of an effect's default from its neutral value
 
 
@@ -39,7 +40,7 @@ class Parameter:
         std: standard deviation of the prior.
         step: of finite differences.
         central: differences are taken to both sides, where times make one-sided ones crude.
-        role: "size", "place" (where in the room) or "lateness", as on the effect's card.
+        role: "size", "place" (where in the room), "moment" or "lateness", as on the effect's card.
         strength: an effect's default less its neutral value.
     """
 
@@ -56,8 +57,8 @@ class Parameter:
     strength: float = 0.0
 
     def at(self, value: float) -> "Parameter":
-        """The same, begun elsewhere; no place is usual, so the prior of one goes with it."""
-        return replace(self, value=value, usual=value if self.role == "place" else self.usual)
+        """The same, begun elsewhere; no place or moment is usual: the prior of one goes with it."""
+        return replace(self, value=value, usual=value if self.role in WHERE_OR_WHEN else self.usual)
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,12 @@ def catalogue() -> dict[str, dict]:
 def needing(need: str) -> list[str]:
     """Effects that show only in data that hold this, as `needs` on their cards says."""
     return [name for name, entry in catalogue().items() if entry["needs"] == need]
+
+
+def beginning_at_a_moment() -> list[str]:
+    """Effects that act from a moment of their log on."""
+    cards = catalogue().items()
+    return [n for n, card in cards if any(p["role"] == "moment" for p in card["parameters"])]
 
 
 def late_part(effect: str) -> tuple[str, str] | None:

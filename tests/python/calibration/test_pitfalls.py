@@ -294,22 +294,38 @@ def test_moments_without_power_are_told_one_by_one(tanh_robot, measure, fitted):
     assert "4 moments" in found.sentence
 
 
-@pytest.mark.parametrize(("from_s", "certainty"), [(0.0, "sure"), (20.0, "doubtful")])
-def test_a_weakness_that_comes_later_is_no_sure_weakness(
-    tanh_robot, measure, fitted, from_s, certainty
-):
-    """Two wheels lose 12 %: all the time, or from the middle of the log on."""
+def _weak_left_from(robot, from_s: float):
+    """The robot with left wheels that lose 12 % from a time of its log on."""
 
-    class Weak(tanh_robot):
+    class Weak(robot):
         def wheels_mps(self, duty):
             later = np.arange(len(duty)) * EULER_S > from_s
             weaker = np.where(later[:, None], (0.88, 1, 0.88, 1), 1.0)
             return super().wheels_mps(duty) * weaker
 
-    found = diagnose([measure(Weak(), 22, 40.0)], fitted)
-    weak = next(f for f in found.findings if f.effect == "wheel_gain")
-    assert weak.certainty == certainty
-    assert ("time" in weak.why) == (certainty == "doubtful")
+    return Weak()
+
+
+def test_a_weakness_that_is_always_there_is_a_gain(tanh_robot, measure, fitted):
+    found = diagnose([measure(_weak_left_from(tanh_robot, 0.0), 22, 40.0)], fitted)
+    (gain,) = (f for f in found.findings if f.effect == "wheel_gain")
+    assert gain.certainty == "sure"
+
+
+def test_a_weakness_that_comes_later_is_told_with_its_moment(tanh_robot, measure, fitted):
+    """12 % of the left wheels are 6 % of all and 6 % of their difference."""
+    found = diagnose([measure(_weak_left_from(tanh_robot, 20.0), 22, 40.0)], fitted)
+    (finding,) = found.findings
+    assert (finding.effect, finding.certainty) == ("abrupt_loss", "sure")
+    loss, side, from_s = finding.parameters
+    for part in (loss, side):
+        assert abs(part.value - 0.06) < 2 * part.std < 0.04
+    assert from_s.value == pytest.approx(20.0, abs=0.5)
+
+
+def test_a_moment_of_one_log_is_not_looked_for_in_several(tanh_robot, measure, fitted):
+    logs = [measure(_weak_left_from(tanh_robot, s), 22 + int(s), 20.0) for s in (0.0, 10.0)]
+    assert dict(diagnose(logs, fitted).not_identifiable)["abrupt_loss"].startswith("a moment of")
 
 
 def test_a_body_that_turns_sooner_than_it_drives_is_named(tanh_robot, measure, fitted):

@@ -13,6 +13,7 @@ enum class Role
 {
     kSize,      // how strong the effect is
     kPlace,     // where in the room it acts, how far: a search starts from several places
+    kMoment,    // when it begins: a search starts from several
     kLateness,  // how late a response comes: only the sum with other such parameters is firm
     kLimit,     // beyond which something happens, with no trace below: a search starts from several
 };
