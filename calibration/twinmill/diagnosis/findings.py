@@ -8,7 +8,16 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.constancy import Change, changes_of
-from twinmill.diagnosis.search import REFIT, Round, Search, State, Trial, fitted, grown
+from twinmill.diagnosis.search import (
+    REFIT,
+    Round,
+    Search,
+    State,
+    Trial,
+    fitted,
+    grown,
+    of_levels,
+)
 from twinmill.fitting.compare import GOOD
 from twinmill.model.parameters import (
     LAG,
@@ -27,6 +36,7 @@ MISSES = 1.5  # score of a final model whose errors are not noise
 WITHIN = 2.0  # standard deviations: a lag that differs by less is the model's own error
 BEYOND = 3.0  # usual sizes, or standard deviations from it at a bound: doubtful beyond ...
 NEAR = 0.5  # ... if another leaves less than this more of the squared score, or a rest is left
+AWAY_S = 2.0  # between two visits of a place
 SWINGS = "sooner by one lag and later by another is what a body does that swings"
 # Groups of a rest, and what the cards of effects that act by them need or are shown by.
 BY = {"place": {"places"}, "heading": {"headings", "heading"}}
@@ -44,6 +54,7 @@ class Finding:
         certainty: sure, group or doubtful.
         why: of a doubt; empty otherwise.
         again: the model given has the effect already, with other numbers.
+        wrong_form: what is left says that something of another form stands behind it.
     """
 
     effect: str
@@ -53,6 +64,7 @@ class Finding:
     certainty: str
     why: str = ""
     again: bool = False
+    wrong_form: bool = False
 
     @property
     def takes(self) -> str:
@@ -148,29 +160,42 @@ def findings_of(
 def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list[Finding]:
     """Findings, doubtful where their form is wrong.
 
-    So it is where what is left still depends on what they act by, and where one makes the robot
-    later and another sooner: a lag below its own and a delay imitate a body that swings.
+    So it is where what is left still depends on what they act by; where one makes the robot later
+    and another sooner: a lag below its own and a delay imitate a body that swings; and where a
+    second one bends the curve of speed over command as a better one does already.
 
     Args:
         found: in the order of worth.
         depends_on: groups that what is left depends on.
     """
-    cards = catalogue()
     late_s = [_lateness_s(f) for f in found]
     swings = min(late_s, default=0.0) < 0 < max(late_s, default=0.0)
+    curves = [f.effect for f in found if f.effect in _curves()]
 
     def judged(finding: Finding) -> Finding:
         if swings and _lateness_s(finding):
-            return replace(finding, certainty="doubtful", why=SWINGS)
-        card = cards.get(finding.effect, {"identify": (), "needs": ""})  # a refit has none
-        acts_by = {*card["identify"], card["needs"]}
-        on = next((group for group in depends_on if BY.get(group, set()) & acts_by), None)
+            return replace(finding, certainty="doubtful", why=SWINGS, wrong_form=True)
+        if finding.effect in curves[1:]:
+            why = f"{curves[0]} bends the speed over the command, too: both may be one other curve"
+            return replace(finding, certainty="doubtful", why=why)
+        on = next((group for group in depends_on if BY.get(group, set()) & _acts_by(finding)), None)
         if on is None:
             return finding
         why = f"what is left still depends on {on}, so that it may have another form"
-        return replace(finding, certainty="doubtful", why=why)
+        return replace(finding, certainty="doubtful", why=why, wrong_form=True)
 
     return [f if f.why else judged(f) for f in found]
+
+
+def _acts_by(finding: Finding) -> set[str]:
+    """What the effect's card needs or is shown by; nothing for a refit, which has none."""
+    card = catalogue().get(finding.effect, {"identify": (), "needs": ""})
+    return {*card["identify"], card["needs"]}
+
+
+def _curves() -> set[str]:
+    """Effects that bend the steady speed over the command."""
+    return {n for n in of_levels() if catalogue()[n]["needs"] == "steady_speed"}
 
 
 def _lateness_s(finding: Finding) -> float:
@@ -311,6 +336,8 @@ def _finding(done: Search, name: str, share: float, changes: Mapping[str, Change
     group = (name, *tied) if tied else None
     card = catalogue_of(done.last.state.model)[name]
     doubt = _at_bound(card, own) or ("" if _stands_alone(done, name) else _unusual(card, own))
+    if not doubt and _visits(done.last, instance) == 1:
+        doubt = f"the robot came to the place of {name} once: it may be that time and not the place"
     if not doubt and instance in changes:
         doubt = changes[instance].why
     if not doubt and done.last.fit.chance_of_none(instance) > NOTHING:
@@ -347,6 +374,21 @@ def _unusual(card: dict, own: Sequence[ParameterEstimate]) -> str:
                 "behind it"
             )
     return ""
+
+
+def _visits(last: Trial, instance: str) -> int | None:
+    """How often robots came to an effect's place in all logs; None for one without a place."""
+    fit = last.fit
+    if f"{instance}.radius_m" not in {v["name"] for v in last.state.model.values()}:
+        return None
+    visits = 0
+    for data, model in zip(fit.datasets, fit.models, strict=True):
+        if isinstance(data, Trajectory):
+            x_m, y_m, radius_m = (model.get(f"{instance}.{k}") for k in ("x_m", "y_m", "radius_m"))
+            pose = data.measurement.track.pose[data.windows.starts]
+            there_s = data.start_s[np.hypot(pose[:, 0] - x_m, pose[:, 1] - y_m) < radius_m]
+            visits += int(np.count_nonzero(np.diff(there_s, prepend=-np.inf) > AWAY_S))
+    return visits
 
 
 def _stands_alone(done: Search, name: str) -> bool:

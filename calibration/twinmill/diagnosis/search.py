@@ -23,6 +23,7 @@ from twinmill.model.parameters import (
     Parameter,
     base_lag_is_identifiable,
     base_parameters,
+    beginning_at_a_moment,
     catalogue,
     catalogue_of,
     effect_names,
@@ -336,7 +337,7 @@ def _best(
 
 def _began_before(trial: Trial, name: str) -> bool:
     """An effect of a moment that is hardly within the logs: it is there all the time, or never."""
-    if not _has(name, "moment"):
+    if name not in beginning_at_a_moment():
         return False
     instance = [n for n in effect_names(trial.state.model) if n.split("#")[0] == name][-1]
     at_s = [trial.state.model.get(f"{instance}.{key}") for key in _moments_of(name)]

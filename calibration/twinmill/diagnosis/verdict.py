@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from twinmill.diagnosis import moments
-from twinmill.diagnosis.findings import SWINGS, Finding
+from twinmill.diagnosis.findings import Finding
 from twinmill.diagnosis.rest import MOMENTS, Rest
 from twinmill.diagnosis.search import NEWS, REFIT, of_levels
 from twinmill.fitting.compare import GOOD, MISSING
@@ -47,7 +47,7 @@ class Weighed:
     @property
     def verdict(self) -> str:
         """As in Diagnosis."""
-        outweighed = self._noise_outweighs or self._rest_outweighs or self._swings
+        outweighed = self._noise_outweighs or self._rest_outweighs or self._of_another_form
         if self.effects and not outweighed:
             top = self.effects[0]
             return "ambiguous" if top.group else "effect_missing"
@@ -106,9 +106,9 @@ class Weighed:
         return self._taken < 0.5
 
     @property
-    def _swings(self) -> bool:
-        """What was found stands for a body that swings, which no effect describes."""
-        return any(f.why == SWINGS for f in self.effects)
+    def _of_another_form(self) -> bool:
+        """Most of what was found stands for something else of another form."""
+        return sum(f.share for f in self.effects if f.wrong_form) > self._taken / 2
 
     @property
     def _rest_outweighs(self) -> bool:
