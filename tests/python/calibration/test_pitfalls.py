@@ -328,6 +328,20 @@ def test_a_moment_of_one_log_is_not_looked_for_in_several(tanh_robot, measure, f
     assert dict(diagnose(logs, fitted).not_identifiable)["abrupt_loss"].startswith("a moment of")
 
 
+def test_a_weakness_for_a_while_is_no_sure_patch_of_the_floor(tanh_robot, measure, fitted):
+    """A third of the speed is gone from 15 to 22 s, wherever the robot is then."""
+
+    class Tired(tanh_robot):
+        def wheels_mps(self, duty):
+            at_s = np.arange(len(duty)) * EULER_S
+            tired = (at_s > 15) & (at_s < 22)
+            return super().wheels_mps(duty) * np.where(tired, 0.67, 1.0)[:, None]
+
+    found = diagnose([measure(Tired(), 22, 40.0)], fitted)
+    assert found.verdict != "model_adequate"
+    assert not [f.effect for f in found.findings if f.certainty == "sure"]
+
+
 def test_a_body_that_turns_sooner_than_it_drives_is_named(tanh_robot, measure, fitted):
     """Driving takes the robot's 0.09 s, turning 0.04 s: first orders by themselves, summed."""
     spin = np.array([-1, 1, -1, 1]) / 2
@@ -520,7 +534,7 @@ def test_what_leaves_a_rest_of_its_own_kind_has_another_form(effect, depends_on,
     found = Finding(effect, None, [], 0.9, "sure")
     (judged,) = of_another_form([found], depends_on)
     assert judged.certainty == certainty
-    assert bool(judged.why) == (certainty == "doubtful")
+    assert bool(judged.why) == judged.wrong_form == (certainty == "doubtful")
 
 
 @pytest.mark.parametrize(("extra_s", "certainty"), [(-0.06, "doubtful"), (0.06, "sure")])
@@ -538,3 +552,11 @@ def test_sooner_by_one_lag_and_later_by_another_is_no_lag(extra_s, certainty):
         for name, value in sizes.items()
     ]
     assert [f.certainty for f in of_another_form(found, [])] == [certainty] * 2
+
+
+def test_two_curves_of_the_speed_over_the_command_may_be_one():
+    """Any odd curve is some dead zone and some bend; a gain of a wheel is no part of it."""
+    found = [Finding(n, None, [], 0.3, "sure") for n in ("dead_zone", "speed_curve", "wheel_gain")]
+    judged = of_another_form(found, [])
+    assert [f.certainty for f in judged] == ["sure", "doubtful", "sure"]
+    assert "dead_zone" in judged[1].why
