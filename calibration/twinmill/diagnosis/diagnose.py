@@ -12,6 +12,7 @@ from twinmill.diagnosis.detections.merge import with_detections
 from twinmill.diagnosis.encoders import geometry_notes, time_base_notes
 from twinmill.diagnosis.findings import (
     SWINGS,
+    beside_more,
     findings_of,
     lateness,
     of_another_form,
@@ -194,7 +195,7 @@ def _concluded(
         findings, last.state.model, model_file.lag_std_s(hashes), model_file.effect_stds
     )
     rest = rest_of(formulas, last.fit, start.fit, model_file.left_over(hashes))
-    findings = of_another_form(findings, rest.depends_on)
+    findings = beside_more(of_another_form(findings, rest.depends_on), rest)
     if any(f.why == SWINGS for f in findings):
         rest = replace(rest, depends_on=[*dict.fromkeys([CHANGE, *rest.depends_on])])
     models = zip(known, last.state.models, strict=True)

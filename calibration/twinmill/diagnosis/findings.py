@@ -8,6 +8,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.constancy import Change, changes_of
+from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import (
     REFIT,
     Round,
@@ -39,7 +40,7 @@ NEAR = 0.5  # ... if another leaves less than this more of the squared score, or
 AWAY_S = 2.0  # between two visits of a place
 SWINGS = "sooner by one lag and later by another is what a body does that swings"
 # Groups of a rest, and what the cards of effects that act by them need or are shown by.
-BY = {"place": {"places"}, "heading": {"headings", "heading"}}
+BY = {"place": {"places", "place"}, "heading": {"headings", "heading"}}
 NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
 
 
@@ -174,23 +175,40 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
 
     def judged(finding: Finding) -> Finding:
         if swings and _lateness_s(finding):
-            return replace(finding, certainty="doubtful", why=SWINGS, wrong_form=True)
+            return _doubted(finding, SWINGS, wrong_form=True)
+        on = next((group for group in depends_on if BY.get(group, set()) & _acts_by(finding)), None)
+        if on is not None:
+            why = f"what is left still depends on {on}, so that it may have another form"
+            return _doubted(finding, why, wrong_form=True)
         if finding.effect in curves[1:]:
             why = f"{curves[0]} bends the speed over the command, too: both may be one other curve"
-            return replace(finding, certainty="doubtful", why=why)
-        on = next((group for group in depends_on if BY.get(group, set()) & _acts_by(finding)), None)
-        if on is None:
-            return finding
-        why = f"what is left still depends on {on}, so that it may have another form"
-        return replace(finding, certainty="doubtful", why=why, wrong_form=True)
+            return _doubted(finding, why)
+        return finding
 
-    return [f if f.why else judged(f) for f in found]
+    return [judged(f) for f in found]
+
+
+def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
+    """Findings, doubtful where more is left than all of them take, and it is no noise."""
+    taken = sum(f.share for f in found if f.effect != REFIT)
+    if not rest.firm or rest.share <= taken:
+        return list(found)
+    why = "more is left than it takes, so that it may be a part of something else"
+    return [f if f.effect == REFIT else _doubted(f, why) for f in found]
+
+
+def _doubted(finding: Finding, why: str, wrong_form: bool = False) -> Finding:
+    """The finding with one more reason to doubt it; the first is told."""
+    why = finding.why or why
+    return replace(
+        finding, certainty="doubtful", why=why, wrong_form=finding.wrong_form or wrong_form
+    )
 
 
 def _acts_by(finding: Finding) -> set[str]:
-    """What the effect's card needs or is shown by; nothing for a refit, which has none."""
-    card = catalogue().get(finding.effect, {"identify": (), "needs": ""})
-    return {*card["identify"], card["needs"]}
+    """What the effect's card says of it in this respect; nothing for a refit, which has none."""
+    card = catalogue().get(finding.effect, {"identify": (), "needs": "", "family": ""})
+    return {*card["identify"], card["needs"], card["family"]}
 
 
 def _curves() -> set[str]:

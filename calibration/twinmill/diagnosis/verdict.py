@@ -11,6 +11,7 @@ from twinmill.diagnosis.search import NEWS, REFIT, of_levels
 from twinmill.fitting.compare import GOOD, MISSING
 
 DRIFTED = 0.85  # share of the score as given that drifting gains leave, where they were stale
+MUCH = 0.1  # share of the squared error that is left, beyond which doubtful findings are not all
 WORSE = 1.5  # score over the usual one, beyond which it is a finding
 
 
@@ -87,11 +88,8 @@ class Weighed:
     @property
     def _outside(self) -> bool:
         """Something is left that no effect takes: it depends on something, or it is much."""
-        if self.rest.again or (self.noises and self._continuous):
-            return True
-        if self.last <= GOOD * self.known:
-            return False
-        return bool(self._continuous) or self.last > WORSE * self.known
+        much = self.last > WORSE * self.known
+        return bool(self.rest.again or self._continuous) or much
 
     @property
     def _left_in_the_dark(self) -> bool:
@@ -112,10 +110,12 @@ class Weighed:
 
     @property
     def _rest_outweighs(self) -> bool:
-        """No effect is beyond doubt, and more is left than they take, which is no noise."""
-        doubtful = all(f.certainty == "doubtful" for f in self.effects)
-        no_noise = bool(self._continuous) or self.rest.firm
-        return doubtful and no_noise and self.rest.share > self._taken
+        """No effect is beyond doubt, and much is left that is no noise."""
+        if not all(f.certainty == "doubtful" for f in self.effects):
+            return False
+        if self._continuous and self.rest.share > MUCH:
+            return True
+        return self.rest.firm and self.rest.share > self._taken
 
     @property
     def _taken(self) -> float:

@@ -21,6 +21,7 @@ from twinmill.data.checks.motion import (
     Motion,
 )
 
+NEGLIGIBLE = 1e-4  # share of the largest channel's squared speed: no unit is told from it
 LEVERS_M = (0.05, 0.3)  # turning (rad/s) is weighed against moving (m/s) by the wheels' lever
 TWIST_LEVER_M = 0.2  # where there are no wheels
 ONE_FLIP = ((-1, -1, -1, -1), (-1, 1, -1, 1), (1, -1, 1, -1))  # all, the left, the right wheels
@@ -97,7 +98,7 @@ class Explained:
         left: share of the squared motion that it leaves, on stretches not fitted to.
         by_block: (B,) the same summed by stretch, over the whole motion.
         turned_rad: heading offset that went with it.
-        gain: (3,) measured over predicted speed, by channel.
+        gain: (3,) measured over predicted speed, by channel; 0 where next to none is predicted.
         lag_s, late_s: at which it was found.
     """
 
@@ -293,7 +294,8 @@ class Search:
             left[:, judge] = (best**2 * here_p - 2 * best * here_m).sum(axis=2)
         left = (left + total) / max(total.sum(), 1e-12)
         linear_p, linear_m = power[:, :, 1].sum(axis=1), along[:, :, 1].sum(axis=1)
-        return left, linear_m / np.maximum(linear_p, 1e-12)
+        moves = linear_p > NEGLIGIBLE * linear_p.max(axis=1, keepdims=True)
+        return left, np.where(moves, linear_m / np.maximum(linear_p, 1e-12), 0.0)
 
 
 def _inverse(place: tuple[int, ...]) -> list[int]:
