@@ -120,7 +120,7 @@ def first_state(
     """Where the search starts: the model as given, and what is free in it without being a finding.
 
     The base of a model that other logs told is held, but for gains that drift with battery and
-    heat. A base that was fitted to these very logs moves with whatever is added. The numbers of a
+    heat, and for speeds at duties that those logs hardly had. A base that was fitted to these very logs moves with whatever is added. The numbers of a
     data sheet are a candidate like any effect: `refit`.
     """
     model = model_file.model
@@ -131,6 +131,9 @@ def first_state(
     if told and model.drive == "duty":
         gains = [n for n in BASE_GAINS if n in names]
         free = [replace(p, std=DRIFT_STD) for p in base_parameters(opened[0].model, gains)]
+        unsure = model_file.unsure_speeds()
+        speeds = base_parameters(opened[0].model, unsure)
+        free += [replace(p, std=min(p.std, unsure[p.name])) for p in speeds]
     elif model_file.fitted_on(hashes):
         free = base_parameters(opened[0].model, names) + all_effect_parameters(opened[0].model)
     base = tuple(n for n in names if n != LAG and n not in {p.name for p in free})

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 import twinmill_native as native
+from scipy.linalg import eigh
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
@@ -395,7 +396,10 @@ class ScoreFit:
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """(P, P) by leaving out a block at a time; no less than the curvature of the cost says."""
+        """(P, P) by leaving out a block at a time; no less than the curvature of the cost says.
+
+        What the data leave undetermined is as wide as the prior, which is part of the curvature.
+        """
         rows, slopes = self.state
         gram, _ = self._normal(rows, slopes, self.x)
         inverse = np.linalg.pinv(gram)
@@ -419,8 +423,7 @@ class ScoreFit:
                 spread += np.outer(moved, moved)
         blocks = self.blocks
         spread *= (blocks - 1) / max(blocks, 1)
-        # What the data leave undetermined is as wide as the curvature, and so the prior, says.
-        return spread + np.diag(np.maximum(np.diag(inverse) - np.diag(spread), 0.0))
+        return _no_less(spread, inverse)
 
     @property
     def blocks(self) -> int:
@@ -493,3 +496,12 @@ class ScoreFit:
         """Of data set i alone: its clock and its robot's gains."""
         count = len(self.shared_estimates())
         return {self.estimates[c].name: self.estimates[c] for c in self.columns[i] if c >= count}
+
+
+def _no_less(wide: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """(P, P) a covariance, raised in each direction in which another one is wider."""
+    scale = np.sqrt(np.diag(least))
+    over = np.outer(scale, scale)
+    ratio, ways = eigh(wide / over, least / over)
+    half = (least / over) @ ways * np.sqrt(np.maximum(ratio, 1.0))
+    return half @ half.T * over

@@ -18,6 +18,8 @@ import twinmill_native as native
 from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import LAG_EFFECT, ParameterEstimate, catalogue_of, effect_names
 
+UNSURE = 0.05  # share of a speed: one that is told worse may be anything
+
 
 class ModelError(ValueError):
     """A model file that cannot be read or written; the message is one sentence."""
@@ -72,6 +74,17 @@ class ModelFile:
                 else {f"base.{key}"}
             )
         return told
+
+    def unsure_speeds(self) -> dict[str, float]:
+        """Speeds of the duty table that logs told badly, or not at all, and their std in m/s."""
+        table = self._document.get("base", {}).get("std", {}).get("wheel_speed_mps", ())
+        found = {}
+        for i, std in enumerate(table):
+            name = f"base.wheel_speed_mps.{i}"
+            speed_mps = self.model.get(name) if i else 0.0
+            if speed_mps > 0 and not std < UNSURE * speed_mps:
+                found[name] = float("inf") if math.isnan(std) else float(std)
+        return found
 
     def lag_std_s(self, log_sha256: Collection[str]) -> float:
         """How well other logs told the lag; 0 where none did."""
