@@ -120,8 +120,9 @@ def first_state(
     """Where the search starts: the model as given, and what is free in it without being a finding.
 
     The base of a model that other logs told is held, but for gains that drift with battery and
-    heat, and for speeds at duties that those logs hardly had. A base that was fitted to these very logs moves with whatever is added. The numbers of a
-    data sheet are a candidate like any effect: `refit`.
+    heat, and for speeds at duties that those logs hardly had. A base that was fitted to these very
+    logs moves with whatever is added. The numbers of a data sheet are a candidate like any effect:
+    `refit`.
     """
     model = model_file.model
     hashes = [o.measurement.log_sha256 for o in opened]

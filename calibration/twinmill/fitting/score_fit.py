@@ -441,18 +441,19 @@ class ScoreFit:
         return self._widening * np.sqrt(np.diag(self.covariance))
 
     def chance_of_none(self, instance: str) -> float:
-        """Chance of an effect's sizes if all were neutral; 0 where it has no sizes.
+        """Chance of an effect's sizes if all were neutral; 0 where sizes alone do not tell.
 
         Wald's test with the covariance of left-out blocks, so that an effect that some blocks ask
         for and others deny is no sure one: F with as many degrees of freedom as blocks less one
         (Cameron and Miller 2015, section VI).
         """
-        own = [
-            c
+        roles = {
+            c: u.parameter.role
             for c, u in enumerate(self.unknowns)
-            if u.parameter.role == "size" and u.parameter.name.split(".")[0] == instance
-        ]
-        if not own:
+            if u.parameter.name.split(".")[0] == instance
+        }
+        own = [c for c, role in roles.items() if role == "size"]
+        if not own or "limit" in roles.values():
             return 0.0
         away = (self.x - self.usual)[own]
         square = away @ np.linalg.pinv(self.covariance[np.ix_(own, own)]) @ away
