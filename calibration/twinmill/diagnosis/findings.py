@@ -38,9 +38,14 @@ WITHIN = 2.0  # standard deviations: a lag that differs by less is the model's o
 BEYOND = 3.0  # usual sizes, or standard deviations from it at a bound: doubtful beyond ...
 NEAR = 0.5  # ... if another leaves less than this more of the squared score, or a rest is left
 AWAY_S = 2.0  # between two visits of a place
+WEIGHTY = 0.1  # share of what the visit brings that speaks loudest for a place
 SWINGS = "sooner by one lag and later by another is what a body does that swings"
 # Groups of a rest, and what the cards of effects that act by them need or are shown by.
-BY = {"place": {"places", "place"}, "heading": {"headings", "heading"}}
+BY = {
+    "place": {"places", "place"},
+    "heading": {"headings", "heading"},
+    "time": {"history", "battery"},
+}
 NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
 
 
@@ -154,7 +159,7 @@ def findings_of(
     found = []
     for k, name in enumerate(names):
         share = float(np.clip((errors[k] - errors[k + 1]) / excess, 0.0, 1.0))
-        found.append(_finding(done, name, share, changes))
+        found.append(_finding(done, name, less.get(name), share, changes))
     return found, [(n, t.held_score) for n, t in zip(names, chain[1:], strict=True)]
 
 
@@ -341,7 +346,13 @@ def _rivals(done: Search, name: str) -> list[Trial]:
     return [t for t in rivals if not set(t.names) & set(done.found)][: done.settings.group - 1]
 
 
-def _finding(done: Search, name: str, share: float, changes: Mapping[str, Change]) -> Finding:
+def _finding(
+    done: Search,
+    name: str,
+    less: Trial | None,
+    share: float,
+    changes: Mapping[str, Change],
+) -> Finding:
     estimates = done.last.fit.shared_estimates()
     if name == REFIT:
         own = [e for e in estimates if e.name in done.last.state.base]
@@ -354,8 +365,8 @@ def _finding(done: Search, name: str, share: float, changes: Mapping[str, Change
     group = (name, *tied) if tied else None
     card = catalogue_of(done.last.state.model)[name]
     doubt = _at_bound(card, own) or ("" if _stands_alone(done, name) else _unusual(card, own))
-    if not doubt and _visits(done.last, instance) == 1:
-        doubt = f"the robot came to the place of {name} once: it may be that time and not the place"
+    if not doubt and less and _visits(done.last, less, instance) == 1:
+        doubt = f"one visit of its place speaks for {name}: it may be that time and not the place"
     if not doubt and instance in changes:
         doubt = changes[instance].why
     if not doubt and done.last.fit.chance_of_none(instance) > NOTHING:
@@ -394,19 +405,25 @@ def _unusual(card: dict, own: Sequence[ParameterEstimate]) -> str:
     return ""
 
 
-def _visits(last: Trial, instance: str) -> int | None:
-    """How often robots came to an effect's place in all logs; None for one without a place."""
+def _visits(last: Trial, less: Trial, instance: str) -> int | None:
+    """How many visits of an effect's place speak for it, in all logs; None for one without a place.
+
+    By the fall of the squared errors in windows that begin there: at least WEIGHTY of the largest.
+    """
     fit = last.fit
     if f"{instance}.radius_m" not in {v["name"] for v in last.state.model.values()}:
         return None
-    visits = 0
-    for data, model in zip(fit.datasets, fit.models, strict=True):
+    falls: list[float] = []
+    parts = zip(fit.datasets, fit.models, less.fit.state[0], fit.state[0], strict=True)
+    for data, model, before, after in parts:
         if isinstance(data, Trajectory):
             x_m, y_m, radius_m = (model.get(f"{instance}.{k}") for k in ("x_m", "y_m", "radius_m"))
             pose = data.measurement.track.pose[data.windows.starts]
-            there_s = data.start_s[np.hypot(pose[:, 0] - x_m, pose[:, 1] - y_m) < radius_m]
-            visits += int(np.count_nonzero(np.diff(there_s, prepend=-np.inf) > AWAY_S))
-    return visits
+            there = np.hypot(pose[:, 0] - x_m, pose[:, 1] - y_m) < radius_m
+            visit = np.cumsum(np.diff(data.start_s[there], prepend=-np.inf) > AWAY_S) - 1
+            fall = (before**2 - after**2).reshape(len(there), -1).sum(axis=1)[there]
+            falls += list(np.bincount(visit, fall))
+    return int(np.sum(np.array(falls) > WEIGHTY * max(falls, default=0.0)))
 
 
 def _stands_alone(done: Search, name: str) -> bool:
