@@ -22,6 +22,18 @@ from twinmill.model.model_file import ModelFile
 from twinmill.predict.windows import Windows
 from twinmill_cli.main import run
 
+CARRIED_BY_THREE = """
+[[effect]]
+name = "dead_zone"
+width = 0.1
+[[effect]]
+name = "motor_lag"
+extra_s = 0.03
+[[effect]]
+name = "wheel_gain"
+w1 = 0.05
+w3 = -0.04
+"""
 CARRIED = """
 [[effect]]
 name = "dead_zone"
@@ -102,6 +114,7 @@ def predicted(model, commands, command_t_s, end_s):
         ({}, 100, 4),
         ({"drive": "twist"}, (0.3, 0.2, 1.5), 3),
         ({"drive": "wheel_speed", "wheels": "omni3"}, 8, 3),
+        ({"wheels": "omni3"}, 100, 3),
         ({"drive": "twist", "wheels": "differential"}, (0.3, 0, 1.5), 3),
         ({"drive": "wheel_speed", "wheels": "differential"}, 8, 4),
     ],
@@ -113,21 +126,42 @@ def test_stock_mujoco_drives_the_path_of_the_planar_plant(
     text = model_text("m", forward_gain=0.97, sideways_gain=0.88, yaw_gain=0.9)
     for key, old in (("drive", "duty"), ("wheels", "mecanum")):
         text = text.replace(f'{key} = "{old}"', f'{key} = "{change.get(key, old)}"')
-    if change:
+    if "drive" in change:
         text = text.replace("duty_pct = [0, 100]\nwheel_speed_mps = [0, 0.36]\n", "")
         text += '[[effect]]\nname = "input_delay"\ndelay_s = 0.02\n'
     else:
-        text += CARRIED
+        text += CARRIED if not change else CARRIED_BY_THREE
     robot = open_text(folder, text)
     random = np.random.default_rng(3)
     commands = random.uniform(-1, 1, (10, columns)) * highest
-    commands = np.rint(commands) if not change else commands
+    commands = commands if "drive" in change else np.rint(commands)
     command_t_s = np.arange(10) * 0.5
     t_s, poses = in_mujoco(mjcf(robot)[0], commands, command_t_s, 5.0005)
     assert t_s[-1] == pytest.approx(5)
     miss = np.abs(poses[-1] - predicted(robot.model, commands, command_t_s, 5.0))
     assert np.all(miss < (0.002, 0.002, 0.005)), miss
     assert np.hypot(*np.diff(poses[:, :2], axis=0).T).sum() > 0.2  # it did move
+
+
+STRAIGHT = {"mecanum": (1, 1, 1, 1), "differential": (1, 1, 1, 1), "omni3": (-1, 0, 1)}
+
+
+@pytest.mark.parametrize("wheels", STRAIGHT)
+@pytest.mark.parametrize("lag_s", [0.05, 0.1])
+def test_in_stock_mujoco_a_robot_has_63_percent_of_its_speed_after_the_lag(
+    wheels, lag_s, folder, model_text
+):
+    """A first-order lag by algebra, 1 - 1/e; a millisecond of the body's settling is allowed."""
+    text = model_text("m", motor_lag_s=lag_s).replace('"mecanum"', f'"{wheels}"')
+    model = mujoco.MjModel.from_xml_string(mjcf(open_text(folder, text))[0])
+    data = mujoco.MjData(model)
+    data.ctrl[: len(STRAIGHT[wheels])] = 0.3 * np.array(STRAIGHT[wheels])
+    mujoco.mj_step(model, data, round(lag_s / model.opt.timestep))
+    after_lag_mps = data.qvel[0]
+    mujoco.mj_step(model, data, 3000)
+    assert data.qvel[0] > 0.2  # it does drive straight on
+    slack = 1.5 * 0.001 / lag_s / np.e  # slope of the curve there
+    assert after_lag_mps / data.qvel[0] == pytest.approx(1 - 1 / np.e, abs=slack)
 
 
 BY_HAND = """

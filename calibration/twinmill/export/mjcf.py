@@ -107,9 +107,11 @@ def lag_table(model: native.Model) -> np.ndarray:
 def _ways_m(model: native.Model, duties: list[float]) -> tuple[float, float]:
     """Way forward in the first and in the second 20 s, the duties sharing that time evenly."""
     count = len(duties)
+    commands = np.zeros((count, 4))
+    commands[:, : len(model.wheels())] = np.outer(duties, _ahead(model))
     track = native.Track(
         np.arange(count) * LONG_S,
-        np.repeat(np.array(duties)[:, None], 4, axis=1),
+        commands,
         np.full(count, np.nan),
         np.arange(3) * LONG_S,
         np.zeros((3, 3)),
@@ -117,6 +119,11 @@ def _ways_m(model: native.Model, duties: list[float]) -> tuple[float, float]:
     )
     ahead = native.windows(model, track, np.array([0]), np.array([[1, 2]]))[0]
     return float(np.hypot(*ahead[0, :2])), float(np.hypot(*(ahead[1] - ahead[0])[:2]))
+
+
+def _ahead(model: native.Model) -> np.ndarray:
+    """(K,) duties -1, 0 or 1 that drive straight on; three omni wheels all at 1 only turn."""
+    return np.rint([wheel["grip"][0] for wheel in model.wheels()])
 
 
 def _with(model: native.Model, effects: tuple[str, ...]) -> native.Model:
@@ -277,14 +284,15 @@ def _actuators(robot: RobotModel, lag_s: float) -> ET.Element:
             scale = arm_m if name == "turn" else 1.0
             actuator.append(_servo(robot, lag_s, name, row, kv * scale**2, gain))
         return actuator
-    kv /= len(wheels)
+    held = kv
+    kv /= np.sum(rows[:, 0] ** 2)  # together they pull forward at kv
     unit = robot.get("robot.wheel_radius_m") if robot.model.drive == "wheel_speed" else 1.0
     for k, (wheel, row) in enumerate(zip(wheels, rows, strict=True)):
         gain = unit * np.prod([1 + list(v.values())[k] for v in _values(robot, "wheel_gain")])
         own = unit if robot.model.drive == "duty" else gain
         actuator.append(_servo(robot, lag_s, wheel["name"], row / gains, kv, float(own)))
     if not strafes:  # plain wheels hold the robot sideways
-        actuator.append(_servo(robot, lag_s, "left", np.array([0.0, 1, 0]), kv * len(wheels), 0.0))
+        actuator.append(_servo(robot, lag_s, "left", np.array([0.0, 1, 0]), held, 0.0))
     return actuator
 
 
