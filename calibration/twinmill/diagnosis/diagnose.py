@@ -4,6 +4,7 @@
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
+import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
@@ -71,6 +72,14 @@ TWO_CLOCKS = (
 NO_HEADING = "the heading was not recorded, and what the robot holds is found"
 ONE_LOG = "a moment of one log is none of another; give each log by itself"
 CONTACTS = "predictions of one robot have no contacts; twinmill compare-swarm looks at whole swarms"
+NO_VOLTAGE = (
+    "the log has no voltage of the battery; tables have no column for it, the telemetry of our "
+    "program has one"
+)
+# What robots on these wheels cannot do.
+SIDEWAYS = {"strafe", "diagonal"}
+CANNOT = {"differential": SIDEWAYS, "ackermann": {*SIDEWAYS, "spin"}}
+NO_SIDEWAYS = "only driving sideways shows it, which these wheels do not do"
 
 
 def diagnose(
@@ -167,6 +176,8 @@ def _unseen(opened: Sequence[Opened]) -> dict[str, str]:
     for name, entry in catalogue().items():
         if tables and entry["needs"] in LACKS:
             found[name] = LACKS[entry["needs"]]
+        elif opened[0].model.wheel_kind in CANNOT and set() < {*entry["identify"]} <= SIDEWAYS:
+            found[name] = NO_SIDEWAYS
     if not tables:
         shared = any(not o.same_clock for o in opened if o.floor)
         if shared:
@@ -177,6 +188,8 @@ def _unseen(opened: Sequence[Opened]) -> dict[str, str]:
             found |= dict.fromkeys(beginning_at_a_moment(), ONE_LOG)
         if len({_robot_of(o) for o in opened}) > 1:
             found |= dict.fromkeys(needing("contacts"), CONTACTS)
+        if all(np.isnan(o.measurement.track.battery_V).all() for o in opened if o.floor):
+            found |= dict.fromkeys(needing("battery"), NO_VOLTAGE)
     return found
 
 
@@ -223,6 +236,7 @@ def _concluded(
         noise,
         usual,
     )
+    drives = _drives(faint, _shown(done, faint), first.model.wheel_kind)
     steps = [(None, start.held_score), *chain]
     late = lateness(done, findings, all(o.same_clock for o in known if o.floor))
     return Diagnosis(
@@ -240,7 +254,7 @@ def _concluded(
         scenes=scenes,
         steps=steps,
         notes=[*time_base_notes(scenes), *geometry_notes(last.state.model), *noise, *weighed.notes],
-        next_experiment=_next(findings, faint, _shown(done, faint), weighed.verdict),
+        next_experiment=_next(findings, drives, faint, weighed.verdict),
         robots_off=tuple(off),
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
         base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),
@@ -306,28 +320,25 @@ DRIVES = {
 }
 
 
-def _drives(hidden: list[tuple[str, str]], seen: Sequence[str]) -> str:
-    """Drives that the hidden effects ask for and no effect that these data show does."""
+def _drives(hidden: list[tuple[str, str]], seen: Sequence[str], wheel_kind: str) -> str:
+    """Drives that the hidden effects ask for, the wheels allow, and no effect shown asks for."""
     cards = catalogue()
     asked = {t for name, _ in hidden for t in cards[name]["identify"]}
-    had = {t for name in seen for t in cards[name]["identify"]}
+    had = {t for name in seen for t in cards[name]["identify"]} | CANNOT.get(wheel_kind, set())
     return ", ".join(words for t, words in DRIVES.items() if t in asked - had)
 
 
-def _next(
-    findings, hidden: list[tuple[str, str]], seen: Sequence[str], verdict: str
-) -> dict | None:
+def _next(findings, drives: str, hidden: list[tuple[str, str]], verdict: str) -> dict | None:
     """What to drive next, in words; the script itself is designed by `twinmill next`."""
     tied = next((f.group for f in findings if f.group), None)
     if verdict == "ambiguous" and tied:
         return {
             "script": None,
             "separates": list(tied),
-            "why": f"this log cannot tell {' from '.join(tied)}: drive all three axes at five or "
+            "why": f"this log cannot tell {' from '.join(tied)}: drive all its axes at five or "
             "more duties, from rest and through zero, on clocks tied by a calibration log",
         }
     if hidden:
-        drives = _drives(hidden, seen)
         names = ", ".join(name for name, _ in hidden)
         ask = f"drive {drives}" if drives else "`twinmill effects NAME` says what shows one"
         return {

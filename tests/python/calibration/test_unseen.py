@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a log cannot show by what it holds, or a robot by its wheels, and what to drive then."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import twinmill_native as native
+
+from twinmill.diagnosis.diagnose import DRIVES, _drives, diagnose
+from twinmill.model.parameters import catalogue
+
+
+@pytest.mark.parametrize("wheels", ["mecanum", "omni3", "differential", "ackermann"])
+def test_no_robot_is_told_to_drive_where_its_wheels_do_not_go(wheels, model_text):
+    """By geometry: wheels that grip forward alone move nothing to the left."""
+    text = model_text("m").replace('"mecanum"', f'"{wheels}"').replace('"duty"', '"twist"')
+    text = text.replace("duty_pct = [0, 100]\nwheel_speed_mps = [0, 0.36]\n", "")
+    model = native.Model.from_toml(text, "m.toml")
+    strafes = any(abs(wheel["grip"][1]) > 0.1 for wheel in model.wheels())
+    every = [(name, "") for name in catalogue()]
+    told = _drives(every, [], model.wheel_kind).split(", ")
+    assert {DRIVES["strafe"] in told, DRIVES["diagonal"] in told} == {strafes}
+    assert DRIVES["straight"] in told and DRIVES["arcs"] in told
+
+
+@pytest.fixture(scope="module")
+def without_voltage(tanh_robot, measure, model_file):
+    """Of a log of the robot as it is, whose battery nobody measured."""
+    run = measure(tanh_robot(), 1, 20.0)
+    unknown_V = np.full(len(run.track.command_t_s), np.nan)
+    return diagnose([replace(run, track=replace(run.track, battery_V=unknown_V))], model_file())
+
+
+def test_a_log_without_voltage_says_that_this_hides_the_battery(without_voltage):
+    assert "no voltage" in dict(without_voltage.not_identifiable)["battery_sag"]
+    plan = without_voltage.next_experiment
+    assert plan is None or "battery_sag" not in plan["separates"]  # no drive would show it
