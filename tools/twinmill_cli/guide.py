@@ -83,6 +83,13 @@ QUESTIONS = {
     "clocks": (Clocks, "Does one computer stamp poses and commands (one), or do two"),
 }
 TOLD = {"duty": "duties", "wheel_speed": "wheel speeds", "twist": "velocities of the body"}
+ROLLS = {
+    "mecanum": "four mecanum wheels",
+    "differential": "plain wheels left and right",
+    "omni3": "three omni wheels",
+    "ackermann": "wheels that steer",
+    "none": "wheels that the model leaves out",
+}
 SEEN = {
     "camera": "a camera on the ceiling",
     "optitrack": "OptiTrack",
@@ -217,7 +224,10 @@ def _write(have: Have, folder: Path) -> str:
     text = _render(
         "guide.md.j2",
         have=have,
+        rolls=ROLLS[have.wheels],
         told=TOLD[have.drive],
+        columns=COLUMNS[have.drive][:3],
+        ruler=re.findall(r"^(\w+_m) =", model_text, re.MULTILINE),
         seen="the twin" if have.robot == "twin" else SEEN[have.poses],
         one_clock=have.clocks == "one",
         same_clock=" --same-clock" if have.clocks == "one" else "",

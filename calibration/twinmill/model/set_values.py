@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sets numbers of a model by hand; what fits told of them is taken out of the new file."""
 
+import difflib
 import math
 from collections.abc import Mapping
 
@@ -36,10 +37,12 @@ def with_values(parent: ModelFile, values: Mapping[str, float], command: str) ->
 
 
 def _check(name: str, value: float, bounds: Mapping[str, dict]) -> None:
-    if name not in bounds or name.startswith("theta_"):
+    known = [own for own in bounds if not own.startswith("theta_")]
+    if name not in known:
+        (near,) = difflib.get_close_matches(name, known, n=1, cutoff=0)
         raise ModelError(
-            f"{name}: is no quantity of this model; `twinmill open` lists them all with their "
-            "bounds."
+            f"{name}: is no quantity of this model; the nearest known is '{near}' "
+            "(`twinmill open` shows all with their bounds)."
         )
     low, high = bounds[name]["min"], bounds[name]["max"]
     if not low <= value <= high:

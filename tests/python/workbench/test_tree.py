@@ -39,7 +39,10 @@ def test_only_what_was_set_is_another_and_is_not_certain_any_more(model):
 
 @pytest.mark.parametrize(
     ("name", "value", "why"),
-    [("base.lag", 0.1, "is no quantity"), ("base.motor_lag_s", -1.0, "within 0 to 2")],
+    [
+        ("base.motorlag_s", 0.1, r"no quantity.*nearest known is 'base\.motor_lag_s'"),
+        ("base.motor_lag_s", -1.0, "within 0 to 2"),
+    ],
 )
 def test_a_wrong_name_or_value_is_one_sentence(model, name, value, why):
     with pytest.raises(ModelError, match=why):
