@@ -166,8 +166,8 @@ def moments(diagnosis: Diagnosis) -> Table:
         "Single moments",
         ["log", "time\ns", "of the\nway"],
         rows,
-        "At these a robot did not do in the next half second what was predicted; of the way: how much "
-        "of the predicted way it went. About 100 %: it went elsewhere, or turned.",
+        "At these a robot did not do in the next half second what was predicted; of the way: how "
+        "much of the predicted way it went. About 100 %: it went elsewhere, or turned.",
         words=(0,),
     )
 
