@@ -16,6 +16,7 @@ from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
     import re
+    import textwrap
 
     import numpy as np
     import twinmill_native as native
@@ -82,6 +83,7 @@ QUESTIONS = {
     "drive": (Drive, "What is it told: duties, wheel speeds or velocities"),
     "clocks": (Clocks, "Does one computer stamp poses and commands (one), or do two"),
 }
+WIDTH = 72  # of a paragraph of the plan
 TOLD = {"duty": "duties", "wheel_speed": "wheel speeds", "twist": "velocities of the body"}
 ROLLS = {
     "mecanum": "four mecanum wheels",
@@ -238,9 +240,21 @@ def _write(have: Have, folder: Path) -> str:
         drive_s=drive_s,
         answers=ANSWERS,
     )
-    text = re.sub(r"\n{3,}", "\n\n", text)
+    text = _wrapped(re.sub(r"\n{3,}", "\n\n", text))
     (folder / "plan.md").write_text(text)
     return text
+
+
+def _wrapped(text: str) -> str:
+    """Markdown with paragraphs of WIDTH; headings, tables and blocks of commands as they are."""
+    parts = re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL)
+    parts[::2] = [re.sub(r"(?m)(^[^\n#|].*(\n|\Z))+", _filled, part) for part in parts[::2]]
+    return "".join(parts)
+
+
+def _filled(paragraph: re.Match) -> str:
+    text = textwrap.fill(paragraph[0], WIDTH, break_long_words=False, break_on_hyphens=False)
+    return text + "\n"
 
 
 def _render(template: str, **values: Any) -> str:
