@@ -49,7 +49,7 @@ Result = TypeVar("Result")
 
 # The threads of a BLAS wait in loops: on matrices as narrow as ours, two take many times the
 # processor time of one where other programs run, and are no sooner done.
-one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
+_one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
 
 
 class _Shown:
@@ -286,7 +286,7 @@ class Model(_Shown):
         """As `fit`."""
         return fit(log, self)
 
-    @one_thread
+    @_one_thread
     def add(self, effect: str, log: "Log | str | Path", **texts: str) -> "Addition":
         """Adds an effect, fits it with all the rest, and judges it on data it was not fitted to.
 
@@ -542,7 +542,7 @@ def load(*paths: str | Path) -> Log:
     return Log(paths)
 
 
-@one_thread
+@_one_thread
 def compare(log: Log | str | Path, model: Model | str | None = None) -> Comparison:
     """Tells how well a model predicts a log.
 
@@ -566,7 +566,7 @@ def compare(log: Log | str | Path, model: Model | str | None = None) -> Comparis
     return Comparison(_compare.compare(_log(log).measurements(model), model.file))
 
 
-@one_thread
+@_one_thread
 def fit(log: Log | str | Path, model: Model | str | None = None) -> Fit:
     """Fits all free quantities of a model, and the parameters of its effects, to a log.
 
@@ -596,7 +596,7 @@ def fit(log: Log | str | Path, model: Model | str | None = None) -> Fit:
     return Fit(result, Model(file))
 
 
-@one_thread
+@_one_thread
 def diagnose(
     log: Log | str | Path,
     model: Model | str | None = None,

@@ -472,16 +472,7 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
         step, drops = {"moment": moment, "loss": 0.05}, {"per_s": 0.12}
         swing = {"share": 0.4, "hz": hz}
         found += [
-            Hidden(
-                "for a while",
-                "outside",
-                "target",
-                _for_a_while,
-                step,
-                ("loss",),
-                5,
-                time,
-            ),
+            Hidden("for a while", "outside", "target", _for_a_while, step, ("loss",), 5, time),
             Hidden("drop-outs", "outside", "target", _drop_outs, drops, (), 1, time),
         ]
         if robot.plant == "planar":

@@ -28,6 +28,7 @@ from twinmill.model.parameters import (
     catalogue_of,
     effect_names,
     late_part,
+    newest_instance,
 )
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
@@ -359,7 +360,7 @@ def _finding(
         alike = tuple(n for t in _rivals(done, REFIT) for n in t.names)
         group = (REFIT, *alike) if alike else None
         return Finding(REFIT, group, own, share, "group" if alike else "sure")
-    instance = [n for n in effect_names(done.last.state.model) if n.split("#")[0] == name][-1]
+    instance = newest_instance(done.last.state.model, name)
     own = [e for e in estimates if e.name.startswith(f"{instance}.")]
     tied = [n for t in _rivals(done, name) for n in t.names]
     group = (name, *tied) if tied else None

@@ -23,12 +23,13 @@ from twinmill.model.parameters import (
     Parameter,
     base_lag_is_identifiable,
     base_parameters,
-    beginning_at_a_moment,
     catalogue,
     catalogue_of,
     effect_names,
     effect_parameters,
     making_late,
+    newest_instance,
+    with_role,
 )
 from twinmill.predict.datasets import Dataset, Trajectory, total_score
 
@@ -337,10 +338,11 @@ def _best(
 
 def _began_before(trial: Trial, name: str) -> bool:
     """An effect of a moment that is hardly within the logs: it is there all the time, or never."""
-    if name not in beginning_at_a_moment():
+    moments = with_role(name, "moment")
+    if not moments:
         return False
-    instance = [n for n in effect_names(trial.state.model) if n.split("#")[0] == name][-1]
-    at_s = [trial.state.model.get(f"{instance}.{key}") for key in _moments_of(name)]
+    instance = newest_instance(trial.state.model, name)
+    at_s = [trial.state.model.get(f"{instance}.{key}") for key in moments]
     low_s, high_s = np.quantile(_times_s(trial.state), (MARGIN, 1 - MARGIN))
     return not all(low_s < t_s < high_s for t_s in at_s)
 
@@ -378,10 +380,10 @@ def _with_best_lateness(
         The best, and what is gone from the findings; a swap is one more round.
     """
     gone = []
-    for name in [n for n in found if _has(n, "lateness")]:
+    for name in [n for n in found if with_role(n, "lateness")]:
         base = without(last, name)
         others = candidates(base.state) if base else []
-        others = [n for n in others if _has(n, "lateness") and n != name]
+        others = [n for n in others if with_role(n, "lateness") and n != name]
         trials = [attempt(base, (n,)) for n in others]
         trials = [t for t in trials if t.fit.held_cost < last.fit.held_cost + settings.tie]
         if not trials:
@@ -405,7 +407,7 @@ def _proven(trial: Trial, score: float, settings: Settings) -> bool:
     """Enough evidence, and blocks that agree; near the noise agreement alone is not enough."""
     count = len(trial.names)
     loud = trial.evidence >= settings.evidence * count
-    somewhere = count == 1 and _has(trial.names[0], "place")
+    somewhere = count == 1 and bool(with_role(trial.names[0], "place"))
     least = settings.without_visit if somewhere else settings.without_best
     spread = trial.without_best >= least * count
     agreed = (
@@ -420,7 +422,7 @@ def _is_neutral(trial: Trial, name: str) -> bool:
     """An effect whose sizes are all where it does nothing explains nothing, wherever it is."""
     if name == REFIT:
         return False
-    instance = [n for n in effect_names(trial.state.model) if n.split("#")[0] == name][-1]
+    instance = newest_instance(trial.state.model, name)
     for p in catalogue_of(trial.state.model)[name]["parameters"]:
         if p["role"] in WHERE_OR_WHEN:
             continue
@@ -477,7 +479,7 @@ def screen(before: Trial, ways: Ways | None = None) -> list[Screened]:
     rest = padded - basis @ (basis.T @ padded)
     found = []
     for name in candidates(state):
-        searched = any(_has(name, role) for role in STARTS)
+        searched = any(with_role(name, role) for role in STARTS)
         if searched and name not in ways:
             ways[name] = _ways(name, state, rows)
         start = _best_start(*ways[name], weights, rest) if searched else {}
@@ -499,16 +501,11 @@ def _widths(name: str, parameters: Sequence[Parameter], start: dict[str, float])
     return np.maximum(std / np.maximum(reach, 1e-12), 1.0)
 
 
-def _has(name: str, role: str) -> bool:
-    """Whether an effect has a parameter of this role: its value must be searched."""
-    return name != REFIT and any(p["role"] == role for p in catalogue()[name]["parameters"])
-
-
 def _ways(
     name: str, state: State, rows: list[np.ndarray]
 ) -> tuple[list[dict[str, float]], list[np.ndarray]]:
     """Starts of an effect that has several, and the change of the rows from each, see Ways."""
-    starts = next(of(name, state) for role, of in STARTS.items() if _has(name, role))
+    starts = next(of(name, state) for role, of in STARTS.items() if with_role(name, role))
     if len(starts) < 2:
         return starts, []
     changes = []
@@ -658,12 +655,9 @@ MARGIN = 0.05  # share of it at each end, within which a moment is none
 def _moments(name: str, state: State) -> list[dict[str, float]]:
     """Starts of an effect that begins at a moment."""
     instance = _next_instance(name, state)
+    moments = with_role(name, "moment")
     at_s = np.quantile(_times_s(state), (np.arange(MOMENTS) + 0.5) / MOMENTS)
-    return [{f"{instance}.{key}": float(t_s) for key in _moments_of(name)} for t_s in at_s]
-
-
-def _moments_of(name: str) -> list[str]:
-    return [p["name"] for p in catalogue()[name]["parameters"] if p["role"] == "moment"]
+    return [{f"{instance}.{key}": float(t_s) for key in moments} for t_s in at_s]
 
 
 def _times_s(state: State) -> np.ndarray:
@@ -677,8 +671,9 @@ LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual one
 def _limits(name: str, state: State) -> list[dict[str, float]]:
     """Starts of an effect with a limit."""
     instance = _next_instance(name, state)
-    limits = [p for p in catalogue()[name]["parameters"] if p["role"] == "limit"]
-    return [{f"{instance}.{p['name']}": k * p["default"] for p in limits} for k in LIMITS]
+    usual = {p["name"]: p["default"] for p in catalogue()[name]["parameters"]}
+    limits = with_role(name, "limit")
+    return [{f"{instance}.{key}": k * usual[key] for key in limits} for k in LIMITS]
 
 
 # Where a search starts, by the role of the parameter that it is for.

@@ -88,8 +88,8 @@ class Weighed:
     @property
     def _outside(self) -> bool:
         """Something is left that no effect takes: it depends on something, or it is much."""
-        much = self.last > WORSE * self.known
-        return bool(self.rest.again or self._continuous) or much
+        depends = bool(self.rest.again or self._continuous)
+        return depends or self.last > WORSE * self.known
 
     @property
     def _left_in_the_dark(self) -> bool:

@@ -94,10 +94,15 @@ def needing(need: str) -> list[str]:
     return [name for name, entry in catalogue().items() if entry["needs"] == need]
 
 
+def with_role(effect: str, role: str) -> list[str]:
+    """Parameters of an effect that have this role on its card; none of what is no effect."""
+    card = catalogue().get(effect, {"parameters": ()})
+    return [p["name"] for p in card["parameters"] if p["role"] == role]
+
+
 def beginning_at_a_moment() -> list[str]:
     """Effects that act from a moment of their log on."""
-    cards = catalogue().items()
-    return [n for n, card in cards if any(p["role"] == "moment" for p in card["parameters"])]
+    return [name for name in catalogue() if with_role(name, "moment")]
 
 
 def late_part(effect: str) -> tuple[str, str] | None:
@@ -106,9 +111,8 @@ def late_part(effect: str) -> tuple[str, str] | None:
     Returns:
         "lag", "delay" or "clock", and the parameter of role "lateness".
     """
-    entry = catalogue().get(effect, {"stage": "", "parameters": ()})
-    own = [p["name"] for p in entry["parameters"] if p["role"] == "lateness"]
-    return (LATE_PARTS.get(entry["stage"], "lag"), own[0]) if own else None
+    own = with_role(effect, "lateness")
+    return (LATE_PARTS.get(catalogue()[effect]["stage"], "lag"), own[0]) if own else None
 
 
 def making_late(part: str) -> list[str]:
@@ -135,6 +139,15 @@ def effect_names(model: native.Model) -> list[str]:
         seen[name] = seen.get(name, 0) + 1
         names.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
     return names
+
+
+def newest_instance(model: native.Model, effect: str) -> str:
+    """Name of the instance of an effect that was added last.
+
+    Raises:
+        IndexError: the model has none.
+    """
+    return [n for n in effect_names(model) if n.split("#")[0] == effect][-1]
 
 
 def base_parameters(model: native.Model, names: Iterable[str]) -> list[Parameter]:
