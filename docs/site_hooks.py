@@ -3,7 +3,8 @@
 
 A fenced block marked `console` holds commands, each after `$ `. All of a page that shows a part of
 `runs/<page>/` run one after the other in an empty folder; what they print goes below them, and the
-pictures and pages that they make go there. A command that fails ends the build.
+pictures and pages that they make go there. A command that fails ends the build, and so does a page
+that would fetch something from the internet.
 """
 
 import os
@@ -19,6 +20,10 @@ FENCE = re.compile(r"^`{3,}", re.MULTILINE)
 ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 PICTURES = {".svg", ".png", ".html"}
 MARK = "<!-- catalogue -->"
+FOREIGN = re.compile(
+    r"""<(?:script|img|iframe)\b[^>]*\bsrc=["']?https?:[^>]*>|"""
+    r"""<link\b[^>]*\brel=["']?(?:stylesheet|preload|icon)[^>]*https?:[^>]*>"""
+)
 
 
 def commands_of(page: str) -> list[str]:
@@ -77,6 +82,8 @@ def catalogue() -> str:
 
 
 def _card(card: dict) -> str:
+    from twinmill.workbench.typeset import typeset
+
     rows = [
         f"| `{p['name']}` | {'' if p['unit'] == '1' else p['unit']} | {p['default']:g} | "
         f"{p['min']:g} to {p['max']:g} | {p['neutral']:g} | {p['doc']} |"
@@ -87,7 +94,7 @@ def _card(card: dict) -> str:
         [
             f"## {card['name']}\n",
             f"{card['summary']}\n",
-            f"<div class='equation' markdown>\\`{_ascii_math(card['equation'])}\\`</div>\n",
+            f'<div class="eq">{typeset(card["equation"])}</div>\n',
             *(table if rows else []),
             "",
             f"- Stage: `{card['stage']}`",
@@ -98,13 +105,15 @@ def _card(card: dict) -> str:
     )
 
 
-def _ascii_math(equation: str) -> str:
-    """Names of more than one letter upright, as words; words in a row as one text."""
-    known = {"sin", "cos", "tan", "exp", "ln", "log", "min", "max", "tau", "omega", "theta", "abs"}
-    known |= {"sign", "sqrt", "phi", "dt", "dv", "pi", "sum", "int"}
-    word = rf"(?!(?:{'|'.join(sorted(known))})\b)[A-Za-z_]{{2,}}[A-Za-z_0-9]*"
-    words = re.compile(rf"\b{word}(?: {word})*\b")
-    return words.sub(lambda m: f'"{m[0].replace("_", " ")}"', equation)
+def on_files(files, config):
+    """Called by MkDocs once: equations look as they do in the workbench."""
+    from mkdocs.structure.files import File
+
+    from twinmill.workbench import typeset
+
+    sheet = Path(typeset.__file__).parent / "static/equation.css"
+    files.append(File.generated(config, sheet.name, abs_src_path=str(sheet)))
+    return files
 
 
 def on_page_markdown(markdown: str, page, config, files) -> str:
@@ -121,3 +130,12 @@ def on_page_markdown(markdown: str, page, config, files) -> str:
                 name = f"runs/{Path(page.file.src_path).stem}/{path.relative_to(folder)}"
                 files.append(File.generated(config, name, abs_src_path=str(path)))
     return markdown
+
+
+def on_post_page(output: str, page, config) -> str:
+    """Called by MkDocs for each page as it will be written."""
+    if foreign := FOREIGN.search(output):
+        raise ValueError(
+            f"{page.file.src_path}: {foreign[0]}: needs the internet; ship it instead."
+        )
+    return output

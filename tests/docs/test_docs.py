@@ -5,12 +5,13 @@ import json
 import re
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
-from site_hooks import catalogue, commands_of, run, with_outputs  # noqa: E402
+from site_hooks import catalogue, commands_of, on_post_page, run, with_outputs  # noqa: E402
 
 PAGES = sorted((ROOT / "docs").glob("*.md"))
 LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]+)?\)")
@@ -82,6 +83,18 @@ def test_links_between_pages_hold(page):
     linked = [m[0] for m in LINK.findall(page.read_text())]
     local = [t for t in linked if "://" not in t and not t.startswith("runs/")]
     assert [target for target in local if not (page.parent / target).exists()] == []
+
+
+@pytest.mark.parametrize(
+    "part",
+    ['<script src="https://a.org/x.js"></script>', '<link rel="stylesheet" href="https://a.org/x">'],
+)
+def test_a_page_that_needs_the_internet_ends_the_build(part):
+    page = SimpleNamespace(file=SimpleNamespace(src_path="x.md"))
+    links = '<link rel="canonical" href="https://a.org"><a href="https://a.org">a paper</a>'
+    assert on_post_page(links, page, None) == links
+    with pytest.raises(ValueError, match="internet"):
+        on_post_page(links + part, page, None)
 
 
 def test_the_catalogue_has_a_card_for_each_effect():

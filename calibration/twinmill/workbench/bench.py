@@ -7,7 +7,7 @@ A screen asks `changes` a few times a second and draws anew what has another num
 import asyncio
 import json
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from twinmill.charts.arrays import RESTARTS, measured_path
@@ -15,6 +15,7 @@ from twinmill.charts.packed import pack, pack_log, pack_prediction, pack_robot
 from twinmill.data.camera_frames import frames_of
 from twinmill.data.log import LogError
 from twinmill.diagnosis.detections.add import is_of_camera
+from twinmill.diagnosis.search import REFIT
 from twinmill.files import plain
 from twinmill.workbench.session import Session
 from twinmill.workbench.state_file import StateFile
@@ -204,6 +205,15 @@ class Bench:
         else:
             self.session.take(done)
             self.changed("work", "score", "findings", "plan", "swarm")
+            if done.work.kind == "diagnose":
+                await self._look_ahead([f["effect"] for f in done.result["findings"]])
+
+    async def _look_ahead(self, findings: Iterable[str]) -> None:
+        """Foresees what a click on each finding will show, before it comes."""
+        for effect in findings:
+            of = "" if effect == REFIT else effect
+            if self.ready and not (of and is_of_camera(of)):
+                await asyncio.to_thread(self.session.foresee, of, self.picked)
 
     async def _settled(self) -> None:
         """The session stands at another model: its prediction first, then what takes longer."""

@@ -6,11 +6,11 @@ import html
 from nicegui import ui
 
 from twinmill.diagnosis.detections.add import is_of_camera
+from twinmill.diagnosis.search import REFIT
 from twinmill.model.parameters import catalogue
 from twinmill.workbench.panel import Hands, estimate, scored, tone
 from twinmill.workbench.typeset import typeset
 
-REFIT = "refit"
 OTHERS = 8  # effects of the ranking that are shown beside the findings
 
 

@@ -30,6 +30,7 @@ HINTS = {
 HEAD = """
 <link rel="stylesheet" href="/charts/charts.css">
 <link rel="stylesheet" href="/look/workbench.css">
+<link rel="stylesheet" href="/look/equation.css">
 <link rel="modulepreload" href="/look/workbench.js">
 """
 SCRIPT = """

@@ -126,6 +126,7 @@ class Session:
         self._passing: dict[int, Opened] = {}
         self._clocks: dict[int, float] = {}  # as the hand goes on, they come nearer to the best
         self._settled: dict[tuple[int, int], Opened] = {}
+        self._foresights: dict[tuple, dict[int, Opened]] = {}
 
     # -- opening --------------------------------------------------------------------------------
 
@@ -166,7 +167,7 @@ class Session:
         places = {id(m): k for k, m in enumerate(self.measurements)}
         kept = {k: places[id(m)] for k, m in enumerate(before) if id(m) in places}
         self.robots = {kept[k]: view for k, view in self.robots.items() if k in kept}
-        for known in (self._bits, self._settled):
+        for known in (self._bits, self._settled, self._foresights):
             known.clear()
         self.beside = None
         self.forget()
@@ -178,6 +179,7 @@ class Session:
             on_clock = on_clock_of_others(view.opened, all_opened)
             if on_clock is not view.opened:
                 self.robots[k] = OpenedView(on_clock)
+        self._foresights.clear()
         self.score_now(exact=self.tree.current.number == 0)
 
     def raw(self, index: int) -> RobotLog:
@@ -265,7 +267,14 @@ class Session:
         """About what a fit, or the addition of an effect, will come to: all robots by index.
 
         A few steps of the fit to as many robots as an answer at once can be about; `index` is one.
+        What was foreseen once is known from then on.
         """
+        asked = (self.tree.current.number, frozenset(self.held), len(self.robots), effect, index)
+        if asked not in self._foresights:
+            self._foresights[asked] = self._foresee(effect, index)
+        return self._foresights[asked]
+
+    def _foresee(self, effect: str, index: int) -> dict[int, Opened]:
         number = self.tree.current.number
         model = self._file(number).model.copy()
         free = [p for p in self._free(model) if p.name not in self.held]

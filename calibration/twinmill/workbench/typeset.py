@@ -7,7 +7,8 @@ import re
 GREEK = {"tau": "τ", "omega": "ω", "theta": "θ", "phi": "φ", "pi": "π"}
 LETTERS = {"vx": "v_x", "vy": "v_y", "gx": "g_x", "gy": "g_y"}
 STEPS = {"dt", "du", "dv", "dh"}
-SIGNS = {"&lt;=": "≤", "&gt;=": "≥", " - ": " \N{MINUS SIGN} ", " * ": " · ", "&#x27;": "\N{PRIME}"}
+SIGNS = {"&lt;=": "≤", "&gt;=": "≥", " * ": " · ", "&#x27;": "\N{PRIME}"}
+SIGNS |= {f"{before}-": f"{before}\N{MINUS SIGN}" for before in (" ", "(")}
 DERIVATIVE = re.compile(r"\b(d\w+'?)/(dt)\b")
 OVER = " / "
 INSIDE = r"(?:[^()]|\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\))*"  # brackets three deep
@@ -16,7 +17,8 @@ ABOVE = re.compile(rf"(?:{BRACKETS}|\|[^|]*\||[\w.']+)$")
 BELOW = re.compile(rf"{BRACKETS}(?:\^\d)?|\|[^|]*\||[\d.]+ [ms]\b|[\w.']+")
 FRACTION = {"\1": '<span class="frac"><span>', "\2": "</span><span>", "\3": "</span></span>"}
 TOKEN = re.compile(
-    r"[\d.]+ (?:m/s|m|s)\b|&[#\w]+;|[A-Za-z]+(?:_[A-Za-z]+)*|\d+(?:\.\d+)?e-?\d+|\^\d"
+    r"[\d.]+ (?:m/s|m|s)\b|[a-z]{2,}&#x27;s\b|&[#\w]+;|[A-Za-z]+(?:_[A-Za-z]+)*|"
+    r"\d+(?:\.\d+)?e-?\d+|\^\d"
 )
 
 
@@ -49,6 +51,8 @@ def _bare(term: str) -> str:
 def _token(token: str) -> str:
     if token.startswith("&"):
         return token
+    if token.endswith("&#x27;s"):  # a word of the text
+        return token.replace("&#x27;", "\N{RIGHT SINGLE QUOTATION MARK}")
     if token.startswith("^"):
         return f"<sup>{token[1:]}</sup>"
     if token[-1] in "ms" and token[0].isdigit():

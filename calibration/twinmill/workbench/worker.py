@@ -14,6 +14,7 @@ from time import monotonic
 from typing import Any
 
 PATH_S = 0.1  # between points of a path that is drawn
+YIELDS = 5  # niceness: what the user's hands do goes before
 
 
 @dataclass(frozen=True)
@@ -121,8 +122,10 @@ class Worker:
 
 def _serve(pipe: Connection, logs: list[Path]) -> None:
     """Until the other end is closed."""
+    import os
     import signal
 
+    os.nice(YIELDS)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the server's
     measurements: dict = {}
     while True:

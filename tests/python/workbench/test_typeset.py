@@ -28,6 +28,19 @@ def test_units_keep_their_stroke():
     assert "frac" not in typeset("w = 0.02 m/s") and "0.02 m/s" in typeset("w = 0.02 m/s")
 
 
+def test_a_genitive_is_no_derivative():
+    assert (
+        typeset("t since the log's start")
+        == "<i>t</i> since the log\N{RIGHT SINGLE QUOTATION MARK}s start"
+    )
+    assert "<i>v</i>\N{PRIME}" in typeset("v' = v")
+
+
+def test_a_minus_is_one_wherever_it_stands():
+    for equation in ("a - b", "exp(-t)", "s = -1"):
+        assert "\N{MINUS SIGN}" in typeset(equation) and "-" not in typeset(equation)
+
+
 @pytest.mark.parametrize("entry", catalogue().values(), ids=lambda entry: entry["name"])
 def test_every_division_of_the_catalogue_is_a_fraction(entry):
     equation = entry["equation"]
