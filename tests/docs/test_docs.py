@@ -87,7 +87,10 @@ def test_links_between_pages_hold(page):
 
 @pytest.mark.parametrize(
     "part",
-    ['<script src="https://a.org/x.js"></script>', '<link rel="stylesheet" href="https://a.org/x">'],
+    [
+        '<script src="https://a.org/x.js"></script>',
+        '<link rel="stylesheet" href="https://a.org/x">',
+    ],
 )
 def test_a_page_that_needs_the_internet_ends_the_build(part):
     page = SimpleNamespace(file=SimpleNamespace(src_path="x.md"))
