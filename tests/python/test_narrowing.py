@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from twinmill.data.measurement import load_measurements
 from twinmill.experiment.design import Limits
 from twinmill.experiment.foresight import Played
-from twinmill.experiment.moves import family
+from twinmill.experiment.moves import duty_axes, family
 from twinmill.fitting.fit import fitted
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
@@ -53,7 +53,7 @@ def spread(slope):
 
 def turning(found):
     """Share of the driven duty that turns the robot on the spot."""
-    duty = np.vstack([m.duty for m in found.moves])
+    duty = np.vstack([m.command for m in found.moves])
     turn = np.abs(duty @ [-1, 1, -1, 1])
     return turn.sum() / (turn + np.abs(duty.sum(axis=1))).sum()
 
@@ -172,7 +172,7 @@ def test_a_refit_knows_the_outcome_best_after_the_run_that_was_designed_for_it(s
     limits = Limits(13.0, (3.0, 3.0), 1.0)
     own = design_for(spread([*slope, 0]), "milling", file, scene, limits, 1.0)
     other = design_for(spread([3, 0, 0]), "milling", file, scene, limits, 1.0)
-    moves = family(1.0)
+    moves = family(duty_axes(1.0))
     runs = {"own": own.moves, "other": other.moves}
     for k in range(3):
         order = [moves[i] for i in random.permutation(len(moves))]

@@ -35,6 +35,7 @@ if working():  # not for --help
     from twinmill.data.log import LogError
     from twinmill.data.measurement_table import read_header, read_table
     from twinmill.data.recorder import Recorder
+    from twinmill.experiment.foresight import Rows
     from twinmill.export.script import TwistScript
     from twinmill.files import check_new_file
     from twinmill.model.mixing import duties_from_inputs
@@ -137,7 +138,7 @@ def _for_ros(
     else:
         end_s = check_script(script, cap_pct)
         t_s, duties_pct = read_script(script)
-        twists = TwistScript.of(ModelFile.load(model).model, t_s, duties_pct / 100, end_s)
+        twists = TwistScript.of(ModelFile.load(model).model, Rows(t_s, duties_pct / 100, end_s))
     words = ["twinmill", "characterise", "--script", str(script), "--script-as", form]
     write_script(twists, form, out, force, shlex.join([*words, "--model", model]))
     deliver({"script_as": str(out), "duration_s": end_s}, f"Written: {out}", as_json)

@@ -54,7 +54,14 @@ def _next(
         str, typer.Option("--floor-m", metavar="LxW", help="Free floor, along and across.")
     ] = "2x2",
     max_duty_pct: Annotated[
-        int, typer.Option("--max-duty-pct", min=20, max=100, help="Highest duty of a wheel.")
+        int,
+        typer.Option(
+            "--max-duty-pct",
+            min=20,
+            max=100,
+            help="Highest duty of a wheel; of a robot told velocities, share of the highest in its "
+            "logs.",
+        ),
     ] = 100,
     behavior: Annotated[
         str,
@@ -113,7 +120,7 @@ def _next(
     data = {"script": str(output), **plan.to_json()}
     if script_as:
         data["script_as"] = str(ros_path(script_as, output))
-        twists = TwistScript.of(model_file.model, plan.rows.t_s, plan.rows.duty, plan.rows.end_s)
+        twists = TwistScript.of(model_file.model, plan.rows)
         write_script(twists, script_as, Path(data["script_as"]), force, source.command)
     section = partial(present.section, plan, how)
     finish(data, present.terminal(plan, how), source, section, as_json, out)
@@ -149,15 +156,30 @@ def _sides(text: str) -> tuple[float, float]:
 def _how(plan: Plan | Narrowing, logs: list[Path], model: str, script: Path) -> present.How:
     """How to play the script and what to do then."""
     path, number = shlex.quote(str(script)), plan.robot_id
-    cap_pct = round(100 * float(np.abs(plan.rows.duty).max()))
+    first = (
+        f"Written: {script}. Put the robot in the middle of the floor, its camera along the first "
+        "side."
+    )
+    then = command_line("diagnose", [*logs, Path("next.lcmlog")], model)
+    if plan.rows.kind == "twist":
+        program = shlex.quote(str(script.with_suffix(".py")))
+        robot = f"twinmill characterise --robot {number} --script {path} --script-as publisher"
+        return present.How(
+            first,
+            [
+                ("As a program for ROS 2:", f"{robot} --out {program}"),
+                ("on the robot:", f"python3 {program}"),
+                ("then, what it sent and its poses imported:", then),
+            ],
+        )
+    cap_pct = round(100 * float(np.abs(plan.rows.command).max()))
     robot = f"twinmill characterise --robot {number} --script {path} --cap-pct {cap_pct}"
     twin = f"twin_run --n 1 --model {shlex.quote(model)} --script {path}"
     return present.How(
-        f"Written: {script}. Put the robot in the middle of the floor, its camera along the first "
-        "side.",
+        first,
         [
             ("On the robot:", f"{robot} --out next.lcmlog"),
             ("or in the twin:", f"{twin} --log next.lcmlog"),
-            ("then:", command_line("diagnose", [*logs, Path("next.lcmlog")], model)),
+            ("then:", then),
         ],
     )

@@ -14,7 +14,7 @@ from twinmill.diagnosis.result import Diagnosis
 from twinmill.experiment.foresight import LEAD_S, Played, Rows, rows_of
 from twinmill.experiment.hypotheses import Hypotheses, candidate_effects, hypotheses_of, question
 from twinmill.experiment.information import CandidateEffect, FisherInformation
-from twinmill.experiment.moves import Move, family
+from twinmill.experiment.moves import Axis, Move, duty_axes, family, twist_axes
 from twinmill.experiment.power import power
 from twinmill.experiment.relevance import relevance
 from twinmill.fitting.fit import base_names
@@ -29,6 +29,7 @@ BESIDES = 0.05  # weight of effects that are not in question: once these are see
 WANDER_M = 0.08  # of a real robot from the predicted path within a minute, beside the candidates'
 SHORTEST_RUN_S = SHORTEST_LOG_S + 3  # as much may be left where no further move fits
 CENTRE = np.zeros(3)
+DRIVES = ("duty", "twist")  # of robots that play scripts
 NO_LOG = (
     "only steady-state tables were given; the next run is designed for the noise and the clocks "
     "of a log, so give one of any drive besides."
@@ -37,7 +38,13 @@ NO_LOG = (
 
 @dataclass(frozen=True)
 class Limits:
-    """What the user has: s, m by m (along and across the robot at its start), share of duty."""
+    """What the user has.
+
+    Attributes:
+        duration_s: longest run.
+        floor_m: along and across the robot at its start.
+        max_duty: highest duty, 0..1; of a robot told velocities, share of the highest in its logs.
+    """
 
     duration_s: float
     floor_m: tuple[float, float]
@@ -133,7 +140,7 @@ def design(
     logs = [o for o in diagnosis.opened if o.floor]
     hashes = [o.measurement.log_sha256 for o in logs]
     usual = model_file.usual_score(hashes)
-    moves = family(limits.max_duty)
+    moves = family(_axes([o.measurement for o in logs], model_file.model.drive, limits))
     say("playing the moves in the twin")
     names = base_names(model_file.model, logs, model_file.known_from_other_logs(hashes))
     asked = hypotheses_of(diagnosis, base_parameters(model_file.model, names))
@@ -158,7 +165,7 @@ def design(
     return Plan(
         why,
         chosen,
-        rows_of(chosen),
+        rows_of(chosen, scene.measurement.track.command_kind),
         outlook.chances(told, after, planned),
         whole.pose_t_s - whole.pose_t_s[0],
         np.array([whole.path(m, CENTRE) for m in floor.models]),
@@ -189,24 +196,42 @@ def check(
         raise ValueError(NO_LOG)
     model = model_file.model.for_robot(logs[0].track.robot_id)
     scene = Scene(logs[0], model, StepGrid.of(logs[0]), clock_free=True)
-    if scene.model.drive != "duty":
+    if scene.model.drive not in DRIVES:
         raise ValueError(
-            f"the model is driven by {scene.model.drive}; scripts are made of wheel duties, so "
-            "they can be designed for a robot driven by duty alone."
+            f"the model is driven by {scene.model.drive}, which is measured and not commanded; "
+            f"scripts can be designed for robots driven by {' or '.join(DRIVES)}."
         )
     if limits.duration_s < SHORTEST_RUN_S:
         raise ValueError(
             f"a run of {limits.duration_s:g} s is too short: no model is judged on less than "
             f"{SHORTEST_LOG_S:g} s, and moves come whole; allow {SHORTEST_RUN_S:g} s."
         )
-    floor = Floor(limits, scene, [])
-    if not any(floor.holds([m]) for m in family(limits.max_duty)):
+    floor, axes = Floor(limits, scene, []), _axes(logs, scene.model.drive, limits)
+    if not any(floor.holds([m]) for m in family(axes)):
         size = "x".join(f"{side:g}" for side in limits.floor_m)
         need_m = 2 * (scene.model.get("robot.body_radius_m") + WANDER_M)
         raise ValueError(
             f"no move fits on a floor of {size} m: the robot's body and what it may stray take "
             f"{need_m:.2g} m each way; allow more."
         )
+
+
+def _axes(logs: Sequence[Measurement], drive: str, limits: Limits) -> list[Axis]:
+    """Ways to drive within the limits; velocities as high as any in the logs are known to be safe.
+
+    Raises:
+        ValueError: the logs tell the robot no velocity.
+    """
+    if drive == "duty":
+        return duty_axes(limits.max_duty)
+    told = np.vstack([log.track.command[:, :3] for log in logs])
+    axes = twist_axes(limits.max_duty * np.abs(told).max(axis=0))
+    if not axes:
+        raise ValueError(
+            "the logs tell the robot no velocity but zero, so nothing says how fast it may drive; "
+            "give a log in which it drives."
+        )
+    return axes
 
 
 class Floor:

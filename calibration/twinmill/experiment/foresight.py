@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import twinmill_native as native
 
+from twinmill.data.log import CommandKind
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import Timing, Track
 from twinmill.experiment.moves import Move
@@ -15,36 +16,51 @@ from twinmill.predict.residual import StepGrid
 
 LEAD_S = 1.0  # stands before the first move, and as long after the last
 BETWEEN_S = 0.5  # more than any clock offset: so much later the next of several starts begins
+COLUMNS = {  # of a script: their names, how many are one of a track's, decimals
+    "duty": (("fl_pct", "fr_pct", "rl_pct", "rr_pct"), 100, 0),
+    "twist": (("vx_mps", "vy_mps", "omega_radps"), 1, 3),
+}
 SILENT = ("noise.sensor_m", "noise.sensor_rad", "noise.drive_mps", "noise.drive_radps")
 
 
 @dataclass(frozen=True)
 class Rows:
-    """A script: (K,) s at which each duty begins, and (K, 4) duties, -1..1; it ends at end_s."""
+    """A script.
+
+    Attributes:
+        t_s: (K,) when each command begins.
+        command: (K, 4) as in a track of this kind.
+        end_s: when it ends.
+        kind: of the commands.
+    """
 
     t_s: np.ndarray
-    duty: np.ndarray
+    command: np.ndarray
     end_s: float
+    kind: CommandKind = "duty"
 
 
-def rows_of(moves: list[Move]) -> Rows:
+def rows_of(moves: list[Move], kind: CommandKind = "duty") -> Rows:
     """Moves one after the other, with a rest before and after; commands that change nothing go."""
     hold_s = np.concatenate([[LEAD_S], *(m.hold_s for m in moves), [LEAD_S]])
-    duty = np.vstack([np.zeros((1, 4)), *(m.duty for m in moves), np.zeros((1, 4))])
+    command = np.vstack([np.zeros((1, 4)), *(m.command for m in moves), np.zeros((1, 4))])
     ends_s = np.cumsum(hold_s)
-    fresh = np.append(True, np.any(duty[1:] != duty[:-1], axis=1))
-    return Rows((ends_s - hold_s)[fresh], duty[fresh], float(ends_s[-1]))
+    fresh = np.append(True, np.any(command[1:] != command[:-1], axis=1))
+    return Rows((ends_s - hold_s)[fresh], command[fresh], float(ends_s[-1]), kind)
 
 
 def csv_text(rows: Rows) -> str:
-    """The script as firmware and twin read it.
+    """The script as firmware and twin read it, or `characterise --script-as`.
 
-    Rows `t_s,fl_pct,fr_pct,rl_pct,rr_pct`, each held until the next; the last one stops.
+    Rows `t_s,fl_pct,fr_pct,rl_pct,rr_pct` or `t_s,vx_mps,vy_mps,omega_radps`, each held until the
+    next; the last one stops.
     """
-    lines = ["t_s,fl_pct,fr_pct,rl_pct,rr_pct"]
-    for t_s, duty in zip(rows.t_s, rows.duty, strict=True):
-        lines.append(",".join([f"{t_s:.3f}", *(f"{100 * d:.0f}" for d in duty + 0.0)]))
-    return "\n".join([*lines, f"{rows.end_s:.3f},0,0,0,0", ""])
+    columns, scale, digits = COLUMNS[rows.kind]
+    values = scale * rows.command[:, : len(columns)] + 0.0
+    lines = [",".join(["t_s", *columns])]
+    for t_s, row in zip(rows.t_s, values, strict=True):
+        lines.append(",".join([f"{t_s:.3f}", *(f"{v:.{digits}f}" for v in row)]))
+    return "\n".join([*lines, ",".join([f"{rows.end_s:.3f}", *["0"] * len(columns)]), ""])
 
 
 @dataclass(frozen=True)
@@ -66,7 +82,8 @@ class Played:
     @classmethod
     def of(cls, starts: list[list[Move]], like: Scene) -> "Played":
         """Each start is a list of moves; clock, battery and rate of poses are the scene's."""
-        parts = [rows_of(moves) for moves in starts]
+        kind = like.measurement.track.command_kind
+        parts = [rows_of(moves, kind) for moves in starts]
         lengths_s = [rows.end_s + BETWEEN_S for rows in parts]
         begins_s = np.cumsum([0.0, *lengths_s[:-1]])
         period_s = like.measurement.track.timing.pose_period_s
@@ -74,8 +91,9 @@ class Played:
         seen = [np.arange(b, b + r.end_s, period_s) for b, r in zip(begins_s, parts, strict=True)]
         rows = Rows(
             np.concatenate([b + r.t_s for b, r in zip(begins_s, parts, strict=True)]),
-            np.concatenate([r.duty for r in parts]),
+            np.concatenate([r.command for r in parts]),
             float(sum(lengths_s)),
+            kind,
         )
         part = np.repeat(np.arange(len(seen)), [len(s) for s in seen])
         battery_V = float(np.median(like.measurement.track.battery_V))
@@ -94,9 +112,9 @@ class Played:
         old = like.measurement.track
         track = Track(
             old.robot_id,
-            old.command_kind,
+            self.rows.kind,
             self.rows.t_s,
-            self.rows.duty,
+            self.rows.command,
             np.full(len(self.rows.t_s), self.battery_V),
             self.pose_t_s,
             pose,
@@ -113,7 +131,7 @@ class Played:
         rows = self.rows
         return native.Track(
             np.ascontiguousarray(rows.t_s),
-            np.ascontiguousarray(rows.duty),
+            np.ascontiguousarray(rows.command),
             np.full(len(rows.t_s), self.battery_V),
             np.ascontiguousarray(self.pose_t_s),
             np.ascontiguousarray(pose),

@@ -2,9 +2,10 @@
 """The short moves that a script is put together from; each starts and ends at rest.
 
 Effects that act when the command changes look alike under one kind of step: so there are steps from
-rest and through zero, up and down, at several duties and on all axes (Ljung 1999, ch. 13).
+rest and through zero, up and down, at several sizes and on all axes (Ljung 1999, ch. 13).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ AXES = {
     "strafe": np.array([-1.0, 1, 1, -1]),
     "spin": np.array([-1.0, 1, -1, 1]),
 }
+UNITS = {"straight": "m/s", "strafe": "m/s", "spin": "rad/s"}  # of robots told velocities
 LEVELS = (0.25, 0.4, 0.6, 0.8, 1.0)
 REST_S = 0.7  # a TurboPi that coasts stands after half a second
 HOLD_S = 0.7  # six times its motor lag
@@ -23,18 +25,49 @@ RANDOM_HOLDS = 10
 
 
 @dataclass(frozen=True)
+class Axis:
+    """A way to drive.
+
+    Attributes:
+        name: of AXES.
+        full: (4,) command of full drive along it, as in a track: duties in -1..1, or velocities.
+        unit: "%" of duties; else of the velocity.
+    """
+
+    name: str
+    full: np.ndarray
+    unit: str = "%"
+
+    def size(self, level: float) -> str:
+        """A share of full drive, for people."""
+        size = level * float(np.abs(self.full).max())
+        return f"{100 * size:.0f} %" if self.unit == "%" else f"{size:.2g} {self.unit}"
+
+
+def duty_axes(max_duty: float) -> list[Axis]:
+    """Of a robot told duties of at most `max_duty` (0..1)."""
+    return [Axis(name, max_duty * wheels) for name, wheels in AXES.items()]
+
+
+def twist_axes(highest: np.ndarray) -> list[Axis]:
+    """Of a robot told velocities, (3,) at most so large; without those of none."""
+    commands = zip(UNITS.items(), np.diag([*highest, 0.0]), strict=False)
+    return [Axis(name, full, unit) for (name, unit), full in commands if full.any()]
+
+
+@dataclass(frozen=True)
 class Move:
     """One move.
 
     Attributes:
         name: for people.
-        hold_s: (K,) how long each duty is held.
-        duty: (K, 4) share of full duty, -1..1; the last is zero.
+        hold_s: (K,) how long each command is held.
+        command: (K, 4) as in a track; the last is zero.
     """
 
     name: str
     hold_s: np.ndarray
-    duty: np.ndarray
+    command: np.ndarray
 
     @property
     def duration_s(self) -> float:
@@ -42,60 +75,66 @@ class Move:
         return float(self.hold_s.sum())
 
 
-def family(max_duty: float) -> list[Move]:
-    """All moves whose duties are at most `max_duty` (0..1)."""
-    axes = {name: max_duty * axis for name, axis in AXES.items()}
-    moves = []
-    for name, axis in axes.items():
+def family(axes: Sequence[Axis]) -> list[Move]:
+    """All moves along these axes, at most at full drive.
+
+    Along several axes at once their shares add up to one at most, so that no wheel is asked for
+    more than along one of them.
+    """
+    ways = dict(zip((a.name for a in axes), np.eye(len(axes)), strict=True))
+    moves: list[tuple[str, list]] = []
+    for axis in axes:
+        way = ways[axis.name]
         for level in LEVELS:
-            moves += [*_steps(name, axis, level), *_steps(f"{name}, reversed", -axis, level)]
-        moves += [_stairs(name, axis), _stairs(f"{name}, reversed", -axis)]
-    for side, word in ((1, "left"), (-1, "right")):
-        for level in (0.5, 0.8):
-            forward, spin = level * axes["straight"], 0.35 * side * axes["spin"]
-            moves.append(_arc(f"arc {word}", forward, spin, max_duty))
+            size = axis.size(level)
+            moves += [*_steps(axis.name, size, level * way)]
+            moves += [*_steps(f"{axis.name}, reversed", size, -level * way)]
+        moves += [_stairs(axis.name, way), _stairs(f"{axis.name}, reversed", -way)]
+    if {"straight", "spin"} <= set(ways):
+        (straight,) = (a for a in axes if a.name == "straight")
+        for side, word in ((1, "left"), (-1, "right")):
+            for level in (0.5, 0.8):
+                forward, spin = level * ways["straight"], 0.35 * side * ways["spin"]
+                moves.append(_arc(f"arc {word}, {straight.size(level)}", forward, spin))
     random = np.random.default_rng(1)
-    moves += [_random(random, axes, max_duty) for _ in range(RANDOM_MOVES)]
-    return [Move(m.name, m.hold_s, np.rint(100 * m.duty) / 100) for m in moves]
+    moves += [_random(random, len(axes)) for _ in range(RANDOM_MOVES)]
+    return [_move(name, steps, axes) for name, steps in moves]
 
 
-def _move(name: str, steps: list[tuple[float, np.ndarray]]) -> Move:
-    hold_s, duty = zip(*steps, (REST_S, np.zeros(4)), strict=True)
-    return Move(name, np.array(hold_s), np.array(duty))
+def _move(name: str, steps: list[tuple[float, np.ndarray]], axes: Sequence[Axis]) -> Move:
+    """Of shares of full drive along each axis, to whole percent or thousandths."""
+    hold_s, shares = zip(*steps, (REST_S, np.zeros(len(axes))), strict=True)
+    shares = np.array(shares) / np.maximum(1, np.abs(shares).sum(axis=1, keepdims=True))
+    command = shares @ np.array([a.full for a in axes])
+    return Move(name, np.array(hold_s), np.round(command, 2 if axes[0].unit == "%" else 3))
 
 
-def _steps(name: str, axis: np.ndarray, level: float) -> list[Move]:
+def _steps(name: str, size: str, out: np.ndarray) -> list[tuple[str, list]]:
     """Out and back, once with a stop between and once through zero."""
-    out, rest = level * axis, (REST_S, np.zeros(4))
-    percent = f"{100 * np.abs(out).max():.0f} %"
+    rest = (REST_S, np.zeros(len(out)))
     return [
-        _move(f"{name} from rest, {percent}", [(HOLD_S, out), rest, (HOLD_S, -out)]),
-        _move(f"{name} through zero, {percent}", [(HOLD_S, out), (HOLD_S, -out)]),
+        (f"{name} from rest, {size}", [(HOLD_S, out), rest, (HOLD_S, -out)]),
+        (f"{name} through zero, {size}", [(HOLD_S, out), (HOLD_S, -out)]),
     ]
 
 
-def _stairs(name: str, axis: np.ndarray) -> Move:
+def _stairs(name: str, way: np.ndarray) -> tuple[str, list]:
     """Up and down all levels, then back."""
     levels = [*LEVELS, *LEVELS[-2::-1]]
-    return _move(f"{name}, stairs", [(0.25, s * level * axis) for s in (1, -1) for level in levels])
+    return f"{name}, stairs", [(0.25, s * level * way) for s in (1, -1) for level in levels]
 
 
-def _arc(name: str, forward: np.ndarray, spin: np.ndarray, max_duty: float) -> Move:
+def _arc(name: str, forward: np.ndarray, spin: np.ndarray) -> tuple[str, list]:
     """An arc and back on it, then a piece of another."""
-    steps = [(1.2, forward + spin), (1.2, -forward - spin), (0.6, forward - spin)]
-    return _move(
-        f"{name}, {100 * np.abs(forward).max():.0f} %",
-        [(hold_s, np.clip(duty, -max_duty, max_duty)) for hold_s, duty in steps],
-    )
+    return name, [(1.2, forward + spin), (1.2, -forward - spin), (0.6, forward - spin)]
 
 
-def _random(random: np.random.Generator, axes: dict[str, np.ndarray], max_duty: float) -> Move:
+def _random(random: np.random.Generator, axes: int) -> tuple[str, list]:
     """Random levels on all axes at once, each once forward and once, in another order, back."""
-    mixes = random.choice([-1, 0, 1], (RANDOM_HOLDS // 2, 3)) * random.choice(
-        LEVELS, (RANDOM_HOLDS // 2, 3)
+    mixes = random.choice([-1, 0, 1], (RANDOM_HOLDS // 2, axes)) * random.choice(
+        LEVELS, (RANDOM_HOLDS // 2, axes)
     )
-    mixes = np.concatenate([mixes, -random.permutation(mixes)]) @ np.array(list(axes.values()))
-    mixes /= np.maximum(1, np.abs(mixes).max(axis=1, keepdims=True) / max_duty)
+    mixes = np.concatenate([mixes, -random.permutation(mixes)])
     holds_s = np.rint(100 * random.uniform(0.2, 0.6, len(mixes) // 2)) / 100
     holds_s = np.concatenate([holds_s, random.permutation(holds_s)])
-    return _move("random on all axes", list(zip(holds_s, mixes, strict=True)))
+    return "random on all axes", list(zip(holds_s, mixes, strict=True))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A script of duties for robots that listen to geometry_msgs/Twist: as a ROS bag or a publisher.
+"""A script for robots that listen to geometry_msgs/Twist: as a ROS bag or a publisher.
 
 Duties become the body velocities that the model reaches at them. Robots stop when no command comes
 for a while, so each is said again every PERIOD_S.
@@ -12,6 +12,7 @@ from string import Template
 import numpy as np
 import twinmill_native as native
 
+from twinmill.experiment.foresight import Rows
 from twinmill.files import check_new_file, replacing_folder
 from twinmill.model.model_file import write_whole
 
@@ -36,19 +37,22 @@ class TwistScript:
     end_s: float
 
     @classmethod
-    def of(cls, model: native.Model, t_s: np.ndarray, duty: np.ndarray, end_s: float):
-        """From (K, 4) duties, -1..1, as the model drives them.
+    def of(cls, model: native.Model, rows: Rows) -> "TwistScript":
+        """Velocities as they are; duties as the model drives them.
 
         Raises:
-            ValueError: the model's robot is not told duties.
+            ValueError: the model's robot is not told duties, and the script holds some.
         """
+        if rows.kind == "twist":
+            return cls(rows.t_s, rows.command[:, :3], rows.end_s)
         if model.drive != "duty":
             raise ValueError(
                 f"--script-as: the script holds duties, and the model's robot is told by "
                 f"'{model.drive}'; give the model of a duty robot with --model."
             )
-        steady = native.steady(model, np.ascontiguousarray(duty), [], np.zeros((0, 0)))[0]
-        return cls(np.asarray(t_s, float), np.round(steady[:, :3], 6) + 0.0, float(end_s))
+        duty = np.ascontiguousarray(rows.command)
+        steady = native.steady(model, duty, [], np.zeros((0, 0)))[0]
+        return cls(rows.t_s, np.round(steady[:, :3], 6) + 0.0, rows.end_s)
 
     def repeated(self) -> tuple[np.ndarray, np.ndarray]:
         """(M,) times every PERIOD_S and at every change, (M, 3) velocities; the last is zero."""

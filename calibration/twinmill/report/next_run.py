@@ -61,7 +61,7 @@ def section(plan: Plan, how: How) -> Section:
         [("predicted power", percent(power), _tone(power))],
         f"{plan.why} {_outlook(plan)}",
         [("run", _length(plan))],
-        [figures.duties(plan), figures.floor(plan), figures.margins(plan)],
+        [figures.commands(plan), figures.floor(plan), figures.margins(plan)],
         [_chances(plan), _moves(plan)],
         next_step=how.first,
         commands=how.commands,

@@ -10,26 +10,34 @@ from twinmill.report import Figure
 from twinmill.report.canvas import BEFORE, FLOOR, MEASURED, PREDICTED, draw, legend_above
 
 WHEELS = ("front left", "front right", "rear left", "rear right")
+VELOCITIES = ("forward (m/s)", "left (m/s)", "turn (rad/s)")
 EVERY_S = 0.05  # points of a drawn line
 LEAST_CHI2 = 0.1  # a margin that is less is drawn as this
 
 
-def duties(plan: Plan) -> Figure:
-    """What each wheel is told over time."""
+def commands(plan: Plan) -> Figure:
+    """What each wheel is told over time, or the body."""
     t_s = np.append(plan.rows.t_s, plan.rows.end_s)
-    percent = 100 * np.vstack([plan.rows.duty, plan.rows.duty[-1:]])
+    told = np.vstack([plan.rows.command, plan.rows.command[-1:]])
+    duties = plan.rows.kind == "duty"
+    names = WHEELS if duties else VELOCITIES
+    told = told * (100 if duties else 1)
 
     def paint(panels) -> None:
-        for wheel, axes in enumerate(panels):
-            axes.fill_between(t_s, percent[:, wheel], step="post", color=BEFORE, alpha=0.3, lw=0)
-            axes.step(t_s, percent[:, wheel], where="post", color=BEFORE, lw=1)
-            axes.set(ylim=(-108, 108), yticks=(-100, 0, 100), ylabel=WHEELS[wheel])
+        for column, axes in enumerate(panels):
+            axes.fill_between(t_s, told[:, column], step="post", color=BEFORE, alpha=0.3, lw=0)
+            axes.step(t_s, told[:, column], where="post", color=BEFORE, lw=1)
+            axes.set_ylabel(names[column])
+            if duties:
+                axes.set(ylim=(-108, 108), yticks=(-100, 0, 100))
         panels[-1].set_xlabel("time (s)")
 
     return Figure(
-        draw(4.6, paint, nrows=4, sharex=True),
+        draw(4.6, paint, nrows=len(names), sharex=True),
         "The script",
-        "Duty of each wheel in percent, over time. Positive drives the robot forward.",
+        "Duty of each wheel in percent, over time. Positive drives the robot forward."
+        if duties
+        else "Velocities that the robot is told, over time.",
     )
 
 

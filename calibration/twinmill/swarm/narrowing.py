@@ -25,7 +25,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.track import command_at
 from twinmill.experiment.design import CENTRE, Floor, Limits, choose
 from twinmill.experiment.foresight import LEAD_S, Played, Rows, rows_of
-from twinmill.experiment.moves import Move, family
+from twinmill.experiment.moves import Move, duty_axes, family
 from twinmill.experiment.one_step_fit import System
 from twinmill.fitting.fit import base_names, fitted, judged
 from twinmill.fitting.opening import open_measurements
@@ -197,7 +197,7 @@ def design_for(
             f"what the swarm does hangs on {names}, which no drive of one robot shows; measure "
             "these by themselves (twinmill effects NAME)."
         )
-    moves, floor = family(limits.max_duty), Floor(limits, scene, [])
+    moves, floor = family(duty_axes(limits.max_duty)), Floor(limits, scene, [])
     prior = np.linalg.inv(spread.covariance)
 
     def left(grams: np.ndarray) -> np.ndarray:

@@ -18,6 +18,9 @@ def next_command(logs: list[Path], model: str, options: Mapping) -> list[str]:
 def then_commands(logs: list[Path], model: str, plan: Mapping) -> list[str]:
     """To play the script on the robot, and to diagnose with what comes of it."""
     robot = ["twinmill", "characterise", "--robot", str(plan["robot_id"]), "--script", "script.csv"]
-    robot += ["--cap-pct", str(plan["cap_pct"]), "--out", "next.lcmlog"]
+    if plan["drive"] == "twist":
+        robot += ["--script-as", "publisher", "--out", "script.py"]
+    else:
+        robot += ["--cap-pct", str(plan["cap_pct"]), "--out", "next.lcmlog"]
     again = ["twinmill", "diagnose", *map(str, logs), "next.lcmlog", "--model", model]
     return [shlex.join(robot), shlex.join(again)]

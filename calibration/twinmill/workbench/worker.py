@@ -228,5 +228,6 @@ def _told(plan: Any) -> dict:
         "floor_m": plan.limits.floor_m,
         "paths": np.round(plan.paths[:, ::every, :2], 3),
         "robot_id": plan.robot_id,
-        "cap_pct": round(100 * float(np.abs(plan.rows.duty).max())),
+        "drive": plan.rows.kind,
+        "cap_pct": round(100 * float(np.abs(plan.rows.command).max())),
     }

@@ -17,7 +17,7 @@ from twinmill.diagnosis.result import Diagnosis
 from twinmill.experiment.design import Limits, Plan, check, design
 from twinmill.experiment.foresight import Rows, csv_text, rows_of
 from twinmill.experiment.information import CLOCKS, FisherInformation
-from twinmill.experiment.moves import AXES, family
+from twinmill.experiment.moves import AXES, duty_axes, family
 from twinmill.experiment.power import ALPHA, named_apart
 from twinmill.experiment.relevance import Relevance
 from twinmill.fitting.fit import fit
@@ -113,9 +113,9 @@ def test_promised_chance_is_that_of_a_simulated_trial(energy, alike):
 
 
 def test_each_move_comes_to_rest_and_keeps_the_duty_cap():
-    for move in family(max_duty=0.6):
-        assert not move.duty[-1].any() and move.hold_s[-1] >= 0.5
-        assert np.abs(move.duty).max() <= 0.6
+    for move in family(duty_axes(0.6)):
+        assert not move.command[-1].any() and move.hold_s[-1] >= 0.5
+        assert np.abs(move.command).max() <= 0.6
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def at_steps(rows: Rows) -> np.ndarray:
     """(K, 4) duties in percent at the robot's control steps."""
     t_s = np.arange(0, rows.end_s, COMMAND_S)
     held = np.searchsorted(rows.t_s, t_s + 1e-9, side="right") - 1
-    return np.rint(100 * rows.duty[held]).astype(int)
+    return np.rint(100 * rows.command[held]).astype(int)
 
 
 def test_the_run_names_what_milling_alone_cannot(designed, measure):
@@ -183,9 +183,9 @@ def test_the_run_names_what_milling_alone_cannot(designed, measure):
 def test_the_script_keeps_to_time_floor_and_duty_and_strafes(designed):
     rows, plan = designed.plan.rows, designed.plan
     assert rows.end_s <= 15
-    assert np.abs(rows.duty).max() <= 0.8
+    assert np.abs(rows.command).max() <= 0.8
     assert np.all(plan.extent_m <= plan.limits.floor_m)
-    assert np.abs(rows.duty @ AXES["strafe"]).max() > 1
+    assert np.abs(rows.command @ AXES["strafe"]).max() > 1
 
 
 def test_the_real_path_is_the_predicted_one(designed, tanh_robot):
@@ -202,7 +202,7 @@ def test_the_real_path_is_the_predicted_one(designed, tanh_robot):
 @pytest.mark.skipif("TWIN_RUN" not in os.environ, reason="TWIN_RUN does not name the program")
 def test_the_firmware_reads_the_script_as_it_was_meant(tmp_path):
     """The twin reads scripts with the firmware's parser; its telemetry must say the same duties."""
-    rows = rows_of(family(1.0)[-3:])
+    rows = rows_of(family(duty_axes(1.0))[-3:])
     script, log = tmp_path / "script.csv", tmp_path / "run.lcmlog"
     script.write_text(csv_text(rows))
     subprocess.run(
@@ -217,7 +217,7 @@ def test_the_firmware_reads_the_script_as_it_was_meant(tmp_path):
     )
     held = np.searchsorted(rows.t_s, robot.command_t_s, side="right") - 1
     assert np.count_nonzero(settled) > 200
-    assert np.allclose(robot.command[settled], rows.duty[held][settled], atol=1e-6)
+    assert np.allclose(robot.command[settled], rows.command[held][settled], atol=1e-6)
 
 
 def test_the_command_writes_the_script_and_says_what_it_parts(
@@ -233,7 +233,7 @@ def test_the_command_writes_the_script_and_says_what_it_parts(
     assert told["script"] == str(script) and "heading_bias" in told["separates"]
     assert 0 <= told["predicted_power"] <= 1
     rows = np.loadtxt(script, delimiter=",", skiprows=1)
-    assert np.array_equal(rows[:-1, 1:], np.rint(100 * designed.plan.rows.duty))
+    assert np.array_equal(rows[:-1, 1:], np.rint(100 * designed.plan.rows.command))
     assert not rows[-1, 1:].any() and rows[-1, 0] == pytest.approx(told["duration_s"], abs=1e-3)
     assert (report / "index.html").read_text().count("<svg") == 3
     monkeypatch.setenv("COLUMNS", "60")  # a narrow terminal does not break what is to be copied

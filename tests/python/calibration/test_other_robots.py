@@ -15,6 +15,8 @@ from twinmill.data.measurement import load_measurements
 from twinmill.data.time_base import find_time_base, retimed
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.encoders import geometry_notes
+from twinmill.experiment.design import Limits, check, design
+from twinmill.experiment.foresight import csv_text
 from twinmill.fitting.add import add
 from twinmill.model.model_file import ModelFile
 
@@ -164,6 +166,35 @@ def test_a_robot_told_velocities_is_seen_to_turn_faster_to_the_left(tmp_path):
     assert parameter.value == pytest.approx(asymmetry, abs=0.02)
 
 
+def test_the_next_run_of_a_robot_told_velocities_shows_what_its_log_could_not(tmp_path):
+    """It turned to the left alone: that it turns less to the right nothing can tell."""
+    random, asymmetry = np.random.default_rng(8), 0.12
+    legs = drive_legs(2500, random, (-0.2, 0.15, 0.25), (0.6, 1.0))
+    driven = legs * (1, 1 + asymmetry)
+    found = diagnosed_cart(tmp_path, legs, driven, random)
+    assert not found.found and "turn_asymmetry" in dict(found.not_identifiable)
+    limits = Limits(30, (2.0, 2.0), 0.8)
+    model = model_file(tmp_path, CART)
+    check([o.measurement for o in found.opened], model, limits)
+    plan = design(found, model, limits, print)
+    told = plan.rows.command
+    assert np.all(np.abs(told).max(axis=0) <= (0.2, 0, 0.8, 0))  # of the log's, and never sideways
+    assert told[:, 2].min() < 0 and "turn_asymmetry" in plan.separates
+    assert np.all(plan.extent_m <= 2.0)
+    script = tmp_path / "script.csv"
+    script.write_text(csv_text(plan.rows))
+    rows = np.loadtxt(script, delimiter=",", skiprows=1)
+    assert script.read_text().startswith("t_s,vx_mps,vy_mps,omega_radps\n")
+    t_s = np.arange(0, rows[-1, 0], 0.02)
+    again = rows[np.searchsorted(rows[:, 0], t_s + 1e-9, side="right") - 1][:, [1, 3]]
+    turn = again[:, 1] + asymmetry * np.abs(again[:, 1])
+    run = cart_log(tmp_path, "next", again, np.column_stack([again[:, 0], turn]), random)
+    then = diagnose(load_measurements([tmp_path / "run.lcmlog", run]), model)
+    assert then.found == ["turn_asymmetry"]
+    (parameter,) = then.ranking[0].parameters
+    assert parameter.value == pytest.approx(asymmetry, abs=0.02)
+
+
 def test_a_top_speed_of_the_controller_is_no_slip(tmp_path):
     """Commands above 0.3 m/s are cut to it, in any direction."""
     random = np.random.default_rng(5)
@@ -214,6 +245,12 @@ def strafing_log(folder, number, held_rad, random, period_s=0.05):
 
 def diagnosed_cart(folder, told, driven, random, period_s=0.02):
     """Diagnosis of a cart told (K, 2) speeds and rates of turn, which drives others."""
+    log = cart_log(folder, "run", told, driven, random, period_s)
+    return diagnose(load_measurements([log]), model_file(folder, CART))
+
+
+def cart_log(folder, name, told, driven, random, period_s=0.02):
+    """Its log, by way of import."""
     heading = np.cumsum(driven[:, 1]) * period_s
     middle = heading - driven[:, 1] * period_s / 2
     x, y = (np.cumsum(driven[:, 0] * f(middle)) * period_s for f in (np.cos, np.sin))
@@ -222,9 +259,9 @@ def diagnosed_cart(folder, told, driven, random, period_s=0.02):
     write_csv(folder / "c.csv", "t_s,vx_mps,vy_mps,omega_radps",
               np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]]))  # fmt: skip
     write_csv(folder / "p.csv", "t_s,x_m,y_m,theta_rad", np.column_stack([t_s + period_s, pose]))
-    log = folder / "run.lcmlog"
+    log = folder / f"{name}.lcmlog"
     import_log(folder / "p.csv", folder / "c.csv", log, options=ImportOptions(robot_id=2))
-    return diagnose(load_measurements([log]), model_file(folder, CART))
+    return log
 
 
 def write_csv(path, header, rows):
