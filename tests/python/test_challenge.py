@@ -11,7 +11,7 @@ import twinmill_native as native
 from twinmill.challenge.cases import CASES, LEAST, Floors, draw, draw_robots, seal
 from twinmill.challenge.drives import drive
 from twinmill.challenge.intervals import SETS, coverage, draw_known, errors
-from twinmill.challenge.physics import STEP_S, Signals, catalogue_forms, outside_forms
+from twinmill.challenge.physics import STEP_S, Signals, catalogue_forms, outside_forms, slow
 from twinmill.challenge.robots import KINDS
 from twinmill.challenge.rollers import drive_by_forces
 from twinmill.challenge.run import Plan, play
@@ -100,6 +100,12 @@ def test_a_steady_turn_is_a_circle():
     late = motion.pose[round(2 / STEP_S) :, :2]
     middle = 0.5 * (late.max(axis=0) + late.min(axis=0))
     assert np.hypot(*(late - middle).T) == pytest.approx(0.5, rel=0.002)
+
+
+def test_a_lag_is_behind_a_ramp_by_its_time():
+    """y = t - T once it has settled: of a step its mean, not its end, which is half a step early."""
+    ramp_s = STEP_S * np.arange(1000)
+    assert slow(ramp_s, 0.1)[-1] == pytest.approx(ramp_s[-1] - 0.1, abs=1e-5)
 
 
 def test_a_marker_beside_the_middle_moves_only_in_turns():

@@ -3,7 +3,8 @@
 
 Robots are drawn and driven as in the exam, on formulas of their own, with effects whose numbers are
 known; their owner knows which effects there are, but no number of them, and the base by some
-percent.
+percent. Of the wheels' mean gain and the base's gains only the products show: an interval of one of
+them is the prior's, and can be right only of wheels that are drawn from it.
 """
 
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ from twinmill.challenge.physics import Hidden, catalogue_forms
 from twinmill.challenge.robots import draw_robot
 from twinmill.challenge.run import Plan
 from twinmill.challenge.scoring import WITHIN, rate
+from twinmill.model.parameters import catalogue
 
 # Fitted together; in turn. All can be told from a mixed drive.
 SETS = (
@@ -51,7 +53,7 @@ def draw_known(number: int, seed: int, duration_s: float) -> Known:
     random = np.random.default_rng([seed, 4, number])
     robot = replace(draw_robot(0, random), bend=STRAIGHT)  # planar, duties, mecanum
     plain = {h.name: h for h in catalogue_forms(robot, random) if h.kind == "plain"}
-    hidden = tuple(plain[name].scaled(random.uniform(*SIZES)) for name in SETS[number % len(SETS)])
+    hidden = tuple(_sized(plain[name], random) for name in SETS[number % len(SETS)])
     legs = drive("mixed", duration_s * random.uniform(0.7, 1.3), robot.sideways, random)
     base = dict(
         zip(("forward_gain", "sideways_gain", "yaw_gain"), robot.gains, strict=True),
@@ -73,6 +75,13 @@ def draw_known(number: int, seed: int, duration_s: float) -> Known:
     truth |= {f"{h.name}.{name}": value for h in hidden for name, value in h.values.items()}
     plan = Plan(robot, legs, int(random.integers(2**31)))
     return Known(plan, hidden, truth, "\n".join(lines) + "\n")
+
+
+def _sized(form: Hidden, random: np.random.Generator) -> Hidden:
+    if form.name != "wheel_gain":
+        return form.scaled(random.uniform(*SIZES))
+    (usual,) = {p["usual_size"] for p in catalogue()["wheel_gain"]["parameters"]}
+    return replace(form, values={wheel: random.normal(0, usual) for wheel in form.values})
 
 
 def errors(known: Known, fitted: dict) -> list[dict]:

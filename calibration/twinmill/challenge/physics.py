@@ -17,6 +17,7 @@ from twinmill.challenge.robots import Robot
 
 STEP_S = 1 / 500
 NOMINAL_V = 7.4
+TURNS_MPS = 1e-3  # of a wheel's rim: below it stands
 
 
 @dataclass(frozen=True)
@@ -77,12 +78,13 @@ class Hidden:
 
 
 def slow(signal: np.ndarray, time_s: float, start: float | np.ndarray = 0.0) -> np.ndarray:
-    """First-order lag of each column of (N, k) or of (N,)."""
+    """First-order lag of each column of (N, k) or of (N,); mean of a step's begin and end."""
     if time_s <= STEP_S:
         return signal
     a = np.exp(-STEP_S / time_s)
-    first = np.broadcast_to(a * np.asarray(start, float), signal.shape[1:])
-    return lfilter([1 - a], [1, -a], signal, axis=0, zi=first[None])[0]
+    first = np.broadcast_to(np.asarray(start, float), signal.shape[1:])[None]
+    end = lfilter([1 - a], [1, -a], signal, axis=0, zi=a * first)[0]
+    return (np.concatenate([first, end[:-1]]) + end) / 2
 
 
 def _dead_zone(duty, v, _):
@@ -222,7 +224,7 @@ def _friction(twist, v, _):
 
 
 def _tilt(twist, v, s):
-    moves = (np.abs(s.duty).max(axis=1) > 0) | (_speed(twist)[:, 0] > 0.01)
+    moves = np.abs(twist @ s.robot.to_wheels.T).max(axis=1) > TURNS_MPS
     c, n = np.cos(s.pose[:, 2]), np.sin(s.pose[:, 2])
     x, y = v["drift_x_mps"] * moves, v["drift_y_mps"] * moves
     return twist + np.column_stack([c * x + n * y, c * y - n * x, 0 * x])

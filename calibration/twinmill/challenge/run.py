@@ -63,7 +63,7 @@ def play(plan: Plan, hidden: Sequence[Hidden] = (), forces: bool = False, calm: 
     battery_V = 8.3 - random.uniform(0.4, 1.1) * t_s / t_s[-1]
     noise = _disturbance(robot, len(t_s), random) * (not calm)
     at_s = _acted("command", tick_s, hidden, Signals(robot, command, battery_V, axes, random))
-    row = np.clip(np.searchsorted(at_s, t_s, side="right") - 1, 0, None)
+    row = np.clip(np.searchsorted(at_s, t_s + STEP_S / 2, side="right") - 1, 0, None)
     duty = _acted(
         "duty", command[row], hidden, Signals(robot, command[row], battery_V, axes, random)
     )

@@ -26,7 +26,7 @@ from twinmill.model.parameters import (
     ParameterEstimate,
     stated_names,
 )
-from twinmill.predict.datasets import PARTS, Dataset
+from twinmill.predict.datasets import PARTS, Dataset, Trajectory
 
 ROUNDS = 12
 CONVERGED = 1e-2  # change of the cost that decides nothing
@@ -396,49 +396,75 @@ class ScoreFit:
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """(P, P) by leaving out a block at a time; no less than the curvature of the cost says.
+        """(P, P) by leaving out a block at a time, and what the prior adds.
 
-        What the data leave undetermined is as wide as the prior, which is part of the curvature.
+        What the data leave undetermined is as wide as the prior. Fits for evidence are no surer
+        than the curvature of the cost: their model is not whole yet, and of its base they hold what
+        other logs told. Nor are those to tables, whose inputs are few.
         """
-        rows, slopes = self.state
-        gram, _ = self._normal(rows, slopes, self.x)
-        inverse = np.linalg.pinv(gram)
-        spread = np.zeros_like(gram)
+        told = self._scatter + self._pulled
+        if not self.by_channel and all(isinstance(d, Trajectory) for d in self.datasets):
+            return told
+        return _no_less(told, np.linalg.pinv(self._curvature))
+
+    @cached_property
+    def _curvature(self) -> np.ndarray:
+        """(P, P) of half the cost, the prior included."""
+        return self._normal(*self.state, self.x)[0]
+
+    @cached_property
+    def _pulled(self) -> np.ndarray:
+        """(P, P) covariance of what a prior of precision D pulls, G^-1 D G^-1 with curvature G."""
+        pull = np.linalg.pinv(self._curvature) / self.std
+        return pull @ pull.T
+
+    @cached_property
+    def _scatter(self) -> np.ndarray:
+        """(P, P) covariance of what the data scatter: the jackknife over blocks.
+
+        Of a log the mean over two divisions into blocks, half a block apart, which scatters less
+        itself (Künsch 1989, section 2).
+        """
+        spread = np.zeros_like(self._curvature)
+        for i, data in enumerate(self.datasets):
+            divisions = _divisions(data)
+            for block in divisions:
+                for b in np.unique(block):
+                    moved = self._moved_without(i, block == b)
+                    spread += np.outer(moved, moved) / len(divisions)
+        return spread * (self.blocks - 1) / max(self.blocks, 1)
+
+    def _moved_without(self, i: int, out: np.ndarray) -> np.ndarray:
+        """(P,) Newton's step without the rows `out` (R,) of data set i."""
+        rows, slopes, own = self.state[0][i], self.state[1][i], self.columns[i]
+        weighted = slopes[out] * self.weight(i, rows)[out, None]
+        less, push = self._curvature.copy(), np.zeros(len(self.x))
+        less[np.ix_(own, own)] -= weighted.T @ slopes[out]
+        push[own] = weighted.T @ rows[out]
+        try:
+            moved = np.linalg.solve(less, push)
+        except np.linalg.LinAlgError:
+            moved = np.linalg.pinv(self._curvature) @ push
         # Without the block around a moment, only the prior says where in it the moment was.
         parameters = [u.parameter for u in self.unknowns]
         reach = np.array([p.std if p.role == "moment" else np.inf for p in parameters])
-        for i, (r, j) in enumerate(zip(rows, slopes, strict=True)):
-            weight, own, block = self.weight(i, r), self.columns[i], self.datasets[i].block
-            for b in np.unique(block):
-                out = block == b
-                weighted = j[out] * weight[out, None]
-                less, push = gram.copy(), np.zeros(len(gram))
-                less[np.ix_(own, own)] -= weighted.T @ j[out]
-                push[own] = weighted.T @ r[out]
-                try:
-                    moved = np.linalg.solve(less, push)
-                except np.linalg.LinAlgError:
-                    moved = inverse @ push
-                moved = np.clip(moved, -reach, reach)
-                spread += np.outer(moved, moved)
-        blocks = self.blocks
-        spread *= (blocks - 1) / max(blocks, 1)
-        return _no_less(spread, inverse)
+        return np.clip(moved, -reach, reach)
 
     @property
     def blocks(self) -> int:
         """Of all data sets."""
         return int(sum(len(np.unique(d.block)) for d in self.datasets))
 
-    @property
-    def _widening(self) -> float:
-        """Of standard errors: Student's t for so few blocks."""
-        return float(student.ppf(0.975, max(self.blocks - 1, 1)) / NORMAL_95)
+    @cached_property
+    def _intervals(self) -> np.ndarray:
+        """(P, P) the same, its scatter widened by Student's t for so few blocks."""
+        widening = student.ppf(0.975, max(self.blocks - 1, 1)) / NORMAL_95
+        return self.covariance + (widening**2 - 1) * self._scatter
 
     @property
     def stds(self) -> np.ndarray:
         """(P,) half 95 % intervals over 1.96."""
-        return self._widening * np.sqrt(np.diag(self.covariance))
+        return np.sqrt(np.diag(self._intervals))
 
     def chance_of_none(self, instance: str) -> float:
         """Chance of an effect's sizes if all were neutral; 0 where sizes alone do not tell.
@@ -490,13 +516,21 @@ class ScoreFit:
     def shared_covariance(self) -> Covariance:
         """Of the quantities that all data sets share and that these tell, as wide as their stds."""
         told = [c for c, e in enumerate(self.shared_estimates()) if e.seen]
-        values = self._widening**2 * self.covariance[np.ix_(told, told)]
+        values = self._intervals[np.ix_(told, told)]
         return Covariance(tuple(self.estimates[c].name for c in told), values)
 
     def own_estimates(self, i: int) -> dict[str, ParameterEstimate]:
         """Of data set i alone: its clock and its robot's gains."""
         count = len(self.shared_estimates())
         return {self.estimates[c].name: self.estimates[c] for c in self.columns[i] if c >= count}
+
+
+def _divisions(data: Dataset) -> list[np.ndarray]:
+    """(R,) blocks of a data set; of a log also those that begin half a block later."""
+    if not isinstance(data, Trajectory):
+        return [data.block]
+    later = np.floor((data.start_s - data.start_s[0]) / data.block_s + 0.5).astype(int)
+    return [data.block, np.repeat(later, data.measured[0].size)]
 
 
 def _no_less(wide: np.ndarray, least: np.ndarray) -> np.ndarray:
