@@ -103,7 +103,7 @@ def test_a_steady_turn_is_a_circle():
 
 
 def test_a_lag_is_behind_a_ramp_by_its_time():
-    """y = t - T once it has settled: of a step its mean, not its end, which is half a step early."""
+    """Settled, y = t - T: a step has its mean; its end would be half a step early."""
     ramp_s = STEP_S * np.arange(1000)
     assert slow(ramp_s, 0.1)[-1] == pytest.approx(ramp_s[-1] - 0.1, abs=1e-5)
 

@@ -149,10 +149,32 @@ class Scene:
         for tag in self.tags:
             if not tag.lies:
                 self._draw(picture, tag, t_s)
-        picture = cv2.GaussianBlur(picture * self._light, (5, 5), 0.6)
         first = np.random.default_rng([self.seed, k]).integers(0, len(picture))
-        picture += self._noise[first : first + len(picture)]
-        return np.repeat(np.clip(picture, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+        seen = self._seen(picture, self._light, self._noise[first : first + len(picture)])
+        return np.repeat(seen[..., None], 3, axis=2)
+
+    def part(self, k: int, tag: Tag, around_px: int) -> tuple[np.ndarray, np.ndarray]:
+        """(h, w) bytes of frame k about a tag, but for the other tags that drive; (2,) its corner.
+
+        The corner is on a multiple of 8 px, as the blocks of a codec are.
+        """
+        place = tag.path(np.array([k / self.rate_hz]))[0]
+        (middle,) = self.lens.project(np.array([[*place[:2], tag.height_m]]))
+        low = np.maximum(np.floor((middle - around_px) / 8).astype(int) * 8, 0)
+        high = np.minimum(low + 2 * around_px, self.lens.size_px)
+        cut = np.s_[low[1] : high[1], low[0] : high[0]]
+        floor = self._floor[cut].copy()
+        self._draw(self._floor, tag, k / self.rate_hz)
+        drawn, self._floor[cut] = self._floor[cut].copy(), floor
+        first = np.random.default_rng([self.seed, k]).integers(0, self.lens.size_px[1])
+        noise = self._noise[first : first + self.lens.size_px[1]][cut]
+        return self._seen(drawn, self._light[cut], noise), low
+
+    @staticmethod
+    def _seen(picture: np.ndarray, light: np.ndarray, noise: np.ndarray) -> np.ndarray:
+        """(h, w) bytes."""
+        lit = cv2.GaussianBlur(picture * light, (5, 5), 0.6)
+        return np.clip(lit + noise, 0, 255).astype(np.uint8)
 
     def write(self, path: str, count: int, codec: str = "mp4v") -> None:
         """A film of so many frames."""
