@@ -287,19 +287,23 @@ class Model(_Shown):
         return fit(log, self)
 
     @_one_thread
-    def add(self, effect: str, log: "Log | str | Path", **texts: str) -> "Addition":
+    def add(
+        self, effect: str, log: "Log | str | Path", robot: int | None = None, **texts: str
+    ) -> "Addition":
         """Adds an effect, fits it with all the rest, and judges it on data it was not fitted to.
 
         Args:
-            effect: name from the catalogue.
+            effect: name from the catalogue; of one robot also `gains`.
             log: what it is fitted to.
+            robot: number of the robot that alone has it; by default all have.
             texts: of the effect `equation`: adds_to and formula.
 
         Returns:
             Scores without and with the effect, and the new model.
 
         Raises:
-            ValueError: there is no such effect, or a text makes no sense.
+            ValueError: there is no such effect, a text makes no sense, or it is of the camera and
+                to be one robot's.
 
         Examples:
             >>> added = tm.Model.load("turbopi.toml").add("coasting", "run.lcmlog")
@@ -308,11 +312,14 @@ class Model(_Shown):
             >>> added.heldout_after < added.heldout_before
             True
         """
-        if effect not in catalogue():
+        gains = robot is not None and effect == _add.OWN_GAINS
+        if effect not in catalogue() and not gains:
             raise ValueError(f"{effect}: no such effect; `twinmill effects` lists them.")
         measurements = _log(log).measurements(self)
         name = f"{self.file.path.stem}+{effect}.toml"
-        if is_of_camera(effect):
+        if not gains and is_of_camera(effect):
+            if robot is not None:
+                raise ValueError(f"{effect}: is of the camera, and is added to all robots alike.")
             result, file = _made(
                 name,
                 lambda out: add_to_camera(
@@ -323,7 +330,13 @@ class Model(_Shown):
             result, file = _made(
                 name,
                 lambda out: _add.add(
-                    effect, measurements, self.file, out, f"twinmill.add {effect}", texts
+                    effect,
+                    measurements,
+                    self.file,
+                    out,
+                    f"twinmill.add {effect}",
+                    texts,
+                    robot_id=robot,
                 ),
             )
         return Addition(result, Model(file))

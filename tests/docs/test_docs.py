@@ -100,6 +100,13 @@ def test_a_page_that_needs_the_internet_ends_the_build(part):
         on_post_page(links + part, page, None)
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_lists_within_lists_stand_as_far_in_as_the_site_asks_for(page):
+    """Four columns, by Python-Markdown's documentation; with fewer it makes one list of both."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    assert re.findall(r"^ {1,3}(?:[-*]|\d+\.) .*$", text, flags=re.MULTILINE) == []
+
+
 def test_the_catalogue_has_a_card_for_each_effect():
     made = {path.stem for path in (ROOT / "twin/effects/catalogue").glob("*.cpp")}
     shown = set(re.findall(r"^## (\w+)$", catalogue(), flags=re.MULTILINE))

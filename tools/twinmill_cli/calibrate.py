@@ -16,7 +16,7 @@ from twinmill_cli.output import AsJson, busy
 
 if working():  # not for --help
     from twinmill.diagnosis.detections.add import DetectionAddition, add_to_camera, is_of_camera
-    from twinmill.fitting.add import AddResult, add
+    from twinmill.fitting.add import OWN_GAINS, AddResult, add
     from twinmill.fitting.compare import Comparison, compare
     from twinmill.fitting.fit import FitResult, fit
     from twinmill.report import (
@@ -33,6 +33,7 @@ if working():  # not for --help
         finish,
         holding,
         load,
+        of_robot,
         open_model,
         provenance,
         told,
@@ -99,7 +100,9 @@ def _add(
     effect: Annotated[
         str,
         typer.Argument(
-            metavar="EFFECT", show_default=False, help="Its name; `twinmill effects` lists them."
+            metavar="EFFECT",
+            show_default=False,
+            help="Its name; `twinmill effects` lists them. Of one robot also gains.",
         ),
     ],
     logs: Logs,
@@ -113,6 +116,12 @@ def _add(
         str | None, typer.Option("--formula", help="Of an equation: what is added, of p0 to p3.")
     ] = None,
     hold: Hold = None,
+    robot: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=99, show_default=False, help="Its number: that robot alone has the effect."
+        ),
+    ] = None,
     as_json: AsJson = False,
     out: Out = None,
 ) -> AddResult | DetectionAddition:
@@ -120,7 +129,8 @@ def _add(
 
     Example: twinmill add coasting run.lcmlog --model fitted.toml -o better.toml
     """
-    known = [text["name"] for text in find_effect(effect)["texts"]]
+    gains = robot is not None and effect == OWN_GAINS
+    known = [] if gains else [text["name"] for text in find_effect(effect)["texts"]]
     texts = {"adds_to": adds_to, "formula": formula}
     texts = {name: text for name, text in texts.items() if text is not None}
     if extra := [name for name in texts if name not in known]:
@@ -128,15 +138,17 @@ def _add(
         raise ValueError(f"{option}: {effect} has none; it is for `twinmill add equation`.")
     held = hold or []
     given = [w for name, text in texts.items() for w in (f"--{name.replace('_', '-')}", text)]
-    verb = shlex.join(["add", effect, *given, *holding(held)])
+    verb = shlex.join(["add", effect, *of_robot(robot), *given, *holding(held)])
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
     check_output(output, model_file, force)
     measurements = load(logs, model_file, as_json)
-    if is_of_camera(effect):
+    if not gains and is_of_camera(effect):
         if held:
             raise ValueError(f"--hold: {effect} is of the camera; nothing else is fitted with it.")
+        if robot is not None:
+            raise ValueError(f"--robot: {effect} is of the camera; all robots have it alike.")
         with busy(f"adding {effect} to {model}"):
             seen = add_to_camera(effect, measurements, model_file, output, source.command)
         section = partial(bits.addition_section, seen, model_file.path.name)
@@ -144,7 +156,7 @@ def _add(
         finish(data, bits.addition(seen), source, section, as_json, out)
         return seen
     with busy(f"adding {effect} to {model}"):
-        result = add(effect, measurements, model_file, output, source.command, texts, held)
+        result = add(effect, measurements, model_file, output, source.command, texts, held, robot)
     section = partial(added_section, result)
     data = {**result.to_json(), **told(measurements)}
     finish(data, show.added(result), source, section, as_json, out)

@@ -29,6 +29,11 @@ def holding(names: list[str]) -> list[str]:
     return [word for name in names for word in ("--hold", name)]
 
 
+def of_robot(robot: int | None) -> list[str]:
+    """As words of a command."""
+    return [] if robot is None else ["--robot", str(robot)]
+
+
 def open_model(model: str, out: Path | None) -> ModelFile:
     """Reads the model, once it is clear that the report's folder can be written."""
     if out:

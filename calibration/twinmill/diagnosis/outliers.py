@@ -11,18 +11,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import twinmill_native as native
 from scipy.stats import chi2
 
 from twinmill.diagnosis.odd import ODD, middle_and_scale
 from twinmill.diagnosis.search import REFIT, Search, State, Trial, attempt, fitted, screen
-from twinmill.fitting.opening import Opened
+from twinmill.fitting.opening import Opened, wide_gains
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     GAINS,
-    Parameter,
     ParameterEstimate,
-    base_parameters,
     catalogue,
 )
 from twinmill.predict.datasets import total_score
@@ -30,7 +27,6 @@ from twinmill.predict.datasets import total_score
 FEWEST = 3  # robots, below which none can be called the odd one
 TRIED = 3
 EVIDENCE = 16.0  # as in the search, for one robot
-WIDE_STD = 0.15  # of a robot's gains where they are in question
 SPREAD = 0.01  # by which robots of a kind differ at least
 ALPHA = 0.001  # chance that one of robots that are alike is called different
 SIDES = {
@@ -153,11 +149,6 @@ def _suspects(states: dict[int, State], progress: Callable[[str], None]) -> list
         (n for n in apart if apart[n] > EVIDENCE / 2 and n != REFIT), key=lambda n: -apart[n]
     )
     return ["gains", *best[:TRIED]]
-
-
-def wide_gains(model: native.Model) -> tuple[Parameter, ...]:
-    """A robot's own gains where they are in question."""
-    return tuple(replace(p, usual=1.0, std=WIDE_STD) for p in base_parameters(model, GAINS))
 
 
 def _attempt(before: Trial, name: str) -> Trial:

@@ -4,8 +4,7 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
-from twinmill.diagnosis.outliers import wide_gains
-from twinmill.fitting.opening import Opened
+from twinmill.fitting.opening import Opened, wide_gains
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import GAINS
 

@@ -293,7 +293,7 @@ def attempt(before: Trial, names: tuple[str, ...], start: dict[str, float] | Non
     """A fit of the state before with something added, judged on held-out parts."""
     state = grown(before.state, names, start)
     fit = ScoreFit(state.datasets, state.models, state.free, state.by_channel)
-    fit.begin_at_best(len(state.free) - len(before.state.free))
+    fit.begin_at_best(state.free[len(before.state.free) :])
     fit.fit()
     return Trial(names, fit, replace(state, models=fit.models), *_against(before.fit, fit))
 

@@ -105,12 +105,12 @@ def _moves(own: Opened, gain: str) -> bool:
 
 
 def fitted(
-    opened: Sequence[Opened], free: Sequence[Parameter], fresh: int = 0
+    opened: Sequence[Opened], free: Sequence[Parameter], fresh: Sequence[Parameter] = ()
 ) -> tuple[list[Opened], ScoreFit]:
     """The measurements with their models fitted together; never to a worse score.
 
-    Those without a floor get the shared quantities alone. The last `fresh` of the free quantities
-    are new: their fit begins at the best of several strengths.
+    Those without a floor get the shared quantities alone. The fit begins at the best of several
+    strengths of what is `fresh`.
     """
     known = judged(opened)
     fit = ScoreFit([o.data for o in known], [o.model for o in known], free)

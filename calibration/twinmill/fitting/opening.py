@@ -29,6 +29,7 @@ from twinmill.steady.scene import SteadyScene
 CLOCK_REACH_S = 1.0  # how far from its start an offset of the clocks is looked for
 RATE_REACH_PPM = 500.0
 SPREAD = 0.03  # standard deviation of gains among robots of a kind where the model states none
+WIDE_STD = 0.15  # of a robot's gains where they are in question
 
 
 @dataclass(frozen=True)
@@ -188,6 +189,11 @@ def judged(opened: Sequence[Opened]) -> list[Opened]:
     if not known:
         raise LogError(f"{' '.join(o.floor.reason for o in opened if o.floor)}.")
     return known
+
+
+def wide_gains(model: native.Model) -> tuple[Parameter, ...]:
+    """A robot's own gains where they are in question."""
+    return tuple(replace(p, usual=1.0, std=WIDE_STD) for p in base_parameters(model, GAINS))
 
 
 def with_own_gains(opened: Sequence[Opened]) -> list[Opened]:

@@ -20,7 +20,7 @@ from scipy.stats import t as student
 
 from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import (
-    GAINS,
+    ALIGNMENT,
     WHERE_OR_WHEN,
     Parameter,
     ParameterEstimate,
@@ -110,7 +110,7 @@ class ScoreFit:
         by_robot: dict[tuple[int, str], list[int]] = {}
         for i, d in enumerate(self.datasets):
             for p in d.own:
-                if p.name in GAINS:  # a robot has one gain in all its logs
+                if p.name not in ALIGNMENT:  # of the robot, in all its logs
                     by_robot.setdefault((d.robot_id, p.name), []).append(i)
                 else:
                     unknowns.append(Unknown(p, frozenset([i])))
@@ -237,10 +237,9 @@ class ScoreFit:
         fit.x = begin
         return fit.fit().x
 
-    def begin_at_best(self, fresh: int) -> None:
-        """Begins with the last `fresh` shared parameters at the best of several strengths."""
-        added = self.shared[len(self.shared) - fresh :]
-        names = {p.name for p in added if p.role not in WHERE_OR_WHEN}
+    def begin_at_best(self, fresh: Sequence[Parameter]) -> None:
+        """Begins with what is new at the best of several strengths."""
+        names = {p.name for p in fresh if p.role not in WHERE_OR_WHEN}
         new = np.array([u.parameter.name in names for u in self.unknowns], bool)
         points = [np.where(new, self.usual + s * (self.x - self.usual), self.x) for s in STARTS]
         points = np.clip(np.array(points), self.low, self.high)
@@ -520,7 +519,7 @@ class ScoreFit:
         return Covariance(tuple(self.estimates[c].name for c in told), values)
 
     def own_estimates(self, i: int) -> dict[str, ParameterEstimate]:
-        """Of data set i alone: its clock and its robot's gains."""
+        """Of data set i alone: its clock and what its robot has of its own."""
         count = len(self.shared_estimates())
         return {self.estimates[c].name: self.estimates[c] for c in self.columns[i] if c >= count}
 

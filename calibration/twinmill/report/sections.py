@@ -64,7 +64,7 @@ def added_section(result: AddResult) -> Section:
         _score("held out, without", result.heldout_refit.score),
         _score("held out, with it", result.heldout_after.score),
     ]
-    title = f"{result.effect} added to {result.before.model_name}"
+    title = f"{result.label} added to {result.before.model_name}"
     return Section(
         title,
         scores,

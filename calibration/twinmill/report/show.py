@@ -51,7 +51,7 @@ def fit(result: FitResult) -> RenderableType:
 
 def added(result: AddResult) -> RenderableType:
     """An added effect."""
-    own = [e for e in result.parameters if e.name.startswith(f"{result.effect}.")]
+    own = result.added
     rest = len(result.parameters) - len(own)
     return Group(
         _facts(views.facts(result.before)),

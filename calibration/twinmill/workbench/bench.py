@@ -17,12 +17,18 @@ from twinmill.data.log import LogError
 from twinmill.diagnosis.detections.add import is_of_camera
 from twinmill.diagnosis.search import REFIT
 from twinmill.files import plain
-from twinmill.workbench.session import Session
+from twinmill.model.parameters import catalogue
+from twinmill.workbench.session import Session, beside_label
 from twinmill.workbench.state_file import StateFile
 from twinmill.workbench.swarm import has_poses
 from twinmill.workbench.worker import Done, Work, Worker
 
 AWAITED = ("fit", "add", "diagnose", "next", "swarm")  # work that the user waits for
+
+
+def moves(effect: str) -> bool:
+    """Whether an effect changes the motion, as all but those of the camera do."""
+    return not (effect in catalogue() and is_of_camera(effect))
 
 
 class Bench:
@@ -156,19 +162,20 @@ class Bench:
         self.failure = ""
         self._waiting = work = self.session.work(kind, effect, options)
         self.changed("work")
-        if kind in ("fit", "add") and not (effect and is_of_camera(effect)):
-            foreseen = await asyncio.to_thread(self.session.foresee, effect, self.picked)
+        if kind in ("fit", "add") and moves(effect):
+            asked = (effect, self.picked, work.robot_id)
+            foreseen = await asyncio.to_thread(self.session.foresee, *asked)
             if self.doing is work:  # not done or cancelled before
                 self.session.show(foreseen)
                 self.changed("score", "prediction", "beside")
         self._next()
 
-    async def try_beside(self, effect: str) -> None:
+    async def try_beside(self, effect: str, robot_id: int | None = None) -> None:
         """Draws beside the model what an effect would change; once more takes it away."""
         beside = self.session.beside
-        if beside and beside.label == f"with {effect}":
+        if beside and beside.label == beside_label(effect, robot_id):
             return self.leave_beside()
-        await asyncio.to_thread(self.session.try_beside, effect, self.picked)
+        await asyncio.to_thread(self.session.try_beside, effect, self.picked, robot_id)
         self.changed("prediction", "beside")
 
     def leave_beside(self) -> None:
@@ -208,11 +215,11 @@ class Bench:
             if done.work.kind == "diagnose":
                 await self._look_ahead([f["effect"] for f in done.result["findings"]])
 
-    async def _look_ahead(self, findings: Iterable[str]) -> None:
+    async def _look_ahead(self, effects: Iterable[str]) -> None:
         """Foresees what a click on each finding will show, before it comes."""
-        for effect in findings:
+        for effect in effects:
             of = "" if effect == REFIT else effect
-            if self.ready and not (of and is_of_camera(of)):
+            if self.ready and moves(of):
                 await asyncio.to_thread(self.session.foresee, of, self.picked)
 
     async def _settled(self) -> None:

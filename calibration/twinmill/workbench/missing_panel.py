@@ -5,10 +5,12 @@ import html
 
 from nicegui import ui
 
-from twinmill.diagnosis.detections.add import is_of_camera
 from twinmill.diagnosis.search import REFIT
+from twinmill.fitting.add import OWN_GAINS
 from twinmill.model.parameters import catalogue
+from twinmill.workbench.bench import moves
 from twinmill.workbench.panel import Hands, estimate, scored, tone
+from twinmill.workbench.session import beside_label, effect_of
 from twinmill.workbench.typeset import typeset
 
 OTHERS = 8  # effects of the ranking that are shown beside the findings
@@ -20,7 +22,7 @@ class MissingPanel:
     def __init__(self, page: Hands) -> None:
         self.page, self.bench = page, page.bench
         self._adding: list[ui.button] = []
-        self._trying: dict[str, list[ui.button]] = {}
+        self._trying: dict[str, list[ui.button]] = {}  # by the words of what is drawn beside
         with ui.element("div").classes("buttons"):
             self.button = ui.button("Diagnose", on_click=lambda: page.start("diagnose"))
             self.button.props('dense unelevated no-caps padding="2px 16px" data-testid="diagnose"')
@@ -47,8 +49,8 @@ class MissingPanel:
     def draw_beside(self) -> None:
         """What an effect that is tried would change, in one sentence."""
         beside = self.bench.session.beside
-        for effect, buttons in self._trying.items():
-            on = beside is not None and beside.label == f"with {effect}"
+        for label, buttons in self._trying.items():
+            on = beside is not None and beside.label == label
             for button in buttons:
                 button.set_text("Hide" if on else "Show")
         self.beside.set_visibility(beside is not None and beside.label.startswith("with "))
@@ -123,17 +125,19 @@ class MissingPanel:
         button.props('dense flat no-caps padding="0 8px" data-testid="part-them"')
         self._adding.append(button)
 
-    def _buttons(self, effect: str) -> None:
+    def _buttons(self, effect: str, robot_id: int | None = None) -> None:
         """To see what an effect would change, and to take it in."""
         verb, words = ("fit", "Refit") if effect == REFIT else ("add", "Add")
         of = "" if effect == REFIT else effect
-        if not is_of_camera(of):
-            button = ui.button("Show", on_click=lambda: self.page.try_beside(of))
-            button.props(f'dense flat no-caps padding="0 8px" data-testid="show-{effect}"')
+        name = effect_of(effect, robot_id).replace(" of ", "-")
+        if moves(of):
+            button = ui.button("Show", on_click=lambda: self.page.try_beside(of, robot_id))
+            button.props(f'dense flat no-caps padding="0 8px" data-testid="show-{name}"')
             button.tooltip("Draws what it would change, before it is taken")
-            self._trying.setdefault(of, []).append(button)
-        button = ui.button(words, on_click=lambda: self.page.start(verb, of))
-        button.props(f'dense outline no-caps padding="0 12px" data-testid="add-{effect}"')
+            self._trying.setdefault(beside_label(of, robot_id), []).append(button)
+        options = {"robot_id": robot_id}
+        button = ui.button(words, on_click=lambda: self.page.start(verb, of, options))
+        button.props(f'dense outline no-caps padding="0 12px" data-testid="add-{name}"')
         self._adding.append(button)
 
     def _rest(self, found: dict) -> None:
@@ -144,11 +148,25 @@ class MissingPanel:
             words += f", depends on {on}." if on else "."
             ui.label(words + ("" if rest["firm"] else " It may be noise.")).classes("soft")
         for off in found["robots_off"]:
-            if sentence := off.get("sentence"):
-                _card("wrong", html.escape(sentence))
+            self._robot(off)
         self._would_show(found.get("robots", []))
         for note in found["notes"]:
             ui.label(note).classes("soft").style("margin-top: 6px")
+
+    def _robot(self, off: dict) -> None:
+        """One that differs from the others: how, and its own effect to be taken in."""
+        sentence, effect = off.get("sentence"), off["effect"]
+        if not sentence:
+            return
+        if effect is None or not moves(effect):
+            _card("wrong", html.escape(sentence))
+            return
+        with ui.element("div").classes("note wrong").props(f'data-testid="off-{off["robot_id"]}"'):
+            with ui.element("div").classes("head"):
+                ui.html(f"<b>{html.escape(sentence)}</b>", sanitize=False).style("flex: 1")
+                own = effect if effect in catalogue() else OWN_GAINS
+                self._buttons(own, off["robot_id"])
+            ui.label("; ".join(estimate(p) for p in off["parameters"])).classes("soft")
 
     def _would_show(self, robots: list[dict]) -> None:
         """The smallest difference of each robot that these logs would have put beyond doubt."""

@@ -24,7 +24,7 @@ class Hands(Protocol):
     async def design(self) -> None:
         """Designs the run that parts what cannot be parted, in its panel."""
 
-    async def try_beside(self, effect: str) -> None:
+    async def try_beside(self, effect: str, robot_id: int | None = None) -> None:
         """Draws what an effect would change beside the model; once more takes it away."""
 
     async def keep(self, name: str, value: float) -> None:

@@ -148,6 +148,7 @@ class Screen:
 
     async def start(self, kind: str, effect: str = "", options: dict | None = None) -> None:
         """A fit, an addition, a diagnosis, a next run or a swarm."""
+        self._look_at((options or {}).get("robot_id"))
         await self.bench.start(kind, effect, options)
         await self._refresh()
 
@@ -156,9 +157,10 @@ class Screen:
         self.tabs.set_value("next")
         await self.next.design()
 
-    async def try_beside(self, effect: str) -> None:
+    async def try_beside(self, effect: str, robot_id: int | None = None) -> None:
         """Draws what an effect would change."""
-        await self.bench.try_beside(effect)
+        self._look_at(robot_id)
+        await self.bench.try_beside(effect, robot_id)
         await self._refresh()
 
     async def keep(self, name: str, value: float) -> None:
@@ -168,6 +170,15 @@ class Screen:
     async def go(self, number: int) -> None:
         """To a model tried before."""
         await self._act(self.bench.session.go, number)
+
+    def _look_at(self, robot_id: int | None) -> None:
+        """Shows the robot that something is about."""
+        if robot_id is not None and self._shown_robot != robot_id:
+            self._pick(self.bench.session.place_of(robot_id))
+
+    @property
+    def _shown_robot(self) -> int:
+        return self.bench.session.measurements[self.bench.picked].track.robot_id
 
     def _pick(self, index: int | None) -> None:
         if index is not None and index != self.bench.picked:

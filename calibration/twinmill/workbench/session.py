@@ -22,6 +22,7 @@ from twinmill.data.log import Log, RobotLog, read_log
 from twinmill.data.measurement import Measurements, clean_measurements
 from twinmill.data.steady_table import is_steady_table
 from twinmill.files import replacing
+from twinmill.fitting.add import with_effect, with_own
 from twinmill.fitting.fit import base_names
 from twinmill.fitting.opening import Opened, on_clock_of_others, open_measurements
 from twinmill.fitting.score_fit import ScoreFit
@@ -31,8 +32,6 @@ from twinmill.model.parameters import (
     Parameter,
     all_effect_parameters,
     base_parameters,
-    effect_names,
-    effect_parameters,
 )
 from twinmill.predict.datasets import Trajectory, total_score
 from twinmill.predict.detections import Detections, detections_of
@@ -250,9 +249,9 @@ class Session:
         """Shows the model where the tree stands."""
         self._dragged, self._passing, self._clocks, self._foreseen = {}, {}, {}, {}
 
-    def try_beside(self, effect: str, index: int) -> None:
+    def try_beside(self, effect: str, index: int, robot_id: int | None = None) -> None:
         """Draws what an effect would change beside the model where the tree stands."""
-        self.beside = Beside(f"with {effect}", self.foresee(effect, index))
+        self.beside = Beside(beside_label(effect, robot_id), self.foresee(effect, index, robot_id))
 
     def show(self, foreseen: dict[int, Opened]) -> None:
         """Shows what `foresee` gave until something else is shown, beside the model as it is."""
@@ -263,31 +262,35 @@ class Session:
     def _before(self, number: int) -> Beside:
         return Beside("before", {k: self.settled(number, k) for k in self.robots})
 
-    def foresee(self, effect: str, index: int) -> dict[int, Opened]:
+    def foresee(self, effect: str, index: int, robot_id: int | None = None) -> dict[int, Opened]:
         """About what a fit, or the addition of an effect, will come to: all robots by index.
 
         A few steps of the fit to as many robots as an answer at once can be about; `index` is one.
-        What was foreseen once is known from then on.
+        What was foreseen once is known from then on. With `robot_id` that robot alone has the
+        effect.
         """
-        asked = (self.tree.current.number, frozenset(self.held), len(self.robots), effect, index)
+        held, seen = frozenset(self.held), len(self.robots)
+        asked = (self.tree.current.number, held, seen, effect, index, robot_id)
         if asked not in self._foresights:
-            self._foresights[asked] = self._foresee(effect, index)
+            self._foresights[asked] = self._foresee(effect, index, robot_id)
         return self._foresights[asked]
 
-    def _foresee(self, effect: str, index: int) -> dict[int, Opened]:
+    def _foresee(self, effect: str, index: int, robot_id: int | None) -> dict[int, Opened]:
         number = self.tree.current.number
-        model = self._file(number).model.copy()
+        model, fresh = self._file(number).model.copy(), []
         free = [p for p in self._free(model) if p.name not in self.held]
-        fresh = []
         if effect:
-            model.add_effect(effect, {})
-            fresh = effect_parameters(model, effect_names(model)[-1], fresh=True)
+            model, _, fresh = with_effect(model, effect, {}, robot_id)
         members = self._foremost(index)
         known = [_from_here(self.settled(number, k)) for k in members]
+        if robot_id is not None:
+            known, shared = with_own(known, robot_id, fresh), free
+        else:
+            shared = [*free, *fresh]
         models = [o.with_model(model).model for o in known]
-        fit = ScoreFit([o.data for o in known], models, [*free, *fresh])
+        fit = ScoreFit([o.data for o in known], models, shared)
         if fresh:
-            fit.begin_at_best(len(fresh))
+            fit.begin_at_best(fresh)
         fit.fit(rounds=FORESEEN_ROUNDS)
         for p in fit.shared_values:
             model.set(p.name, p.value)
@@ -305,6 +308,10 @@ class Session:
             if data is not None and (not members or windows <= FORESEEN_WINDOWS):
                 members.append(k)
         return members
+
+    def place_of(self, robot_id: int) -> int:
+        """Place of the first measurement of a robot."""
+        return next(k for k, m in enumerate(self.measurements) if m.track.robot_id == robot_id)
 
     @property
     def _judged(self) -> list[Opened]:
@@ -464,12 +471,15 @@ class Session:
         if kind in ("read", "diagnose", "compare"):
             return Work(kind, self.tree.file_name(number), self.tree.tried[number].text, of=number)
         names = {k.name for k in self.knobs() if k.fitted}
-        held = tuple(sorted(self.held & names))
+        held, robot_id = tuple(sorted(self.held & names)), (options or {}).get("robot_id")
+        what = [effect] if effect else []
+        if robot_id is not None:
+            what += ["--robot", str(robot_id)]
         holds = [word for name in held for word in ("--hold", name)]
-        words = (kind, *([effect] if effect else []), *holds, *map(str, self.paths))
+        words = (kind, *what, *holds, *map(str, self.paths))
         command = self.tree.command_to_come(number, words)
         name, text = self.tree.file_name(number), self.tree.tried[number].text
-        return Work(kind, name, text, command, effect, held, number, words)
+        return Work(kind, name, text, command, effect, held, number, words, robot_id=robot_id)
 
     def take(self, done: Done) -> None:
         """Takes in what a worker did."""
@@ -496,7 +506,7 @@ class Session:
         return [*chain, own, *then_commands(self.paths, work.model, plan)]
 
     def _grow(self, work: Work, result: Mapping, text: str) -> None:
-        label = f"+ {work.effect}" if work.effect else "fitted"
+        label = f"+ {effect_of(work.effect, work.robot_id)}" if work.effect else "fitted"
         made = self.tree.add(work.of, work.words, label, text)
         self.forget()
         self.beside = self._before(work.of)
@@ -541,6 +551,16 @@ class Session:
         self.diagnosis = data["diagnosis"]
         self.plan = data.get("plan")
         self.swarm = data.get("swarm")
+
+
+def effect_of(effect: str, robot_id: int | None) -> str:
+    """An effect, and whose it is."""
+    return effect if robot_id is None else f"{effect} of R{robot_id:02d}"
+
+
+def beside_label(effect: str, robot_id: int | None) -> str:
+    """Of the model that has it, drawn beside."""
+    return f"with {effect_of(effect, robot_id)}"
 
 
 def _from_here(opened: Opened) -> Opened:

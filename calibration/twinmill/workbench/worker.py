@@ -14,7 +14,7 @@ from time import monotonic
 from typing import Any
 
 PATH_S = 0.1  # between points of a path that is drawn
-YIELDS = 5  # niceness: what the user's hands do goes before
+YIELDS = 2  # niceness: what the user's hands do goes before
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,7 @@ class Work:
         model, text: name and text of the model file.
         command: recorded in the file that is made.
         effect: that is added.
+        robot_id: of the robot that alone is to have it, or None.
         held: names that a fit leaves alone.
         of: number of the model in the tree.
         words: of the command, without models.
@@ -44,6 +45,7 @@ class Work:
     words: tuple[str, ...] = ()
     options: Mapping[str, Any] = field(default_factory=dict)
     given: str = ""
+    robot_id: int | None = None
 
 
 @dataclass(frozen=True)
@@ -170,7 +172,7 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     from twinmill.diagnosis.diagnose import diagnose
     from twinmill.experiment.design import check, design
     from twinmill.files import plain
-    from twinmill.fitting.add import add
+    from twinmill.fitting.add import OWN_GAINS, add
     from twinmill.fitting.compare import compare
     from twinmill.fitting.fit import fit
     from twinmill.model.model_file import ModelFile
@@ -198,10 +200,18 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     with TemporaryDirectory(prefix="twinmill-") as folder:
         out = Path(folder) / "made.toml"
         say(f"adding {work.effect}" if work.effect else "fitting")
-        if work.kind == "add" and is_of_camera(work.effect):
+        if work.kind == "add" and work.effect != OWN_GAINS and is_of_camera(work.effect):
             result = add_to_camera(work.effect, measurements, model_file, out, work.command)
         elif work.kind == "add":
-            result = add(work.effect, measurements, model_file, out, work.command, held=work.held)
+            result = add(
+                work.effect,
+                measurements,
+                model_file,
+                out,
+                work.command,
+                held=work.held,
+                robot_id=work.robot_id,
+            )
         else:
             result = fit(measurements, model_file, out, work.command, held=work.held)
         return Done(work, plain(result.to_json()), out.read_text())

@@ -10,10 +10,11 @@ from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
+from twinmill.fitting.add import add
 from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
 from twinmill.fitting.opening import open_measurements
-from twinmill.model.model_file import ModelFile
+from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.report import Provenance, write_report
 from twinmill.report.sections import comparison_section
 
@@ -215,6 +216,28 @@ def test_drives_in_order_of_duty_name_the_same_robot(imported, model_of):
     found = diagnose(imported("fleet_weak_left", "sorted", same_clock=True), model_of(FLEET))
     assert [r.robot_id for r in found.robots_off] == [3]
     assert found.verdict != "outside_catalogue"
+
+
+def test_an_effect_of_one_robot_alone_leaves_the_others_as_they_are(imported, model_of, tmp_path):
+    logs = imported("fleet_weak_left", "sorted", same_clock=True)
+    added = add("wheel_gain", logs, model_of(FLEET), tmp_path / "own.toml", "", robot_id=3)
+    model = ModelFile.load(str(tmp_path / "own.toml")).model
+    own, other = model.for_robot(3), model.for_robot(1)
+    for wheel, size in (("fl", -0.08), ("rl", -0.08), ("fr", 0.0), ("rr", 0.0)):
+        # README: and each wheel of every robot differs by 1 %.
+        assert own.get(f"wheel_gain.{wheel}") == pytest.approx(size, abs=0.03)
+        assert other.get(f"wheel_gain.{wheel}") == 0.0
+    assert added.heldout_after.score < 0.9 * added.heldout_refit.score
+    assert compare(logs, ModelFile.load(str(tmp_path / "own.toml"))).score == pytest.approx(
+        added.after.score, rel=1e-3
+    )
+
+
+def test_a_robot_that_is_not_in_the_logs_is_refused(imported, model_of, tmp_path):
+    logs = imported("fleet_weak_left", "sorted", same_clock=True)
+    with pytest.raises(ModelError, match=r"R07.*R01, R02, R03, R04"):
+        add("wheel_gain", logs, model_of(FLEET), tmp_path / "own.toml", "", robot_id=7)
+    assert not (tmp_path / "own.toml").exists()
 
 
 def test_a_robot_without_heading_gets_a_report_with_what_was_noted(imported, model_of, tmp_path):

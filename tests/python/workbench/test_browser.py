@@ -318,6 +318,28 @@ def test_the_weak_robot_is_named(fleet, page):
         page.get_by_test_id("robot").click()
         page.get_by_role("option", name=re.compile("^R01")).click()
         page.wait_for_function("twinmill.robot.name === 'R01'")
+        give_the_robot_its_own(page)
+
+
+def give_the_robot_its_own(page) -> None:
+    """The weak robot is shown, and the model with its wheels is that of the command."""
+    page.get_by_test_id("show-wheel_gain-R03").click()
+    page.wait_for_function("twinmill.robot.name === 'R03'")
+    page.wait_for_function("document.body.dataset.beside === 'with wheel_gain of R03'")
+    page.get_by_test_id("add-wheel_gain-R03").and_(page.locator(":enabled")).click()
+    page.get_by_test_id("tab-models").click()
+    row = page.locator("[data-testid^=model-].now").filter(has_text="wheel_gain of R03")
+    expect(row).not_to_contain_text("≈")
+    page.get_by_test_id("save-as").fill("mine.toml")
+    page.get_by_test_id("save").click()
+    page.get_by_text("Written: mine.toml").wait_for()
+    (command,) = page.get_by_test_id("commands").text_content().strip().splitlines()
+    mine = Path("mine.toml").read_bytes()
+    os.remove("mine.toml")
+    result = cli.run(shlex.split(command)[1:])
+    assert Path("mine.toml").read_bytes() == mine
+    scores = [row.locator("div").nth(k).text_content() for k in (1, 2)]
+    assert scores == [number(result.after.score), number(result.heldout_after.score)]
 
 
 def type_a_number(page) -> None:
