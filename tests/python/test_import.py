@@ -262,18 +262,42 @@ def test_motive_y_up_millimetres_become_z_up_metres(put, tmp_path):
     assert robot.valid.tolist() == [True, True, False]
 
 
+def take_of_angles(head, angles):
+    """An export with three angles in place of a quaternion."""
+    for old, new in (
+        ("Rotation,Rotation,Rotation,Rotation", "Rotation,Rotation,Rotation"),
+        (",X,X,Y,Z,W,X", ",X,X,Y,Z,X"),
+        (",turbopi-04" * 8, ",turbopi-04" * 7),
+        (",Rigid Body" * 8, ",Rigid Body" * 7),
+        (",B" * 8, ",B" * 7),
+    ):
+        head = head.replace(old, new)
+    rows = "".join(
+        f"{k},{k / 100:.3f},1,{x},{y},{z},100,50,200,0.1\n" for k, (x, y, z) in enumerate(angles)
+    )
+    return head[: head.index("0,0.000")] + rows
+
+
 def test_motive_euler_angles_are_about_axes_that_turn_with_the_body(put, tmp_path):
     """Yaw about Y first, by the vector that is carried along: turned 90 degrees, then nodding."""
-    head = MOTIVE.replace("Quaternion", "YXZ").replace("Rotation,Rotation,Rotation,Rotation",
-        "Rotation,Rotation,Rotation").replace(",X,X,Y,Z,W,X", ",X,X,Y,Z,X")  # fmt: skip
-    head = head.replace(",turbopi-04" * 8, ",turbopi-04" * 7)
-    rows = "".join(f"{k},{k / 100:.3f},1,20,{90 * k},0,100,50,200,0.1\n" for k in range(3))
-    take = head.replace(",Rigid Body" * 8, ",Rigid Body" * 7).replace(",B" * 8, ",B" * 7)
-    take = take[: take.index("0,0.000")] + rows
+    head = MOTIVE.replace("Quaternion", "YXZ")
+    take = take_of_angles(head, [(20, 90 * k, 0) for k in range(3)])
     import_log(None, put("c.csv", COMMANDS), tmp_path / "o.lcmlog", motive=put("take.csv", take))
     robot = read_log(tmp_path / "o.lcmlog").robots[4]
     # A nod about the body's own x axis leaves where that axis points.
     np.testing.assert_allclose(robot.pose[:, 2], [0, np.pi / 2, np.pi], atol=1e-9)
+
+
+def test_motive_exports_of_older_formats_are_read(put, tmp_path):
+    """Format 1.21 calls its column Time; angles whose order no file names are X, Y, Z."""
+    head = MOTIVE.replace("1.23", "1.21").replace("Time (Seconds)", "Time")
+    take = take_of_angles(head.replace("Rotation Type,Quaternion,", ""), [(30, 40, 0)] * 2)
+    import_log(None, put("c.csv", COMMANDS), tmp_path / "o.lcmlog", motive=put("take.csv", take))
+    robot = read_log(tmp_path / "o.lcmlog").robots[4]
+    # About X first, then about the new Y, which leans by 30 degrees: the body's x axis then has
+    # sin 40 of its length across the first, cos 30 of that in the floor.
+    across, along = np.sin(np.radians(40)) * np.cos(np.radians(30)), np.cos(np.radians(40))
+    np.testing.assert_allclose(robot.pose[:, 2], np.arctan2(across, along))
 
 
 def test_motive_bodies_that_are_no_robots_are_left_out_and_named(put, tmp_path):

@@ -25,7 +25,9 @@ from twinmill.data.measurement_table import open_text
 UNIT_M = {"Meters": 1.0, "Centimeters": 0.01, "Millimeters": 0.001}
 HEADER_ROWS = 10  # more than any version has above the first frame
 CAPTURE_TIME = "%Y-%m-%d %I.%M.%S.%f %p"
+TIMES = ("Time (Seconds)", "Time")  # from format 1.22 on, and before
 QUATERNION = "Quaternion"
+UNNAMED = "XYZ"  # angles of a file that does not name their order
 ROTATIONS = (QUATERNION, "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 
@@ -34,13 +36,9 @@ class _Header:
     """What the rows above the first frame say."""
 
     fields: dict[str, str]
+    rotation: str  # one of ROTATIONS
     bodies: dict[str, list[int]]  # name: columns of position and rotation
     time_column: int
-
-    @property
-    def rotation(self) -> str:
-        """How the file writes rotations: one of ROTATIONS; quaternions if it does not say."""
-        return self.fields.get("Rotation Type", QUATERNION)
 
 
 def read_motive(path: Path, robots: dict[str, int], up: str, absolute: bool) -> list[PoseSeries]:
@@ -148,8 +146,12 @@ def _header(reader, name: str) -> _Header:
                 f"{name}: {key} is '{fields[key]}', but must be {' or '.join(good)}; export "
                 "again with that setting."
             )
-    axes = "WXYZ" if fields.get("Rotation Type", QUATERNION) == QUATERNION else "XYZ"
-    return _Header(fields, _bodies(rows, axes, name), rows[-1].index("Time (Seconds)"))
+    time = next((k for k, cell in enumerate(rows[-1]) if cell in TIMES), None)
+    if time is None:
+        raise LogError(f"{name}: has no column {' or '.join(TIMES)}; export the take again.")
+    rotation = fields.get("Rotation Type", QUATERNION if "W" in rows[-1] else UNNAMED)
+    axes = "WXYZ" if rotation == QUATERNION else "XYZ"
+    return _Header(fields, rotation, _bodies(rows, axes, name), time)
 
 
 def _bodies(rows: list[list[str]], turned_about: str, name: str) -> dict[str, list[int]]:
@@ -231,7 +233,7 @@ def _unit_m(header: _Header, name: str) -> float:
     if unit not in UNIT_M:
         raise LogError(
             f"{name}: Length Units is '{unit}', not one of {', '.join(UNIT_M)}; export "
-            "again in metres."
+            "again in metres, or add `,Length Units,` and what they are to line 1."
         )
     return UNIT_M[unit]
 
