@@ -56,6 +56,8 @@ class Fitting:
             self._set_least()
         if self._fits(console, options):
             yield self.made
+            if self.made.caption:
+                yield Text()
             return
         if self.made.title:
             yield Text(str(self.made.title), "bold")

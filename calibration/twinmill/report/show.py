@@ -26,8 +26,8 @@ def comparison(result: Comparison) -> RenderableType:
         _facts(views.facts(result)),
         Text(),
         score_line("score", result),
-        *_robots(result),
         Text(),
+        *(table(t) for t in tables.robots(result)),
         *(table(t) for t in views.robot_tables(result)),
         *_warnings(result.warnings),
         _next(result),
@@ -43,6 +43,7 @@ def fit(result: FitResult) -> RenderableType:
         score_line("", result.after, number_too=False),
         Text(),
         table(tables.parameters(result.parameters)),
+        *(table(t) for t in tables.robots(result.after, result.before)),
         *_warnings(result.after.warnings),
         _written(result.path),
         _next(result.after),
@@ -67,6 +68,7 @@ def added(result: AddResult) -> RenderableType:
         Text(),
         table(tables.parameters(own)),
         Text(f"  and {rest} more refitted (--json has all).", "dim"),
+        *(table(t) for t in tables.robots(result.after, result.before)),
         *(table(t) for t in tables.held_out(result)),
         *_warnings(result.after.warnings),
         _written(result.path),
@@ -145,15 +147,6 @@ def _facts(pairs: list[tuple[str, str]]) -> RenderableType:
     for label, text in pairs:
         grid.add_row(label, Text(text))
     return grid
-
-
-def _robots(result: Comparison) -> list[Text]:
-    if len(result.robots) == 1:
-        return []
-    return [
-        Text.assemble(f"  {r.scene.measurement.label}  ", (number(r.score), STYLES[tone(r.score)]))
-        for r in result.robots
-    ]
 
 
 def _change(label: str, before: float, after: float, note: str = "") -> Text:

@@ -123,6 +123,26 @@ def _noise(noise: Noise, has_heading: bool) -> str:
     )
 
 
+def robots(result: Comparison, before: Comparison | None = None) -> list[Table]:
+    """Score of each of several robots, worst first; before as well, if told; none of one robot."""
+    if len(result.robots) == 1:
+        return []
+    old = [r.score for r in before.robots] if before else []
+    order = sorted(range(len(result.robots)), key=lambda k: -np.nan_to_num(result.robots[k].score))
+    rows = [
+        [
+            Cell(result.robots[k].scene.measurement.label),
+            *(
+                Cell(number(score), tone(score))
+                for score in (*old[k : k + 1], result.robots[k].score)
+            ),
+        ]
+        for k in order
+    ]
+    columns = ["robot", "before", "after"] if before else ["robot", "score"]
+    return [Table("Each robot", columns, rows)]
+
+
 def errors(robot: RobotComparison) -> Table:
     """Errors by horizon and channel, each beside its floor."""
     found, floor = rms(robot.errors), robot.floor.rms
