@@ -180,7 +180,8 @@ def _row(judged: Judged) -> list[Cell]:
     for name in METRICS:
         d = worst.metrics[name]
         tone: Tone = "" if d.low > 0 or d.high < 0 else "dim"
-        cells.append(Cell(f"{number(d.before, 2)} to {number(d.after, 2)}", tone))
+        words = f"{number(d.before, 2)} to {number(d.after, 2)}"
+        cells.append(Cell("-" if np.isnan([d.before, d.after]).all() else words, tone))
     return [
         Cell(judged.verdict, TONES[judged.verdict]),
         Cell(label(judged)),
