@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of what was found: the archive's map, and pictures of the best of each kind."""
 
+from dataclasses import replace
+
 import numpy as np
 import twinmill_native as native
 from matplotlib.axes import Axes
@@ -16,6 +18,8 @@ from twinmill.swarm.discover.kinds import KIND_COLORS, KIND_WORDS, MEASURES
 from twinmill.swarm.discover.search import Hunt
 
 ACROSS = 3
+LOGARITHMS = ("circliness", "scatter")  # what the archive has the powers of 10 of
+UNITS = {"scatter": "scatter\nm²", "odd_ratio": "odd ones"}
 
 
 def section(
@@ -56,7 +60,7 @@ def section(
         ],
         figures=[
             _map(offered, present),
-            *[_gallery(hunt, k, [e for e in shown if e.kind == k]) for k in present],
+            *_galleries(hunt, shown, present),
         ],
         tables=[_table(shown)],
     )
@@ -69,8 +73,8 @@ def _map(found: list[Entry], present: list[str]) -> Figure:
     def paint(axes: Axes) -> None:
         for kind in reversed(present):
             at = np.array([entry.measures for entry in found if entry.kind == kind])
-            axes.plot(at[:, x], at[:, y], "o", ms=3.5, color=KIND_COLORS[kind], label=kind)
-        axes.set(xlabel="circliness (power of 10)", ylabel="scatter (power of 10, m²)")
+            axes.plot(*10 ** at[:, [x, y]].T, "o", ms=3.5, color=KIND_COLORS[kind], label=kind)
+        axes.set(xscale="log", yscale="log", xlabel="circliness", ylabel="scatter (m²)")
         axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=4, columnspacing=1)
 
     return Figure(
@@ -79,6 +83,17 @@ def _map(found: list[Entry], present: list[str]) -> Figure:
         "Each dot is the most repeatable swarm of its cell; cells also differ in rotation, groups "
         "and where odd robots are.",
     )
+
+
+def _galleries(hunt: Hunt, shown: list[Entry], present: list[str]) -> list[Figure]:
+    """One of each kind; the first says what is seen in all."""
+    made = [_gallery(hunt, k, [e for e in shown if e.kind == k]) for k in present]
+    seen = (
+        f"The last {TRACE_S:.0f} s of one run each, here and below; dots are the robots at the "
+        "end, odd ones hollow; the bar is 1 m. Below the name: speed and turn for nothing seen, "
+        "then for seen."
+    )
+    return [replace(made[0], caption=seen), *made[1:]]
 
 
 def _gallery(hunt: Hunt, kind: str, best: list[Entry]) -> Figure:
@@ -105,22 +120,19 @@ def _gallery(hunt: Hunt, kind: str, best: list[Entry]) -> Figure:
     return Figure(
         draw(2.1 * rows + 0.2, paint, nrows=rows, ncols=ACROSS, squeeze=False),
         f"{kind.capitalize()}: {words}",
-        f"The last {TRACE_S:.0f} s of one run each; dots are the robots at the end, odd ones "
-        "hollow; the bar is 1 m. Below the name: speed and turn for nothing seen, then for seen.",
+        "",
     )
 
 
 def _table(shown: list[Entry]) -> Table:
     rows = [
         [
-            Cell(entry.name),
-            Cell(entry.kind),
+            Cell(entry.mix.behavior(entry.name)),
             Cell(f"{100 * entry.share:.0f}"),
             Cell("-" if entry.drawn is None else f"{100 * entry.drawn:.0f}"),
             Cell("-" if entry.mujoco is None else f"{100 * entry.mujoco:.0f}"),
             Cell(number(entry.alike, 2)),
-            *(Cell(number(value, 2)) for value in entry.measures),
-            Cell(entry.mix.behavior(entry.name)),
+            *_measured(entry),
         ]
         for entry in shown
     ]
@@ -128,18 +140,25 @@ def _table(shown: list[Entry]) -> Table:
     return Table(
         "The most repeatable of each kind",
         [
-            "name",
-            "kind",
-            "% of its kind",
-            "% in twins drawn",
-            "% in MuJoCo",
-            "alike",
-            *MEASURES,
             "behaviour",
+            "so called\n%",
+            "in twins\n%",
+            "in MuJoCo\n%",
+            "alike",
+            *(UNITS.get(name, name) for name in MEASURES),
         ],
         rows,
-        f"Shares are of {runs} runs with fresh seeds, and of as many in twins drawn from the "
-        "model's errors, if it knows them. Alike: 1 is the same whatever the seed. "
-        "Circliness and scatter are powers of 10. The last column goes after --behavior.",
-        words=(0, 1, 6 + len(MEASURES)),
+        "The first column goes after --behavior. So called: the share that is what its name says, "
+        f"of {runs} runs with fresh seeds; in twins: of as many drawn from the model's errors, if "
+        "it knows them. Alike: 1 is the same whatever the seed. Odd ones: how far from the middle "
+        "they are, over the ring's radius, and 2 if farther.",
     )
+
+
+def _measured(entry: Entry) -> list[Cell]:
+    """Its measures in their units."""
+    values = dict(zip(MEASURES, entry.measures, strict=True))
+    values |= {name: 10 ** values[name] for name in LOGARITHMS}
+    if not entry.mix.odd_count:
+        values["odd_ratio"] = None
+    return [Cell(number(value, 2)) for value in values.values()]

@@ -7,7 +7,7 @@ A screen asks `changes` a few times a second and draws anew what has another num
 import asyncio
 import json
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 from twinmill.charts.arrays import RESTARTS, measured_path
@@ -93,6 +93,7 @@ class Bench:
         await asyncio.to_thread(self.session.conclude)
         self.opening = ""
         self.changed("work", "model", "score", "prediction")
+        await self._look_ahead()
 
     def _heed(self) -> None:
         """Leaves out the robots whose commands the worker found to be wrong, once it told."""
@@ -213,12 +214,12 @@ class Bench:
             self.session.take(done)
             self.changed("work", "score", "findings", "plan", "swarm")
             if done.work.kind == "diagnose":
-                await self._look_ahead([f["effect"] for f in done.result["findings"]])
+                await self._look_ahead()
 
-    async def _look_ahead(self, effects: Iterable[str]) -> None:
+    async def _look_ahead(self) -> None:
         """Foresees what a click on each finding will show, before it comes."""
-        for effect in effects:
-            of = "" if effect == REFIT else effect
+        for finding in (self.session.diagnosis or {"findings": ()})["findings"]:
+            of = "" if finding["effect"] == REFIT else finding["effect"]
             if self.ready and moves(of):
                 await asyncio.to_thread(self.session.foresee, of, self.picked)
 
