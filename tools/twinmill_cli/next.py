@@ -134,6 +134,11 @@ def _narrowing(
     from twinmill.swarm.narrowing import design_for, spread_of
 
     check(measurements, model_file, limits)
+    if model_file.model.drive != "duty":
+        raise ValueError(
+            f"--for: the model is driven by {model_file.model.drive}, and what narrows a swarm's "
+            "prediction is a script of wheel duties; leave --for out."
+        )
     with progress_bar() as progress:
         task = progress.add_task("swarms of models drawn", total=draws)
         spread = spread_of(swarm, goal_of(swarm), draws, 1, lambda: progress.advance(task))

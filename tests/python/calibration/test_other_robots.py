@@ -19,6 +19,7 @@ from twinmill.experiment.design import Limits, check, design
 from twinmill.experiment.foresight import csv_text
 from twinmill.fitting.add import add
 from twinmill.model.model_file import ModelFile
+from twinmill_cli import main as cli
 
 OMNI4 = """
 name = "omni4"
@@ -193,6 +194,9 @@ def test_the_next_run_of_a_robot_told_velocities_shows_what_its_log_could_not(tm
     assert then.found == ["turn_asymmetry"]
     (parameter,) = then.ranking[0].parameters
     assert parameter.value == pytest.approx(asymmetry, abs=0.02)
+    words = ["next", str(run), "--model", str(tmp_path / "model.toml"), "--for", "milling"]
+    with pytest.raises(ValueError, match="leave --for out"):
+        cli.run([*words, "-o", str(tmp_path / "swarm.csv")])
 
 
 def test_a_top_speed_of_the_controller_is_no_slip(tmp_path):
