@@ -208,7 +208,9 @@ export class Floor {
     }
     if (picked && this.stage.prediction) this._now(g);
     if (picked?.arrays?.seen.rows) this._sight(g, picked, t);
-    for (const robot of this.robots) this._robot(g, robot, t, robot === picked);
+    const others = this.robots.filter((robot) => robot !== picked);
+    for (const robot of others) this._robot(g, robot, t, false);
+    if (picked) this._robot(g, picked, t, true); // above those that it touches
   }
 
   /** The prediction from the cursor on, with its band. */
@@ -312,6 +314,9 @@ export class Floor {
       g.font = SMALL;
       g.textAlign = "center";
       g.textBaseline = "bottom";
+      g.lineWidth = 3;
+      g.strokeStyle = "#fff"; // on what lies below
+      g.strokeText(robot.name, 0, -radius - 2);
       g.fillText(robot.name, 0, -radius - 2);
     }
     g.restore();
