@@ -16,10 +16,10 @@ from twinmill.data.time_base import find_time_base, retimed
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.encoders import geometry_notes
 from twinmill.experiment.design import Limits, check, design
-from twinmill.experiment.foresight import csv_text
 from twinmill.fitting.add import add
 from twinmill.model.model_file import ModelFile
 from twinmill_cli import main as cli
+from twinmill_cli import next as next_run
 
 OMNI4 = """
 name = "omni4"
@@ -167,7 +167,9 @@ def test_a_robot_told_velocities_is_seen_to_turn_faster_to_the_left(tmp_path):
     assert parameter.value == pytest.approx(asymmetry, abs=0.02)
 
 
-def test_the_next_run_of_a_robot_told_velocities_shows_what_its_log_could_not(tmp_path):
+def test_the_next_run_of_a_robot_told_velocities_shows_what_its_log_could_not(
+    tmp_path, monkeypatch, capsys
+):
     """It turned to the left alone: that it turns less to the right nothing can tell."""
     random, asymmetry = np.random.default_rng(8), 0.12
     legs = drive_legs(2500, random, (-0.2, 0.15, 0.25), (0.6, 1.0))
@@ -182,21 +184,25 @@ def test_the_next_run_of_a_robot_told_velocities_shows_what_its_log_could_not(tm
     assert np.all(np.abs(told).max(axis=0) <= (0.2, 0, 0.8, 0))  # of the log's, and never sideways
     assert told[:, 2].min() < 0 and "turn_asymmetry" in plan.separates
     assert np.all(plan.extent_m <= 2.0)
-    script = tmp_path / "script.csv"
-    script.write_text(csv_text(plan.rows))
+    monkeypatch.setattr(next_run, "diagnose", lambda *_: found)
+    monkeypatch.setattr(next_run, "design", lambda *_: plan)
+    script, log = tmp_path / "script.csv", str(tmp_path / "run.lcmlog")
+    words = ["next", log, "--model", str(tmp_path / "model.toml"), "-o", str(script)]
+    cli.run([*words, "--script-as", "publisher"])
+    assert "--script-as publisher" in capsys.readouterr().out
+    assert "END_S = " in (tmp_path / "script_publisher.py").read_text()
     rows = np.loadtxt(script, delimiter=",", skiprows=1)
     assert script.read_text().startswith("t_s,vx_mps,vy_mps,omega_radps\n")
     t_s = np.arange(0, rows[-1, 0], 0.02)
     again = rows[np.searchsorted(rows[:, 0], t_s + 1e-9, side="right") - 1][:, [1, 3]]
     turn = again[:, 1] + asymmetry * np.abs(again[:, 1])
     run = cart_log(tmp_path, "next", again, np.column_stack([again[:, 0], turn]), random)
-    then = diagnose(load_measurements([tmp_path / "run.lcmlog", run]), model)
+    then = diagnose(load_measurements([log, run]), model)
     assert then.found == ["turn_asymmetry"]
     (parameter,) = then.ranking[0].parameters
     assert parameter.value == pytest.approx(asymmetry, abs=0.02)
-    words = ["next", str(run), "--model", str(tmp_path / "model.toml"), "--for", "milling"]
     with pytest.raises(ValueError, match="leave --for out"):
-        cli.run([*words, "-o", str(tmp_path / "swarm.csv")])
+        cli.run([*words, "--for", "milling", "--force"])
 
 
 def test_a_top_speed_of_the_controller_is_no_slip(tmp_path):
