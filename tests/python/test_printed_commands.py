@@ -17,6 +17,7 @@ import pytest
 from typer.core import TyperGroup
 
 from twinmill.challenge.script import write_rich_script
+from twinmill.experiment.foresight import Rows, csv_text
 from twinmill.programs import find_program
 from twinmill.workbench.next_run import then_commands
 from twinmill_cli import main as cli
@@ -264,18 +265,34 @@ def test_what_next_says_to_do_with_its_script_can_be_done(swarm, monkeypatch, ro
     script = Path("a script.csv")
     script.write_text("t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,40,40,40,40\n1,0,0,0,0\n")
     duty = np.array([[0.4, 0.4, 0.4, 0.4], [0.0, 0.0, 0.0, 0.0]])
-    plan = SimpleNamespace(robot_id=robot_id, rows=SimpleNamespace(duty=duty))
+    plan = SimpleNamespace(robot_id=robot_id, rows=Rows(np.array([0.0, 1.0]), duty, 1.0))
     logs = [Path("s.lcmlog")]
     (_, robot), (_, twin), (_, then) = next_command._how(
         plan, logs, "turbopi.toml", script
     ).commands
-    told = {"robot_id": robot_id, "cap_pct": 40}
+    told = {"robot_id": robot_id, "cap_pct": 40, "drive": "duty"}
     for line in (robot, then, *then_commands(logs, "turbopi.toml", told)):
         check(line)
     program, *words = shlex.split(twin)
     subprocess.run([str(find_program(program)), *words], check=True, capture_output=True)
     assert Path("next.lcmlog").stat().st_size > 0
     Path("next.lcmlog").unlink()
+
+
+def test_what_next_says_to_do_with_a_script_of_velocities_can_be_done(tmp_path, monkeypatch):
+    """It becomes a program that Python reads."""
+    monkeypatch.chdir(tmp_path)
+    rows = Rows(np.array([0.0, 1.0]), np.array([[0.2, 0, 0, 0], [0.0] * 4]), 2.0, "twist")
+    Path("script.csv").write_text(csv_text(rows))
+    plan, logs = SimpleNamespace(robot_id=2, rows=rows), [Path("s.lcmlog")]
+    (_, write), (_, play), (_, then) = next_command._how(
+        plan, logs, "cart.toml", Path("script.csv")
+    ).commands
+    write_too, then_too = then_commands(logs, "cart.toml", {"robot_id": 2, "drive": "twist"})
+    assert (write, then) == (write_too, then_too)
+    check(then)
+    said(write.removeprefix("twinmill "))
+    compile(Path(shlex.split(play)[1]).read_text(), "script.py", "exec")
 
 
 def said(line: str) -> dict:
