@@ -18,7 +18,6 @@ from twinmill.challenge.drives import drive
 from twinmill.challenge.physics import STEP_S
 from twinmill.challenge.run import EPOCH_US, Plan, play, write_log
 from twinmill.data.measurement import Measurement, load_measurements
-from twinmill.predict.datasets import displacement
 from twinmill.predict.residual import rotate
 from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms
 
@@ -48,7 +47,7 @@ class Unseen:
         Args:
             predicted: (W, H, 3) displacements seen from the start.
         """
-        wrong = rms(difference(displacement(self.measurement, self.windows, None), predicted))
+        wrong = rms(difference(self.windows.measured(self.measurement), predicted))
         ratio = np.sqrt(np.nanmean((wrong / self.floor) ** 2, axis=1))
         return [float(ratio[HORIZONS_S.index(ahead_s)]) for ahead_s in AHEAD_S]
 
@@ -81,7 +80,7 @@ def _unseen(case: Case, plan: Plan, log: Path) -> Unseen:
     (measurement,) = load_measurements([log])
     windows = Windows.of(measurement.track)
     true = _displacement(np.load(kept), _plant_s(measurement, plan), windows)
-    floor = rms(difference(displacement(measurement, windows, None), true))
+    floor = rms(difference(windows.measured(measurement), true))
     return Unseen(measurement, windows, floor)
 
 

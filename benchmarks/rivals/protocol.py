@@ -12,7 +12,6 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement, load_measurements
 from twinmill.model.model_file import ModelFile
-from twinmill.predict.datasets import displacement
 from twinmill.predict.windows import Windows
 
 DOCUMENTED, TUNED = "as documented", "tuned"
@@ -92,4 +91,4 @@ class Rival:
 
 def predicted_by(model: native.Model) -> Predict:
     """Predictions of a model on its own clock."""
-    return lambda measurement, windows: displacement(measurement, windows, model)
+    return lambda measurement, windows: windows.predicted(measurement, model)

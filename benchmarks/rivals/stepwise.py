@@ -23,7 +23,6 @@ from twinmill.model.parameters import (
     making_late,
     needing,
 )
-from twinmill.predict.datasets import displacement
 from twinmill.predict.windows import HORIZONS_S, Windows, difference
 
 AHEAD_S = 0.5  # errors of windows that follow each other
@@ -82,13 +81,13 @@ class Errors:
                 kept.append(k)
                 last_s = measurement.track.pose_t_s[start]
         windows = Windows(every.starts[kept], np.ascontiguousarray(every.ends[kept][:, [h]]))
-        measured = displacement(measurement, windows, None)
-        left = difference(measured, displacement(measurement, windows, model))[:, 0]
+        measured = windows.measured(measurement)
+        left = difference(measured, windows.predicted(measurement, model))[:, 0]
         return cls(measurement, windows, measured, scale(left))
 
     def __call__(self, model: native.Model) -> np.ndarray:
         """(3 W,) errors."""
-        off = difference(self.measured, displacement(self.measurement, self.windows, model))
+        off = difference(self.measured, self.windows.predicted(self.measurement, model))
         return (off[:, 0] / self.by).ravel()
 
     def change(self, model: native.Model, parameter: Parameter, step: float) -> np.ndarray:

@@ -24,7 +24,6 @@ from twinmill.challenge.drives import drive
 from twinmill.challenge.physics import catalogue_forms
 from twinmill.challenge.robots import draw_robot
 from twinmill.challenge.run import Plan, play, write_log
-from twinmill.predict.datasets import displacement
 from twinmill.predict.windows import HORIZONS_S
 
 SECONDS = 40.0
@@ -161,16 +160,19 @@ def test_trees_lose_most_without_what_was_planted(random):
 
 
 def test_truth_errs_by_nothing_where_nothing_disturbs(quiet, tmp_path):
-    """Poses of a log are rounded to nothing but its clock's microseconds."""
+    """Poses of a log are rounded to nothing but its clock's microseconds.
+
+    A straight line over 50 ms misses a heading whose rate changes, by less than half a milliradian.
+    """
     case, _ = driven(quiet, tmp_path)
     found = exam._unseen(case, case.plan, tmp_path / "same.lcmlog")
-    assert found.floor[HORIZONS_S.index(2.0)] == pytest.approx(0, abs=1e-4)
+    assert found.floor[HORIZONS_S.index(2.0)] == pytest.approx(0, abs=5e-4)
 
 
 def test_a_wrong_model_errs_by_its_error_over_the_truths(quiet, tmp_path):
     case, _ = driven(replace(quiet, sensor_m=1e-3, sensor_rad=3e-3), tmp_path)
     log = exam._unseen(case, case.plan, tmp_path / "same.lcmlog")
-    measured = displacement(log.measurement, log.windows, None)
+    measured = log.windows.measured(log.measurement)
     off = measured + 3 * log.floor
     assert log.over_truth(off) == pytest.approx([3, 3])
 

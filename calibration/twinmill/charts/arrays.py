@@ -11,7 +11,6 @@ from twinmill.data.log import RobotLog
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import Track, local_line
 from twinmill.fitting.floor import NoiseFloor
-from twinmill.predict.datasets import displacement
 from twinmill.predict.detections import Detections
 from twinmill.predict.problem import Scene
 from twinmill.predict.regimes import HORIZON, regime_masks
@@ -98,7 +97,7 @@ class RobotView:
         self.track = measurement.track
         self.grid = StepGrid.of(measurement)
         self.windows = Windows.of(self.track)
-        self._measured = displacement(measurement, self.windows, None)
+        self._measured = self.windows.measured(measurement)
         self._starts, self._ends = _everywhere(self.track)
 
     @property
@@ -108,7 +107,7 @@ class RobotView:
 
     def errors(self, model: native.Model) -> np.ndarray:
         """(W, H, 3) measured less predicted; NaN where it is not judged."""
-        predicted = displacement(self.measurement, self.windows, model)
+        predicted = self.windows.predicted(self.measurement, model)
         errors = difference(self._measured, predicted)
         return np.where(self.noise.keep[:, None, None], errors, np.nan)
 
@@ -143,11 +142,11 @@ class RobotView:
         after each step, NaN where the track ends; predicted_speed: (T, 4) as the measured one;
         errors: (W, 5) t_s, then position in m and heading in rad, 0.5 s and 2 s ahead.
         """
-        played = self.measurement.played
+        started = self.measurement.started
         begin, end = self._starts[::every], self._ends[::every]
         with ThreadPoolExecutor(1) as beside:
             velocity = beside.submit(body_velocity, self.measurement, self.grid, model.copy())
-            ahead = native.windows(model, played, begin, end)
+            ahead = native.windows(model, started, begin, end)
             errors = self.errors(model)
         ahead[end < 0] = np.nan
         starts = np.column_stack([self.track.pose_t_s[begin], self.track.pose[begin]])

@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +28,6 @@ class Measurement:
     Attributes:
         log_name, log_sha256: where it comes from.
         track: cleaned arrays.
-        played: the same for the native module; where telemetry falls silent the robot's watchdog
-            stops it, so a zero command is put in.
         warnings: sentences of reading and cleaning.
         recorded_utime_us: earliest stamp in the log, us since the Unix epoch.
         time_base: of the log, where it was not what the stamps say; `track` has it put right.
@@ -38,7 +37,6 @@ class Measurement:
     log_name: str
     log_sha256: str
     track: Track
-    played: native.Track
     warnings: list[str]
     recorded_utime_us: int
     time_base: TimeBase | None = None
@@ -47,7 +45,7 @@ class Measurement:
     @classmethod
     def live(cls, track: Track) -> "Measurement":
         """Of a robot that is heard now: from no file."""
-        return cls("live", "", track, _played(track), track.notes, 0)
+        return cls("live", "", track, track.notes, 0)
 
     @property
     def label(self) -> str:
@@ -59,6 +57,26 @@ class Measurement:
         """The log says that one clock stamped commands and poses."""
         return self.track.same_clock
 
+    @cached_property
+    def played(self) -> native.Track:
+        """Commands and poses for the native module.
+
+        Where telemetry falls silent the robot's watchdog stops it, so a zero command is put in.
+        """
+        return _played(self.track, self.track.heading_rad)
+
+    @cached_property
+    def started(self) -> native.Track:
+        """The same with smoothed headings, for predictions over windows.
+
+        A prediction goes where its first heading points, and one reading of it is noisier than the
+        few around it.
+        """
+        smooth_rad = self.track.heading_smooth
+        return _played(
+            self.track, np.where(np.isnan(smooth_rad), self.track.heading_rad, smooth_rad)
+        )
+
     def with_pose(self, pose: np.ndarray) -> "Measurement":
         """The same run with other poses (N, 3)."""
         smooth_rad = self.track.heading_smooth
@@ -66,7 +84,7 @@ class Measurement:
             t_s, segment = self.track.pose_t_s, self.track.segment
             smooth_rad, _ = local_line(t_s, pose[:, 2], segment, SMOOTH_S)
         track = replace(self.track, pose=pose, heading_smooth=smooth_rad)
-        return replace(self, track=track, played=_played(track))
+        return replace(self, track=track)
 
     def without(self, stretches_s: list[tuple[float, float]], why: str) -> "Measurement":
         """The same run cut: poses within stretches of capture's clock are not used."""
@@ -79,7 +97,7 @@ class Measurement:
         number = np.where(kept >= 0, np.cumsum(begins) - 1, -1)
         smooth_rad = np.where(inside, np.nan, self.track.heading_smooth)
         track = replace(self.track, segment=number, heading_smooth=smooth_rad)
-        return replace(self, track=track, played=_played(track), warnings=[*self.warnings, why])
+        return replace(self, track=track, warnings=[*self.warnings, why])
 
 
 class Measurements(list[Measurement | SteadyTable]):
@@ -200,7 +218,6 @@ def _measured(log: Log, robot: RobotLog, runs: int) -> Measurement:
         name,
         log.sha256,
         track,
-        _played(track),
         [*log.warnings, *([f"{base}; put right."] if base else []), *track.notes],
         log.t0_utime_us,
         base,
@@ -226,14 +243,14 @@ def _check_length(name: str, track: Track) -> None:
         )
 
 
-def _played(track: Track) -> native.Track:
+def _played(track: Track, heading_rad: np.ndarray) -> native.Track:
     t_s, command, battery_V = track.command_t_s, track.command, track.battery_V
     if track.command_kind == "duty":
         silent = np.flatnonzero(np.diff(t_s) > SILENCE_S)
         t_s = np.insert(t_s, silent + 1, t_s[silent] + SILENCE_S)
         command = np.insert(command, silent + 1, 0.0, axis=0)
         battery_V = np.insert(battery_V, silent + 1, battery_V[silent])
-    pose = np.column_stack([track.pose[:, :2], track.heading_rad])
+    pose = np.column_stack([track.pose[:, :2], heading_rad])
     return native.Track(
         *(np.ascontiguousarray(a, float) for a in (t_s, command, battery_V, track.pose_t_s, pose)),
         np.ascontiguousarray(track.segment, np.int64),

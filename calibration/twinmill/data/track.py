@@ -13,7 +13,7 @@ SILENCE_S = 0.25  # telemetry comes every 22 ms: after this the duties are not k
 CLOCK_S = 0.3  # more than any offset between the clocks
 FROZEN_S = 0.5  # a pose that keeps its very bits for longer while driven is no measurement
 REST_S = 1.5  # coasting ends within 0.5 s; the rest is for lag and clocks
-SMOOTH_S = 0.025  # half width of the heading's smoothing
+SMOOTH_S = 0.026  # half width of the heading's smoothing: three poses of 120 Hz to each side
 ASTRAY_RAD = 0.35  # more than any heading bias: the marker body's axes are turned
 
 

@@ -14,7 +14,6 @@ import twinmill_native as native
 
 from twinmill.fitting.floor import is_far
 from twinmill.fitting.opening import Opened
-from twinmill.predict.datasets import displacement
 from twinmill.predict.windows import HORIZONS_S
 
 FAR = 10.0  # times the median squared error; with nothing but noise the largest is 3 to 7
@@ -71,7 +70,7 @@ def _of_log(own: Opened, model: native.Model) -> list[Moment]:
     clusters = np.split(missed, 1 + np.flatnonzero(np.diff(data.start_s[missed]) > APART_S))
     if len(clusters) < SEVERAL:
         return []
-    predicted = displacement(data.measurement, data.windows, model)
+    predicted = data.windows.predicted(data.measurement, model)
     way = _way(data.measured[:, HORIZON], predicted[:, HORIZON])
     track = data.measurement.track
     return [

@@ -8,7 +8,7 @@ import twinmill_native as native
 
 from twinmill.data.log import CommandKind
 from twinmill.data.measurement import Measurement
-from twinmill.data.track import Timing, Track
+from twinmill.data.track import Timing, Track, command_at
 from twinmill.experiment.moves import Move
 from twinmill.model.parameters import CLOCK
 from twinmill.predict.problem import Scene
@@ -107,15 +107,21 @@ class Played:
         return native.replica(quiet, self._track(np.tile(start, (len(self.part), 1))), 1)
 
     def scene(self, like: Scene, start: np.ndarray) -> Scene:
-        """As if motion capture had seen the scene's model drive; with the same noise."""
+        """As if motion capture had seen the scene's model drive; with the same noise.
+
+        Telemetry tells the commands as often as in the scene's log.
+        """
         pose = self.path(like.model, start)
         old = like.measurement.track
+        t_s = np.union1d(
+            self.rows.t_s, np.arange(0.0, self.rows.t_s[-1], old.timing.command_period_s)
+        )
         track = Track(
             old.robot_id,
             self.rows.kind,
-            self.rows.t_s,
-            self.rows.command,
-            np.full(len(self.rows.t_s), self.battery_V),
+            t_s,
+            command_at(t_s, self.rows.t_s, self.rows.command),
+            np.full(len(t_s), self.battery_V),
             self.pose_t_s,
             pose,
             self.part,
@@ -124,7 +130,7 @@ class Played:
             Timing(old.timing.pose_period_s, old.timing.command_period_s, 0.0, 0.0),
             [],
         )
-        seen = Measurement("planned", "", track, self._track(pose), [], 0)
+        seen = Measurement("planned", "", track, [], 0)
         return replace(like, measurement=seen, grid=StepGrid.of(seen))
 
     def _track(self, pose: np.ndarray) -> native.Track:

@@ -14,8 +14,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.model.parameters import Parameter
-from twinmill.predict.residual import rotate
-from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms
+from twinmill.predict.windows import HORIZONS_S, Windows, difference
 
 BLOCK_S = 8.0  # errors of different blocks count as independent
 FEWEST_BLOCKS = 6  # a shorter log has shorter blocks
@@ -101,7 +100,7 @@ class Trajectory:
     @classmethod
     def at(cls, measurement: Measurement, windows: Windows) -> "Trajectory":
         """The same with some windows alone."""
-        measured = displacement(measurement, windows, None)
+        measured = windows.measured(measurement)
         return cls(
             measurement,
             windows,
@@ -149,14 +148,14 @@ class Trajectory:
 
     def errors(self, model: native.Model) -> np.ndarray:
         """(W, H, 3) measured less predicted."""
-        return difference(self.measured, displacement(self.measurement, self.windows, model))
+        return difference(self.measured, self.windows.predicted(self.measurement, model))
 
     def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
         """See Dataset."""
         ahead = native.windows_batch(
-            model, self.measurement.played, self.windows.starts, self.windows.ends, names, values
+            model, self.measurement.started, self.windows.starts, self.windows.ends, names, values
         )
-        apart = difference(self.measured, _seen(self.measurement, self.windows, ahead))
+        apart = difference(self.measured, self.windows.seen(self.measurement.track, ahead))
         return (np.nan_to_num(apart) * self.weight).reshape(len(values), -1)
 
     def as_errors(self, rows: np.ndarray) -> np.ndarray:
@@ -170,26 +169,6 @@ class Trajectory:
         return float(np.sqrt(np.sum((np.nan_to_num(self.errors(model)) * self.weight) ** 2)))
 
 
-def displacement(
-    measurement: Measurement, windows: Windows, model: native.Model | None
-) -> np.ndarray:
-    """(W, H, 3) forward, left (m) and turn (rad) seen from the start; a model's if given."""
-    if model is None:
-        ahead = measurement.track.pose[windows.ends]
-    else:
-        ahead = native.windows(model, measurement.played, windows.starts, windows.ends)
-    return _seen(measurement, windows, ahead)
-
-
-def _seen(measurement: Measurement, windows: Windows, end: np.ndarray) -> np.ndarray:
-    track = measurement.track
-    step = end - track.pose[windows.starts][:, None]
-    heading_rad = track.heading_smooth[windows.starts][:, None]
-    seen = np.stack([*rotate(step[..., 0], step[..., 1], -heading_rad), step[..., 2]], -1)
-    seen[..., windows.ends < 0, :] = np.nan
-    return seen
-
-
 def total_score(parts: Sequence[float]) -> float:
     """Score of several data sets: the geometric mean of each one's, no less than 1 each.
 
@@ -198,6 +177,3 @@ def total_score(parts: Sequence[float]) -> float:
     if len(parts) == 1:
         return float(parts[0])
     return float(np.exp(np.mean(np.log(np.maximum(parts, 1.0)))))
-
-
-__all__ = ["Dataset", "Trajectory", "displacement", "rms", "total_score"]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
+from twinmill.data.measurement import Measurement
 from twinmill.data.track import Track
 from twinmill.predict.problem import Scene
 from twinmill.predict.residual import rotate
@@ -53,27 +54,29 @@ class Windows:
         ends[np.cumsum(ends < 0, axis=1) > 0] = -1
         return cls(starts.astype(np.int64), ends.astype(np.int64))
 
-    def measured(self, scene: Scene) -> np.ndarray:
+    def measured(self, measurement: Measurement) -> np.ndarray:
         """(W, H, 3) displacement forward, left (m) and turn (rad), seen from the start."""
-        pose = scene.measurement.track.pose
-        return self._seen(scene, pose[self.starts], pose[self.ends])
+        return self.seen(measurement.track, measurement.track.pose[self.ends])
 
-    def predicted(self, scene: Scene) -> np.ndarray:
-        """(W, H, 3) the same as the scene's model predicts it."""
-        track = scene.measurement.track
-        ahead = native.windows(scene.model, scene.measurement.played, self.starts, self.ends)
-        return self._seen(scene, track.pose[self.starts], ahead)
+    def predicted(self, measurement: Measurement, model: native.Model) -> np.ndarray:
+        """(W, H, 3) the same as a model predicts it."""
+        ahead = native.windows(model, measurement.started, self.starts, self.ends)
+        return self.seen(measurement.track, ahead)
 
-    def _seen(self, scene: Scene, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    def seen(self, track: Track, end: np.ndarray) -> np.ndarray:
+        """(..., W, H, 3) poses at the ends to displacements, seen from the smoothed start."""
+        heading_rad = track.heading_smooth[self.starts]
+        start = np.column_stack([track.pose[self.starts, :2], heading_rad])
         step = end - start[:, None]
-        heading_rad = scene.measurement.track.heading_smooth[self.starts][:, None]
-        seen = np.stack([*rotate(step[..., 0], step[..., 1], -heading_rad), step[..., 2]], -1)
-        seen[self.ends < 0] = np.nan
+        turned = rotate(step[..., 0], step[..., 1], -heading_rad[:, None])
+        seen = np.stack([*turned, step[..., 2]], -1)
+        seen[..., self.ends < 0, :] = np.nan
         return seen
 
     def errors(self, scene: Scene) -> np.ndarray:
         """(W, H, 3) measured less predicted; NaN where the track ends before the horizon."""
-        return difference(self.measured(scene), self.predicted(scene))
+        predicted = self.predicted(scene.measurement, scene.model)
+        return difference(self.measured(scene.measurement), predicted)
 
 
 def difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -22,7 +22,6 @@ import pyarrow as pa
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
-from twinmill.data.track import command_at
 from twinmill.experiment.design import CENTRE, Floor, Limits, choose
 from twinmill.experiment.foresight import LEAD_S, Played, Rows, rows_of
 from twinmill.experiment.moves import Move, duty_axes, family
@@ -243,17 +242,8 @@ def _left_by_fits(
 
 
 def driven(moves: list[Move], scene: Scene) -> Measurement:
-    """The run as the scene's robot would drive it, its telemetry as dense as in the log before."""
-    planned = Played.of([moves], scene).scene(scene, CENTRE).measurement
-    track, period_s = planned.track, scene.measurement.track.timing.command_period_s
-    t_s = np.arange(track.command_t_s[0], track.pose_t_s[-1], period_s)
-    dense = replace(
-        track,
-        command_t_s=t_s,
-        command=command_at(t_s, track.command_t_s, track.command),
-        battery_V=np.full(len(t_s), track.battery_V[0]),
-    )
-    return replace(planned, track=dense).with_pose(track.pose)
+    """The run as the scene's robot would drive it."""
+    return Played.of([moves], scene).scene(scene, CENTRE).measurement
 
 
 def _fit_to(seen: Measurement, file: ModelFile, names: list[str]) -> Covariance:

@@ -95,5 +95,5 @@ def _ahead(measurement: Measurement, model: native.Model) -> np.ndarray:
     if start >= newest:
         return track.pose[[start]]
     starts = np.array([start], np.int64)
-    path = native.windows(model, measurement.played, starts, ends[None])
+    path = native.windows(model, measurement.started, starts, ends[None])
     return np.vstack([track.pose[start], path[0]])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import twinmill_native as native
 
-from twinmill.data.measurement import Measurement, _played
+from twinmill.data.measurement import Measurement
 from twinmill.data.track import make_track
 from twinmill.predict.problem import Scene
 from twinmill.predict.residual import StepGrid
@@ -27,7 +27,7 @@ def scene_of(model_file):
             ("[0, 0.1, 0.2, 0.3, 0.4]", f"[0, {top_mps!r}]"),
             ("motor_lag_s = 0.05", f"motor_lag_s = 0.0\nyaw_gain = {yaw_gain!r}"),
         ).model
-        run = Measurement("run", "0", track, _played(track), [], 0)
+        run = Measurement("run", "0", track, [], 0)
         return Scene(run, model, StepGrid.of(run), False)
 
     return make
@@ -42,7 +42,7 @@ def circle_m_rad():
 
 def test_measured_displacement_on_a_circle(driven, scene_of):
     scene = scene_of(driven())
-    measured = Windows.of(scene.measurement.track).measured(scene)
+    measured = Windows.of(scene.measurement.track).measured(scene.measurement)
     whole = np.isfinite(measured).all(axis=(1, 2))
     assert np.count_nonzero(whole) == pytest.approx((10 - 2) / 0.25, abs=1)
     assert measured[whole] == pytest.approx(np.tile(circle_m_rad(), (whole.sum(), 1, 1)), abs=1e-9)
@@ -52,7 +52,7 @@ def test_predicted_displacement_on_a_circle(driven, scene_of):
     # Duties 0.5 left and 0.8 right: v = 0.65 top, and w = gain 0.15 top / lever.
     top_mps = SPEED_MPS / 0.65
     scene = scene_of(driven(), TURN_RADPS * LEVER_M / (0.15 * top_mps), top_mps)
-    predicted = Windows.of(scene.measurement.track).predicted(scene)
+    predicted = Windows.of(scene.measurement.track).predicted(scene.measurement, scene.model)
     whole = np.isfinite(predicted).all(axis=(1, 2))
     # Steps of 1/120 s and shorter, each an arc: only rounding is left.
     assert predicted[whole] == pytest.approx(np.tile(circle_m_rad(), (whole.sum(), 1, 1)), abs=1e-7)
@@ -79,9 +79,13 @@ def test_displacement_is_the_same_wherever_and_however_the_room_is_turned(
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     turned = np.column_stack([c * x - s * y + 5, s * x + c * y - 3, theta + angle_rad])
     scenes = [scene_of(r) for r in (robot, replace(robot, pose=turned))]
-    for method in (Windows.measured, Windows.predicted):
-        first, second = (method(Windows.of(s.measurement.track), s) for s in scenes)
-        assert first == pytest.approx(second, abs=1e-9, nan_ok=True)
+    windows = [Windows.of(s.measurement.track) for s in scenes]
+    first, second = (w.measured(s.measurement) for w, s in zip(windows, scenes, strict=True))
+    assert first == pytest.approx(second, abs=1e-9, nan_ok=True)
+    first, second = (
+        w.predicted(s.measurement, s.model) for w, s in zip(windows, scenes, strict=True)
+    )
+    assert first == pytest.approx(second, abs=1e-9, nan_ok=True)
 
 
 def test_a_heading_error_shows_as_motion_to_the_side(driven, scene_of):
@@ -89,11 +93,25 @@ def test_a_heading_error_shows_as_motion_to_the_side(driven, scene_of):
     robot = driven()
     pose = robot.pose + np.array([0, 0, 0.1])
     scene = scene_of(replace(robot, pose=pose))
-    measured = Windows.of(scene.measurement.track).measured(scene)[0]
+    measured = Windows.of(scene.measurement.track).measured(scene.measurement)[0]
     x, y = circle_m_rad()[:, :2].T
     c, s = np.cos(0.1), np.sin(0.1)
     assert measured[:, 0] == pytest.approx(c * x + s * y, abs=1e-9)
     assert measured[:, 1] == pytest.approx(c * y - s * x, abs=1e-9)
+
+
+def test_noise_of_the_first_heading_turns_a_prediction_by_that_of_a_mean_of_seven(driven, scene_of):
+    """The line over 50 ms, seven poses at 120 Hz, has in its middle the noise of their mean."""
+    robot, noise_rad = driven(200.0), 0.02
+    wrong_rad = np.random.default_rng(1).normal(0, noise_rad, len(robot.pose))
+    pose = robot.pose + wrong_rad[:, None] * [0, 0, 1]
+    top_mps = SPEED_MPS / 0.65
+    scene = scene_of(replace(robot, pose=pose), TURN_RADPS * LEVER_M / (0.15 * top_mps), top_mps)
+    errors = Windows.of(scene.measurement.track).errors(scene)
+    chord_m = np.linalg.norm(circle_m_rad()[:, :2], axis=1)
+    missed_m = np.linalg.norm(rms(errors)[:, :2], axis=1)
+    # 800 windows tell an RMS to 3 %.
+    assert missed_m == pytest.approx(chord_m * noise_rad / np.sqrt(7), rel=0.1)
 
 
 def test_no_prediction_crosses_a_break(driven, scene_of):
