@@ -23,7 +23,7 @@ FAMILIES = (
     TIMING,
     ("dead_zone", "speed_curve", "speed_slip", "coulomb_friction"),
     ("wheel_gain", "reverse_asymmetry"),
-    ("battery_sag", "heat_gain", "abrupt_loss"),
+    ("battery_sag", "heat_gain", "abrupt_loss", "transient_loss"),
     ("floor_tilt", "carpet_grain", "floor_patch", "gain_slope"),
     ("yaw_lever", "turn_asymmetry", "lateral_slip", "strafe_loss"),
     ("marker_offset", "heading_bias"),

@@ -322,6 +322,17 @@ def _for_a_while(rim, v, _):
     return rim
 
 
+def _swelling(rim, v, _):
+    """A loss that comes and leaves slowly, at its most 0.15 of the log after it began."""
+    since = np.arange(len(rim)) / len(rim) - v["moment"]
+    return rim * (1 - v["loss"] * np.sin(np.pi * np.clip(since / 0.3, 0, 1)) ** 2)[:, None]
+
+
+def _several_losses(rim, v, _):
+    away = np.sin(2 * np.pi * (v["times"] * np.arange(len(rim)) / len(rim) + v["moment"])) > 0.4
+    return rim * np.where(away, 1 - v["loss"], 1.0)[:, None]
+
+
 def _drop_outs(rim, v, s):
     rim = rim.copy()
     seconds = len(rim) * STEP_S
@@ -388,6 +399,8 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
             both["side"] = 0.05 * float(random.choice([-1, 0, 1]))
         form("abrupt_loss", "plain", "target", _from_a_moment, ("loss", "side"), **both)
         form("abrupt_loss", "cousin", "target", _over_seconds, ("loss",), **slowly)
+        form("transient_loss", "plain", "target", _for_a_while, ("loss",), **at)
+        form("transient_loss", "cousin", "target", _swelling, ("loss",), **at)
         if robot.plant == "planar":  # before motors with a lag of their own it is a second one
             form("motor_lag", "plain", "lag", _lag, extra_s=0.03)
         form("motor_lag", "cousin", "lag", _second_order, second_s=0.03)
@@ -471,10 +484,11 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
     if robot.drive != "wheel_speed":
         time = ("time", "moment", "event")
         past = ("past", "history", "change", "start", "stop", "transient", "accel")
-        step, drops = {"moment": moment, "loss": 0.05}, {"per_s": 0.12}
+        several = {"moment": moment, "loss": 0.05, "times": float(random.uniform(2.5, 4.5))}
+        drops = {"per_s": 0.12}
         swing = {"share": 0.4, "hz": hz}
         found += [
-            Hidden("for a while", "outside", "target", _for_a_while, step, ("loss",), 5, time),
+            Hidden("several", "outside", "target", _several_losses, several, ("loss",), 5, time),
             Hidden("drop-outs", "outside", "target", _drop_outs, drops, (), 1, time),
         ]
         if robot.plant == "planar":

@@ -12,12 +12,12 @@ from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.detections.merge import with_detections
 from twinmill.diagnosis.encoders import geometry_notes, time_base_notes
 from twinmill.diagnosis.findings import (
-    SWINGS,
     beside_more,
     findings_of,
     lateness,
     of_another_form,
     ranking_of,
+    swings,
     with_stale_numbers,
 )
 from twinmill.diagnosis.irregularity import notes_on
@@ -213,7 +213,7 @@ def _concluded(
     )
     rest = rest_of(formulas, last.fit, start.fit, model_file.left_over(hashes))
     findings = beside_more(of_another_form(findings, rest.depends_on), rest)
-    if any(f.why == SWINGS for f in findings):
+    if swings(findings):
         rest = replace(rest, depends_on=[*dict.fromkeys([CHANGE, *rest.depends_on])])
     models = zip(known, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}

@@ -8,6 +8,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.constancy import Change, changes_of
+from twinmill.diagnosis.library import CHANGE
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import (
     REFIT,
@@ -46,7 +47,9 @@ BY = {
     "place": {"places", "place"},
     "heading": {"headings", "heading"},
     "time": {"history", "battery"},
+    CHANGE: {"changes"},
 }
+MUCH = 0.25  # share of what was to be explained that is left: no lag leaves so much
 NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
 
 
@@ -169,18 +172,19 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
 
     So it is where what is left still depends on what they act by; where one makes the robot later
     and another sooner: a lag below its own and a delay imitate a body that swings; and where a
-    second one bends the curve of speed over command as a better one does already.
+    second one bends the curve of speed over command, or is late at every change of the command, as
+    a better one is already.
 
     Args:
         found: in the order of worth.
         depends_on: groups that what is left depends on.
     """
-    late_s = [_lateness_s(f) for f in found]
-    swings = min(late_s, default=0.0) < 0 < max(late_s, default=0.0)
+    swinging = swings(found)
     curves = [f.effect for f in found if f.effect in _curves()]
+    late = [f.effect for f in found if _is_late(f)]
 
     def judged(finding: Finding) -> Finding:
-        if swings and _lateness_s(finding):
+        if swinging and _lateness_s(finding):
             return _doubted(finding, SWINGS, wrong_form=True)
         on = next((group for group in depends_on if BY.get(group, set()) & _acts_by(finding)), None)
         if on is not None:
@@ -189,18 +193,39 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
         if finding.effect in curves[1:]:
             why = f"{curves[0]} bends the speed over the command, too: both may be one other curve"
             return _doubted(finding, why)
+        if finding.effect in late[1:]:
+            why = f"{late[0]} is late at changes of the command, too: both may be one other lag"
+            return _doubted(finding, why)
         return finding
 
     return [judged(f) for f in found]
 
 
+def swings(found: Sequence[Finding]) -> bool:
+    """Whether one finding makes the robot later and another sooner."""
+    late_s = [_lateness_s(f) for f in found]
+    return min(late_s, default=0.0) < 0 < max(late_s, default=0.0)
+
+
 def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
-    """Findings, doubtful where more is left than all of them take, and it is no noise."""
+    """Findings, doubtful where more is left than all of them take, and it is no noise.
+
+    A lag is doubtful where much is left at all: something else at changes of the command is late,
+    too.
+    """
     taken = sum(f.share for f in found if f.effect != REFIT)
-    if not rest.firm or rest.share <= taken:
-        return list(found)
-    why = "more is left than it takes, so that it may be a part of something else"
-    return [f if f.effect == REFIT else _doubted(f, why) for f in found]
+
+    def judged(finding: Finding) -> Finding:
+        if finding.effect == REFIT or not rest.firm:
+            return finding
+        if rest.share > taken:
+            why = "more is left than it takes, so that it may be a part of something else"
+            return _doubted(finding, why)
+        if rest.share > MUCH and _is_late(finding):
+            return _doubted(finding, "much is left: something else may come late")
+        return finding
+
+    return [judged(f) for f in found]
 
 
 def _doubted(finding: Finding, why: str, wrong_form: bool = False) -> Finding:
@@ -215,6 +240,13 @@ def _acts_by(finding: Finding) -> set[str]:
     """What the effect's card says of it in this respect; nothing for a refit, which has none."""
     card = catalogue().get(finding.effect, {"identify": (), "needs": "", "family": ""})
     return {*card["identify"], card["needs"], card["family"]}
+
+
+def _is_late(finding: Finding) -> bool:
+    """Whether all of the motion comes late, at every change of the command."""
+    card = catalogue().get(finding.effect, {"needs": "", "identify": ()})
+    always = card["needs"] == "changes" and "steps" in card["identify"]
+    return bool(late_part(finding.effect)) or (always and "spin" not in card["identify"])
 
 
 def _curves() -> set[str]:

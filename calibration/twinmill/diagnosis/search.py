@@ -514,7 +514,23 @@ def _ways(
         names = points[0][1]
         values = np.array([p[2].values[-1] for p in points])
         changes.append(row - dataset.rows(points[0][2].model, names, values))
+    if len(with_role(name, "moment")) == 2:
+        return _between(name, state, starts, changes)
     return starts, changes
+
+
+def _between(
+    name: str, state: State, begins: list[dict[str, float]], changes: list[np.ndarray]
+) -> tuple[list[dict[str, float]], list[np.ndarray]]:
+    """Ways of an effect that begins and ends, from what it changes if it never ends.
+
+    A small effect of a while is one that begins with it, less one that begins where it ends.
+    """
+    begin, end = (f"{_next_instance(name, state)}.{key}" for key in with_role(name, "moment"))
+    pairs = list(combinations(range(len(begins)), 2))
+    starts = [{begin: begins[a][begin], end: begins[b][begin]} for a, b in pairs]
+    first, second = np.array(pairs).T
+    return starts, [c[first] - c[second] for c in changes]
 
 
 def _best_start(
@@ -649,15 +665,16 @@ def _next_instance(name: str, state: State) -> str:
 
 
 MOMENTS = 16  # over the time of the log
+NEVER_S = 1e5  # later than any log ends
 MARGIN = 0.05  # share of it at each end, within which a moment is none
 
 
 def _moments(name: str, state: State) -> list[dict[str, float]]:
-    """Starts of an effect that begins at a moment."""
+    """Starts of an effect that begins at a moment, and never ends."""
     instance = _next_instance(name, state)
-    moments = with_role(name, "moment")
+    begin, *end = (f"{instance}.{key}" for key in with_role(name, "moment"))
     at_s = np.quantile(_times_s(state), (np.arange(MOMENTS) + 0.5) / MOMENTS)
-    return [{f"{instance}.{key}": float(t_s) for key in moments} for t_s in at_s]
+    return [{begin: float(t_s), **dict.fromkeys(end, NEVER_S)} for t_s in at_s]
 
 
 def _times_s(state: State) -> np.ndarray:

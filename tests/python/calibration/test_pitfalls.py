@@ -328,7 +328,7 @@ def test_a_moment_of_one_log_is_not_looked_for_in_several(tanh_robot, measure, f
     assert dict(diagnose(logs, fitted).not_identifiable)["abrupt_loss"].startswith("a moment of")
 
 
-def test_a_weakness_for_a_while_is_no_sure_patch_of_the_floor(tanh_robot, measure, fitted):
+def test_a_weakness_for_a_while_is_named_with_its_times(tanh_robot, measure, fitted):
     """A third of the speed is gone from 15 to 22 s, wherever the robot is then."""
 
     class Tired(tanh_robot):
@@ -338,8 +338,11 @@ def test_a_weakness_for_a_while_is_no_sure_patch_of_the_floor(tanh_robot, measur
             return super().wheels_mps(duty) * np.where(tired, 0.67, 1.0)[:, None]
 
     found = diagnose([measure(Tired(), 22, 40.0)], fitted)
-    assert found.verdict != "model_adequate"
-    assert not [f.effect for f in found.findings if f.certainty == "sure"]
+    (finding,) = found.findings
+    assert (finding.effect, finding.certainty) == ("transient_loss", "sure")
+    loss, from_s, until_s = finding.parameters
+    assert abs(loss.value - 0.33) < 2 * loss.std < 0.15
+    assert (from_s.value, until_s.value) == pytest.approx((15, 22), abs=0.5)
 
 
 def test_a_body_that_turns_sooner_than_it_drives_is_named(tanh_robot, measure, fitted):
