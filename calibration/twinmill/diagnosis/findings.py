@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import twinmill_native as native
@@ -49,6 +50,7 @@ BY = {
     "time": {"history", "battery"},
     CHANGE: {"changes"},
 }
+SLIGHT = 0.3  # of the squared score that is left: what a second finding must at least take
 MUCH = 0.25  # share of what was to be explained that is left: no lag leaves so much
 NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
 
@@ -141,7 +143,8 @@ def findings_of(
     """Findings in the order of worth, and the held-out score after each of them.
 
     Worth is what the final model loses without the effect. Shares are those of a chain that adds
-    the effects in this order.
+    the effects in this order. Effects that stand in for each other lose little alone: where the
+    first takes less than a later one, the order is that of what each takes in the chain.
 
     Args:
         done: the search.
@@ -152,10 +155,14 @@ def findings_of(
     given = _as_given(done.last, first) if REFIT in names else None
     loss = {n: _loss(done.last, given if n == REFIT else less[n]) for n in names}
     names.sort(key=lambda n: -loss[n])
-    state, chain = first, [fitted(first)]
-    for name in names:
-        state = grown(state, [name])
-        chain.append(_from_final(state, done.last))
+    chain = _chain(names, first, done.last)
+    falls = {
+        n: a.held_score**2 - b.held_score**2
+        for n, (a, b) in zip(names, pairwise(chain), strict=True)
+    }
+    if falls and max(falls.values()) > falls[names[0]]:
+        names.sort(key=lambda n: -falls[n])
+        chain = _chain(names, first, done.last)
     errors = [_squared(t) for t in chain]
     # Where the floor itself holds a part of what was found, the final error stands for it.
     excess = max(errors[0] - min(errors[-1], 1.0), 1e-9)
@@ -163,7 +170,13 @@ def findings_of(
     found = []
     for k, name in enumerate(names):
         share = float(np.clip((errors[k] - errors[k + 1]) / excess, 0.0, 1.0))
-        found.append(_finding(done, name, less.get(name), share, changes))
+        finding = _finding(done, name, less.get(name), share, changes)
+        larger = next((n for n in names[:k] if n != REFIT), None)
+        before, after = (t.held_score**2 for t in chain[k : k + 2])
+        if larger and name != REFIT and before - after < SLIGHT * after:
+            why = f"it takes little of what {larger} leaves, which may have another form"
+            finding = _doubted(finding, why)
+        found.append(finding)
     return found, [(n, t.held_score) for n, t in zip(names, chain[1:], strict=True)]
 
 
@@ -172,8 +185,8 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
 
     So it is where what is left still depends on what they act by; where one makes the robot later
     and another sooner: a lag below its own and a delay imitate a body that swings; and where a
-    second one bends the curve of speed over command, or is late at every change of the command, as
-    a better one is already.
+    second one bends the curve of speed over command as a better one does already, or comes late at
+    every change of the command, unless both are the usual delay and lags in a row.
 
     Args:
         found: in the order of worth.
@@ -182,6 +195,7 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
     swinging = swings(found)
     curves = [f.effect for f in found if f.effect in _curves()]
     late = [f.effect for f in found if _is_late(f)]
+    peculiar = any(not late_part(n) for n in late)
 
     def judged(finding: Finding) -> Finding:
         if swinging and _lateness_s(finding):
@@ -193,7 +207,7 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
         if finding.effect in curves[1:]:
             why = f"{curves[0]} bends the speed over the command, too: both may be one other curve"
             return _doubted(finding, why)
-        if finding.effect in late[1:]:
+        if peculiar and finding.effect in late[1:]:
             why = f"{late[0]} is late at changes of the command, too: both may be one other lag"
             return _doubted(finding, why)
         return finding
@@ -222,7 +236,8 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
             why = "more is left than it takes, so that it may be a part of something else"
             return _doubted(finding, why)
         if rest.share > MUCH and _is_late(finding):
-            return _doubted(finding, "much is left: something else may come late")
+            why = "much is left: something else at changes of the command may be late"
+            return _doubted(finding, why, wrong_form=True)
         return finding
 
     return [judged(f) for f in found]
@@ -311,6 +326,15 @@ def _is_error(own: ParameterEstimate, model: native.Model, stds: Mapping[str, fl
     card = next(p for p in catalogue_of(model)[name]["parameters"] if p["name"] == key)
     known = stds.get(f"{name}.{key}", 0.0)
     return abs(own.value - card["neutral"]) <= WITHIN * np.hypot(own.std, known)
+
+
+def _chain(names: Sequence[str], first: State, last: Trial) -> list[Trial]:
+    """Fits of the first state, and of it with one effect more each time."""
+    state, chain = first, [fitted(first)]
+    for name in names:
+        state = grown(state, [name])
+        chain.append(_from_final(state, last))
+    return chain
 
 
 def _from_final(state: State, last: Trial) -> Trial:

@@ -66,7 +66,12 @@ def relevance(
             value = refitted.get(free.name) + change
             refitted.set(free.name, float(np.clip(value, free.min, free.max)))
         parts = [
-            score(difference(*(w.predicted(s.with_model(m)) for m in (model, refitted))), f)
+            score(
+                difference(
+                    *(w.predicted(s.measurement, s.with_model(m).model) for m in (model, refitted))
+                ),
+                f,
+            )
             for s, w, f in zip(scenes, windows, floors, strict=True)
         ]
         added2.append(np.mean(np.square(parts)))
