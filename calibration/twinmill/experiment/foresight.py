@@ -8,7 +8,7 @@ import twinmill_native as native
 
 from twinmill.data.log import CommandKind
 from twinmill.data.measurement import Measurement
-from twinmill.data.track import Timing, Track, command_at
+from twinmill.data.track import SILENCE_S, Timing, Track, command_at
 from twinmill.experiment.moves import Move
 from twinmill.model.parameters import CLOCK
 from twinmill.predict.problem import Scene
@@ -113,9 +113,8 @@ class Played:
         """
         pose = self.path(like.model, start)
         old = like.measurement.track
-        t_s = np.union1d(
-            self.rows.t_s, np.arange(0.0, self.rows.t_s[-1], old.timing.command_period_s)
-        )
+        period_s = min(old.timing.command_period_s, SILENCE_S / 2)
+        t_s = np.union1d(self.rows.t_s, np.arange(0.0, self.rows.t_s[-1], period_s))
         track = Track(
             old.robot_id,
             self.rows.kind,
