@@ -16,6 +16,7 @@ from twinmill.diagnosis.search import REFIT, Search, Trial, without
 from twinmill.fitting.opening import Opened
 
 TIMES, MORE = 1.15, 6.0  # a formula that takes so many times as much, and so much more, outdoes it
+KEPT = 0.5  # share of what an effect takes that it takes beside a formula for something else
 
 
 def less_each(done: Search, opened: Sequence[Opened]) -> tuple[dict[str, Trial], Formulas | None]:
@@ -39,7 +40,7 @@ def less_each(done: Search, opened: Sequence[Opened]) -> tuple[dict[str, Trial],
 
 
 def better_formula(formulas: Formulas, less: Trial, whole: Trial) -> Term | None:
-    """The formula that outdoes an effect, if there is one.
+    """The formula that outdoes an effect, if there is one, and does what the effect does.
 
     Args:
         formulas: over the logs.
@@ -49,7 +50,13 @@ def better_formula(formulas: Formulas, less: Trial, whole: Trial) -> Term | None
     before, _ = less.fit.state
     after, _ = whole.fit.state
     effect = [before[i] - after[i] for i, _ in formulas.logs]
-    gains = formulas.products(less.fit, effect).each_held_out()
-    best = int(np.argmax(gains[1:]))
-    outdone = gains[1 + best] > max(TIMES * gains[0], gains[0] + MORE)
-    return formulas.terms[best] if outdone else None
+    products = formulas.products(less.fit, effect)
+    own, *gains = products.each_held_out()
+    for k in np.argsort(gains)[::-1]:
+        if gains[k] <= max(TIMES * own, own + MORE):
+            return None
+        both = np.isin(np.arange(1 + len(gains)), [0, 1 + k])
+        beside = products.held_out(both, 0)[0] - gains[k]
+        if beside < KEPT * own:
+            return formulas.terms[k]
+    return None

@@ -466,7 +466,8 @@ def screen(before: Trial, ways: Ways | None = None) -> list[Screened]:
     Args:
         before: what is free in it is projected out.
         ways: of effects whose start is searched, found in earlier rounds; new ones are added. What
-            was accepted since changes little of how a patch of the floor changes the rows.
+            was accepted since changes little of how a patch of the floor changes the rows, but
+            much of which limit is the right one.
     """
     fit, state = before.fit, before.state
     ways = {} if ways is None else ways
@@ -480,7 +481,7 @@ def screen(before: Trial, ways: Ways | None = None) -> list[Screened]:
     found = []
     for name in candidates(state):
         searched = any(with_role(name, role) for role in STARTS)
-        if searched and name not in ways:
+        if searched and (name not in ways or with_role(name, "limit")):
             ways[name] = _ways(name, state, rows)
         start = _best_start(*ways[name], weights, rest) if searched else {}
         found.append(_screened(name, state, rows, weights, basis, rest, start))
