@@ -17,11 +17,9 @@ from twinmill.diagnosis.findings import (
     lateness,
     of_another_form,
     ranking_of,
-    swings,
     with_stale_numbers,
 )
 from twinmill.diagnosis.irregularity import notes_on
-from twinmill.diagnosis.library import CHANGE
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
 from twinmill.diagnosis.resolution import resolutions
 from twinmill.diagnosis.rest import rest_of
@@ -213,8 +211,8 @@ def _concluded(
     )
     rest = rest_of(formulas, last.fit, start.fit, model_file.left_over(hashes))
     findings = beside_more(of_another_form(findings, rest.depends_on), rest)
-    if swings(findings):
-        rest = replace(rest, depends_on=[*dict.fromkeys([CHANGE, *rest.depends_on])])
+    told = [f.depends_on for f in findings if f.depends_on]
+    rest = replace(rest, depends_on=[*dict.fromkeys([*told, *rest.depends_on])])
     models = zip(known, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]

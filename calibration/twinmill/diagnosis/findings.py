@@ -9,7 +9,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.constancy import Change, changes_of
-from twinmill.diagnosis.library import CHANGE
+from twinmill.diagnosis.library import CHANGE, TIME
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import (
     REFIT,
@@ -17,6 +17,7 @@ from twinmill.diagnosis.search import (
     Search,
     State,
     Trial,
+    comes_again,
     fitted,
     grown,
     of_levels,
@@ -31,6 +32,7 @@ from twinmill.model.parameters import (
     effect_names,
     late_part,
     newest_instance,
+    with_role,
 )
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
@@ -42,12 +44,11 @@ BEYOND = 3.0  # usual sizes, or standard deviations from it at a bound: doubtful
 NEAR = 0.5  # ... if another leaves less than this more of the squared score, or a rest is left
 AWAY_S = 2.0  # between two visits of a place
 WEIGHTY = 0.1  # share of what the visit brings that speaks loudest for a place
-SWINGS = "sooner by one lag and later by another is what a body does that swings"
 # Groups of a rest, and what the cards of effects that act by them need or are shown by.
 BY = {
     "place": {"places", "place"},
     "heading": {"headings", "heading"},
-    "time": {"history", "battery"},
+    TIME: {"history", "battery"},
     CHANGE: {"changes"},
 }
 SLIGHT = 0.3  # of the squared score that is left: what a second finding must at least take
@@ -66,7 +67,8 @@ class Finding:
         certainty: sure, group or doubtful.
         why: of a doubt; empty otherwise.
         again: the model given has the effect already, with other numbers.
-        wrong_form: what is left says that something of another form stands behind it.
+        wrong_form: something of another form stands behind it.
+        depends_on: what that depends on, where the doubt tells it; else empty.
     """
 
     effect: str
@@ -77,6 +79,7 @@ class Finding:
     why: str = ""
     again: bool = False
     wrong_form: bool = False
+    depends_on: str = ""
 
     @property
     def takes(self) -> str:
@@ -171,13 +174,22 @@ def findings_of(
     for k, name in enumerate(names):
         share = float(np.clip((errors[k] - errors[k + 1]) / excess, 0.0, 1.0))
         finding = _finding(done, name, less.get(name), share, changes)
+        if again := comes_again(done, name):
+            why = f"it comes more than once: from {again[0]:.0f} to {again[1]:.0f} s, too"
+            finding = _doubted(finding, why, wrong_form=True, depends_on=TIME)
         larger = next((n for n in names[:k] if n != REFIT), None)
-        before, after = (t.held_score**2 for t in chain[k : k + 2])
-        if larger and name != REFIT and before - after < SLIGHT * after:
-            why = f"it takes little of what {larger} leaves, which may have another form"
-            finding = _doubted(finding, why)
-        found.append(finding)
+        found.append(_beside_larger(finding, larger, *chain[k : k + 2]))
     return found, [(n, t.held_score) for n, t in zip(names, chain[1:], strict=True)]
+
+
+def _beside_larger(finding: Finding, larger: str | None, before: Trial, after: Trial) -> Finding:
+    """The finding, doubtful where it takes little of what a larger one leaves."""
+    left = after.held_score**2
+    if larger is None or finding.effect == REFIT or before.held_score**2 - left >= SLIGHT * left:
+        return finding
+    return _doubted(
+        finding, f"it takes little of what {larger} leaves, which may have another form"
+    )
 
 
 def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list[Finding]:
@@ -186,20 +198,27 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
     So it is where what is left still depends on what they act by; where one makes the robot later
     and another sooner: a lag below its own and a delay imitate a body that swings; and where a
     second one bends the curve of speed over command as a better one does already, or comes late at
-    every change of the command, unless both are the usual delay and lags in a row.
+    every change of the command, unless both are the usual delay and lags in a row; and where losses
+    come at several times.
 
     Args:
         found: in the order of worth.
         depends_on: groups that what is left depends on.
     """
-    swinging = swings(found)
+    late_s = [_lateness_s(f) for f in found]
+    swings = min(late_s, default=0.0) < 0 < max(late_s, default=0.0)
     curves = [f.effect for f in found if f.effect in _curves()]
     late = [f.effect for f in found if _is_late(f)]
     peculiar = any(not late_part(n) for n in late)
+    events = [f.effect for f in found if with_role(f.effect, "moment")]
 
     def judged(finding: Finding) -> Finding:
-        if swinging and _lateness_s(finding):
-            return _doubted(finding, SWINGS, wrong_form=True)
+        if swings and _lateness_s(finding):
+            why = "sooner by one lag and later by another is what a body does that swings"
+            return _doubted(finding, why, wrong_form=True, depends_on=CHANGE)
+        if finding.effect in events and len(events) > 1:
+            why = "losses at several times may be one that comes and goes"
+            return _doubted(finding, why, wrong_form=True, depends_on=TIME)
         on = next((group for group in depends_on if BY.get(group, set()) & _acts_by(finding)), None)
         if on is not None:
             why = f"what is left still depends on {on}, so that it may have another form"
@@ -213,12 +232,6 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
         return finding
 
     return [judged(f) for f in found]
-
-
-def swings(found: Sequence[Finding]) -> bool:
-    """Whether one finding makes the robot later and another sooner."""
-    late_s = [_lateness_s(f) for f in found]
-    return min(late_s, default=0.0) < 0 < max(late_s, default=0.0)
 
 
 def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
@@ -243,11 +256,14 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
     return [judged(f) for f in found]
 
 
-def _doubted(finding: Finding, why: str, wrong_form: bool = False) -> Finding:
+def _doubted(finding: Finding, why: str, wrong_form: bool = False, depends_on: str = "") -> Finding:
     """The finding with one more reason to doubt it; the first is told."""
-    why = finding.why or why
     return replace(
-        finding, certainty="doubtful", why=why, wrong_form=finding.wrong_form or wrong_form
+        finding,
+        certainty="doubtful",
+        why=finding.why or why,
+        wrong_form=finding.wrong_form or wrong_form,
+        depends_on=finding.depends_on or depends_on,
     )
 
 

@@ -24,6 +24,7 @@ TYPICAL = {"vx_mps": 0.01, "vy_mps": 0.01, "omega_radps": 0.05, "rim_mps": 0.01}
 # Rates, voltage, history: not at hand in a body's formula.
 NO_NAMES = {"dvx", "dvy", "domega", "V", "after_reversal"}
 CHANGE = "change of the command"
+TIME = "time"
 REVERSAL_S = 0.15  # how long a reversal is felt
 # Of one wheel's command, with its half `h`; in proportion to u is a wheel's gain.
 SHAPES = ("u*abs(u)", "abs(u)", "sign(u)*max(0, abs(u) - h)")
@@ -84,12 +85,12 @@ def _terms_of_all_speeds(terms: Sequence[Term]) -> tuple[list[Term], np.ndarray]
     found: dict[str, dict[int, Term]] = {}
     for k, term in enumerate(terms):
         factor, _, carrier = term.formula.rpartition("*")
-        if term.group == "time" and carrier == carriers[term.adds_to]:
+        if term.group == TIME and carrier == carriers[term.adds_to]:
             found.setdefault(factor, {})[k] = term
     parts, of_all = np.zeros((len(terms), len(found))), []
     for n, (factor, own) in enumerate(found.items()):
         size = max(t.size for t in own.values() if t.adds_to != CHANNELS[2])
-        of_all.append(Term("time", "rim_mps", f"{factor}*rim", size))
+        of_all.append(Term(TIME, "rim_mps", f"{factor}*rim", size))
         for k, term in own.items():
             parts[k, n] = of_all[-1].strength / term.strength
     return of_all, parts
@@ -261,7 +262,7 @@ def _named_terms(
                 for carrier, values in (("moves", moving), *speeds):
                     terms["heading", f"{name}({n}*theta)*{carrier}"] = wave * values
     for group, name, values in (
-        ("place", "x", x), ("place", "y", y), ("time", "t", t_s), ("battery voltage", "V", voltage)
+        ("place", "x", x), ("place", "y", y), (TIME, "t", t_s), ("battery voltage", "V", voltage)
     ):  # fmt: skip
         if np.ptp(values) <= 0:
             continue
@@ -273,7 +274,7 @@ def _named_terms(
                 terms[group, f"{text}*{text}*{carrier}"] = away**2 * speed
     for at_s in (middles[f"t{k}"] for k in range(len(PARTS))):
         for carrier, speed in speeds:
-            terms["time", f"sign(t - {at_s:g})*{carrier}"] = np.sign(t_s - at_s) * speed
+            terms[TIME, f"sign(t - {at_s:g})*{carrier}"] = np.sign(t_s - at_s) * speed
     return terms
 
 

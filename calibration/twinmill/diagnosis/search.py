@@ -347,6 +347,24 @@ def _began_before(trial: Trial, name: str) -> bool:
     return not all(low_s < t_s < high_s for t_s in at_s)
 
 
+def comes_again(done: Search, name: str) -> tuple[float, float] | None:
+    """When an effect that begins and ends comes a second time, s since the first command.
+
+    None if it does not, or if the second time touches the first, which is another form of one.
+    """
+    if name not in done.found or len(with_role(name, "moment")) < 2:
+        return None
+    (again,) = screen(done.last, names=[name])
+    trial = attempt(done.last, (name,), again.start)
+    first, second = (
+        [model.get(f"{newest_instance(model, name)}.{key}") for key in with_role(name, "moment")]
+        for model in (done.last.state.model, trial.state.model)
+    )
+    apart_s = max(second[0] - first[1], first[0] - second[1])
+    fresh = _proven(trial, done.last.held_score, done.settings) and not _began_before(trial, name)
+    return (second[0], second[1]) if fresh and apart_s > APART_S else None
+
+
 def _is_common(before: Trial, refit: Trial, settings: Settings) -> bool:
     """Whether the base's numbers take what each robot's own gains took, and all took alike.
 
@@ -460,11 +478,14 @@ def candidates(state: State) -> list[str]:
 Ways = dict[str, tuple[list[dict[str, float]], list[np.ndarray]]]
 
 
-def screen(before: Trial, ways: Ways | None = None) -> list[Screened]:
+def screen(
+    before: Trial, ways: Ways | None = None, names: Sequence[str] | None = None
+) -> list[Screened]:
     """Every candidate's expected worth, by its signature over what is free.
 
     Args:
         before: what is free in it is projected out.
+        names: of the candidates, where not all that the state can have are meant.
         ways: of effects whose start is searched, found in earlier rounds; new ones are added. What
             was accepted since changes little of how a patch of the floor changes the rows, but
             much of which limit is the right one.
@@ -479,7 +500,7 @@ def screen(before: Trial, ways: Ways | None = None) -> list[Screened]:
     basis = np.linalg.qr(free)[0] if len(fit.x) else free
     rest = padded - basis @ (basis.T @ padded)
     found = []
-    for name in candidates(state):
+    for name in candidates(state) if names is None else names:
         searched = any(with_role(name, role) for role in STARTS)
         if searched and (name not in ways or with_role(name, "limit")):
             ways[name] = _ways(name, state, rows)
@@ -667,6 +688,7 @@ def _next_instance(name: str, state: State) -> str:
 
 MOMENTS = 16  # over the time of the log
 NEVER_S = 1e5  # later than any log ends
+APART_S = 2.0  # between the end of what lasts for a while and its next begin
 MARGIN = 0.05  # share of it at each end, within which a moment is none
 
 

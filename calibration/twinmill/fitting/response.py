@@ -6,6 +6,9 @@ dozen delays, shapes of it, products, heading, place and time, and the velocity 
 refitted to this very log. A window's displacement is then linear in the same coefficients, so that
 ridge regression on the windows of the score gives them. A ridge for each group of features is
 chosen by the errors of left-out blocks (Hoerl and Kennard 1970; generalised to groups).
+
+A second stage lets the gains of that response wander over time and place. It is fitted to what the
+first one leaves on left-out blocks, since together they would have too many features.
 """
 
 from collections.abc import Sequence
@@ -27,14 +30,24 @@ HAT_LAGS = (0.5, 1.0, 1.8)  # times the base's lag
 BASE_LAGS_S = (0.0, 0.1, 0.3)
 SHORTEST_LAG_S = 0.03
 NEAR_S = 0.3  # delays whose mean stands for the command in products
-LADDER = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 1e5)  # ridge over a group's mean square; the last: out
+OUT = 1e5  # ridge over a group's mean square with which nothing of it is left
+LADDER = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, OUT)
 GROUPS = ("base", "own", "cross", "shape", "product", "room", "place")
 FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
+WANDERS = ("waves", "hats", "places")  # groups of the second stage
 WORTH = 0.998  # a ridge is taken if it lowers the left-out error to this share
+WORTH_WANDER = 0.97  # the same of the second stage: gains that wander are no usual thing
+WAVE_S = 6.0  # the shortest time over which a gain wanders
+MOST_WAVES = 24
+PLACES = 5  # along each side of the floor that was driven
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
 GRID_S = 0.01
 PLACE_SCALE_M = 2.0
 MIXING = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # of four mecanum wheels
+
+
+# (W,) bool, and (w, F) rows forward, left and of turning for the windows of a horizon.
+Rows = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -74,6 +87,7 @@ class Response:
             self._fit(self.errors, self.ridges)
         else:
             self._fit(begin.errors, begin.ridges)
+        self._fit_wandering()
 
     # -- where features are taken ---------------------------------------------------------------
 
@@ -231,7 +245,7 @@ class Response:
     # -- windows --------------------------------------------------------------------------------
 
     def _lay_windows(self) -> None:
-        """Blocks and parts of windows, and the rows (w, F) of each horizon and channel."""
+        """Blocks and parts of windows, and the features' rows."""
         data = self.data
         start_s = data.start_s - data.start_s[0]
         length_s = float(start_s[-1])
@@ -242,22 +256,28 @@ class Response:
         self.fold = self._part(start_s)
         self.end_fold = self._part(end_s)
         self.tail_fold = self._part(start_s - 2.0)
+        self.rows = self._rows(self.features)
+
+    def _rows(self, features: Sequence[np.ndarray]) -> list[Rows]:
+        """Of each horizon the windows that have it, and (w, F) rows of each channel."""
+        data = self.data
         c, s = np.cos(self.heading_rad) * self.step_s, np.sin(self.heading_rad) * self.step_s
-        forward, left, turn = self.features
+        forward, left, turn = features
         sums = [
             np.cumsum(weight[:, None] * f, axis=0)
             for weight, f in ((c, forward), (s, forward), (c, left), (s, left), (self.step_s, turn))
         ]
         track = data.measurement.track
         heading = np.nan_to_num(track.heading_smooth[data.windows.starts])
-        self.rows = []
+        rows = []
         for h in range(self.ends.shape[1]):
             ok = (self.ends[:, h] >= 0) & np.isfinite(data.measured[:, h, :2]).all(axis=1)
             cx, sx, cy, sy, w = (q[self.ends[ok, h]] - q[self.starts[ok]] for q in sums)
             ch, sh = np.cos(heading[ok])[:, None], np.sin(heading[ok])[:, None]
             along = np.concatenate([ch * cx + sh * sx, -ch * sy + sh * cy], axis=1)
             across = np.concatenate([ch * sx - sh * cx, ch * cy + sh * sy], axis=1)
-            self.rows.append((ok, along, across, w))
+            rows.append((ok, along, across, w))
+        return rows
 
     def _part(self, t_s: np.ndarray) -> np.ndarray:
         return np.floor(t_s / self.block_s).astype(int) % self.folds
@@ -267,15 +287,69 @@ class Response:
     def _fit(self, scale: np.ndarray, ridges: list[np.ndarray | None]) -> None:
         """Coefficients with the errors (H, 3) of another fit as weights."""
         scale = _isotropic(scale)
-        self.coefficients, self.ridges = [], list(ridges)
+        coefficients, self.ridges = [], list(ridges)
         for part in (0, 1):
-            equations = self._equations(part, scale)
+            equations = self._equations(part, scale, self.rows, self.data.measured)
             if equations is None:
-                self.coefficients.append(None)
+                coefficients.append(None)
                 continue
             groups = np.concatenate(self.groups[:2]) if part == 0 else self.groups[2]
-            self.ridges[part], *found = _ridge(*equations, groups, ridges[part])
-            self.coefficients.append(found)
+            begun = ridges[part]
+            if begun is None:
+                begun = np.array([FIRST_RIDGE.get(g, OUT) for g in GROUPS])
+            self.ridges[part], *found = _ridge(*equations, groups, begun, WORTH)
+            coefficients.append(found)
+        self.stages = [(self.features, coefficients)]
+        self._judge()
+
+    def _fit_wandering(self) -> None:
+        """The second stage, fitted to what the first leaves."""
+        shapes = self._wandering()
+        groups = np.repeat(np.arange(len(WANDERS)), [s.shape[1] for s in shapes])
+        gain = np.hstack(shapes)
+        features = [gain * own[:, None] for own in self.velocity(None).T]
+        rows, left, scale = self._rows(features), self._left(), _isotropic(self.errors)
+        coefficients = []
+        for part in (0, 1):
+            equations = self._equations(part, scale, rows, left)
+            if equations is None:
+                coefficients.append(None)
+                continue
+            begun = np.full(len(WANDERS), OUT)
+            own = np.tile(groups, 2) if part == 0 else groups
+            _, *found = _ridge(*equations, own, begun, WORTH_WANDER)
+            coefficients.append(found)
+        self.stages.append((features, coefficients))
+        self._judge()
+
+    def _wandering(self) -> list[np.ndarray]:
+        """(N, k) shapes of each of WANDERS: waves and hats over time, bells over the floor."""
+        t_s = self.middle_s - self.middle_s.min()
+        length_s = 1.1 * t_s.max()
+        waves = np.arange(1, 1 + int(np.clip(length_s / WAVE_S, 2, MOST_WAVES)))
+        angle = 2 * np.pi * t_s[:, None] / length_s * waves
+        knots_s = np.linspace(0, t_s.max(), len(waves) + 1)
+        hats = [np.interp(t_s, knots_s, own) for own in np.eye(len(knots_s))]
+        bells = []
+        for axis in self.pose[:, :2].T:
+            middles = np.linspace(*np.quantile(axis, (0.03, 0.97)), PLACES)
+            width_m = max(middles[1] - middles[0], 0.1)
+            bells.append(np.exp(-(((axis[:, None] - middles) / width_m) ** 2)))
+        x, y = bells
+        places = (x[:, :, None] * y[:, None, :]).reshape(len(t_s), -1)
+        return [np.hstack([np.cos(angle), np.sin(angle)]), np.stack(hats, axis=-1), places]
+
+    def _left(self) -> np.ndarray:
+        """(W, H, 3) what the first stage, fitted to other blocks, leaves of the rows."""
+        left = self.data.measured.copy()
+        plane, turn = self.stages[0][1]
+        for h, (ok, along, across, w) in enumerate(self.rows):
+            for channel, x, found in ((0, along, plane), (1, across, plane), (2, w, turn)):
+                if found is not None:
+                    left[ok, h, channel] -= np.sum(x * found[1][self.fold[ok]], axis=1)
+        return left
+
+    def _judge(self) -> None:
         self.within = difference(self.data.measured, self.predict(None))
         self.across = difference(self.data.measured, self.predict(self.fold))
 
@@ -285,14 +359,14 @@ class Response:
         return np.sqrt((rms(self.within) ** 2 + rms(self.across) ** 2) / 2)
 
     def _equations(
-        self, part: int, scale: np.ndarray
+        self, part: int, scale: np.ndarray, rows: list[Rows], wanted: np.ndarray
     ) -> tuple[tuple[np.ndarray, np.ndarray], list[Fold]] | None:
         """Normal matrices of all rows of the plane (0) or of turning (1), and of each fold."""
         total, folds = None, []
-        for h, (ok, along, across, w) in enumerate(self.rows):
+        for h, (ok, along, across, w) in enumerate(rows):
             chosen = ((0, along), (1, across)) if part == 0 else ((2, w),)
             for channel, x in chosen:
-                size, y = scale[h, channel], self.data.measured[ok, h, channel]
+                size, y = scale[h, channel], wanted[ok, h, channel]
                 known = np.isfinite(y)
                 if not size > 1e-9 or not known.any():
                     continue
@@ -324,16 +398,14 @@ class Response:
     def velocity(self, fold: int | None) -> np.ndarray:
         """(N, 3) forward, left, turning at each point; of the fit without a fold."""
         found = np.zeros((len(self.points), 3))
-        width = self.features[0].shape[1]
-        plane, turn = self.coefficients
-        if plane is not None:
-            beta = plane[0] if fold is None else plane[1][fold]
-            found[:, 0], found[:, 1] = (
-                self.features[0] @ beta[:width],
-                self.features[1] @ beta[width:],
-            )
-        if turn is not None:
-            found[:, 2] = self.features[2] @ (turn[0] if fold is None else turn[1][fold])
+        for features, (plane, turn) in self.stages:
+            width = features[0].shape[1]
+            if plane is not None:
+                beta = plane[0] if fold is None else plane[1][fold]
+                found[:, 0] += features[0] @ beta[:width]
+                found[:, 1] += features[1] @ beta[width:]
+            if turn is not None:
+                found[:, 2] += features[2] @ (turn[0] if fold is None else turn[1][fold])
         return found
 
     def predict(self, fold: np.ndarray | None) -> np.ndarray:
@@ -444,7 +516,8 @@ def _ridge(
     total: tuple[np.ndarray, np.ndarray],
     folds: list[Fold],
     groups: np.ndarray,
-    ridge: np.ndarray | None,
+    ridge: np.ndarray,
+    worth: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Ridge of each group, coefficients (F,) of all rows, and (K, F) without each fold.
 
@@ -455,15 +528,13 @@ def _ridge(
         mean[groups == g] = mean[groups == g].mean()
     mean += 1e-9 * mean.max() + 1e-30
     left_out = _LeftOut(total, folds, mean, groups)
-    if ridge is None:
-        ridge = np.array([FIRST_RIDGE.get(g, 1e5) for g in GROUPS])
     best = left_out.at(ridge)
     for _ in range(2):
         moved = False
         for g in np.unique(groups):
             trials = left_out.trials(g, LADDER)
             k = int(np.argmin(trials))
-            if trials[k] < best * WORTH:
+            if trials[k] < best * worth:
                 ridge = np.where(np.arange(len(ridge)) == g, LADDER[k], ridge)
                 best, moved = left_out.at(ridge), True
         if not moved:
