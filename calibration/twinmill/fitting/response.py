@@ -14,6 +14,7 @@ first one leaves on left-out blocks, since together they would have too many fea
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import lfilter
@@ -34,10 +35,11 @@ OUT = 1e5  # ridge over a group's mean square with which nothing of it is left
 LADDER = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, OUT)
 GROUPS = ("base", "own", "cross", "shape", "product", "room", "place")
 FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
-WANDERS = ("waves", "hats", "places")  # groups of the second stage
+WANDERS = ("quick", "waves", "slow", "hats", "places")  # groups of the second stage
 WORTH = 0.998  # a ridge is taken if it lowers the left-out error to this share
 WORTH_WANDER = 0.97  # the same of the second stage: gains that wander are no usual thing
 WAVE_S = 6.0  # the shortest time over which a gain wanders
+BANDS_S = (0.0, 9.0, 18.0, np.inf)  # of the periods of waves
 MOST_WAVES = 24
 PLACES = 5  # along each side of the floor that was driven
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
@@ -337,7 +339,10 @@ class Response:
             bells.append(np.exp(-(((axis[:, None] - middles) / width_m) ** 2)))
         x, y = bells
         places = (x[:, :, None] * y[:, None, :]).reshape(len(t_s), -1)
-        return [np.hstack([np.cos(angle), np.sin(angle)]), np.stack(hats, axis=-1), places]
+        period_s = length_s / waves
+        bands = [(low <= period_s) & (period_s < high) for low, high in pairwise(BANDS_S)]
+        swells = [np.hstack([np.cos(angle[:, own]), np.sin(angle[:, own])]) for own in bands]
+        return [*swells, np.stack(hats, axis=-1), places]
 
     def _left(self) -> np.ndarray:
         """(W, H, 3) what the first stage, fitted to other blocks, leaves of the rows."""

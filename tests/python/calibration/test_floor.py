@@ -17,6 +17,7 @@ from twinmill.predict.windows import difference, rms
 
 NO_NOISE = dict(sensor_m=0, sensor_rad=0, drive_mps=0, drive_radps=0)
 SWAPPED = [1, 0, 2, 3]
+EULER_S = 1 / 480  # step of the robots here
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +76,24 @@ def test_floor_is_how_far_noise_takes_the_robot(opened, tanh_robot, measure):
     truth = rms(np.where(opened.floor.keep[:, None, None], errors, np.nan))
     assert 0.8 < np.sqrt(np.mean((truth / opened.floor.rms) ** 2)) < 1.1
     assert np.all((opened.floor.rms / truth > 0.6) & (opened.floor.rms / truth < 1.6))
+
+
+def test_a_gain_that_swells_and_ebbs_is_not_all_noise(tanh_robot, measure, model_file):
+    """A quarter of the speed more and less, over 20 s: no command tells it, but the time does.
+
+    Blocks of 8 s that are left out are gaps of 12 s between windows, so that a part stays. How far
+    the swell alone takes the robot is told by the same drive without it and without noise.
+    """
+
+    class Tidal(tanh_robot):
+        def wheels_mps(self, duty):
+            at_s = np.arange(len(duty)) * EULER_S
+            return super().wheels_mps(duty) * (1 + 0.25 * np.sin(2 * np.pi * at_s / 20))[:, None]
+
+    (opened,) = open_measurements([measure(Tidal(), 2, 150.0)], model_file())
+    steady = opened.data.windows.measured(measure(tanh_robot(**NO_NOISE), 2, 150.0))
+    swell = rms(difference(opened.data.measured, steady))[2:, 0]
+    assert np.all(opened.floor.rms[2:, 0] < 0.65 * swell)
 
 
 def test_the_right_model_scores_one_and_a_wrong_one_more(drive, true_model, model_file):

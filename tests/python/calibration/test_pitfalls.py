@@ -347,6 +347,21 @@ def test_a_weakness_for_a_while_is_named_with_its_times(tanh_robot, measure, fit
         assert abs(moment.value - true_s) < min(2 * moment.std, 2.0)
 
 
+def test_a_weakness_that_comes_again_is_told_to_depend_on_time(tanh_robot, measure, fitted):
+    """A quarter of the speed is gone from 12 to 20 s, and from 35 to 43 s: no effect is so."""
+
+    class Weary(tanh_robot):
+        def wheels_mps(self, duty):
+            at_s = np.arange(len(duty)) * EULER_S
+            weary = ((at_s > 12) & (at_s < 20)) | ((at_s > 35) & (at_s < 43))
+            return super().wheels_mps(duty) * np.where(weary, 0.75, 1.0)[:, None]
+
+    found = diagnose([measure(Weary(), 22, 60.0)], fitted)
+    assert found.verdict == "outside_catalogue"
+    assert found.rest.depends_on[0] == "time"
+    assert not [f.effect for f in found.findings if f.certainty == "sure"]
+
+
 def test_a_body_that_turns_sooner_than_it_drives_is_named(tanh_robot, measure, fitted):
     """Driving takes the robot's 0.09 s, turning 0.04 s: first orders by themselves, summed."""
     spin = np.array([-1, 1, -1, 1]) / 2
