@@ -198,8 +198,7 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
     So it is where what is left still depends on what they act by; where one makes the robot later
     and another sooner: a lag below its own and a delay imitate a body that swings; and where a
     second one bends the curve of speed over command as a better one does already, or comes late at
-    every change of the command, unless both are the usual delay and lags in a row; and where losses
-    come at several times.
+    every change of the command; and where losses come at several times.
 
     Args:
         found: in the order of worth.
@@ -209,7 +208,6 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
     swings = min(late_s, default=0.0) < 0 < max(late_s, default=0.0)
     curves = [f.effect for f in found if f.effect in _curves()]
     late = [f.effect for f in found if _is_late(f)]
-    peculiar = any(not late_part(n) for n in late)
     events = [f.effect for f in found if with_role(f.effect, "moment")]
 
     def judged(finding: Finding) -> Finding:
@@ -226,7 +224,7 @@ def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list
         if finding.effect in curves[1:]:
             why = f"{curves[0]} bends the speed over the command, too: both may be one other curve"
             return _doubted(finding, why)
-        if peculiar and finding.effect in late[1:]:
+        if finding.effect in late[1:]:
             why = f"{late[0]} is late at changes of the command, too: both may be one other lag"
             return _doubted(finding, why)
         return finding

@@ -58,7 +58,7 @@ class Settings:
         pairs: so many pairs are tried where no single candidate is accepted.
         most: rounds.
         alike: canonical correlation of signatures from which two candidates are one group.
-        unlike: the same up to which they explain different things, however alike they do it.
+        unlike: cosine of what two take of the errors, up to which they explain different things.
         tie: difference of the held-out cost that decides nothing within a group.
         each: what a number that was fitted costs besides, where candidates are compared.
         imitates: share of the squared score taken by other numbers of the base that an effect must
@@ -86,7 +86,7 @@ class Settings:
     pairs: int = 3
     most: int = 6
     alike: float = 0.95
-    unlike: float = 0.2
+    unlike: float = 0.3
     tie: float = 6.0
     each: float = 2.0
     imitates: float = 0.95
@@ -784,11 +784,20 @@ def _tied(this: Round, settings: Settings) -> list[Trial]:
         *_, blocks_t = _against(trial.fit, accepted.fit)
         same = canonical_correlation(columns[accepted.names[0]], columns[trial.names[0]])
         below = max(accepted.held_score, trial.held_score) < 1.0  # differences there are no news
-        close = apart < settings.tie and same > settings.unlike and (blocks_t < 2.0 or below)
-        if close or (same > settings.alike and apart < settings.evidence):
+        close = apart < settings.tie and (blocks_t < 2.0 or below)
+        rivals = close and _in_common(this.before, accepted, trial) > settings.unlike
+        if rivals or (same > settings.alike and apart < settings.evidence):
             tied.append((same, trial))
     nearest = sorted(tied, key=lambda pair: -pair[0])[: settings.group - 1]
     return [trial for _, trial in nearest]
+
+
+def _in_common(before: Trial, one: Trial, other: Trial) -> float:
+    """Cosine between what two trials take of the errors: 0 if each explains something else."""
+    rows = [np.concatenate(t.fit.state[0]) for t in (before, one, other)]
+    first, second = rows[0] - rows[1], rows[0] - rows[2]
+    size = float(np.linalg.norm(first) * np.linalg.norm(second))
+    return float(first @ second) / max(size, 1e-300)
 
 
 def of_levels() -> list[str]:

@@ -557,9 +557,11 @@ def test_what_leaves_a_rest_of_its_own_kind_has_another_form(effect, depends_on,
     assert bool(judged.why) == judged.wrong_form == (certainty == "doubtful")
 
 
-@pytest.mark.parametrize(("extra_s", "certainty"), [(-0.06, "doubtful"), (0.06, "sure")])
+@pytest.mark.parametrize(
+    ("extra_s", "certainty"), [(-0.06, ["doubtful"] * 2), (0.06, ["sure", "doubtful"])]
+)
 def test_sooner_by_one_lag_and_later_by_another_is_no_lag(extra_s, certainty):
-    """A body on a spring answers late and then fast; two lags in a row only answer later."""
+    """A body on a spring answers late and then fast; two lags in a row may be one of more order."""
     sizes = {"input_delay.delay_s": 0.07, "motor_lag.extra_s": extra_s}
     found = [
         Finding(
@@ -571,7 +573,7 @@ def test_sooner_by_one_lag_and_later_by_another_is_no_lag(extra_s, certainty):
         )
         for name, value in sizes.items()
     ]
-    assert [f.certainty for f in of_another_form(found, [])] == [certainty] * 2
+    assert [f.certainty for f in of_another_form(found, [])] == certainty
 
 
 @pytest.mark.parametrize(
