@@ -390,8 +390,8 @@ TEST_P(EveryEffect, RestartsFromACopyOfItsState)
 // Of effects that change within a step and are right to second order: some micrometres.
 double Tolerance(const std::string &effect)
 {
-    for (const char *second_order : {"abrupt_loss", "transient_loss", "coasting", "floor_patch", "wheel_eccentricity",
-                                     "second_order_lag", "yaw_lag"})
+    for (const char *second_order : {"abrupt_loss", "transient_loss", "coasting", "floor_patch",
+                                     "wheel_eccentricity", "second_order_lag", "yaw_lag"})
         if (effect == second_order)
             return 1e-5;
     return 1e-12;

@@ -30,8 +30,8 @@ constexpr ParameterSpec kParameters[] = {
      "slower for a while", "faster for a while"},
     {"from_s", "s", 0, 1, 0, 100000, "since the log's first command; means nothing at no loss", "",
      "", 3, Role::kMoment},
-    {"until_s", "s", 100000, 6, 0, 100000, "when all is as before again; means nothing at no loss", "",
-     "", 3, Role::kMoment},
+    {"until_s", "s", 100000, 6, 0, 100000, "when all is as before again; means nothing at no loss",
+     "", "", 3, Role::kMoment},
 };
 
 // Narrower than the shortest prediction, so that both ends can be fitted and are still moments.
