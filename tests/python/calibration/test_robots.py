@@ -13,7 +13,7 @@ from twinmill.challenge.script import write_rich_script
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
-from twinmill.fitting.compare import GOOD, compare
+from twinmill.fitting.compare import MISSING, compare
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
 
@@ -118,7 +118,8 @@ def test_explain_writes_the_difference_as_that_robots_own(logged, tmp_path):
     # Each clock is the log's own, and takes up a part of a lag.
     assert lag_s == pytest.approx([0.06, 0.06, 0.12], abs=0.01)
     assert lag_s[2] - lag_s[0] == pytest.approx(0.06, abs=0.005)
-    assert compare(measurements, model).score < GOOD
+    # 30 s a robot tell the floor of each cell to some tenths.
+    assert compare(measurements, model).score < MISSING
 
 
 def test_a_robot_of_one_command_takes_the_clock_of_the_others(tanh_robot, measure, model_file):
