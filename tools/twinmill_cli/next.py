@@ -169,22 +169,18 @@ def _how(plan: Plan | Narrowing, logs: list[Path], model: str, script: Path) -> 
     if plan.rows.kind == "twist":
         program = shlex.quote(str(script.with_suffix(".py")))
         robot = f"twinmill characterise --robot {number} --script {path} --script-as publisher"
-        return present.How(
-            first,
-            [
-                ("As a program for ROS 2:", f"{robot} --out {program}"),
-                ("on the robot:", f"python3 {program}"),
-                ("then, what it sent and its poses imported:", then),
-            ],
-        )
+        steps = [
+            ("As a program for ROS 2:", f"{robot} --out {program}"),
+            ("on the robot:", f"python3 {program}"),
+            ("then, what it sent and its poses imported:", then),
+        ]
+        return present.How(first, steps)
     cap_pct = round(100 * float(np.abs(plan.rows.command).max()))
     robot = f"twinmill characterise --robot {number} --script {path} --cap-pct {cap_pct}"
     twin = f"twin_run --n 1 --model {shlex.quote(model)} --script {path}"
-    return present.How(
-        first,
-        [
-            ("On the robot:", f"{robot} --out next.lcmlog"),
-            ("or in the twin:", f"{twin} --log next.lcmlog"),
-            ("then:", then),
-        ],
-    )
+    steps = [
+        ("On the robot:", f"{robot} --out next.lcmlog"),
+        ("or in the twin:", f"{twin} --log next.lcmlog"),
+        ("then:", then),
+    ]
+    return present.How(first, steps)

@@ -52,7 +52,7 @@ BY = {
     CHANGE: {"changes"},
 }
 SLIGHT = 0.3  # of the squared score that is left: what a second finding must at least take
-MUCH = 0.25  # share of what was to be explained that is left: no lag leaves so much
+LAG_LEAVES = 0.25  # at most, of what was to be explained, where nothing else is late
 NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
 
 
@@ -246,7 +246,7 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
         if rest.share > taken:
             why = "more is left than it takes, so that it may be a part of something else"
             return _doubted(finding, why)
-        if rest.share > MUCH and _is_late(finding):
+        if rest.share > LAG_LEAVES and _is_late(finding):
             why = "much is left: something else at changes of the command may be late"
             return _doubted(finding, why, wrong_form=True)
         return finding

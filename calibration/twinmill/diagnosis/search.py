@@ -340,13 +340,17 @@ def _best(
 
 def _began_before(trial: Trial, name: str) -> bool:
     """An effect of a moment that is hardly within the logs: it is there all the time, or never."""
-    moments = with_role(name, "moment")
-    if not moments:
+    if not with_role(name, "moment"):
         return False
-    instance = newest_instance(trial.state.model, name)
-    at_s = [trial.state.model.get(f"{instance}.{key}") for key in moments]
     low_s, high_s = np.quantile(_times_s(trial.state), (MARGIN, 1 - MARGIN))
-    return not all(low_s < t_s < high_s for t_s in at_s)
+    return not all(low_s < t_s < high_s for t_s in _when_s(trial, name))
+
+
+def _when_s(trial: Trial, name: str) -> list[float]:
+    """Moments at which an effect begins and ends, s since the first command."""
+    model = trial.state.model
+    instance = newest_instance(model, name)
+    return [model.get(f"{instance}.{key}") for key in with_role(name, "moment")]
 
 
 def comes_again(done: Search, name: str) -> tuple[float, float] | None:
@@ -358,13 +362,10 @@ def comes_again(done: Search, name: str) -> tuple[float, float] | None:
         return None
     (again,) = screen(done.last, names=[name])
     trial = attempt(done.last, (name,), again.start)
-    first, second = (
-        [model.get(f"{newest_instance(model, name)}.{key}") for key in with_role(name, "moment")]
-        for model in (done.last.state.model, trial.state.model)
-    )
-    apart_s = max(second[0] - first[1], first[0] - second[1])
+    (begin_s, end_s), (again_s, over_s) = _when_s(done.last, name), _when_s(trial, name)
+    apart_s = max(again_s - end_s, begin_s - over_s)
     fresh = _proven(trial, done.last.held_score, done.settings) and not _began_before(trial, name)
-    return (second[0], second[1]) if fresh and apart_s > APART_S else None
+    return (again_s, over_s) if fresh and apart_s > PAUSE_S else None
 
 
 def _is_common(before: Trial, refit: Trial, settings: Settings) -> bool:
@@ -487,10 +488,10 @@ def screen(
 
     Args:
         before: what is free in it is projected out.
-        names: of the candidates, where not all that the state can have are meant.
         ways: of effects whose start is searched, found in earlier rounds; new ones are added. What
             was accepted since changes little of how a patch of the floor changes the rows, but
             much of which limit is the right one.
+        names: of the candidates, where not all that the state can have are meant.
     """
     fit, state = before.fit, before.state
     ways = {} if ways is None else ways
@@ -690,7 +691,7 @@ def _next_instance(name: str, state: State) -> str:
 
 MOMENTS = 16  # over the time of the log
 NEVER_S = 1e5  # later than any log ends
-APART_S = 2.0  # between the end of what lasts for a while and its next begin
+PAUSE_S = 2.0  # between the end of what lasts for a while and its next begin
 MARGIN = 0.05  # share of it at each end, within which a moment is none
 
 

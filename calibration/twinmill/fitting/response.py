@@ -288,19 +288,12 @@ class Response:
 
     def _fit(self, scale: np.ndarray, ridges: list[np.ndarray | None]) -> None:
         """Coefficients with the errors (H, 3) of another fit as weights."""
-        scale = _isotropic(scale)
-        coefficients, self.ridges = [], list(ridges)
-        for part in (0, 1):
-            equations = self._equations(part, scale, self.rows, self.data.measured)
-            if equations is None:
-                coefficients.append(None)
-                continue
-            groups = np.concatenate(self.groups[:2]) if part == 0 else self.groups[2]
-            begun = ridges[part]
-            if begun is None:
-                begun = np.array([FIRST_RIDGE.get(g, OUT) for g in GROUPS])
-            self.ridges[part], *found = _ridge(*equations, groups, begun, WORTH)
-            coefficients.append(found)
+        first = np.array([FIRST_RIDGE.get(g, OUT) for g in GROUPS])
+        begun = [first if ridge is None else ridge for ridge in ridges]
+        groups = [np.concatenate(self.groups[:2]), self.groups[2]]
+        coefficients, self.ridges = self._solved(
+            self.rows, self.data.measured, scale, groups=groups, begun=begun, worth=WORTH
+        )
         self.stages = [(self.features, coefficients)]
         self._judge()
 
@@ -310,19 +303,46 @@ class Response:
         groups = np.repeat(np.arange(len(WANDERS)), [s.shape[1] for s in shapes])
         gain = np.hstack(shapes)
         features = [gain * own[:, None] for own in self.velocity(None).T]
-        rows, left, scale = self._rows(features), self._left(), _isotropic(self.errors)
-        coefficients = []
+        coefficients, _ = self._solved(
+            self._rows(features),
+            self._left(),
+            self.errors,
+            groups=[np.tile(groups, 2), groups],
+            begun=[np.full(len(WANDERS), OUT)] * 2,
+            worth=WORTH_WANDER,
+        )
+        self.stages.append((features, coefficients))
+        self._judge()
+
+    def _solved(
+        self,
+        rows: list[Rows],
+        wanted: np.ndarray,
+        scale: np.ndarray,
+        *,
+        groups: Sequence[np.ndarray],
+        begun: Sequence[np.ndarray],
+        worth: float,
+    ) -> tuple[list, list[np.ndarray]]:
+        """Coefficients of the plane and of turning, None where nothing tells them; their ridges.
+
+        Args:
+            rows: of the features.
+            wanted: (W, H, 3) what they are to make.
+            scale: (H, 3) errors that count as one.
+            groups: of the plane and of turning, (F,) number of each feature's group.
+            begun: of both, the ridge of each group that the search begins at.
+            worth: a ridge is taken if it lowers the left-out error to this share.
+        """
+        scale, coefficients, ridges = _isotropic(scale), [], list(begun)
         for part in (0, 1):
-            equations = self._equations(part, scale, rows, left)
+            equations = self._equations(part, scale, rows, wanted)
             if equations is None:
                 coefficients.append(None)
                 continue
-            begun = np.full(len(WANDERS), OUT)
-            own = np.tile(groups, 2) if part == 0 else groups
-            _, *found = _ridge(*equations, own, begun, WORTH_WANDER)
+            ridges[part], *found = _ridge(*equations, groups[part], begun[part], worth)
             coefficients.append(found)
-        self.stages.append((features, coefficients))
-        self._judge()
+        return coefficients, ridges
 
     def _wandering(self) -> list[np.ndarray]:
         """(N, k) shapes of each of WANDERS: waves and hats over time, bells over the floor."""
@@ -355,6 +375,7 @@ class Response:
         return left
 
     def _judge(self) -> None:
+        """Errors of the stages so far: fitted to all, and to other blocks."""
         self.within = difference(self.data.measured, self.predict(None))
         self.across = difference(self.data.measured, self.predict(self.fold))
 
