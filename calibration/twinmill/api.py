@@ -29,7 +29,6 @@ from twinmill.data.multi_log import read_multi_log
 from twinmill.data.steady_table import is_steady_table
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill.diagnosis import diagnose as _diagnose
-from twinmill.diagnosis.detections.add import DetectionAddition, add_to_camera, is_of_camera
 from twinmill.diagnosis.findings import Ranked
 from twinmill.files import plain, replacing
 from twinmill.fitting import add as _add
@@ -38,7 +37,7 @@ from twinmill.fitting import fit as _fit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import catalogue
 from twinmill.programs import find_program
-from twinmill.report import detections, error_figures, show, steady_figures, views
+from twinmill.report import comparisons, detections, error_figures, show, steady
 from twinmill.report import diagnosis as diagnosis_report
 from twinmill.report.canvas import draw
 from twinmill.report.log_figures import Drawing
@@ -317,28 +316,13 @@ class Model(_Shown):
             raise ValueError(f"{effect}: no such effect; `twinmill effects` lists them.")
         measurements = _log(log).measurements(self)
         name = f"{self.file.path.stem}+{effect}.toml"
-        if not gains and is_of_camera(effect):
-            if robot is not None:
-                raise ValueError(f"{effect}: is of the camera, and is added to all robots alike.")
-            result, file = _made(
-                name,
-                lambda out: add_to_camera(
-                    effect, measurements, self.file, out, f"twinmill.add {effect}"
-                ),
-            )
-        else:
-            result, file = _made(
-                name,
-                lambda out: _add.add(
-                    effect,
-                    measurements,
-                    self.file,
-                    out,
-                    f"twinmill.add {effect}",
-                    texts,
-                    robot_id=robot,
-                ),
-            )
+        command = f"twinmill.add {effect}"
+        result, file = _made(
+            name,
+            lambda out: _add.add(
+                effect, measurements, self.file, out, command, texts, robot_id=robot
+            ),
+        )
         return Addition(result, Model(file))
 
     def diagnose(self, log: "Log | str | Path", **options: Any) -> "Diagnosis":
@@ -436,7 +420,7 @@ class Addition(_Shown):
             effect, all else refitted.
     """
 
-    def __init__(self, result: _add.AddResult | DetectionAddition, model: Model):
+    def __init__(self, result: _add.AddResult | _add.CameraAddResult, model: Model):
         self._result, self.model = result, model
         self.effect = result.effect
         told = result.to_json()
@@ -449,13 +433,12 @@ class Addition(_Shown):
 
     def plot(self) -> Figure:
         """Errors before and after; of an effect of the camera, what it sees."""
-        if isinstance(self._result, DetectionAddition):
+        if isinstance(self._result, _add.CameraAddResult):
             return detections.field_of_view(self._result.after).svg.picture
         return _errors_drawn([("before", self._result.before), ("after", self._result.after)])
 
     def _text(self) -> RenderableType:
-        camera = isinstance(self._result, DetectionAddition)
-        return detections.addition(self._result) if camera else show.added(self._result)
+        return show.added(self._result)
 
     def __repr__(self) -> str:
         return (
@@ -743,8 +726,8 @@ def _commands(log: Any) -> pd.DataFrame:
 
 def _errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
     last = results[-1][1]
-    if last.main in (tables := views.steady_comparisons(last)):
-        return steady_figures.steady_values(tables).svg.picture
+    if last.main in (tables := comparisons.steady_comparisons(last)):
+        return steady.values(tables).svg.picture
     mains = [(label, result.main) for label, result in results]
     return error_figures.error_growth(mains).svg.picture
 

@@ -15,8 +15,7 @@ from twinmill_cli.options import Force, Hold, Logs, Model, NewModel, Out
 from twinmill_cli.output import AsJson, busy
 
 if working():  # not for --help
-    from twinmill.diagnosis.detections.add import DetectionAddition, add_to_camera, is_of_camera
-    from twinmill.fitting.add import OWN_GAINS, AddResult, add
+    from twinmill.fitting.add import OWN_GAINS, AddResult, CameraAddResult, add
     from twinmill.fitting.compare import Comparison, compare
     from twinmill.fitting.fit import FitResult, fit
     from twinmill.report import (
@@ -25,7 +24,6 @@ if working():  # not for --help
         fit_section,
         show,
     )
-    from twinmill.report import detections as bits
     from twinmill_cli.effects import find_effect
     from twinmill_cli.frame import (
         check_output,
@@ -124,7 +122,7 @@ def _add(
     ] = None,
     as_json: AsJson = False,
     out: Out = None,
-) -> AddResult | DetectionAddition:
+) -> AddResult | CameraAddResult:
     """Add an effect to a model, fit it with all the rest, and judge it on data not fitted to.
 
     Example: twinmill add coasting run.lcmlog --model fitted.toml -o better.toml
@@ -144,17 +142,6 @@ def _add(
     )
     check_output(output, model_file, force)
     measurements = load(logs, model_file, as_json)
-    if not gains and is_of_camera(effect):
-        if held:
-            raise ValueError(f"--hold: {effect} is of the camera; nothing else is fitted with it.")
-        if robot is not None:
-            raise ValueError(f"--robot: {effect} is of the camera; all robots have it alike.")
-        with busy(f"adding {effect} to {model}"):
-            seen = add_to_camera(effect, measurements, model_file, output, source.command)
-        section = partial(bits.addition_section, seen, model_file.path.name)
-        data = {**seen.to_json(), **told(measurements)}
-        finish(data, bits.addition(seen), source, section, as_json, out)
-        return seen
     with busy(f"adding {effect} to {model}"):
         result = add(effect, measurements, model_file, output, source.command, texts, held, robot)
     section = partial(added_section, result)

@@ -23,7 +23,6 @@ if working():  # not for --help
     from twinmill.files import check_new_folder
     from twinmill.report import Provenance, write_report
     from twinmill.report.discover import section
-    from twinmill.swarm.discover.changes import with_changes
     from twinmill.swarm.discover.entries import (
         Entry,
         confirm,
@@ -34,6 +33,7 @@ if working():  # not for --help
     )
     from twinmill.swarm.discover.kinds import KIND_COLORS
     from twinmill.swarm.discover.search import Hunt, search
+    from twinmill.swarm.request import without_axes
     from twinmill.swarm.sweep import make_request
     from twinmill.terminal import progress_bar, whole
 
@@ -90,7 +90,7 @@ def _discover(
         "milling", model, change or [], n=n, seeds=seeds, duration_s=duration_s, start=start
     )
     check_new_folder(out)
-    hunt = Hunt(with_changes(request), n, seed)
+    hunt = Hunt(without_axes(request), n, seed)
     with _progress(generations) as tell:
         elites = search(hunt, out, generations, tell)
     found, start_m2 = entries(hunt, elites)

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from twinmill_cli.lazy import working
+from twinmill_cli.options import parse_numbers
 from twinmill_cli.output import AsJson, busy, deliver
 
 if working():  # not for --help
@@ -16,7 +17,6 @@ if working():  # not for --help
     from twinmill.track.boards import Board
     from twinmill.track.detect import FLOOR, ROBOTS
     from twinmill.track.sheets import PAPERS_M, board_sheet, floor_sheet, robot_sheet, write_sheets
-    from twinmill_cli.numbers import parse_numbers
 
 
 def register(app: typer.Typer) -> None:

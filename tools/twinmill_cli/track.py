@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from twinmill_cli.lazy import working
-from twinmill_cli.options import LcmUrl
+from twinmill_cli.options import LcmUrl, parse_numbers
 from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
@@ -38,7 +38,6 @@ if working():  # not for --help
     from twinmill.track.paths import RobotPath, Tags, follow, write_poses
     from twinmill.track.quality import Quality, judge
     from twinmill.track.together import Pair, clocks, compared, merged, on_clock
-    from twinmill_cli.numbers import parse_numbers
 
 WHOLE = 0.98  # of the frames that a container promises; some count them wrongly by a few
 

@@ -10,7 +10,6 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.detections.merge import with_detections
-from twinmill.diagnosis.encoders import geometry_notes, time_base_notes
 from twinmill.diagnosis.findings import (
     beside_more,
     findings_of,
@@ -19,7 +18,7 @@ from twinmill.diagnosis.findings import (
     ranking_of,
     with_stale_numbers,
 )
-from twinmill.diagnosis.irregularity import notes_on
+from twinmill.diagnosis.notes import geometry_notes, irregularity_notes, time_base_notes
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
 from twinmill.diagnosis.resolution import resolutions
 from twinmill.diagnosis.rest import rest_of
@@ -217,7 +216,7 @@ def _concluded(
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]
     scenes = [r.scene.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
-    noise = notes_on(opened, [s.noise for s in scenes], model_file.model)
+    noise = irregularity_notes(opened, [s.noise for s in scenes], model_file.model)
     faint = _hidden(done, first.model)
     hidden = [*faint, *unseen.items()]
     refit = _refit(done)

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from twinmill.diagnosis.odd import ODD, middle_and_scale
 from twinmill.diagnosis.search import REFIT, Search, State, Trial, attempt, fitted, screen
 from twinmill.fitting.opening import Opened, wide_gains
 from twinmill.fitting.score_fit import ScoreFit
@@ -24,6 +23,7 @@ from twinmill.model.parameters import (
 )
 from twinmill.predict.datasets import total_score
 
+ODD = 3.5  # robust standard deviations from the median
 FEWEST = 3  # robots, below which none can be called the odd one
 TRIED = 3
 EVIDENCE = 16.0  # as in the search, for one robot
@@ -35,6 +35,18 @@ SIDES = {
     ("fl", "fr"): "front wheels",
     ("rl", "rr"): "rear wheels",
 }
+
+
+def middle_and_scale(values: list[float]) -> tuple[float, float]:
+    """Median, and a standard deviation by the median absolute one (Rousseeuw and Croux 1993)."""
+    middle = np.median(values)
+    return float(middle), float(1.4826 * np.median(np.abs(np.array(values) - middle)))
+
+
+def odd_ones(away: dict[int, float]) -> set[int]:
+    """Those that are more than ODD scales off: the worst, and always fewer than half."""
+    worst = sorted(away, key=lambda i: -away[i])[: max(len(away) - 1, 0) // 2]
+    return {i for i in worst if away[i] > ODD}
 
 
 @dataclass(frozen=True)

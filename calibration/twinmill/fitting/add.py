@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adds an effect to a model: fitted together with the base, judged on data it was not fitted to."""
+"""Adds an effect to a model, fits it, and judges it on data that it was not fitted to.
+
+An effect on motion is fitted together with the base, one of the camera to detections, alone.
+"""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -9,6 +12,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.fitting.compare import Comparison, comparison
+from twinmill.fitting.detection_fit import fit_detections
 from twinmill.fitting.fit import (
     base_names,
     common_clock,
@@ -29,8 +33,11 @@ from twinmill.model.parameters import (
     base_parameters,
     effect_names,
     effect_parameters,
+    is_of_camera,
     stated_names,
 )
+from twinmill.predict.detection_errors import DetectionComparison, compare_detections
+from twinmill.predict.detections import all_detections
 
 OWN_GAINS = "gains"  # of one robot: its speed and its rate of turn
 
@@ -88,6 +95,42 @@ class AddResult:
         }
 
 
+@dataclass(frozen=True)
+class CameraAddResult:
+    """What adding an effect of the camera did; all scores are those of detections.
+
+    Attributes:
+        effect: its name.
+        model_name: of the model as given.
+        before: comparison of the model as given; after: with the effect.
+        heldout_before, heldout_after: scores on frames not fitted to, without it and with it.
+        parameters: estimates of the effect's quantities; nothing else was fitted.
+        path: of the new model.
+    """
+
+    effect: str
+    model_name: str
+    before: DetectionComparison
+    after: DetectionComparison
+    heldout_before: float
+    heldout_after: float
+    parameters: list[ParameterEstimate]
+    path: Path
+
+    def to_json(self) -> dict:
+        """The interface's object."""
+        return {
+            "effect": self.effect,
+            "model": str(self.path),
+            "score_before": self.before.score,
+            "score_after": self.after.score,
+            "heldout_before": self.heldout_before,
+            "heldout_after": self.heldout_after,
+            "parameters": [e.to_json() for e in self.parameters],
+            "bits": self.after.to_json(),
+        }
+
+
 def add(
     effect: str,
     measurements: list[Measurement],
@@ -97,7 +140,7 @@ def add(
     texts: dict[str, str] | None = None,
     held: Collection[str] = (),
     robot_id: int | None = None,
-) -> AddResult:
+) -> AddResult | CameraAddResult:
     """Adds an effect and writes the new model.
 
     Args:
@@ -107,14 +150,19 @@ def add(
         out: the new model file.
         command: recorded in it.
         texts: the effect's formula and the like, by name.
-        held: names of quantities that keep their values.
+        held: names of quantities that keep their values; beside an effect of the camera all do.
         robot_id: of the robot that alone has it; by default all have.
 
     Raises:
-        ValueError: no such effect, it is made for another drive, or a text makes no sense.
+        ValueError: no such effect, it is made for another drive, or a text makes no sense; of the
+            camera: the model has it, no log has detections, or one robot is to have it.
         ModelError: the new file cannot be written, `held` names what is not fitted, or the robot
             is not in the logs or has such gains.
     """
+    if is_of_camera(effect):
+        if robot_id is not None:
+            raise ValueError(f"{effect}: is of the camera, and is added to all robots alike.")
+        return _add_to_camera(effect, measurements, model_file, out, command)
     richer, name, fresh = with_effect(model_file.model, effect, texts or {}, robot_id)
     opened = open_measurements(measurements, model_file)
     logs = {m.log_name: m.log_sha256 for m in measurements}
@@ -149,6 +197,37 @@ def add(
         command,
     )
     return AddResult(name, before, after, [*estimates, *own], *held, Path(out), robot_id)
+
+
+def _add_to_camera(
+    effect: str, measurements: list[Measurement], model_file: ModelFile, out: Path, command: str
+) -> CameraAddResult:
+    if effect in model_file.model.effects:
+        raise ValueError(
+            f"effect '{effect}': {model_file.path.name} has it already; remove its [[effect]]."
+        )
+    cameras = all_detections([o.scene() for o in open_measurements(measurements, model_file)])
+    if not cameras:
+        raise ValueError(
+            f"effect '{effect}': acts on the camera's bit, and no log has bits of a robot and the "
+            "poses of another one beside it; record telemetry and poses of two robots or more."
+        )
+    without, found = (fit_detections(cameras, model_file.model, name) for name in (None, effect))
+    before, after = (compare_detections(cameras, m) for m in (model_file.model, found.model))
+    logs = {m.log_name: m.log_sha256 for m in measurements}
+    estimates = list(found.added)
+    fitted_model = Fitted(found.model, estimates, logs, before.score, after.score)
+    write_child(model_file, fitted_model, out, command)
+    return CameraAddResult(
+        effect,
+        model_file.path.name,
+        before,
+        after,
+        without.score,
+        found.score,
+        estimates,
+        Path(out),
+    )
 
 
 def with_effect(

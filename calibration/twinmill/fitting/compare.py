@@ -17,9 +17,9 @@ from twinmill.predict.detection_errors import DetectionComparison, compare_detec
 from twinmill.predict.detections import all_detections
 from twinmill.predict.problem import Scene
 from twinmill.predict.regimes import Regime, where_it_fails
+from twinmill.predict.steady_errors import SteadyComparison, compare_steady
+from twinmill.predict.steady_states import SteadyStates
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, Windows, rms
-from twinmill.steady.compare import SteadyComparison, compare_steady
-from twinmill.steady.scene import SteadyScene
 
 # Scores: stop; something is missing; the smooth response is not good enough, or data leaked.
 GOOD, MISSING, SUSPECT = 1.15, 1.3, 0.9
@@ -157,7 +157,7 @@ class Comparison:
 def compare_robot(own: Opened) -> RobotComparison | SteadyComparison:
     """Compares one robot; its model and clock are taken as they are."""
     scene = own.scene()
-    if isinstance(scene, SteadyScene):
+    if isinstance(scene, SteadyStates):
         return compare_steady(scene)
     windows = Windows.of(own.measurement.track)
     errors = np.where(own.floor.keep[:, None, None], windows.errors(scene), np.nan)

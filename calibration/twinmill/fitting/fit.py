@@ -26,7 +26,7 @@ from twinmill.model.parameters import (
     base_parameters,
     duty_table,
 )
-from twinmill.steady.scene import SteadyScene
+from twinmill.predict.steady_states import SteadyStates
 
 AGREE_SIGMA = 5.0  # clock offsets of several logs that differ by less are one
 
@@ -98,7 +98,7 @@ def base_names(
 
 def _moves(own: Opened, gain: str) -> bool:
     """Whether the commands move the robot along what a gain scales."""
-    if isinstance(own.data, SteadyScene):
+    if isinstance(own.data, SteadyStates):
         return True
     track = own.measurement.track
     return track.command_kind != "twist" or bool(track.command[:, BASE_GAINS.index(gain)].any())

@@ -24,7 +24,7 @@ from twinmill.model.parameters import (
 )
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.problem import Scene
-from twinmill.steady.scene import SteadyScene
+from twinmill.predict.steady_states import SteadyStates
 
 CLOCK_REACH_S = 1.0  # how far from its start an offset of the clocks is looked for
 RATE_REACH_PPM = 500.0
@@ -45,7 +45,7 @@ class Opened:
     """
 
     measurement: Measurement | SteadyTable
-    data: Trajectory | SteadyScene | None
+    data: Trajectory | SteadyStates | None
     model: native.Model
     floor: NoiseFloor | None
     same_clock: bool
@@ -65,9 +65,9 @@ class Opened:
         """Whether the heading was not recorded, so that the robot is taken to hold one."""
         return self.floor is not None and not self.measurement.track.has_heading
 
-    def scene(self) -> Scene | SteadyScene:
+    def scene(self) -> Scene | SteadyStates:
         """What reports and other tests look at: measurement, model, noise."""
-        if isinstance(self.data, SteadyScene):
+        if isinstance(self.data, SteadyStates):
             return self.data.with_model(self.model)
         return Scene.on_clock(self.measurement, self.model, clock_free=not self.same_clock)
 
@@ -133,7 +133,7 @@ def open_measurements(
 
 def _open(measurement: Measurement | SteadyTable, model_file: ModelFile, number: int) -> Opened:
     if isinstance(measurement, SteadyTable):
-        table = SteadyScene.of(measurement, model_file.model)
+        table = SteadyStates.of(measurement, model_file.model)
         return Opened(measurement, table, table.model, None, True)
     model = model_file.model.for_robot(measurement.track.robot_id)
     told = model.clock_known and measurement.log_sha256 not in model_file.clock_logs

@@ -9,6 +9,7 @@ from functools import cache
 import twinmill_native as native
 
 MOTION_STAGES = ("duty", "wheel", "ground", "observe")  # what the path of one robot shows
+CAMERA_STAGES = ("view", "decide")  # what detections show
 CLOCK, CLOCK_RATE = "clock.offset_s", "clock.rate_ppm"
 HEADING = "frame.heading_rad"  # that a robot holds in a log that does not record it
 ALIGNMENT = (CLOCK, CLOCK_RATE, HEADING)  # of one log, not of a robot
@@ -87,6 +88,11 @@ class ParameterEstimate:
 def catalogue() -> dict[str, dict]:
     """The twin's effects by name."""
     return {entry["name"]: entry for entry in native.catalogue()}
+
+
+def is_of_camera(effect: str) -> bool:
+    """Whether an effect changes what a camera sees, and not the motion; false of what is none."""
+    return effect in catalogue() and catalogue()[effect]["stage"] in CAMERA_STAGES
 
 
 def needing(need: str) -> list[str]:
@@ -201,12 +207,14 @@ def base_lag_is_identifiable(model: native.Model) -> bool:
     return LAG_EFFECT not in model.effects
 
 
-def all_effect_parameters(model: native.Model) -> list[Parameter]:
-    """Free quantities of all of a model's effects on motion."""
+def all_effect_parameters(
+    model: native.Model, stages: Collection[str] = MOTION_STAGES
+) -> list[Parameter]:
+    """Free quantities of all of a model's effects at some stages; by default those on motion."""
     return [
         p
         for instance in effect_names(model)
-        if catalogue()[instance.split("#")[0]]["stage"] in MOTION_STAGES
+        if catalogue()[instance.split("#")[0]]["stage"] in stages
         for p in effect_parameters(model, instance)
     ]
 

@@ -1,41 +1,126 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An effect added to the camera, for the terminal and as a section of a report."""
+"""Predicted and measured detections of cameras, as tables and as a figure."""
 
-from rich.console import Group, RenderableType
-from rich.text import Text
+from collections.abc import Sequence
+from itertools import pairwise
 
-from twinmill.diagnosis.detections.add import DetectionAddition
-from twinmill.report import show, tables
-from twinmill.report.detection_figures import field_of_view
-from twinmill.report.detection_tables import detection_tables
-from twinmill.report.html import Section
-from twinmill.report.tables import number, tone
+import numpy as np
+
+from twinmill.predict.detection_errors import SHOWN, Confusion, DetectionComparison
+from twinmill.report.canvas import draw
+from twinmill.report.html import Figure
+from twinmill.report.tables import Cell, Table, number, tone
+
+BINS = 6
+COLUMNS = ["seen\nboth", "missed", "false", "unseen\nboth", "agree"]
+FEWEST = 10  # frames of a place that tell a share
 
 
-def addition(result: DetectionAddition) -> RenderableType:
-    """What a person reads of an added effect."""
-    return Group(
-        Text(
-            f"bits' score {number(result.before.score)} → {number(result.after.score)}, held out "
-            f"{number(result.heldout_before)} → {number(result.heldout_after)} without and with it"
-        ),
-        Text(),
-        show.table(tables.parameters(result.parameters)),
-        *(show.table(t) for t in detection_tables(result.after)),
-        Text(f"Written: {result.path}"),
+def steps(found: Sequence[tuple[str | None, float]]) -> Table:
+    """The camera's effects as they were found, on frames that were not fitted to."""
+    rows = [
+        [Cell(f"+ {effect}" if effect else "as given"), Cell(number(score, 4), tone(score))]
+        for effect, score in found
+    ]
+    return Table(
+        "The bits, step by step",
+        ["step", "held-out\nscore"],
+        rows,
+        "On frames that were not fitted to: 1.0 is right.",
+        words=(0,),
     )
 
 
-def addition_section(result: DetectionAddition, model_name: str) -> Section:
-    """Of a report."""
-    scores = [
-        ("bits before", number(result.before.score), tone(result.before.score)),
-        ("bits after", number(result.after.score), tone(result.after.score)),
+def confusion_tables(bits: DetectionComparison) -> list[Table]:
+    """By robot, and by range and bearing of the nearest robot."""
+    return [_by_robot(bits), _by_place(bits)]
+
+
+def _by_robot(bits: DetectionComparison) -> Table:
+    rows = [
+        [Cell(label), *_counts(confusion), Cell(number(score), tone(score))]
+        for label, confusion, score in bits.by_robot()
     ]
-    return Section(
-        f"{result.effect} added to {model_name}",
-        scores,
-        f"Held out: {number(result.heldout_before)} without, {number(result.heldout_after)} with.",
-        figures=[field_of_view(result.after)],
-        tables=[tables.parameters(result.parameters), *detection_tables(result.after)],
+    if len(rows) > 1:
+        total = [Cell("all"), *_counts(bits.confusion), Cell(number(bits.score), tone(bits.score))]
+        rows.append(total)
+    vote = (
+        ""
+        if bits.vote_agreement is None
+        else f" The voted bit follows from the raw ones in {100 * bits.vote_agreement:.1f} % of "
+        "the frames."
+    )
+    return Table(
+        f"The camera's bit ({'raw' if bits.raw else 'after the vote'})",
+        ["robot", *COLUMNS, "score"],
+        rows,
+        "Frames by what the model's geometry says and what the robot reported; score: how far off "
+        "the model's chances are over how far such chances must be, 1.0 is right." + vote,
+    )
+
+
+def _by_place(bits: DetectionComparison) -> Table:
+    rows = []
+    edges = np.linspace(0, SHOWN * bits.reach_m, BINS + 1)
+    inside = np.abs(bits.bearing_rad) < bits.half_rad
+    for near, far in pairwise(edges):
+        for ahead in (True, False):
+            here = (bits.range_m >= near) & (bits.range_m < far) & (inside == ahead)
+            if here.any():
+                confusion = Confusion.of(bits.in_view[here], bits.measured[here])
+                where = "in the cone" if ahead else "beside it"
+                rows.append([Cell(f"{near:.2f} to {far:.2f} m"), Cell(where), *_counts(confusion)])
+    return Table(
+        "Bits by the place of the nearest robot",
+        ["range", "bearing", *COLUMNS],
+        rows,
+        words=(0, 1),
+    )
+
+
+def _counts(c: Confusion) -> list[Cell]:
+    return [
+        Cell(str(c.true_positive)),
+        Cell(str(c.false_positive), "dim"),
+        Cell(str(c.false_negative), "dim"),
+        Cell(str(c.true_negative)),
+        Cell(f"{100 * c.agreement:.1f} %"),
+    ]
+
+
+def field_of_view(bits: DetectionComparison, title: str = "What the camera sees") -> Figure:
+    """Share of frames that see, over range and bearing of the nearest robot."""
+    cells = bits.cells()
+    ranges = sorted({r for c in cells for r in c["range_m"]})
+    bearings = np.degrees(sorted({b for c in cells for b in c["bearing_rad"]}))
+    kinds = ("measured", "predicted")
+    shares = {kind: np.full((len(ranges) - 1, len(bearings) - 1), np.nan) for kind in kinds}
+    for cell in (c for c in cells if c["frames"] >= FEWEST):
+        r = ranges.index(cell["range_m"][0])
+        b = int(np.searchsorted(bearings, np.degrees(cell["bearing_rad"][0]) - 1e-6))
+        for kind in kinds:
+            shares[kind][r, b] = cell[f"{kind}_share"]
+
+    def paint(panels) -> None:
+        for axes, kind in zip(panels, kinds, strict=True):
+            mesh = axes.pcolormesh(
+                bearings, ranges, shares[kind], cmap="viridis", vmin=0, vmax=1, rasterized=False
+            )
+            half = min(np.degrees(bits.half_rad), 180)
+            axes.plot(
+                [-half, -half, half, half], [0, bits.reach_m, bits.reach_m, 0], color="#d55e00"
+            )
+            axes.set(title=kind, xlabel="bearing (°), left positive", xticks=[-90, 0, 90])
+            axes.invert_xaxis()
+            axes.grid(visible=False)
+        panels[0].set_ylabel("range of the nearest robot (m)")
+        panels[0].figure.colorbar(mesh, ax=panels, label="share of frames that see", shrink=0.8)
+
+    return Figure(
+        draw(3.0, paint, ncols=2, sharey=True),
+        title,
+        "Share of frames whose bit is 1, by where the nearest robot was. Inside the orange line "
+        "the model's camera sees. Both pictures should be alike; light outside the line is a false "
+        "or a farther robot's detection, dark inside a missed one. Places of fewer than "
+        f"{FEWEST} frames are left white.",
     )

@@ -11,10 +11,8 @@ from rich.text import Text
 from twinmill.diagnosis.explain import Explanation, steps
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.model.parameters import ParameterEstimate
-from twinmill.report import Figure, Section, show, tables, views
+from twinmill.report import Figure, Section, comparisons, detections, show, tables
 from twinmill.report.charted import charts
-from twinmill.report.detection_figures import field_of_view
-from twinmill.report.detection_tables import detection_steps, detection_tables
 from twinmill.report.error_figures import waterfall
 from twinmill.report.sections import robot_pictures
 from twinmill.report.tables import Cell, Table, Tone, number, tone
@@ -251,7 +249,7 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
         f"What {before.model_name} lacks",
         [(label, number(value), tone(value)) for label, value in scores],
         diagnosis.sentence,
-        views.facts(before),
+        comparisons.facts(before),
         [*_detection_figures(diagnosis), waterfall(_labelled(diagnosis)), *robot_pictures(before)],
         [*_tables(diagnosis), *_detection_steps(diagnosis), *_detection_tables(diagnosis)],
         charts=charts(before, *_found(diagnosis)),
@@ -284,13 +282,13 @@ def _tables(diagnosis: Diagnosis) -> list[Table]:
 
 
 def _detection_steps(diagnosis: Diagnosis) -> list[Table]:
-    return [detection_steps(diagnosis.bit_steps)] if len(diagnosis.bit_steps) > 1 else []
+    return [detections.steps(diagnosis.bit_steps)] if len(diagnosis.bit_steps) > 1 else []
 
 
 def _detection_tables(diagnosis: Diagnosis) -> list[Table]:
     """Predicted and measured bits, with the effects that were found if there are any."""
     bits = diagnosis.bits_after or diagnosis.bits
-    return detection_tables(bits) if bits else []
+    return detections.confusion_tables(bits) if bits else []
 
 
 def _detection_figures(diagnosis: Diagnosis) -> list[Figure]:
@@ -298,8 +296,10 @@ def _detection_figures(diagnosis: Diagnosis) -> list[Figure]:
     if not diagnosis.bits:
         return []
     after = diagnosis.bits_after
-    found = [field_of_view(after, "What the camera sees, effects added")] if after else []
-    return [field_of_view(diagnosis.bits), *found]
+    found = (
+        [detections.field_of_view(after, "What the camera sees, effects added")] if after else []
+    )
+    return [detections.field_of_view(diagnosis.bits), *found]
 
 
 def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:

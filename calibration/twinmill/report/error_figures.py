@@ -4,11 +4,11 @@
 import numpy as np
 
 from twinmill.fitting.compare import GOOD, MISSING, RobotComparison
+from twinmill.predict.steady_errors import SteadyComparison
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
 from twinmill.report.canvas import BEFORE, FLOOR, PREDICTED, draw, legend_above, plain_ticks
 from twinmill.report.html import Figure
 from twinmill.report.tables import SHOWN, WORST, number
-from twinmill.steady.compare import SteadyComparison
 
 TONES = {"good": "#009e73", "warn": "#e69f00", "bad": "#d55e00"}
 

@@ -4,17 +4,14 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from twinmill.fitting.add import AddResult
+from twinmill.fitting.add import AddResult, CameraAddResult
 from twinmill.fitting.compare import Comparison, RobotComparison
 from twinmill.fitting.fit import FitResult
-from twinmill.report import tables, views
-from twinmill.report.advice import advice
+from twinmill.report import comparisons, detections, steady, tables
 from twinmill.report.charted import charts
-from twinmill.report.detection_figures import field_of_view
 from twinmill.report.error_figures import error_growth, regimes, waterfall
 from twinmill.report.html import Figure, Section
 from twinmill.report.motion_figures import floor_map
-from twinmill.report.steady_figures import steady_values
 from twinmill.report.tables import number, tone
 
 
@@ -26,14 +23,14 @@ def comparison_section(result: Comparison) -> Section:
         title,
         [_score("score", result.score)],
         result.verdict,
-        views.facts(result),
+        comparisons.facts(result),
         [
             *_pictures(result, [("this model", robot)]),
-            *([field_of_view(result.bits)] if result.bits else []),
+            *([detections.field_of_view(result.bits)] if result.bits else []),
         ],
-        [*tables.robots(result), *views.robot_tables(result)],
+        [*tables.robots(result), *comparisons.robot_tables(result)],
         charts=charts(result),
-        next_step=advice(result),
+        next_step=comparisons.advice(result),
         warnings=result.warnings,
     )
 
@@ -46,21 +43,23 @@ def fit_section(result: FitResult) -> Section:
         title,
         [_score("before", result.before.score), _score("after", result.after.score)],
         result.after.verdict,
-        views.facts(result.after),
+        comparisons.facts(result.after),
         _pictures(result.after, [("before", before), ("after", after)]),
         [
             tables.parameters(result.parameters),
             *tables.robots(result.after, result.before),
-            *views.robot_tables(result.after),
+            *comparisons.robot_tables(result.after),
         ],
         charts=_before_and_after(result),
-        next_step=advice(result.after),
+        next_step=comparisons.advice(result.after),
         warnings=result.after.warnings,
     )
 
 
-def added_section(result: AddResult) -> Section:
+def added_section(result: AddResult | CameraAddResult) -> Section:
     """Of one added effect."""
+    if isinstance(result, CameraAddResult):
+        return _camera_section(result)
     before, after = _same_robot(result)
     scores = [
         _score("before", result.before.score),
@@ -73,7 +72,7 @@ def added_section(result: AddResult) -> Section:
         title,
         scores,
         result.after.verdict,
-        views.facts(result.after),
+        comparisons.facts(result.after),
         _pictures(result.after, [("before", before), ("after", after)]),
         [
             tables.parameters(result.parameters),
@@ -81,8 +80,19 @@ def added_section(result: AddResult) -> Section:
             *tables.held_out(result),
         ],
         charts=_before_and_after(result),
-        next_step=advice(result.after),
+        next_step=comparisons.advice(result.after),
         warnings=result.after.warnings,
+    )
+
+
+def _camera_section(result: CameraAddResult) -> Section:
+    before, after = number(result.heldout_before), number(result.heldout_after)
+    return Section(
+        f"{result.effect} added to {result.model_name}",
+        [_score("bits before", result.before.score), _score("bits after", result.after.score)],
+        f"Held out: {before} without, {after} with.",
+        figures=[detections.field_of_view(result.after)],
+        tables=[tables.parameters(result.parameters), *detections.confusion_tables(result.after)],
     )
 
 
@@ -106,21 +116,23 @@ def _same_robot(result: FitResult | AddResult) -> tuple[RobotComparison, RobotCo
 
 def robot_pictures(result: Comparison) -> list[Figure]:
     """When the model fails the robot that is missed most, and where."""
-    robot, steady = result.worst, views.steady_comparisons(result)
+    robot, sheets = result.worst, comparisons.steady_comparisons(result)
     own = []
-    if robot not in steady:
+    if robot not in sheets:
         own = [*([regimes(robot)] if robot.where else []), floor_map(robot)]
     if len(result.robots) > 1:
         own = [replace(f, title=f"{f.title}: {robot.scene.measurement.label}") for f in own]
-    if steady:
-        number = steady[0].scene.measurement.robot_id
-        own += [steady_values(steady), regimes(steady[0], f"Steady inputs of robot {number}")]
+    if sheets:
+        number = sheets[0].scene.measurement.robot_id
+        own += [steady.values(sheets), regimes(sheets[0], f"Steady inputs of robot {number}")]
     return own
 
 
 def _pictures(result: Comparison, models: list[tuple]) -> list[Figure]:
     """The same, with errors over time if there is a log."""
-    growth = [] if result.worst in views.steady_comparisons(result) else [error_growth(models)]
+    growth = (
+        [] if result.worst in comparisons.steady_comparisons(result) else [error_growth(models)]
+    )
     return robot_pictures(result) + growth
 
 

@@ -7,11 +7,10 @@ from rich.padding import Padding
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from twinmill.fitting.add import AddResult
+from twinmill.fitting.add import AddResult, CameraAddResult
 from twinmill.fitting.compare import Comparison
 from twinmill.fitting.fit import FitResult
-from twinmill.report import tables, views
-from twinmill.report.advice import advice
+from twinmill.report import comparisons, detections, tables
 from twinmill.report.tables import Cell, Table, number, tone
 from twinmill.terminal import Fitting
 
@@ -23,12 +22,12 @@ WARNINGS = 3  # in the terminal; --json has all
 def comparison(result: Comparison) -> RenderableType:
     """A comparison."""
     return Group(
-        _facts(views.facts(result)),
+        _facts(comparisons.facts(result)),
         Text(),
         score_line("score", result),
         Text(),
         *(table(t) for t in tables.robots(result)),
-        *(table(t) for t in views.robot_tables(result)),
+        *(table(t) for t in comparisons.robot_tables(result)),
         *_warnings(result.warnings),
         _next(result),
     )
@@ -37,7 +36,7 @@ def comparison(result: Comparison) -> RenderableType:
 def fit(result: FitResult) -> RenderableType:
     """A fit."""
     return Group(
-        _facts(views.facts(result.before)),
+        _facts(comparisons.facts(result.before)),
         Text(),
         _change("score", result.before.score, result.after.score),
         score_line("", result.after, number_too=False),
@@ -50,12 +49,14 @@ def fit(result: FitResult) -> RenderableType:
     )
 
 
-def added(result: AddResult) -> RenderableType:
+def added(result: AddResult | CameraAddResult) -> RenderableType:
     """An added effect."""
+    if isinstance(result, CameraAddResult):
+        return _added_to_camera(result)
     own = result.added
     rest = len(result.parameters) - len(own)
     return Group(
-        _facts(views.facts(result.before)),
+        _facts(comparisons.facts(result.before)),
         Text(),
         _change("score", result.before.score, result.after.score),
         _change(
@@ -73,6 +74,19 @@ def added(result: AddResult) -> RenderableType:
         *_warnings(result.after.warnings),
         _written(result.path),
         _next(result.after),
+    )
+
+
+def _added_to_camera(result: CameraAddResult) -> RenderableType:
+    return Group(
+        Text(
+            f"bits' score {number(result.before.score)} → {number(result.after.score)}, held out "
+            f"{number(result.heldout_before)} → {number(result.heldout_after)} without and with it"
+        ),
+        Text(),
+        table(tables.parameters(result.parameters)),
+        *(table(t) for t in detections.confusion_tables(result.after)),
+        _written(result.path),
     )
 
 
@@ -171,4 +185,4 @@ def _written(path: object) -> Text:
 
 
 def _next(result: Comparison) -> RenderableType:
-    return Padding(Text(f"Next: {advice(result)}"), (1, 0, 0, 0))
+    return Padding(Text(f"Next: {comparisons.advice(result)}"), (1, 0, 0, 0))

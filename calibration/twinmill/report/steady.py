@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A comparison with a steady-state table as tables for people, all robots of it together."""
+"""A comparison with a steady-state table as tables and as a figure, all its robots together."""
 
 from collections import defaultdict
 
 import numpy as np
 
+from twinmill.predict.steady_errors import SteadyComparison
+from twinmill.predict.steady_states import CHANNELS
+from twinmill.report.canvas import MEASURED, draw, legend_above
+from twinmill.report.html import Figure
 from twinmill.report.tables import Cell, Table, number, tone
-from twinmill.steady.compare import SteadyComparison
-from twinmill.steady.scene import CHANNELS
 
 WORST = 15  # inputs shown
+
+# Okabe and Ito (2008), one colour a robot.
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 
 
 def facts(robots: list[SteadyComparison], model_name: str) -> list[tuple[str, str]]:
@@ -139,3 +144,37 @@ def _mean(values: np.ndarray) -> np.ndarray:
     """Over rows, NaN left out; NaN where there is nothing else."""
     count = np.isfinite(values).sum(axis=0)
     return np.nansum(values, axis=0) / np.where(count, count, np.nan)
+
+
+def values(robots: list[SteadyComparison]) -> Figure:
+    """Each input once per robot: what the model says, across, and what was measured, up."""
+
+    def paint(panels) -> None:
+        for c, (axes, unit) in enumerate(zip(panels, ("m/s", "rad/s"), strict=True)):
+            for k, robot in enumerate(robots):
+                sheet = robot.scene.measurement
+                axes.errorbar(
+                    robot.predicted[:, c],
+                    sheet.value[:, c],
+                    sheet.floor[:, c],
+                    fmt="o",
+                    ms=3,
+                    lw=0.7,
+                    alpha=0.7,
+                    color=COLOURS[k % len(COLOURS)],
+                    label=f"robot {sheet.robot_id}",
+                )
+            known = np.concatenate(
+                [np.r_[r.predicted[:, c], r.scene.measurement.value[:, c]] for r in robots]
+            )
+            ends = [np.nanmin(known), np.nanmax(known)]
+            axes.plot(ends, ends, color=MEASURED, lw=1, ls="--")
+            axes.set(xlabel=f"predicted {unit}", ylabel=f"measured {unit}")
+        legend_above(panels[0], len(robots))
+
+    return Figure(
+        draw(6.4, paint, nrows=2),
+        "Steady speed and turn rate",
+        "Each dot is one robot at one input; a right model has all dots on the dashed line, within "
+        "their bars. Dots of a level row were measured alike but predicted differently.",
+    )

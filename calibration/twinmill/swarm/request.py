@@ -6,12 +6,13 @@ import itertools
 import json
 import math
 from collections import Counter
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 import twinmill_native as native
 
 from twinmill.swarm.axes import QUANTITIES, Axis, set_speeds
+from twinmill.swarm.model_text import with_values
 
 MAX_ROBOTS = 1000
 # Agent-steps in one part: about a second's work. The batched kernel is a hundred times faster, and
@@ -202,3 +203,34 @@ def run_part(request: Request, worlds: range) -> dict[str, list]:
     kernels = [request.kernel(cell) for cell in cells]
     columns["kernel"] = [kernels[c - used[0]] for c in cell_of]
     return columns
+
+
+def without_axes(request: Request) -> Request:
+    """The same swarm, each single value of an axis written into the model.
+
+    Raises:
+        ValueError: an axis has several values, or is no quantity of the model file.
+    """
+    model = request.model
+    before = {row["name"]: row["value"] for row in model.values()}
+    for axis in request.axes:
+        quantity = QUANTITIES.get(axis.name)
+        if len(axis.values) > 1 or (quantity and not quantity.set):
+            raise ValueError(
+                f"--set {axis.name}: takes one value of a quantity of the model, as in "
+                "sensor.range_m=0.8."
+            )
+        _apply(model, axis.name, axis.values[0])
+    after = {row["name"]: row["value"] for row in model.values()}
+    changed = {name: value for name, value in after.items() if value != before[name]}
+    text = with_values(request.model_text, request.model, changed)
+    native.Model.from_toml(text, request.model_name)
+    return replace(request, model_text=text, axes=[])
+
+
+def _apply(model: native.Model, name: str, value: float) -> None:
+    quantity = QUANTITIES.get(name)
+    if quantity and quantity.set:
+        quantity.set(model, value)
+    else:
+        model.set(name, value)

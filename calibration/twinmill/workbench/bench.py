@@ -14,10 +14,9 @@ from twinmill.charts.arrays import RESTARTS, measured_path
 from twinmill.charts.packed import pack, pack_log, pack_prediction, pack_robot
 from twinmill.data.camera_frames import frames_of
 from twinmill.data.log import LogError
-from twinmill.diagnosis.detections.add import is_of_camera
 from twinmill.diagnosis.search import REFIT
 from twinmill.files import plain
-from twinmill.model.parameters import catalogue
+from twinmill.model.parameters import is_of_camera
 from twinmill.workbench.session import Session, beside_label
 from twinmill.workbench.state_file import StateFile
 from twinmill.workbench.swarm import has_poses
@@ -28,7 +27,7 @@ AWAITED = ("fit", "add", "diagnose", "next", "swarm")  # work that the user wait
 
 def moves(effect: str) -> bool:
     """Whether an effect changes the motion, as all but those of the camera do."""
-    return not (effect in catalogue() and is_of_camera(effect))
+    return not is_of_camera(effect)
 
 
 class Bench:

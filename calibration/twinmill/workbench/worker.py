@@ -168,11 +168,10 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     import twinmill_native as native
 
     from twinmill.data.measurement import load_measurements
-    from twinmill.diagnosis.detections.add import add_to_camera, is_of_camera
     from twinmill.diagnosis.diagnose import diagnose
     from twinmill.experiment.design import check, design
     from twinmill.files import plain
-    from twinmill.fitting.add import OWN_GAINS, add
+    from twinmill.fitting.add import add
     from twinmill.fitting.compare import compare
     from twinmill.fitting.fit import fit
     from twinmill.model.model_file import ModelFile
@@ -200,9 +199,7 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     with TemporaryDirectory(prefix="twinmill-") as folder:
         out = Path(folder) / "made.toml"
         say(f"adding {work.effect}" if work.effect else "fitting")
-        if work.kind == "add" and work.effect != OWN_GAINS and is_of_camera(work.effect):
-            result = add_to_camera(work.effect, measurements, model_file, out, work.command)
-        elif work.kind == "add":
+        if work.kind == "add":
             result = add(
                 work.effect,
                 measurements,

@@ -179,7 +179,7 @@ def test_a_hidden_effect_is_named_with_its_value(effect, make_scenes):
         make_scenes(50 + list(HIDDEN).index(effect), **HIDDEN[effect]), model()
     )
     assert done.found == [effect]
-    first = done.rounds[0].accepted.own[0]
+    first = done.rounds[0].accepted.fit.added[0]
     true, sampling = TRUE[first.name], 4 * first.std if np.isfinite(first.std) else 0.0
     assert first.value == pytest.approx(true, abs=max(0.05 * abs(true), sampling))
     assert sampling < 0.5 * abs(true)
@@ -191,7 +191,7 @@ def test_a_camera_better_than_the_model_is_named_too(effect, clean, make_scenes)
     worse = native.Model.from_toml(MODEL.replace("rate = 0.05", "rate = 0.15"), "test")
     done = search_detections(make_scenes(64, **{"miss": 0.15, clean: 0.0}), worse)
     assert done.found == [effect]
-    assert done.rounds[0].accepted.own[0].value == pytest.approx(-1, abs=0.05)
+    assert done.rounds[0].accepted.fit.added[0].value == pytest.approx(-1, abs=0.05)
 
 
 def test_nothing_is_named_where_nothing_is_hidden(make_scenes):

@@ -6,14 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from twinmill.diagnosis.detections.evidence import HeldOut, weigh
+from twinmill.diagnosis.detections.evidence import weigh
+from twinmill.fitting.detection_fit import HeldOutFrames
 from twinmill.predict.detections import thue_morse
 
 BLOCKS, FRAMES = 400, 60
 ONE, OTHER = 0.4, 0.1
 
 
-def frames(bits: np.ndarray, share: np.ndarray) -> tuple[list, HeldOut, HeldOut]:
+def frames(bits: np.ndarray, share: np.ndarray) -> tuple[list, HeldOutFrames, HeldOutFrames]:
     """A robot whose bits are those given; both models differ in the frames of `share` alone."""
     block = np.repeat(np.arange(len(bits) // FRAMES), FRAMES)
     scene = SimpleNamespace(
@@ -23,7 +24,7 @@ def frames(bits: np.ndarray, share: np.ndarray) -> tuple[list, HeldOut, HeldOut]
     for rate in (ONE, OTHER):
         chance = np.where(share, rate, OTHER)
         told = np.log(np.where(bits, chance, 1 - chance))
-        held.append(HeldOut([told], [chance], [np.zeros(len(bits), bool)]))
+        held.append(HeldOutFrames([told], [chance], [np.zeros(len(bits), bool)]))
     return [scene], *held
 
 

@@ -14,7 +14,7 @@ from twinmill.data.log import RobotLog
 from twinmill.data.measurement import load_measurements
 from twinmill.data.time_base import find_time_base, retimed
 from twinmill.diagnosis.diagnose import diagnose
-from twinmill.diagnosis.encoders import geometry_notes
+from twinmill.diagnosis.notes import geometry_notes
 from twinmill.experiment.design import Limits, check, design
 from twinmill.fitting.add import add
 from twinmill.model.model_file import ModelFile

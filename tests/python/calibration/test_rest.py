@@ -8,8 +8,8 @@ import pytest
 import twinmill_native as native
 
 from twinmill.diagnosis.findings import Finding, with_stale_numbers
-from twinmill.diagnosis.irregularity import IRREGULAR, irregularity
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
+from twinmill.diagnosis.notes import IRREGULAR, irregularity
 from twinmill.diagnosis.place import HORIZON, comes_again
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import REFIT

@@ -12,42 +12,12 @@ overwhelming likelihood do, which in their own scatter would drown.
 from dataclasses import dataclass
 
 import numpy as np
-import twinmill_native as native
 
-from twinmill.predict.detections import SURE, UNSEEN_FRAMES, VOTE_ERROR, Detections
+from twinmill.fitting.detection_fit import HeldOutFrames
+from twinmill.predict.detections import UNSEEN_FRAMES, VOTE_ERROR, Detections
 
 ALPHA = 0.05
 VOTE_WEIGHT = np.log(1 / VOTE_ERROR - 1)  # of one voted bit that two models tell differently
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """What a model fitted to the other half says of each robot's frames; a list of (K,) each.
-
-    Attributes:
-        told: log likelihood of what was reported; NaN where nothing can be said.
-        chance: probability of the bit, raw or voted.
-        voted: the bit that the vote must give by the raw ones.
-    """
-
-    told: list[np.ndarray]
-    chance: list[np.ndarray]
-    voted: list[np.ndarray]
-
-    @classmethod
-    def of(cls, scenes: list[Detections], models: tuple[native.Model, native.Model]) -> "HeldOut":
-        """Each half of the frames by the model in its place."""
-        rows = []
-        for scene in scenes:
-            both = [_of_robot(scene, m.for_robot(scene.robot_id)) for m in models]
-            first = scene.half == 0
-            rows.append([np.where(first, a, b) for a, b in zip(*both, strict=True)])
-        return cls(*(list(column) for column in zip(*rows, strict=True)))
-
-
-def _of_robot(scene: Detections, own: native.Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    chance = np.clip(scene.reported(own, scene.frames.has_raw), SURE, 1 - SURE)
-    return scene.likelihood(own), chance, scene.voted(int(own.sight()["vote_frames"]))
 
 
 @dataclass(frozen=True)
@@ -76,20 +46,20 @@ class Evidence:
         return float(min(1.0, candidates * np.exp(-self.worth)))
 
 
-def weigh(scenes: list[Detections], one: HeldOut, other: HeldOut) -> Evidence:
+def weigh(cameras: list[Detections], one: HeldOutFrames, other: HeldOutFrames) -> Evidence:
     """Evidence for `one` against `other`."""
     halves, surprise, variance = np.zeros(2), 0.0, 0.0
     best, half_of_best = 0.0, 0
-    for i, scene in enumerate(scenes):
-        told = np.nan_to_num(one.told[i] - other.told[i])
-        expected, spread = _expected(scene, one, other, i)
-        blocks = np.bincount(scene.block, told)
-        halves += np.bincount(scene.half, told, 2)
-        surprise += float(np.sum(np.bincount(scene.block, told - expected) ** 2))
+    for i, camera in enumerate(cameras):
+        told = np.nan_to_num(one.log_likelihood[i] - other.log_likelihood[i])
+        expected, spread = _expected(camera, one, other, i)
+        blocks = np.bincount(camera.block, told)
+        halves += np.bincount(camera.half, told, 2)
+        surprise += float(np.sum(np.bincount(camera.block, told - expected) ** 2))
         variance += float(spread.sum())
         if blocks.max() > best:
             best = float(blocks.max())
-            half_of_best = scene.half[scene.block == blocks.argmax()][0]
+            half_of_best = camera.half[camera.block == blocks.argmax()][0]
     gain = float(halves.sum())
     halves[half_of_best] -= best
     log_ratio = float(np.logaddexp(*halves) - np.log(2))
@@ -98,17 +68,17 @@ def weigh(scenes: list[Detections], one: HeldOut, other: HeldOut) -> Evidence:
 
 
 def _expected(
-    scene: Detections, one: HeldOut, other: HeldOut, i: int
+    camera: Detections, one: HeldOutFrames, other: HeldOutFrames, i: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """(K,) gain of each frame of robot i if `one` were true, and its variance."""
     p, q = one.chance[i], other.chance[i]
     odds = np.log(p / (1 - p)) - np.log(q / (1 - q))
     expected = p * odds + np.log((1 - p) / (1 - q))
     spread = p * (1 - p) * odds**2
-    if scene.frames.has_raw:
+    if camera.frames.has_raw:
         differ = one.voted[i] != other.voted[i]
         differ[:UNSEEN_FRAMES] = False
         expected += VOTE_WEIGHT * (1 - 2 * VOTE_ERROR) * differ
         spread += (2 * VOTE_WEIGHT) ** 2 * VOTE_ERROR * (1 - VOTE_ERROR) * differ
-    use = np.isfinite(one.told[i]) & np.isfinite(other.told[i])
+    use = np.isfinite(one.log_likelihood[i]) & np.isfinite(other.log_likelihood[i])
     return np.where(use, expected, 0), np.where(use, spread, 0)

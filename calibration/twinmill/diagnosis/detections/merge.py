@@ -20,7 +20,7 @@ def with_detections(
     diagnosis,
     scenes: list,
     model_file: ModelFile,
-    say: Callable[[str], None],
+    progress: Callable[[str], None],
     excluded: Collection[str] = (),
 ):
     """The diagnosis with the camera's effects in it; unchanged if no robot reported bits.
@@ -29,18 +29,18 @@ def with_detections(
         diagnosis: of the motion.
         scenes: measurements with their clocks.
         model_file: the model as given.
-        say: told in words what is being done.
+        progress: told in words what is being done.
         excluded: effects that are not to be thought of.
     """
     seen = all_detections(scenes)
     if not seen:
         return diagnosis
-    say("comparing the camera's bits")
+    progress("comparing the camera's bits")
     bits = compare_detections(seen, model_file.model)
     out = odd_cameras(seen, model_file.model)
     alike, odd = ([s for s in seen if (s.robot_id in out) == o] for o in (False, True))
-    done = search_detections(alike, model_file.model, say, excluded)
-    off = judge_cameras(alike, odd, done.rounds[-1].before.model, say, excluded)
+    done = search_detections(alike, model_file.model, progress, excluded)
+    off = judge_cameras(alike, odd, done.rounds[-1].before.model, progress, excluded)
     group = max((r.group or 0 for r in diagnosis.ranking), default=0)
     ranking = rank_bits(done, group)
     tied = any(r.tied for r in done.rounds)
@@ -65,7 +65,7 @@ def with_detections(
 
 def _steps(done: DetectionSearch) -> list[tuple[str | None, float]]:
     """Each accepted effect and the bits' held-out score with it."""
-    return [(r.accepted.effect, r.accepted.score) for r in done.rounds if r.accepted]
+    return [(r.accepted.fit.effect, r.accepted.fit.score) for r in done.rounds if r.accepted]
 
 
 def rank_bits(done: DetectionSearch, group: int) -> list[Ranked]:
@@ -81,18 +81,18 @@ def rank_bits(done: DetectionSearch, group: int) -> list[Ranked]:
             number = group
         ranking += [_entry(t, done, total, number) for t in (this.accepted, *this.tied)]
     named = {r.effect for r in ranking}
-    rest = [t for t in done.rounds[0].trials if t.effect not in named]
+    rest = [t for t in done.rounds[0].trials if t.fit.effect not in named]
     return ranking + [_entry(t, done, total, None) for t in rest]
 
 
 def _entry(trial: Trial, done: DetectionSearch, total: float, group: int | None) -> Ranked:
     return Ranked(
-        trial.effect or "",
-        trial.score,
+        trial.fit.effect or "",
+        trial.fit.score,
         max(trial.evidence.gain, 0.0) / max(total, trial.evidence.gain, 1e-9),
         trial.evidence.p_value(len(done.candidates)),
         trial.evidence.worth,
-        list(trial.own),
+        list(trial.fit.added),
         group,
     )
 
@@ -109,10 +109,10 @@ def _sentence(diagnosis, done: DetectionSearch) -> str:
 def _of_round(this: Round) -> str:
     assert this.accepted is not None
     if this.tied:
-        names = " or ".join(str(t.effect) for t in (this.accepted, *this.tied))
+        names = " or ".join(str(t.fit.effect) for t in (this.accepted, *this.tied))
         return f"The camera's bits lack one of {names}; these logs cannot tell which."
-    values = ", ".join(_value(e) for e in this.accepted.own)
-    return f"The camera's bits lack {this.accepted.effect} ({values})."
+    values = ", ".join(_value(e) for e in this.accepted.fit.added)
+    return f"The camera's bits lack {this.accepted.fit.effect} ({values})."
 
 
 def _value(estimate) -> str:

@@ -8,8 +8,7 @@ import twinmill_native as native
 from scipy.stats import t
 
 from twinmill.diagnosis.detections.search import search_detections
-from twinmill.diagnosis.odd import ODD, middle_and_scale, odd_ones
-from twinmill.diagnosis.outliers import Outlier
+from twinmill.diagnosis.outliers import ODD, Outlier, middle_and_scale, odd_ones
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import Detections
@@ -19,21 +18,21 @@ from twinmill.predict.detections import Detections
 SPREAD, SPREAD_IN_VIEW = 0.1, 0.2
 
 
-def odd_cameras(scenes: list[Detections], model: native.Model) -> set[int]:
+def odd_cameras(cameras: list[Detections], model: native.Model) -> set[int]:
     """Numbers of the robots whose bits fit the model much worse than the others'; never half."""
-    return odd_ones(camera_outliers(scenes, model))
+    return odd_ones(camera_outliers(cameras, model))
 
 
-def camera_outliers(scenes: list[Detections], model: native.Model) -> dict[int, float]:
+def camera_outliers(cameras: list[Detections], model: native.Model) -> dict[int, float]:
     """By robot: how many scales its bits' errors are above the median robot's.
 
     Over all frames, or over those with a robot in view if they say more: a camera that sees nothing
     is right in all the others.
     """
-    found = compare_detections(scenes, model)
+    found = compare_detections(cameras, model)
     if found is None:
         return {}
-    robots = np.array([s.robot_id for s in scenes])[found.robot]
+    robots = np.array([s.robot_id for s in cameras])[found.robot]
     over_all = _apart(found, robots, np.ones(len(robots), bool), SPREAD)
     in_view = _apart(found, robots, found.in_view, SPREAD_IN_VIEW)
     return {i: max(over_all[i], in_view[i]) for i in over_all}
@@ -58,7 +57,7 @@ def judge_cameras(
     alike: list[Detections],
     odd: list[Detections],
     model: native.Model,
-    say: Callable[[str], None],
+    progress: Callable[[str], None],
     excluded: Collection[str] = (),
 ) -> list[Outlier]:
     """Says of each odd camera what is different, with the model of the others held.
@@ -67,7 +66,7 @@ def judge_cameras(
         alike: frames of the others.
         odd: frames of the odd ones.
         model: with all effects that were found for the others.
-        say: told in words what is being done.
+        progress: told in words what is being done.
         excluded: effects that are not to be thought of.
     """
     away = camera_outliers([*alike, *odd], model)
@@ -76,7 +75,7 @@ def judge_cameras(
     for robot_id in sorted({s.robot_id for s in odd}):
         if away[robot_id] < ODD:
             continue
-        say(f"the camera of robot {robot_id} differs: looking for what it is")
+        progress(f"the camera of robot {robot_id} differs: looking for what it is")
         own = [s for s in odd if s.robot_id == robot_id]
         off.append(_judge_camera(own, model, excluded, away, others))
     return off
@@ -105,7 +104,7 @@ def _judge_camera(
     told += f"model of all, those of the others {others:.2f} times; "
     told += (
         f"{' and '.join(done.found)} of its own makes it {after.score:.2f}"
-        + "".join(f"; {trial.effect} would do as well" for trial in done.rounds[0].tied)
+        + "".join(f"; {trial.fit.effect} would do as well" for trial in done.rounds[0].tied)
         if done.found
         else "no effect of the catalogue explains it"
     )
@@ -130,7 +129,7 @@ def _plain(robot_id: int, parameters: list[ParameterEstimate]) -> str:
     return f"{label}: {', '.join(f'{e.name} {e.value:.3g}' for e in parameters)}."
 
 
-def _scores(scenes: list[Detections], model: native.Model) -> list[float]:
+def _scores(cameras: list[Detections], model: native.Model) -> list[float]:
     """Brier score over its expectation, of each robot that could be judged."""
-    found = compare_detections(scenes, model)
+    found = compare_detections(cameras, model)
     return [score for *_, score in found.by_robot()] if found else []

@@ -1,10 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How much less regular a log's motion is than the noise in the model file says.
-
-The floor of a log is what no smooth response to its commands follows. Where that is far above the
-disturbance that the model file states, something is there that such a response cannot follow
-either: play, joints between tiles, drop-outs, or more noise.
-"""
+"""What logs and a fitted base say beside effects: stamps, wheel geometry, irregular motion."""
 
 from collections.abc import Sequence
 
@@ -13,16 +8,56 @@ import twinmill_native as native
 
 from twinmill.fitting.opening import Opened
 from twinmill.predict.noise import ChannelNoise, Noise
+from twinmill.predict.problem import Scene
 from twinmill.predict.windows import HORIZONS_S, rms
 
+NOTABLE = 0.01  # change of a gain that is worth a sentence
 LEAST_DRIVE = (2e-3, 2e-2)  # m/s, rad/s: no robot follows more regularly
 IRREGULAR = 2.2  # floor over what the model file's noise makes, beyond which it is a finding
 
 
-def notes_on(
+def time_base_notes(scenes: list[Scene]) -> list[str]:
+    """A sentence if logs do not last as long as they say."""
+    bases = [s.measurement.time_base for s in scenes if s.measurement.time_base]
+    if not bases:
+        return []
+    straight, turning = (np.array([getattr(b, k) for b in bases]) for k in ("straight", "turning"))
+    return [
+        "clock_rate: the stamps of the wheel speeds are not times. A second of them lasts "
+        f"{straight.mean():.3f} s on straights ({straight.min():.3f} to {straight.max():.3f} over "
+        f"{len(bases)} logs) and {turning.mean():.3f} s in turns ({turning.min():.3f} to "
+        f"{turning.max():.3f}); this was put right before anything else."
+    ]
+
+
+def geometry_notes(model: native.Model) -> list[str]:
+    """Sentences on what gains mean where wheel speeds are measured: rolling and lever."""
+    if model.drive != "wheel_speed":
+        return []
+    forward, sideways, yaw = (model.get(f"base.{k}_gain") for k in ("forward", "sideways", "yaw"))
+    notes = []
+    if abs(1 - sideways / forward) > NOTABLE:
+        more = "less" if sideways < forward else "more"
+        notes.append(
+            f"Sideways the robot rolls {100 * abs(1 - sideways / forward):.1f} % {more} far than "
+            f"forward at the same wheel speeds (gains {sideways:.3f} and {forward:.3f})."
+        )
+    if abs(1 - yaw) > NOTABLE:
+        notes.append(
+            f"It turns as if the wheels' lever (half wheelbase and half track) were {1 / yaw:.3f} "
+            "times as long as the model says."
+        )
+    return notes
+
+
+def irregularity_notes(
     opened: Sequence[Opened], noises: Sequence[Noise | None], model: native.Model
 ) -> list[str]:
     """A sentence for each log that is far less regular than the model's noise says.
+
+    The floor of a log is what no smooth response to its commands follows. Where it is far above the
+    disturbance that the model file states, something is there that such a response cannot follow
+    either: play, joints between tiles, drop-outs, or more noise.
 
     Args:
         opened: logs over their floors; tables have no noise.

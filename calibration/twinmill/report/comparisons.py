@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What to do after a comparison, in a sentence."""
+"""A comparison of logs, steady-state tables or both: facts, tables, and what to do next."""
+
+from dataclasses import replace
 
 from twinmill.fitting.compare import GOOD, SUSPECT, Comparison
 from twinmill.model.parameters import catalogue_of
-from twinmill.report.tables import number
-from twinmill.steady.compare import SteadyComparison
+from twinmill.predict.steady_errors import SteadyComparison
+from twinmill.report import detections, steady, tables
+from twinmill.report.tables import Table, number
 
 # By what the robot was doing; the cards of effects say which to think of first.
 WRONG = {
@@ -14,6 +17,39 @@ WRONG = {
     "stopping": "stops are wrong",
     "changing": "changes of command are followed wrongly",
 }
+
+
+def steady_comparisons(comparison: Comparison) -> list[SteadyComparison]:
+    """The robots known from tables."""
+    return [r for r in comparison.robots if isinstance(r, SteadyComparison)]
+
+
+def facts(comparison: Comparison) -> list[tuple[str, str]]:
+    """What was compared with what: label and text."""
+    if isinstance(comparison.worst, SteadyComparison):
+        return steady.facts(steady_comparisons(comparison), comparison.model_name)
+    return tables.facts(comparison)
+
+
+def _of_worst(comparison: Comparison) -> list[Table]:
+    """Errors and where they come, of the robot that is missed most; of several it is named."""
+    robot = comparison.worst
+    made = [tables.errors(robot), tables.where(robot)]
+    if len(comparison.robots) == 1:
+        return made
+    return [replace(t, title=f"{t.title}: {robot.scene.measurement.label}") for t in made]
+
+
+def robot_tables(comparison: Comparison) -> list[Table]:
+    """Errors and where they come: of the robot that is missed most, then of all tables."""
+    made = []
+    if not isinstance(comparison.worst, SteadyComparison):
+        made += _of_worst(comparison)
+    if sheets := steady_comparisons(comparison):
+        made += [steady.errors(sheets), steady.cells(sheets)]
+    if comparison.bits:
+        made += detections.confusion_tables(comparison.bits)
+    return made
 
 
 def advice(comparison: Comparison) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinmill.predict.regimes import Regime
-from twinmill.steady.scene import CHANNELS, SteadyScene
+from twinmill.predict.steady_states import CHANNELS, SteadyStates
 
 SLOW, FAST = 0.45, 0.75  # duty below and above which an input counts as slow and fast
 SPOT_MPS = 0.05
@@ -31,7 +31,7 @@ class SteadyComparison:
         where: regimes.
     """
 
-    scene: SteadyScene
+    scene: SteadyStates
     predicted: np.ndarray
     errors: np.ndarray
     floor: SteadyFloor
@@ -117,7 +117,7 @@ class SteadyComparison:
         }
 
 
-def compare_steady(scene: SteadyScene) -> SteadyComparison:
+def compare_steady(scene: SteadyStates) -> SteadyComparison:
     """Compares one robot of a table."""
     kind = "repeat" if scene.measurement.fold is None else "spread"
     return SteadyComparison(
@@ -129,7 +129,7 @@ def compare_steady(scene: SteadyScene) -> SteadyComparison:
     )
 
 
-def _where(scene: SteadyScene, ratios: np.ndarray) -> list[Regime]:
+def _where(scene: SteadyStates, ratios: np.ndarray) -> list[Regime]:
     """By path and by the smallest duty, the worst first."""
     count = np.isfinite(ratios).sum(axis=1)
     squares = np.nansum(ratios**2, axis=1)
@@ -147,7 +147,7 @@ def _where(scene: SteadyScene, ratios: np.ndarray) -> list[Regime]:
     return sorted(regimes, key=lambda r: (r.group != "path", -r.ratio))
 
 
-def _masks(scene: SteadyScene) -> Iterator[tuple[str, str, np.ndarray]]:
+def _masks(scene: SteadyStates) -> Iterator[tuple[str, str, np.ndarray]]:
     sheet = scene.measurement
     turns = sheet.inputs[:, 2] != 0
     along = np.isin(sheet.inputs[:, 1] % 180, (90,))

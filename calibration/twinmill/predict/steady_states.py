@@ -17,7 +17,7 @@ TYPING_ERROR = 10.0  # times the floor: beyond it, more likely the sheet is wron
 
 
 @dataclass
-class SteadyScene:
+class SteadyStates:
     """One robot of a table with its model: a data set. Values are (U, 3), as CHANNELS.
 
     The third is the rim speed of the slower side where a note says that it stood still: an input
@@ -32,7 +32,7 @@ class SteadyScene:
     clock_free: bool = False
 
     @classmethod
-    def of(cls, sheet: SteadyTable, model: native.Model) -> "SteadyScene":
+    def of(cls, sheet: SteadyTable, model: native.Model) -> "SteadyStates":
         """A sheet with a model of its kind of robot.
 
         Raises:
@@ -72,11 +72,11 @@ class SteadyScene:
         """Values measured."""
         return float(max(np.isfinite(self._measured()).sum(), 1))
 
-    def with_model(self, model: native.Model) -> "SteadyScene":
+    def with_model(self, model: native.Model) -> "SteadyStates":
         """The same table with another model."""
         return replace(self, model=model.for_robot(self.measurement.robot_id))
 
-    def fitted(self, model: native.Model) -> "SteadyScene":
+    def fitted(self, model: native.Model) -> "SteadyStates":
         """The same with a model of its own robot that was fitted to it."""
         return replace(self, model=model)
 

@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fits quantities of the camera to reported bits by maximum likelihood."""
+"""Fits quantities of the camera to detections, and judges them on frames that were not fitted to.
 
+A detection is drawn with a chance that the model tells, so that the fit is by maximum likelihood:
+there is no floor of errors as `ScoreFit` has it. The likelihood has edges where a frame leaves the
+cone, hence no slopes: a grid finds where to begin, and Powell's method goes on from there.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -8,15 +15,15 @@ import twinmill_native as native
 from scipy.optimize import minimize
 
 from twinmill.model.parameters import (
+    CAMERA_STAGES,
     Parameter,
     ParameterEstimate,
-    catalogue,
-    effect_names,
+    all_effect_parameters,
     effect_parameters,
 )
-from twinmill.predict.detections import Detections
+from twinmill.predict.detection_errors import brier_ratio
+from twinmill.predict.detections import SURE, Detections
 
-STAGES = ("view", "decide")
 MOST_FRAMES = 10000  # a fit takes every Nth frame beyond
 STRENGTHS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0)  # times the usual one: where a fit may begin
 FAR = (5.0, 10.0)  # more of them where only one quantity is looked for
@@ -26,27 +33,102 @@ FALL = 1.0  # of the log likelihood on both sides together: less may be the grai
 REACH = 0.5  # times the usual strength: how far a fit goes from where it begins
 
 
-def camera_effects(model: native.Model) -> list[str]:
-    """Effects of the camera that a model could lack, in the catalogue's order."""
-    return [n for n, e in catalogue().items() if e["stage"] in STAGES and n not in model.effects]
+@dataclass(frozen=True)
+class HeldOutFrames:
+    """What a model fitted to the other half says of each robot's frames; a list of (K,) each.
+
+    Attributes:
+        log_likelihood: of what was reported; NaN where nothing can be said.
+        chance: probability of the bit, raw or voted.
+        voted: the bit that the vote must give by the raw ones.
+    """
+
+    log_likelihood: list[np.ndarray]
+    chance: list[np.ndarray]
+    voted: list[np.ndarray]
+
+    @classmethod
+    def of(
+        cls, cameras: Sequence[Detections], models: tuple[native.Model, native.Model]
+    ) -> "HeldOutFrames":
+        """Each half of the frames by the model in its place."""
+        rows = []
+        for camera in cameras:
+            both = [_of_robot(camera, m.for_robot(camera.robot_id)) for m in models]
+            first = camera.half == 0
+            rows.append([np.where(first, a, b) for a, b in zip(*both, strict=True)])
+        return cls(*(list(column) for column in zip(*rows, strict=True)))
+
+    def score(self, cameras: Sequence[Detections]) -> float:
+        """RMS error of the chances over what such chances must err, in all frames that count."""
+        chance = [c[s.usable] for s, c in zip(cameras, self.chance, strict=True)]
+        bits = [(s.frames.raw if s.frames.has_raw else s.frames.voted)[s.usable] for s in cameras]
+        return brier_ratio(np.concatenate(chance), np.concatenate(bits))
 
 
-def camera_parameters(model: native.Model) -> list[Parameter]:
-    """Free quantities of all camera effects that the model has."""
-    entries = catalogue()
-    own = [n for n in effect_names(model) if entries[n.split("#")[0]]["stage"] in STAGES]
-    return [p for name in own for p in effect_parameters(model, name)]
+def _of_robot(camera: Detections, own: native.Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    chance = np.clip(camera.reported(own, camera.frames.has_raw), SURE, 1 - SURE)
+    return camera.likelihood(own), chance, camera.voted(int(own.sight()["vote_frames"]))
+
+
+@dataclass(frozen=True)
+class DetectionFit:
+    """A model of the camera, perhaps with one effect more, fitted to all frames and to each half.
+
+    Attributes:
+        effect: what was added; None if nothing.
+        model: fitted to all frames.
+        values: of all camera parameters.
+        heldout: what fits to either half say of the other.
+        score: of these.
+        added: estimates of the added effect's quantities.
+    """
+
+    effect: str | None
+    model: native.Model
+    values: np.ndarray
+    heldout: HeldOutFrames
+    score: float
+    added: tuple[ParameterEstimate, ...]
+
+
+def fit_detections(
+    cameras: Sequence[Detections], model: native.Model, effect: str | None = None
+) -> DetectionFit:
+    """Fits the model's camera effects, and `effect`, which it has not, to all frames.
+
+    Args:
+        cameras: frames with poses; at least one.
+        model: of all robots; it is copied.
+        effect: of the catalogue, at a stage of the camera; None adds none.
+    """
+    richer = model.copy()
+    fresh = []
+    if effect:
+        richer.add_effect(effect)
+        fresh = effect_parameters(richer, effect)
+    free = all_effect_parameters(richer, CAMERA_STAGES)
+    likelihood = Likelihood(cameras, richer, free)
+    values = np.array([richer.get(k.name) for k in free])
+    if fresh:
+        values = start(likelihood, fresh, values)
+    values = climb(likelihood, values) if free else values
+    fits = [climb(likelihood, values, 1 - half) if free else values for half in (0, 1)]
+    heldout = HeldOutFrames.of(cameras, tuple(likelihood.set(own).copy() for own in fits))
+    added = [e for e in estimates(likelihood, values) if effect and e.name.startswith(f"{effect}.")]
+    model = likelihood.set(values)
+    return DetectionFit(effect, model, values, heldout, heldout.score(cameras), tuple(added))
 
 
 class Likelihood:
     """Of bits, given values of some parameters."""
 
-    def __init__(self, scenes: list[Detections], model: native.Model, free: list[Parameter]):
+    def __init__(self, cameras: Sequence[Detections], model: native.Model, free: list[Parameter]):
         """Takes frames of all robots; the model is copied."""
-        self.scenes, self.free = scenes, free
+        self.cameras, self.free = cameras, free
         self.model = model.copy()
-        count = sum(len(s.frames.t_s) for s in scenes)
-        raw = all(s.frames.has_raw for s in scenes)  # else few frames count as it is
+        count = sum(len(s.frames.t_s) for s in cameras)
+        raw = all(s.frames.has_raw for s in cameras)  # else few frames count as it is
         self.thin = slice(None, None, max(1, -(-count // MOST_FRAMES)) if raw else 1)
 
     def set(self, values: np.ndarray) -> native.Model:
@@ -58,14 +140,14 @@ class Likelihood:
     def frames(self, values: np.ndarray, thin: bool = False) -> list[np.ndarray]:
         """(K,) log likelihoods per robot; of every Nth frame if `thin`."""
         model = self.set(values)
-        return [s.likelihood(model, self.thin if thin else slice(None)) for s in self.scenes]
+        return [s.likelihood(model, self.thin if thin else slice(None)) for s in self.cameras]
 
     def total(self, values: np.ndarray, half: int | None = None, thin: bool = True) -> float:
         """Sum over the frames of one half, or of both."""
         pick = self.thin if thin else slice(None)
         total = 0.0
-        for scene, told in zip(self.scenes, self.frames(values, thin), strict=True):
-            total += np.nansum(told if half is None else told[scene.half[pick] == half])
+        for camera, told in zip(self.cameras, self.frames(values, thin), strict=True):
+            total += np.nansum(told if half is None else told[camera.half[pick] == half])
         return float(total) * (self.thin.step if thin else 1)
 
 
