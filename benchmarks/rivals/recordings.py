@@ -105,5 +105,5 @@ def _noise(log: Path, sheet: Path) -> str:
     """A table of the noise that a log has, which a rival may ask of the model."""
     sheet.write_text(OMNI3)
     found = compare(load_measurements([log]), ModelFile.load(str(sheet)))
-    noise = found.robots[0].scene.noise.to_json()
+    noise = found.robots[0].modelled.noise.to_json()
     return "\n".join(["[noise]", *(f"{k} = {v}" for k, v in noise.items())]) + "\n"

@@ -368,7 +368,7 @@ class Comparison(_Shown):
         return show.comparison(self._result)
 
     def __repr__(self) -> str:
-        log = self._result.main.scene.measurement.log_name
+        log = self._result.main.measurement.log_name
         return f"Comparison({self._result.model_name}, {log}: score {self.score:.3g})"
 
 

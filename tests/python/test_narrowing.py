@@ -41,10 +41,10 @@ def file(brief_coasting_robot):
 
 
 @pytest.fixture(scope="module")
-def scene(brief_coasting_robot, file):
+def modelled(brief_coasting_robot, file):
     """Of a log and the model that it was made with."""
     (opened,) = open_measurements(load_measurements([brief_coasting_robot.log], file.model), file)
-    return opened.scene()
+    return opened.modelled()
 
 
 def spread(slope):
@@ -82,9 +82,9 @@ def test_a_clock_that_must_be_found_takes_away_what_the_inverse_says():
     np.testing.assert_allclose(np.linalg.inv(told), np.linalg.inv(gram)[:3, :3], rtol=1e-6)
 
 
-def test_the_run_tells_the_number_that_decides(scene, file):
-    forward = design_for(spread([3, 0, 0]), "milling", file, scene, LIMITS, 1.0)
-    yaw = design_for(spread([0, 3, 0]), "milling", file, scene, LIMITS, 1.0)
+def test_the_run_tells_the_number_that_decides(modelled, file):
+    forward = design_for(spread([3, 0, 0]), "milling", file, modelled, LIMITS, 1.0)
+    yaw = design_for(spread([0, 3, 0]), "milling", file, modelled, LIMITS, 1.0)
     assert turning(yaw) > 0.6 > 0.4 > turning(forward)
     assert forward.untold == 0 and forward.rows.end_s <= LIMITS.duration_s
     for own, other in ((forward, yaw), (yaw, forward)):
@@ -94,12 +94,12 @@ def test_the_run_tells_the_number_that_decides(scene, file):
         assert own.spread.std(own.bound) < after
 
 
-def test_what_no_drive_shows_is_said(scene, file):
-    found = design_for(spread([3, 0, 6]), "milling", file, scene, LIMITS, 1.0)
+def test_what_no_drive_shows_is_said(modelled, file):
+    found = design_for(spread([3, 0, 6]), "milling", file, modelled, LIMITS, 1.0)
     assert found.untold == pytest.approx(0.5)
     assert found.stds[1] == pytest.approx(0.3, rel=0.05)  # what the range leaves open stays
     with pytest.raises(ValueError, match=r"sensor.range_m.*no drive of one robot shows"):
-        design_for(spread([0, 0, 6]), "milling", file, scene, LIMITS, 1.0)
+        design_for(spread([0, 0, 6]), "milling", file, modelled, LIMITS, 1.0)
 
 
 @pytest.fixture
@@ -134,13 +134,13 @@ def test_where_all_draws_end_alike_there_is_nothing_to_narrow(planted, monkeypat
         run([*planted, "--draws", "6"])
 
 
-def refit(scene, moves, gains, seed):
+def refit(modelled, moves, gains, seed):
     """Both gains from one drive of a robot that has `gains`: by ways over a quarter of a second.
 
     Nothing of the design's: the twin drives with its noise, SciPy fits the ways that it went.
     """
-    played = Played.of([moves], scene)
-    stride = round(0.25 / scene.measurement.track.timing.pose_period_s)
+    played = Played.of([moves], modelled)
+    stride = round(0.25 / modelled.measurement.track.timing.pose_period_s)
 
     def ways(pose):
         d = pose[stride:] - pose[:-stride]
@@ -148,7 +148,7 @@ def refit(scene, moves, gains, seed):
         return np.stack([c * d[:, 0] + s * d[:, 1], c * d[:, 1] - s * d[:, 0], 0.1 * d[:, 2]], 1)
 
     def model(values):
-        made = scene.model.copy()
+        made = modelled.model.copy()
         for name, value in zip(NAMES, values, strict=False):
             made.set(name, float(value))
         return made
@@ -164,14 +164,14 @@ def refit(scene, moves, gains, seed):
     return least_squares(off, np.ones(2), diff_step=1e-3).x
 
 
-def test_a_refit_knows_the_outcome_best_after_the_run_that_was_designed_for_it(scene, file):
+def test_a_refit_knows_the_outcome_best_after_the_run_that_was_designed_for_it(modelled, file):
     """Of runs as long: that for the other gain, and moves at random. The outcome is planted."""
     random = np.random.default_rng(3)
     truths = 1 + STDS[:2] * random.normal(size=(40, 2))
     slope = np.array([0.3, 3.0])
     limits = Limits(13.0, (3.0, 3.0), 1.0)
-    own = design_for(spread([*slope, 0]), "milling", file, scene, limits, 1.0)
-    other = design_for(spread([3, 0, 0]), "milling", file, scene, limits, 1.0)
+    own = design_for(spread([*slope, 0]), "milling", file, modelled, limits, 1.0)
+    other = design_for(spread([3, 0, 0]), "milling", file, modelled, limits, 1.0)
     moves = family(duty_axes(1.0))
     runs = {"own": own.moves, "other": other.moves}
     for k in range(3):
@@ -180,7 +180,7 @@ def test_a_refit_knows_the_outcome_best_after_the_run_that_was_designed_for_it(s
         runs[f"random {k}"] = order[: int(np.searchsorted(ends_s, 11.0))]
     left = {
         name: np.sqrt(
-            np.mean([(slope @ (refit(scene, run, t, k) - t)) ** 2 for k, t in enumerate(truths)])
+            np.mean([(slope @ (refit(modelled, run, t, k) - t)) ** 2 for k, t in enumerate(truths)])
         )
         for name, run in runs.items()
     }
@@ -188,18 +188,18 @@ def test_a_refit_knows_the_outcome_best_after_the_run_that_was_designed_for_it(s
     assert left["own"] < 0.2 * own.stds[0]
 
 
-def test_fits_to_the_run_come_as_near_as_was_promised(scene, file):
+def test_fits_to_the_run_come_as_near_as_was_promised(modelled, file):
     """Robots with gains drawn from the errors drive it, and the tool's own fit is asked.
 
     Errors are squared over what was promised: chi squared, if the promise is no better than true.
     """
     slope = np.array([0.3, 3.0])
-    own = design_for(spread([*slope, 0]), "milling", file, scene, LIMITS, 1.0)
-    planned = narrowing.driven(own.moves, scene)
+    own = design_for(spread([*slope, 0]), "milling", file, modelled, LIMITS, 1.0)
+    planned = narrowing.driven(own.moves, modelled)
     truths = 1 + STDS[:2] * np.random.default_rng(5).normal(size=(6, 2))
     off = []
     for k, truth in enumerate(truths):
-        made = scene.model.copy()
+        made = modelled.model.copy()
         for name, value in zip(NAMES, truth, strict=False):
             made.set(name, float(value))
         seen = planned.with_pose(native.replica(made, planned.played, 100 + k))

@@ -144,8 +144,8 @@ def _narrowing(
         spread = spread_of(swarm, goal_of(swarm), draws, 1, lambda: progress.advance(task))
     logs = [o for o in open_measurements(measurements, model_file) if o.floor]
     excess = model_file.usual_score([o.measurement.log_sha256 for o in logs]) ** 2
-    scene = log_of([o.scene() for o in logs])
-    return design_for(spread, goal_of(swarm), model_file, scene, limits, excess)
+    modelled = log_of([o.modelled() for o in logs])
+    return design_for(spread, goal_of(swarm), model_file, modelled, limits, excess)
 
 
 def _sides(text: str) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.track import Track, local_line
 from twinmill.fitting.floor import NoiseFloor
 from twinmill.predict.detections import Detections
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.regimes import HORIZON, regime_masks
 from twinmill.predict.residual import StepGrid, body_velocity, rotate
 from twinmill.predict.windows import HORIZONS_S, Windows, difference
@@ -111,9 +111,9 @@ class RobotView:
         errors = difference(self._measured, predicted)
         return np.where(self.noise.keep[:, None, None], errors, np.nan)
 
-    def scene(self, model: native.Model) -> Scene:
+    def modelled(self, model: native.Model) -> ModelledLog:
         """Measurement and model, without the noise, which no drawing needs."""
-        return Scene(self.measurement, model, self.grid, self.clock_free)
+        return ModelledLog(self.measurement, model, self.grid, self.clock_free)
 
     def moments(self, model: native.Model) -> dict[tuple[str, str], tuple[np.ndarray, float]]:
         """By group and regime: (K,) s, starts of the predictions in it, and that of the worst."""
@@ -121,7 +121,7 @@ class RobotView:
         squares = over[:, np.isfinite(self.floor[HORIZON])].mean(axis=1)
         t_s = self.track.pose_t_s[self.windows.starts]
         found = {}
-        for group, name, inside in regime_masks(self.scene(model), self.windows):
+        for group, name, inside in regime_masks(self.modelled(model), self.windows):
             worst = np.argmax(np.where(inside & np.isfinite(squares), squares, -1.0))
             found[group, name] = t_s[inside], float(t_s[worst])
         return found

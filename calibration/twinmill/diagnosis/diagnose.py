@@ -116,7 +116,9 @@ def diagnose(
         known = alike
     progress("looking for what no effect explains")
     found = _concluded(opened, known, first, done, model_file, before, unseen, off)
-    whole = with_detections(found, [r.scene for r in before.robots], model_file, progress, excluded)
+    whole = with_detections(
+        found, [r.modelled for r in before.robots], model_file, progress, excluded
+    )
     return replace(whole, sentence=" ".join([whole.sentence, *map(sentence, whole.robots_off)]))
 
 
@@ -215,8 +217,8 @@ def _concluded(
     models = zip(known, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]
-    scenes = [r.scene.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
-    noise = irregularity_notes(opened, [s.noise for s in scenes], model_file.model)
+    modelled = [r.modelled.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
+    noise = irregularity_notes(opened, [s.noise for s in modelled], model_file.model)
     faint = _hidden(done, first.model)
     hidden = [*faint, *unseen.items()]
     refit = _refit(done)
@@ -248,9 +250,14 @@ def _concluded(
         late=late if any(o.floor for o in known) else None,
         search=done,
         opened=after,
-        scenes=scenes,
+        modelled=modelled,
         steps=steps,
-        notes=[*time_base_notes(scenes), *geometry_notes(last.state.model), *noise, *weighed.notes],
+        notes=[
+            *time_base_notes(modelled),
+            *geometry_notes(last.state.model),
+            *noise,
+            *weighed.notes,
+        ],
         next_experiment=_next(findings, drives, faint, weighed.verdict),
         robots_off=tuple(off),
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),

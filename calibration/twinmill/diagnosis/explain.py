@@ -80,7 +80,7 @@ def explain(
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
     logs = {m.log_name: m.log_sha256 for m in measurements}
-    noise = next((s.noise for s in diagnosis.scenes if s.noise), None)
+    noise = next((s.noise for s in diagnosis.modelled if s.noise), None)
     written = Fitted(
         model,
         [e for e in estimates if e.seen],

@@ -7,8 +7,8 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.fitting.opening import Opened
+from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import ChannelNoise, Noise
-from twinmill.predict.problem import Scene
 from twinmill.predict.windows import HORIZONS_S, rms
 
 NOTABLE = 0.01  # change of a gain that is worth a sentence
@@ -16,9 +16,9 @@ LEAST_DRIVE = (2e-3, 2e-2)  # m/s, rad/s: no robot follows more regularly
 IRREGULAR = 2.2  # floor over what the model file's noise makes, beyond which it is a finding
 
 
-def time_base_notes(scenes: list[Scene]) -> list[str]:
+def time_base_notes(logs: list[ModelledLog]) -> list[str]:
     """A sentence if logs do not last as long as they say."""
-    bases = [s.measurement.time_base for s in scenes if s.measurement.time_base]
+    bases = [s.measurement.time_base for s in logs if s.measurement.time_base]
     if not bases:
         return []
     straight, turning = (np.array([getattr(b, k) for b in bases]) for k in ("straight", "turning"))

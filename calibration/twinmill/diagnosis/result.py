@@ -33,7 +33,7 @@ class Diagnosis:
         late: how late the motion is; None of tables.
         search: all that was tried.
         opened: measurements with the model that has the findings.
-        scenes: the same as reports and other tests look at them.
+        modelled: the same with the models that were found, as reports look at them.
         steps: held-out score of the model as given and after each finding.
         notes: sentences on what to keep in mind.
         next_experiment: which run would settle what this log leaves open, or None.
@@ -59,7 +59,7 @@ class Diagnosis:
     late: Late | None
     search: Search
     opened: Sequence[Opened]
-    scenes: Sequence
+    modelled: Sequence
     steps: list[tuple[str | None, float]]
     notes: list[str]
     next_experiment: dict | None
@@ -121,9 +121,9 @@ class Diagnosis:
             "steps": [{"effect": e, "score_heldout": s} for e, s in self.steps],
             "next_experiment": self.next_experiment,
             "time_base": [
-                {"log": r.scene.measurement.log_name, **r.scene.measurement.time_base.to_json()}
+                {"log": r.measurement.log_name, **r.measurement.time_base.to_json()}
                 for r in self.before.robots
-                if getattr(r.scene.measurement, "time_base", None)
+                if getattr(r.measurement, "time_base", None)
             ],
             "robots": [r.to_json() for r in self.robots],
             "robots_off": [r.to_json() for r in self.robots_off],

@@ -8,7 +8,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.model.parameters import catalogue_of
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 
 STAGES = ("duty", "wheel", "ground", "observe")
 SMALL = 0.05  # of a parameter's plausible strength: the step of a derivative
@@ -36,19 +36,19 @@ class Candidate:
     strength: np.ndarray
     corner: bool
 
-    def columns(self, scenes: list[Scene], without: list[np.ndarray]) -> np.ndarray:
+    def columns(self, logs: list[ModelledLog], without: list[np.ndarray]) -> np.ndarray:
         """(R, k) fall of the whitened errors per unit of each column.
 
         Args:
-            scenes: measurements with their models.
+            logs: measurements with their models.
             without: (S, 3) whitened errors of each without the effect: those at its neutral values.
         """
         parts = []
-        for scene, white in zip(scenes, without, strict=True):
-            model = scene.model.copy()
+        for modelled, white in zip(logs, without, strict=True):
+            model = modelled.model.copy()
             model.add_effect(self.effect)
             names = [f"{_instance(model, self.effect)}.{n}" for n in self.names]
-            moved = scene.with_model(model).whitened(names, np.array(self.target))
+            moved = modelled.with_model(model).whitened(names, np.array(self.target))
             parts.append((white - moved).reshape(len(moved), -1).T)
         return np.concatenate(parts) / self._scale()
 
@@ -65,16 +65,16 @@ def _instance(model: native.Model, effect: str) -> str:
 
 
 def candidates(
-    scenes: list[Scene], excluded: Collection[str] = ()
+    logs: list[ModelledLog], excluded: Collection[str] = ()
 ) -> tuple[list[tuple[Candidate, np.ndarray]], list[str]]:
     """Candidates with their columns (R, k), and effects that leave no trace in these logs.
 
     Args:
-        scenes: measurements with their models.
+        logs: measurements with their models.
         excluded: effects that are not to be thought of.
     """
-    model = scenes[0].model
-    without = [s.white_errors() for s in scenes]
+    model = logs[0].model
+    without = [s.white_errors() for s in logs]
     found, blind = [], []
     for name, entry in catalogue_of(model).items():
         if name in model.effects or name in excluded or entry["stage"] not in STAGES:
@@ -83,7 +83,7 @@ def candidates(
             continue
         if entry["texts"]:  # a formula is the user's own, and no candidate
             continue
-        candidate, columns = _best_columns(scenes, entry, without)
+        candidate, columns = _best_columns(logs, entry, without)
         if np.any(_energy(candidate, columns) > BLIND):
             found.append((candidate, columns))
         else:
@@ -92,11 +92,11 @@ def candidates(
 
 
 def _best_columns(
-    scenes: list[Scene], entry: dict, without: list[np.ndarray]
+    logs: list[ModelledLog], entry: dict, without: list[np.ndarray]
 ) -> tuple[Candidate, np.ndarray]:
     """Derivatives at the neutral value, or the way to the default where these say nothing of it."""
     smooth, corner = _smooth(entry), _corner(entry)
-    columns, whole = smooth.columns(scenes, without), corner.columns(scenes, without)
+    columns, whole = smooth.columns(logs, without), corner.columns(logs, without)
     foreseen = columns @ smooth.strength
     size, reached = np.linalg.norm(foreseen), np.linalg.norm(whole)
     alike = foreseen @ whole[:, 0] / max(size * reached, 1e-12)

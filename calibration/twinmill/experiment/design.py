@@ -20,7 +20,7 @@ from twinmill.experiment.relevance import relevance
 from twinmill.fitting.fit import base_names
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import base_parameters, catalogue
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.residual import StepGrid
 from twinmill.predict.windows import Windows, score
 
@@ -144,44 +144,44 @@ def design(
     say("playing the moves in the twin")
     names = base_names(model_file.model, logs, model_file.known_from_other_logs(hashes))
     asked = hypotheses_of(diagnosis, base_parameters(model_file.model, names))
-    scene = log_of(asked.state.scenes)
-    foreseen = Played.of([[m] for m in moves], scene).scene(scene, CENTRE)
-    known = candidate_effects(asked.state.scenes, foreseen, asked.state, asked, usual)
+    modelled = log_of(asked.state.logs)
+    foreseen = Played.of([[m] for m in moves], modelled).modelled(modelled, CENTRE)
+    known = candidate_effects(asked.state.logs, foreseen, asked.state, asked, usual)
     fisher = FisherInformation(asked.state.free, known)
-    told = np.sum([fisher.told(s) for s in asked.state.scenes], axis=0)
+    told = np.sum([fisher.told(s) for s in asked.state.logs], axis=0)
     names, why = question(asked, known, _tempered(fisher, told), ENOUGH_CHI2)
-    wanted = {i: with_effect(scene.model, s) for i, s in enumerate(known) if s.name in names}
+    wanted = {i: with_effect(modelled.model, s) for i, s in enumerate(known) if s.name in names}
     if not wanted:
         raise ValueError(f"{why} No move that the twin can play shows any of them.")
     say("choosing moves")
-    floor = Floor(limits, scene, list(wanted.values()))
+    floor = Floor(limits, modelled, list(wanted.values()))
     worth = partial(_worth, fisher, wanted=list(wanted))
     chosen = choose(moves, worth, told, fisher.foreseen(foreseen), floor)
     say("checking the whole script")
-    whole = Played.of([chosen], scene)
-    planned = whole.scene(scene, CENTRE)
+    whole = Played.of([chosen], modelled)
+    planned = whole.modelled(modelled, CENTRE)
     after = told + fisher.foreseen(planned)[0]
     outlook = _Outlook(asked, fisher, wanted, usual)
     return Plan(
         why,
         chosen,
-        rows_of(chosen, scene.measurement.track.command_kind),
+        rows_of(chosen, modelled.measurement.track.command_kind),
         outlook.chances(told, after, planned),
         whole.pose_t_s - whole.pose_t_s[0],
         np.array([whole.path(m, CENTRE) for m in floor.models]),
         limits,
-        scene.model.get("robot.body_radius_m"),
-        scene.measurement.track.robot_id,
+        modelled.model.get("robot.body_radius_m"),
+        modelled.measurement.track.robot_id,
     )
 
 
-def log_of(scenes: list[Scene]) -> Scene:
+def log_of(logs: list[ModelledLog]) -> ModelledLog:
     """The first log: clock, noise and rate of poses are taken to be the same in the next.
 
     Raises:
         ValueError: there is none.
     """
-    logs = [scene for scene in scenes if scene.noise]
+    logs = [log for log in logs if log.noise]
     if not logs:
         raise ValueError(NO_LOG)
     return logs[0]
@@ -195,10 +195,10 @@ def check(
     if not logs:
         raise ValueError(NO_LOG)
     model = model_file.model.for_robot(logs[0].track.robot_id)
-    scene = Scene(logs[0], model, StepGrid.of(logs[0]), clock_free=True)
-    if scene.model.drive not in DRIVES:
+    modelled = ModelledLog(logs[0], model, StepGrid.of(logs[0]), clock_free=True)
+    if modelled.model.drive not in DRIVES:
         raise ValueError(
-            f"the model is driven by {scene.model.drive}, which is measured and not commanded; "
+            f"the model is driven by {modelled.model.drive}, which is measured and not commanded; "
             f"scripts can be designed for robots driven by {' or '.join(DRIVES)}."
         )
     if limits.duration_s < SHORTEST_RUN_S:
@@ -206,10 +206,10 @@ def check(
             f"a run of {limits.duration_s:g} s is too short: no model is judged on less than "
             f"{SHORTEST_LOG_S:g} s, and moves come whole; allow {SHORTEST_RUN_S:g} s."
         )
-    floor, axes = Floor(limits, scene, []), _axes(logs, scene.model.drive, limits)
+    floor, axes = Floor(limits, modelled, []), _axes(logs, modelled.model.drive, limits)
     if not any(floor.holds([m]) for m in family(axes)):
         size = "x".join(f"{side:g}" for side in limits.floor_m)
-        need_m = 2 * (scene.model.get("robot.body_radius_m") + WANDER_M)
+        need_m = 2 * (modelled.model.get("robot.body_radius_m") + WANDER_M)
         raise ValueError(
             f"no move fits on a floor of {size} m: the robot's body and what it may stray take "
             f"{need_m:.2g} m each way; allow more."
@@ -237,15 +237,15 @@ def _axes(logs: Sequence[Measurement], drive: str, limits: Limits) -> list[Axis]
 class Floor:
     """Keeps the robot on the floor, whichever of the effects it has."""
 
-    def __init__(self, limits: Limits, scene: Scene, richer: list[native.Model]) -> None:
-        self.scene, self.limits = scene, limits
-        self.models = [scene.model, *richer]
-        radius_m = scene.model.get("robot.body_radius_m")
+    def __init__(self, limits: Limits, modelled: ModelledLog, richer: list[native.Model]) -> None:
+        self.modelled, self.limits = modelled, limits
+        self.models = [modelled.model, *richer]
+        radius_m = modelled.model.get("robot.body_radius_m")
         self.room_m = np.array(limits.floor_m) / 2 - radius_m - WANDER_M
 
     def holds(self, moves: list[Move]) -> bool:
         """Whether these moves, one after the other, stay on it."""
-        played = Played.of([moves], self.scene)
+        played = Played.of([moves], self.modelled)
         return all(
             np.all(np.abs(played.path(model, CENTRE)[:, :2]) <= self.room_m)
             for model in self.models
@@ -321,7 +321,7 @@ class _Outlook:
     wanted: dict[int, native.Model]
     usual: float
 
-    def chances(self, told: np.ndarray, after: np.ndarray, planned: Scene) -> list[Chance]:
+    def chances(self, told: np.ndarray, after: np.ndarray, planned: ModelledLog) -> list[Chance]:
         """Of each effect before and after the planned run, surest first."""
         before_chi2, before = self._power(told, [])
         chi2, then = self._power(after, [planned])
@@ -340,16 +340,18 @@ class _Outlook:
             )
         return sorted(chances, key=lambda c: -c.power)
 
-    def _power(self, grams: np.ndarray, planned: list[Scene]) -> tuple[np.ndarray, np.ndarray]:
+    def _power(
+        self, grams: np.ndarray, planned: list[ModelledLog]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """(T, 1 + J) margins of the wanted over the scatter, and (T,) chances to be named."""
         state, candidate_effects = self.asked.state, self.fisher.candidate_effects
         margins = _tempered(self.fisher, grams)[list(self.wanted)]
-        logs = [(s, f) for s, f in zip(state.scenes, state.floors, strict=True) if s.noise]
-        scores = [score(Windows.of(s.measurement.track).errors(s), f) for s, f in logs]
-        scenes = [*(s for s, _ in logs), *planned]
-        floors = [*(f for _, f in logs), *(logs[0][1] for _ in planned)]
+        driven = [(s, f) for s, f in zip(state.logs, state.floors, strict=True) if s.noise]
+        scores = [score(Windows.of(s.measurement.track).errors(s), f) for s, f in driven]
+        logs = [*(s for s, _ in driven), *planned]
+        floors = [*(f for _, f in driven), *(driven[0][1] for _ in planned)]
         scores += [max(1.0, self.usual, *scores) for _ in planned]
-        matter = relevance(scenes, floors, scores, self.fisher, grams, self.wanted)
+        matter = relevance(logs, floors, scores, self.fisher, grams, self.wanted)
         entries = [catalogue()[candidate_effects[i].name] for i in self.wanted]
         return margins, power(
             margins,

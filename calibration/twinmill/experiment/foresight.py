@@ -11,7 +11,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.track import SILENCE_S, Timing, Track, command_at
 from twinmill.experiment.moves import Move
 from twinmill.model.parameters import CLOCK
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.residual import StepGrid
 
 LEAD_S = 1.0  # stands before the first move, and as long after the last
@@ -80,8 +80,8 @@ class Played:
     battery_V: float
 
     @classmethod
-    def of(cls, starts: list[list[Move]], like: Scene) -> "Played":
-        """Each start is a list of moves; clock, battery and rate of poses are the scene's."""
+    def of(cls, starts: list[list[Move]], like: ModelledLog) -> "Played":
+        """Each start is a list of moves; clock, battery and rate of poses are the log's."""
         kind = like.measurement.track.command_kind
         parts = [rows_of(moves, kind) for moves in starts]
         lengths_s = [rows.end_s + BETWEEN_S for rows in parts]
@@ -106,10 +106,10 @@ class Played:
             quiet.set(name, 0.0)
         return native.replica(quiet, self._track(np.tile(start, (len(self.part), 1))), 1)
 
-    def scene(self, like: Scene, start: np.ndarray) -> Scene:
-        """As if motion capture had seen the scene's model drive; with the same noise.
+    def modelled(self, like: ModelledLog, start: np.ndarray) -> ModelledLog:
+        """As if motion capture had seen the log's model drive; with the same noise.
 
-        Telemetry tells the commands as often as in the scene's log.
+        Telemetry tells the commands as often as in that log.
         """
         pose = self.path(like.model, start)
         old = like.measurement.track

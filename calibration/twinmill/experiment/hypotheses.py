@@ -12,7 +12,7 @@ from twinmill.experiment.candidates import Candidate, candidates
 from twinmill.experiment.information import CandidateEffect
 from twinmill.experiment.screen import screen
 from twinmill.model.parameters import Parameter, all_effect_parameters, catalogue
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 
 WEAKEST = 4  # effects that show least, where nothing else is in question
 
@@ -21,7 +21,7 @@ WEAKEST = 4  # effects that show least, where nothing else is in question
 class State:
     """Logs and tables with the model so far, what is free of it, and (H, 3) floors of the logs."""
 
-    scenes: list[Scene]
+    logs: list[ModelledLog]
     free: list[Parameter]
     floors: list[np.ndarray]
 
@@ -95,16 +95,16 @@ def question(
 
 
 def candidate_effects(
-    scenes: list[Scene], planned: Scene, state: State, asked: Hypotheses, usual: float
+    logs: list[ModelledLog], planned: ModelledLog, state: State, asked: Hypotheses, usual: float
 ) -> list[CandidateEffect]:
     """Every effect that the logs or the planned run show, at its fitted or its usual strength.
 
     Errors of the next run scatter no less over their noise than the score `usual` says.
     """
-    shown, _ = candidates([*scenes, planned])
-    without = [s.white_errors() for s in scenes]
-    found = [(candidate, candidate.columns(scenes, without)) for candidate, _ in shown]
-    tested = screen(scenes, state.free, found).found
+    shown, _ = candidates([*logs, planned])
+    without = [s.white_errors() for s in logs]
+    found = [(candidate, candidate.columns(logs, without)) for candidate, _ in shown]
+    tested = screen(logs, state.free, found).found
     return [
         CandidateEffect(
             t.candidate, _whole(t.candidate.effect, asked.fitted), max(t.excess, usual**2)
@@ -135,7 +135,7 @@ def _without(diagnosis: Diagnosis, names: list[str], base: list[Parameter]) -> S
     model = last.state.model
     logs = [o for o in diagnosis.opened if o.floor and o.data is not None]
     free = [p.at(model.get(p.name)) for p in [*base, *all_effect_parameters(model)]]
-    return State([o.scene().with_model(model) for o in logs], free, [o.floor.rms for o in logs])
+    return State([o.modelled().with_model(model) for o in logs], free, [o.floor.rms for o in logs])
 
 
 def _values(ranked: list[Ranked]) -> dict[str, dict[str, float]]:

@@ -13,7 +13,7 @@ from twinmill.experiment.candidates import Candidate
 from twinmill.experiment.one_step_fit import System
 from twinmill.experiment.screen import EFFECT_PRIOR
 from twinmill.model.parameters import Parameter
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 
 CLOCKS = 2  # offset and rate of a run
 
@@ -55,9 +55,9 @@ class FisherInformation:
         self.nuisance = np.r_[0 : len(free), self.shared : self.shared + CLOCKS]
         self.steps = ends - 1  # places of the whole steps
 
-    def told(self, scene: Scene) -> np.ndarray:
+    def told(self, modelled: ModelledLog) -> np.ndarray:
         """(C, C) products of a measured run; its own clock is projected out."""
-        columns, prior = self._columns(scene)
+        columns, prior = self._columns(modelled)
         gram = columns.T @ columns
         own = slice(self.shared, None)
         clock = gram[own, own] + np.diag(prior)
@@ -65,10 +65,10 @@ class FisherInformation:
         gram[own] = gram[:, own] = 0
         return gram
 
-    def foreseen(self, scene: Scene) -> np.ndarray:
+    def foreseen(self, modelled: ModelledLog) -> np.ndarray:
         """(K, C, C) products of each part of a planned run."""
-        columns, _ = self._columns(scene)
-        parts = [slice(3 * p.start, 3 * p.stop) for p in scene.grid.slices]
+        columns, _ = self._columns(modelled)
+        parts = [slice(3 * p.start, 3 * p.stop) for p in modelled.grid.slices]
         return np.array([columns[p].T @ columns[p] for p in parts])
 
     def margins(self, grams: np.ndarray) -> np.ndarray:
@@ -108,19 +108,19 @@ class FisherInformation:
         widths = np.array([f.std for f in self.free] + [np.inf] * CLOCKS)
         return grams[..., at[:, None], at] + np.diag(1 / widths**2 + 1e-9)
 
-    def _columns(self, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    def _columns(self, modelled: ModelledLog) -> tuple[np.ndarray, np.ndarray]:
         """(R, C) columns of a run, and (2,) 1 / variance of its clock's priors."""
-        system = System([scene], self.free)
+        system = System([modelled], self.free)
         count = len(system.unknowns)
         jacobian = system.jacobian(system.start)[:-count]
         clock = np.zeros((len(jacobian), CLOCKS))
-        if scene.clock_free:
+        if modelled.clock_free:
             clock = jacobian[:, -CLOCKS:]
-        without = [scene.white_errors()]
+        without = [modelled.white_errors()]
         effects = [
-            c.columns([scene], without)
+            c.columns([modelled], without)
             for s in self.candidate_effects
             for c in (s.candidate, s.whole)
         ]
-        prior = 1 / system.prior[-CLOCKS:] ** 2 if scene.clock_free else np.ones(CLOCKS)
+        prior = 1 / system.prior[-CLOCKS:] ** 2 if modelled.clock_free else np.ones(CLOCKS)
         return np.hstack([jacobian[:, : len(self.free)], *effects, clock]), prior

@@ -10,24 +10,24 @@ from dataclasses import replace
 import numpy as np
 
 from twinmill.model.parameters import CLOCK, CLOCK_RATE, Parameter, base_parameters
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 
 HUBER_SIGMA = 3.5
 BLOCK_S = 4.0  # errors of one block may be correlated; blocks are not
 
 
 class System:
-    """Whitened errors of scenes as a function of the shared parameters and of each free clock."""
+    """Whitened errors of logs as a function of the shared parameters and of each free clock."""
 
-    def __init__(self, scenes: list[Scene], free: list[Parameter]) -> None:
-        self.scenes, self.free = scenes, list(free)
+    def __init__(self, logs: list[ModelledLog], free: list[Parameter]) -> None:
+        self.logs, self.free = logs, list(free)
         self.unknowns: list[Parameter] = list(free)
         self.columns: list[list[int]] = []
-        for scene in scenes:
-            own = [i for i, p in enumerate(free) if p.name not in scene.stated]
-            if scene.clock_free:
+        for modelled in logs:
+            own = [i for i, p in enumerate(free) if p.name not in modelled.stated]
+            if modelled.clock_free:
                 own += range(len(self.unknowns), len(self.unknowns) + 2)
-                offset, rate = base_parameters(scene.model, [CLOCK, CLOCK_RATE])
+                offset, rate = base_parameters(modelled.model, [CLOCK, CLOCK_RATE])
                 self.unknowns += [offset, replace(rate, usual=0.0)]
             self.columns.append(own)
         self.start, self.high, self.step, self.prior, self.centre = (
@@ -36,12 +36,12 @@ class System:
         )
 
     def _whitened(self, rows: np.ndarray) -> np.ndarray:
-        """(B, P) unknowns to (B, R) whitened errors of all scenes, then the prior's rows."""
+        """(B, P) unknowns to (B, R) whitened errors of all logs, then the prior's rows."""
         parts = []
-        for scene, columns in zip(self.scenes, self.columns, strict=True):
+        for modelled, columns in zip(self.logs, self.columns, strict=True):
             own, place = np.unique(rows[:, columns], axis=0, return_inverse=True)
             names = [self.unknowns[c].name for c in columns]
-            white = scene.whitened(names, own) if names else scene.white_errors()[None]
+            white = modelled.whitened(names, own) if names else modelled.white_errors()[None]
             parts.append(white.reshape(len(own), -1)[place.ravel()])
         return np.concatenate([*parts, (rows - self.centre) / self.prior], axis=1)
 
@@ -56,6 +56,6 @@ class System:
         return ((values[1:] - values[0]) / step[:, None]).T
 
     def blocks(self) -> np.ndarray:
-        """(R,) number of the block that each whitened error belongs to, over all scenes."""
-        label = [np.repeat(1e6 * i + s.grid.t_s // BLOCK_S, 3) for i, s in enumerate(self.scenes)]
+        """(R,) number of the block that each whitened error belongs to, over all logs."""
+        label = [np.repeat(1e6 * i + s.grid.t_s // BLOCK_S, 3) for i, s in enumerate(self.logs)]
         return np.unique(np.concatenate(label), return_inverse=True)[1]

@@ -8,7 +8,7 @@ import twinmill_native as native
 from scipy.stats import norm
 
 from twinmill.experiment.information import FisherInformation
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.windows import HORIZONS_S, Windows, difference, score
 
 WORTH = 0.98  # an effect that is worth a name lowers the score to this share
@@ -40,7 +40,7 @@ class Relevance:
 
 
 def relevance(
-    scenes: list[Scene],
+    logs: list[ModelledLog],
     floors: list[np.ndarray],
     scores: list[float],
     fisher: FisherInformation,
@@ -50,18 +50,18 @@ def relevance(
     """Of some effects, over logs and planned runs.
 
     Args:
-        scenes: with the model that lacks the effects.
-        floors: (H, 3) per scene.
-        scores: that the model leaves in each scene with the effect in it.
+        logs: with the model that lacks the effects.
+        floors: (H, 3) per log.
+        scores: that the model leaves in each log with the effect in it.
         fisher: of all effects.
-        grams: (C, C) products of the scenes.
+        grams: (C, C) products of the logs.
         richer: by the place of an effect in the fisher the model with it.
     """
-    windows = [Windows.of(s.measurement.track) for s in scenes]
+    windows = [Windows.of(s.measurement.track) for s in logs]
     shifts = fisher.shifts(grams)
     added2 = []
     for place, model in richer.items():
-        refitted = scenes[0].model.copy()
+        refitted = logs[0].model.copy()
         for free, change in zip(fisher.free, shifts[place], strict=True):
             value = refitted.get(free.name) + change
             refitted.set(free.name, float(np.clip(value, free.min, free.max)))
@@ -72,8 +72,8 @@ def relevance(
                 ),
                 f,
             )
-            for s, w, f in zip(scenes, windows, floors, strict=True)
+            for s, w, f in zip(logs, windows, floors, strict=True)
         ]
         added2.append(np.mean(np.square(parts)))
-    length_s = sum(float(np.ptp(s.measurement.track.pose_t_s)) for s in scenes)
+    length_s = sum(float(np.ptp(s.measurement.track.pose_t_s)) for s in logs)
     return Relevance(float(np.mean(np.square(scores))), np.array(added2), length_s / HORIZONS_S[-1])

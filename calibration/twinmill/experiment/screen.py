@@ -12,7 +12,7 @@ import numpy as np
 from twinmill.experiment.candidates import Candidate
 from twinmill.experiment.one_step_fit import HUBER_SIGMA, System
 from twinmill.model.parameters import Parameter
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 
 EFFECT_PRIOR = 2.0  # standard deviation of an effect over its usual strength
 RIDGE = 1e-9  # of the trace
@@ -61,10 +61,10 @@ class Screening:
 
 
 def screen(
-    scenes: list[Scene], base: list[Parameter], found: list[tuple[Candidate, np.ndarray]]
+    logs: list[ModelledLog], base: list[Parameter], found: list[tuple[Candidate, np.ndarray]]
 ) -> Screening:
-    """Tests all candidates, given with their columns, against what the scenes' models leave."""
-    system = System(scenes, base)
+    """Tests all candidates, given with their columns, against what the logs' models leave."""
+    system = System(logs, base)
     left, basis = project_out(system)
     blocks = np.append(system.blocks(), np.full(len(system.unknowns), -1))
     candidates = [c for c, _ in found]

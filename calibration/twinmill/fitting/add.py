@@ -206,7 +206,7 @@ def _add_to_camera(
         raise ValueError(
             f"effect '{effect}': {model_file.path.name} has it already; remove its [[effect]]."
         )
-    cameras = all_detections([o.scene() for o in open_measurements(measurements, model_file)])
+    cameras = all_detections([o.modelled() for o in open_measurements(measurements, model_file)])
     if not cameras:
         raise ValueError(
             f"effect '{effect}': acts on the camera's bit, and no log has bits of a robot and the "

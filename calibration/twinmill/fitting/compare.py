@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
@@ -15,7 +16,7 @@ from twinmill.model.parameters import CLOCK, HEADING
 from twinmill.predict.datasets import total_score
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import all_detections
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.regimes import Regime, where_it_fails
 from twinmill.predict.steady_errors import SteadyComparison, compare_steady
 from twinmill.predict.steady_states import SteadyStates
@@ -30,7 +31,7 @@ class RobotComparison:
     """One robot in one log.
 
     Attributes:
-        scene: measurement, model with the clock used, noise.
+        modelled: measurement, model with the clock used, noise.
         windows: where predictions start and end.
         errors: (W, H, 3) measured less predicted, seen from the start; m, m, rad; NaN where a bump
             hides them.
@@ -39,12 +40,22 @@ class RobotComparison:
         where: regimes.
     """
 
-    scene: Scene
+    modelled: ModelledLog
     windows: Windows
     errors: np.ndarray
     floor: NoiseFloor
     score: float
     where: list[Regime]
+
+    @property
+    def measurement(self) -> Measurement:
+        """What was compared."""
+        return self.modelled.measurement
+
+    @property
+    def model(self) -> native.Model:
+        """Of the robot, on the clock used."""
+        return self.modelled.model
 
     @property
     def size(self) -> int:
@@ -54,13 +65,13 @@ class RobotComparison:
     @property
     def time_offset_s(self) -> float:
         """Capture's clock less the robot's."""
-        return self.scene.model.get(CLOCK)
+        return self.model.get(CLOCK)
 
     @property
     def held_heading_rad(self) -> float | None:
         """Where the robot heads in a log that does not record it; None where it was recorded."""
-        recorded = self.scene.measurement.track.has_heading
-        return None if recorded else self.scene.model.get(HEADING)
+        recorded = self.measurement.track.has_heading
+        return None if recorded else self.model.get(HEADING)
 
     def error_rows(self) -> list[dict]:
         """errors[] of the interface: one row per channel and horizon."""
@@ -81,16 +92,16 @@ class RobotComparison:
     def to_json(self) -> dict:
         """One entry of robots[]."""
         return {
-            "robot_id": self.scene.measurement.track.robot_id,
-            "log": self.scene.measurement.log_name,
+            "robot_id": self.measurement.track.robot_id,
+            "log": self.measurement.log_name,
             "score": self.score,
             "floor_kind": self.floor.kind,
-            "noise": self.scene.noise.to_json(),
+            "noise": self.modelled.noise.to_json(),
             "errors": self.error_rows(),
             "where": [r.to_json() for r in self.where],
             "time_offset_s": self.time_offset_s,
             "held_heading_rad": self.held_heading_rad,
-            "time_base": base.to_json() if (base := self.scene.measurement.time_base) else None,
+            "time_base": base.to_json() if (base := self.measurement.time_base) else None,
         }
 
 
@@ -156,13 +167,13 @@ class Comparison:
 
 def compare_robot(own: Opened) -> RobotComparison | SteadyComparison:
     """Compares one robot; its model and clock are taken as they are."""
-    scene = own.scene()
-    if isinstance(scene, SteadyStates):
-        return compare_steady(scene)
+    modelled = own.modelled()
+    if isinstance(modelled, SteadyStates):
+        return compare_steady(modelled)
     windows = Windows.of(own.measurement.track)
-    errors = np.where(own.floor.keep[:, None, None], windows.errors(scene), np.nan)
-    regimes = where_it_fails(scene, windows, errors, own.floor.rms) if own.data else []
-    return RobotComparison(scene, windows, errors, own.floor, own.score, regimes)
+    errors = np.where(own.floor.keep[:, None, None], windows.errors(modelled), np.nan)
+    regimes = where_it_fails(modelled, windows, errors, own.floor.rms) if own.data else []
+    return RobotComparison(modelled, windows, errors, own.floor, own.score, regimes)
 
 
 def comparison(model_file: ModelFile, opened: Sequence[Opened]) -> Comparison:
@@ -179,5 +190,5 @@ def compare(measurements: Sequence[Measurement | SteadyTable], model_file: Model
     """
     opened = open_measurements(measurements, model_file)
     found = comparison(model_file, opened)
-    bits = compare_detections(all_detections([r.scene for r in found.robots]), model_file.model)
+    bits = compare_detections(all_detections([r.modelled for r in found.robots]), model_file.model)
     return replace(found, bits=bits)

@@ -178,7 +178,7 @@ def fit(
 def noise_of(after: Comparison):
     """Of the first log that has a score; None of tables."""
     return next(
-        (r.scene.noise for r in after.robots if r.scene.noise and np.isfinite(r.score)), None
+        (r.modelled.noise for r in after.robots if r.modelled.noise and np.isfinite(r.score)), None
     )
 
 

@@ -23,7 +23,7 @@ from twinmill.model.parameters import (
     base_parameters,
 )
 from twinmill.predict.datasets import Trajectory
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.steady_states import SteadyStates
 
 CLOCK_REACH_S = 1.0  # how far from its start an offset of the clocks is looked for
@@ -65,11 +65,11 @@ class Opened:
         """Whether the heading was not recorded, so that the robot is taken to hold one."""
         return self.floor is not None and not self.measurement.track.has_heading
 
-    def scene(self) -> Scene | SteadyStates:
+    def modelled(self) -> ModelledLog | SteadyStates:
         """What reports and other tests look at: measurement, model, noise."""
         if isinstance(self.data, SteadyStates):
             return self.data.with_model(self.model)
-        return Scene.on_clock(self.measurement, self.model, clock_free=not self.same_clock)
+        return ModelledLog.on_clock(self.measurement, self.model, clock_free=not self.same_clock)
 
     def aligned(
         self, model: native.Model, offset_s: float | None = None, rounds: int = ROUNDS

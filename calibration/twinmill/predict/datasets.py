@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Data sets that a model is scored on: rows of error over floor.
 
-All fits, searches and tests see a data set through `Dataset` alone. `Trajectory` is one robot in
-one log.
+`ScoreFit` and the search see a data set through `Dataset` alone. Two kinds have errors and a
+floor: `Trajectory`, one robot in one log, and `SteadyStates`, one robot of a table. The third,
+`Detections`, has events with chances: it is fitted by likelihood (`fitting.detection_fit`).
 """
 
 from collections.abc import Sequence

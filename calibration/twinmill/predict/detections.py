@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames of one robot with the poses of all robots around it, and how likely a model finds them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,7 +10,7 @@ import twinmill_native as native
 from twinmill.data.camera_frames import Frames
 from twinmill.data.track import Track
 from twinmill.model.parameters import CLOCK, CLOCK_RATE
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 
 BLOCK_S = 4.0  # errors of detections within a block are correlated
 # Poses are never better known than this: markers sit off the wheels' centre, cameras off theirs.
@@ -152,42 +153,42 @@ def pose_at(track: Track, t_s: np.ndarray) -> np.ndarray:
     return np.where(whole[:, None], pose, np.nan)
 
 
-def all_detections(scenes: list) -> list[Detections]:
+def all_detections(logs: Sequence) -> list[Detections]:
     """Robots that reported bits while at least one other was tracked.
 
     Args:
-        scenes: measurements with their clocks; those without a track or frames are passed over.
+        logs: with their models and clocks; those without frames, and tables, are passed over.
     """
     found = []
-    logs: dict[str, list[Scene]] = {}
-    for scene in scenes:
-        if isinstance(scene, Scene):
-            logs.setdefault(scene.measurement.log_sha256, []).append(scene)
-    for together in logs.values():
-        for own, scene in enumerate(together):
-            if len(together) > 1 and scene.measurement.frames is not None:
+    by_log: dict[str, list[ModelledLog]] = {}
+    for modelled in logs:
+        if isinstance(modelled, ModelledLog):
+            by_log.setdefault(modelled.measurement.log_sha256, []).append(modelled)
+    for together in by_log.values():
+        for own, modelled in enumerate(together):
+            if len(together) > 1 and modelled.measurement.frames is not None:
                 made = detections_of(together, own)
                 if made.usable.any():
                     found.append(made)
     return found
 
 
-def detections_of(together: list[Scene], own: int) -> Detections:
+def detections_of(together: list[ModelledLog], own: int) -> Detections:
     """Of one robot of a log that has frames; of the others the tracks alone are used."""
-    scene = together[own]
-    noise, frames = scene.noise.to_json(), scene.measurement.frames
+    modelled = together[own]
+    noise, frames = modelled.noise.to_json(), modelled.measurement.frames
     block = ((frames.t_s - frames.t_s[0]) // BLOCK_S).astype(int)
     made = Detections(
-        scene.measurement.label,
-        scene.measurement.track.robot_id,
-        scene.measurement.log_sha256,
+        modelled.measurement.label,
+        modelled.measurement.track.robot_id,
+        modelled.measurement.log_sha256,
         own,
         [s.measurement.track for s in together],
         frames,
         np.ones(len(frames.t_s), bool),
-        scene.model.get(CLOCK),
-        scene.model.get(CLOCK_RATE) * 1e-6,
-        scene.clock_free,
+        modelled.model.get(CLOCK),
+        modelled.model.get(CLOCK_RATE) * 1e-6,
+        modelled.clock_free,
         (max(noise["sensor_m"], LEAST_M), max(noise["sensor_rad"], LEAST_RAD)),
         block,
         thue_morse(block),

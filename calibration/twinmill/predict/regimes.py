@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from twinmill.data.track import command_at
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.residual import body_velocity
 from twinmill.predict.windows import HORIZONS_S, Windows
 
@@ -36,7 +36,7 @@ class Regime:
 
 
 def where_it_fails(
-    scene: Scene, windows: Windows, errors: np.ndarray, floor: np.ndarray
+    modelled: ModelledLog, windows: Windows, errors: np.ndarray, floor: np.ndarray
 ) -> list[Regime]:
     """Regimes with enough windows, by group; within a group the worst first."""
     over = (errors[:, HORIZON] / floor[HORIZON]) ** 2
@@ -44,7 +44,7 @@ def where_it_fails(
     squares = over[:, judged].mean(axis=1)
     known = np.isfinite(squares)
     regimes = []
-    for group, name, mask in regime_masks(scene, windows):
+    for group, name, mask in regime_masks(modelled, windows):
         inside = mask & known
         if np.count_nonzero(inside) >= FEWEST:
             regimes.append(
@@ -60,12 +60,12 @@ def where_it_fails(
     return sorted(regimes, key=lambda r: (order[r.group], -r.ratio))
 
 
-def regime_masks(scene: Scene, windows: Windows) -> Iterator[tuple[str, str, np.ndarray]]:
+def regime_masks(modelled: ModelledLog, windows: Windows) -> Iterator[tuple[str, str, np.ndarray]]:
     """(group, regime, (W,) bool): windows that lie in each regime."""
-    track, starts = scene.measurement.track, windows.starts
-    t_s = track.pose_t_s[starts] - scene.model.get("clock.offset_s")
+    track, starts = modelled.measurement.track, windows.starts
+    t_s = track.pose_t_s[starts] - modelled.model.get("clock.offset_s")
     yield from _by_change(track, t_s)
-    yield from _by_motion(scene, starts)
+    yield from _by_motion(modelled, starts)
     if track.command_kind == "duty":
         level = np.abs(
             command_at(t_s + HORIZONS_S[HORIZON] / 2, track.command_t_s, track.command)
@@ -101,9 +101,11 @@ def _by_change(track, t_s: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
     yield "phase", "changing", ~constant & (zero[:, 0] == zero[:, -1])
 
 
-def _by_motion(scene: Scene, starts: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
-    velocity = np.full((len(scene.measurement.track.pose), 3), np.nan)
-    velocity[scene.grid.source] = body_velocity(scene.measurement, scene.grid, scene.model)
+def _by_motion(modelled: ModelledLog, starts: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
+    velocity = np.full((len(modelled.measurement.track.pose), 3), np.nan)
+    velocity[modelled.grid.source] = body_velocity(
+        modelled.measurement, modelled.grid, modelled.model
+    )
     forward, left, turn = np.nan_to_num(velocity[starts]).T
     turning = np.abs(turn) > TURNING_RADPS
     yield "motion", "turning left", turning & (turn > 0)

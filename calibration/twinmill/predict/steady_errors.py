@@ -5,7 +5,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import twinmill_native as native
 
+from twinmill.data.steady_table import SteadyTable
 from twinmill.predict.regimes import Regime
 from twinmill.predict.steady_states import CHANNELS, SteadyStates
 
@@ -25,27 +27,37 @@ class SteadyComparison:
     """One robot of one table.
 
     Attributes:
-        scene: table and model.
+        modelled: table and model.
         predicted, errors: (U, 3); m/s, rad/s, m/s.
         floor: where it comes from.
         where: regimes.
     """
 
-    scene: SteadyStates
+    modelled: SteadyStates
     predicted: np.ndarray
     errors: np.ndarray
     floor: SteadyFloor
     where: list[Regime]
 
     @property
+    def measurement(self) -> SteadyTable:
+        """What was compared."""
+        return self.modelled.measurement
+
+    @property
+    def model(self) -> native.Model:
+        """Of the robot."""
+        return self.modelled.model
+
+    @property
     def ratios(self) -> np.ndarray:
         """(U, 3) errors over floor."""
-        return self.scene.ratios()
+        return self.modelled.ratios()
 
     @property
     def score(self) -> float:
         """Of this robot alone."""
-        return self.scene.score(self.scene.model)
+        return self.modelled.score(self.model)
 
     @property
     def size(self) -> int:
@@ -58,7 +70,7 @@ class SteadyComparison:
         for c, (channel, unit) in enumerate(CHANNELS):
             known = np.isfinite(self.errors[:, c])
             if known.any():
-                parts = (self.errors, self.scene.floor(), self.ratios)
+                parts = (self.errors, self.modelled.floor(), self.ratios)
                 values = [float(np.sqrt(np.mean(part[known, c] ** 2))) for part in parts]
                 rows.append(
                     {
@@ -72,7 +84,7 @@ class SteadyComparison:
 
     def cells(self) -> list[dict]:
         """One entry per input, in the vendor's convention; a spread is relative, over robots."""
-        sheet = self.scene.measurement
+        sheet = self.measurement
         names = ("speed_input", "direction_deg", "turn_input")
         keys = ("measured", "predicted", "floor", "ratio")
         entries = []
@@ -99,7 +111,7 @@ class SteadyComparison:
 
     def to_json(self) -> dict:
         """One entry of robots[]."""
-        sheet = self.scene.measurement
+        sheet = self.measurement
         return {
             "robot_id": sheet.robot_id,
             "log": sheet.log_name,
@@ -117,19 +129,19 @@ class SteadyComparison:
         }
 
 
-def compare_steady(scene: SteadyStates) -> SteadyComparison:
+def compare_steady(states: SteadyStates) -> SteadyComparison:
     """Compares one robot of a table."""
-    kind = "repeat" if scene.measurement.fold is None else "spread"
+    kind = "repeat" if states.measurement.fold is None else "spread"
     return SteadyComparison(
-        scene,
-        scene.predicted(),
-        scene.errors(),
+        states,
+        states.predicted(),
+        states.errors(),
         SteadyFloor(kind),
-        _where(scene, scene.ratios()),
+        _where(states, states.ratios()),
     )
 
 
-def _where(scene: SteadyStates, ratios: np.ndarray) -> list[Regime]:
+def _where(states: SteadyStates, ratios: np.ndarray) -> list[Regime]:
     """By path and by the smallest duty, the worst first."""
     count = np.isfinite(ratios).sum(axis=1)
     squares = np.nansum(ratios**2, axis=1)
@@ -141,14 +153,14 @@ def _where(scene: SteadyStates, ratios: np.ndarray) -> list[Regime]:
             float(np.sqrt(squares[mask].sum() / count[mask].sum())),
             int(count[mask].sum()),
         )
-        for group, name, mask in _masks(scene)
+        for group, name, mask in _masks(states)
         if count[mask].sum()
     ]
     return sorted(regimes, key=lambda r: (r.group != "path", -r.ratio))
 
 
-def _masks(scene: SteadyStates) -> Iterator[tuple[str, str, np.ndarray]]:
-    sheet = scene.measurement
+def _masks(states: SteadyStates) -> Iterator[tuple[str, str, np.ndarray]]:
+    sheet = states.measurement
     turns = sheet.inputs[:, 2] != 0
     along = np.isin(sheet.inputs[:, 1] % 180, (90,))
     spot = turns & (np.nan_to_num(sheet.value[:, 0], nan=1.0) < SPOT_MPS)
@@ -156,7 +168,7 @@ def _masks(scene: SteadyStates) -> Iterator[tuple[str, str, np.ndarray]]:
     yield "path", "straight, sideways or diagonal", ~turns & ~along
     yield "path", "on the spot", spot
     yield "path", "in a circle", turns & ~spot
-    slowest = np.abs(scene.commands).min(axis=1)
+    slowest = np.abs(states.commands).min(axis=1)
     yield "slowest wheel", f"duty below {SLOW:.0%}", slowest < SLOW
     yield "slowest wheel", f"duty {SLOW:.0%} to {FAST:.0%}", (slowest >= SLOW) & (slowest <= FAST)
     yield "slowest wheel", f"duty above {FAST:.0%}", slowest > FAST

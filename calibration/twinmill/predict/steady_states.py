@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A steady-state table with the model that is to explain it: what a scene is for a log."""
+"""A steady-state table with the model that is to explain it, as a data set."""
 
 from dataclasses import dataclass, replace
 

@@ -8,7 +8,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import Track
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.residual import rotate
 
 HORIZONS_S = (0.1, 0.2, 0.5, 1.0, 2.0)
@@ -73,10 +73,10 @@ class Windows:
         seen[..., self.ends < 0, :] = np.nan
         return seen
 
-    def errors(self, scene: Scene) -> np.ndarray:
+    def errors(self, modelled: ModelledLog) -> np.ndarray:
         """(W, H, 3) measured less predicted; NaN where the track ends before the horizon."""
-        predicted = self.predicted(scene.measurement, scene.model)
-        return difference(self.measured(scene.measurement), predicted)
+        predicted = self.predicted(modelled.measurement, modelled.model)
+        return difference(self.measured(modelled.measurement), predicted)
 
 
 def difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -98,7 +98,7 @@ def score(errors: np.ndarray, floor: np.ndarray) -> float:
 
 
 def score_of(parts: list[np.ndarray], floors: list[np.ndarray]) -> float:
-    """The same for several scenes: (H, 3) RMS errors and floors of each."""
+    """The same for several logs: (H, 3) RMS errors and floors of each."""
     return float(
         np.sqrt(np.mean([np.nanmean((e / f) ** 2) for e, f in zip(parts, floors, strict=True)]))
     )

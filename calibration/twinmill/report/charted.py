@@ -36,22 +36,22 @@ def charts(
 def _drawn(
     worst: RobotComparison, robots: list[RobotComparison], label: str, others: list[native.Model]
 ) -> str:
-    bits = {b.label: b for b in all_detections([r.scene for r in robots])}
+    bits = {b.label: b for b in all_detections([r.modelled for r in robots])}
     shown = []
     for k, robot in enumerate(robots):
-        scene = robot.scene
-        view = RobotView(scene.measurement, robot.floor, scene.clock_free)
-        name = f"{scene.measurement.label} · {number(robot.score)}"
+        modelled = robot.modelled
+        view = RobotView(modelled.measurement, robot.floor, modelled.clock_free)
+        name = f"{modelled.measurement.label} · {number(robot.score)}"
         other = (label, others[k]) if others else None
-        seen = bits.get(scene.measurement.label)
-        shown.append(Shown(view, name, scene.model, robot.where, other, seen))
+        seen = bits.get(modelled.measurement.label)
+        shown.append(Shown(view, name, modelled.model, robot.where, other, seen))
     first = robots.index(worst) if worst in robots else 0
     return embedded(shown, first, _stretch(robots[first]))
 
 
 def _stretch(robot: RobotComparison) -> tuple[float, float]:
     """The 20 s in which predictions miss most."""
-    track, starts = robot.scene.measurement.track, robot.windows.starts
+    track, starts = robot.measurement.track, robot.windows.starts
     square = np.nansum((robot.errors / robot.floor.rms)[:, HORIZON] ** 2, axis=1)
     total = np.concatenate([[0], np.cumsum(square)])
     t_s = track.pose_t_s[starts]

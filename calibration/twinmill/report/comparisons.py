@@ -37,7 +37,7 @@ def _of_worst(comparison: Comparison) -> list[Table]:
     made = [tables.errors(robot), tables.where(robot)]
     if len(comparison.robots) == 1:
         return made
-    return [replace(t, title=f"{t.title}: {robot.scene.measurement.label}") for t in made]
+    return [replace(t, title=f"{t.title}: {robot.measurement.label}") for t in made]
 
 
 def robot_tables(comparison: Comparison) -> list[Table]:
@@ -65,7 +65,7 @@ def advice(comparison: Comparison) -> str:
     if not phases:
         return "record a longer log with starts, stops and turns, then compare again."
     worst = max(phases, key=lambda r: r.share)
-    model = robot.scene.model
+    model = robot.model
     fresh = [
         name
         for name, card in catalogue_of(model).items()

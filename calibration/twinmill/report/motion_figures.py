@@ -16,7 +16,7 @@ CELLS = 9  # of the floor map along its longer side
 
 def floor_map(robot: RobotComparison) -> Figure:
     """Mean signed error of predictions half a second ahead, by place."""
-    track, starts = robot.scene.measurement.track, robot.windows.starts
+    track, starts = robot.measurement.track, robot.windows.starts
     heading_rad = track.heading_smooth[starts]
     error = robot.errors[:, HORIZON]
     world = np.column_stack(rotate(error[:, 0], error[:, 1], heading_rad))

@@ -18,7 +18,7 @@ from twinmill.report.tables import number, tone
 def comparison_section(result: Comparison) -> Section:
     """Of one comparison."""
     robot = result.worst
-    title = f"{result.model_name} against {robot.scene.measurement.log_name}"
+    title = f"{result.model_name} against {robot.measurement.log_name}"
     return Section(
         title,
         [_score("score", result.score)],
@@ -38,7 +38,7 @@ def comparison_section(result: Comparison) -> Section:
 def fit_section(result: FitResult) -> Section:
     """Of one fit: the same pictures of the fitted model, beside the old one's errors."""
     before, after = _same_robot(result)
-    title = f"{result.before.model_name} fitted to {after.scene.measurement.log_name}"
+    title = f"{result.before.model_name} fitted to {after.measurement.log_name}"
     return Section(
         title,
         [_score("before", result.before.score), _score("after", result.after.score)],
@@ -104,7 +104,7 @@ def steps_section(title: str, scores: list[tuple[str, float]], verdict: str) -> 
 
 def _before_and_after(result: FitResult | AddResult) -> Callable[[], str] | None:
     """Charts of the new model, the old one beside."""
-    old = [r.scene.model for r in result.before.robots]
+    old = [r.model for r in result.before.robots]
     return charts(result.after, "before", old)
 
 
@@ -121,9 +121,9 @@ def robot_pictures(result: Comparison) -> list[Figure]:
     if robot not in sheets:
         own = [*([regimes(robot)] if robot.where else []), floor_map(robot)]
     if len(result.robots) > 1:
-        own = [replace(f, title=f"{f.title}: {robot.scene.measurement.label}") for f in own]
+        own = [replace(f, title=f"{f.title}: {robot.measurement.label}") for f in own]
     if sheets:
-        number = sheets[0].scene.measurement.robot_id
+        number = sheets[0].measurement.robot_id
         own += [steady.values(sheets), regimes(sheets[0], f"Steady inputs of robot {number}")]
     return own
 

@@ -19,9 +19,9 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 
 def facts(robots: list[SteadyComparison], model_name: str) -> list[tuple[str, str]]:
     """What was compared with what: label and text."""
-    sheet = robots[0].scene.measurement
-    numbers = ", ".join(str(r.scene.measurement.robot_id) for r in robots)
-    runs = sum(int(r.scene.measurement.runs.sum()) for r in robots)
+    sheet = robots[0].measurement
+    numbers = ", ".join(str(r.measurement.robot_id) for r in robots)
+    runs = sum(int(r.measurement.runs.sum()) for r in robots)
     kind = robots[0].floor.kind
     return [
         ("table", f"{sheet.log_name}, robot{'s' * (len(robots) > 1)} {numbers}"),
@@ -37,7 +37,7 @@ def facts(robots: list[SteadyComparison], model_name: str) -> list[tuple[str, st
 
 
 def _scatter(robot: SteadyComparison, channel: int) -> str:
-    spread = robot.scene.measurement.spread[channel]
+    spread = robot.measurement.spread[channel]
     between = f", between robots {100 * spread.robots:.1f} %" if np.isfinite(spread.robots) else ""
     return f"{CHANNELS[channel][0]}: runs of one robot {100 * spread.runs:.1f} %{between}"
 
@@ -47,7 +47,7 @@ def errors(robots: list[SteadyComparison]) -> Table:
     rows = []
     for c, (channel, unit) in enumerate(CHANNELS):
         found = np.concatenate([r.errors[:, c] for r in robots])
-        floor = np.concatenate([r.scene.floor()[:, c] for r in robots])
+        floor = np.concatenate([r.modelled.floor()[:, c] for r in robots])
         known = np.isfinite(found)
         if not known.any():
             continue
@@ -119,14 +119,14 @@ def _by_input(robots: list[SteadyComparison]) -> list[tuple]:
     """Input, measured, predicted and spread (2,), whether a side stood still, RMS ratio."""
     groups: dict[tuple, list[tuple[SteadyComparison, int]]] = defaultdict(list)
     for robot in robots:
-        for u, inputs in enumerate(robot.scene.measurement.inputs):
+        for u, inputs in enumerate(robot.measurement.inputs):
             groups[tuple(inputs)].append((robot, u))
     entries = []
     for inputs, members in groups.items():
         ratios = np.array([r.ratios[u] for r, u in members])
         if not np.isfinite(ratios).any():
             continue
-        sheets = [(r.scene.measurement, u) for r, u in members]
+        sheets = [(r.measurement, u) for r, u in members]
         entries.append(
             (
                 inputs,
@@ -152,7 +152,7 @@ def values(robots: list[SteadyComparison]) -> Figure:
     def paint(panels) -> None:
         for c, (axes, unit) in enumerate(zip(panels, ("m/s", "rad/s"), strict=True)):
             for k, robot in enumerate(robots):
-                sheet = robot.scene.measurement
+                sheet = robot.measurement
                 axes.errorbar(
                     robot.predicted[:, c],
                     sheet.value[:, c],
@@ -165,7 +165,7 @@ def values(robots: list[SteadyComparison]) -> Figure:
                     label=f"robot {sheet.robot_id}",
                 )
             known = np.concatenate(
-                [np.r_[r.predicted[:, c], r.scene.measurement.value[:, c]] for r in robots]
+                [np.r_[r.predicted[:, c], r.measurement.value[:, c]] for r in robots]
             )
             ends = [np.nanmin(known), np.nanmax(known)]
             axes.plot(ends, ends, color=MEASURED, lw=1, ls="--")

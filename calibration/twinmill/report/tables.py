@@ -68,7 +68,7 @@ def tone(score: float) -> Tone:
 def facts(comparison: Comparison) -> list[tuple[str, str]]:
     """What was compared with what: label and text."""
     robot = comparison.worst
-    measurement, noise = robot.scene.measurement, robot.scene.noise
+    measurement, noise = robot.measurement, robot.modelled.noise
     track = measurement.track
     recorded = datetime.fromtimestamp(measurement.recorded_utime_us / 1e6, UTC)
     date = f"{recorded:%Y-%m-%d %H:%M} UTC" if recorded.year > 2000 else "date unknown"
@@ -131,7 +131,7 @@ def robots(result: Comparison, before: Comparison | None = None) -> list[Table]:
     order = sorted(range(len(result.robots)), key=lambda k: -np.nan_to_num(result.robots[k].score))
     rows = [
         [
-            Cell(result.robots[k].scene.measurement.label),
+            Cell(result.robots[k].measurement.label),
             *(
                 Cell(number(score), tone(score))
                 for score in (*old[k : k + 1], result.robots[k].score)

@@ -39,7 +39,7 @@ from twinmill.model.parameters import (
     duty_table,
 )
 from twinmill.model.ranges import Ranges, ranges
-from twinmill.predict.problem import Scene
+from twinmill.predict.modelled_log import ModelledLog
 from twinmill.swarm.classes import reached
 from twinmill.swarm.forecast.draws import drawn_models, file_of
 from twinmill.swarm.request import Request, run_part
@@ -170,7 +170,7 @@ class Narrowing:
 
 
 def design_for(
-    spread: Spread, goal: str, file: ModelFile, scene: Scene, limits: Limits, excess: float
+    spread: Spread, goal: str, file: ModelFile, modelled: ModelledLog, limits: Limits, excess: float
 ) -> Narrowing:
     """Designs the run.
 
@@ -178,14 +178,14 @@ def design_for(
         spread: of the share over the numbers.
         goal: class that is wanted.
         file: of the model, as it will be fitted to the run.
-        scene: a log's, whose clock, noise and rate of poses the next run is taken to have.
+        modelled: a log, whose clock, noise and rate of poses the next run is taken to have.
         limits: time, floor, duty; as `check` let them pass.
         excess: how much more errors scatter than the noise alone: the square of the usual score.
 
     Raises:
         ValueError: the share hangs on numbers that no drive of one robot shows.
     """
-    free = _told_by_drives(scene.model, spread.names)
+    free = _told_by_drives(modelled.model, spread.names)
     place = [spread.names.index(p.name) for p in free]
     untold = sum(
         part for name, part in spread.parts().items() if name not in {p.name for p in free}
@@ -196,7 +196,7 @@ def design_for(
             f"what the swarm does hangs on {names}, which no drive of one robot shows; measure "
             "these by themselves (twinmill effects NAME)."
         )
-    moves, floor = family(duty_axes(limits.max_duty)), Floor(limits, scene, [])
+    moves, floor = family(duty_axes(limits.max_duty)), Floor(limits, modelled, [])
     prior = np.linalg.inv(spread.covariance)
 
     def left(grams: np.ndarray) -> np.ndarray:
@@ -210,23 +210,23 @@ def design_for(
         return -np.einsum("i,...ij,j->...", spread.slope, left(grams), spread.slope)
 
     nothing = np.zeros((len(free) + CLOCKS,) * 2)
-    foreseen = _products(Played.of([[m] for m in moves], scene).scene(scene, CENTRE), free)
+    foreseen = _products(Played.of([[m] for m in moves], modelled).modelled(modelled, CENTRE), free)
     chosen = _exchanged(
         choose(moves, worth, nothing, foreseen, floor), moves, worth, foreseen, floor
     )
-    (whole,) = _products(Played.of([chosen], scene).scene(scene, CENTRE), free)
-    fits = _left_by_fits(spread, file, scene, chosen, excess)
-    robot_id = scene.measurement.track.robot_id
+    (whole,) = _products(Played.of([chosen], modelled).modelled(modelled, CENTRE), free)
+    fits = _left_by_fits(spread, file, modelled, chosen, excess)
+    robot_id = modelled.measurement.track.robot_id
     return Narrowing(spread, goal, chosen, rows_of(chosen), fits, left(whole), untold, robot_id)
 
 
 def _left_by_fits(
-    spread: Spread, file: ModelFile, scene: Scene, moves: list[Move], excess: float
+    spread: Spread, file: ModelFile, modelled: ModelledLog, moves: list[Move], excess: float
 ) -> np.ndarray:
     """(P, P) covariance that fits to the run leave, mean over REPLICAS of it with noise."""
-    planned = driven(moves, scene)
-    prior, noisy = np.linalg.inv(spread.covariance), scene.model.copy()
-    for name, value in scene.noise.to_json().items():
+    planned = driven(moves, modelled)
+    prior, noisy = np.linalg.inv(spread.covariance), modelled.model.copy()
+    for name, value in modelled.noise.to_json().items():
         noisy.set(f"noise.{name}", value)
     left = []
     for seed in range(1, REPLICAS + 1):
@@ -241,9 +241,9 @@ def _left_by_fits(
     return np.mean(left, axis=0)
 
 
-def driven(moves: list[Move], scene: Scene) -> Measurement:
-    """The run as the scene's robot would drive it."""
-    return Played.of([moves], scene).scene(scene, CENTRE).measurement
+def driven(moves: list[Move], modelled: ModelledLog) -> Measurement:
+    """The run as the log's robot would drive it."""
+    return Played.of([moves], modelled).modelled(modelled, CENTRE).measurement
 
 
 def _fit_to(seen: Measurement, file: ModelFile, names: list[str]) -> Covariance:
@@ -298,7 +298,7 @@ def _told_by_drives(model: native.Model, names: list[str]) -> list[Parameter]:
     return [*base_parameters(model, base), *effects]
 
 
-def _products(planned: Scene, free: list[Parameter]) -> np.ndarray:
+def _products(planned: ModelledLog, free: list[Parameter]) -> np.ndarray:
     """(K, F + CLOCKS, F + CLOCKS) products of slopes of each part's errors, its clock's last."""
     system = System([planned], free)
     slopes = system.jacobian(system.start)[: -len(system.unknowns)]

@@ -438,10 +438,10 @@ class Session:
         members = [k for k in self.robots if self.measurements[k].log_sha256 == log]
         if len(members) < 2 or self.measurements[index].frames is None:
             return None
-        scenes = [self.robots[k].scene(self.robots[k].opened.model) for k in members]
+        logs = [self.robots[k].modelled(self.robots[k].opened.model) for k in members]
         own = members.index(index)
-        scenes[own] = self.robots[index].opened.scene()
-        made = detections_of(scenes, own)
+        logs[own] = self.robots[index].opened.modelled()
+        made = detections_of(logs, own)
         return made if made.usable.any() else None
 
     def own_scores(self) -> dict[int, float]:
@@ -454,7 +454,7 @@ class Session:
         view, model = self.robots[index], self.shown(index).model
         if view.opened.data is None:
             return []
-        return where_it_fails(view.scene(model), view.windows, view.errors(model), view.floor)
+        return where_it_fails(view.modelled(model), view.windows, view.errors(model), view.floor)
 
     def moments(self, index: int, group: str, regime: str) -> tuple[np.ndarray, float]:
         """(K,) s, starts of the predictions in a regime, and that of the worst."""

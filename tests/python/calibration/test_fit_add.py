@@ -82,7 +82,7 @@ def test_a_clock_that_is_not_the_logs_is_no_noise(tanh_robot, measure, fitted):
     run = measure(tanh_robot(offset_s=OFFSET_S - 0.1), 91, 30.0)
     found = compare([run], ModelFile.load(str(fitted.path)))
     assert found.score > 3
-    noise = found.robots[0].scene.noise
+    noise = found.robots[0].modelled.noise
     assert noise.position.sensor == pytest.approx(tanh_robot().sensor_m, rel=0.1)
 
 

@@ -54,7 +54,7 @@ def added(folder, base, tmp_path):
 
 def test_noise_of_the_log_is_the_one_told(base):
     """README: 0.3 mm, 0.1 degree; 3 mm/s, 0.03 rad/s, 0.15 s, of which a log tells 10 and 40 %."""
-    noise = base[0].after.robots[0].scene.noise
+    noise = base[0].after.robots[0].modelled.noise
     assert noise.position.sensor == pytest.approx(0.3e-3, rel=0.03)
     assert noise.heading.sensor == pytest.approx(np.radians(0.1), rel=0.03)
     assert noise.position.drive == pytest.approx(3e-3, rel=0.1)

@@ -10,8 +10,8 @@ from scipy.stats import chi2
 
 from twinmill.data.track import command_at
 from twinmill.predict.flexible import unexplained
+from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import TRANSIENT, ChannelNoise, Noise, fit_noise
-from twinmill.predict.problem import Scene
 from twinmill.predict.residual import StepGrid
 
 TRUTHS = [
@@ -187,5 +187,7 @@ def test_noise_of_a_scene_does_not_hang_on_the_model(driven_log, model_file):
         model_file(),
         model_file(("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.2, 0.3, 0.4, 0.5]"), ("0.05", "0.2")),
     ]
-    first, second = (Scene.on_clock(measurement, g.model, clock_free=False).noise for g in guesses)
+    first, second = (
+        ModelledLog.on_clock(measurement, g.model, clock_free=False).noise for g in guesses
+    )
     assert first == second

@@ -71,7 +71,7 @@ def test_a_robot_with_dead_zone_and_curve_is_seen_to_have_both(tmp_path):
     assert "starts and stops" in hidden["coasting"]
     assert {"motor_lag", "input_delay", "clock_offset", "marker_offset"} <= set(hidden)
     # A linear robot's side would move at 0.07 m/s on average where it was seen to stand still.
-    still = [s.predicted()[s.measurement.still, 2] for s in found.scenes]
+    still = [s.predicted()[s.measurement.still, 2] for s in found.modelled]
     assert np.concatenate(still).mean() < 0.03
 
 

@@ -18,7 +18,7 @@ ADEQUATE = ("model_adequate", "refit_enough", "cannot_tell")
 
 def with_detections(
     diagnosis,
-    scenes: list,
+    logs: list,
     model_file: ModelFile,
     progress: Callable[[str], None],
     excluded: Collection[str] = (),
@@ -27,12 +27,12 @@ def with_detections(
 
     Args:
         diagnosis: of the motion.
-        scenes: measurements with their clocks.
+        logs: with their models and clocks, and tables.
         model_file: the model as given.
         progress: told in words what is being done.
         excluded: effects that are not to be thought of.
     """
-    seen = all_detections(scenes)
+    seen = all_detections(logs)
     if not seen:
         return diagnosis
     progress("comparing the camera's bits")

@@ -15,8 +15,8 @@ from twinmill.predict.residual import StepGrid
 
 
 @dataclass
-class Scene:
-    """One measurement with the model of its own robot and clock, its step grid and its noise.
+class ModelledLog:
+    """One robot in one log with the model of that robot on its clock, step grid and noise.
 
     Attributes:
         clock_free: the clock's offset was found from this log itself.
@@ -34,30 +34,34 @@ class Scene:
         return stated_names(self.model, self.measurement.track.robot_id)
 
     @classmethod
-    def on_clock(cls, measurement: Measurement, model: native.Model, clock_free: bool) -> "Scene":
+    def on_clock(
+        cls, measurement: Measurement, model: native.Model, clock_free: bool
+    ) -> "ModelledLog":
         """Of a robot's own model on the measurement's clock, with the noise that the log shows."""
-        scene = cls(measurement, model, StepGrid.of(measurement), clock_free)
-        scene.noise = fit_noise(
-            unexplained(measurement, scene.grid, model.get(CLOCK)), scene._moving(), scene.grid
+        modelled = cls(measurement, model, StepGrid.of(measurement), clock_free)
+        modelled.noise = fit_noise(
+            unexplained(measurement, modelled.grid, model.get(CLOCK)),
+            modelled._moving(),
+            modelled.grid,
         )
-        scene.settle_noise()
-        return scene
+        modelled.settle_noise()
+        return modelled
 
-    def with_model(self, model: native.Model) -> "Scene":
+    def with_model(self, model: native.Model) -> "ModelledLog":
         """The same measurement, clock and noise with another model."""
         model = model.for_robot(self.measurement.track.robot_id)
         for name in ALIGNMENT:
             model.set(name, self.model.get(name))
         return replace(self, model=model)
 
-    def fitted(self, model: native.Model) -> "Scene":
+    def fitted(self, model: native.Model) -> "ModelledLog":
         """The same with a model of its own robot that was fitted to it, its clock included."""
-        scene = replace(self, model=model)
-        scene.settle_noise()
-        return scene
+        modelled = replace(self, model=model)
+        modelled.settle_noise()
+        return modelled
 
     def errors(self) -> np.ndarray:
-        """(S, 3) one-step errors of the scene's model."""
+        """(S, 3) one-step errors of the model."""
         return self.grid.errors(
             native.one_step(self.model, self.measurement.played), self.measurement
         )
