@@ -3,6 +3,7 @@
 
 import { unpack } from "/charts/packed.js";
 import { Stage } from "/charts/stage.js";
+import { keepFocus } from "./focus.js";
 import { Swarm } from "./swarm.js";
 
 class Server {
@@ -89,6 +90,7 @@ const GONE = [
 export function start({ token, view, log }) {
   const words = document.querySelectorAll("#popup > span"); // NiceGUI shows it
   words.forEach((span, k) => (span.textContent = GONE[k]));
+  keepFocus();
   window.twinmill = new Workbench({ source: new Server(token), view });
   window.twinmill.showLog(log);
 }
