@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import twinmill_native as native
 from scipy.stats import chi2
 
 from twinmill.diagnosis.search import REFIT, Search, State, Trial, attempt, fitted, screen
@@ -62,6 +63,7 @@ class Outlier:
         why: in numbers.
         smallest_shown: by effect the smallest difference that this log would have shown.
         gains: its speed and turn, over the model's.
+        models: with what all lack and its own, one for each log; none where its camera differs.
     """
 
     robot_id: int
@@ -74,6 +76,7 @@ class Outlier:
     why: str
     smallest_shown: dict[str, float]
     gains: list[ParameterEstimate]
+    models: Sequence[native.Model] = ()
 
     @property
     def label(self) -> str:
@@ -208,6 +211,7 @@ def _judged(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
         f"{others:.2f}; with {effect} of its own {after:.2f}",
         _smallest(own),
         parameters if best_name == "gains" else [],
+        best.fit.models,
     )
 
 
@@ -245,6 +249,7 @@ def _unexplained(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
         "and bumps by others would look so",
         _smallest(own),
         [],
+        own.before.fit.models,
     )
 
 

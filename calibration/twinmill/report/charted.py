@@ -18,31 +18,31 @@ STRETCH_S = 20.0  # that can be looked at without getting lost
 
 
 def charts(
-    result: Comparison, label: str = "", beside: Sequence[native.Model] = ()
+    result: Comparison, beside: Sequence[tuple[str, native.Model] | None] = ()
 ) -> Callable[[], str] | None:
     """HTML of the charts, made when it is asked for; None where no robot has a log.
 
     Args:
         result: its models' predictions are shown.
-        label: of other models that are drawn beside.
-        beside: these, one for each robot of the result; or none.
+        beside: another model of each robot of the result with its label, or None; or nothing.
     """
     places = [k for k, r in enumerate(result.robots) if isinstance(r, RobotComparison)]
     robots = [result.robots[k] for k in places]
-    others = [beside[k] for k in places] if beside else []
-    return partial(_drawn, result.worst, robots, label, others) if robots else None
+    others = [beside[k] if beside else None for k in places]
+    return partial(_drawn, result.worst, robots, others) if robots else None
 
 
 def _drawn(
-    worst: RobotComparison, robots: list[RobotComparison], label: str, others: list[native.Model]
+    worst: RobotComparison,
+    robots: list[RobotComparison],
+    others: list[tuple[str, native.Model] | None],
 ) -> str:
     bits = {b.label: b for b in all_detections([r.modelled for r in robots])}
     shown = []
-    for k, robot in enumerate(robots):
+    for robot, other in zip(robots, others, strict=True):
         modelled = robot.modelled
         view = RobotView(modelled.measurement, robot.floor, modelled.clock_free)
         name = f"{modelled.measurement.label} · {number(robot.score)}"
-        other = (label, others[k]) if others else None
         seen = bits.get(modelled.measurement.label)
         shown.append(Shown(view, name, modelled.model, robot.where, other, seen))
     first = robots.index(worst) if worst in robots else 0

@@ -9,6 +9,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from twinmill.diagnosis.explain import Explanation, steps
+from twinmill.diagnosis.outliers import Outlier
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.report import Figure, Section, comparisons, detections, show, tables
@@ -252,7 +253,7 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
         comparisons.facts(before),
         [*_detection_figures(diagnosis), waterfall(_labelled(diagnosis)), *robot_pictures(before)],
         [*_tables(diagnosis), *_detection_steps(diagnosis), *_detection_tables(diagnosis)],
-        charts=charts(before, *_found(diagnosis)),
+        charts=charts(before, found_models(diagnosis)),
         next_step=next_run(diagnosis),
         commands=[(f"{why}:", command) for why, command in commands],
         notes=lines(diagnosis),
@@ -260,13 +261,29 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
     )
 
 
-def _found(diagnosis: Diagnosis) -> tuple[str, list[native.Model]]:
-    """What was found, and each robot's model with it; nothing if that is the model as given."""
-    if not diagnosis.findings:
-        return "", []
-    return f"with {' and '.join(diagnosis.motion) or 'its base refitted'}", [
-        o.model for o in diagnosis.opened
-    ]
+def found_models(diagnosis: Diagnosis) -> list[tuple[str, native.Model] | None]:
+    """Each robot's model with what was found, and its name; None where that is as given.
+
+    A robot that differs has its own effect as well.
+    """
+    name = " and ".join(diagnosis.motion) or "its base refitted"
+    common = f"with {name}" if diagnosis.findings else ""
+    off = {
+        r.robot_id: (_with_own(common, r), iter(r.models)) for r in diagnosis.robots_off if r.models
+    }
+    beside = []
+    for own in diagnosis.opened:
+        label, models = off.get(own.measurement.track.robot_id, (common, iter(())))
+        model = next(models, own.model) if own.floor else own.model
+        beside.append((label, model) if label else None)
+    return beside
+
+
+def _with_own(common: str, robot: Outlier) -> str:
+    if robot.effect is None:
+        return common
+    name = "gains" if robot.gains else robot.effect
+    return f"{common} and its own {name}" if common else f"with its own {name}"
 
 
 def _tables(diagnosis: Diagnosis) -> list[Table]:

@@ -104,8 +104,7 @@ def steps_section(title: str, scores: list[tuple[str, float]], verdict: str) -> 
 
 def _before_and_after(result: FitResult | AddResult) -> Callable[[], str] | None:
     """Charts of the new model, the old one beside."""
-    old = [r.model for r in result.before.robots]
-    return charts(result.after, "before", old)
+    return charts(result.after, [("before", r.model) for r in result.before.robots])
 
 
 def _same_robot(result: FitResult | AddResult) -> tuple[RobotComparison, RobotComparison]:

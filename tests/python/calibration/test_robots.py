@@ -16,6 +16,7 @@ from twinmill.diagnosis.explain import explain
 from twinmill.fitting.compare import MISSING, compare
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
+from twinmill.report.diagnosis import found_models
 
 ROOT = Path(__file__).resolve().parents[3]
 TWIN_RUN = os.environ.get("TWIN_RUN", str(ROOT / "build/bin/twin_run"))
@@ -99,6 +100,14 @@ def test_a_wheel_of_one_robot_is_named_beside_what_all_lack(logged):
     # A common change of all wheels is the robot's gain, which is known to 3 %: the contrast counts.
     others = sum(own[f"wheel_gain.{w}"] for w in ("fr", "rl", "rr")) / 3
     assert own["wheel_gain.fl"] - others == pytest.approx(-0.1, abs=0.01)
+    # Its report draws the robot with its own wheel beside the model as given.
+    (other, own_model, _) = [model for _, model in found_models(found)]
+    assert own_model.get("wheel_gain.fl") == pytest.approx(own["wheel_gain.fl"], abs=1e-9)
+    assert "wheel_gain" in own_model.effects and "wheel_gain" not in other.effects
+    labels = [label for label, _ in found_models(found)]
+    assert labels == [
+        f"with dead_zone{with_own}" for with_own in ("", " and its own wheel_gain", "")
+    ]
     # In plain words, with how small a difference this log would have shown.
     assert "R01" in found.sentence and "front left wheel" in found.sentence
     assert "weak" in found.sentence and off["smallest_shown"]
