@@ -2,6 +2,7 @@
 """Tables as people have them: units, usual names, order of rows, and the mapping file."""
 
 import re
+import shlex
 
 import numpy as np
 import pytest
@@ -120,26 +121,42 @@ def test_signs_drift_and_shift_are_taken_out(imported):
     np.testing.assert_allclose(np.diff(robot.pose_t_s), 1 / 1.001, atol=1e-6)
 
 
-def test_columns_are_explained_and_the_mapping_kept(tmp_path):
+def test_columns_are_explained_and_the_mapping_kept(tmp_path, monkeypatch):
     poses, commands = tmp_path / "p.csv", tmp_path / "c.csv"
     rows = [f"{k * 50},{k * 20},{k},{k * 2}" for k in range(60)]
     poses.write_text("time,X,Y,yaw\n" + "\n".join(rows) + "\n")
     commands.write_text("time,left,right\n0,-255,255\n1000,127.5,0\n")
-    mapping, out = tmp_path / "m.toml", tmp_path / "o.lcmlog"
+    mapping = tmp_path / "m.toml"
     files = ["import", "--poses", str(poses), "--commands", str(commands)]
     result = CliRunner().invoke(app, [*files, "--explain-columns", str(mapping)])
     assert result.exit_code == 0, result.output
     words = " ".join(result.output.split())
     assert "looks like mm" in words and "PWM of 255" in words
-    result = CliRunner().invoke(
-        app, [*files, "--mapping", str(mapping), "--robot-id", "4", "-o", str(out)]
-    )
+    # What it prints runs as it is, with a robot for tables that name none.
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, shlex.split(result.output.splitlines()[-1])[1:])
     assert result.exit_code == 0, result.output
-    robot = read_log(out).robots[4]
+    (robot,) = read_log(tmp_path / "run.lcmlog").robots.values()
     np.testing.assert_allclose(robot.pose_t_s[1], 0.05)
     np.testing.assert_allclose(robot.pose[-1, 0], 1.18)
     np.testing.assert_allclose(robot.pose[-1, 2], np.radians(118))
     np.testing.assert_allclose(robot.command[[0, -1]], [[-1, 1, -1, 1], [0.5, 0, 0.5, 0]])
+
+
+def test_names_that_mean_nothing_to_us_are_asked_for(imported, tmp_path):
+    """As they stand no import can come of them, so none is proposed before they are named."""
+    strange = "t_s,robot_id,fahr,dreh\n0,4,0.2,0.5\n1,4,0,0\n"
+    with pytest.raises(
+        LogError, match=r"no column is known to be a command .*fahr, dreh.*--rename"
+    ):
+        imported(commands=strange)
+    robot, _ = imported(commands=strange, rename={"fahr": "vx_mps", "dreh": "omega_radps"})
+    np.testing.assert_allclose(robot.command[0], [0.2, 0, 0.5, 0])
+    files = ["--commands", str(tmp_path / "c.csv"), "--explain-columns", str(tmp_path / "m.toml")]
+    result = CliRunner().invoke(app, ["import", *files])
+    assert 'write under [commands] what its columns hold, as in vx_mps = { column = "fahr"' in (
+        " ".join(result.output.split())
+    )
 
 
 def test_a_speed_and_a_turn_make_a_velocity_command(tmp_path):

@@ -169,7 +169,8 @@ def _command(
         if up not in ("y", "z", None):
             raise LogError(f"--up {up}: must be y or z.")
         if explain_columns_to:
-            _explain(explain_columns(poses, commands), explain_columns_to, force)
+            asked = {"poses": poses, "commands": commands}
+            _explain(asked, explain_columns(poses, commands), explain_columns_to, robot_id, force)
             return
         if bag and not pose and not command:
             _list(bag, list_topics(bag), as_json)
@@ -245,8 +246,14 @@ def _unpaired(topics: list[Topic]) -> str:
     return "Which poses and commands belong together is not clear; name them (--pose, --command)."
 
 
-def _explain(explained: dict[str, tuple[TableFile, list[Guess]]], out: Path, force: bool) -> None:
-    """What each column was taken for, on the terminal and as a mapping file."""
+def _explain(
+    asked: dict[str, Path | None],
+    explained: dict[str, tuple[TableFile, list[Guess]]],
+    out: Path,
+    robot_id: int | None,
+    force: bool,
+) -> None:
+    """What each column was taken for, here and as a mapping file, and what to type then."""
     if not explained:
         raise LogError("--explain-columns: give the tables with --poses and --commands.")
     guesses = {kind: columns for kind, (_, columns) in explained.items()}
@@ -263,7 +270,31 @@ def _explain(explained: dict[str, tuple[TableFile, list[Guess]]], out: Path, for
             words=(0, 1, 2),
         )
         Console().print(show.table(table))
-    typer.echo(f"Check {out}, then import with --mapping {out}")
+    words = ["twinmill", "import"]
+    for kind, path in asked.items():
+        words += [f"--{kind}", str(path) if path else kind.upper()]
+    if not any("robot_id" in g.targets for g in guesses.get("poses", [])):
+        words += ["--robot-id", str(1 if robot_id is None else robot_id)]
+    line = shlex.join([*words, "--mapping", str(out), "-o", "run.lcmlog"])
+    told = [word for kind in guesses for word in _lacking(kind, guesses[kind])]
+    typer.echo(f"Check {out}{''.join(told)}; then:\n  {line}")
+
+
+def _lacking(kind: str, columns: list[Guess]) -> list[str]:
+    """What a person must write down of a table in which nothing was known."""
+    known = {target for guess in columns for target in guess.targets} - {
+        "t_s",
+        "robot_id",
+        "vy_mps",
+    }
+    if known:
+        return []
+    example = {"poses": "x_m", "commands": "vx_mps"}[kind]
+    left = next((g.column for g in columns if not g.targets), "NAME")
+    return [
+        f", and write under [{kind}] what its columns hold, as in "
+        f'{example} = {{ column = "{left}", factor = 1.0 }}'
+    ]
 
 
 def _pair(text: str, form: str) -> tuple[str, str]:

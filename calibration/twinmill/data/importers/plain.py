@@ -194,6 +194,12 @@ def _kind(table: Table) -> CommandKind:
     # Name the column that is missing from the group that is most complete.
     groups = [*VALUES.values(), INPUTS, WORLD]
     group = max(groups, key=lambda names: sum(table.has(name) for name in names) / len(names))
+    if not any(map(table.has, group)):
+        raise LogError(
+            f"{table.name}: no column is known to be a command (it has {', '.join(table.header)}); "
+            "say what its columns are, as with --rename NAME=vx_mps --rename NAME=omega_radps, or "
+            "let --explain-columns FILE write down all columns and give that to --mapping."
+        )
     raise table.missing(next(name for name in group if not table.has(name)))
 
 
