@@ -103,9 +103,16 @@ class Log(_Shown):
             model: tells what commands do, so that they are checked against the motion; compare,
                 fit, add and diagnose give theirs. None: they are not checked.
 
+        Returns:
+            A list of runs; its `findings` say what is wrong with the others.
+
         Raises:
             BadInputError: by what is wrong with the logs, nothing is left to judge.
             LogError: a run is shorter than 10 s.
+
+        Examples:
+            >>> [run.label for run in tm.load("run.lcmlog").measurements()]
+            ['run.lcmlog R00']
         """
         key = model.file.hash if model else ""
         if key not in self._measurements:
@@ -138,6 +145,10 @@ class Log(_Shown):
         Returns:
             log, robot_id, t_s (motion capture's clock), x_m, y_m, theta_rad (unwrapped), valid; NaN
             where a pose is not valid.
+
+        Examples:
+            >>> set(tm.load("run.lcmlog").table()["log"])
+            {'run.lcmlog'}
         """
         return pd.concat([_poses(log) for log in self._logs], ignore_index=True)
 
@@ -148,6 +159,10 @@ class Log(_Shown):
             log, robot_id, t_s (robot's clock), kind, c0 to c3: duty as a fraction or speed in rad/s
             of the wheels front-left, front-right, rear-left, rear-right; or vx_mps, vy_mps,
             omega_radps, 0.
+
+        Examples:
+            >>> set(tm.load("run.lcmlog").commands()["kind"])
+            {'duty'}
         """
         return pd.concat([_commands(log) for log in self._logs], ignore_index=True)
 
@@ -162,6 +177,10 @@ class Log(_Shown):
 
         Raises:
             LogError: the log has not two robots with poses at the same time.
+
+        Examples:
+            >>> list(tm.simulate(n=3, duration_s=20).metrics().columns)[:2]
+            ['t_s', 'circliness']
         """
         native_model = _model(model).file.model
         scale = native_model.get("sensor.range_m"), native_model.get("robot.body_radius_m")
@@ -172,12 +191,20 @@ class Log(_Shown):
         return table
 
     def plot(self) -> Figure:
-        """Paths of all robots, seen from above."""
+        """Paths of all robots, seen from above.
+
+        Returns:
+            A figure of matplotlib, axes in m of the world frame.
+        """
         robots = [recorded for log in self._logs for recorded in read_multi_log(log.path).robots]
         return draw(4.6, Drawing(robots).paths).picture
 
     def save(self, path: str | Path, force: bool = False) -> None:
-        """Copies the log to a file, which must not be there unless `force`.
+        """Copies the log to a file.
+
+        Args:
+            path: new file (.lcmlog).
+            force: replace it if it is there.
 
         Raises:
             ValueError: it is there, cannot be written, or these are several logs.
@@ -229,8 +256,15 @@ class Model(_Shown):
         Args:
             name: path, or name of an installed model.
 
+        Returns:
+            The model; a file that is missing or wrong is refused before anything else is done.
+
         Raises:
             ModelError: there is no such file, or it is no valid model; one sentence.
+
+        Examples:
+            >>> tm.Model.load("turbopi.toml").effects
+            []
         """
         return cls(ModelFile.load(str(name)))
 
@@ -249,7 +283,16 @@ class Model(_Shown):
         return self.file.model.get(quantity)
 
     def table(self) -> pd.DataFrame:
-        """All quantities: name, unit, value, min, max."""
+        """All quantities of base, camera and effects.
+
+        Returns:
+            name, unit, value, min and max (both in the unit), held (no fit moves it), doc.
+
+        Examples:
+            >>> table = tm.Model.load("turbopi.toml").table().set_index("name")
+            >>> table.loc["base.motor_lag_s", "unit"]
+            's'
+        """
         return pd.DataFrame(self.file.model.values())
 
     def to_json(self) -> dict:
@@ -273,16 +316,35 @@ class Model(_Shown):
 
         Raises:
             ValueError: it is there, or cannot be written.
+
+        Examples:
+            >>> tm.Model.load("fitted.toml").save("fitted.toml")
+            Traceback (most recent call last):
+            ValueError: fitted.toml: exists; choose another name, or replace it with --force.
         """
         with replacing(Path(path), force) as temporary:
             temporary.write_text(self.file.text)
 
     def compare(self, log: "Log | str | Path") -> "Comparison":
-        """As `compare`."""
+        """Tells how well the model predicts a log.
+
+        Args:
+            log: a log, or the path of one.
+
+        Returns:
+            As `compare`, which says more.
+        """
         return compare(log, self)
 
     def fit(self, log: "Log | str | Path") -> "Fit":
-        """As `fit`."""
+        """Fits all free quantities of the model to a log.
+
+        Args:
+            log: a log, or the path of one.
+
+        Returns:
+            As `fit`, which says more.
+        """
         return fit(log, self)
 
     @_one_thread
@@ -326,7 +388,15 @@ class Model(_Shown):
         return Addition(result, Model(file))
 
     def diagnose(self, log: "Log | str | Path", **options: Any) -> "Diagnosis":
-        """As `diagnose`."""
+        """Names the physical effect that the model lacks.
+
+        Args:
+            log: a log, or the path of one.
+            options: as of `diagnose`, which says more.
+
+        Returns:
+            As `diagnose`.
+        """
         return diagnose(log, self, **options)
 
     def __repr__(self) -> str:
@@ -341,6 +411,13 @@ class Comparison(_Shown):
         score: root mean square of prediction errors over what noise alone would cause: 1.0 is as
             good as the log can tell; above 1.3 something is missing.
         verdict: what that means, in a sentence.
+
+    Examples:
+        >>> found = tm.compare("run.lcmlog", "turbopi.toml")
+        >>> found.table().loc[0, ["channel", "unit"]].tolist()
+        ['forward', 'm']
+        >>> len(found.plot().axes)  # forward, left, heading
+        3
     """
 
     def __init__(self, result: _compare.Comparison):
@@ -356,11 +433,22 @@ class Comparison(_Shown):
         return pd.DataFrame(self._result.main.to_json()["errors"])
 
     def plot(self) -> Figure:
-        """Errors over the time predicted ahead, with the noise floor; of a table, its values."""
+        """Errors over the time predicted ahead, with the noise floor; of a table, its values.
+
+        Returns:
+            A figure of matplotlib: m for forward and left, degrees for heading, over s.
+        """
         return _errors_drawn([("this model", self._result)])
 
     def report(self, folder: str | Path) -> Path:
-        """Writes folder/index.html with all tables and figures, as `--out` does."""
+        """Writes a page with all tables and figures, as `--out` does.
+
+        Args:
+            folder: made if it is not there; an older page in it is replaced.
+
+        Returns:
+            Path of the page, folder/index.html.
+        """
         section = report.comparison_section(self._result)
         return _report(folder, section, "twinmill.compare")
 
@@ -379,6 +467,13 @@ class Fit(_Shown):
         model: the new one.
         before, after: comparisons of both models on the same noise.
         score: of the new model on the log it was fitted to.
+
+    Examples:
+        >>> fitted = tm.fit("run.lcmlog", "turbopi.toml")
+        >>> fitted.model.effects, fitted.score < fitted.before.score
+        ([], True)
+        >>> fitted.table().set_index("name").loc["base.motor_lag_s", "unit"]
+        's'
     """
 
     def __init__(self, result: _fit.FitResult, model: Model):
@@ -387,19 +482,42 @@ class Fit(_Shown):
         self.score = self.after.score
 
     def table(self) -> pd.DataFrame:
-        """Fitted quantities: name, value, std, unit, at_bound, seen (the log tells it)."""
+        """Fitted quantities.
+
+        Returns:
+            name, value, std (half a 95 % interval over 1.96), unit, at_bound, seen (false where
+            the log does not tell the quantity, and the prior holds it).
+        """
         return pd.DataFrame([e.to_json() for e in self._result.parameters])
 
     def plot(self) -> Figure:
-        """Errors before and after, over the time predicted ahead."""
+        """Errors before and after, over the time predicted ahead.
+
+        Returns:
+            A figure of matplotlib, as of `Comparison.plot`.
+        """
         return _errors_drawn([("before", self._result.before), ("after", self._result.after)])
 
     def compare(self, log: "Log | str | Path") -> Comparison:
-        """The fitted model against a log, best another than it was fitted to."""
+        """Compares the fitted model with a log.
+
+        Args:
+            log: best another than it was fitted to.
+
+        Returns:
+            As `compare`.
+        """
         return self.model.compare(log)
 
     def report(self, folder: str | Path) -> Path:
-        """Writes folder/index.html with all tables and figures, as `--out` does."""
+        """Writes a page with all tables and figures, as `--out` does.
+
+        Args:
+            folder: made if it is not there; an older page in it is replaced.
+
+        Returns:
+            Path of the page, folder/index.html.
+        """
         return _report(folder, report.fit_section(self._result), "twinmill.fit")
 
     def _text(self) -> RenderableType:
@@ -418,6 +536,11 @@ class Addition(_Shown):
         model: the new model.
         heldout_before, heldout_after: scores on data that was not fitted to, without and with the
             effect, all else refitted.
+
+    Examples:
+        >>> added = tm.Model.load("fitted.toml").add("dead_zone", "run.lcmlog")
+        >>> added.table()["name"].iloc[-1]
+        'dead_zone.width'
     """
 
     def __init__(self, result: _add.AddResult | _add.CameraAddResult, model: Model):
@@ -428,14 +551,35 @@ class Addition(_Shown):
         self.heldout_after = told["heldout_after"]
 
     def table(self) -> pd.DataFrame:
-        """Fitted quantities: name, value, std, unit, at_bound, seen (the log tells it)."""
+        """Fitted quantities.
+
+        Returns:
+            name, value, std (half a 95 % interval over 1.96), unit, at_bound, seen (false where
+            the log does not tell the quantity, and the prior holds it).
+        """
         return pd.DataFrame([e.to_json() for e in self._result.parameters])
 
     def plot(self) -> Figure:
-        """Errors before and after; of an effect of the camera, what it sees."""
+        """Errors before and after; of an effect of the camera, what it sees.
+
+        Returns:
+            A figure of matplotlib: as of `Comparison.plot`, or shares over range in m and bearing
+            in degrees.
+        """
         if isinstance(self._result, _add.CameraAddResult):
             return detections.field_of_view(self._result.after).svg.picture
         return _errors_drawn([("before", self._result.before), ("after", self._result.after)])
+
+    def report(self, folder: str | Path) -> Path:
+        """Writes a page with all tables and figures, as `--out` does.
+
+        Args:
+            folder: made if it is not there; an older page in it is replaced.
+
+        Returns:
+            Path of the page, folder/index.html.
+        """
+        return _report(folder, report.added_section(self._result), "twinmill.add")
 
     def _text(self) -> RenderableType:
         return show.added(self._result)
@@ -462,11 +606,25 @@ class Finding(_Shown):
         self.parameters = {e.name.split(".", 1)[-1]: e.value for e in ranked.parameters}
 
     def add_to(self, model: Model) -> Model:
-        """The model with this effect, all fitted to the log of the diagnosis."""
+        """Adds the effect to a model, all fitted to the log of the diagnosis.
+
+        Args:
+            model: that lacks it.
+
+        Returns:
+            The new model.
+
+        Raises:
+            ValueError: the effect is made for another drive, or, of the camera, it is there.
+        """
         return model.add(self.effect.split("#")[0], self._log).model
 
     def table(self) -> pd.DataFrame:
-        """Its parameters: name, value, std, unit, at_bound, seen."""
+        """Its parameters.
+
+        Returns:
+            name, value, std, unit, at_bound, seen, as of `Fit.table`.
+        """
         return pd.DataFrame([e.to_json() for e in self._result.parameters])
 
     def __repr__(self) -> str:
@@ -478,7 +636,8 @@ class Diagnosis(_Shown):
     """What a model lacks.
 
     Attributes:
-        verdict: model_adequate, refit_enough, effect_missing, ambiguous or outside_catalogue.
+        verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue
+            or cannot_tell.
         sentence: the same for people.
         found: the missing effects, most important first.
         best: the first of them; None if none is named.
@@ -505,11 +664,22 @@ class Diagnosis(_Shown):
         return table
 
     def plot(self) -> Figure:
-        """Score after each step: as given, refitted, with each effect found."""
+        """Score after each step: as given, refitted, with each effect found.
+
+        Returns:
+            A figure of matplotlib; where robots reported detections, what their cameras see.
+        """
         return diagnosis_report.section(self._result).figures[0].svg.picture
 
     def report(self, folder: str | Path) -> Path:
-        """Writes folder/index.html with all tables and figures, as `--out` does."""
+        """Writes a page with all tables and figures, as `--out` does.
+
+        Args:
+            folder: made if it is not there; an older page in it is replaced.
+
+        Returns:
+            Path of the page, folder/index.html.
+        """
         return _report(folder, diagnosis_report.section(self._result), "twinmill.diagnose")
 
     def _text(self) -> RenderableType:
@@ -547,6 +717,9 @@ def compare(log: Log | str | Path, model: Model | str | None = None) -> Comparis
     Args:
         log: a log, or the path of one.
         model: a model, or the name of one; None is TurboPi's.
+
+    Returns:
+        The score with its errors, floors and regimes, of each robot.
 
     Raises:
         LogError: the log cannot be judged; one sentence.
@@ -607,6 +780,9 @@ def diagnose(
         model: best one that was fitted to another log; None is TurboPi's.
         without: names of effects that are not considered.
         progress: is told in words what is being done.
+
+    Returns:
+        The verdict, what was found, and all effects that were tried.
 
     Raises:
         LogError: the log cannot be used; one sentence.

@@ -33,8 +33,8 @@ public:
     explicit Alone(BoundEffect effect) : effect_(std::move(effect)) {}
 
     int StateSize() const { return effect_.StateSize(); }
-    void Look(Sight &sight) const { effect_.Look(sight); }
-    void Touch(Body &body) const { effect_.Touch(body); }
+    void Set(DetectionModel &detection) const { effect_.Set(detection); }
+    void Set(Body &body) const { effect_.Set(body); }
 
     // What it does to the signals of its stage; of others nothing.
     void Step(Signals &s, double *state) const

@@ -87,7 +87,7 @@ TEST_P(EveryEffect, HasACompleteCard)
     EXPECT_EQ(ManeuverNames(card.identify).empty(), card.family == Family::kFormula);
 }
 
-bool IsOfSight(const Act &act)
+bool IsOfCamera(const Act &act)
 {
     return std::holds_alternative<OnView>(act) || std::holds_alternative<OnDecision>(act);
 }
@@ -96,7 +96,7 @@ bool IsOfSight(const Act &act)
 TEST_P(EveryEffect, NeedsFramesIfItIsOfTheCamera)
 {
     const Card &card = GetParam()->card;
-    const bool of_camera = IsOfSight(GetParam()->act);
+    const bool of_camera = IsOfCamera(GetParam()->act);
     EXPECT_EQ(card.family == Family::kCamera, of_camera);
     EXPECT_EQ(card.needs == Needs::kFrames || card.needs == Needs::kRawFrames, of_camera);
 }
@@ -169,10 +169,10 @@ bool Same(const Signals &a, const Signals &b)
     return all(a) == all(b);
 }
 
-Sight RandomSight(std::mt19937_64 &engine)
+DetectionModel RandomDetectionModel(std::mt19937_64 &engine)
 {
     std::uniform_real_distribution<double> one(0, 1);
-    Sight s;
+    DetectionModel s;
     for (double *v : {&s.range_m, &s.softness_m, &s.cone_rad, &s.pan_rad, &s.target_radius_m,
                       &s.hide_radius_m, &s.miss_rate, &s.false_rate, &s.age_s, &s.delay_s})
         *v = one(engine);
@@ -180,9 +180,9 @@ Sight RandomSight(std::mt19937_64 &engine)
     return s;
 }
 
-bool Same(const Sight &a, const Sight &b)
+bool Same(const DetectionModel &a, const DetectionModel &b)
 {
-    const auto all = [](const Sight &s) {
+    const auto all = [](const DetectionModel &s) {
         return std::tie(s.range_m, s.softness_m, s.cone_rad, s.pan_rad, s.target_radius_m,
                         s.hide_radius_m, s.miss_rate, s.false_rate, s.age_s, s.delay_s,
                         s.vote_frames);
@@ -195,42 +195,42 @@ bool Same(const Body &a, const Body &b)
     return std::tie(a.radius_m, a.friction) == std::tie(b.radius_m, b.friction);
 }
 
-TEST_P(EveryEffect, AtNeutralLeavesSightAndBodyAlone)
+TEST_P(EveryEffect, AtNeutralLeavesCameraAndBodyAlone)
 {
     const auto effect = NeutralOf(*GetParam());
     std::mt19937_64 engine(7);
     for (int i = 0; i < 1000; ++i)
     {
-        const Sight sight = RandomSight(engine);
-        const Body body{sight.range_m, sight.miss_rate};
-        Sight sight_after = sight;
+        const DetectionModel detection = RandomDetectionModel(engine);
+        const Body body{detection.range_m, detection.miss_rate};
+        DetectionModel detection_after = detection;
         Body body_after = body;
-        effect.Look(sight_after);
-        effect.Touch(body_after);
-        ASSERT_TRUE(Same(sight, sight_after));
+        effect.Set(detection_after);
+        effect.Set(body_after);
+        ASSERT_TRUE(Same(detection, detection_after));
         ASSERT_TRUE(Same(body, body_after));
     }
 }
 
-TEST_P(EveryEffect, ByDefaultChangesSightAndBodyOnlyAtItsStage)
+TEST_P(EveryEffect, ByDefaultChangesCameraAndBodyOnlyAtItsStage)
 {
     const auto effect = DefaultsOf(*GetParam());
     const Act &act = GetParam()->act;
     std::mt19937_64 engine(7);
-    int sights = 0, bodies = 0;
+    int cameras_changed = 0, bodies = 0;
     for (int i = 0; i < 100; ++i)
     {
-        const Sight sight = RandomSight(engine);
-        const Body body{sight.range_m, sight.miss_rate};
-        Sight sight_after = sight;
+        const DetectionModel detection = RandomDetectionModel(engine);
+        const Body body{detection.range_m, detection.miss_rate};
+        DetectionModel detection_after = detection;
         Body body_after = body;
-        effect.Look(sight_after);
-        effect.Touch(body_after);
-        sights += !Same(sight, sight_after);
+        effect.Set(detection_after);
+        effect.Set(body_after);
+        cameras_changed += !Same(detection, detection_after);
         bodies += !Same(body, body_after);
     }
-    EXPECT_EQ(sights > 50, IsOfSight(act));
-    EXPECT_EQ(sights > 0, IsOfSight(act));
+    EXPECT_EQ(cameras_changed > 50, IsOfCamera(act));
+    EXPECT_EQ(cameras_changed > 0, IsOfCamera(act));
     EXPECT_EQ(bodies > 50, std::holds_alternative<OnBody>(act));
     EXPECT_EQ(bodies > 0, std::holds_alternative<OnBody>(act));
 }
@@ -265,7 +265,7 @@ TEST_P(EveryEffect, ByDefaultChangesSomeSignalIfItActsOnThem)
         changed += !Same(before, after);
     }
     const Act &act = GetParam()->act;
-    if (IsOfSight(act) || std::holds_alternative<OnBody>(act))
+    if (IsOfCamera(act) || std::holds_alternative<OnBody>(act))
         EXPECT_EQ(changed, 0);
     else
         EXPECT_GT(changed, 10);

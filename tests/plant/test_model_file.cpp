@@ -207,7 +207,7 @@ TEST(ModelFile, ARobotHasItsOwnValuesOfTheModelsEffects)
     const Model third = model.ForRobot(3);
     EXPECT_EQ(third.Get("wheel_gain.fl"), -0.1);
     EXPECT_EQ(third.Get("wheel_gain.fr"), 0.01);
-    EXPECT_EQ(third.MakeSight().range_m, 1.0);
+    EXPECT_EQ(third.MakeDetectionModel().range_m, 1.0);
     EXPECT_EQ(model.ForRobot(2).Get("wheel_gain.fl"), 0);
     Model without = model;
     without.RemoveEffect(0);

@@ -191,7 +191,7 @@ def test_a_run_may_come_as_a_log(planned: Path, tmp_path: Path, capsys):
     ("text", "says"),
     [
         ("run,class\n1,miling\n", "'miling' is no class"),
-        ("run,class\n99,milling\n", "run '99' is none of the plan's"),
+        ("run,class\n99,milling\n", "run '99' is not one of the plan's"),
         ("run,class\n1,milling\n1,milling\n", "run 1 is there twice"),
         ("class\nmilling\n", "no column 'run'"),
         ("run,class,range_m\n1,milling,7\n", r"line 2: range_m is '7', but the plan's run 1 has"),

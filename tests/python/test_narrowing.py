@@ -12,8 +12,8 @@ from scipy.stats import chi2
 
 from twinmill.data.measurement import load_measurements
 from twinmill.experiment.design import Limits
-from twinmill.experiment.foresight import Played
 from twinmill.experiment.moves import duty_axes, family
+from twinmill.experiment.played import Played
 from twinmill.fitting.fit import fitted
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile

@@ -17,7 +17,7 @@ import pytest
 from typer.core import TyperGroup
 
 from twinmill.challenge.script import write_rich_script
-from twinmill.experiment.foresight import Rows, csv_text
+from twinmill.experiment.played import Rows, csv_text
 from twinmill.programs import find_program
 from twinmill.workbench.next_run import then_commands
 from twinmill_cli import main as cli

@@ -87,7 +87,7 @@ def test_two_columns_of_one_quantity_are_refused(imported, more, why):
     ("rename", "why"),
     [
         ({"nope": "x_m"}, r"--rename nope=x_m: no table has a column 'nope' \(p\.csv has t_s"),
-        ({"x_m": "foo"}, "foo is none of our columns"),
+        ({"x_m": "foo"}, "foo is not one of our columns"),
         ({"x_m": "theta_deg"}, "m is no unit of what theta_deg holds"),
     ],
 )

@@ -211,7 +211,7 @@ TEST(Camera, SameSeedSameBytes)
 // A target straight ahead of a camera that looks left by the pan lands right of the middle.
 TEST(CameraSensor, LooksWhereItsPanSays)
 {
-    Sight sight = CameraSight({}, {});
+    DetectionModel sight = CameraDetectionModel({}, {});
     sight.pan_rad = 0.3;
     CameraSensor camera({}, 0, sight, 1);
     const fw_config config = fw_config_default();
@@ -235,7 +235,7 @@ TEST(CameraSensor, LooksWhereItsPanSays)
 TEST(CameraSensor, AFrameArrivesAfterItsDelay)
 {
     const CameraWorld world;
-    Sight sight = CameraSight({}, world);
+    DetectionModel sight = CameraDetectionModel({}, world);
     sight.delay_s = 0.05;
     CameraSensor camera(world, 0, sight, 1);
     fw_config config = fw_config_default();

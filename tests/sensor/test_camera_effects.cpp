@@ -38,7 +38,7 @@ class Looker
 {
 public:
     explicit Looker(const std::vector<Setting> &effects, const CameraWorld &world = Pinhole())
-        : camera_(world, 0, CameraSight(ModelWith(effects), world), 1)
+        : camera_(world, 0, CameraDetectionModel(ModelWith(effects), world), 1)
     {
         const fw_config config = fw_config_default();
         EXPECT_EQ(fw_init(&firmware_, &config), FW_OK);

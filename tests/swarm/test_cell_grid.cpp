@@ -90,17 +90,17 @@ TEST(CellGrid, BodiesArePushedAsByAllPairsToTheBit)
 // Whom a hiding body stands before, and who is too far to matter, is the same with those left out.
 TEST(CellGrid, SensorsSeeTheSameWithFarRobotsLeftOut)
 {
-    Sight sight;
-    sight.range_m = 1.1;
-    sight.cone_rad = 0.9;
+    DetectionModel detection;
+    detection.range_m = 1.1;
+    detection.cone_rad = 0.9;
     int seen = 0;
     for (const double hide_m : {0.0, 0.1})
         for (uint64_t seed = 0; seed < 20; ++seed)
         {
-            sight.hide_radius_m = hide_m;
+            detection.hide_radius_m = hide_m;
             const auto poses = Scatter(80, 6, seed);
             CellGrid grid;
-            grid.Fill(poses, sight.range_m);
+            grid.Fill(poses, detection.range_m);
             for (size_t i = 0; i < poses.size(); ++i)
             {
                 const auto &near = grid.Near(i);
@@ -109,7 +109,8 @@ TEST(CellGrid, SensorsSeeTheSameWithFarRobotsLeftOut)
                     some.push_back(poses[j]);
                 const auto self =
                     static_cast<size_t>(std::ranges::lower_bound(near, i) - near.begin());
-                ConeSensor all(sight, static_cast<int>(i), 1), few(sight, static_cast<int>(i), 1);
+                ConeSensor all(detection, static_cast<int>(i), 1),
+                    few(detection, static_cast<int>(i), 1);
                 const bool by_all = all.Next(poses, i, 0)->detected;
                 EXPECT_EQ(by_all, few.Next(some, self, 0)->detected);
                 seen += by_all;

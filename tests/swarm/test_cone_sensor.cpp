@@ -19,9 +19,9 @@ Pose2 At(double distance_m, double bearing_rad)
     return {distance_m * std::cos(bearing_rad), distance_m * std::sin(bearing_rad), 0};
 }
 
-Sight Cone(double range_m, double cone_rad, double target_radius_m = 0)
+DetectionModel Cone(double range_m, double cone_rad, double target_radius_m = 0)
 {
-    Sight sensor;
+    DetectionModel sensor;
     sensor.range_m = range_m;
     sensor.cone_rad = cone_rad;
     sensor.target_radius_m = target_radius_m;
@@ -30,7 +30,7 @@ Sight Cone(double range_m, double cone_rad, double target_radius_m = 0)
 
 TEST(InView, PointIsSeenInsideTheConeAndRangeOnly)
 {
-    const Sight sensor = Cone(1.1, 49 * kDeg);
+    const DetectionModel sensor = Cone(1.1, 49 * kDeg);
     for (const double sign : {-1.0, 1.0})
     {
         EXPECT_TRUE(InView({}, At(1.099, sign * 24.4 * kDeg), sensor));
@@ -55,7 +55,7 @@ TEST(InView, ConeWiderThanAHalfTurnSeesBehind)
 // A disc at distance d touches the edge of the cone when its centre is asin(r/d) outside it.
 TEST(InView, DiscIsSeenUntilItsLastPartLeavesTheCone)
 {
-    const Sight sensor = Cone(1.1, 49 * kDeg, 0.1);
+    const DetectionModel sensor = Cone(1.1, 49 * kDeg, 0.1);
     const double edge_rad = 24.5 * kDeg + std::asin(0.1 / 0.8);
     EXPECT_TRUE(InView({}, At(0.8, edge_rad - 1e-6), sensor));
     EXPECT_FALSE(InView({}, At(0.8, edge_rad + 1e-6), sensor));
@@ -65,7 +65,7 @@ TEST(InView, DiscIsSeenUntilItsLastPartLeavesTheCone)
 TEST(ConeSensor, ErrorRatesAreThoseOfTheModel)
 {
     constexpr int kFrames = 20000;
-    Sight sensor = Cone(1, 1);
+    DetectionModel sensor = Cone(1, 1);
     sensor.miss_rate = 0.04;
     sensor.false_rate = 0.1;
     const std::vector<Pose2> apart{{0, 0, 0}, {5, 0, 0}}, close{{0, 0, 0}, {0.5, 0, 0}};
@@ -83,7 +83,7 @@ TEST(ConeSensor, ErrorRatesAreThoseOfTheModel)
 
 TEST(ConeSensor, DelayHoldsFramesBackAndKeepsTheirTimeStamps)
 {
-    Sight sensor = Cone(1, 1);
+    DetectionModel sensor = Cone(1, 1);
     sensor.delay_s = 0.05;
     ConeSensor delayed(sensor, 0, 1);
     const std::vector<Pose2> apart{{0, 0, 0}, {5, 0, 0}}, close{{0, 0, 0}, {0.5, 0, 0}};

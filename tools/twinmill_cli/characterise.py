@@ -35,7 +35,7 @@ if working():  # not for --help
     from twinmill.data.log import LogError
     from twinmill.data.measurement_table import read_header, read_table
     from twinmill.data.recorder import Recorder
-    from twinmill.experiment.foresight import Rows
+    from twinmill.experiment.played import Rows
     from twinmill.export.script import TwistScript
     from twinmill.files import check_new_file
     from twinmill.model.mixing import duties_from_inputs

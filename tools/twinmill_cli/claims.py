@@ -99,9 +99,9 @@ def _claims(
     if out:
         check_new_folder(out)
     found = []
-    with telling("checking claims") as say:
+    with telling("checking claims") as progress:
         for name in names:
-            say(name)
+            progress(name)
             more = {"turns": tuple(odd_turn or ODD_TURNS)} if name == "bullseye" else {}
             found.append(CHECKED[name](seeds, **more))
     if actuation_table:

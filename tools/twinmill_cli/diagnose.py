@@ -55,12 +55,12 @@ def _diagnose(
     Example: twinmill diagnose run.lcmlog --model fitted.toml
     """
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
-    with telling(f"diagnosing with {model}") as say:
+    with telling(f"diagnosing with {model}") as progress:
         measurements = load(logs, model_file, as_json)
-        result = diagnose(measurements, model_file, say)
+        result = diagnose(measurements, model_file, progress)
         swarm = None
         if robots_recorded(logs[0], measurements) > 1:
-            say("the swarm as a whole")
+            progress("the swarm as a whole")
             note, swarm = _judge_swarm(logs[0], result)
             result = replace(result, notes=[*result.notes, note])
     data = {**result.to_json(), **told(measurements), "swarm": swarm}
@@ -147,9 +147,9 @@ def _explain(
         command_line("explain", logs, model, output), model_file := open_model(model, out)
     )
     check_output(output, model_file, force)
-    with telling(f"explaining with {model}") as say:
+    with telling(f"explaining with {model}") as progress:
         measurements = load(logs, model_file, as_json)
-        result = explain(measurements, model_file, output, source.command, say)
+        result = explain(measurements, model_file, output, source.command, progress)
     then = _settling(result.diagnosis, logs, str(output))
     section = partial(present.section, result.diagnosis, then)
     data = {**result.to_json(), **told(measurements)}

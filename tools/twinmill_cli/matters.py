@@ -168,8 +168,8 @@ def _hidden(logs: list[Path], model_file: ModelFile, folder: Path, as_json: bool
     key = {"model": model_file.hash, "logs": hashes}
     if kept.exists() and (known := json.loads(kept.read_text()))["of"] == key:
         return [Hidden(**one) for one in known["hidden"]]
-    with telling("looking for what the logs do not exclude") as say:
-        diagnosis = diagnose(load(logs, model_file, as_json), model_file, say)
+    with telling("looking for what the logs do not exclude") as progress:
+        diagnosis = diagnose(load(logs, model_file, as_json), model_file, progress)
     if diagnosis.found:
         typer.echo(
             f"twinmill: these logs show that {model_file.path} lacks {', '.join(diagnosis.found)}; "

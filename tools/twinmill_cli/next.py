@@ -22,7 +22,7 @@ if working():  # not for --help
     from twinmill.data.measurement import Measurements
     from twinmill.diagnosis.diagnose import diagnose
     from twinmill.experiment.design import Limits, Plan, check, design, log_of
-    from twinmill.experiment.foresight import csv_text
+    from twinmill.experiment.played import csv_text
     from twinmill.export.script import TwistScript
     from twinmill.files import check_new_file
     from twinmill.fitting.opening import open_measurements
@@ -86,7 +86,7 @@ def _next(
     else effects that would not show. Play the script, log it, and diagnose
     the old and the new logs together.
 
-    With --for the run tells what a swarm's predicted share of success hangs on:
+    With --for the run tells what a swarm's predicted share of success depends on:
     models drawn from what the fits leave open are run as swarms, and the drive
     that narrows their spread most is put together.
 
@@ -111,10 +111,10 @@ def _next(
         data = {"script": str(output), **narrowing.to_json(), **source.to_json()}
         deliver(data, present.narrowing_terminal(narrowing, how), as_json)
         return narrowing
-    with telling(f"designing a run with {model}") as say:
+    with telling(f"designing a run with {model}") as progress:
         measurements = load(logs, model_file, as_json)
         check(measurements, model_file, limits)
-        plan = design(diagnose(measurements, model_file, say), model_file, limits, say)
+        plan = design(diagnose(measurements, model_file, progress), model_file, limits, progress)
     write_whole(output, csv_text(plan.rows))
     how = _how(plan, logs, model, output)
     data = {"script": str(output), **plan.to_json()}

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "swarm/camera_sight.h"
+#include "swarm/camera_scenes.h"
 
 namespace CLI
 {

@@ -48,10 +48,10 @@ void UseFirmware(Swarm &swarm, const HilOptions &options, const CameraWorld &wor
     for (int i = 0; i < options.robots; ++i)
     {
         const size_t k = static_cast<size_t>(i);
-        const Sight sight = CameraSight(robots[k], world);
+        const DetectionModel detection = CameraDetectionModel(robots[k], world);
         const FirmwareOptions firmware{program, behaviors[k]->name, behaviors[k]->table,
                                        !options.free_run};
-        swarm.SetSensor(i, std::make_unique<FirmwareSensor>(firmware, world, i, sight, seed));
+        swarm.SetSensor(i, std::make_unique<FirmwareSensor>(firmware, world, i, detection, seed));
     }
 }
 

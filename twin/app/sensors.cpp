@@ -29,12 +29,12 @@ struct SensorKind
 constexpr SensorKind kSensors[] = {
     {"cone",
      [](const Place &at) -> std::unique_ptr<RobotSensor> {
-         return std::make_unique<ConeSensor>(at.robot.MakeSight(), at.number, at.seed);
+         return std::make_unique<ConeSensor>(at.robot.MakeDetectionModel(), at.number, at.seed);
      }},
     {"camera",
      [](const Place &at) -> std::unique_ptr<RobotSensor> {
-         const Sight sight = CameraSight(at.robot, at.world);
-         return std::make_unique<CameraSensor>(at.world, at.number, sight, at.seed);
+         const DetectionModel detection = CameraDetectionModel(at.robot, at.world);
+         return std::make_unique<CameraSensor>(at.world, at.number, detection, at.seed);
      }},
 };
 

@@ -10,9 +10,10 @@ ViewOptions MakeViewOptions(const Options &options, const std::vector<Model> &ro
     const CameraWorld world = MakeCameraWorld(options.camera, 0, 0);
     for (const Model &robot : robots)
     {
-        const Sight sight =
-            options.sensor == "camera" ? CameraSight(robot, world) : robot.MakeSight();
-        view.cones.push_back({sight.range_m, sight.cone_rad, sight.pan_rad});
+        const DetectionModel detection = options.sensor == "camera"
+                                             ? CameraDetectionModel(robot, world)
+                                             : robot.MakeDetectionModel();
+        view.cones.push_back({detection.range_m, detection.cone_rad, detection.pan_rad});
     }
     return view;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "effects/effect.h"
 
+#include <cmath>
+
 namespace twin
 {
 
@@ -26,18 +28,24 @@ BoundEffect::BoundEffect(const EffectSpec &spec, std::vector<double> values,
     formula_ = std::move(compiled.formula);
 }
 
-void BoundEffect::Look(Sight &sight) const
+void BoundEffect::Set(DetectionModel &detection) const
 {
     if (const auto *view = std::get_if<OnView>(&act_))
-        view->look(sight, numbers());
+        view->set(detection, numbers());
     if (const auto *decision = std::get_if<OnDecision>(&act_))
-        decision->look(sight, numbers());
+        decision->set(detection, numbers());
 }
 
-void BoundEffect::Touch(Body &body) const
+void BoundEffect::Set(Body &body) const
 {
     if (const auto *on = std::get_if<OnBody>(&act_))
-        on->touch(body, numbers());
+        on->set(body, numbers());
+}
+
+double Begun(double since_s)
+{
+    constexpr double kEdge_s = 0.1;
+    return 1 / (1 + std::exp(-since_s / kEdge_s));
 }
 
 const EffectSpec *FindEffect(std::string_view name)

@@ -10,12 +10,12 @@ namespace twin
 {
 
 FirmwareSensor::FirmwareSensor(const FirmwareOptions &options, const CameraWorld &world, int robot,
-                               const Sight &sight, uint64_t seed)
-    : CameraSensor(world, robot, sight, seed),
+                               const DetectionModel &detection, uint64_t seed)
+    : CameraSensor(world, robot, detection, seed),
       options_(options),
       camera_(world.settings),
       robot_(robot),
-      vote_frames_(static_cast<int>(std::lround(sight.vote_frames))),
+      vote_frames_(static_cast<int>(std::lround(detection.vote_frames))),
       process_(std::make_unique<Process>(options_, camera_, robot_, vote_frames_))
 {
 }

@@ -203,26 +203,26 @@ Model Model::ForRobot(int robot_id) const
     return model;
 }
 
-Sight Model::MakeSight() const
+DetectionModel Model::MakeDetectionModel() const
 {
-    Sight sight;
-    sight.range_m = sensor.range_m;
-    sight.cone_rad = sensor.cone_rad;
-    sight.target_radius_m = sensor.target_radius_m;
-    sight.miss_rate = sensor.false_negative_rate;
-    sight.false_rate = sensor.false_positive_rate;
-    sight.delay_s = sensor.delay_s;
-    sight.vote_frames = sensor.vote_frames;
+    DetectionModel detection;
+    detection.range_m = sensor.range_m;
+    detection.cone_rad = sensor.cone_rad;
+    detection.target_radius_m = sensor.target_radius_m;
+    detection.miss_rate = sensor.false_negative_rate;
+    detection.false_rate = sensor.false_positive_rate;
+    detection.delay_s = sensor.delay_s;
+    detection.vote_frames = sensor.vote_frames;
     for (const EffectInstance &effect : effects)
-        effect.Bind().Look(sight);
-    return sight;
+        effect.Bind().Set(detection);
+    return detection;
 }
 
 Body Model::MakeBody() const
 {
     Body body{robot.body_radius_m, 0};
     for (const EffectInstance &effect : effects)
-        effect.Bind().Touch(body);
+        effect.Bind().Set(body);
     return body;
 }
 

@@ -225,21 +225,21 @@ const char *DriveName(const Model &model)
     return "";
 }
 
-nb::dict SightDict(const Model &model)
+nb::dict DetectionModelDict(const Model &model)
 {
-    const Sight sight = model.MakeSight();
+    const DetectionModel detection = model.MakeDetectionModel();
     nb::dict entry;
-    entry["range_m"] = sight.range_m;
-    entry["softness_m"] = sight.softness_m;
-    entry["cone_rad"] = sight.cone_rad;
-    entry["pan_rad"] = sight.pan_rad;
-    entry["target_radius_m"] = sight.target_radius_m;
-    entry["hide_radius_m"] = sight.hide_radius_m;
-    entry["miss_rate"] = sight.miss_rate;
-    entry["false_rate"] = sight.false_rate;
-    entry["age_s"] = sight.age_s;
-    entry["delay_s"] = sight.delay_s;
-    entry["vote_frames"] = sight.vote_frames;
+    entry["range_m"] = detection.range_m;
+    entry["softness_m"] = detection.softness_m;
+    entry["cone_rad"] = detection.cone_rad;
+    entry["pan_rad"] = detection.pan_rad;
+    entry["target_radius_m"] = detection.target_radius_m;
+    entry["hide_radius_m"] = detection.hide_radius_m;
+    entry["miss_rate"] = detection.miss_rate;
+    entry["false_rate"] = detection.false_rate;
+    entry["age_s"] = detection.age_s;
+    entry["delay_s"] = detection.delay_s;
+    entry["vote_frames"] = detection.vote_frames;
     return entry;
 }
 
@@ -249,7 +249,7 @@ Array InViewOf(const Model &model, size_t self, Poses poses, double position_m, 
     const size_t frames = poses.shape(0), robots = poses.shape(1);
     if (poses.shape(2) != 3 || self >= robots)
         throw std::invalid_argument("poses must be (T, N, 3), with the robot itself among the N");
-    const Sight sight = model.MakeSight();
+    const DetectionModel detection = model.MakeDetectionModel();
     std::vector<double> seen(frames);
     std::vector<Pose2> at(robots);
     for (size_t t = 0; t < frames; ++t)
@@ -257,7 +257,7 @@ Array InViewOf(const Model &model, size_t self, Poses poses, double position_m, 
         const double *pose = poses.data() + 3 * robots * t;
         for (size_t i = 0; i < robots; ++i, pose += 3)
             at[i] = {pose[0], pose[1], pose[2]};
-        seen[t] = ViewProbability(at, self, sight, {position_m, heading_rad});
+        seen[t] = ViewProbability(at, self, detection, {position_m, heading_rad});
     }
     return ToNumpy(std::move(seen), {frames});
 }
@@ -381,7 +381,8 @@ NB_MODULE(twinmill_native, m)
                                                             : found->second;
             },
             "robot_id"_a, "What [robots.Rnn] states of this robot: values by field or name.")
-        .def("sight", &SightDict, "What the robot's camera sees and how it errs, effects included.")
+        .def("detection_model", &DetectionModelDict,
+             "What the robot's camera sees and how it errs, effects included.")
         .def("copy", [](const Model &model) { return Model(model); })
         .def_prop_ro("drive", &DriveName)
         .def_prop_ro("wheel_kind",

@@ -7,11 +7,11 @@
 namespace twin
 {
 
-ConeSensor::ConeSensor(const Sight &sight, int robot, uint64_t seed)
-    : sight_(sight),
+ConeSensor::ConeSensor(const DetectionModel &detection, int robot, uint64_t seed)
+    : detection_(detection),
       random_(seed, robot, "sensor"),
-      age_us_(std::llround(sight.age_s * 1e6)),
-      delay_us_(std::llround(sight.delay_s * 1e6))
+      age_us_(std::llround(detection.age_s * 1e6)),
+      delay_us_(std::llround(detection.delay_s * 1e6))
 {
 }
 
@@ -19,15 +19,15 @@ ConeSensor::ConeSensor(const Sight &sight, int robot, uint64_t seed)
 // step.
 bool ConeSensor::Seen(std::span<const Pose2> poses, size_t self)
 {
-    const double sure = ViewProbability(poses, self, sight_, {});
-    const bool in_view = sight_.softness_m > 0 ? random_.Uniform() < sure : sure > 0;
-    const bool errs = random_.Uniform() < (in_view ? sight_.miss_rate : sight_.false_rate);
+    const double sure = ViewProbability(poses, self, detection_, {});
+    const bool in_view = detection_.softness_m > 0 ? random_.Uniform() < sure : sure > 0;
+    const bool errs = random_.Uniform() < (in_view ? detection_.miss_rate : detection_.false_rate);
     return in_view != errs;
 }
 
 double ConeSensor::ReachM() const
 {
-    return sight_.softness_m > 0 ? std::numeric_limits<double>::infinity() : sight_.range_m;
+    return detection_.softness_m > 0 ? std::numeric_limits<double>::infinity() : detection_.range_m;
 }
 
 std::optional<SensorFrame> ConeSensor::Next(std::span<const Pose2> poses, size_t self,

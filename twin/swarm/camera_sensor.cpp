@@ -6,11 +6,12 @@
 namespace twin
 {
 
-CameraSensor::CameraSensor(const CameraWorld &world, int robot, const Sight &sight, uint64_t seed)
-    : sightings_(world, robot, sight, seed),
-      camera_(sightings_.settings(), robot, seed),
-      age_us_(std::llround(sight.age_s * 1e6)),
-      delay_us_(std::llround(sight.delay_s * 1e6))
+CameraSensor::CameraSensor(const CameraWorld &world, int robot, const DetectionModel &detection,
+                           uint64_t seed)
+    : scenes_(world, robot, detection, seed),
+      camera_(scenes_.settings(), robot, seed),
+      age_us_(std::llround(detection.age_s * 1e6)),
+      delay_us_(std::llround(detection.delay_s * 1e6))
 {
 }
 
@@ -29,11 +30,11 @@ std::optional<fw_frame> CameraSensor::DrawArrived()
 {
     if (!arrived_)
         return std::nullopt;
-    frame_ = camera_.Draw(sightings_.Next(arrived_->poses), arrived_->poses[arrived_->self]);
+    frame_ = camera_.Draw(scenes_.Next(arrived_->poses), arrived_->poses[arrived_->self]);
     fw_frame frame{};
     frame.yuyv = frame_.data();
-    frame.width_px = sightings_.settings().width_px;
-    frame.height_px = sightings_.settings().height_px;
+    frame.width_px = scenes_.settings().width_px;
+    frame.height_px = scenes_.settings().height_px;
     frame.stride_bytes = 2 * frame.width_px;
     frame.utime_us = arrived_->utime_us;
     frame.seq = arrived_->seq;

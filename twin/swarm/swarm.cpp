@@ -20,11 +20,11 @@ namespace
 constexpr double kFullPack_V = 8.2, kEmptyPack_V = 7.0, kPackCharge_As = 1.8 * 3600;
 constexpr double kComputer_A = 0.6, kMotors_A = 4 * 0.17;
 
-fw_config ConfigFor(const Sight &sight, const fw_table &table)
+fw_config ConfigFor(const DetectionModel &detection, const fw_table &table)
 {
     fw_config config = fw_config_default();
     config.table = table;
-    config.vote.max_frames = static_cast<int32_t>(std::lround(sight.vote_frames));
+    config.vote.max_frames = static_cast<int32_t>(std::lround(detection.vote_frames));
     config.vote.window_us = std::numeric_limits<int64_t>::max();
     return config;
 }
@@ -80,16 +80,17 @@ Swarm::Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
 {
     for (size_t i = 0; i < models.size(); ++i)
     {
-        const Sight sight = models[i].MakeSight();
-        const fw_config config = ConfigFor(sight, tables[i]);
+        const DetectionModel detection = models[i].MakeDetectionModel();
+        const fw_config config = ConfigFor(detection, tables[i]);
         CheckModel(models[i], config);
-        members_.push_back({{},
-                            {},
-                            std::make_unique<ConeSensor>(sight, static_cast<int>(i), options.seed),
-                            models[i].base,
-                            kFullPack_V,
-                            nullptr,
-                            0});
+        members_.push_back(
+            {{},
+             {},
+             std::make_unique<ConeSensor>(detection, static_cast<int>(i), options.seed),
+             models[i].base,
+             kFullPack_V,
+             nullptr,
+             0});
         if (const fw_err error = fw_init(&members_.back().firmware, &config); error != FW_OK)
             throw std::invalid_argument(std::string("the firmware refuses its configuration: ") +
                                         fw_err_str(error));

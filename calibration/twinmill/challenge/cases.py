@@ -50,7 +50,7 @@ class Case:
     adds_floors: tuple[float, ...]
 
     def to_json(self) -> dict:
-        """For the sealed answers."""
+        """What is hidden in the log, as the sealed answers keep it."""
         return {
             "case": self.number,
             "kind": self.kind,

@@ -73,7 +73,7 @@ class Hidden:
         return replace(self, values=values)
 
     def to_json(self) -> dict:
-        """For the sealed answers."""
+        """Name, kind and values, as the sealed answers keep them."""
         return {"name": self.name, "kind": self.kind, "values": self.values}
 
 

@@ -61,8 +61,8 @@ def pack_robot(
     """Speeds, commands, sight and band of one robot."""
     names, unit = COMMAND_WORDS.get(driven.command_kind, ((), ""))
     arrays = {**view.measured(), **commands(driven), **seen(frames)}
-    sight = model.sight()
-    cone = {key: sight[key] for key in ("range_m", "cone_rad", "pan_rad")}
+    detection = model.detection_model()
+    cone = {key: detection[key] for key in ("range_m", "cone_rad", "pan_rad")}
     return pack(arrays, command_names=names, command_unit=unit, cone=cone)
 
 

@@ -48,7 +48,7 @@ def actuation(sheets: list[SteadyTable]) -> Claim:
         "Robots differ: each one's mean speed over the group's, N(1, 0.04).",
         agrees,
         f"The published factors vary by {spread:.3f}. In the measured table of "
-        f"{len({s.robot_id for s in sheets})} robots the spread hangs on the operating point: "
+        f"{len({s.robot_id for s in sheets})} robots the spread depends on the operating point: "
         f"{_range(straight)} straight, {_range(turning)} where they turn. One number for all "
         "points is not what was measured.",
         rows,

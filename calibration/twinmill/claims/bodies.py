@@ -104,7 +104,7 @@ def bodies(seeds: int, folder: Path) -> Claim:
         None,
         f"Planar and MuJoCo. {told}. In the planar plant points pass through each other and discs "
         "slide off; in MuJoCo all have the robot's hull, and those that meet head-on hold each "
-        "other, which hangs on the hull's shape, not on its friction or the motors' torque "
+        "other, which depends on the hull's shape, not on its friction or the motors' torque "
         "(bench_jams).",
         rows,
         [

@@ -72,7 +72,7 @@ class Senders:
 
     @property
     def hosts(self) -> list[str]:
-        """Their machines."""
+        """Addresses of the machines that speak on the channel, in order."""
         return sorted({sender[0] for _, sender in self._recent})
 
     @property

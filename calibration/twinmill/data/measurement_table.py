@@ -103,7 +103,7 @@ class Table:
 
     @property
     def strange(self) -> list[str]:
-        """Columns without a meaning."""
+        """Names of columns that no importer knows."""
         return [name for name in self.header if name not in self.known]
 
     def where(self, kept: np.ndarray) -> "Table":

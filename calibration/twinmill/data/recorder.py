@@ -32,7 +32,7 @@ class Recorder:
 
     @property
     def events(self) -> int:
-        """How many are kept."""
+        """Number of events of the log that are in the file."""
         return len(self._ends_bytes) - 1
 
     def __enter__(self) -> "Recorder":

@@ -22,7 +22,7 @@ class Batch(Events):
 
     @classmethod
     def of(cls, messages: list[Message]) -> "Batch":
-        """In their order."""
+        """Messages (time in us, channel, payload) by channel, their order kept."""
         batch = cls()
         for stamp_us, channel, payload in messages:
             batch.by_channel.setdefault(channel, []).append(payload)
@@ -117,5 +117,5 @@ class Window:
             self._messages.popleft()
 
     def events(self) -> Batch:
-        """All that it holds."""
+        """All messages received and not yet dropped, by channel."""
         return Batch.of(list(self._messages))

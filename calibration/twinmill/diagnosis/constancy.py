@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinmill.data.track import command_at
+from twinmill.diagnosis.library import TIME
 from twinmill.diagnosis.search import Trial
 from twinmill.model.parameters import Parameter, effect_names
 from twinmill.predict.datasets import Trajectory
@@ -87,7 +88,7 @@ def _doing(data: Trajectory) -> dict[tuple[str, str], np.ndarray]:
     found = {
         ("speed", ""): np.hypot(moved[:, 0], moved[:, 1]),
         ("turning", ""): np.abs(moved[:, 2]),
-        ("time", ""): data.start_s - data.start_s[0],
+        (TIME, ""): data.start_s - data.start_s[0],
         ("heading", "cos"): np.cos(heading_rad),
         ("heading", "sin"): np.sin(heading_rad),
     }

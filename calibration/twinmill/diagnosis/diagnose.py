@@ -34,7 +34,7 @@ from twinmill.diagnosis.search import (
     instead_of_drift,
     search,
 )
-from twinmill.diagnosis.verdict import Weighed, drifted
+from twinmill.diagnosis.verdict import VerdictInputs, drifted
 from twinmill.fitting.compare import comparison
 from twinmill.fitting.fit import base_names
 from twinmill.fitting.opening import Opened, judged, open_measurements, with_own_gains
@@ -67,7 +67,7 @@ TWO_CLOCKS = (
     "--same-clock), or fit a calibration log on the same clocks first"
 )
 NO_HEADING = "the heading was not recorded, and what the robot holds is found"
-ONE_LOG = "a moment of one log is none of another; give each log by itself"
+ONE_LOG = "a moment in one log is not the same in another; diagnose each log by itself"
 CONTACTS = "predictions of one robot have no contacts; twinmill compare-swarm looks at whole swarms"
 NO_VOLTAGE = (
     "the log has no voltage of the battery; tables have no column for it, the telemetry of our "
@@ -223,7 +223,7 @@ def _concluded(
     hidden = [*faint, *unseen.items()]
     refit = _refit(done)
     usual = model_file.usual_score(hashes)
-    weighed = Weighed(
+    weighed = VerdictInputs(
         before.score,
         start.held_score,
         refit,

@@ -80,7 +80,7 @@ class Outlier:
 
     @property
     def label(self) -> str:
-        """Short name."""
+        """The robot as channels name it, such as R03."""
         return f"R{self.robot_id:02d}"
 
     def to_json(self) -> dict:

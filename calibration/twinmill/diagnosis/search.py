@@ -45,7 +45,7 @@ class Settings:
 
     Attributes:
         evidence: least fall of the held-out cost (twice a log likelihood ratio) of one addition ...
-        without_best: ... and without the block that speaks loudest for it.
+        without_best: ... and without the block with the most evidence for it.
         without_visit: the same for an effect of a place, which speaks where the robot comes by.
         drowned, less_evidence, blocks_t: the same from this score on, where what the model lacks
             besides drowns the evidence, and blocks agree: t of the relative fall over blocks.
@@ -140,7 +140,7 @@ class Trial:
         fit: of all free parameters.
         state: with the fitted models.
         evidence: fall of the held-out cost against the state it started from.
-        without_best: the same without the block that speaks loudest for it.
+        without_best: the same without the block with the most evidence for it.
         blocks_t: t of the relative fall over blocks.
     """
 

@@ -16,7 +16,7 @@ WORSE = 1.5  # score over the usual one, beyond which it is a finding
 
 
 @dataclass(frozen=True)
-class Weighed:
+class VerdictInputs:
     """What the verdict rests on.
 
     Attributes:
@@ -47,7 +47,7 @@ class Weighed:
 
     @property
     def verdict(self) -> str:
-        """As in Diagnosis."""
+        """One of the verdicts that `Diagnosis.verdict` lists."""
         outweighed = self._noise_outweighs or self._rest_outweighs or self._of_another_form
         if self.effects and not outweighed:
             top = self.effects[0]

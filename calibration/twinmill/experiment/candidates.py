@@ -97,9 +97,9 @@ def _best_columns(
     """Derivatives at the neutral value, or the way to the default where these say nothing of it."""
     smooth, corner = _smooth(entry), _corner(entry)
     columns, whole = smooth.columns(logs, without), corner.columns(logs, without)
-    foreseen = columns @ smooth.strength
-    size, reached = np.linalg.norm(foreseen), np.linalg.norm(whole)
-    alike = foreseen @ whole[:, 0] / max(size * reached, 1e-12)
+    predicted = columns @ smooth.strength
+    size, reached = np.linalg.norm(predicted), np.linalg.norm(whole)
+    alike = predicted @ whole[:, 0] / max(size * reached, 1e-12)
     if alike < ALIKE or not 1 / MISJUDGED < size / max(reached, 1e-12) < MISJUDGED:
         return corner, whole
     shown = _energy(smooth, columns) > BLIND

@@ -11,10 +11,10 @@ import twinmill_native as native
 from twinmill.data.measurement import SHORTEST_LOG_S, Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.experiment.foresight import LEAD_S, Played, Rows, rows_of
 from twinmill.experiment.hypotheses import Hypotheses, candidate_effects, hypotheses_of, question
 from twinmill.experiment.information import CandidateEffect, FisherInformation
 from twinmill.experiment.moves import Axis, Move, duty_axes, family, twist_axes
+from twinmill.experiment.played import LEAD_S, Played, Rows, rows_of
 from twinmill.experiment.power import power
 from twinmill.experiment.relevance import relevance
 from twinmill.fitting.fit import base_names
@@ -71,7 +71,7 @@ class Chance:
 
 @dataclass(frozen=True)
 class Plan:
-    """The script and what is foreseen of it.
+    """The script and what is predicted of it.
 
     Attributes:
         why: what the logs leave open.
@@ -123,7 +123,7 @@ class Plan:
 
 
 def design(
-    diagnosis: Diagnosis, model_file: ModelFile, limits: Limits, say: Callable[[str], None]
+    diagnosis: Diagnosis, model_file: ModelFile, limits: Limits, progress: Callable[[str], None]
 ) -> Plan:
     """Designs the run that best names what the diagnosis leaves open.
 
@@ -132,7 +132,7 @@ def design(
         model_file: that the diagnosis was given. Its score on other logs says what it lacks in
             drives that these logs do not have; its base is refitted to all that the run shows.
         limits: time, floor, duty; as `check` let them pass.
-        say: told in words what is being done.
+        progress: told in words what is being done.
 
     Raises:
         ValueError: there is no log, or no move shows what is in question.
@@ -141,26 +141,26 @@ def design(
     hashes = [o.measurement.log_sha256 for o in logs]
     usual = model_file.usual_score(hashes)
     moves = family(_axes([o.measurement for o in logs], model_file.model.drive, limits))
-    say("playing the moves in the twin")
+    progress("playing the moves in the twin")
     names = base_names(model_file.model, logs, model_file.known_from_other_logs(hashes))
     asked = hypotheses_of(diagnosis, base_parameters(model_file.model, names))
     modelled = log_of(asked.state.logs)
-    foreseen = Played.of([[m] for m in moves], modelled).modelled(modelled, CENTRE)
-    known = candidate_effects(asked.state.logs, foreseen, asked.state, asked, usual)
+    predicted = Played.of([[m] for m in moves], modelled).modelled(modelled, CENTRE)
+    known = candidate_effects(asked.state.logs, predicted, asked.state, asked, usual)
     fisher = FisherInformation(asked.state.free, known)
     told = np.sum([fisher.told(s) for s in asked.state.logs], axis=0)
     names, why = question(asked, known, _tempered(fisher, told), ENOUGH_CHI2)
     wanted = {i: with_effect(modelled.model, s) for i, s in enumerate(known) if s.name in names}
     if not wanted:
         raise ValueError(f"{why} No move that the twin can play shows any of them.")
-    say("choosing moves")
+    progress("choosing moves")
     floor = Floor(limits, modelled, list(wanted.values()))
     worth = partial(_worth, fisher, wanted=list(wanted))
-    chosen = choose(moves, worth, told, fisher.foreseen(foreseen), floor)
-    say("checking the whole script")
+    chosen = choose(moves, worth, told, fisher.predicted(predicted), floor)
+    progress("checking the whole script")
     whole = Played.of([chosen], modelled)
     planned = whole.modelled(modelled, CENTRE)
-    after = told + fisher.foreseen(planned)[0]
+    after = told + fisher.predicted(planned)[0]
     outlook = _Outlook(asked, fisher, wanted, usual)
     return Plan(
         why,
@@ -265,7 +265,7 @@ def choose(
     moves: list[Move],
     worth_of: Callable[[np.ndarray], np.ndarray],
     told: np.ndarray,
-    foreseen: np.ndarray,
+    predicted: np.ndarray,
     floor: Floor,
 ) -> list[Move]:
     """Greedy: each time the move that adds most per second and still stays on the floor.
@@ -274,21 +274,21 @@ def choose(
         moves: M of them.
         worth_of: (..., C, C) products of what runs tell to (...,) what they are worth.
         told: (C, C) of the runs so far.
-        foreseen: (M, C, C) of each move.
+        predicted: (M, C, C) of each move.
         floor: with its limits.
     """
     left_s = floor.limits.duration_s - 2 * LEAD_S
     duration_s = np.array([m.duration_s for m in moves])
     chosen: list[Move] = []
     while True:
-        worth = worth_of(told + foreseen) - worth_of(told)
+        worth = worth_of(told + predicted) - worth_of(told)
         worth = np.where(duration_s <= left_s, worth / duration_s, -np.inf)
         order = [int(k) for k in np.argsort(worth)[::-1] if np.isfinite(worth[k])]
         best = next((k for k in order if floor.holds([*chosen, moves[k]])), None)
         if best is None:
             break
         chosen.append(moves[best])
-        told = told + foreseen[best]
+        told = told + predicted[best]
         left_s -= duration_s[best]
     return chosen
 
@@ -308,7 +308,7 @@ def _tempered(fisher: FisherInformation, grams: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Outlook:
-    """What is foreseen of the effects in question.
+    """What is predicted of the effects in question.
 
     Attributes:
         asked, fisher: the question, and what runs tell of all effects.

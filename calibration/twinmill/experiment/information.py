@@ -34,7 +34,7 @@ class CandidateEffect:
 
     @property
     def name(self) -> str:
-        """Name of the effect."""
+        """Name of the effect in the catalogue."""
         return self.candidate.effect
 
 
@@ -65,7 +65,7 @@ class FisherInformation:
         gram[own] = gram[:, own] = 0
         return gram
 
-    def foreseen(self, modelled: ModelledLog) -> np.ndarray:
+    def predicted(self, modelled: ModelledLog) -> np.ndarray:
         """(K, C, C) products of each part of a planned run."""
         columns, _ = self._columns(modelled)
         parts = [slice(3 * p.start, 3 * p.stop) for p in modelled.grid.slices]

@@ -36,7 +36,7 @@ class Left:
     together_with: tuple[str, ...] = ()
 
     def sentence(self) -> str:
-        """For people."""
+        """What the file carries of the effect, or why not, with its share of the error."""
         if self.share is None:
             return f"{self.name}: {self.why}"
         others = f", with {' and '.join(self.together_with)}" if self.together_with else ""

@@ -184,7 +184,7 @@ def _custom(robot: RobotModel, lags_s: np.ndarray) -> ET.Element:
     _numeric(custom, "control_period_s", [robot.get("base.control_period_s")])
     for key in ("sensor_m", "sensor_rad", "drive_mps", "drive_s", "drive_radps", "drive_turn_s"):
         _numeric(custom, f"noise_{key}", [robot.get(f"noise.{key}")])
-    for key, value in robot.model.sight().items():
+    for key, value in robot.model.detection_model().items():
         _numeric(custom, f"sight_{key}", [value])
     return custom
 
@@ -252,10 +252,10 @@ def _body(robot: RobotModel) -> ET.Element:
 
 def _camera(robot: RobotModel, body: ET.Element, x_m: float, z_m: float) -> None:
     """Looks ahead, turned by the pan; its picture is as wide as the cone that the model sees."""
-    sight = robot.model.sight()
-    wide_rad = min(sight["cone_rad"], 0.95 * np.pi)
+    detection = robot.model.detection_model()
+    wide_rad = min(detection["cone_rad"], 0.95 * np.pi)
     fovy_deg = np.degrees(2 * np.arctan(np.tan(wide_rad / 2) / ASPECT))  # as MuJoCo has it
-    c, s = np.cos(sight["pan_rad"]), np.sin(sight["pan_rad"])
+    c, s = np.cos(detection["pan_rad"]), np.sin(detection["pan_rad"])
     ET.SubElement(
         body,
         "camera",

@@ -45,7 +45,7 @@ def model_json(robot: RobotModel) -> dict[str, Any]:
         "duty_pct": base.get("duty_pct") if robot.model.drive == "duty" else None,
         "numbers": numbers,
         "effects": [_effect(robot, i) for i in range(len(robot.model.effects))],
-        "sight": robot.model.sight(),
+        "sight": robot.model.detection_model(),
         "robots": document.get("robots", {}),
         "covariance": {"names": list(covariance.names), "values": covariance.values},
         "fit": {k: v for k, v in document.get("fit", {}).items() if k != "covariance"},

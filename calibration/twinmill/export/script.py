@@ -12,7 +12,7 @@ from string import Template
 import numpy as np
 import twinmill_native as native
 
-from twinmill.experiment.foresight import Rows
+from twinmill.experiment.played import Rows
 from twinmill.files import check_new_file, replacing_folder
 from twinmill.model.model_file import write_whole
 

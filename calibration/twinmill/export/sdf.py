@@ -55,18 +55,18 @@ def _left(robot: RobotModel) -> list[Left]:
 
 def _camera(base: ET.Element, robot: RobotModel, x_m: float) -> None:
     """As wide as the cone that the model sees, as far as its range."""
-    sight = robot.model.sight()
+    detection = robot.model.detection_model()
     sensor = ET.SubElement(base, "sensor", name="camera", type="camera")
-    _text(sensor, "pose", _n(x_m, 0, 0, 0, 0, sight["pan_rad"]))
+    _text(sensor, "pose", _n(x_m, 0, 0, 0, 0, detection["pan_rad"]))
     _text(sensor, "update_rate", _n(1 / robot.get("base.control_period_s")))
     camera = ET.SubElement(sensor, "camera", name="camera")
-    _text(camera, "horizontal_fov", _n(min(sight["cone_rad"], 3.1)))
+    _text(camera, "horizontal_fov", _n(min(detection["cone_rad"], 3.1)))
     image = ET.SubElement(camera, "image")
     _text(image, "width", "640")
     _text(image, "height", "480")
     clip = ET.SubElement(camera, "clip")
     _text(clip, "near", "0.01")
-    _text(clip, "far", _n(max(sight["range_m"], 0.02)))
+    _text(clip, "far", _n(max(detection["range_m"], 0.02)))
 
 
 def _wheel(model: ET.Element, robot: RobotModel, wheel: dict) -> None:

@@ -33,7 +33,7 @@ def urdf(robot: RobotModel) -> tuple[str, list[Left]]:
     )
     for wheel in robot.model.wheels():
         _wheel(root, robot, wheel)
-    pan_rad = robot.model.sight()["pan_rad"]
+    pan_rad = robot.model.detection_model()["pan_rad"]
     ET.SubElement(root, "link", name="camera_link")
     place = (body_m, 0, HULL_HEIGHT_M / 2)
     _joint(root, "camera_joint", "fixed", "base_link", "camera_link", place, (0, 0, pan_rad))

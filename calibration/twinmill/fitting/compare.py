@@ -49,7 +49,7 @@ class RobotComparison:
 
     @property
     def measurement(self) -> Measurement:
-        """What was compared."""
+        """The robot in its log."""
         return self.modelled.measurement
 
     @property
@@ -59,7 +59,7 @@ class RobotComparison:
 
     @property
     def size(self) -> int:
-        """How many values were predicted: the largest of a comparison speaks for its errors."""
+        """How many values were predicted: the errors of the largest are shown."""
         return len(self.windows.starts)
 
     @property
@@ -122,7 +122,7 @@ class Comparison:
 
     @property
     def main(self) -> RobotComparison | SteadyComparison:
-        """The robot that speaks for the errors."""
+        """The robot with the most predictions, whose errors are shown."""
         return max(self.robots, key=lambda r: r.size)
 
     @property

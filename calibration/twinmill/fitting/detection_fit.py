@@ -68,7 +68,7 @@ class HeldOutFrames:
 
 def _of_robot(camera: Detections, own: native.Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     chance = np.clip(camera.reported(own, camera.frames.has_raw), SURE, 1 - SURE)
-    return camera.likelihood(own), chance, camera.voted(int(own.sight()["vote_frames"]))
+    return camera.likelihood(own), chance, camera.voted(int(own.detection_model()["vote_frames"]))
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ class HeldOut:
 
     @property
     def score(self) -> float:
-        """Of all data sets."""
+        """Held-out score of all data sets together, as `total_score`."""
         return total_score(self.scores)
 
     @property

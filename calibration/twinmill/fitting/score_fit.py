@@ -172,7 +172,7 @@ class ScoreFit:
         return np.array([d.n_eff for d in self.datasets])
 
     def cost(self, rows: list[np.ndarray], x: np.ndarray) -> float:
-        """What is minimised."""
+        """The cost that the module states: of (R,) rows of each data set, at (P,) values."""
         fit = sum(self._misfit(i, r) for i, r in enumerate(rows))
         return float(fit + np.sum(((x - self.usual) / self.std) ** 2))
 
@@ -451,7 +451,7 @@ class ScoreFit:
 
     @property
     def blocks(self) -> int:
-        """Of all data sets."""
+        """Number of blocks in all data sets together."""
         return int(sum(len(np.unique(d.block)) for d in self.datasets))
 
     @cached_property

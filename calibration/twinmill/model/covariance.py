@@ -43,7 +43,7 @@ class Covariance:
             raise ValueError("must be symmetric, with the variances on its diagonal.")
         values = (values + values.T) / 2
         if size and np.linalg.eigvalsh(_correlation(values))[0] < -SYMMETRIC * size:
-            raise ValueError("is none: some sum of its quantities would have a negative variance.")
+            raise ValueError("is wrong: some sum of its quantities would have a negative variance.")
         return cls(names, values)
 
     def of(self, names: Collection[str]) -> "Covariance":

@@ -27,14 +27,14 @@ class Body:
     @classmethod
     def of(cls, model: native.Model) -> "Body":
         """The model's body and field of view."""
-        sight = model.sight()
+        camera = model.detection_model()
         return cls(
             model.get("robot.body_radius_m"),
-            *(sight[k] for k in ("range_m", "cone_rad", "pan_rad")),
+            *(camera[k] for k in ("range_m", "cone_rad", "pan_rad")),
         )
 
     def outline(self) -> np.ndarray:
-        """A circle, closed."""
+        """(K, 2) m: the body's circle, its first point again at the end."""
         return self.radius_m * _arc(0, 2 * np.pi)
 
     def nose(self) -> np.ndarray:

@@ -227,7 +227,7 @@ def duty_table(model: native.Model) -> list[str]:
 
 
 def words(formula: str) -> set[str]:
-    """Names in a formula."""
+    """Names of parameters and signals in a formula."""
     return set(re.findall(r"[A-Za-z_]\w*", formula))
 
 

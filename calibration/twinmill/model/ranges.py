@@ -40,7 +40,7 @@ class Quantity:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 %, within bounds."""
+        """95 % interval, cut at the bounds."""
         half = NORMAL_95 * self.std
         return max(self.min, self.value - half), min(self.max, self.value + half)
 

@@ -117,17 +117,17 @@ class Trajectory:
 
     @property
     def label(self) -> str:
-        """Of log and robot."""
+        """Name of the log and number of the robot."""
         return self.measurement.label
 
     @property
     def robot_id(self) -> int:
-        """Of the robot."""
+        """Number of the robot in the log."""
         return self.measurement.track.robot_id
 
     @property
     def start_s(self) -> np.ndarray:
-        """(W,) capture's clock."""
+        """(W,) times at which predictions start, by the capture's clock."""
         return self.measurement.track.pose_t_s[self.windows.starts]
 
     @property

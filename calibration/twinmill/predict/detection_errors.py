@@ -23,7 +23,7 @@ class Confusion:
 
     @classmethod
     def of(cls, predicted: np.ndarray, measured: np.ndarray) -> "Confusion":
-        """Counts (K,) bools."""
+        """The four counts of (K,) bools each."""
         pairs = ((True, True), (False, True), (True, False), (False, False))
         counts = [int(np.sum((predicted == p) & (measured == m))) for p, m in pairs]
         return cls(*counts)
@@ -135,53 +135,55 @@ def brier_ratio(chance: np.ndarray, bit: np.ndarray) -> float:
     return float(np.sqrt(np.sum((bit - chance) ** 2) / np.sum(chance * (1 - chance))))
 
 
-def compare_detections(scenes: list[Detections], model: native.Model) -> DetectionComparison | None:
+def compare_detections(
+    cameras: list[Detections], model: native.Model
+) -> DetectionComparison | None:
     """Compares a model's bits with those of all robots; None if no robot reported any.
 
     Raw bits are compared where every log has them, else voted ones with the vote predicted.
 
     Args:
-        scenes: frames with poses.
+        cameras: frames with poses.
         model: of all robots; each takes its own overrides.
     """
-    if not scenes:
+    if not cameras:
         return None
-    raw = all(s.frames.has_raw for s in scenes)
-    parts = [_of_robot(s, model.for_robot(s.robot_id), raw) for s in scenes]
+    raw = all(s.frames.has_raw for s in cameras)
+    parts = [_of_robot(s, model.for_robot(s.robot_id), raw) for s in cameras]
     columns = [np.concatenate(c) for c in zip(*(p[:5] for p in parts), strict=True)]
     robot = np.concatenate([np.full(len(p[0]), i) for i, p in enumerate(parts)])
-    sight = model.sight()
+    detection = model.detection_model()
     votes = np.concatenate([p[5] for p in parts])
     return DetectionComparison(
-        [s.label for s in scenes],
+        [s.label for s in cameras],
         *columns[:3],
         robot,
         *columns[3:],
-        sight["range_m"],
-        sight["cone_rad"] / 2,
+        detection["range_m"],
+        detection["cone_rad"] / 2,
         raw,
         float(votes.mean()) if raw and len(votes) else None,
     )
 
 
-def _of_robot(scene: Detections, model: native.Model, raw: bool) -> tuple[np.ndarray, ...]:
+def _of_robot(camera: Detections, model: native.Model, raw: bool) -> tuple[np.ndarray, ...]:
     """Predicted, in view, measured, range and bearing; and whether each vote follows, if `raw`."""
-    use, frames = scene.usable, int(model.sight()["vote_frames"])
-    poses = scene.poses(0.0)
-    gap = poses[:, :, :2] - poses[:, scene.own : scene.own + 1, :2]
+    use, frames = camera.usable, int(model.detection_model()["vote_frames"])
+    poses = camera.poses(0.0)
+    gap = poses[:, :, :2] - poses[:, camera.own : camera.own + 1, :2]
     distance_m = np.hypot(gap[..., 0], gap[..., 1])
-    distance_m[:, scene.own] = np.inf
+    distance_m[:, camera.own] = np.inf
     nearest = distance_m[use].argmin(axis=1)
     row = np.arange(len(nearest))
     to = gap[use][row, nearest]
-    bearing = np.arctan2(to[:, 1], to[:, 0]) - poses[use, scene.own, 2]
+    bearing = np.arctan2(to[:, 1], to[:, 0]) - poses[use, camera.own, 2]
     return (
-        scene.reported(model, raw)[use],
-        scene.view(model)[use] > 0.5,
-        (scene.frames.raw if raw else scene.frames.voted)[use],
+        camera.reported(model, raw)[use],
+        camera.view(model)[use] > 0.5,
+        (camera.frames.raw if raw else camera.frames.voted)[use],
         distance_m[use][row, nearest],
         np.angle(np.exp(1j * bearing)),
-        (scene.voted(frames) == scene.frames.voted)[use]
-        if raw and scene.frames.has_vote
+        (camera.voted(frames) == camera.frames.voted)[use]
+        if raw and camera.frames.has_vote
         else np.empty(0),
     )

@@ -63,10 +63,10 @@ class Detections:
 
     def view(self, model: native.Model, pick: slice = slice(None)) -> np.ndarray:
         """(K,) probability that the robot of `model` (its own) has another in view."""
-        sight = model.sight()
-        age_s = sight["age_s"] + (0.0 if self.frames.stamped else sight["delay_s"])
+        detection = model.detection_model()
+        age_s = detection["age_s"] + (0.0 if self.frames.stamped else detection["delay_s"])
         geometry = ("range_m", "softness_m", "cone_rad", "pan_rad", "hide_radius_m")
-        key = (pick.step, age_s, *(sight[g] for g in geometry))
+        key = (pick.step, age_s, *(detection[g] for g in geometry))
         if self._seen[0] != key:
             poses = self.poses(age_s, pick)
             self._seen = (key, native.in_view(model, self.own, poses, *self.blur))
@@ -74,24 +74,24 @@ class Detections:
 
     def chance(self, model: native.Model, pick: slice = slice(None)) -> np.ndarray:
         """(K,) probability that the frame shows a target."""
-        sight = model.sight()
+        detection = model.detection_model()
         view = self.view(model, pick)
-        chance = view * (1 - sight["miss_rate"]) + (1 - view) * sight["false_rate"]
+        chance = view * (1 - detection["miss_rate"]) + (1 - view) * detection["false_rate"]
         return np.clip(chance, SURE, 1 - SURE)
 
     def reported(self, model: native.Model, raw: bool) -> np.ndarray:
         """(K,) chance of the raw bit, or of the voted one."""
         chance = self.chance(model)
-        return chance if raw else majority(chance, int(model.sight()["vote_frames"]))
+        return chance if raw else majority(chance, int(model.detection_model()["vote_frames"]))
 
     def likelihood(self, model: native.Model, pick: slice = slice(None)) -> np.ndarray:
         """(K,) log likelihood of what the robot reported; NaN where nothing can be said.
 
         Raw bits are independent draws, and voted ones follow from them. Without raw bits only
-        every so many frames counts, since neighbouring votes share their frames.
+        every Nth frame counts, of a vote of N: neighbouring votes share their frames.
         """
         model = model.for_robot(self.robot_id)
-        frames = int(model.sight()["vote_frames"])
+        frames = int(model.detection_model()["vote_frames"])
         if not self.frames.has_raw:
             return self._voted_alone(model, frames)[pick]
         chance = self.chance(model, pick)

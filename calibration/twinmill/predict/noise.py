@@ -19,8 +19,8 @@ CHUNK = 256  # steps of one periodogram: 2 s at 120 Hz, a few times the disturba
 FEWEST_CHUNKS = 6
 FINER = 2  # frequencies per bin at which the spectrum is taken: exact up to memories of a stretch
 TRANSIENT = 20  # steps after a break in which the filter settles
-# Sensor and drive of position and heading that no capture and no floor are below: what a log made
-# without any noise leaves is the arithmetic of its maker, of which nothing can be learned.
+# Least noise of sensor and drive, of position and heading: less than any capture and floor have.
+# Residuals of a noise-free log are numerical error.
 LEAST = ((1e-5, 1e-4), (1e-4, 1e-3))
 LEAST_MEMORY_S = 0.15
 

@@ -83,6 +83,6 @@ def body_velocity(measurement: Measurement, grid: StepGrid, model: native.Model)
 
 
 def rotate(x: np.ndarray, y: np.ndarray, angle_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vectors turned counter-clockwise."""
+    """Components of vectors turned counter-clockwise by an angle; arrays that broadcast."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return c * x - s * y, s * x + c * y

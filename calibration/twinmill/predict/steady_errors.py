@@ -41,12 +41,12 @@ class SteadyComparison:
 
     @property
     def measurement(self) -> SteadyTable:
-        """What was compared."""
+        """The robot's rows of the table."""
         return self.modelled.measurement
 
     @property
     def model(self) -> native.Model:
-        """Of the robot."""
+        """Of this robot, its own numbers included."""
         return self.modelled.model
 
     @property
@@ -56,7 +56,7 @@ class SteadyComparison:
 
     @property
     def score(self) -> float:
-        """Of this robot alone."""
+        """RMS over channels of error over floor, of this robot alone."""
         return self.modelled.score(self.model)
 
     @property

@@ -43,12 +43,12 @@ class SteadyStates:
 
     @property
     def label(self) -> str:
-        """Of table and robot."""
+        """Name of the table and number of the robot."""
         return f"{self.measurement.log_name} R{self.robot_id:02d}"
 
     @property
     def robot_id(self) -> int:
-        """Of the robot."""
+        """Number of the robot in the table."""
         return self.measurement.robot_id
 
     @property
@@ -69,7 +69,7 @@ class SteadyStates:
 
     @property
     def n_eff(self) -> float:
-        """Values measured."""
+        """Number of values that were measured, each independent; at least 1."""
         return float(max(np.isfinite(self._measured()).sum(), 1))
 
     def with_model(self, model: native.Model) -> "SteadyStates":
@@ -117,7 +117,7 @@ class SteadyStates:
         return float(np.sqrt(np.sum(self.rows(model, [], np.zeros((1, 0))) ** 2)))
 
     def floor(self) -> np.ndarray:
-        """(U, 3) standard deviations."""
+        """(U, 3) standard deviations of measured values, as CHANNELS."""
         still = np.full(len(self.commands), STILL_MPS)
         return np.column_stack([self.measurement.floor, still])
 

@@ -70,7 +70,7 @@ def findings(diagnosis: Diagnosis) -> Table:
 
 
 def ranking(diagnosis: Diagnosis) -> Table:
-    """Effects, best first."""
+    """Table of all effects that were tried, best first, with scores and estimates."""
     rows = []
     for r in diagnosis.ranking:
         found = r.effect in diagnosis.found
@@ -241,7 +241,7 @@ def terminal_explanation(result: Explanation, commands: Commands = ()) -> Render
 
 
 def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
-    """Of a report."""
+    """The page of a diagnosis: verdict, figures, tables and the commands that follow."""
     before = diagnosis.before
     scores = [("as given", before.score), ("base refitted", diagnosis.score_refit)]
     if len(diagnosis.bit_steps) > 1:

@@ -30,7 +30,7 @@ def section(
     tried: int,
     cells: int,
 ) -> Section:
-    """The whole page."""
+    """The page of a search: the archive, what is offered and how it was confirmed."""
     present = [kind for kind in KIND_COLORS if any(entry.kind == kind for entry in offered)]
     count = {kind: sum(entry.kind == kind for entry in offered) for kind in present}
     listed = ", ".join(f"{kind} {count[kind]}" for kind in present)

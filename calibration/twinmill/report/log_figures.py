@@ -59,13 +59,13 @@ class Drawing:
         axes.xaxis.set_major_locator(MaxNLocator(8))
 
     def speed(self, axes: Axes) -> None:
-        """Forward, from poses."""
+        """Forward velocity of each robot over time, in m/s, from poses."""
         self._velocity(axes, 0, 1.0, "forward (m/s)")
         if len(self.tracked) > 1:
             legend_above(axes, min(int(axes.figure.get_figwidth()), len(self.tracked)))
 
     def turn(self, axes: Axes) -> None:
-        """Counter-clockwise, from poses."""
+        """Turn rate of each robot over time, in rad/s, counter-clockwise, from poses."""
         self._velocity(axes, 2, np.degrees(1), "turn (°/s)")
 
     def _velocity(self, axes: Axes, component: int, factor: float, label: str) -> None:

@@ -54,7 +54,7 @@ def terminal(plan: Plan, how: How) -> RenderableType:
 
 
 def section(plan: Plan, how: How) -> Section:
-    """Of a report."""
+    """The page of a planned run: its path, its script and what it would tell apart."""
     power = plan.predicted_power
     return Section(
         "The next run",
@@ -154,7 +154,7 @@ def _narrowed(found: Narrowing) -> list[str]:
     said = [
         f"{share:.0%} of runs end as {found.goal}; what the fits leave open makes that +- "
         f"{before:.1%} ({len(shares)} models drawn, {shares.min():.0%} to {shares.max():.0%}).",
-        f"That hangs on {named}.",
+        f"That depends on {named}.",
         f"After a fit to this run of {found.rows.end_s:.0f} s it would be +- {after:.1%}: {drive}.",
     ]
     if found.untold > SMALL_SHARE:

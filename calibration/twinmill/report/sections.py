@@ -16,7 +16,7 @@ from twinmill.report.tables import number, tone
 
 
 def comparison_section(result: Comparison) -> Section:
-    """Of one comparison."""
+    """The page of a comparison: score, where the model misses, and what to do next."""
     robot = result.worst
     title = f"{result.model_name} against {robot.measurement.log_name}"
     return Section(
@@ -57,7 +57,7 @@ def fit_section(result: FitResult) -> Section:
 
 
 def added_section(result: AddResult | CameraAddResult) -> Section:
-    """Of one added effect."""
+    """The page of an added effect: scores on data fitted to and held out, and estimates."""
     if isinstance(result, CameraAddResult):
         return _camera_section(result)
     before, after = _same_robot(result)

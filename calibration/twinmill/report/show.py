@@ -20,7 +20,7 @@ WARNINGS = 3  # in the terminal; --json has all
 
 
 def comparison(result: Comparison) -> RenderableType:
-    """A comparison."""
+    """What `twinmill compare` prints: facts, score, tables, warnings, next step."""
     return Group(
         _facts(comparisons.facts(result)),
         Text(),
@@ -34,7 +34,7 @@ def comparison(result: Comparison) -> RenderableType:
 
 
 def fit(result: FitResult) -> RenderableType:
-    """A fit."""
+    """What `twinmill fit` prints: score before and after, estimates, the new file."""
     return Group(
         _facts(comparisons.facts(result.before)),
         Text(),
@@ -50,7 +50,7 @@ def fit(result: FitResult) -> RenderableType:
 
 
 def added(result: AddResult | CameraAddResult) -> RenderableType:
-    """An added effect."""
+    """What `twinmill add` prints: scores fitted and held out, the effect's estimates."""
     if isinstance(result, CameraAddResult):
         return _added_to_camera(result)
     own = result.added
@@ -114,7 +114,7 @@ def effect(entry: dict) -> RenderableType:
 
 
 def table(data: Table) -> RenderableType:
-    """Any table."""
+    """A table for the terminal: cells in their tone, bars as blocks, words left-aligned."""
     made = RichTable(
         title=data.title,
         title_justify="left",

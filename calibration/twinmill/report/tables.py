@@ -278,7 +278,7 @@ def catalogue(entries: list[dict]) -> Table:
 
 
 def effect_parameters(entry: dict) -> Table:
-    """Parameters of one effect."""
+    """Parameters of an effect's card: unit, default, bounds and meaning."""
     rows = [
         [
             Cell(p["name"]),

@@ -74,12 +74,12 @@ class Packages:
         self._built: dict[str, Package] = {}
         self._lock = Lock()
 
-    def for_release(self, release: str, say: Callable[[str], None]) -> Package:
+    def for_release(self, release: str, progress: Callable[[str], None]) -> Package:
         """Returns the package; builds it if nobody did so far.
 
         Args:
             release: of the robot's Debian, as "12".
-            say: told what is being done.
+            progress: told what is being done.
 
         Raises:
             ValueError: there is none for this release, or it cannot be built.
@@ -95,16 +95,16 @@ class Packages:
             )
         with self._lock:
             if release not in self._built:
-                self._built[release] = build_package(RELEASES[release], say)
+                self._built[release] = build_package(RELEASES[release], progress)
             return self._built[release]
 
 
-def build_package(suite: str, say: Callable[[str], None]) -> Package:
+def build_package(suite: str, progress: Callable[[str], None]) -> Package:
     """Builds for arm64; only what changed since the last time.
 
     Args:
         suite: Debian's name of the release.
-        say: told what is being done.
+        progress: told what is being done.
 
     Raises:
         ValueError: a tool is missing, or a step failed, with its last words.
@@ -116,9 +116,9 @@ def build_package(suite: str, say: Callable[[str], None]) -> Package:
         )
     sysroot, build = ROOT / ".deps" / f"sysroot-{suite}", ROOT / "build" / f"arm64-{suite}"
     if not sysroot.is_dir():
-        say("fetching the robot's headers and libraries, once")
+        progress("fetching the robot's headers and libraries, once")
         _run([str(ROOT / "scripts/make_sysroot"), str(sysroot), suite])
-    say(f"building for arm64, {suite}")
+    progress(f"building for arm64, {suite}")
     options = [
         f"-DCMAKE_TOOLCHAIN_FILE={ROOT / 'cmake' / 'aarch64.cmake'}",
         f"-DTWINMILL_SYSROOT={sysroot}",

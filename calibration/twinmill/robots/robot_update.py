@@ -87,7 +87,7 @@ class Outcome:
 
 
 def update(
-    target: Target, request: UpdateRequest, fleet: Fleet, say: Callable[[str], None]
+    target: Target, request: UpdateRequest, fleet: Fleet, progress: Callable[[str], None]
 ) -> Outcome:
     """Does what is wished.
 
@@ -95,15 +95,15 @@ def update(
         target: the robot.
         request: what to do.
         fleet: somebody else listens to it meanwhile.
-        say: told the step that begins.
+        progress: told the step that begins.
     """
     outcome = Outcome(target)
     try:
-        _update(target, request, fleet, say, outcome)
+        _update(target, request, fleet, progress, outcome)
         outcome.ok = True
     except RemoteError as error:
         outcome.kind, outcome.sentence = error.kind, str(error)
-    say("done" if outcome.ok else outcome.kind)
+    progress("done" if outcome.ok else outcome.kind)
     return outcome
 
 
@@ -122,44 +122,44 @@ def _update(
     target: Target,
     request: UpdateRequest,
     fleet: Fleet,
-    say: Callable[[str], None],
+    progress: Callable[[str], None],
     outcome: Outcome,
 ) -> None:
     remote = Remote(target.host, request.ssh_config)
-    say("looking")
+    progress("looking")
     found = remote.run("probe")
     outcome.before = found.get("installed", "")
-    package = _choose(request, found, say)
+    package = _choose(request, found, progress)
     settings = {"robot_id": str(target.robot_id), **request.settings}
     if request.dry_run:
         outcome.would = _plan(request, package, found, settings)
         return
     if found.get("others"):
-        say("taking over")
+        progress("taking over")
         remote.run("take_over")
     if package is None:
-        say("going back")
+        progress("going back")
         remote.run("rollback", timeout_s=INSTALL_S)
     else:
-        say("copying")
+        progress("copying")
         upload = _upload(remote, package.path)
-        say("installing")
+        progress("installing")
         remote.run("install", upload, timeout_s=INSTALL_S)
-        say("configuring")
+        progress("configuring")
         if request.behaviors:
             remote.run("behaviors", _upload(remote, request.behaviors))
         _bring_key(remote, of_robot(request.key, target.robot_id))
         remote.run("configure", *(f"{key}={value}" for key, value in settings.items()))
-    say("restarting")
+    progress("restarting")
     restarted_s = time.monotonic()
     remote.run("restart")
-    say("waiting for telemetry")
+    progress("waiting for telemetry")
     version = package.version if package else found["previous"]
     _hear(target, version, restarted_s, request.wait_s, fleet, outcome)
 
 
 def _choose(
-    request: UpdateRequest, found: dict[str, str], say: Callable[[str], None]
+    request: UpdateRequest, found: dict[str, str], progress: Callable[[str], None]
 ) -> Package | None:
     """The package for a robot; None: the one before. All that can be refused is refused here."""
     if found.get("others") and not request.take_over:
@@ -175,7 +175,7 @@ def _choose(
             )
         return None
     try:
-        package = request.packages.for_release(found["release"], say)
+        package = request.packages.for_release(found["release"], progress)
     except ValueError as error:
         raise RemoteError("no package", str(error)) from error
     if package.architecture != found["architecture"]:

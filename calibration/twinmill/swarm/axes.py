@@ -64,7 +64,7 @@ class Axis:
 
     @property
     def whole(self) -> bool:
-        """Whether it counts."""
+        """Whether its values are whole numbers, as of robots."""
         return self.name in QUANTITIES and QUANTITIES[self.name].whole
 
 

@@ -91,7 +91,7 @@ def compared(has_odd: bool) -> list[str]:
 
 
 def least_spread(names: list[str]) -> np.ndarray:
-    """(K,) for judge()."""
+    """(K,) least standard deviations of metrics, below which no difference counts."""
     return np.array([COMPARED[name][3] for name in names])
 
 

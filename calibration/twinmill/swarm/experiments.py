@@ -132,7 +132,7 @@ def varied(phase: Phase) -> list[Axis]:
 
 
 def words(axes: list[Axis]) -> str:
-    """Names, ends and counts."""
+    """Each axis as its name, its first and last value and their number, for a sentence."""
     return ", ".join(
         f"{axis.name} {axis.values[0]:g} to {axis.values[-1]:g} ({len(axis.values)})"
         for axis in axes

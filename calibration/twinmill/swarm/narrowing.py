@@ -23,9 +23,9 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.experiment.design import CENTRE, Floor, Limits, choose
-from twinmill.experiment.foresight import LEAD_S, Played, Rows, rows_of
 from twinmill.experiment.moves import Move, duty_axes, family
 from twinmill.experiment.one_step_fit import System
+from twinmill.experiment.played import LEAD_S, Played, Rows, rows_of
 from twinmill.fitting.fit import base_names, fitted, judged
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.covariance import Covariance
@@ -52,7 +52,7 @@ REPLICAS = 3  # of the run, with noise, that are fitted to
 
 @dataclass(frozen=True)
 class Spread:
-    """How the share that reaches the goal hangs on the numbers of the model.
+    """How the share that reaches the goal depends on the numbers of the model.
 
     Attributes:
         names: (P,) of the numbers that are drawn.
@@ -126,7 +126,7 @@ def spread_of(
 
 @dataclass(frozen=True)
 class Narrowing:
-    """The script and what is foreseen of it.
+    """The script and what is predicted of it.
 
     Attributes:
         spread: before it.
@@ -183,7 +183,7 @@ def design_for(
         excess: how much more errors scatter than the noise alone: the square of the usual score.
 
     Raises:
-        ValueError: the share hangs on numbers that no drive of one robot shows.
+        ValueError: the share depends on numbers that no drive of one robot shows.
     """
     free = _told_by_drives(modelled.model, spread.names)
     place = [spread.names.index(p.name) for p in free]
@@ -193,7 +193,7 @@ def design_for(
     if not free or untold > 1 - 1e-3:
         names = ", ".join(list(spread.parts())[:3])
         raise ValueError(
-            f"what the swarm does hangs on {names}, which no drive of one robot shows; measure "
+            f"what the swarm does depends on {names}, which no drive of one robot shows; measure "
             "these by themselves (twinmill effects NAME)."
         )
     moves, floor = family(duty_axes(limits.max_duty)), Floor(limits, modelled, [])
@@ -210,9 +210,11 @@ def design_for(
         return -np.einsum("i,...ij,j->...", spread.slope, left(grams), spread.slope)
 
     nothing = np.zeros((len(free) + CLOCKS,) * 2)
-    foreseen = _products(Played.of([[m] for m in moves], modelled).modelled(modelled, CENTRE), free)
+    predicted = _products(
+        Played.of([[m] for m in moves], modelled).modelled(modelled, CENTRE), free
+    )
     chosen = _exchanged(
-        choose(moves, worth, nothing, foreseen, floor), moves, worth, foreseen, floor
+        choose(moves, worth, nothing, predicted, floor), moves, worth, predicted, floor
     )
     (whole,) = _products(Played.of([chosen], modelled).modelled(modelled, CENTRE), free)
     fits = _left_by_fits(spread, file, modelled, chosen, excess)
@@ -262,7 +264,7 @@ def _exchanged(
     chosen: list[Move],
     moves: list[Move],
     worth_of: Callable[[np.ndarray], np.ndarray],
-    foreseen: np.ndarray,
+    predicted: np.ndarray,
     floor: Floor,
 ) -> list[Move]:
     """One move for another as long as the whole run tells more and fits (Fedorov 1972).
@@ -274,10 +276,10 @@ def _exchanged(
     duration_s = np.array([move.duration_s for move in moves])
     most_s = floor.limits.duration_s - 2 * LEAD_S
     while True:
-        whole, best = foreseen[run].sum(axis=0), None
+        whole, best = predicted[run].sum(axis=0), None
         least = worth_of(whole) * (1 - LEAST_GAIN)
         for at, old in enumerate(run):
-            worth = worth_of(whole - foreseen[old] + foreseen)
+            worth = worth_of(whole - predicted[old] + predicted)
             fits = duration_s <= most_s - duration_s[run].sum() + duration_s[old]
             for new in np.argsort(np.where(fits, worth, -np.inf))[::-1]:
                 if not fits[new] or worth[new] <= least:

@@ -73,7 +73,7 @@ class Request:
 
     @property
     def model(self) -> native.Model:
-        """Read anew."""
+        """The model of `model_text`, a new object each time."""
         return native.Model.from_toml(self.model_text, self.model_name)
 
     @property
@@ -84,7 +84,7 @@ class Request:
 
     @property
     def world_count(self) -> int:
-        """Cells times seeds."""
+        """Number of simulations: cells times seeds."""
         return math.prod(len(axis.values) for axis in self.axes) * self.seeds
 
     def seed_of(self, worlds: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ class Store:
 
     @property
     def result(self) -> Path:
-        """The finished table."""
+        """Path of the finished table (Parquet, a row for each cell and seed)."""
         return self.folder / "sweep.parquet"
 
     @property
@@ -50,7 +50,7 @@ class Store:
         self._replace(self._manifest, json.dumps(manifest, indent=1, sort_keys=True).encode())
 
     def read_manifest(self) -> dict:
-        """`sha256` and `request`."""
+        """What the folder was made for: the `request`, and its `sha256`."""
         return json.loads(self._manifest.read_text())
 
     def missing(self, count: int) -> list[int]:

@@ -40,7 +40,7 @@ def align(paths: list[RobotPath], commands: list[CommandSeries]) -> float:
     second = likeness[far].max(initial=-1.0)
     if likeness[best] < LIKE or second > SECOND * likeness[best]:
         raise ValueError(
-            "--commands: where the film begins in them cannot be told (likeness "
+            "--commands: where the film begins in them cannot be found (likeness "
             f"{likeness[best]:.2f}, elsewhere {second:.2f}); give --start-s, or drive with stops "
             "of different lengths."
         )

@@ -31,12 +31,12 @@ class Sightings:
     corners_px: np.ndarray
 
     def of(self, rows: np.ndarray) -> "Sightings":
-        """Some of them."""
+        """Those at these rows."""
         return Sightings(self.frame[rows], self.number[rows], self.corners_px[rows])
 
 
 class Detector:
-    """Finds tags in pictures."""
+    """Finds AprilTags in pictures, their corners to parts of a pixel."""
 
     def __init__(self):
         settings = cv2.aruco.DetectorParameters()

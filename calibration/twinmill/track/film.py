@@ -100,7 +100,7 @@ class LiveCamera:
             yield time.time() - (age_s if 0 <= age_s < NEAR_S else 0.0), picture
 
     def close(self) -> None:
-        """Gives the camera back."""
+        """Ends the capture, so that other programs can open the camera."""
         self._capture.release()
 
 

@@ -36,7 +36,7 @@ class View:
 
     @property
     def tilt_rad(self) -> float:
-        """From looking straight down."""
+        """Angle between the camera's axis and the way straight down."""
         return float(np.arccos(np.clip(-self.rotation[2, 2], -1, 1)))
 
     def on_plane(self, pixels: np.ndarray, height_m: float) -> np.ndarray:

@@ -40,7 +40,7 @@ class Calibration:
     advice: list[str]
 
     def to_json(self) -> dict:
-        """For people and programs."""
+        """Focal lengths and centre in px, distortion, error and advice, as `--json` prints them."""
         return {
             "focal_px": [float(self.camera.matrix[0, 0]), float(self.camera.matrix[1, 1])],
             "centre_px": [float(self.camera.matrix[0, 2]), float(self.camera.matrix[1, 2])],

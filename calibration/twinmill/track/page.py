@@ -116,7 +116,7 @@ class Page:
                 self._beat("robot", robot_id, now_s)
 
     def close(self) -> None:
-        """Serves no more."""
+        """Ends the server; pages that are open show their last picture."""
         self._ends = True
         self._server.should_exit = True
         self._thread.join(2 * END_S)

@@ -55,7 +55,7 @@ class RobotPath:
 
     @property
     def valid(self) -> np.ndarray:
-        """(F,) bool."""
+        """(F,) bool: whether the tag was found in that frame."""
         return np.isfinite(self.pose[:, 0])
 
 

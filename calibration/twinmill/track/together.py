@@ -10,7 +10,7 @@ from twinmill.track.paths import RobotPath
 
 STEP_S = 0.05  # of the search; a robot moves little meanwhile
 OVERLAP_S = 2.0  # in which both see a robot
-MOVES_M = 0.1  # so much at least, or the clocks cannot be told
+MOVES_M = 0.1  # so much at least, or the clocks cannot be aligned
 LEVER_M = 0.1  # weighs turning against moving
 FARTHEST_M, FARTHEST_RAD = 0.05, 0.1  # that two cameras may be apart on one floor
 NEAR_S, SECOND = 0.5, 1.5  # another shift that fits nearly as well, this far away
@@ -50,7 +50,7 @@ def clocks(films: list[Paths], names: list[str]) -> list[Pair | None]:
         k = next((k for k, pair in pairs.items() if pair), None)
         if k is None:
             raise ValueError(
-                f"{names[next(iter(pairs))]}: when it began cannot be told from the other films: "
+                f"{names[next(iter(pairs))]}: when it began cannot be found from the other films: "
                 "no robot moves where two cameras see it at once; give --start-s for each film."
             )
         found[k] = pairs[k]

@@ -225,7 +225,7 @@ def _told(plan: Any) -> dict:
     """A planned run as --json tells it, with its script and its way over the floor."""
     import numpy as np
 
-    from twinmill.experiment.foresight import csv_text
+    from twinmill.experiment.played import csv_text
 
     every = max(1, round(PATH_S / float(np.median(np.diff(plan.pose_t_s)))))
     return {

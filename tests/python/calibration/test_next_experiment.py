@@ -15,9 +15,9 @@ from twinmill.data.measurement import Measurement
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.experiment.design import Limits, Plan, check, design
-from twinmill.experiment.foresight import Rows, csv_text, rows_of
 from twinmill.experiment.information import CLOCKS, FisherInformation
 from twinmill.experiment.moves import AXES, duty_axes, family
+from twinmill.experiment.played import Rows, csv_text, rows_of
 from twinmill.experiment.power import ALPHA, named_apart
 from twinmill.experiment.relevance import Relevance
 from twinmill.fitting.fit import fit

@@ -13,7 +13,7 @@ from twinmill.diagnosis.notes import IRREGULAR, irregularity
 from twinmill.diagnosis.place import HORIZON, comes_again
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import REFIT
-from twinmill.diagnosis.verdict import Weighed
+from twinmill.diagnosis.verdict import VerdictInputs
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S
@@ -134,7 +134,7 @@ def test_an_effect_that_changed_within_the_models_own_error_is_a_stale_number(kn
 
 @pytest.mark.parametrize(("known", "words"), [(1.0, "a little more than"), (1.2, "as it did")])
 def test_a_model_that_misses_as_before_is_not_said_to_miss_anew(known, words):
-    weighed = Weighed(1.21, 1.21, 1.21, 1.21, [], Rest(1.0, False, []), [], [], [], known)
+    weighed = VerdictInputs(1.21, 1.21, 1.21, 1.21, [], Rest(1.0, False, []), [], [], [], known)
     assert weighed.verdict == "model_adequate"
     assert words in weighed.sentence
 
@@ -153,6 +153,6 @@ def test_much_that_is_left_and_depends_on_something_outweighs_a_doubtful_effect(
 ):
     found = [Finding("heading_bias", None, [], 0.3, certainty, "it changes with heading")]
     rest = Rest(left, True, ["heading"])
-    weighed = Weighed(4.2, 4.2, 3.6, 2.8, found, rest, [], [], [], 1.0)
+    weighed = VerdictInputs(4.2, 4.2, 3.6, 2.8, found, rest, [], [], [], 1.0)
     assert weighed.verdict == verdict
     assert "heading_bias" in weighed.sentence and "heading" in weighed.sentence

@@ -66,8 +66,8 @@ def test_what_cannot_be_told_is_said():
     series = commands(4)
     with pytest.raises(ValueError, match="none is in both"):
         align([driven(series, 3.0, 20.0, robot_id=7)], [series])
-    with pytest.raises(ValueError, match="cannot be told"):
+    with pytest.raises(ValueError, match="cannot be found"):
         align([driven(commands(5), 3.0, 40.0)], [series])  # another drive
     steady = commands(6, steps=(50, 50))
-    with pytest.raises(ValueError, match="cannot be told"):
+    with pytest.raises(ValueError, match="cannot be found"):
         align([driven(steady, 10.0, 20.0)], [steady])

@@ -75,7 +75,7 @@ def test_films_that_cannot_be_placed_are_refused(why):
     else:
         stands = still(0.1, 0.2, 0.3)
         films = [film(LEFT, 0.0, k, path=stands) for k in (1, 2)]
-    with pytest.raises(ValueError, match=r"b\.mp4: when it began cannot be told.*--start-s"):
+    with pytest.raises(ValueError, match=r"b\.mp4: when it began cannot be found.*--start-s"):
         clocks(films, ["a.mp4", "b.mp4"])
 
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
-
 #include "effects/effect.h"
 
 namespace twin
@@ -36,15 +34,11 @@ constexpr ParameterSpec kParameters[] = {
      "", 3, Role::kMoment},
 };
 
-// Narrower than the shortest prediction, so that the moment can be fitted and is still one.
-constexpr double kEdge_s = 0.1;
-
 void Step(RollSignals &s, const Numbers &v, double *)
 {
     if (v[0] == 0 && v[1] == 0)
         return;
-    const double since_s = s.t_s + s.dt_s / 2 - v[2];
-    const double whole = 1 / (1 + std::exp(-since_s / kEdge_s));
+    const double whole = Begun(s.t_s + s.dt_s / 2 - v[2]);
     for (int k = 0; k < s.robot.wheels; ++k)
         s.radius_ratio[k] *= 1 - (v[0] + v[1] * s.robot.left[k]) * whole;
 }

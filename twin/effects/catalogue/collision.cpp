@@ -32,7 +32,7 @@ constexpr ParameterSpec kParameters[] = {
      "bodies slide past"},
 };
 
-void Touch(Body &b, const Numbers &v)
+void Set(Body &b, const Numbers &v)
 {
     b.radius_m = std::max(0.0, b.radius_m + v[0]);
     b.friction += v[1];
@@ -43,7 +43,7 @@ void Touch(Body &b, const Numbers &v)
 EFFECT(collision) = {
     .card = kCard,
     .parameters = kParameters,
-    .act = OnBody{Touch},
+    .act = OnBody{Set},
 };
 
 }  // namespace twin

@@ -29,7 +29,7 @@ constexpr ParameterSpec kParameters[] = {
      "sees what is not there more often", "sees what is not there less often"},
 };
 
-void Look(Sight &s, const Numbers &v)
+void Set(DetectionModel &s, const Numbers &v)
 {
     s.false_rate += v[0] * (v[0] > 0 ? 1 - s.false_rate : s.false_rate);
 }
@@ -39,7 +39,7 @@ void Look(Sight &s, const Numbers &v)
 EFFECT(false_detection) = {
     .card = kCard,
     .parameters = kParameters,
-    .act = OnDecision{Look},
+    .act = OnDecision{Set},
 };
 
 }  // namespace twin

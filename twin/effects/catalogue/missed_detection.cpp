@@ -29,7 +29,7 @@ constexpr ParameterSpec kParameters[] = {
      "misses targets more often", "misses targets less often"},
 };
 
-void Look(Sight &s, const Numbers &v)
+void Set(DetectionModel &s, const Numbers &v)
 {
     s.miss_rate += v[0] * (v[0] > 0 ? 1 - s.miss_rate : s.miss_rate);
 }
@@ -39,7 +39,7 @@ void Look(Sight &s, const Numbers &v)
 EFFECT(missed_detection) = {
     .card = kCard,
     .parameters = kParameters,
-    .act = OnDecision{Look},
+    .act = OnDecision{Set},
 };
 
 }  // namespace twin

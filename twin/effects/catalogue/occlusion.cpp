@@ -28,7 +28,7 @@ constexpr ParameterSpec kParameters[] = {
      "robots hide less"},
 };
 
-void Look(Sight &s, const Numbers &v)
+void Set(DetectionModel &s, const Numbers &v)
 {
     s.hide_radius_m += v[0];
 }
@@ -38,7 +38,7 @@ void Look(Sight &s, const Numbers &v)
 EFFECT(occlusion) = {
     .card = kCard,
     .parameters = kParameters,
-    .act = OnView{Look},
+    .act = OnView{Set},
 };
 
 }  // namespace twin

@@ -26,7 +26,7 @@ constexpr ParameterSpec kParameters[] = {
      "the camera is early"},
 };
 
-void Look(Sight &s, const Numbers &v)
+void Set(DetectionModel &s, const Numbers &v)
 {
     s.age_s += v[0];
 }
@@ -36,7 +36,7 @@ void Look(Sight &s, const Numbers &v)
 EFFECT(sensor_delay) = {
     .card = kCard,
     .parameters = kParameters,
-    .act = OnDecision{Look},
+    .act = OnDecision{Set},
 };
 
 }  // namespace twin

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
-
 #include "effects/effect.h"
 
 namespace twin
@@ -33,14 +31,6 @@ constexpr ParameterSpec kParameters[] = {
     {"until_s", "s", 100000, 6, 0, 100000, "when all is as before again; means nothing at no loss",
      "", "", 3, Role::kMoment},
 };
-
-// Narrower than the shortest prediction, so that both ends can be fitted and are still moments.
-constexpr double kEdge_s = 0.1;
-
-double Begun(double since_s)
-{
-    return 1 / (1 + std::exp(-since_s / kEdge_s));
-}
 
 void Step(RollSignals &s, const Numbers &v, double *)
 {

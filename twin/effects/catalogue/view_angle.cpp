@@ -29,7 +29,7 @@ constexpr ParameterSpec kParameters[] = {
      "sees a narrower angle"},
 };
 
-void Look(Sight &s, const Numbers &v)
+void Set(DetectionModel &s, const Numbers &v)
 {
     s.cone_rad = std::min(s.cone_rad * v[0], 2 * std::numbers::pi);
 }
@@ -39,7 +39,7 @@ void Look(Sight &s, const Numbers &v)
 EFFECT(view_angle) = {
     .card = kCard,
     .parameters = kParameters,
-    .act = OnView{Look},
+    .act = OnView{Set},
 };
 
 }  // namespace twin

@@ -27,7 +27,7 @@ constexpr ParameterSpec kParameters[] = {
      "camera looks to the left", "camera looks to the right"},
 };
 
-void Look(Sight &s, const Numbers &v)
+void Set(DetectionModel &s, const Numbers &v)
 {
     s.pan_rad += v[0];
 }
@@ -37,7 +37,7 @@ void Look(Sight &s, const Numbers &v)
 EFFECT(view_pan) = {
     .card = kCard,
     .parameters = kParameters,
-    .act = OnView{Look},
+    .act = OnView{Set},
 };
 
 }  // namespace twin

@@ -29,7 +29,7 @@ constexpr ParameterSpec kParameters[] = {
      "the edge of sight is soft", "the edge of sight is sharp"},
 };
 
-void Look(Sight &s, const Numbers &v)
+void Set(DetectionModel &s, const Numbers &v)
 {
     s.range_m *= v[0];
     s.softness_m += v[1];
@@ -40,7 +40,7 @@ void Look(Sight &s, const Numbers &v)
 EFFECT(view_range) = {
     .card = kCard,
     .parameters = kParameters,
-    .act = OnView{Look},
+    .act = OnView{Set},
 };
 
 }  // namespace twin

@@ -30,7 +30,7 @@ constexpr ParameterSpec kParameters[] = {
      "fewer frames vote"},
 };
 
-void Look(Sight &s, const Numbers &v)
+void Set(DetectionModel &s, const Numbers &v)
 {
     s.vote_frames = std::clamp(s.vote_frames + std::round(v[0]), 1.0, 64.0);
 }
@@ -40,7 +40,7 @@ void Look(Sight &s, const Numbers &v)
 EFFECT(vote) = {
     .card = kCard,
     .parameters = kParameters,
-    .act = OnDecision{Look},
+    .act = OnDecision{Set},
 };
 
 }  // namespace twin

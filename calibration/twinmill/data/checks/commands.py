@@ -78,7 +78,7 @@ class CheckedTrack:
     body: np.ndarray
 
     def finding(self, what: str, evidence: str, remedy: str, fatal: bool = True) -> InputFinding:
-        """Of this robot."""
+        """An `InputFinding` with the name of this log and the number of this robot."""
         return InputFinding(what, evidence, remedy, fatal, self.label, self.track.robot_id)
 
 

@@ -273,7 +273,7 @@ def check_renames(rename: dict[str, str], tables: list[Path], known: frozenset[s
             )
         if not by_name(new, known) and not _usual(new):
             raise LogError(
-                f"--rename {old}={new}: {new} is none of our columns; they are "
+                f"--rename {old}={new}: {new} is not one of our columns; they are "
                 f"{', '.join(sorted(known))}."
             )
 

@@ -222,7 +222,8 @@ def _columns(options: ImportOptions, kind: str) -> Columns:
     """How to read the table of poses, or that of commands."""
     if unknown := options.flips - KNOWN:
         raise LogError(
-            f"--flip {min(unknown)}: is none of our columns; they are {', '.join(sorted(KNOWN))}."
+            f"--flip {min(unknown)}: is not one of our columns; they are "
+            f"{', '.join(sorted(KNOWN))}."
         )
     mapping = read_mapping(options.mapping, kind, KNOWN) if options.mapping else None
     return Columns(options.rename, mapping, options.flips, options.robot_id, options.robots)

@@ -23,7 +23,7 @@ class Frames:
         self._parent: dict[str, tuple[str, np.ndarray, np.ndarray]] = {}
 
     def put(self, frame: str, parent: str, row: Row) -> None:
-        """Args: row as ros_messages.transform_row."""
+        """Places a frame in its parent; the row is that of `ros_messages.transform_row`."""
         self._parent[frame] = parent, np.array(row[:3]), np.array(row[3:])
 
     def place(self, frame: str) -> tuple[str, Row]:

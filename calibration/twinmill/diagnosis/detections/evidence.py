@@ -4,9 +4,9 @@
 The ratio of held-out likelihoods alone (split likelihood ratio: Wasserman, Ramdas and Balakrishnan
 2020) takes every frame for an independent draw with the model's chance. Where the preferred model
 does not give that either, 4 s blocks scatter more than it says they would; the logarithm is divided
-by that excess, as a deviance is by its dispersion (McCullagh and Nelder 1989, 4.5). The block that
-speaks loudest for a model is left out: one strange event proves nothing, while a few blocks of
-overwhelming likelihood do, which in their own scatter would drown.
+by that excess, as a deviance is by its dispersion (McCullagh and Nelder 1989, 4.5). The block with
+the most evidence for a model is left out: one strange event proves nothing. A few blocks of
+overwhelming likelihood do prove it, though their own scatter is large.
 """
 
 from dataclasses import dataclass

@@ -167,7 +167,7 @@ def _changed(cameras: list[Detections], before: native.Model, after: native.Mode
     for camera in cameras:
         a, b = before.for_robot(camera.robot_id), after.for_robot(camera.robot_id)
         raw += float(np.abs(camera.chance(a) - camera.chance(b))[camera.usable].sum())
-        frames = [int(m.sight()["vote_frames"]) for m in (a, b)]
+        frames = [int(m.detection_model()["vote_frames"]) for m in (a, b)]
         if camera.frames.has_raw and frames[0] != frames[1]:
             voted += float(
                 (camera.voted(frames[0]) != camera.voted(frames[1]))[camera.usable].sum()
@@ -232,7 +232,7 @@ def _divergence(cameras: list[Detections], model: native.Model, other: native.Mo
         a, b = model.for_robot(camera.robot_id), other.for_robot(camera.robot_id)
         p, q = camera.chance(b)[camera.usable], camera.chance(a)[camera.usable]
         told += float(np.sum(p * np.log(p / q) + (1 - p) * np.log((1 - p) / (1 - q))))
-        frames = [int(m.sight()["vote_frames"]) for m in (a, b)]
+        frames = [int(m.detection_model()["vote_frames"]) for m in (a, b)]
         if camera.frames.has_raw and frames[0] != frames[1]:
             told += 4.6 * float(np.sum(camera.voted(frames[0]) != camera.voted(frames[1])))
     return told

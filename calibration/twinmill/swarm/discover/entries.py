@@ -63,7 +63,7 @@ class Entry:
 
     @property
     def command(self) -> str:
-        """What runs it."""
+        """The command line of `twin_run` that plays the behaviour."""
         behavior = self.mix.behavior(self.name)
         return f"twin_run --plant planar --model {MODEL} --n {self.mix.n} --behavior {behavior}"
 

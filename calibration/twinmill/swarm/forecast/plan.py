@@ -193,7 +193,7 @@ def read_outcomes(path: Path, plan: Plan) -> tuple[np.ndarray, np.ndarray, list[
 def _run_number(text: str | None, plan: Plan, seen: dict[int, int]) -> int:
     most = len(plan.order)
     if not (text or "").strip().isdigit() or not 1 <= int(text or "") <= most:
-        raise ValueError(f"run '{text}' is none of the plan's, 1 to {most}.")
+        raise ValueError(f"run '{text}' is not one of the plan's, 1 to {most}.")
     if int(text or "") in seen:
         raise ValueError(f"run {text} is there twice.")
     return int(text or "")

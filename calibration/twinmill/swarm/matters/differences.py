@@ -25,7 +25,7 @@ class Difference:
 
     @property
     def change(self) -> float:
-        """After minus before."""
+        """Value after the change less the value before, in the unit of both."""
         return self.after - self.before
 
     def to_json(self) -> dict:

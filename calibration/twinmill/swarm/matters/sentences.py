@@ -17,7 +17,7 @@ NAMED = 4  # of a list in a sentence
 
 
 def sentence(judged: Judged) -> str:
-    """One answer."""
+    """Whether one thing matters to the swarm, with the shares that say so."""
     factor, worst = judged.factor, judged.worst
     verb = VERBS[judged.verdict]
     low, high = judged.shares

@@ -55,7 +55,7 @@ struct OnGround
 };
 struct OnBody
 {
-    void (*touch)(Body &, const Numbers &);
+    void (*set)(Body &, const Numbers &);
 };
 struct OnObservation
 {
@@ -65,11 +65,11 @@ struct OnObservation
 };
 struct OnView
 {
-    void (*look)(Sight &, const Numbers &);
+    void (*set)(DetectionModel &, const Numbers &);
 };
 struct OnDecision
 {
-    void (*look)(Sight &, const Numbers &);
+    void (*set)(DetectionModel &, const Numbers &);
 };
 using Act =
     std::variant<OnDuty, OnWheels, OnRolling, OnGround, OnBody, OnObservation, OnView, OnDecision>;
@@ -115,6 +115,11 @@ struct EffectSpec
                         std::span<const std::string> texts) = nullptr;
 };
 
+// How much of what begins at a moment is there `since_s` after it, 0 to 1: 1 / (1 + exp(-t / 0.1
+// s)). The edge is narrower than the shortest prediction, so that the moment can be fitted and is
+// one.
+double Begun(double since_s);
+
 // Defines the effect of the file catalogue/<name>.cpp.
 #define EFFECT(name)                        \
     extern const EffectSpec kEffect_##name; \
@@ -133,8 +138,8 @@ public:
     Numbers numbers() const { return {values_, formula_.get()}; }
     int StateSize() const { return spec_->state_size ? spec_->state_size(numbers()) : 0; }
     // What it does to a camera or a body; nothing if it acts elsewhere.
-    void Look(Sight &sight) const;
-    void Touch(Body &body) const;
+    void Set(DetectionModel &detection) const;
+    void Set(Body &body) const;
 
 private:
     const EffectSpec *spec_;

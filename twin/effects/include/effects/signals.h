@@ -89,7 +89,7 @@ struct ObservedPose
 
 // What a robot's camera sees, and how its bit errs. One robot's numbers do not change while it
 // runs: its effects set them once.
-struct Sight
+struct DetectionModel
 {
     double range_m = 0;          // view: farthest target seen
     double softness_m = 0;       // view: scale of a logistic edge at range_m; 0: sharp

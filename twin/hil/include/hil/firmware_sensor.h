@@ -32,7 +32,7 @@ class FirmwareSensor final : public CameraSensor
 public:
     // Starts the program. Throws std::runtime_error in one sentence if it does not come up.
     FirmwareSensor(const FirmwareOptions &options, const CameraWorld &world, int robot,
-                   const Sight &sight, uint64_t seed);
+                   const DetectionModel &detection, uint64_t seed);
     ~FirmwareSensor() override;
 
     // All but the duties is what the built-in firmware says of the same frame. Throws

@@ -130,7 +130,7 @@ public:
     // The model of one robot: its [robots.Rnn] overrides applied.
     Model ForRobot(int robot_id) const;
     // What this robot's camera sees and its body does on contact, effects included.
-    Sight MakeSight() const;
+    DetectionModel MakeDetectionModel() const;
     Body MakeBody() const;
     // The robot's driven wheels.
     std::vector<Wheel> MakeWheels() const { return DrivenWheels(robot, base.wheels); }

@@ -26,8 +26,8 @@ struct SensorFrame
 class ConeSensor final : public RobotSensor
 {
 public:
-    // `sight` is this robot's own, effects included (Model::MakeSight).
-    ConeSensor(const Sight &sight, int robot, uint64_t seed);
+    // `detection` is this robot's own, effects included (Model::MakeDetectionModel).
+    ConeSensor(const DetectionModel &detection, int robot, uint64_t seed);
 
     // Exposes a frame at `utime_us`, misses and imagines targets at the given rates, and stamps it
     // age_s later. Returns the newest frame whose stamp is delay_s old or older; none if no further
@@ -42,7 +42,7 @@ public:
 private:
     bool Seen(std::span<const Pose2> poses, size_t self);
 
-    Sight sight_;
+    DetectionModel detection_;
     Random random_;
     int64_t age_us_, delay_us_;
     uint32_t seq_ = 0;

@@ -15,10 +15,11 @@ namespace twin
 // Whether `eye` sees `target`: its centre strictly within range_m, and strictly within half of
 // cone_rad of the heading turned by pan_rad. A target_radius_m above zero: any part of that disc
 // may be in the cone. Edges are sharp, and nothing hides the target.
-bool InView(const Pose2 &eye, const Pose2 &target, const Sight &sight);
+bool InView(const Pose2 &eye, const Pose2 &target, const DetectionModel &detection);
 
 // Whether the body of another robot, of hide_radius_m, hides robot `target` from `self`.
-bool Hidden(std::span<const Pose2> poses, size_t self, size_t target, const Sight &sight);
+bool Hidden(std::span<const Pose2> poses, size_t self, size_t target,
+            const DetectionModel &detection);
 
 // How well poses are known: standard deviations. All zero: exactly.
 struct Blur
@@ -29,7 +30,7 @@ struct Blur
 // Probability, 0 to 1, that robot `self` has at least one other in view; misses and false
 // detections apart. With exact poses and a sharp range it is 0 or 1. Blurred edges are logistic,
 // with the variance of the pose noise that they stand for. A pose of NaN is seen by nobody.
-double ViewProbability(std::span<const Pose2> poses, size_t self, const Sight &sight,
+double ViewProbability(std::span<const Pose2> poses, size_t self, const DetectionModel &detection,
                        const Blur &blur);
 
 }  // namespace twin

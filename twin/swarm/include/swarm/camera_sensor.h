@@ -9,7 +9,7 @@
 
 #include "sensor/camera.h"
 #include "sensor/robot_sensor.h"
-#include "swarm/camera_sight.h"
+#include "swarm/camera_scenes.h"
 
 namespace twin
 {
@@ -17,15 +17,16 @@ namespace twin
 class CameraSensor : public RobotSensor
 {
 public:
-    // `sight` by CameraSight(): a frame's time stamp is age_s after its exposure, and it reaches
-    // the firmware delay_s after that. The rest is in the pixels.
-    CameraSensor(const CameraWorld &world, int robot, const Sight &sight, uint64_t seed);
+    // `detection` by CameraDetectionModel(): a frame's time stamp is age_s after its exposure, and
+    // it reaches the firmware delay_s after that. The rest is in the pixels.
+    CameraSensor(const CameraWorld &world, int robot, const DetectionModel &detection,
+                 uint64_t seed);
 
     void Expose(std::span<const Pose2> poses, size_t self, int64_t now_us) override;
     void Decide(int64_t now_us, fw_ctx &firmware, fw_output &out) override;
     Image LastImage() const override
     {
-        return {frame_, sightings_.settings().width_px, sightings_.settings().height_px};
+        return {frame_, scenes_.settings().width_px, scenes_.settings().height_px};
     }
 
 protected:
@@ -40,7 +41,7 @@ private:
         int64_t utime_us;  // time stamp
         uint32_t seq;
     };
-    CameraSightings sightings_;
+    CameraScenes scenes_;
     Camera camera_;
     int64_t age_us_, delay_us_;
     uint32_t seq_ = 0;

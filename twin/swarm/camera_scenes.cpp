@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "swarm/camera_sight.h"
+#include "swarm/camera_scenes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -35,71 +35,72 @@ double OwnCone(const CameraSettings &settings)
     return 2 * settings.lens.AngleRad(settings.width_px / 2.0 / settings.lens.focal_px);
 }
 
-void CheckSight(const Sight &sight)
+void CheckDetectionModel(const DetectionModel &detection)
 {
-    if (sight.cone_rad > kWidest_rad)
+    if (detection.cone_rad > kWidest_rad)
         throw std::invalid_argument(
             "the model's effects make a camera's view " +
-            std::to_string(std::lround(sight.cone_rad * 180 / kPi)) +
+            std::to_string(std::lround(detection.cone_rad * 180 / kPi)) +
             " degrees wide, and a picture can show 160: lower view_angle.factor, or use "
             "--sensor cone");
-    if (sight.miss_rate + sight.false_rate > 1)
+    if (detection.miss_rate + detection.false_rate > 1)
         throw std::invalid_argument(
             "the model's effects let a camera miss targets at a rate of " +
-            std::to_string(sight.miss_rate) + " and imagine them at " +
-            std::to_string(sight.false_rate) +
+            std::to_string(detection.miss_rate) + " and imagine them at " +
+            std::to_string(detection.false_rate) +
             ": above 1 together, which no picture can show; lower missed_detection.rate or "
             "false_detection.rate, or use --sensor cone");
 }
 
-CameraSettings SettingsFor(CameraSettings settings, const Sight &sight)
+CameraSettings SettingsFor(CameraSettings settings, const DetectionModel &detection)
 {
-    settings.pan_rad += sight.pan_rad;
-    if (sight.cone_rad != OwnCone(settings))
-        settings.lens.focal_px = settings.width_px / 2.0 / settings.lens.Radius(sight.cone_rad / 2);
+    settings.pan_rad += detection.pan_rad;
+    if (detection.cone_rad != OwnCone(settings))
+        settings.lens.focal_px =
+            settings.width_px / 2.0 / settings.lens.Radius(detection.cone_rad / 2);
     return settings;
 }
 
 }  // namespace
 
-Sight CameraSight(const Model &robot, const CameraWorld &world)
+DetectionModel CameraDetectionModel(const Model &robot, const CameraWorld &world)
 {
     Model model = robot;
     model.sensor.range_m = OwnRange(world);
     model.sensor.cone_rad = OwnCone(world.settings);
     model.sensor.false_negative_rate = model.sensor.false_positive_rate = 0;
-    const Sight sight = model.MakeSight();
-    CheckSight(sight);
-    return sight;
+    const DetectionModel detection = model.MakeDetectionModel();
+    CheckDetectionModel(detection);
+    return detection;
 }
 
-CameraSightings::CameraSightings(const CameraWorld &world, int robot, const Sight &sight,
-                                 uint64_t seed)
+CameraScenes::CameraScenes(const CameraWorld &world, int robot, const DetectionModel &detection,
+                           uint64_t seed)
     : world_(world),
       self_(static_cast<size_t>(robot)),
-      sight_(sight),
-      settings_(SettingsFor(world.settings, sight)),
+      detection_(detection),
+      settings_(SettingsFor(world.settings, detection)),
       own_range_m_(OwnRange(world)),
       scale_of_lens_(world.settings.lens.focal_px / settings_.lens.focal_px),
-      random_(seed, robot, "camera_sight")
+      random_(seed, robot, "camera_scenes")
 {
 }
 
 // One draw whatever is seen, if the edge is soft.
-double CameraSightings::TargetScale(std::span<const Pose2> poses, size_t target)
+double CameraScenes::TargetScale(std::span<const Pose2> poses, size_t target)
 {
-    double range_m = sight_.range_m;
-    if (sight_.softness_m > 0)
+    double range_m = detection_.range_m;
+    if (detection_.softness_m > 0)
     {
         const double u = random_.Uniform();
-        range_m = std::max(0.0, range_m + sight_.softness_m * std::log(u / (1 - u)));
+        range_m = std::max(0.0, range_m + detection_.softness_m * std::log(u / (1 - u)));
     }
-    const bool hidden = target != self_ && Hidden(poses, self_, target, sight_);
+    const bool hidden = target != self_ && Hidden(poses, self_, target, detection_);
     return hidden ? 0 : range_m / own_range_m_ * scale_of_lens_;
 }
 
 // On the camera's axis, nearer than any other robot can come.
-Ball CameraSightings::FalseTarget(const Pose2 &pose) const
+Ball CameraScenes::FalseTarget(const Pose2 &pose) const
 {
     const double c = std::cos(pose.theta_rad), s = std::sin(pose.theta_rad);
     const double yaw_rad = pose.theta_rad + settings_.pan_rad;
@@ -113,10 +114,10 @@ Ball CameraSightings::FalseTarget(const Pose2 &pose) const
             TargetColour()};
 }
 
-Scene CameraSightings::Next(std::span<const Pose2> poses)
+Scene CameraScenes::Next(std::span<const Pose2> poses)
 {
     const double u = random_.Uniform();
-    const bool misses = u >= 1 - sight_.miss_rate, imagines = u < sight_.false_rate;
+    const bool misses = u >= 1 - detection_.miss_rate, imagines = u < detection_.false_rate;
     scales_.resize(poses.size());
     for (size_t i = 0; i < poses.size(); ++i)
         scales_[i] = TargetScale(poses, i) * !misses;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The effects of view and decide in drawn frames. All act in the picture, so that the firmware's
 // threshold, built in or in a program of its own, finds what the effect says.
-#ifndef SWARM_CAMERA_SIGHT_H
-#define SWARM_CAMERA_SIGHT_H
+#ifndef SWARM_CAMERA_SCENES_H
+#define SWARM_CAMERA_SCENES_H
 
 #include <span>
 #include <vector>
@@ -25,19 +25,20 @@ struct CameraWorld
 // What such a camera sees by itself, without errors, changed by the effects of `robot`. Of the
 // model's [sensor], which describes the cone, it takes delay and vote alone. Throws
 // std::invalid_argument in one sentence if no picture can show what the effects ask for.
-Sight CameraSight(const Model &robot, const CameraWorld &world);
+DetectionModel CameraDetectionModel(const Model &robot, const CameraWorld &world);
 
-// Draws what camera `robot` is given to see, by CameraSight:
+// Draws what camera `robot` is given to see, by CameraDetectionModel:
 // pan      the camera is turned;
 // cone     a lens of another focal length, and targets that keep their size in the picture;
 // range    more or less of a target is green, so that it fills the firmware's limit at that range;
 //          a soft edge draws the range anew for each target and frame;
 // hiding   a target behind a body of that radius is not drawn;
 // misses   no target is drawn; false detections: a green spot twice the limit in the middle.
-class CameraSightings
+class CameraScenes
 {
 public:
-    CameraSightings(const CameraWorld &world, int robot, const Sight &sight, uint64_t seed);
+    CameraScenes(const CameraWorld &world, int robot, const DetectionModel &detection,
+                 uint64_t seed);
 
     const CameraSettings &settings() const { return settings_; }
     // The scene of the next frame while robots are at `poses`.
@@ -49,7 +50,7 @@ private:
 
     CameraWorld world_;
     size_t self_;
-    Sight sight_;
+    DetectionModel detection_;
     CameraSettings settings_;
     double own_range_m_, scale_of_lens_;
     Random random_;
