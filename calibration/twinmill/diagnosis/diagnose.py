@@ -67,7 +67,7 @@ TWO_CLOCKS = (
     "--same-clock), or fit a calibration log on the same clocks first"
 )
 NO_HEADING = "the heading was not recorded, and what the robot holds is found"
-ONE_LOG = "a moment in one log is not the same in another; diagnose each log by itself"
+ONE_LOG = "it begins at a moment of one run, and these are several; diagnose one robot's log alone"
 CONTACTS = "predictions of one robot have no contacts; twinmill compare-swarm looks at whole swarms"
 NO_VOLTAGE = (
     "the log has no voltage of the battery; tables have no column for it, the telemetry of our "
