@@ -68,6 +68,6 @@ def test_the_page_scrolls_though_the_pointer_is_over_the_charts(report, page):
 
 def test_many_robots_and_long_logs_are_small_enough(result):
     """As of a fit: two models are drawn, and all data come for each robot."""
-    page = charts(result, "before", [r.model for r in result.robots])()
+    page = charts(result, [("before", r.model) for r in result.robots])()
     data = sum(map(len, re.findall(r'<script type="text/plain".*?</script>', page)))
     assert data * ROBOTS * LONG_S / DRIVEN_S + len(page) - data < LARGEST_BYTES
