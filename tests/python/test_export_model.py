@@ -129,6 +129,8 @@ def test_stock_mujoco_drives_the_path_of_the_planar_plant(
     if "drive" in change:
         text = text.replace("duty_pct = [0, 100]\nwheel_speed_mps = [0, 0.36]\n", "")
         text += '[[effect]]\nname = "input_delay"\ndelay_s = 0.02\n'
+        left, right = ("w1", "w3") if change.get("wheels") == "omni3" else ("fl", "rr")
+        text += f'[[effect]]\nname = "wheel_gain"\n{left} = -0.12\n{right} = 0.05\n'
     else:
         text += CARRIED if not change else CARRIED_BY_THREE
     robot = open_text(folder, text)
@@ -293,6 +295,26 @@ def test_a_controller_told_the_exported_numbers_drives_as_fast_as_it_is_asked(fo
     wheels = (vx + sides * vy + turns * lever_m * omega) / radius_m
     ideal = file.model.body_velocity(list(wheels))
     np.testing.assert_allclose(np.multiply(ideal, (0.9, 0.9, 0.8)), (vx, vy, omega), rtol=1e-4)
+
+
+def test_a_differential_controller_knows_that_the_left_wheel_is_weak(folder, model_text):
+    """The inverse kinematics of ros2_control's diff_drive_controller, by hand."""
+    text = model_text("m").replace("mecanum", "differential")
+    text += '[[effect]]\nname = "wheel_gain"\nfl = -0.2\nrl = -0.1\nfr = 0.03\nrr = 0.03\n'
+    file = open_text(folder, text)
+    left_out = run(["export-model", "m.toml", "--to", "ros2_control", "--json"])["not_carried"]
+    assert "wheel_gain" not in [item["name"] for item in left_out]
+    data = yaml.safe_load((folder / "m_control.yaml").read_text())
+    told = data["diff_drive_controller"]["ros__parameters"]
+    v_mps, w_radps = 0.2, 1.5
+    rims = {}
+    for side, sign, weak in (("left", -1, 0.85), ("right", 1, 1.03)):
+        rim_mps = v_mps + sign * w_radps * told["wheel_separation"] / 2
+        radius_m = told[f"{side}_wheel_radius_multiplier"] * told["wheel_radius"]
+        rims[side] = weak * rim_mps / radius_m  # what the real wheel makes of it, rad/s
+    wheels = [rims["left" if w["y_m"] > 0 else "right"] for w in file.model.wheels()]
+    ideal = file.model.body_velocity(wheels)
+    np.testing.assert_allclose(ideal, (v_mps, 0, w_radps), rtol=1e-4, atol=1e-9)
 
 
 def test_json_has_every_number_with_unit_and_every_equation(folder, model_text):

@@ -8,6 +8,8 @@ whose true velocity is (f vx, s vy, y omega) of the ideal one does what is wante
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from twinmill.export.carried import Left, RobotModel
 
 
@@ -44,6 +46,13 @@ def drive_of(robot: RobotModel) -> Drive:
         forward * top_mps if top_mps else None,
         turning,
     )
+
+
+def wheel_gains(robot: RobotModel) -> np.ndarray:
+    """(K,) speed of each wheel over what it is told, by the effects `wheel_gain`."""
+    found = [v for _, card, v in robot.effects() if card["name"] == "wheel_gain"]
+    ones = np.ones(len(robot.model.wheels()))
+    return np.prod([ones, *(1 + np.array([*v.values()])[: len(ones)] for v in found)], axis=0)
 
 
 def left_by_drive(robot: RobotModel, target: str) -> list[Left]:

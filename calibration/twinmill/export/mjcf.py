@@ -9,6 +9,11 @@ along the wheel's grip, by the difference between the rim's speed and the body's
 A body that light settles within about a millisecond where the forces cancel, which is the least
 squares of J v = a: the rolling of mecanum, omni and plain wheels. Gains of the body's speeds are in
 the gears, the motors' lag is the activation's filter, a delay of commands is the actuator's own.
+
+A robot that is told its velocity has an actuator for each part of it, which pushes the body along
+what the wheels make of that part, a column of G, and damped joints:
+
+    force = D (G a - v),  D the damping
 """
 
 import xml.etree.ElementTree as ET
@@ -18,6 +23,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.export.carried import HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
+from twinmill.export.drive import wheel_gains
 
 STEP_S = 0.001
 SETTLE_S = 0.001  # of the body behind its wheels
@@ -159,7 +165,7 @@ def _left(robot: RobotModel) -> list[Left]:
     carried = [*PLACED, "motor_lag", "input_delay"]
     if robot.model.drive == "duty":
         carried += STATIC
-    elif robot.model.drive == "wheel_speed":
+    else:
         carried.append("wheel_gain")
     target = "stock MuJoCo"
     left = [
@@ -196,12 +202,13 @@ def _numeric(custom: ET.Element, name: str, data: np.ndarray | list[float]) -> N
 def _body(robot: RobotModel) -> ET.Element:
     radius_m, wheel_m = robot.get("robot.body_radius_m"), robot.get("robot.wheel_radius_m")
     body = ET.Element("body", name="base")
-    for name, kind, axis in (
-        ("x", "slide", "1 0 0"),
-        ("y", "slide", "0 1 0"),
-        ("yaw", "hinge", "0 0 1"),
+    held = _damping(robot) if robot.model.drive == "twist" else np.zeros(3)
+    for name, kind, axis, damping in (
+        ("x", "slide", "1 0 0", held[0]),
+        ("y", "slide", "0 1 0", held[1]),
+        ("yaw", "hinge", "0 0 1", held[2]),
     ):
-        ET.SubElement(body, "joint", name=name, type=kind, axis=axis)
+        ET.SubElement(body, "joint", name=name, type=kind, axis=axis, damping=_n(damping))
     middle = _n(0, 0, wheel_m + HULL_HEIGHT_M / 2)
     ET.SubElement(
         body,
@@ -269,6 +276,8 @@ def _camera(robot: RobotModel, body: ET.Element, x_m: float, z_m: float) -> None
 
 def _actuators(robot: RobotModel, lag_s: float) -> ET.Element:
     """One for each wheel, or for each direction of a robot told its velocity."""
+    if robot.model.drive == "twist":
+        return _pushes(robot, lag_s)
     gains = np.array([robot.get(f"base.{d}_gain") for d in ("forward", "sideways", "yaw")])
     gains *= [robot.get(n) for n in ("theta_a1", "theta_a1", "theta_a2")]
     wheels = robot.model.wheels()
@@ -276,24 +285,37 @@ def _actuators(robot: RobotModel, lag_s: float) -> ET.Element:
     strafes = bool(np.any(rows[:, 1]))
     kv = robot.get("robot.mass_kg") / SETTLE_S
     actuator = ET.Element("actuator")
-    if robot.model.drive == "twist":
-        gains[1] *= strafes
-        # The body is as hard to turn as to push: an arm of its own radius of gyration.
-        arm_m = np.sqrt(robot.hull_inertia_kgm2()[2] / robot.get("robot.mass_kg"))
-        for name, row, gain in zip(("forward", "left", "turn"), np.eye(3), gains, strict=True):
-            scale = arm_m if name == "turn" else 1.0
-            actuator.append(_servo(robot, lag_s, name, row, kv * scale**2, gain))
-        return actuator
     held = kv
     kv /= np.sum(rows[:, 0] ** 2)  # together they pull forward at kv
     unit = robot.get("robot.wheel_radius_m") if robot.model.drive == "wheel_speed" else 1.0
     for k, (wheel, row) in enumerate(zip(wheels, rows, strict=True)):
-        gain = unit * np.prod([1 + list(v.values())[k] for v in _values(robot, "wheel_gain")])
-        own = unit if robot.model.drive == "duty" else gain
+        own = unit * (1.0 if robot.model.drive == "duty" else wheel_gains(robot)[k])
         actuator.append(_servo(robot, lag_s, wheel["name"], row / gains, kv, float(own)))
     if not strafes:  # plain wheels hold the robot sideways
         actuator.append(_servo(robot, lag_s, "left", np.array([0.0, 1, 0]), held, 0.0))
     return actuator
+
+
+def _pushes(robot: RobotModel, lag_s: float) -> ET.Element:
+    """One for each part of the velocity that a robot is told; the damped joints hold against it."""
+    actuator = ET.Element("actuator")
+    pushes = (_damping(robot)[:, None] * _velocity_gains(robot)).T
+    for name, row in zip(("forward", "left", "turn"), pushes, strict=True):
+        actuator.append(ET.Element("general", _signal(robot, lag_s, name, row)))
+    return actuator
+
+
+def _damping(robot: RobotModel) -> np.ndarray:
+    """(3,) N s/m along x and y and N m s about z, by which the body alone settles in SETTLE_S."""
+    mass_kg = robot.get("robot.mass_kg")
+    return np.array([mass_kg, mass_kg, robot.hull_inertia_kgm2()[2]]) / SETTLE_S
+
+
+def _velocity_gains(robot: RobotModel) -> np.ndarray:
+    """(3, 3) velocity that comes of each part of a velocity told, once the lags are over."""
+    still = _with(robot.model, ("wheel_gain",))
+    told = np.column_stack([np.eye(3), np.zeros(3)])
+    return native.steady(still, told, [], np.zeros((0, 0)))[0][:, :3].T
 
 
 def _grip(wheel: dict) -> np.ndarray:
@@ -306,17 +328,23 @@ def _servo(
     robot: RobotModel, lag_s: float, name: str, row: np.ndarray, kv: float, gain: float
 ) -> ET.Element:
     """Pulls along `row` (forward, left, turn) until the speed there is `gain` times its filter."""
-    delay_s = sum(v["delay_s"] for v in _values(robot, "input_delay"))
+    options = _signal(robot, lag_s, name, row)
     top_mps = robot.top_rim_mps
+    if top_mps:
+        options["ctrlrange"] = _n(-2 * top_mps, 2 * top_mps)
+    options |= {"gainprm": _n(kv * gain), "biastype": "affine", "biasprm": _n(0, 0, -kv)}
+    return ET.Element("general", options)
+
+
+def _signal(robot: RobotModel, lag_s: float, name: str, row: np.ndarray) -> dict[str, str]:
+    """Of an actuator along `row` (forward, left, turn), with the robot's lag and delay."""
+    delay_s = sum(v["delay_s"] for v in _values(robot, "input_delay"))
     options = {"name": name, "site": "drive", "gear": _n(row[0], row[1], 0, 0, 0, row[2])}
     if lag_s > 1e-6:
         options |= {"dyntype": "filterexact", "dynprm": _n(lag_s), "actearly": "true"}
     if delay_s > 0:
         options |= {"delay": _n(delay_s), "nsample": str(round(DELAY_SLOTS_PER_S * delay_s) + 1)}
-    if top_mps:
-        options["ctrlrange"] = _n(-2 * top_mps, 2 * top_mps)
-    options |= {"gainprm": _n(kv * gain), "biastype": "affine", "biasprm": _n(0, 0, -kv)}
-    return ET.Element("general", options)
+    return options
 
 
 def _lags_s(robot: RobotModel) -> np.ndarray:

@@ -4,7 +4,7 @@
 import yaml
 
 from twinmill.export.carried import Left, RobotModel
-from twinmill.export.drive import drive_of, left_by_drive
+from twinmill.export.drive import drive_of, left_by_drive, wheel_gains
 
 TIMEOUT_S = 0.5  # without a command: stop
 
@@ -26,7 +26,7 @@ def ros2_control(robot: RobotModel) -> tuple[str, list[Left]]:
     left = [
         *left_by_drive(robot, "ros2_control"),
         Left("sensor", "ros2_control moves the robot, and sees nothing"),
-        *robot.left_effects((), "ros2_control"),
+        *robot.left_effects(CARRIED.get(kind, ()), "ros2_control"),
     ]
     data = {
         "controller_manager": {
@@ -68,12 +68,13 @@ def _mecanum(robot: RobotModel) -> dict:
 def _differential(robot: RobotModel) -> dict:
     """https://control.ros.org, diff_drive_controller."""
     drive, wheels = drive_of(robot), robot.model.wheels()
-    sides = {
-        f"{side}_wheel_names": [
-            f"{w['name']}_wheel_joint" for w in wheels if (w["y_m"] > 0) == (side == "left")
-        ]
-        for side in ("left", "right")
-    }
+    gains = wheel_gains(robot)
+    sides = {}
+    for side in ("left", "right"):
+        own = [k for k, w in enumerate(wheels) if (w["y_m"] > 0) == (side == "left")]
+        sides[f"{side}_wheel_names"] = [f"{wheels[k]['name']}_wheel_joint" for k in own]
+        # Wheels of one side that differ slip, and drive as their mean does.
+        sides[f"{side}_wheel_radius_multiplier"] = _short(gains[own].mean())
     limits = {}
     if drive.top_mps and drive.top_radps:
         for axis, top in (("linear.x", drive.top_mps), ("angular.z", drive.top_radps)):
@@ -94,6 +95,7 @@ def _short(value: float) -> float:
     return float(f"{value:.6g}")
 
 
+CARRIED = {"differential": ("wheel_gain",)}
 CONTROLLERS = {
     "mecanum": ("mecanum_drive_controller/MecanumDriveController", _mecanum),
     "differential": ("diff_drive_controller/DiffDriveController", _differential),
