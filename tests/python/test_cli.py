@@ -144,6 +144,17 @@ def test_text_names_the_quantities_that_json_has(twinmill, coasting_robot, monke
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_only_who_has_not_fitted_is_told_to(twinmill, coasting_robot, tmp_path):
+    """A robot that coasts, predicted by a model that does not: no fit of its base mends that."""
+    given = ("--model", coasting_robot.model)
+    told = [
+        twinmill("compare", coasting_robot.log, *given)[1],
+        twinmill("fit", coasting_robot.log, *given, "-o", tmp_path / "fitted.toml")[1],
+    ]
+    assert ["fit if you have not" in " ".join(text.split()) for text in told] == [True, False]
+    assert "Next:" in told[1] and "twinmill diagnose" in " ".join(told[1].split())
+
+
 BAD = {
     "missing log": ("compare", "nowhere.lcmlog", "--model", "{model}"),
     "not a log": ("compare", "{model}", "--model", "{model}"),

@@ -488,14 +488,21 @@ class ScoreFit:
     def estimates(self) -> list[ParameterEstimate]:
         """Of all unknowns, shared ones first."""
         found = []
-        for u, value, std in zip(self.unknowns, self.x, self.stds, strict=True):
-            p = u.parameter
+        alone = 1 / np.sqrt(np.diag(np.linalg.pinv(self._intervals)))  # were the others known
+        for u, value, std, rest in zip(self.unknowns, self.x, self.stds, alone, strict=True):
+            p, seen = u.parameter, bool(std < SEEN * u.parameter.std)
             near = AT_BOUND * (p.max - p.min)
             bounded = p.role != "moment"  # the end of time is none
             at_bound = bounded and bool(value - p.min < near or p.max - value < near)
             found.append(
                 ParameterEstimate(
-                    p.name, float(value), float(std), p.unit, at_bound, bool(std < SEEN * p.std)
+                    p.name,
+                    float(value),
+                    float(std),
+                    p.unit,
+                    at_bound,
+                    seen,
+                    not seen and bool(rest < SEEN * p.std),
                 )
             )
         return found
@@ -513,8 +520,8 @@ class ScoreFit:
         return self.estimates[: sum(1 for u in self.unknowns if u.parameter in self.shared)]
 
     def shared_covariance(self) -> Covariance:
-        """Of the quantities that all data sets share and that these tell, as wide as their stds."""
-        told = [c for c, e in enumerate(self.shared_estimates()) if e.seen]
+        """Of what all data sets share and these tell, alone or together, as wide as the stds."""
+        told = [c for c, e in enumerate(self.shared_estimates()) if e.seen or e.together]
         values = self._intervals[np.ix_(told, told)]
         return Covariance(tuple(self.estimates[c].name for c in told), values)
 

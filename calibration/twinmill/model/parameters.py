@@ -69,7 +69,8 @@ class ParameterEstimate:
     Attributes:
         std: half of a 95 % interval over 1.96, from left-out blocks.
         at_bound: it ended at a bound.
-        seen: false where the log does not tell it and the prior holds it.
+        seen: false where the log does not tell it by itself, and the prior holds it.
+        together: the log tells it once others are known, as left wheels of which the sum is told.
     """
 
     name: str
@@ -78,6 +79,7 @@ class ParameterEstimate:
     unit: str
     at_bound: bool
     seen: bool
+    together: bool = False
 
     def to_json(self) -> dict:
         """Fields of the interface."""

@@ -52,8 +52,8 @@ def robot_tables(comparison: Comparison) -> list[Table]:
     return made
 
 
-def advice(comparison: Comparison) -> str:
-    """One sentence, from the score and the worst phase of the drive."""
+def advice(comparison: Comparison, fitted: bool = False) -> str:
+    """One sentence, from the score and the worst phase of the drive; `fitted`: just now."""
     if comparison.score < SUSPECT:
         return "compare with a log that the model was not fitted on."
     if comparison.score <= GOOD:
@@ -71,9 +71,11 @@ def advice(comparison: Comparison) -> str:
         for name, card in catalogue_of(model).items()
         if worst.regime in card["suspect_when"] and name not in model.effects
     ]
-    try_next = (
-        f"fit if you have not, then add {' or '.join(fresh)}" if fresh else "look at where it fails"
-    )
+    try_next = "look at where it fails"
+    if fitted:
+        try_next = "`twinmill diagnose` names what is missing"
+    elif fresh:
+        try_next = f"fit if you have not, then add {' or '.join(fresh)}"
     return (
         f"{100 * worst.share:.0f} % of the error comes while the robot is {worst.regime} "
         f"({number(worst.ratio)} times the floor): {WRONG[worst.regime]}; {try_next}."

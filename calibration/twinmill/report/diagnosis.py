@@ -16,7 +16,7 @@ from twinmill.report import Figure, Section, comparisons, detections, show, tabl
 from twinmill.report.charted import charts
 from twinmill.report.error_figures import waterfall
 from twinmill.report.sections import robot_pictures
-from twinmill.report.tables import Cell, Table, Tone, number, tone
+from twinmill.report.tables import Cell, Table, Tone, number, rounded, tone
 from twinmill.terminal import whole
 
 LEAST_TAKES = 0.05  # share of what is left that a formula must take to be worth a word
@@ -331,4 +331,4 @@ def _estimate(estimate: ParameterEstimate) -> str:
     name = estimate.name.split(".", 1)[-1]
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
     spread = f" ± {estimate.std:.1g}" if np.isfinite(estimate.std) else ""
-    return f"{name} {estimate.value:.3g}{spread}{unit}"
+    return f"{name} {rounded(estimate.value, estimate.std)}{spread}{unit}"

@@ -51,7 +51,7 @@ def fit_section(result: FitResult) -> Section:
             *comparisons.robot_tables(result.after),
         ],
         charts=_before_and_after(result),
-        next_step=comparisons.advice(result.after),
+        next_step=comparisons.advice(result.after, fitted=True),
         warnings=result.after.warnings,
     )
 
@@ -80,7 +80,7 @@ def added_section(result: AddResult | CameraAddResult) -> Section:
             *tables.held_out(result),
         ],
         charts=_before_and_after(result),
-        next_step=comparisons.advice(result.after),
+        next_step=comparisons.advice(result.after, fitted=True),
         warnings=result.after.warnings,
     )
 

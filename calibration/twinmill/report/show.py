@@ -45,7 +45,7 @@ def fit(result: FitResult) -> RenderableType:
         *(table(t) for t in tables.robots(result.after, result.before)),
         *_warnings(result.after.warnings),
         _written(result.path),
-        _next(result.after),
+        _next(result.after, fitted=True),
     )
 
 
@@ -73,7 +73,7 @@ def added(result: AddResult | CameraAddResult) -> RenderableType:
         *(table(t) for t in tables.held_out(result)),
         *_warnings(result.after.warnings),
         _written(result.path),
-        _next(result.after),
+        _next(result.after, fitted=True),
     )
 
 
@@ -184,5 +184,5 @@ def _written(path: object) -> Text:
     return Text(f"Written: {path}")
 
 
-def _next(result: Comparison) -> RenderableType:
-    return Padding(Text(f"Next: {comparisons.advice(result)}"), (1, 0, 0, 0))
+def _next(result: Comparison, fitted: bool = False) -> RenderableType:
+    return Padding(Text(f"Next: {comparisons.advice(result, fitted)}"), (1, 0, 0, 0))

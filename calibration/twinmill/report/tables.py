@@ -26,6 +26,10 @@ SHOWN = {
     "rad": (float(np.degrees(1)), "°"),
 }  # unit: factor, as a person reads it
 WORST = 3  # regimes of a group
+TOGETHER = (
+    "Told together: the log tells how such quantities go together (the covariance in the model "
+    "file), as that one side is weaker, and none of them by itself."
+)
 
 
 @dataclass(frozen=True)
@@ -82,7 +86,7 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
         (
             "recorded",
             f"{date}, {track.pose_t_s[-1] - track.pose_t_s[0]:.0f} s, "
-            f"{len(track.pose)} poses, driven by {track.command_kind.replace('_', ' ')}",
+            f"{len(track.pose)} poses used, driven by {track.command_kind.replace('_', ' ')}",
         ),
         ("model", comparison.model_name),
         ("noise", _noise(noise, track.has_heading)),
@@ -198,25 +202,33 @@ def parameters(estimates: list[ParameterEstimate]) -> Table:
     """Fitted quantities with their uncertainty."""
     rows = []
     for e in estimates:
-        remark = ("at its bound" if e.at_bound else "") if e.seen else "not told by this log"
+        told = e.seen or e.together
+        remark = "not told by this log"
+        if told:
+            remark = "at its bound" if e.at_bound else "" if e.seen else "told together"
         value, std = (
-            (_rounded(e.value, e.std), f"± {number(e.std)}") if e.seen else (number(e.value), "-")
+            (rounded(e.value, e.std), f"± {number(e.std)}") if told else (number(e.value), "-")
         )
         rows.append(
             [
-                Cell(e.name, "" if e.seen else "dim"),
-                Cell(value, "" if e.seen else "dim"),
+                Cell(e.name, "" if told else "dim"),
+                Cell(value, "" if told else "dim"),
                 Cell(std),
                 Cell("" if e.unit == "1" else e.unit),
                 Cell(remark, "warn" if remark else ""),
             ]
         )
+    together = any(e.together for e in estimates)
     return Table(
-        "Fitted quantities", ["quantity", "value", "std", "unit", ""], rows, words=(0, 3, 4)
+        "Fitted quantities",
+        ["quantity", "value", "std", "unit", ""],
+        rows,
+        TOGETHER if together else "",
+        words=(0, 3, 4),
     )
 
 
-def _rounded(value: float, std: float) -> str:
+def rounded(value: float, std: float) -> str:
     """To the digits that the uncertainty leaves meaning."""
     if not np.isfinite(std) or std <= 0:
         return number(value)

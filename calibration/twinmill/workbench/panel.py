@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from twinmill.fitting.compare import GOOD, MISSING
+from twinmill.report.tables import rounded
 from twinmill.workbench.bench import Bench
 
 
@@ -60,4 +61,4 @@ def estimate(entry: dict) -> str:
     name = entry["name"].split(".", 1)[-1]
     unit = "" if entry["unit"] == "1" else f" {entry['unit'].replace('^2', '²')}"
     spread = f" ± {entry['std']:.1g}" if entry["std"] is not None else ""
-    return f"{name} {entry['value']:.3g}{spread}{unit}"
+    return f"{name} {rounded(entry['value'], entry['std'] or 0.0)}{spread}{unit}"

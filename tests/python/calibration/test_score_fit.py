@@ -222,6 +222,28 @@ def test_what_a_log_does_not_tell_stays_and_is_said_to(straight, model_file):
             assert estimate.std > 0.5 * start.std
 
 
+def test_what_a_log_tells_of_wheels_together_is_kept_though_none_is_told_alone(
+    straight, model_file
+):
+    """Plain wheels driven straight on: it shows that a side is weaker, not which wheel makes it.
+
+    Were they told each by itself, half the difference of the sides would spread as one wheel does.
+    """
+    plain = ('wheels = "mecanum"', 'wheels = "differential"')
+    guess = model_file(plain, extra='[[effect]]\nname = "wheel_gain"\n')
+    opened = judged(open_measurements([straight], guess))
+    free = effect_parameters(guess.model, "wheel_gain")
+    free += base_parameters(guess.model, ["base.sideways_gain"])
+    fitted = ScoreFit([o.data for o in opened], [o.model for o in opened], free).fit()
+    *wheels, sideways = fitted.shared_estimates()
+    assert [e.seen for e in wheels] == [False] * 4 and all(e.together for e in wheels)
+    assert not sideways.seen and not sideways.together
+    covariance = fitted.shared_covariance()
+    assert covariance.names == tuple(e.name for e in wheels)
+    side = np.array([1, -1, 1, -1]) / 2
+    assert np.sqrt(side @ covariance.values @ side) < 0.3 * wheels[0].std
+
+
 def test_a_narrow_prior_holds_and_a_wide_one_does_not(straight, model_file, truth):
     held, let_go = (
         score_fit([straight], model_file(), base__motor_lag_s={"std": width}).shared_estimates()[-1]
