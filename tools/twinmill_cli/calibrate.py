@@ -143,7 +143,16 @@ def _add(
     check_output(output, model_file, force)
     measurements = load(logs, model_file, as_json)
     with busy(f"adding {effect} to {model}"):
-        result = add(effect, measurements, model_file, output, source.command, texts, held, robot)
+        result = add(
+            effect=effect,
+            measurements=measurements,
+            model_file=model_file,
+            out=output,
+            command=source.command,
+            texts=texts,
+            held=held,
+            robot_id=robot,
+        )
     section = partial(added_section, result)
     data = {**result.to_json(), **told(measurements)}
     finish(data, show.added(result), source, section, as_json, out)

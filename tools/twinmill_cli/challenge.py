@@ -87,7 +87,15 @@ def _challenge(
     command = f"twinmill challenge --n {count} --seed {seed} --duration-s {duration_s:g}"
     if intervals:
         command += f" --intervals {intervals}"
-        return _intervals(out, intervals, seed, duration_s, workers, command, as_json)
+        return _intervals(
+            out=out,
+            count=intervals,
+            seed=seed,
+            duration_s=duration_s,
+            workers=workers,
+            command=command,
+            as_json=as_json,
+        )
     robots = draw_robots(seed)
     cases = [draw(number, seed, robots, duration_s) for number in range(count)]
     answers = seal(cases)

@@ -107,7 +107,15 @@ def _characterise(
     Example: twinmill characterise --robot 3 --script steps.csv --out run.lcmlog
     """
     if script_as:
-        return _for_ros(Path(script), script_as, out, model, cap_pct, force, as_json)
+        return _for_ros(
+            script=Path(script),
+            form=script_as,
+            out=out,
+            model=model,
+            cap_pct=cap_pct,
+            force=force,
+            as_json=as_json,
+        )
     check_new_file(out, force)
     end_s = check_script(Path(script), cap_pct)
     name = Path(script).name

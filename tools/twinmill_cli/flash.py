@@ -119,14 +119,14 @@ def _flash(
     given = read_package(package) if package else None
     own_key = load(key)
     request = UpdateRequest(
-        None if rollback else Packages(given),
-        settings,
-        file if behaviors or behavior in tables else None,
-        take_over,
-        dry_run,
-        wait_s,
-        ssh_config,
-        own_key,
+        packages=None if rollback else Packages(given),
+        settings=settings,
+        behaviors=file if behaviors or behavior in tables else None,
+        take_over=take_over,
+        dry_run=dry_run,
+        wait_s=wait_s,
+        ssh_config=ssh_config,
+        key=own_key,
     )
     if give_back:
         outcomes = [hand_back(target, ssh_config) for target in targets]

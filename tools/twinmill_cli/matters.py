@@ -124,13 +124,13 @@ def _matters(
         with progress_bar() as progress:
             task = progress.add_task("runs", total=None)
             found = judge(
-                request,
-                asked,
-                left,
-                wanted,
-                margin,
-                folder,
-                lambda done, planned: progress.update(task, completed=done, total=planned),
+                request=request,
+                factors=asked,
+                left=left,
+                goal=wanted,
+                margin=margin,
+                folder=folder,
+                tell=lambda done, planned: progress.update(task, completed=done, total=planned),
             )
             asked_maps = map_requests(found, axes, map_seeds) if out else {}
             maps = {

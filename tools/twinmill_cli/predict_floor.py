@@ -63,19 +63,27 @@ def _predict_floor(
     with progress_bar() as progress:
         task = progress.add_task("runs of models drawn", total=None)
         expected = forecast(
-            request,
-            table,
-            draws,
-            seeds,
-            seed,
-            output / RUNS,
-            lambda done, planned: progress.update(task, completed=done, total=planned),
+            request=request,
+            table=table,
+            count=draws,
+            seeds=seeds,
+            seed=seed,
+            folder=output / RUNS,
+            tell=lambda done, planned: progress.update(task, completed=done, total=planned),
         )
     chosen = choose(expected, cells, repeats, seed)
     numbers = [cell for cell, _ in chosen]
     bits = [told for _, told in chosen]
     order = in_random_order(cells, repeats, seed)
-    plan = Plan(request, numbers, expected.cells(numbers), bits, repeats, order, seed)
+    plan = Plan(
+        request=request,
+        cells=numbers,
+        expected=expected.cells(numbers),
+        bits=bits,
+        repeats=repeats,
+        order=order,
+        seed=seed,
+    )
     digest = write_plan(plan, output)
     data = {
         "plan": str(output / PLAN),

@@ -146,7 +146,16 @@ def _track(
     ]
     floors = _each("--floor", floor, count)
     if camera:
-        return _live(camera, eyes, floors, tags, lcm_url, duration_s, port, as_json)
+        return _live(
+            names=camera,
+            eyes=eyes,
+            floors=floors,
+            tags=tags,
+            lcm_url=lcm_url,
+            duration_s=duration_s,
+            port=port,
+            as_json=as_json,
+        )
     out = out or Path(f"{videos[0].stem}.csv")
     check_new_file(out, force)
     if len(starts_s) not in (0, 1, count):
@@ -264,7 +273,15 @@ def _found(
     pairs, starts_s = _placed(tracked, starts_s, [str(film.path) for film in films])
     tracked = [on_clock(*row) for row in zip(tracked, starts_s, strict=True)]
     paths = merged(tracked) if len(films) > 1 else tracked[0]
-    return _Found(films, list(map(len, stamps_s)), numbers, views, starts_s, pairs, paths)
+    return _Found(
+        films=films,
+        frames=list(map(len, stamps_s)),
+        numbers=numbers,
+        views=views,
+        starts_s=starts_s,
+        pairs=pairs,
+        paths=paths,
+    )
 
 
 def _looked(film: Film) -> tuple[np.ndarray, Sightings]:

@@ -90,7 +90,15 @@ def draw(number: int, seed: int, robots: Sequence[Robot], duration_s: float) -> 
         drawn = _hidden(kind, plan, random)
         if drawn is not None:
             hidden, adds = drawn
-            return Case(number, kind, which, style, plan, hidden, adds)
+            return Case(
+                number=number,
+                kind=kind,
+                robot=which,
+                style=style,
+                plan=plan,
+                hidden=hidden,
+                adds_floors=adds,
+            )
 
 
 def make_log(case: Case, path: Path) -> None:

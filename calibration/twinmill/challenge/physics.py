@@ -376,7 +376,11 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
 
     def form(name: str, kind: str, stage: str, act: Act, grows=None, most=5.0, **values: float):
         grows = tuple(values) if grows is None else grows
-        found.append(Hidden(name, kind, stage, act, values, grows, most))
+        found.append(
+            Hidden(
+                name=name, kind=kind, stage=stage, act=act, values=values, grows=grows, most=most
+            )
+        )
 
     if robot.drive == "duty":
         form("dead_zone", "plain", "duty", _dead_zone, width=0.04)
@@ -459,8 +463,24 @@ def _of_the_ground(robot: Robot, random: np.random.Generator) -> list[Hidden]:
     grain = {"loss": 0.06, "along_rad": along_rad}
     return [
         *found,
-        Hidden("floor_patch", "plain", "ground", _patch, patch, ("strength",), 4),
-        Hidden("floor_patch", "cousin", "ground", _mat, mat, ("strength",), 4),
+        Hidden(
+            name="floor_patch",
+            kind="plain",
+            stage="ground",
+            act=_patch,
+            values=patch,
+            grows=("strength",),
+            most=4,
+        ),
+        Hidden(
+            name="floor_patch",
+            kind="cousin",
+            stage="ground",
+            act=_mat,
+            values=mat,
+            grows=("strength",),
+            most=4,
+        ),
         Hidden("carpet_grain", "cousin", "ground", _grain_against, grain, ("loss",)),
     ]
 
@@ -471,14 +491,14 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
     compass = {"size_rad": 0.05}
     found = [
         Hidden(
-            "compass",
-            "outside",
-            "observe",
-            _compass,
-            compass,
-            ("size_rad",),
-            5,
-            ("heading", "theta"),
+            name="compass",
+            kind="outside",
+            stage="observe",
+            act=_compass,
+            values=compass,
+            grows=("size_rad",),
+            most=5,
+            depends_on=("heading", "theta"),
         )
     ]
     if robot.drive != "wheel_speed":
@@ -488,26 +508,64 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
         drops = {"per_s": 0.12}
         swing = {"share": 0.4, "hz": hz}
         found += [
-            Hidden("several", "outside", "target", _several_losses, several, ("loss",), 5, time),
-            Hidden("drop-outs", "outside", "target", _drop_outs, drops, (), 1, time),
+            Hidden(
+                name="several",
+                kind="outside",
+                stage="target",
+                act=_several_losses,
+                values=several,
+                grows=("loss",),
+                most=5,
+                depends_on=time,
+            ),
+            Hidden(
+                name="drop-outs",
+                kind="outside",
+                stage="target",
+                act=_drop_outs,
+                values=drops,
+                grows=(),
+                most=1,
+                depends_on=time,
+            ),
         ]
         if robot.plant == "planar":
-            found.append(Hidden("springy", "outside", "lag", _springy, swing, ("share",), 2, past))
+            found.append(
+                Hidden(
+                    name="springy",
+                    kind="outside",
+                    stage="lag",
+                    act=_springy,
+                    values=swing,
+                    grows=("share",),
+                    most=2,
+                    depends_on=past,
+                )
+            )
     if robot.plant == "planar":
         turn, tiles = {"share": 0.08}, {"share": 0.1, "length_m": float(random.uniform(0.5, 0.9))}
         where = ("place", "position", "x", "y", "room", "floor")
         heading = ("heading", "theta")
         found += [
             Hidden(
-                "turn by heading",
-                "outside",
-                "ground",
-                _turn_by_heading,
-                turn,
-                ("share",),
-                5,
-                heading,
+                name="turn by heading",
+                kind="outside",
+                stage="ground",
+                act=_turn_by_heading,
+                values=turn,
+                grows=("share",),
+                most=5,
+                depends_on=heading,
             ),
-            Hidden("tiles", "outside", "ground", _tiles, tiles, ("share",), 5, where),
+            Hidden(
+                name="tiles",
+                kind="outside",
+                stage="ground",
+                act=_tiles,
+                values=tiles,
+                grows=("share",),
+                most=5,
+                depends_on=where,
+            ),
         ]
     return found

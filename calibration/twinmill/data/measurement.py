@@ -215,13 +215,13 @@ def _measured(log: Log, robot: RobotLog, runs: int) -> Measurement:
         raise LogError(f"{name}: {error}") from error
     _check_length(name, track)
     return Measurement(
-        name,
-        log.sha256,
-        track,
-        [*log.warnings, *([f"{base}; put right."] if base else []), *track.notes],
-        log.t0_utime_us,
-        base,
-        frames_of(robot) if robot.has_heading else None,
+        log_name=name,
+        log_sha256=log.sha256,
+        track=track,
+        warnings=[*log.warnings, *([f"{base}; put right."] if base else []), *track.notes],
+        recorded_utime_us=log.t0_utime_us,
+        time_base=base,
+        frames=frames_of(robot) if robot.has_heading else None,
     )
 
 

@@ -97,7 +97,16 @@ def find_server(address: str, local: str = "", port: int = COMMAND_PORT) -> Serv
         return Server(address, way, port, name, protocol)
     _, data_port, multicast, *group = CONNECTION.unpack_from(payload, SENDER_BYTES)
     group = ".".join(map(str, group))
-    return Server(address, way, port, name, protocol, bool(multicast), group, data_port)
+    return Server(
+        address=address,
+        local=way,
+        port=port,
+        name=name,
+        protocol=protocol,
+        multicast=bool(multicast),
+        group=group,
+        data_port=data_port,
+    )
 
 
 def request(kind: int, payload: bytes = b"") -> bytes:

@@ -104,18 +104,18 @@ def read_steady_tables(path: Path) -> list[SteadyTable]:
         own = [np.array([channel[0][key] for key in keys]) for channel in channels]
         sheets.append(
             SteadyTable(
-                path.name,
-                sha256,
-                robot,
-                np.array([key[1] for key in keys]),
-                np.column_stack([o[:, 0] for o in own]),
-                np.column_stack([o[:, 1] for o in own]),
-                np.array([len(cells[key].speed) for key in keys]),
-                np.array([cells[key].still for key in keys]),
-                np.column_stack([o[:, 2] for o in own]),
-                (channels[0][1], channels[1][1]),
-                place % 2 if len(robots) > 1 else None,
-                [],
+                log_name=path.name,
+                log_sha256=sha256,
+                robot_id=robot,
+                inputs=np.array([key[1] for key in keys]),
+                value=np.column_stack([o[:, 0] for o in own]),
+                floor=np.column_stack([o[:, 1] for o in own]),
+                runs=np.array([len(cells[key].speed) for key in keys]),
+                still=np.array([cells[key].still for key in keys]),
+                cell_spread=np.column_stack([o[:, 2] for o in own]),
+                spread=(channels[0][1], channels[1][1]),
+                fold=place % 2 if len(robots) > 1 else None,
+                warnings=[],
             )
         )
     _check(path, sheets)

@@ -119,21 +119,21 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
         heading_smooth = np.where(segment < 0, np.nan, 0.0)
         notes.append("the heading is not recorded: only the position is judged.")
     return Track(
-        robot.robot_id,
-        robot.command_kind,
-        robot.command_t_s,
-        robot.command,
-        _filled(robot.command_t_s, robot.battery_V),
-        robot.pose_t_s,
-        pose,
-        segment,
-        heading_smooth,
-        rest,
-        _timing(robot, segment),
-        notes,
-        robot.has_heading,
-        robot.same_clock,
-        astray_rad,
+        robot_id=robot.robot_id,
+        command_kind=robot.command_kind,
+        command_t_s=robot.command_t_s,
+        command=robot.command,
+        battery_V=_filled(robot.command_t_s, robot.battery_V),
+        pose_t_s=robot.pose_t_s,
+        pose=pose,
+        segment=segment,
+        heading_smooth=heading_smooth,
+        rest=rest,
+        timing=_timing(robot, segment),
+        notes=notes,
+        has_heading=robot.has_heading,
+        same_clock=robot.same_clock,
+        astray_rad=astray_rad,
     )
 
 

@@ -73,7 +73,16 @@ def changes_of(trial: Trial) -> dict[str, Change]:
             ]
         )
         for c in sizes:
-            change = _change(trial, c, on, values, left, columns, blocks, basis)
+            change = _change(
+                trial=trial,
+                c=c,
+                on=on,
+                values=values,
+                left=left,
+                columns=columns,
+                blocks=blocks,
+                basis=basis,
+            )
             instance = fit.unknowns[c].parameter.name.split(".")[0]
             if change and change.evidence > getattr(found.get(instance), "evidence", 0.0):
                 found[instance] = change

@@ -82,17 +82,17 @@ def explain(
     logs = {m.log_name: m.log_sha256 for m in measurements}
     noise = next((s.noise for s in diagnosis.modelled if s.noise), None)
     written = Fitted(
-        model,
-        [e for e in estimates if e.seen],
-        logs,
-        diagnosis.before.score,
-        total_score(fit.held_scores),
-        noise,
-        common_clock(fit),
-        bool(model_file.known_from_other_logs(logs.values())),
-        dict(diagnosis.rest.left_over or {}),
-        _own_values(diagnosis, fit),
-        fit.shared_covariance(),
+        model=model,
+        estimates=[e for e in estimates if e.seen],
+        logs=logs,
+        score_before=diagnosis.before.score,
+        score_after=total_score(fit.held_scores),
+        noise=noise,
+        clock=common_clock(fit),
+        base_told=bool(model_file.known_from_other_logs(logs.values())),
+        left_over=dict(diagnosis.rest.left_over or {}),
+        robots=_own_values(diagnosis, fit),
+        covariance=fit.shared_covariance(),
     )
     write_child(model_file, written, out, command)
     child = ModelFile.load(str(out))

@@ -200,18 +200,18 @@ def _judged(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
     others = total_score([a.before.held_score for a in alone if a is not own])
     effect = best_name if best_name != "gains" else " + ".join(e.name for e in parameters)
     return Outlier(
-        own.robot_id,
-        effect,
-        parameters,
-        before,
-        after,
-        best_p,
-        _plain(own.robot_id, parameters),
-        f"its errors are {before:.2f} times the floor with the model of all, those of the others "
-        f"{others:.2f}; with {effect} of its own {after:.2f}",
-        _smallest(own),
-        parameters if best_name == "gains" else [],
-        best.fit.models,
+        robot_id=own.robot_id,
+        effect=effect,
+        parameters=parameters,
+        score_before=before,
+        score_after=after,
+        p_value=best_p,
+        sentence=_plain(own.robot_id, parameters),
+        why=f"its errors are {before:.2f} times the floor with the model of all, those of the "
+        f"others {others:.2f}; with {effect} of its own {after:.2f}",
+        smallest_shown=_smallest(own),
+        gains=parameters if best_name == "gains" else [],
+        models=best.fit.models,
     )
 
 
@@ -238,18 +238,18 @@ def _unexplained(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
     before = own.before.held_score
     others = float(np.exp(middle))
     return Outlier(
-        own.robot_id,
-        None,
-        [],
-        before,
-        before,
-        ALPHA,
-        f"R{own.robot_id:02d} differs, and no effect of the catalogue explains how.",
-        f"its errors are {before:.2f} times the floor, those of the others {others:.2f}; pushes "
-        "and bumps by others would look so",
-        _smallest(own),
-        [],
-        own.before.fit.models,
+        robot_id=own.robot_id,
+        effect=None,
+        parameters=[],
+        score_before=before,
+        score_after=before,
+        p_value=ALPHA,
+        sentence=f"R{own.robot_id:02d} differs, and no effect of the catalogue explains how.",
+        why=f"its errors are {before:.2f} times the floor, those of the others {others:.2f}; "
+        "pushes and bumps by others would look so",
+        smallest_shown=_smallest(own),
+        gains=[],
+        models=own.before.fit.models,
     )
 
 

@@ -163,15 +163,15 @@ def design(
     after = told + fisher.predicted(planned)[0]
     outlook = _Outlook(asked, fisher, wanted, usual)
     return Plan(
-        why,
-        chosen,
-        rows_of(chosen, modelled.measurement.track.command_kind),
-        outlook.chances(told, after, planned),
-        whole.pose_t_s - whole.pose_t_s[0],
-        np.array([whole.path(m, CENTRE) for m in floor.models]),
-        limits,
-        modelled.model.get("robot.body_radius_m"),
-        modelled.measurement.track.robot_id,
+        why=why,
+        moves=chosen,
+        rows=rows_of(chosen, modelled.measurement.track.command_kind),
+        chances=outlook.chances(told, after, planned),
+        pose_t_s=whole.pose_t_s - whole.pose_t_s[0],
+        paths=np.array([whole.path(m, CENTRE) for m in floor.models]),
+        limits=limits,
+        radius_m=modelled.model.get("robot.body_radius_m"),
+        robot_id=modelled.measurement.track.robot_id,
     )
 
 

@@ -116,18 +116,18 @@ class Played:
         period_s = min(old.timing.command_period_s, SILENCE_S / 2)
         t_s = np.union1d(self.rows.t_s, np.arange(0.0, self.rows.t_s[-1], period_s))
         track = Track(
-            old.robot_id,
-            self.rows.kind,
-            t_s,
-            command_at(t_s, self.rows.t_s, self.rows.command),
-            np.full(len(t_s), self.battery_V),
-            self.pose_t_s,
-            pose,
-            self.part,
-            pose[:, 2],
-            np.zeros((0, 2)),
-            Timing(old.timing.pose_period_s, old.timing.command_period_s, 0.0, 0.0),
-            [],
+            robot_id=old.robot_id,
+            command_kind=self.rows.kind,
+            command_t_s=t_s,
+            command=command_at(t_s, self.rows.t_s, self.rows.command),
+            battery_V=np.full(len(t_s), self.battery_V),
+            pose_t_s=self.pose_t_s,
+            pose=pose,
+            segment=self.part,
+            heading_smooth=pose[:, 2],
+            rest=np.zeros((0, 2)),
+            timing=Timing(old.timing.pose_period_s, old.timing.command_period_s, 0.0, 0.0),
+            notes=[],
         )
         seen = Measurement("planned", "", track, [], 0)
         return replace(like, measurement=seen, grid=StepGrid.of(seen))

@@ -28,13 +28,13 @@ def sdf(robot: RobotModel) -> tuple[str, list[Left]]:
     model = ET.SubElement(root, "model", name=robot.name)
     wheel_m, body_m = robot.get("robot.wheel_radius_m"), robot.get("robot.body_radius_m")
     base = _solid(
-        model,
-        "base_link",
-        (0, 0, wheel_m + HULL_HEIGHT_M / 2, 0, 0, 0),
-        body_m,
-        HULL_HEIGHT_M,
-        robot.hull_mass_kg,
-        robot.hull_inertia_kgm2(),
+        model=model,
+        name="base_link",
+        pose=(0, 0, wheel_m + HULL_HEIGHT_M / 2, 0, 0, 0),
+        radius_m=body_m,
+        length_m=HULL_HEIGHT_M,
+        mass_kg=robot.hull_mass_kg,
+        inertia_kgm2=robot.hull_inertia_kgm2(),
     )
     _camera(base, robot, body_m)
     for wheel in robot.model.wheels():
@@ -74,13 +74,13 @@ def _wheel(model: ET.Element, robot: RobotModel, wheel: dict) -> None:
     heading_rad = float(np.arctan2(wheel["roll"][1], wheel["roll"][0]))
     pose = (wheel["x_m"], wheel["y_m"], radius_m, -np.pi / 2, 0, heading_rad)
     link = _solid(
-        model,
-        f"{name}_wheel",
-        pose,
-        radius_m,
-        WHEEL_WIDTH * radius_m,
-        robot.wheel_mass_kg,
-        robot.wheel_inertia_kgm2(),
+        model=model,
+        name=f"{name}_wheel",
+        pose=pose,
+        radius_m=radius_m,
+        length_m=WHEEL_WIDTH * radius_m,
+        mass_kg=robot.wheel_mass_kg,
+        inertia_kgm2=robot.wheel_inertia_kgm2(),
     )
     if robot.model.wheel_kind == "mecanum":
         surface = ET.SubElement(link.find("collision"), "surface")

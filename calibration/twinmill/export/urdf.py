@@ -22,21 +22,29 @@ def urdf(robot: RobotModel) -> tuple[str, list[Left]]:
     ET.SubElement(root, "link", name="base_footprint")
     _joint(root, "base_joint", "fixed", "base_footprint", "base_link", (0, 0, wheel_m))
     _solid(
-        root,
-        "base_link",
-        (0, 0, HULL_HEIGHT_M / 2),
-        (0, 0, 0),
-        body_m,
-        HULL_HEIGHT_M,
-        robot.hull_mass_kg,
-        robot.hull_inertia_kgm2(),
+        root=root,
+        name="base_link",
+        place=(0, 0, HULL_HEIGHT_M / 2),
+        turned=(0, 0, 0),
+        radius_m=body_m,
+        length_m=HULL_HEIGHT_M,
+        mass_kg=robot.hull_mass_kg,
+        inertia_kgm2=robot.hull_inertia_kgm2(),
     )
     for wheel in robot.model.wheels():
         _wheel(root, robot, wheel)
     pan_rad = robot.model.detection_model()["pan_rad"]
     ET.SubElement(root, "link", name="camera_link")
     place = (body_m, 0, HULL_HEIGHT_M / 2)
-    _joint(root, "camera_joint", "fixed", "base_link", "camera_link", place, (0, 0, pan_rad))
+    _joint(
+        root=root,
+        name="camera_joint",
+        kind="fixed",
+        parent="base_link",
+        child="camera_link",
+        place=place,
+        turned=(0, 0, pan_rad),
+    )
     ET.indent(root)
     return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n", left
 
@@ -53,19 +61,25 @@ def _wheel(root: ET.Element, robot: RobotModel, wheel: dict) -> None:
     """Turns about its axle (z of its link, to the left of where it rolls)."""
     name, radius_m = wheel["name"], robot.get("robot.wheel_radius_m")
     _solid(
-        root,
-        f"{name}_wheel",
-        (0, 0, 0),
-        (0, 0, 0),
-        radius_m,
-        WHEEL_WIDTH * radius_m,
-        robot.wheel_mass_kg,
-        robot.wheel_inertia_kgm2(),
+        root=root,
+        name=f"{name}_wheel",
+        place=(0, 0, 0),
+        turned=(0, 0, 0),
+        radius_m=radius_m,
+        length_m=WHEEL_WIDTH * radius_m,
+        mass_kg=robot.wheel_mass_kg,
+        inertia_kgm2=robot.wheel_inertia_kgm2(),
     )
     heading_rad = float(np.arctan2(wheel["roll"][1], wheel["roll"][0]))
     place, turned = (wheel["x_m"], wheel["y_m"], 0), (-np.pi / 2, 0, heading_rad)
     joint = _joint(
-        root, f"{name}_wheel_joint", "continuous", "base_link", f"{name}_wheel", place, turned
+        root=root,
+        name=f"{name}_wheel_joint",
+        kind="continuous",
+        parent="base_link",
+        child=f"{name}_wheel",
+        place=place,
+        turned=turned,
     )
     ET.SubElement(joint, "axis", xyz="0 0 1")
     if top_mps := robot.top_rim_mps:

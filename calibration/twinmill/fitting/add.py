@@ -182,14 +182,14 @@ def add(
     write_child(
         model_file,
         Fitted(
-            with_estimates(richer, estimates),
-            [e for e in estimates if e.seen],
-            logs,
-            before.score,
-            after.score,
-            noise_of(after),
-            common_clock(found),
-            bool(told),
+            model=with_estimates(richer, estimates),
+            estimates=[e for e in estimates if e.seen],
+            logs=logs,
+            score_before=before.score,
+            score_after=after.score,
+            noise=noise_of(after),
+            clock=common_clock(found),
+            base_told=bool(told),
             robots={} if robot_id is None else {robot_id: own},
             covariance=found.shared_covariance(),
         ),
@@ -219,14 +219,14 @@ def _add_to_camera(
     fitted_model = Fitted(found.model, estimates, logs, before.score, after.score)
     write_child(model_file, fitted_model, out, command)
     return CameraAddResult(
-        effect,
-        model_file.path.name,
-        before,
-        after,
-        without.score,
-        found.score,
-        estimates,
-        Path(out),
+        effect=effect,
+        model_name=model_file.path.name,
+        before=before,
+        after=after,
+        heldout_before=without.score,
+        heldout_after=found.score,
+        parameters=estimates,
+        path=Path(out),
     )
 
 

@@ -82,15 +82,15 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     floor = np.sqrt((rms(within) ** 2 + rms(across) ** 2) / 2)
     moves = rms(data.measured) > 1e-9
     return NoiseFloor(
-        np.where(moves, np.maximum(floor, 1e-9), np.nan),
-        keep,
-        "response",
-        "",
-        offset_s,
-        base.get(HEADING),
-        base.get(LAG) + (base.get("input_delay.delay_s") if same_clock else np.nan),
-        response.across,
-        response,
+        rms=np.where(moves, np.maximum(floor, 1e-9), np.nan),
+        keep=keep,
+        kind="response",
+        reason="",
+        offset_s=offset_s,
+        heading_rad=base.get(HEADING),
+        lateness_s=base.get(LAG) + (base.get("input_delay.delay_s") if same_clock else np.nan),
+        across=response.across,
+        response=response,
     )
 
 
@@ -206,4 +206,14 @@ def _none(data: Trajectory, reason: str) -> NoiseFloor:
     nothing = np.full(data.floor.shape, np.nan)
     empty = np.full(data.measured.shape, np.nan)
     everything = np.ones(len(data.measured), bool)
-    return NoiseFloor(nothing, everything, None, reason, 0.0, 0.0, np.nan, empty, None)
+    return NoiseFloor(
+        rms=nothing,
+        keep=everything,
+        kind=None,
+        reason=reason,
+        offset_s=0.0,
+        heading_rad=0.0,
+        lateness_s=np.nan,
+        across=empty,
+        response=None,
+    )

@@ -167,7 +167,19 @@ def base_parameters(model: native.Model, names: Iterable[str]) -> list[Parameter
         std, step = USUAL_STD.get(name, GAIN_STD), BASE_STEP.get(name, GAIN_STEP)
         timed = name in (LAG, CLOCK)
         at = v["value"]
-        found.append(Parameter(name, v["unit"], at, v["min"], v["max"], at, std, step, timed))
+        found.append(
+            Parameter(
+                name=name,
+                unit=v["unit"],
+                value=at,
+                min=v["min"],
+                max=v["max"],
+                usual=at,
+                std=std,
+                step=step,
+                central=timed,
+            )
+        )
     return found
 
 
@@ -188,17 +200,17 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
         strength = p["default"] - p["neutral"]
         found.append(
             Parameter(
-                full,
-                p["unit"],
-                p["default"] if fresh else model.get(full),
-                low,
-                high,
-                p["neutral"],
-                high - low if texts else p["usual_size"],
-                EFFECT_STEP * abs(strength),
-                p["unit"] == "s",
-                p["role"],
-                strength,
+                name=full,
+                unit=p["unit"],
+                value=p["default"] if fresh else model.get(full),
+                min=low,
+                max=high,
+                usual=p["neutral"],
+                std=high - low if texts else p["usual_size"],
+                step=EFFECT_STEP * abs(strength),
+                central=p["unit"] == "s",
+                role=p["role"],
+                strength=strength,
             )
         )
     return found

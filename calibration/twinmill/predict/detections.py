@@ -179,19 +179,19 @@ def detections_of(together: list[ModelledLog], own: int) -> Detections:
     noise, frames = modelled.noise.to_json(), modelled.measurement.frames
     block = ((frames.t_s - frames.t_s[0]) // BLOCK_S).astype(int)
     made = Detections(
-        modelled.measurement.label,
-        modelled.measurement.track.robot_id,
-        modelled.measurement.log_sha256,
-        own,
-        [s.measurement.track for s in together],
-        frames,
-        np.ones(len(frames.t_s), bool),
-        modelled.model.get(CLOCK),
-        modelled.model.get(CLOCK_RATE) * 1e-6,
-        modelled.clock_free,
-        (max(noise["sensor_m"], LEAST_M), max(noise["sensor_rad"], LEAST_RAD)),
-        block,
-        thue_morse(block),
+        label=modelled.measurement.label,
+        robot_id=modelled.measurement.track.robot_id,
+        log_sha256=modelled.measurement.log_sha256,
+        own=own,
+        tracks=[s.measurement.track for s in together],
+        frames=frames,
+        usable=np.ones(len(frames.t_s), bool),
+        offset_s=modelled.model.get(CLOCK),
+        rate=modelled.model.get(CLOCK_RATE) * 1e-6,
+        clock_free=modelled.clock_free,
+        blur=(max(noise["sensor_m"], LEAST_M), max(noise["sensor_rad"], LEAST_RAD)),
+        block=block,
+        half=thue_morse(block),
     )
     made.usable = np.isfinite(made.poses(0.0)).all(axis=(1, 2))
     return made

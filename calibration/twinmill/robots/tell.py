@@ -280,14 +280,14 @@ def _answer(robot: Robot, command) -> Answer:
     if ack and not signed:
         reason = reason or NO_SIGNATURE
     return Answer(
-        robot.robot_id,
-        bool(ack.accepted) if ack else None,
-        signed is not None,
-        reason,
-        robot.mode,
-        robot.confirms(command.seq) if command.verb == VERBS.VERB_STOP else robot.stands,
-        robot.is_double,
-        robot.alarms,
+        robot_id=robot.robot_id,
+        accepted=bool(ack.accepted) if ack else None,
+        signed=signed is not None,
+        reason=reason,
+        mode=robot.mode,
+        stands=robot.confirms(command.seq) if command.verb == VERBS.VERB_STOP else robot.stands,
+        is_double=robot.is_double,
+        alarms=robot.alarms,
     )
 
 

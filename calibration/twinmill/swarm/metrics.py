@@ -96,7 +96,16 @@ def swarm_metrics(
     )
     means = _moving_mean(t_s, values)
     classes = native.classify(np.ascontiguousarray(means))
-    return SwarmSeries(order, sorted(odd), t_s, pose, values, classes, means[-1], classes[-1])
+    return SwarmSeries(
+        robots=order,
+        odd=sorted(odd),
+        t_s=t_s,
+        pose=pose,
+        values=values,
+        classes=classes,
+        mean=means[-1],
+        final=classes[-1],
+    )
 
 
 def _odd(robots: dict[int, RobotLog]) -> list[int]:

@@ -219,7 +219,16 @@ def design_for(
     (whole,) = _products(Played.of([chosen], modelled).modelled(modelled, CENTRE), free)
     fits = _left_by_fits(spread, file, modelled, chosen, excess)
     robot_id = modelled.measurement.track.robot_id
-    return Narrowing(spread, goal, chosen, rows_of(chosen), fits, left(whole), untold, robot_id)
+    return Narrowing(
+        spread=spread,
+        goal=goal,
+        moves=chosen,
+        rows=rows_of(chosen),
+        covariance=fits,
+        bound=left(whole),
+        untold=untold,
+        robot_id=robot_id,
+    )
 
 
 def _left_by_fits(

@@ -112,14 +112,14 @@ def phase_of(request: Request, table: pa.Table, goal: str) -> Phase:
         return np.median(table[name].to_numpy().reshape(cells, seeds), axis=1)
 
     return Phase(
-        request,
-        table,
-        goal,
-        np.array(request.points),
-        np.stack([(ended == k).sum(axis=1) for k in range(len(CLASSES))], axis=1),
-        reached(table, goal).reshape(cells, seeds).sum(axis=1),
-        seeds,
-        median("circliness"),
-        median("radius_m"),
-        median("odd_ratio"),
+        request=request,
+        table=table,
+        goal=goal,
+        points=np.array(request.points),
+        counts=np.stack([(ended == k).sum(axis=1) for k in range(len(CLASSES))], axis=1),
+        hits=reached(table, goal).reshape(cells, seeds).sum(axis=1),
+        seeds=seeds,
+        circliness=median("circliness"),
+        radius_m=median("radius_m"),
+        odd_ratio=median("odd_ratio"),
     )

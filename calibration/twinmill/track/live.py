@@ -126,7 +126,15 @@ def publish(
         count.frames += 1
         poses = {n: held.pose for n, held in seen.items()}
         lost = [n for n in mine if n not in seen]
-        count.sight = FrameDetections(k, stamp_s, picture, numbers, corners, poses, lost)
+        count.sight = FrameDetections(
+            camera=k,
+            stamp_s=stamp_s,
+            picture=picture,
+            numbers=numbers,
+            corners_px=corners,
+            poses=poses,
+            lost=lost,
+        )
         yield count
 
 

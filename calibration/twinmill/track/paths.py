@@ -80,7 +80,12 @@ def follow(stamp_s: np.ndarray, seen: Sightings, view: View, tags: Tags) -> list
     ratio = squares.side_m / np.nanmedian(squares.side_m)
     good = (np.abs(ratio - 1) < SIZE_ODD) & (squares.error_px < ERROR_PX)
     check_single(seen.of(good))
-    return [_one(n, stamp_s, seen, squares, good, view, tags) for n in robots]
+    return [
+        _one(
+            robot_id=n, stamp_s=stamp_s, seen=seen, squares=squares, good=good, view=view, tags=tags
+        )
+        for n in robots
+    ]
 
 
 def _choose(counts: dict[int, int], frames: int, wanted: frozenset[int] | None) -> list[int]:

@@ -120,14 +120,14 @@ def judge(paths: list[RobotPath], view: View, tags: Tags) -> Quality:
     # A wheel of four that loses the share g turns a robot at speed v by g v / (4 lever).
     turn_rad = SPEED_MPS * WINDOW_S / (4 * LEVER_M)
     return Quality(
-        robots,
-        float(1 / np.median(np.diff(paths[0].t_s))) if len(paths[0].t_s) > 1 else np.nan,
-        view.error_px,
-        float(view.position_m[2]),
-        view.tilt_rad,
-        tuple(_of_place(m) for m in off_m),
-        tuple(_of_heading(m, tags.size_m) for m in off_m),
-        3 * np.sqrt(2) * noise_rad / turn_rad,
+        robots=robots,
+        rate_hz=float(1 / np.median(np.diff(paths[0].t_s))) if len(paths[0].t_s) > 1 else np.nan,
+        floor_error_px=view.error_px,
+        camera_height_m=float(view.position_m[2]),
+        camera_tilt_rad=view.tilt_rad,
+        position_over_floor_m=tuple(_of_place(m) for m in off_m),
+        heading_over_floor_rad=tuple(_of_heading(m, tags.size_m) for m in off_m),
+        weakest_wheel=3 * np.sqrt(2) * noise_rad / turn_rad,
     )
 
 
@@ -140,16 +140,16 @@ def _robot(path: RobotPath, size_m: float) -> RobotQuality:
     scale = np.median(path.scale_px_per_m[valid]) if valid.any() else np.nan
     one_m = _of_one(rms_px) / scale
     return RobotQuality(
-        path.robot_id,
-        len(valid),
-        float(1 - valid.mean()),
-        _longest_gap_s(path),
-        path.odd,
-        rms_px,
-        float(np.sqrt((x**2 + y**2) / 2)),
-        _noise(path.t_s, heading),
-        _of_place(one_m),
-        _of_heading(one_m, size_m),
+        robot_id=path.robot_id,
+        frames=len(valid),
+        lost_share=float(1 - valid.mean()),
+        longest_gap_s=_longest_gap_s(path),
+        odd=path.odd,
+        error_px=rms_px,
+        position_noise_m=float(np.sqrt((x**2 + y**2) / 2)),
+        heading_noise_rad=_noise(path.t_s, heading),
+        corner_position_m=_of_place(one_m),
+        corner_heading_rad=_of_heading(one_m, size_m),
     )
 
 

@@ -189,7 +189,17 @@ class Search:
             left, gain = self._judged(power, along, total)
             k = int(left.sum(axis=1).argmin())
             late_s = float(self.lates_s[k])
-            found.append(Explained(OWN, float(left[k].sum()), left[k], 0.0, gain[k], lag_s, late_s))
+            found.append(
+                Explained(
+                    alternative=OWN,
+                    left=float(left[k].sum()),
+                    by_block=left[k],
+                    turned_rad=0.0,
+                    gain=gain[k],
+                    lag_s=lag_s,
+                    late_s=late_s,
+                )
+            )
         own = min(found, key=lambda e: e.left)
         self._own_key = [(own.lag_s, own.late_s)]
         return own
@@ -222,7 +232,15 @@ class Search:
         left, gain = self._left(
             self.wheels[None], self._by_block(rows, rows), self._by_block(rows, speeds), total
         )
-        return Explained(OWN, float(left.sum()), left[0], 0.0, gain[0], own.lag_s, float(late_s))
+        return Explained(
+            alternative=OWN,
+            left=float(left.sum()),
+            by_block=left[0],
+            turned_rad=0.0,
+            gain=gain[0],
+            lag_s=own.lag_s,
+            late_s=float(late_s),
+        )
 
     def _best_of(
         self,

@@ -67,14 +67,14 @@ class Motion:
         last = max(track.command_t_s[-1], track.pose_t_s[-1]) + 1
         grid_s = np.arange(first, last, GRID_S)
         return cls(
-            track.pose_t_s[known],
-            slope[known, 0] + 1j * slope[known, 1],
-            slope[known, 2],
-            heading_rad[known],
-            track.has_heading,
-            grid_s,
-            _shapes(track, grid_s),
-            half_s,
+            t_s=track.pose_t_s[known],
+            world_mps=slope[known, 0] + 1j * slope[known, 1],
+            turn_radps=slope[known, 2],
+            heading_rad=heading_rad[known],
+            has_heading=track.has_heading,
+            grid_s=grid_s,
+            shapes=_shapes(track, grid_s),
+            half_s=half_s,
         )
 
     @cached_property

@@ -68,15 +68,15 @@ def read_io_tsv(path: Path, robot_id: int | None) -> CommandSeries:
         else []
     )
     return CommandSeries(
-        robot_id,
-        np.array(times),
-        "duty",
-        np.array([duties_from_vendor_move(*move) for move in moves], float),
-        False,
-        np.column_stack([v * np.sin(np.radians(d)), -w]),
-        np.array(seen),
-        turbopi.telemetry_t.MODE_TABLE,
-        warnings,
+        robot_id=robot_id,
+        utime_us=np.array(times),
+        kind="duty",
+        value=np.array([duties_from_vendor_move(*move) for move in moves], float),
+        repeat=False,
+        inputs=np.column_stack([v * np.sin(np.radians(d)), -w]),
+        detected=np.array(seen),
+        mode=turbopi.telemetry_t.MODE_TABLE,
+        warnings=warnings,
     )
 
 

@@ -117,14 +117,14 @@ def read_commands(path: Path, columns: Columns) -> list[CommandSeries]:
     value = _values(table, kind, inputs)
     return [
         CommandSeries(
-            number,
-            utime_us[rows],
-            kind,
-            value[rows],
-            kind == "duty",
-            inputs[rows],
-            np.zeros((len(rows), 2), int),
-            turbopi.telemetry_t.MODE_SCRIPT,
+            robot_id=number,
+            utime_us=utime_us[rows],
+            kind=kind,
+            value=value[rows],
+            repeat=kind == "duty",
+            inputs=inputs[rows],
+            detected=np.zeros((len(rows), 2), int),
+            mode=turbopi.telemetry_t.MODE_SCRIPT,
             warnings=notes,
             world=world,
         )

@@ -381,7 +381,15 @@ class _Rows:
         widths = sorted(messages.widths)
         camera = messages.kind in TAGS or bool(OF_CAMERA.search(messages.root.lower()))
         utime_us = stamps_ns[kept] // 1000
-        return cls(topic, messages.kind, utime_us, value[kept], widths, notes, camera)
+        return cls(
+            topic=topic,
+            kind=messages.kind,
+            utime_us=utime_us,
+            value=value[kept],
+            widths=widths,
+            notes=notes,
+            of_camera=camera,
+        )
 
     def ordered(self) -> tuple[np.ndarray, list[str]]:
         """Rows in order of time, the last of each stamp; remarks."""
@@ -578,15 +586,15 @@ def _commands(robot_id: int, given: _Rows, options: BagOptions) -> CommandSeries
         notes = notes + more
     unknown = np.full((len(rows), 2), np.nan)
     return CommandSeries(
-        robot_id,
-        given.utime_us[rows],
-        command_kind,
-        value,
-        command_kind == "duty",
-        unknown,
-        np.zeros((len(rows), 2), int),
-        turbopi.telemetry_t.MODE_SCRIPT,
-        notes,
+        robot_id=robot_id,
+        utime_us=given.utime_us[rows],
+        kind=command_kind,
+        value=value,
+        repeat=command_kind == "duty",
+        inputs=unknown,
+        detected=np.zeros((len(rows), 2), int),
+        mode=turbopi.telemetry_t.MODE_SCRIPT,
+        warnings=notes,
     )
 
 

@@ -87,13 +87,13 @@ def rank_bits(done: DetectionSearch, group: int) -> list[Ranked]:
 
 def _entry(trial: Trial, done: DetectionSearch, total: float, group: int | None) -> Ranked:
     return Ranked(
-        trial.fit.effect or "",
-        trial.fit.score,
-        max(trial.evidence.gain, 0.0) / max(total, trial.evidence.gain, 1e-9),
-        trial.evidence.p_value(len(done.candidates)),
-        trial.evidence.worth,
-        list(trial.fit.added),
-        group,
+        effect=trial.fit.effect or "",
+        score_heldout=trial.fit.score,
+        share_explained=max(trial.evidence.gain, 0.0) / max(total, trial.evidence.gain, 1e-9),
+        p_value=trial.evidence.p_value(len(done.candidates)),
+        evidence=trial.evidence.worth,
+        parameters=list(trial.fit.added),
+        group=group,
     )
 
 

@@ -109,16 +109,16 @@ def _judge_camera(
         else "no effect of the catalogue explains it"
     )
     return Outlier(
-        robot_id,
-        " + ".join(done.found) or None,
-        parameters,
-        before.score,
-        after.score,
-        float(min(1.0, p_value)),
-        _plain(robot_id, parameters),
-        told,
-        {},
-        [],
+        robot_id=robot_id,
+        effect=" + ".join(done.found) or None,
+        parameters=parameters,
+        score_before=before.score,
+        score_after=after.score,
+        p_value=float(min(1.0, p_value)),
+        sentence=_plain(robot_id, parameters),
+        why=told,
+        smallest_shown={},
+        gains=[],
     )
 
 

@@ -99,14 +99,14 @@ def score(
         rivals.append(Rival(name, _bounded(theirs, cell, seed), brier, _mean(logs - theirs, cell)))
     missed = share[cell].argmax(axis=1) != seen
     return Score(
-        len(seen),
-        _bounded(logs, cell, seed),
-        _bounded(squares, cell, seed),
-        Mean(float(imagined.mean()), *map(float, np.quantile(imagined, [0.025, 0.975]))),
-        float((1 + np.sum(imagined <= logs.mean())) / (1 + LABS)),
-        rivals,
-        int(np.sum(~missed)),
-        _common(expected, cell, seen, missed, axes),
+        runs=len(seen),
+        log_score=_bounded(logs, cell, seed),
+        brier=_bounded(squares, cell, seed),
+        expected=Mean(float(imagined.mean()), *map(float, np.quantile(imagined, [0.025, 0.975]))),
+        p_value=float((1 + np.sum(imagined <= logs.mean())) / (1 + LABS)),
+        rivals=rivals,
+        hits=int(np.sum(~missed)),
+        misses=_common(expected, cell, seen, missed, axes),
     )
 
 

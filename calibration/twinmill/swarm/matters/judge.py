@@ -166,14 +166,14 @@ def judge(
         judged.values(), key=lambda j: (order.index(j.verdict), -abs(j.worst.share.change))
     )
     return Matters(
-        request,
-        goal,
-        margin,
-        (float(hits.mean()), *interval(hits.sum(), len(hits))),
-        {name: _median(_values(before, name, hits)) for name in METRICS},
-        [j for j in ranked if j.factor.kind != "together"],
-        next((j for j in ranked if j.factor.kind == "together"), None),
-        left,
+        request=request,
+        goal=goal,
+        margin=margin,
+        before=(float(hits.mean()), *interval(hits.sum(), len(hits))),
+        medians={name: _median(_values(before, name, hits)) for name in METRICS},
+        ranked=[j for j in ranked if j.factor.kind != "together"],
+        together=next((j for j in ranked if j.factor.kind == "together"), None),
+        left=left,
     )
 
 
