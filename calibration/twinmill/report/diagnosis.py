@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from twinmill.diagnosis.explain import Explanation, steps
-from twinmill.diagnosis.outliers import Outlier
+from twinmill.diagnosis.outliers import FEWEST, Outlier
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.report import Figure, Section, comparisons, detections, show, tables
@@ -20,6 +20,10 @@ from twinmill.report.tables import Cell, Table, Tone, number, rounded, tone
 from twinmill.terminal import whole
 
 LEAST_TAKES = 0.05  # share of what is left that a formula must take to be worth a word
+TOO_FEW = (
+    f"Of fewer than {FEWEST} robots none can be called the odd one, and what one has is looked for "
+    "in all: where their scores differ (twinmill compare), give each a log of its own."
+)
 
 Commands = Sequence[tuple[str, str]]  # what for, and the line to type
 
@@ -105,10 +109,12 @@ def unseen(diagnosis: Diagnosis) -> Table:
 def each_robot(diagnosis: Diagnosis) -> Table:
     """What is said of each robot, and what its logs would have shown of it."""
     off = {o.robot_id: _said_of(o.sentence) for o in diagnosis.robots_off}
+    count = len(diagnosis.robots)
+    usual = "alone" if count == 1 else "as all" if count >= FEWEST else "not compared"
     rows = [
         [
             Cell(f"R{r.robot_id:02d}", "bad" if r.robot_id in off else ""),
-            Cell(off.get(r.robot_id, "as all" if len(diagnosis.robots) > 1 else "alone")),
+            Cell(off.get(r.robot_id, usual)),
             *(Cell("-" if d is None else f"{100 * d:.1f} %") for d in (r.speed, r.turn)),
         ]
         for r in diagnosis.robots
@@ -118,7 +124,7 @@ def each_robot(diagnosis: Diagnosis) -> Table:
         ["robot", "it is", "would show\nin speed", "in turning"],
         rows,
         "Would show: the smallest difference from the model that these logs would have put beyond "
-        "doubt; a smaller one is not excluded.",
+        "doubt; a smaller one is not excluded." + (f" {TOO_FEW}" if 1 < count < FEWEST else ""),
         words=(1,),
     )
 

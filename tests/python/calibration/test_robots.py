@@ -16,7 +16,7 @@ from twinmill.diagnosis.explain import explain
 from twinmill.fitting.compare import MISSING, compare
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
-from twinmill.report.diagnosis import found_models
+from twinmill.report.diagnosis import each_robot, found_models
 
 ROOT = Path(__file__).resolve().parents[3]
 TWIN_RUN = os.environ.get("TWIN_RUN", str(ROOT / "build/bin/twin_run"))
@@ -59,6 +59,16 @@ def test_robots_with_gains_of_their_own_are_not_off(logged):
     found = diagnose(*logged(""))
     assert found.robots_off == ()
     assert found.found == []
+
+
+def test_of_two_robots_none_is_said_to_be_as_the_other(logged):
+    """Which of two is the odd one nothing tells, so a weak one must not stand there as like it."""
+    measurements, plain = logged(WHEELS + "[robots.R01]\nwheel_gain.fl = -0.1\n")
+    found = diagnose(measurements[:2], plain)
+    assert found.robots_off == ()
+    table = each_robot(found)
+    assert [row[1].text for row in table.rows] == ["not compared"] * 2
+    assert "a log of its own" in table.note
 
 
 def pushed(measurement, at_s, move_m, turn_rad):
