@@ -211,7 +211,7 @@ def _concluded(
         findings, last.state.model, model_file.lag_std_s(hashes), model_file.effect_stds
     )
     rest = rest_of(formulas, last.fit, start.fit, model_file.left_over(hashes))
-    findings = beside_more(of_another_form(findings, rest.depends_on), rest)
+    findings = beside_more(of_another_form(findings, rest), rest)
     told = [f.depends_on for f in findings if f.depends_on]
     rest = replace(rest, depends_on=[*dict.fromkeys([*told, *rest.depends_on])])
     models = zip(known, last.state.models, strict=True)

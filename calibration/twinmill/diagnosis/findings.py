@@ -10,16 +10,19 @@ import twinmill_native as native
 
 from twinmill.diagnosis.constancy import Change, changes_of
 from twinmill.diagnosis.library import CHANGE, TIME
-from twinmill.diagnosis.rest import Rest
+from twinmill.diagnosis.rest import LEAST, Rest
 from twinmill.diagnosis.search import (
+    PAUSE_S,
     REFIT,
     Round,
     Search,
     State,
     Trial,
+    against,
     comes_again,
     fitted,
     grown,
+    in_common,
     of_levels,
 )
 from twinmill.fitting.compare import GOOD
@@ -53,6 +56,7 @@ BY = {
 }
 SLIGHT = 0.3  # of the squared score that is left: what a second finding must at least take
 LAG_LEAVES = 0.25  # at most, of what was to be explained, where nothing else is late
+SAME, SAME_FALL = 0.8, 0.9  # cosine of what two take of the errors, and share that one takes
 NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
 
 
@@ -145,9 +149,8 @@ def findings_of(
 ) -> tuple[list[Finding], list[tuple[str, float]]]:
     """Findings in the order of worth, and the held-out score after each of them.
 
-    Worth is what the final model loses without the effect. Shares are those of a chain that adds
-    the effects in this order. Effects that stand in for each other lose little alone: where the
-    first takes less than a later one, the order is that of what each takes in the chain.
+    Worth is the share that an effect takes. What each takes depends on what was taken before, so
+    effects are added in one order and in its reverse, and a share is the mean of both.
 
     Args:
         done: the search.
@@ -158,28 +161,54 @@ def findings_of(
     given = _as_given(done.last, first) if REFIT in names else None
     loss = {n: _loss(done.last, given if n == REFIT else less[n]) for n in names}
     names.sort(key=lambda n: -loss[n])
-    chain = _chain(names, first, done.last)
-    falls = {
-        n: a.held_score**2 - b.held_score**2
-        for n, (a, b) in zip(names, pairwise(chain), strict=True)
-    }
-    if falls and max(falls.values()) > falls[names[0]]:
-        names.sort(key=lambda n: -falls[n])
-        chain = _chain(names, first, done.last)
-    errors = [_squared(t) for t in chain]
-    # Where the floor itself holds a part of what was found, the final error stands for it.
-    excess = max(errors[0] - min(errors[-1], 1.0), 1e-9)
+    chains = [(own, _chain(own, first, done.last)) for own in (names, names[::-1])]
+    takes = [_takes(*chain) for chain in chains]
+    shares = {n: float(np.mean([own[n] for own in takes])) for n in names}
+    names = sorted(names, key=lambda n: -shares[n])
+    known = next((chain for own, chain in chains if own == names), None)
+    chain = known or _chain(names, first, done.last)
     changes = changes_of(done.last)
     found = []
     for k, name in enumerate(names):
-        share = float(np.clip((errors[k] - errors[k + 1]) / excess, 0.0, 1.0))
-        finding = _finding(done, name, less.get(name), share, changes)
+        finding = _finding(done, name, less.get(name), shares[name], changes)
         if again := comes_again(done, name):
             why = f"it comes more than once: from {again[0]:.0f} to {again[1]:.0f} s, too"
             finding = _doubted(finding, why, wrong_form=True, depends_on=TIME)
+        if other := _stand_in(done, name):
+            why = f"{other} alone takes the same errors: both may be one other effect"
+            finding = _doubted(finding, why, wrong_form=True)
         larger = next((n for n in names[:k] if n != REFIT), None)
         found.append(_beside_larger(finding, larger, *chain[k : k + 2]))
     return found, [(n, t.held_score) for n, t in zip(names, chain[1:], strict=True)]
+
+
+def _takes(names: Sequence[str], chain: Sequence[Trial]) -> dict[str, float]:
+    """Share of the squared error at 0.5 s above the floor that each takes in a chain."""
+    errors = [_squared(t) for t in chain]
+    # Where the floor itself holds a part of what was found, the final error stands for it.
+    excess = max(errors[0] - min(errors[-1], 1.0), 1e-9)
+    falls = [a - b for a, b in pairwise(errors)]
+    return {n: float(np.clip(f / excess, 0.0, 1.0)) for n, f in zip(names, falls, strict=True)}
+
+
+def _stand_in(done: Search, name: str) -> str | None:
+    """Another effect that was found and alone does what this one does; None if there is none.
+
+    Of two that act by the same thing the better one is right, and the other its rest; see KINDS.
+    """
+    this = _round_of(done, name)
+    if name == REFIT or this.accepted.names != (name,):
+        return None
+    taken = this.before.held_score**2 - this.accepted.held_score**2
+    for trial in this.trials:
+        (other, *more) = trial.names
+        if more or other in (name, REFIT) or other not in done.found:
+            continue
+        alike = any(kind(name) and kind(other) for kind, *_ in KINDS)
+        as_much = this.before.held_score**2 - trial.held_score**2 > SAME_FALL * taken
+        if as_much and not alike and in_common(this.before, this.accepted, trial) > SAME:
+            return other
+    return None
 
 
 def _beside_larger(finding: Finding, larger: str | None, before: Trial, after: Trial) -> Finding:
@@ -192,44 +221,78 @@ def _beside_larger(finding: Finding, larger: str | None, before: Trial, after: T
     )
 
 
-def of_another_form(found: Sequence[Finding], depends_on: Sequence[str]) -> list[Finding]:
+def of_another_form(found: Sequence[Finding], rest: Rest) -> list[Finding]:
     """Findings, doubtful where their form is wrong.
 
     So it is where what is left still depends on what they act by; where one makes the robot later
     and another sooner: a lag below its own and a delay imitate a body that swings; and where a
-    second one bends the curve of speed over command as a better one does already, or comes late at
-    every change of the command; and where losses come at several times.
+    second one of KINDS does what a better one does already; and where losses come at several times,
+    or as large ones at a place and at a moment.
 
     Args:
         found: in the order of worth.
-        depends_on: groups that what is left depends on.
+        rest: what is left.
     """
+    depends_on = rest.depends_on if rest.share > LEAST else ()
     late_s = [_lateness_s(f) for f in found]
     swings = min(late_s, default=0.0) < 0 < max(late_s, default=0.0)
-    curves = [f.effect for f in found if f.effect in _curves()]
-    late = [f.effect for f in found if _is_late(f)]
-    events = [f.effect for f in found if with_role(f.effect, "moment")]
+    losses = _alike_losses(found)
 
     def judged(finding: Finding) -> Finding:
         if swings and _lateness_s(finding):
             why = "sooner by one lag and later by another is what a body does that swings"
             return _doubted(finding, why, wrong_form=True, depends_on=CHANGE)
-        if finding.effect in events and len(events) > 1:
+        if finding in losses and len(losses) > 1:
             why = "losses at several times may be one that comes and goes"
             return _doubted(finding, why, wrong_form=True, depends_on=TIME)
-        on = next((group for group in depends_on if BY.get(group, set()) & _acts_by(finding)), None)
+        on = next(
+            (group for group in depends_on if BY.get(group, set()) & _acts_by(finding.effect)), None
+        )
         if on is not None:
             why = f"what is left still depends on {on}, so that it may have another form"
             return _doubted(finding, why, wrong_form=True)
-        if finding.effect in curves[1:]:
-            why = f"{curves[0]} bends the speed over the command, too: both may be one other curve"
-            return _doubted(finding, why)
-        if finding.effect in late[1:]:
-            why = f"{late[0]} is late at changes of the command, too: both may be one other lag"
-            return _doubted(finding, why)
+        for of_kind, _, does, what in KINDS:
+            first, *others = [f for f in found if of_kind(f.effect)] or [None]
+            if finding in others:
+                return _doubted(
+                    finding, f"{first.effect} {does}, too: both may be one other {what}"
+                )
         return finding
 
     return [judged(f) for f in found]
+
+
+def _alike_losses(found: Sequence[Finding]) -> list[Finding]:
+    """Findings of a moment, and those of a place that are as large as one of a moment.
+
+    None of a moment that ends where another begins: together they are one of another form.
+    """
+    events = [f for f in found if with_role(f.effect, "moment")]
+    events = [f for f in events if not any(_adjoin(f, other) for other in events)]
+
+    def as_large(finding: Finding) -> bool:
+        own, *_ = finding.parameters
+        losses = [f.parameters[0] for f in events]
+        known = own.value > WITHIN * own.std
+        return known and any(
+            abs(own.value - e.value) < WITHIN * np.hypot(own.std, e.std) for e in losses
+        )
+
+    places = [f for f in found if with_role(f.effect, "place") and as_large(f)]
+    return [*events, *places]
+
+
+def _adjoin(one: Finding, other: Finding) -> bool:
+    """Whether one of two findings of a moment ends where the other begins."""
+    (begin_s, *end_s), (again_s, *over_s) = map(_when_s, (one, other))
+    pairs = [*((e, again_s) for e in end_s), *((o, begin_s) for o in over_s)]
+    return one is not other and any(abs(a - b) < PAUSE_S for a, b in pairs)
+
+
+def _when_s(finding: Finding) -> list[float]:
+    """When it begins and, if it does, ends, s since the first command."""
+    keys = with_role(finding.effect, "moment")
+    return [e.value for e in finding.parameters if e.name.split(".", 1)[1] in keys]
 
 
 def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
@@ -241,12 +304,13 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
     taken = sum(f.share for f in found if f.effect != REFIT)
 
     def judged(finding: Finding) -> Finding:
-        if finding.effect == REFIT or not rest.firm:
+        if finding.effect == REFIT or not (rest.firm or rest.depends_on):
             return finding
         if rest.share > taken:
             why = "more is left than it takes, so that it may be a part of something else"
-            return _doubted(finding, why)
-        if rest.share > LAG_LEAVES and _is_late(finding):
+            on = next((on for of_kind, on, *_ in KINDS if of_kind(finding.effect)), "")
+            return _doubted(finding, why, depends_on=on)
+        if rest.firm and rest.share > LAG_LEAVES and _is_late(finding.effect):
             why = "much is left: something else at changes of the command may be late"
             return _doubted(finding, why, wrong_form=True)
         return finding
@@ -265,22 +329,40 @@ def _doubted(finding: Finding, why: str, wrong_form: bool = False, depends_on: s
     )
 
 
-def _acts_by(finding: Finding) -> set[str]:
+def _acts_by(effect: str) -> set[str]:
     """What the effect's card says of it in this respect; nothing for a refit, which has none."""
-    card = catalogue().get(finding.effect, {"identify": (), "needs": "", "family": ""})
+    card = catalogue().get(effect, {"identify": (), "needs": "", "family": ""})
     return {*card["identify"], card["needs"], card["family"]}
 
 
-def _is_late(finding: Finding) -> bool:
+def _is_late(effect: str) -> bool:
     """Whether all of the motion comes late, at every change of the command."""
-    card = catalogue().get(finding.effect, {"needs": "", "identify": ()})
-    always = card["needs"] == "changes" and "steps" in card["identify"]
-    return bool(late_part(finding.effect)) or (always and "spin" not in card["identify"])
+    always = {"changes", "steps"} <= _acts_by(effect) and "spin" not in _acts_by(effect)
+    return bool(late_part(effect)) or always
 
 
-def _curves() -> set[str]:
-    """Effects that bend the steady speed over the command."""
-    return {n for n in of_levels() if catalogue()[n]["needs"] == "steady_speed"}
+def _bends(effect: str) -> bool:
+    """Whether it bends the steady speed over the command."""
+    return effect in of_levels() and "steady_speed" in _acts_by(effect)
+
+
+def _is_placed(effect: str) -> bool:
+    """Whether it changes with the place in the room."""
+    return "places" in _acts_by(effect)
+
+
+def _is_timed(effect: str) -> bool:
+    """Whether it changes with the time that the robot has been driving."""
+    return bool(BY[TIME] & _acts_by(effect))
+
+
+# Effects of which a second one may be the rest of the first in another form: what they act by.
+KINDS = (
+    (_bends, "speed", "bends the speed over the command", "curve"),
+    (_is_late, CHANGE, "is late at changes of the command", "lag"),
+    (_is_placed, "place", "changes with the place", "floor"),
+    (_is_timed, TIME, "changes with time", "loss"),
+)
 
 
 def _lateness_s(finding: Finding) -> float:
@@ -505,7 +587,14 @@ def _stands_alone(done: Search, name: str) -> bool:
     this = _round_of(done, name)
     most = this.accepted.held_score**2 + NEAR
     near = [t for t in this.trials if t is not this.accepted and t.held_score**2 < most]
-    return done.last.held_score < GOOD and not near
+    return done.last.held_score < GOOD and all(_beats(done, this.accepted, t) for t in near)
+
+
+def _beats(done: Search, one: Trial, other: Trial) -> bool:
+    """Whether one is better by what an addition must bring, also without its best block."""
+    evidence, without_best, _ = against(other.fit, one.fit)
+    least = done.settings
+    return evidence > least.evidence and without_best > least.without_best
 
 
 def ranking_of(done: Search, found: Sequence[Finding]) -> list[Ranked]:

@@ -23,6 +23,7 @@ CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
 TYPICAL = {"vx_mps": 0.01, "vy_mps": 0.01, "omega_radps": 0.05, "rim_mps": 0.01}
 # Rates, voltage, history: not at hand in a body's formula.
 NO_NAMES = {"dvx", "dvy", "domega", "V", "after_reversal"}
+SWELL = 0.05  # share of all speeds: a usual loss
 CHANGE = "change of the command"
 TIME = "time"
 REVERSAL_S = 0.15  # how long a reversal is felt
@@ -38,12 +39,14 @@ class Term:
         group: what it depends on.
         adds_to, formula: as the effect `equation` takes them, but for names in NO_NAMES.
         size: of the formula's values, 95th percentile.
+        family: of terms of the group that are tested together.
     """
 
     group: str
     adds_to: str
     formula: str
     size: float
+    family: str = ""
 
     @property
     def addable(self) -> bool:
@@ -72,11 +75,14 @@ def library(
     terms = [Term(g, CHANNELS[a], f, s) for (g, f), s in sizes.items() for a in range(3)]
     of_wheels = _wheel_terms(opened, models[0])
     of_all, parts = _terms_of_all_speeds(terms)
+    waves, rates_radps = _waves(opened)
     columns = []
     for (own, model), v in zip(pairs, values, strict=True):
         body = _body_columns(own, model, v, sizes)
-        columns.append(np.hstack([body, body @ parts, _wheel_columns(own, model, of_wheels)]))
-    return [*terms, *of_all, *of_wheels], columns
+        swell = _wave_columns(own, model, waves, rates_radps)
+        of_wheel = _wheel_columns(own, model, of_wheels)
+        columns.append(np.hstack([body, body @ parts, swell, of_wheel]))
+    return [*terms, *of_all, *waves, *of_wheels], columns
 
 
 def _terms_of_all_speeds(terms: Sequence[Term]) -> tuple[list[Term], np.ndarray]:
@@ -94,6 +100,39 @@ def _terms_of_all_speeds(terms: Sequence[Term]) -> tuple[list[Term], np.ndarray]
         for k, term in own.items():
             parts[k, n] = of_all[-1].strength / term.strength
     return of_all, parts
+
+
+WAVE_S = 12.0  # the shortest: blocks left out in its midst are told by those beside
+MOST_WAVES = 12
+SWELLS = "swells"
+
+
+def _waves(opened: Sequence[Opened]) -> tuple[list[Term], np.ndarray]:
+    """What changes all speeds alike and comes and goes with time, and the (n,) rates of pairs."""
+    times_s = np.concatenate([own.floor.response.middle_s for own in opened])
+    longest_s = 1.1 * np.ptp(times_s)
+    count = int(np.clip(longest_s / WAVE_S, 0, MOST_WAVES))
+    rates_radps = np.array([float(f"{2 * np.pi * k / longest_s:.4g}") for k in range(1, 1 + count)])
+    size = TYPICAL["rim_mps"] / SWELL
+    terms = [
+        Term(TIME, "rim_mps", f"{wave}({rate:g}*t)*rim", size, SWELLS)
+        for rate in rates_radps
+        for wave in ("cos", "sin")
+    ]
+    return terms, rates_radps
+
+
+def _wave_columns(
+    own: Opened, model: native.Model, waves: Sequence[Term], rates_radps: np.ndarray
+) -> np.ndarray:
+    """(R, n) change of the rows by each wave."""
+    response = own.floor.response
+    velocity = body_velocity_at(own.data, model, response.points)
+    angle = response.middle_s[:, None] * rates_radps
+    gains = SWELL * np.stack([np.cos(angle), np.sin(angle)], axis=-1).reshape(len(angle), -1)
+    parts = [_displaced(response, velocity, velocity[:, [k]] * gains, k) for k in range(3)]
+    columns = sum(parts) * np.nan_to_num(own.data.weight)[..., None]
+    return columns.reshape(-1, len(waves))
 
 
 def _sizes(values: list[dict]) -> dict[tuple[str, str], float]:

@@ -19,6 +19,7 @@ from twinmill.predict.windows import HORIZONS_S
 FAR = 10.0  # times the median squared error; with nothing but noise the largest is 3 to 7
 SEVERAL = 3  # of one log: fewer are an accident
 APART_S = 1.0  # between the starts of windows of two moments
+SEEN = 2  # windows overlap, so that more than one sees what lasts
 HORIZON = HORIZONS_S.index(0.5)
 LESS, MORE = 0.9, 1.1  # of the predicted way
 ARM_M = 0.1  # a turn counts as the way of a point so far from the middle
@@ -65,10 +66,8 @@ def _of_log(own: Opened, model: native.Model) -> list[Moment]:
         is_far(data.errors(model), data.floor, FAR)
         & (is_far(own.floor.across, data.floor, FAR) | ~own.floor.keep)
     )
-    if not len(missed):
-        return []
-    clusters = np.split(missed, 1 + np.flatnonzero(np.diff(data.start_s[missed]) > APART_S))
-    if len(clusters) < SEVERAL:
+    events = _events(missed, data.start_s)
+    if len(events) < SEVERAL:
         return []
     predicted = data.windows.predicted(data.measurement, model)
     way = _way(data.measured[:, HORIZON], predicted[:, HORIZON])
@@ -77,11 +76,22 @@ def _of_log(own: Opened, model: native.Model) -> list[Moment]:
         Moment(
             data.measurement.log_name,
             track.robot_id,
-            float(data.start_s[cluster[-1]]),
-            float(np.nanmedian(way[cluster])),
+            float(data.start_s[event[-1]]),
+            float(np.nanmedian(way[event])),
         )
-        for cluster in clusters
+        for event in events
     ]
+
+
+def _events(missed: np.ndarray, start_s: np.ndarray) -> list[np.ndarray]:
+    """Windows that miss, those of each event together.
+
+    Args:
+        missed: (N,) numbers of windows, rising.
+        start_s: (W,) of all windows.
+    """
+    clusters = np.split(missed, 1 + np.flatnonzero(np.diff(start_s[missed]) > APART_S))
+    return [c for c in clusters if len(c) >= SEEN]
 
 
 def _way(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:

@@ -4,13 +4,15 @@
 Errors of way at two moments far apart in time are multiplied with each other if the moments are
 near each other in the room: a quadratic form with a Gaussian kernel over places, as in Moran's test
 of spatial correlation (Moran 1950, Biometrika 37). It asks for no formula, so that joints between
-tiles are seen like a patch of carpet. What all ways of one block of time have in common, as while a
-battery sinks, is taken out before. A drive that repeats its path repeats every error at its place;
-so the errors of the smooth response, which knows commands and headings, must do so as well.
+tiles are seen like a patch of carpet. Floors are laid in strips, so that one axis of the room may
+be enough. What all ways of one block of time have in common, as while a battery sinks, is taken out
+before. A drive that repeats its path repeats every error at its place; so the errors of the smooth
+response, which knows commands and headings, must do so as well.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import twinmill_native as native
@@ -20,6 +22,7 @@ from twinmill.predict.windows import HORIZONS_S
 
 HORIZON = HORIZONS_S.index(0.5)
 LENGTHS_M = (0.1, 0.2, 0.4)  # of the kernel
+ACROSS = ([0, 1], [0], [1])  # axes of the room: spots, and strips that run right through it
 LEAST_WAY_M = 0.01  # a robot that stands tells nothing of its place
 FLIPS = 999
 STRETCH_S = 2.0  # of one random sign, and least time between two moments
@@ -49,8 +52,9 @@ def comes_again(opened: Sequence[Opened], models: Sequence[native.Model]) -> flo
 
 def _repeats(opened: Sequence[Opened], errors: Sequence[np.ndarray]) -> tuple[float, float]:
     """Chance of so large a form under random signs of stretches, and the share that repeats."""
-    total = np.zeros((len(LENGTHS_M), 1 + FLIPS))
-    weight = np.zeros(len(LENGTHS_M))
+    kernels = list(product(LENGTHS_M, ACROSS))
+    total = np.zeros((len(kernels), 1 + FLIPS))
+    weight = np.zeros(len(kernels))
     random = np.random.default_rng(1)
     for own, each in zip(opened, errors, strict=True):
         ways = _of_way(own, each)
@@ -58,8 +62,8 @@ def _repeats(opened: Sequence[Opened], errors: Sequence[np.ndarray]) -> tuple[fl
             stretches = ways.stretch.max() + 1
             flips = random.choice([-1.0, 1.0], (FLIPS, stretches))
             signs = np.vstack([np.ones(stretches), flips])
-            for k, length_m in enumerate(LENGTHS_M):
-                pairs, full = _products(ways, length_m)
+            for k, (length_m, axes) in enumerate(kernels):
+                pairs, full = _products(ways, length_m, axes)
                 total[k] += np.einsum("fi,ij,fj->f", signs, pairs, signs)
                 weight[k] += full
     spread = total[:, 1:].std(axis=1, keepdims=True)
@@ -122,12 +126,14 @@ def _without_common(along: np.ndarray, length_m: np.ndarray, block: np.ndarray) 
     return along - (moment / np.maximum(energy, 1e-12))[block] * length_m
 
 
-def _products(ways: _Ways, length_m: float) -> tuple[np.ndarray, float]:
+def _products(ways: _Ways, length_m: float, axes: list[int]) -> tuple[np.ndarray, float]:
     """(S, S) of sums over the pairs of two stretches, and the sum if all errors were of places.
 
-    Pairs of one block, or less than a stretch apart, count for nothing.
+    Places are near each other by these axes of the room, whatever the others are. Pairs of one
+    block, or less than a stretch apart, count for nothing.
     """
-    apart_m2 = np.sum((ways.middle_m[:, None] - ways.middle_m[None]) ** 2, axis=-1)
+    at_m = ways.middle_m[:, axes]
+    apart_m2 = np.sum((at_m[:, None] - at_m[None]) ** 2, axis=-1)
     far = np.abs(ways.t_s[:, None] - ways.t_s[None]) > STRETCH_S
     far &= ways.block[:, None] != ways.block[None]
     near = np.exp(-apart_m2 / (2 * length_m**2)) * far

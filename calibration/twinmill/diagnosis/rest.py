@@ -28,6 +28,7 @@ AGAIN = 2.0  # times what the model left in other logs already: no news
 FIRM_T = 3.0
 MOMENTS = "single moments"
 PLACE = "place"
+LEAST = 0.02  # share of what was to be explained, below which nothing is left
 LEFT_OVER = 0.02  # share of a term's norm that must survive the projection
 
 
@@ -205,15 +206,16 @@ def _verdict(
 
 
 def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
-    """What each group brings, as a whole or by one formula, and whether that is beyond chance.
+    """What each group brings, by a family or by one formula, and whether that is beyond chance.
 
     It is if it is more than the largest of all that is tested is under random signs of blocks, each
     over its own spread there, and if it is evidence enough for one of so many.
     """
     tested: list[tuple[str, np.ndarray]] = []
-    for group in dict.fromkeys(t.group for t in terms):
-        own = dict.fromkeys(t.formula for t in terms if t.group == group)
-        tested.append((group, np.array([t.group == group for t in terms])))
+    for group, family in dict.fromkeys((t.group, t.family) for t in terms):
+        together = np.array([(t.group, t.family) == (group, family) for t in terms])
+        own = dict.fromkeys(t.formula for t, used in zip(terms, together, strict=True) if used)
+        tested.append((group, together))
         tested += [(group, np.array([t.formula == f for t in terms])) for f in own]
     if not tested:
         return []

@@ -297,10 +297,10 @@ def attempt(before: Trial, names: tuple[str, ...], start: dict[str, float] | Non
     fit = ScoreFit(state.datasets, state.models, state.free, state.by_channel)
     fit.begin_at_best(state.free[len(before.state.free) :])
     fit.fit()
-    return Trial(names, fit, replace(state, models=fit.models), *_against(before.fit, fit))
+    return Trial(names, fit, replace(state, models=fit.models), *against(before.fit, fit))
 
 
-def _against(less: ScoreFit, more: ScoreFit) -> tuple[float, float, float]:
+def against(less: ScoreFit, more: ScoreFit) -> tuple[float, float, float]:
     """Evidence for the richer fit, the same without the best block, and how well blocks agree."""
     a, b = less.block_costs(less), more.block_costs(less)
     falls = (a - b) / np.maximum(a + b, 1e-300)
@@ -782,18 +782,18 @@ def _tied(this: Round, settings: Settings) -> list[Trial]:
         if _began_before(trial, trial.names[0]):
             continue
         apart = trial.fit.held_cost - accepted.fit.held_cost
-        *_, blocks_t = _against(trial.fit, accepted.fit)
+        *_, blocks_t = against(trial.fit, accepted.fit)
         same = canonical_correlation(columns[accepted.names[0]], columns[trial.names[0]])
         below = max(accepted.held_score, trial.held_score) < 1.0  # differences there are no news
         close = apart < settings.tie and (blocks_t < 2.0 or below)
-        rivals = close and _in_common(this.before, accepted, trial) > settings.unlike
+        rivals = close and in_common(this.before, accepted, trial) > settings.unlike
         if rivals or (same > settings.alike and apart < settings.evidence):
             tied.append((same, trial))
     nearest = sorted(tied, key=lambda pair: -pair[0])[: settings.group - 1]
     return [trial for _, trial in nearest]
 
 
-def _in_common(before: Trial, one: Trial, other: Trial) -> float:
+def in_common(before: Trial, one: Trial, other: Trial) -> float:
     """Cosine between what two trials take of the errors: 0 if each explains something else."""
     rows = [np.concatenate(t.fit.state[0]) for t in (before, one, other)]
     first, second = rows[0] - rows[1], rows[0] - rows[2]
@@ -846,7 +846,7 @@ def _pruned(trial: Trial, names: list[str], settings: Settings) -> tuple[Trial, 
         less = without(trial, name)
         if less is None:
             continue
-        evidence, *_ = _against(less.fit, trial.fit)
+        evidence, *_ = against(less.fit, trial.fit)
         if evidence < settings.evidence / 2:
             gone.append(name)
             trial = replace(less, names=trial.names)

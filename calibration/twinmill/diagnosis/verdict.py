@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from twinmill.diagnosis import moments
 from twinmill.diagnosis.findings import Finding
-from twinmill.diagnosis.rest import MOMENTS, Rest
+from twinmill.diagnosis.rest import LEAST, MOMENTS, Rest
 from twinmill.diagnosis.search import NEWS, REFIT, of_levels
 from twinmill.fitting.compare import GOOD, MISSING
 
@@ -179,7 +179,7 @@ class VerdictInputs:
     def _left(self) -> str:
         """What is left, where it is more than the noise."""
         events = f" {moments.sentence(self.rest.moments)}" if self.rest.moments else ""
-        if self.last <= GOOD or self.rest.share < 0.02:
+        if self.last <= GOOD or self.rest.share < LEAST:
             return events
         on = self._continuous
         depends = f", and depends on {' and '.join(on)}" if on else ""

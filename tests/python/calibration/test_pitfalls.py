@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 from twinmill.diagnosis.diagnose import diagnose, first_state
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.findings import Finding, beside_more, of_another_form
+from twinmill.diagnosis.moments import _events
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import Settings, attempt
 from twinmill.diagnosis.search import fitted as fitted_state
@@ -39,6 +40,7 @@ def on_own_clock(fitted, tmp_path_factory) -> ModelFile:
     return ModelFile.load(str(path))
 
 
+NOTHING_LEFT = Rest(0.0, False, [])
 FLEXIBLE = "p0*sin(7*theta) + p1*cos(7*theta) + p2*sin(5*theta) + p3*cos(5*theta)"
 
 
@@ -362,6 +364,23 @@ def test_a_weakness_that_comes_again_is_told_to_depend_on_time(tanh_robot, measu
     assert not [f.effect for f in found.findings if f.certainty == "sure"]
 
 
+def test_a_small_weakness_that_comes_and_goes_is_told_to_depend_on_time(
+    tanh_robot, measure, fitted
+):
+    """8 % of the speed is gone for 12 s of every 28 s: no one time stands out, all together do."""
+
+    class Unsteady(tanh_robot):
+        def wheels_mps(self, duty):
+            at_s = np.arange(len(duty)) * EULER_S
+            weak = (at_s + 10) % 28 > 16
+            return super().wheels_mps(duty) * np.where(weak, 0.92, 1.0)[:, None]
+
+    found = diagnose([measure(Unsteady(), 24, 110.0)], fitted)
+    assert found.verdict == "outside_catalogue"
+    assert "time" in found.rest.depends_on
+    assert not [f.effect for f in found.findings if f.certainty == "sure"]
+
+
 def test_a_body_that_turns_sooner_than_it_drives_is_named(tanh_robot, measure, fitted):
     """Driving takes the robot's 0.09 s, turning 0.04 s: first orders by themselves, summed."""
     spin = np.array([-1, 1, -1, 1]) / 2
@@ -552,7 +571,7 @@ def test_a_wheel_that_is_far_weaker_than_is_usual_is_named_beyond_doubt(
 )
 def test_what_leaves_a_rest_of_its_own_kind_has_another_form(effect, depends_on, certainty):
     found = Finding(effect, None, [], 0.9, "sure")
-    (judged,) = of_another_form([found], depends_on)
+    (judged,) = of_another_form([found], Rest(0.1, False, depends_on))
     assert judged.certainty == certainty
     assert bool(judged.why) == judged.wrong_form == (certainty == "doubtful")
 
@@ -573,7 +592,7 @@ def test_sooner_by_one_lag_and_later_by_another_is_no_lag(extra_s, certainty):
         )
         for name, value in sizes.items()
     ]
-    assert [f.certainty for f in of_another_form(found, [])] == certainty
+    assert [f.certainty for f in of_another_form(found, NOTHING_LEFT)] == certainty
 
 
 @pytest.mark.parametrize(
@@ -586,7 +605,7 @@ def test_a_lag_that_hangs_on_the_duty_is_not_parted_from_another(second, certain
     How a body turns and how it rolls on are motions that lag_by_duty alone does not make.
     """
     found = [Finding(n, None, [], 0.4, "sure") for n in ("lag_by_duty", second)]
-    assert [f.certainty for f in of_another_form(found, [])] == ["sure", certainty]
+    assert [f.certainty for f in of_another_form(found, NOTHING_LEFT)] == ["sure", certainty]
 
 
 @pytest.mark.parametrize(
@@ -597,6 +616,7 @@ def test_a_lag_that_hangs_on_the_duty_is_not_parted_from_another(second, certain
         ("input_delay", 0.4, False, "sure"),  # noise
         ("floor_tilt", 0.4, True, "sure"),
         ("floor_tilt", 0.7, True, "doubtful"),  # more is left than it takes
+        ("floor_tilt", 0.7, False, "sure"),
     ],
 )
 def test_beside_a_rest_that_is_no_noise_a_name_is_doubtful(effect, left, firm, certainty):
@@ -604,9 +624,44 @@ def test_beside_a_rest_that_is_no_noise_a_name_is_doubtful(effect, left, firm, c
     assert [f.certainty for f in beside_more(found, Rest(left, firm, []))] == [certainty]
 
 
+def test_beside_much_that_depends_on_something_a_name_is_doubtful():
+    found = [Finding("turn_asymmetry", None, [], 0.1, "sure")]
+    (judged,) = beside_more(found, Rest(0.3, False, ["time"]))
+    assert judged.certainty == "doubtful"
+
+
+def _loss(effect: str, size: float, *when_s: float) -> Finding:
+    keys = {"floor_patch": ("strength",)}.get(effect, ("loss", "from_s", "until_s"))
+    numbers = zip(keys, (size, *when_s), strict=False)
+    own = [ParameterEstimate(f"{effect}.{k}", v, 0.02, "", False, True) for k, v in numbers]
+    return Finding(effect, None, own, 0.4, "sure")
+
+
+@pytest.mark.parametrize(
+    ("losses", "certainty"),
+    [
+        # As large here and then: the place may be where the robot was at another time.
+        ([("floor_patch", 0.15), ("abrupt_loss", 0.13, 80.0)], ["doubtful", "doubtful"]),
+        ([("floor_patch", 0.4), ("abrupt_loss", 0.13, 80.0)], ["sure", "sure"]),
+        ([("transient_loss", 0.2, 10.0, 20.0), ("abrupt_loss", 0.2, 40.0)], ["doubtful"] * 2),
+        # One that begins slowly: the second is the first one's rest.
+        ([("abrupt_loss", 0.15, 33.2), ("transient_loss", 0.1, 29.4, 34.4)], ["sure", "doubtful"]),
+    ],
+)
+def test_losses_here_and_then_may_be_one_that_comes_and_goes(losses, certainty):
+    judged = of_another_form([_loss(*own) for own in losses], NOTHING_LEFT)
+    assert [f.certainty for f in judged] == certainty
+
+
+def test_one_window_that_misses_is_no_event():
+    """Two of three stretches are seen by windows that overlap."""
+    events = _events(np.array([10, 40, 41, 80, 81, 82]), np.arange(100) * 0.25)
+    assert [list(e) for e in events] == [[40, 41], [80, 81, 82]]
+
+
 def test_two_curves_of_the_speed_over_the_command_may_be_one():
     """Any odd curve is some dead zone and some bend; a gain of a wheel is no part of it."""
     found = [Finding(n, None, [], 0.3, "sure") for n in ("dead_zone", "speed_curve", "wheel_gain")]
-    judged = of_another_form(found, [])
+    judged = of_another_form(found, NOTHING_LEFT)
     assert [f.certainty for f in judged] == ["sure", "doubtful", "sure"]
     assert "dead_zone" in judged[1].why
