@@ -29,6 +29,7 @@ from twinmill.fitting.compare import GOOD
 from twinmill.model.parameters import (
     LAG,
     LAG_EFFECT,
+    WHERE_OR_WHEN,
     ParameterEstimate,
     catalogue,
     catalogue_of,
@@ -56,7 +57,7 @@ BY = {
 }
 SLIGHT = 0.3  # of the squared score that is left: what a second finding must at least take
 LAG_LEAVES = 0.25  # at most, of what was to be explained, where nothing else is late
-SAME, SAME_FALL = 0.8, 0.9  # cosine of what two take of the errors, and share that one takes
+SAME, SAME_FALL = 0.8, 0.85  # cosine of what two take of the errors, and share that one takes
 NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
 
 
@@ -191,24 +192,29 @@ def _takes(names: Sequence[str], chain: Sequence[Trial]) -> dict[str, float]:
     return {n: float(np.clip(f / excess, 0.0, 1.0)) for n, f in zip(names, falls, strict=True)}
 
 
+def _same(done: Search, name: str) -> list[str]:
+    """Effects that alone took the same errors as this one, when it was accepted."""
+    this = _round_of(done, name)
+    if name == REFIT or this.accepted.names != (name,):
+        return []
+    taken = this.before.held_score**2 - this.accepted.held_score**2
+    return [
+        t.names[0]
+        for t in this.trials
+        if len(t.names) == 1
+        and t.names[0] not in (name, REFIT)
+        and this.before.held_score**2 - t.held_score**2 > SAME_FALL * taken
+        and in_common(this.before, this.accepted, t) > SAME
+    ]
+
+
 def _stand_in(done: Search, name: str) -> str | None:
     """Another effect that was found and alone does what this one does; None if there is none.
 
     Of two that act by the same thing the better one is right, and the other its rest; see KINDS.
     """
-    this = _round_of(done, name)
-    if name == REFIT or this.accepted.names != (name,):
-        return None
-    taken = this.before.held_score**2 - this.accepted.held_score**2
-    for trial in this.trials:
-        (other, *more) = trial.names
-        if more or other in (name, REFIT) or other not in done.found:
-            continue
-        alike = any(kind(name) and kind(other) for kind, *_ in KINDS)
-        as_much = this.before.held_score**2 - trial.held_score**2 > SAME_FALL * taken
-        if as_much and not alike and in_common(this.before, this.accepted, trial) > SAME:
-            return other
-    return None
+    found = [n for n in _same(done, name) if n in done.found]
+    return next((n for n in found if not any(of(name) and of(n) for of, *_ in KINDS)), None)
 
 
 def _beside_larger(finding: Finding, larger: str | None, before: Trial, after: Trial) -> Finding:
@@ -515,10 +521,14 @@ def _finding(
     instance = newest_instance(done.last.state.model, name)
     own = [e for e in estimates if e.name.startswith(f"{instance}.")]
     tied = [n for t in _rivals(done, name) for n in t.names]
+    once = less is not None and _visits(done.last, less, instance) == 1
+    instead = [n for n in _same(done, name) if with_role(n, "moment")] if once else []
+    tied = list(dict.fromkeys([*tied, *instead]))[: done.settings.group - 1]
     group = (name, *tied) if tied else None
     card = catalogue_of(done.last.state.model)[name]
     doubt = _at_bound(card, own) or ("" if _stands_alone(done, name) else _unusual(card, own))
-    if not doubt and less and _visits(done.last, less, instance) == 1:
+    doubt = doubt or _faster(name, own)
+    if not doubt and once and not instead:
         doubt = f"one visit of its place speaks for {name}: it may be that time and not the place"
     if not doubt and instance in changes:
         doubt = changes[instance].why
@@ -555,6 +565,17 @@ def _unusual(card: dict, own: Sequence[ParameterEstimate]) -> str:
                 f"{e.name} = {e.value:.3g} is far beyond what is usual: another effect may be "
                 "behind it"
             )
+    return ""
+
+
+def _faster(name: str, own: Sequence[ParameterEstimate]) -> str:
+    """A doubt where a loss at a place or a moment makes the robot faster; else empty."""
+    loss, *_ = own
+    placed = any(with_role(name, role) for role in WHERE_OR_WHEN)
+    if placed and loss.value < -WITHIN * loss.std:
+        return (
+            f"{loss.name} = {loss.value:.3g} makes the robot faster, which few floors or faults do"
+        )
     return ""
 
 

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from twinmill.diagnosis.diagnose import diagnose, first_state
 from twinmill.diagnosis.explain import explain
-from twinmill.diagnosis.findings import Finding, beside_more, of_another_form
+from twinmill.diagnosis.findings import Finding, _faster, beside_more, of_another_form
 from twinmill.diagnosis.moments import _events
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import Settings, attempt
@@ -651,6 +651,21 @@ def _loss(effect: str, size: float, *when_s: float) -> Finding:
 def test_losses_here_and_then_may_be_one_that_comes_and_goes(losses, certainty):
     judged = of_another_form([_loss(*own) for own in losses], NOTHING_LEFT)
     assert [f.certainty for f in judged] == certainty
+
+
+@pytest.mark.parametrize(
+    ("effect", "size", "doubted"),
+    [
+        ("floor_patch", -0.35, True),
+        ("floor_patch", 0.35, False),
+        ("transient_loss", -0.2, True),
+        ("transient_loss", -0.03, False),  # within its error of 0.02
+        ("turn_asymmetry", -0.2, False),  # has no sign that is usual
+    ],
+)
+def test_a_fault_that_makes_a_robot_faster_is_doubtful(effect, size, doubted):
+    estimate = ParameterEstimate(f"{effect}.size", size, 0.02, "", False, True)
+    assert bool(_faster(effect, [estimate])) == doubted
 
 
 def test_one_window_that_misses_is_no_event():

@@ -21,8 +21,8 @@ from twinmill.predict.windows import HORIZONS_S
 EVERY_S, WINDOWS, BLOCK_S = 0.25, 400, 8.0
 
 
-def wander(seed, gain_at):
-    """A log of a robot that wanders over 2 m x 2 m; its ways are longer by `gain_at` (x, y, t)."""
+def wander(seed, gain_at, half_m=1.0):
+    """A log of a robot that wanders over a square; its ways are longer by `gain_at` (x, y, t)."""
     random = np.random.default_rng(seed)
     t_s = EVERY_S * np.arange(WINDOWS + 2)
     heading = np.cumsum(random.normal(0, 0.5, len(t_s)))
@@ -30,7 +30,7 @@ def wander(seed, gain_at):
     at = np.zeros((len(t_s), 2))
     for k in range(1, len(t_s)):
         ahead = at[k - 1] + step_m * np.array([np.cos(heading[k]), np.sin(heading[k])])
-        if np.abs(ahead).max() > 1:
+        if np.abs(ahead).max() > half_m:
             heading[k:] += np.pi - 0.3
             ahead = at[k - 1] + step_m * np.array([np.cos(heading[k]), np.sin(heading[k])])
         at[k] = ahead
@@ -59,6 +59,14 @@ def test_joints_between_tiles_come_again_at_their_places():
     # A gain of +- 0.1 on ways of 0.1 m beside noise of 3 mm: what repeats is less, since the kernel
     # and the ways are as wide as a part of a tile.
     assert 0.1 < comes_again([wander(1, tiles)], [None]) < 0.1**2 / (0.1**2 + 0.03**2)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_strips_across_a_large_room_come_again_though_few_spots_do(seed):
+    def strips(x, y, t):
+        return 0.05 * np.sin(2 * np.pi * y / 0.6)
+
+    assert comes_again([wander(seed, strips, half_m=3.0)], [None]) > 0.1
 
 
 @pytest.mark.parametrize("seed", range(5))
