@@ -150,8 +150,10 @@ def findings_of(
 ) -> tuple[list[Finding], list[tuple[str, float]]]:
     """Findings in the order of worth, and the held-out score after each of them.
 
-    Worth is the share that an effect takes. What each takes depends on what was taken before, so
-    effects are added in one order and in its reverse, and a share is the mean of both.
+    Worth is what the final model loses without the effect. Shares are those of a chain that adds
+    the effects in this order. Effects that stand in for each other lose little alone, and what each
+    takes depends on what was taken before: the first is the one that takes most on the average over
+    one order of adding and its reverse.
 
     Args:
         done: the search.
@@ -162,12 +164,17 @@ def findings_of(
     given = _as_given(done.last, first) if REFIT in names else None
     loss = {n: _loss(done.last, given if n == REFIT else less[n]) for n in names}
     names.sort(key=lambda n: -loss[n])
-    chains = [(own, _chain(own, first, done.last)) for own in (names, names[::-1])]
-    takes = [_takes(*chain) for chain in chains]
-    shares = {n: float(np.mean([own[n] for own in takes])) for n in names}
-    names = sorted(names, key=lambda n: -shares[n])
-    known = next((chain for own, chain in chains if own == names), None)
-    chain = known or _chain(names, first, done.last)
+    chain = _chain(names, first, done.last)
+    if len(names) > 1:
+        there, back = (
+            _takes(names, chain),
+            _takes(names[::-1], _chain(names[::-1], first, done.last)),
+        )
+        top = max(names, key=lambda n: there[n] + back[n])
+        if top != names[0]:
+            names = [top, *(n for n in names if n != top)]
+            chain = _chain(names, first, done.last)
+    shares = _takes(names, chain)
     changes = changes_of(done.last)
     found = []
     for k, name in enumerate(names):
@@ -211,10 +218,18 @@ def _same(done: Search, name: str) -> list[str]:
 def _stand_in(done: Search, name: str) -> str | None:
     """Another effect that was found and alone does what this one does; None if there is none.
 
-    Of two that act by the same thing the better one is right, and the other its rest; see KINDS.
+    Two of one family may both be there, and of two that act by the same thing the better one is
+    right and the other its rest; see KINDS.
     """
-    found = [n for n in _same(done, name) if n in done.found]
-    return next((n for n in found if not any(of(name) and of(n) for of, *_ in KINDS)), None)
+    for other in _same(done, name):
+        family = catalogue()[name]["family"] == catalogue()[other]["family"]
+        if (
+            other in done.found
+            and not family
+            and not any(of(name) and of(other) for of, *_ in KINDS)
+        ):
+            return other
+    return None
 
 
 def _beside_larger(finding: Finding, larger: str | None, before: Trial, after: Trial) -> Finding:
