@@ -48,6 +48,8 @@ class VerdictInputs:
     @property
     def verdict(self) -> str:
         """One of the verdicts that `Diagnosis.verdict` lists."""
+        if self._maybe:
+            return "model_adequate"
         outweighed = self._noise_outweighs or self._rest_outweighs or self._of_another_form
         if self.effects and not outweighed:
             top = self.effects[0]
@@ -60,6 +62,13 @@ class VerdictInputs:
             return "refit_enough"
         unsure = self.silent or self._instead or self.last > MISSING
         return "cannot_tell" if unsure else "model_adequate"
+
+    @property
+    def _maybe(self) -> list[Finding]:
+        """Effects of which none is beyond doubt, where the model as given misses nothing."""
+        doubtful = all(f.certainty == "doubtful" for f in self.effects)
+        well = self.score <= GOOD and not (self.rest.depends_on or self.noises or self.silent)
+        return self.effects if doubtful and well else []
 
     @property
     def _instead(self) -> list[str]:
@@ -127,7 +136,9 @@ class VerdictInputs:
         """The verdict for people."""
         verdict = self.verdict
         if verdict == "model_adequate":
-            return f"Nothing is missing that these logs would show.{self._as_before}"
+            maybe = f" {' or '.join(f.effect for f in self._maybe)}" if self._maybe else ""
+            there = f"{maybe} may be there, and is too small to be sure." if maybe else ""
+            return f"Nothing is missing that these logs would show.{there}{self._as_before}"
         if verdict == "cannot_tell" and self._left_in_the_dark:
             return (
                 f"The model misses by more than the noise (score {self.last:.2f}), and these logs "

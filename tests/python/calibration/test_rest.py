@@ -164,3 +164,18 @@ def test_much_that_is_left_and_depends_on_something_outweighs_a_doubtful_effect(
     weighed = VerdictInputs(4.2, 4.2, 3.6, 2.8, found, rest, [], [], [], 1.0)
     assert weighed.verdict == verdict
     assert "heading_bias" in weighed.sentence and "heading" in weighed.sentence
+
+
+@pytest.mark.parametrize(
+    ("score", "certainty", "verdict"),
+    [
+        (1.05, "doubtful", "model_adequate"),
+        (1.4, "doubtful", "effect_missing"),
+        (1.05, "sure", "effect_missing"),
+    ],
+)
+def test_a_doubtful_effect_is_not_missing_where_nothing_is_missed(score, certainty, verdict):
+    found = [Finding("speed_curve", None, [], 0.9, certainty, "its size may be nothing")]
+    weighed = VerdictInputs(score, score, score, 1.0, found, Rest(0.0, False, []), [], [], [], 1.0)
+    assert weighed.verdict == verdict
+    assert "speed_curve" in weighed.sentence
