@@ -29,7 +29,7 @@ from twinmill.data.multi_log import read_multi_log
 from twinmill.data.steady_table import is_steady_table
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill.diagnosis import diagnose as _diagnose
-from twinmill.diagnosis.findings import Ranked
+from twinmill.diagnosis.finding import Ranked
 from twinmill.files import plain, replacing
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare

@@ -10,14 +10,8 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.detections.merge import with_detections
-from twinmill.diagnosis.findings import (
-    beside_more,
-    findings_of,
-    lateness,
-    of_another_form,
-    ranking_of,
-    with_stale_numbers,
-)
+from twinmill.diagnosis.doubts import beside_more, of_another_form
+from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_numbers
 from twinmill.diagnosis.notes import geometry_notes, irregularity_notes, time_base_notes
 from twinmill.diagnosis.outliers import Outlier, outliers, sentence
 from twinmill.diagnosis.resolution import resolutions

@@ -1,148 +1,41 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Findings of a diagnosis: what each effect takes away, how sure it is, and its rivals."""
+"""Findings of a diagnosis in their order: what each effect takes away, and its rivals."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.constancy import Change, changes_of
-from twinmill.diagnosis.library import CHANGE, TIME
-from twinmill.diagnosis.rest import LEAST, Rest
+from twinmill.diagnosis.doubts import WITHIN, beside_larger, of_one, seen_once, stand_in
+from twinmill.diagnosis.finding import Finding, Late, Ranked, doubted
+from twinmill.diagnosis.library import TIME
 from twinmill.diagnosis.search import (
-    PAUSE_S,
     REFIT,
     Round,
     Search,
     State,
     Trial,
-    against,
     comes_again,
     fitted,
     grown,
-    in_common,
-    of_levels,
 )
-from twinmill.fitting.compare import GOOD
 from twinmill.model.parameters import (
     LAG,
     LAG_EFFECT,
-    WHERE_OR_WHEN,
     ParameterEstimate,
-    catalogue,
     catalogue_of,
     effect_names,
     late_part,
     newest_instance,
-    with_role,
 )
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
 HORIZON = HORIZONS_S.index(0.5)
 MISSES = 1.5  # score of a final model whose errors are not noise
-WITHIN = 2.0  # standard deviations: a lag that differs by less is the model's own error
-BEYOND = 3.0  # usual sizes, or standard deviations from it at a bound: doubtful beyond ...
-NEAR = 0.5  # ... if another leaves less than this more of the squared score, or a rest is left
-AWAY_S = 2.0  # between two visits of a place
-WEIGHTY = 0.1  # share of what the visit brings that speaks loudest for a place
-# Groups of a rest, and what the cards of effects that act by them need or are shown by.
-BY = {
-    "place": {"places", "place"},
-    "heading": {"headings", "heading"},
-    TIME: {"history", "battery"},
-    CHANGE: {"changes"},
-}
-SLIGHT = 0.3  # of the squared score that is left: what a second finding must at least take
-LAG_LEAVES = 0.25  # at most, of what was to be explained, where nothing else is late
-SAME, SAME_FALL = 0.8, 0.85  # cosine of what two take of the errors, and share that one takes
-NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One effect that is missing, or `refit`: the base's numbers were stale.
-
-    Attributes:
-        group: names that the data cannot tell apart, its own first; None if it is alone.
-        parameters: of the final model.
-        share: of the squared held-out error at 0.5 s above the floor that it takes away.
-        certainty: sure, group or doubtful.
-        why: of a doubt; empty otherwise.
-        again: the model given has the effect already, with other numbers.
-        wrong_form: something of another form stands behind it.
-        depends_on: what that depends on, where the doubt tells it; else empty.
-    """
-
-    effect: str
-    group: tuple[str, ...] | None
-    parameters: list[ParameterEstimate]
-    share: float
-    certainty: str
-    why: str = ""
-    again: bool = False
-    wrong_form: bool = False
-    depends_on: str = ""
-
-    @property
-    def takes(self) -> str:
-        """The share in words."""
-        return "< 1 %" if self.share < 0.005 else f"{100 * self.share:.0f} %"
-
-    def to_json(self) -> dict:
-        """Fields of the interface."""
-        parameters = [e.to_json() for e in self.parameters]
-        group = list(self.group) if self.group else None
-        return {**vars(self), "parameters": parameters, "group": group}
-
-
-@dataclass(frozen=True)
-class Ranked:
-    """One effect of the ranking.
-
-    Attributes:
-        score_heldout: of the model with it, on parts it was not fitted to.
-        share_explained: of the squared score above 1 that the model as given had.
-        p_value: chance of such evidence if nothing were missing, for all effects together.
-        evidence: half the fall of the held-out cost.
-        group: number shared by effects that the data cannot tell apart; None if they can.
-    """
-
-    effect: str
-    score_heldout: float
-    share_explained: float
-    p_value: float
-    evidence: float
-    parameters: list[ParameterEstimate]
-    group: int | None
-
-    def to_json(self) -> dict:
-        """Fields of the interface."""
-        return {**vars(self), "parameters": [e.to_json() for e in self.parameters]}
-
-
-@dataclass(frozen=True)
-class Late:
-    """How late the motion follows its commands.
-
-    Attributes:
-        sum_s, sum_std_s: lag and delay together; with the clocks' offset where that is not known.
-        delay_s, lag_s, clock_s: its parts; None where the data cannot part them.
-        parted: whether they can.
-    """
-
-    sum_s: float
-    sum_std_s: float | None
-    delay_s: float | None
-    lag_s: float | None
-    clock_s: float | None
-    parted: bool
-
-    def to_json(self) -> dict:
-        """Fields of the interface."""
-        return vars(self)
 
 
 def findings_of(
@@ -166,10 +59,8 @@ def findings_of(
     names.sort(key=lambda n: -loss[n])
     chain = _chain(names, first, done.last)
     if len(names) > 1:
-        there, back = (
-            _takes(names, chain),
-            _takes(names[::-1], _chain(names[::-1], first, done.last)),
-        )
+        there = _takes(names, chain)
+        back = _takes(names[::-1], _chain(names[::-1], first, done.last))
         top = max(names, key=lambda n: there[n] + back[n])
         if top != names[0]:
             names = [top, *(n for n in names if n != top)]
@@ -181,12 +72,12 @@ def findings_of(
         finding = _finding(done, name, less.get(name), shares[name], changes)
         if again := comes_again(done, name):
             why = f"it comes more than once: from {again[0]:.0f} to {again[1]:.0f} s, too"
-            finding = _doubted(finding, why, wrong_form=True, depends_on=TIME)
-        if other := _stand_in(done, name):
+            finding = doubted(finding, why, wrong_form=True, depends_on=TIME)
+        if other := stand_in(done, name):
             why = f"{other} alone takes the same errors: both may be one other effect"
-            finding = _doubted(finding, why, wrong_form=True)
+            finding = doubted(finding, why, wrong_form=True)
         larger = next((n for n in names[:k] if n != REFIT), None)
-        found.append(_beside_larger(finding, larger, *chain[k : k + 2]))
+        found.append(beside_larger(finding, larger, *chain[k : k + 2]))
     return found, [(n, t.held_score) for n, t in zip(names, chain[1:], strict=True)]
 
 
@@ -197,201 +88,6 @@ def _takes(names: Sequence[str], chain: Sequence[Trial]) -> dict[str, float]:
     excess = max(errors[0] - min(errors[-1], 1.0), 1e-9)
     falls = [a - b for a, b in pairwise(errors)]
     return {n: float(np.clip(f / excess, 0.0, 1.0)) for n, f in zip(names, falls, strict=True)}
-
-
-def _same(done: Search, name: str) -> list[str]:
-    """Effects that alone took the same errors as this one, when it was accepted."""
-    this = _round_of(done, name)
-    if name == REFIT or this.accepted.names != (name,):
-        return []
-    taken = this.before.held_score**2 - this.accepted.held_score**2
-    return [
-        t.names[0]
-        for t in this.trials
-        if len(t.names) == 1
-        and t.names[0] not in (name, REFIT)
-        and this.before.held_score**2 - t.held_score**2 > SAME_FALL * taken
-        and in_common(this.before, this.accepted, t) > SAME
-    ]
-
-
-def _stand_in(done: Search, name: str) -> str | None:
-    """Another effect that was found and alone does what this one does; None if there is none.
-
-    Two of one family may both be there, and of two that act by the same thing the better one is
-    right and the other its rest; see KINDS.
-    """
-    for other in _same(done, name):
-        family = catalogue()[name]["family"] == catalogue()[other]["family"]
-        if (
-            other in done.found
-            and not family
-            and not any(of(name) and of(other) for of, *_ in KINDS)
-        ):
-            return other
-    return None
-
-
-def _beside_larger(finding: Finding, larger: str | None, before: Trial, after: Trial) -> Finding:
-    """The finding, doubtful where it takes little of what a larger one leaves."""
-    left = after.held_score**2
-    if larger is None or finding.effect == REFIT or before.held_score**2 - left >= SLIGHT * left:
-        return finding
-    return _doubted(
-        finding, f"it takes little of what {larger} leaves, which may have another form"
-    )
-
-
-def of_another_form(found: Sequence[Finding], rest: Rest) -> list[Finding]:
-    """Findings, doubtful where their form is wrong.
-
-    So it is where what is left still depends on what they act by; where one makes the robot later
-    and another sooner: a lag below its own and a delay imitate a body that swings; and where a
-    second one of KINDS does what a better one does already; and where losses come at several times,
-    or as large ones at a place and at a moment.
-
-    Args:
-        found: in the order of worth.
-        rest: what is left.
-    """
-    depends_on = rest.depends_on if rest.share > LEAST else ()
-    late_s = [_lateness_s(f) for f in found]
-    swings = min(late_s, default=0.0) < 0 < max(late_s, default=0.0)
-    losses = _alike_losses(found)
-
-    def judged(finding: Finding) -> Finding:
-        if swings and _lateness_s(finding):
-            why = "sooner by one lag and later by another is what a body does that swings"
-            return _doubted(finding, why, wrong_form=True, depends_on=CHANGE)
-        if finding in losses and len(losses) > 1:
-            why = "losses at several times may be one that comes and goes"
-            return _doubted(finding, why, wrong_form=True, depends_on=TIME)
-        on = next(
-            (group for group in depends_on if BY.get(group, set()) & _acts_by(finding.effect)), None
-        )
-        if on is not None:
-            why = f"what is left still depends on {on}, so that it may have another form"
-            return _doubted(finding, why, wrong_form=True)
-        for of_kind, _, does, what in KINDS:
-            first, *others = [f for f in found if of_kind(f.effect)] or [None]
-            if finding in others:
-                return _doubted(
-                    finding, f"{first.effect} {does}, too: both may be one other {what}"
-                )
-        return finding
-
-    return [judged(f) for f in found]
-
-
-def _alike_losses(found: Sequence[Finding]) -> list[Finding]:
-    """Findings of a moment, and those of a place that are as large as one of a moment.
-
-    None of a moment that ends where another begins: together they are one of another form.
-    """
-    events = [f for f in found if with_role(f.effect, "moment")]
-    events = [f for f in events if not any(_adjoin(f, other) for other in events)]
-
-    def as_large(finding: Finding) -> bool:
-        own, *_ = finding.parameters
-        losses = [f.parameters[0] for f in events]
-        known = own.value > WITHIN * own.std
-        return known and any(
-            abs(own.value - e.value) < WITHIN * np.hypot(own.std, e.std) for e in losses
-        )
-
-    places = [f for f in found if with_role(f.effect, "place") and as_large(f)]
-    return [*events, *places]
-
-
-def _adjoin(one: Finding, other: Finding) -> bool:
-    """Whether one of two findings of a moment ends where the other begins."""
-    (begin_s, *end_s), (again_s, *over_s) = map(_when_s, (one, other))
-    pairs = [*((e, again_s) for e in end_s), *((o, begin_s) for o in over_s)]
-    return one is not other and any(abs(a - b) < PAUSE_S for a, b in pairs)
-
-
-def _when_s(finding: Finding) -> list[float]:
-    """When it begins and, if it does, ends, s since the first command."""
-    keys = with_role(finding.effect, "moment")
-    return [e.value for e in finding.parameters if e.name.split(".", 1)[1] in keys]
-
-
-def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
-    """Findings, doubtful where more is left than all of them take, and it is no noise.
-
-    A lag is doubtful where much is left at all: something else at changes of the command is late,
-    too.
-    """
-    taken = sum(f.share for f in found if f.effect != REFIT)
-
-    def judged(finding: Finding) -> Finding:
-        if finding.effect == REFIT or not (rest.firm or rest.depends_on):
-            return finding
-        if rest.share > taken:
-            why = "more is left than it takes, so that it may be a part of something else"
-            on = next((on for of_kind, on, *_ in KINDS if of_kind(finding.effect)), "")
-            return _doubted(finding, why, depends_on=on)
-        if rest.firm and rest.share > LAG_LEAVES and _is_late(finding.effect):
-            why = "much is left: something else at changes of the command may be late"
-            return _doubted(finding, why, wrong_form=True)
-        return finding
-
-    return [judged(f) for f in found]
-
-
-def _doubted(finding: Finding, why: str, wrong_form: bool = False, depends_on: str = "") -> Finding:
-    """The finding with one more reason to doubt it; the first is told."""
-    return replace(
-        finding,
-        certainty="doubtful",
-        why=finding.why or why,
-        wrong_form=finding.wrong_form or wrong_form,
-        depends_on=finding.depends_on or depends_on,
-    )
-
-
-def _acts_by(effect: str) -> set[str]:
-    """What the effect's card says of it in this respect; nothing for a refit, which has none."""
-    card = catalogue().get(effect, {"identify": (), "needs": "", "family": ""})
-    return {*card["identify"], card["needs"], card["family"]}
-
-
-def _is_late(effect: str) -> bool:
-    """Whether all of the motion comes late, at every change of the command."""
-    always = {"changes", "steps"} <= _acts_by(effect) and "spin" not in _acts_by(effect)
-    return bool(late_part(effect)) or always
-
-
-def _bends(effect: str) -> bool:
-    """Whether it bends the steady speed over the command."""
-    return effect in of_levels() and "steady_speed" in _acts_by(effect)
-
-
-def _is_placed(effect: str) -> bool:
-    """Whether it changes with the place in the room."""
-    return "places" in _acts_by(effect)
-
-
-def _is_timed(effect: str) -> bool:
-    """Whether it changes with the time that the robot has been driving."""
-    return bool(BY[TIME] & _acts_by(effect))
-
-
-# Effects of which a second one may be the rest of the first in another form: what they act by.
-KINDS = (
-    (_bends, "speed", "bends the speed over the command", "curve"),
-    (_is_late, CHANGE, "is late at changes of the command", "lag"),
-    (_is_placed, "place", "changes with the place", "floor"),
-    (_is_timed, TIME, "changes with time", "loss"),
-)
-
-
-def _lateness_s(finding: Finding) -> float:
-    """By how much a finding makes the motion later; 0 where it makes nothing late."""
-    part = late_part(finding.effect)
-    return next(
-        (e.value for e in finding.parameters if part and e.name.split(".", 1)[1] == part[1]), 0.0
-    )
 
 
 def with_stale_numbers(
@@ -495,17 +191,13 @@ def _squared(trial: Trial) -> float:
     return float(np.average(parts, weights=trial.fit.sizes))
 
 
-def _round_of(done: Search, name: str) -> Round:
-    return next(r for r in reversed(done.rounds) if r.accepted and name in r.accepted.names)
-
-
 def _rivals(done: Search, name: str) -> list[Trial]:
     """Trials that the data could not tell from this effect's, unless they were found besides.
 
     Where even the final model misses by far, its errors are no noise, and a few percent between two
     effects decide nothing.
     """
-    this = _round_of(done, name)
+    this = done.round_of(name)
     rivals = list(this.tied)
     if done.last.held_score > MISSES and len(this.accepted.names) == 1 and name != REFIT:
         fall = this.before.held_score**2 - this.accepted.held_score**2
@@ -535,102 +227,15 @@ def _finding(
         return Finding(REFIT, group, own, share, "group" if alike else "sure")
     instance = newest_instance(done.last.state.model, name)
     own = [e for e in estimates if e.name.startswith(f"{instance}.")]
-    tied = [n for t in _rivals(done, name) for n in t.names]
-    once = less is not None and _visits(done.last, less, instance) == 1
-    instead = [n for n in _same(done, name) if with_role(n, "moment")] if once else []
-    tied = list(dict.fromkeys([*tied, *instead]))[: done.settings.group - 1]
+    instead = seen_once(done, name, less)
+    tied = [*(n for t in _rivals(done, name) for n in t.names), *(instead or ())]
+    tied = list(dict.fromkeys(tied))[: done.settings.group - 1]
     group = (name, *tied) if tied else None
-    card = catalogue_of(done.last.state.model)[name]
-    doubt = _at_bound(card, own) or ("" if _stands_alone(done, name) else _unusual(card, own))
-    doubt = doubt or _faster(name, own)
-    if not doubt and once and not instead:
+    doubt = of_one(done, name, own, changes.get(instance))
+    if not doubt and instead == []:
         doubt = f"one visit of its place speaks for {name}: it may be that time and not the place"
-    if not doubt and instance in changes:
-        doubt = changes[instance].why
-    if not doubt and done.last.fit.chance_of_none(instance) > NOTHING:
-        doubt = f"parts of these logs do not agree that {name} is there: its size may be nothing"
     certainty = "doubtful" if doubt else "group" if group else "sure"
     return Finding(name, group, own, share, certainty, doubt, "#" in instance)
-
-
-def _sizes(
-    card: dict, own: Sequence[ParameterEstimate]
-) -> Iterator[tuple[ParameterEstimate, dict, float]]:
-    """Each estimate with its entry of the card and its distance from neutral."""
-    entry = {p["name"]: p for p in card["parameters"]}
-    for e in own:
-        p = entry[e.name.split(".", 1)[1]]
-        yield e, p, abs(e.value - p["neutral"])
-
-
-def _at_bound(card: dict, own: Sequence[ParameterEstimate]) -> str:
-    """A doubt where an estimate ended at its bound, and a usual one is excluded; else empty."""
-    for e, p, away in _sizes(card, own):
-        excluded = e.std is None or abs(e.value - p["default"]) > BEYOND * e.std
-        if e.at_bound and away > 1e-3 and excluded:
-            return f"{e.name} is at its bound ({e.value:.3g}): another effect may be behind it"
-    return ""
-
-
-def _unusual(card: dict, own: Sequence[ParameterEstimate]) -> str:
-    """A doubt where an estimate is far larger than is usual; else empty."""
-    for e, p, away in _sizes(card, own):
-        if p["role"] == "size" and away > BEYOND * p["usual_size"]:
-            return (
-                f"{e.name} = {e.value:.3g} is far beyond what is usual: another effect may be "
-                "behind it"
-            )
-    return ""
-
-
-def _faster(name: str, own: Sequence[ParameterEstimate]) -> str:
-    """A doubt where a loss at a place or a moment makes the robot faster; else empty."""
-    loss, *_ = own
-    placed = any(with_role(name, role) for role in WHERE_OR_WHEN)
-    if placed and loss.value < -WITHIN * loss.std:
-        return (
-            f"{loss.name} = {loss.value:.3g} makes the robot faster, which few floors or faults do"
-        )
-    return ""
-
-
-def _visits(last: Trial, less: Trial, instance: str) -> int | None:
-    """How many visits of an effect's place speak for it, in all logs; None for one without a place.
-
-    By the fall of the squared errors in windows that begin there: at least WEIGHTY of the largest.
-    """
-    fit = last.fit
-    if f"{instance}.radius_m" not in {v["name"] for v in last.state.model.values()}:
-        return None
-    falls: list[float] = []
-    parts = zip(fit.datasets, fit.models, less.fit.state[0], fit.state[0], strict=True)
-    for data, model, before, after in parts:
-        if isinstance(data, Trajectory):
-            x_m, y_m, radius_m = (model.get(f"{instance}.{k}") for k in ("x_m", "y_m", "radius_m"))
-            pose = data.measurement.track.pose[data.windows.starts]
-            there = np.hypot(pose[:, 0] - x_m, pose[:, 1] - y_m) < radius_m
-            visit = np.cumsum(np.diff(data.start_s[there], prepend=-np.inf) > AWAY_S) - 1
-            fall = (before**2 - after**2).reshape(len(there), -1).sum(axis=1)[there]
-            falls += list(np.bincount(visit, fall))
-    return int(np.sum(np.array(falls) > WEIGHTY * max(falls, default=0.0)))
-
-
-def _stands_alone(done: Search, name: str) -> bool:
-    """Whether nothing is left beside an effect, and no other comes near to what it takes.
-
-    Then it is right though its size is none that is usual.
-    """
-    this = _round_of(done, name)
-    most = this.accepted.held_score**2 + NEAR
-    near = [t for t in this.trials if t is not this.accepted and t.held_score**2 < most]
-    return done.last.held_score < GOOD and all(_beats(done, this.accepted, t) for t in near)
-
-
-def _beats(done: Search, one: Trial, other: Trial) -> bool:
-    """Whether one is better by what an addition must bring, also without its best block."""
-    evidence, without_best, _ = against(other.fit, one.fit)
-    least = done.settings
-    return evidence > least.evidence and without_best > least.without_best
 
 
 def ranking_of(done: Search, found: Sequence[Finding]) -> list[Ranked]:
@@ -641,7 +246,7 @@ def ranking_of(done: Search, found: Sequence[Finding]) -> list[Ranked]:
     for finding in found:
         if finding.effect == REFIT:
             continue
-        this, rivals = _round_of(done, finding.effect), _rivals(done, finding.effect)
+        this, rivals = done.round_of(finding.effect), _rivals(done, finding.effect)
         group = None
         if finding.group:
             number += 1

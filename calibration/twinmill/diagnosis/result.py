@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 import twinmill_native as native
 
-from twinmill.diagnosis.findings import Finding, Late, Ranked
+from twinmill.diagnosis.finding import Finding, Late, Ranked
 from twinmill.diagnosis.outliers import Outlier
 from twinmill.diagnosis.resolution import Resolution
 from twinmill.diagnosis.rest import Rest

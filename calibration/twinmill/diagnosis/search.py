@@ -201,6 +201,10 @@ class Search:
         names = [n for r in self.rounds if r.accepted for n in r.accepted.names]
         return [n for n in names if n not in self.dropped]
 
+    def round_of(self, name: str) -> Round:
+        """The last round in which an effect was accepted."""
+        return next(r for r in reversed(self.rounds) if r.accepted and name in r.accepted.names)
+
     @property
     def passes(self) -> int:
         """How often a plant ran over a whole data set, on the average."""

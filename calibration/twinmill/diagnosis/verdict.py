@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from twinmill.diagnosis import moments
-from twinmill.diagnosis.findings import Finding
+from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.rest import LEAST, MOMENTS, Rest
 from twinmill.diagnosis.search import NEWS, REFIT, of_levels
 from twinmill.fitting.compare import GOOD, MISSING

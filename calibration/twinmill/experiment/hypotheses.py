@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinmill.diagnosis.findings import Ranked
+from twinmill.diagnosis.finding import Ranked
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.search import without
 from twinmill.experiment.candidates import Candidate, candidates

@@ -9,8 +9,9 @@ import pytest
 from scipy.signal import lfilter
 
 from twinmill.diagnosis.diagnose import diagnose, first_state
+from twinmill.diagnosis.doubts import _faster, beside_more, of_another_form
 from twinmill.diagnosis.explain import explain
-from twinmill.diagnosis.findings import Finding, _faster, beside_more, of_another_form
+from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.moments import _events
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import Settings, attempt

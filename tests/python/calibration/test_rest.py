@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import twinmill_native as native
 
-from twinmill.diagnosis.findings import Finding, with_stale_numbers
+from twinmill.diagnosis.finding import Finding
+from twinmill.diagnosis.findings import with_stale_numbers
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
 from twinmill.diagnosis.notes import IRREGULAR, irregularity
 from twinmill.diagnosis.place import HORIZON, comes_again

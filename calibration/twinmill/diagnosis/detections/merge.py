@@ -8,7 +8,7 @@ import numpy as np
 
 from twinmill.diagnosis.detections.robots import judge_cameras, odd_cameras
 from twinmill.diagnosis.detections.search import DetectionSearch, Round, Trial, search_detections
-from twinmill.diagnosis.findings import Ranked
+from twinmill.diagnosis.finding import Ranked
 from twinmill.model.model_file import ModelFile
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import all_detections

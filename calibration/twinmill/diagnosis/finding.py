@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a diagnosis says of one effect, of a ranking, and of how late the motion is."""
+
+from dataclasses import dataclass, replace
+
+from twinmill.model.parameters import ParameterEstimate
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One effect that is missing, or `refit`: the base's numbers were stale.
+
+    Attributes:
+        group: names that the data cannot tell apart, its own first; None if it is alone.
+        parameters: of the final model.
+        share: of the squared held-out error at 0.5 s above the floor that it takes away.
+        certainty: sure, group or doubtful.
+        why: of a doubt; empty otherwise.
+        again: the model given has the effect already, with other numbers.
+        wrong_form: something of another form stands behind it.
+        depends_on: what that depends on, where the doubt tells it; else empty.
+    """
+
+    effect: str
+    group: tuple[str, ...] | None
+    parameters: list[ParameterEstimate]
+    share: float
+    certainty: str
+    why: str = ""
+    again: bool = False
+    wrong_form: bool = False
+    depends_on: str = ""
+
+    @property
+    def takes(self) -> str:
+        """The share in words."""
+        return "< 1 %" if self.share < 0.005 else f"{100 * self.share:.0f} %"
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        parameters = [e.to_json() for e in self.parameters]
+        group = list(self.group) if self.group else None
+        return {**vars(self), "parameters": parameters, "group": group}
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One effect of the ranking.
+
+    Attributes:
+        score_heldout: of the model with it, on parts it was not fitted to.
+        share_explained: of the squared score above 1 that the model as given had.
+        p_value: chance of such evidence if nothing were missing, for all effects together.
+        evidence: half the fall of the held-out cost.
+        group: number shared by effects that the data cannot tell apart; None if they can.
+    """
+
+    effect: str
+    score_heldout: float
+    share_explained: float
+    p_value: float
+    evidence: float
+    parameters: list[ParameterEstimate]
+    group: int | None
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return {**vars(self), "parameters": [e.to_json() for e in self.parameters]}
+
+
+@dataclass(frozen=True)
+class Late:
+    """How late the motion follows its commands.
+
+    Attributes:
+        sum_s, sum_std_s: lag and delay together; with the clocks' offset where that is not known.
+        delay_s, lag_s, clock_s: its parts; None where the data cannot part them.
+        parted: whether they can.
+    """
+
+    sum_s: float
+    sum_std_s: float | None
+    delay_s: float | None
+    lag_s: float | None
+    clock_s: float | None
+    parted: bool
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return vars(self)
+
+
+def doubted(finding: Finding, why: str, wrong_form: bool = False, depends_on: str = "") -> Finding:
+    """The finding with one more reason to doubt it; the first is told."""
+    return replace(
+        finding,
+        certainty="doubtful",
+        why=finding.why or why,
+        wrong_form=finding.wrong_form or wrong_form,
+        depends_on=finding.depends_on or depends_on,
+    )
