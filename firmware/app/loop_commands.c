@@ -7,6 +7,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "loop_link.h"
+
 #define COMMANDS_PER_STEP 8
 
 // Reads at most size bytes of a file, without the C library's streams, which take heap.

@@ -5,8 +5,6 @@
 #include <stdio.h>
 #include <unistd.h>
 
-#include "loop_state.h"
-
 void loop_link_init(struct loop *loop, const struct app_config *config)
 {
     struct loop_link *state = &loop->operator_link;

@@ -4,28 +4,7 @@
 #ifndef APP_LOOP_LINK_H
 #define APP_LOOP_LINK_H
 
-#include "config.h"
-#include "link.h"
-
-struct loop;
-
-#define LOOP_LINK_ACKS_MAX 16
-
-struct loop_link
-{
-    // Begin of the session, and when the operator was heard last (monotonic).
-    int64_t session_begin_us, heard_us;
-    // Without a word from the operator a robot that was started drives for so long; 0: for ever.
-    int32_t timeout_ms, configured_timeout_ms;
-    // It stands because that time was over.
-    bool lost;
-    // Answers of this step, which are told when the motor board has been.
-    struct link_ack acks[LOOP_LINK_ACKS_MAX];
-    int ack_count;
-    // File that says, to the next run of the program too, that the robot was stopped; empty: none.
-    char stopped_file[CONFIG_TEXT_MAX + 16];
-    bool stopped_file_is_there;
-};
+#include "loop_state.h"
 
 // @param config already checked.
 void loop_link_init(struct loop *loop, const struct app_config *config);

@@ -12,12 +12,12 @@
 #include "hal/motors.h"
 #include "hal/panel.h"
 #include "link.h"
-#include "loop_link.h"
 #include "own_tables.h"
 #include "watch.h"
 
 #define LOOP_SCRIPT_MAX_ROWS 4096
 #define LOOP_BATTERY_READINGS 5
+#define LOOP_LINK_ACKS_MAX 16
 
 #define LOOP_REASON_MAX 320
 
@@ -57,6 +57,23 @@ struct loop_plan
     bool plays_script;
     // Table to be selected; empty: the one that is.
     char behavior[LINK_NAME_MAX];
+};
+
+// The link to the operator, as loop_link.h keeps it.
+struct loop_link
+{
+    // Begin of the session, and when the operator was heard last (monotonic).
+    int64_t session_begin_us, heard_us;
+    // Without a word from the operator a robot that was started drives for so long; 0: for ever.
+    int32_t timeout_ms, configured_timeout_ms;
+    // It stands because that time was over.
+    bool lost;
+    // Answers of this step, which are told when the motor board has been.
+    struct link_ack acks[LOOP_LINK_ACKS_MAX];
+    int ack_count;
+    // File that says, to the next run of the program too, that the robot was stopped; empty: none.
+    char stopped_file[CONFIG_TEXT_MAX + 16];
+    bool stopped_file_is_there;
 };
 
 struct loop

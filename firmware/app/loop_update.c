@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "loop_update.h"
 
+#include "loop_link.h"
+
 #define BATTERY_PERIOD_US 1000000
 #define BUZZER_HALF_PERIOD_US 500000
 // A reading outside is no pack of two cells: unknown.

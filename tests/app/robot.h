@@ -13,6 +13,7 @@
 #include "hal_stub/stub_panel.h"
 #include "loop.h"
 #include "loop_commands.h"
+#include "loop_link.h"
 #include "unity.h"
 
 #define ROBOT_WIDTH_PX 32
