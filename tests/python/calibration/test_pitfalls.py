@@ -329,7 +329,8 @@ def test_a_weakness_that_comes_later_is_told_with_its_moment(tanh_robot, measure
 
 def test_a_moment_of_one_log_is_not_looked_for_in_several(tanh_robot, measure, fitted):
     logs = [measure(_weak_left_from(tanh_robot, s), 22 + int(s), 20.0) for s in (0.0, 10.0)]
-    assert dict(diagnose(logs, fitted).not_identifiable)["abrupt_loss"].startswith("a moment of")
+    why = dict(diagnose(logs, fitted).not_identifiable)["abrupt_loss"]
+    assert why.startswith("it begins at a moment of one run")
 
 
 def test_a_weakness_for_a_while_is_named_with_its_times(tanh_robot, measure, fitted):
