@@ -13,7 +13,7 @@ from twinmill.diagnosis.detections.merge import with_detections
 from twinmill.diagnosis.doubts import beside_more, of_another_form
 from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_numbers
 from twinmill.diagnosis.notes import geometry_notes, irregularity_notes, time_base_notes
-from twinmill.diagnosis.outliers import Outlier, outliers, sentence
+from twinmill.diagnosis.outliers import Outlier, odd_of_two, outliers, sentence
 from twinmill.diagnosis.resolution import resolutions
 from twinmill.diagnosis.rest import rest_of
 from twinmill.diagnosis.result import Diagnosis
@@ -29,7 +29,7 @@ from twinmill.diagnosis.search import (
     search,
 )
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
-from twinmill.fitting.compare import comparison
+from twinmill.fitting.compare import GOOD, comparison
 from twinmill.fitting.fit import base_names
 from twinmill.fitting.opening import Opened, judged, open_measurements, with_own_gains
 from twinmill.model.model_file import ModelFile
@@ -99,21 +99,30 @@ def diagnose(
     known = with_own_gains(judged(opened))
     first = first_state(known, model_file, {*excluded, *unseen})
     usual = model_file.usual_score([o.measurement.log_sha256 for o in known])
+    off = odd_of_two(known, first, GOOD * usual, progress)
+    if off:
+        known = _without(judged(opened), off)
+        first = first_state(known, model_file, {*excluded, *unseen})
     done = search(first, progress, settings, usual)
-    progress("looking for robots that differ")
-    off = outliers(known, done, progress)
-    if off and done.found:
-        alike = [o for o in known if _robot_of(o) not in {r.robot_id for r in off}]
-        progress("looking again without them")
-        first = first_state(alike, model_file, {*excluded, *unseen})
-        done = search(first, progress, settings, usual)
-        known = alike
+    if not off:
+        progress("looking for robots that differ")
+        off = outliers(known, done, progress)
+        if off and done.found:
+            known = _without(known, off)
+            progress("looking again without them")
+            first = first_state(known, model_file, {*excluded, *unseen})
+            done = search(first, progress, settings, usual)
     progress("looking for what no effect explains")
     found = _concluded(opened, known, first, done, model_file, before, unseen, off)
     whole = with_detections(
         found, [r.modelled for r in before.robots], model_file, progress, excluded
     )
     return replace(whole, sentence=" ".join([whole.sentence, *map(sentence, whole.robots_off)]))
+
+
+def _without(opened: Sequence[Opened], off: Sequence[Outlier]) -> list[Opened]:
+    gone = {r.robot_id for r in off}
+    return [o for o in opened if _robot_of(o) not in gone]
 
 
 def first_state(

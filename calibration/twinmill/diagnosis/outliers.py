@@ -118,37 +118,71 @@ def outliers(
         done: the common search.
         progress: told in words what is being done.
     """
-    ids = sorted({o.measurement.track.robot_id for o in opened if o.floor})
-    if len(ids) < FEWEST:
+    count = len(_ids(opened))
+    if count < FEWEST:
         return []
-    states = {i: _alone_state(opened, done, i) for i in ids}
-    names = _suspects(states, progress)
-    if not names:
-        return []
-    alone = []
-    for i in ids:
-        progress(f"robot {i} alone")
-        before = fitted(states[i])
-        trials = {n: _attempt(before, n) for n in names}
-        alone.append(_Alone(i, before, trials))
+    alone = _each_alone(opened, done.last.state, progress)
     found = [off for a in alone if (off := _judged(a, alone))]
     found.sort(key=lambda off: off.p_value)
-    return found[: max(len(ids) - 1, 0) // 2]
+    return found[: max(count - 1, 0) // 2]
 
 
-def _alone_state(opened: Sequence[Opened], done: Search, robot_id: int) -> State:
-    """One robot's data with the common model; of its own only the clock is free."""
+def odd_of_two(
+    opened: Sequence[Opened],
+    first: State,
+    good: float,
+    progress: Callable[[str], None] = lambda _: None,
+) -> list[Outlier]:
+    """The robot of two that the model as given misses, where it predicts the other one.
+
+    Two robots do not tell which of them is odd; a model that one of them follows does.
+
+    Args:
+        opened: of two robots; for other numbers there is no answer.
+        first: the state with the model as given.
+        good: score up to which the model predicts a robot.
+        progress: told in words what is being done.
+    """
+    if len(_ids(opened)) != 2:
+        return []
+    alone = _each_alone(opened, first, progress)
+    one, other = sorted(alone, key=lambda a: a.before.held_score)
+    if one.before.held_score > good or other.before.held_score <= good:
+        return []
+    off = _judged(other, alone)
+    return [off] if off and off.effect else []
+
+
+def _ids(opened: Sequence[Opened]) -> list[int]:
+    return sorted({o.measurement.track.robot_id for o in opened if o.floor})
+
+
+def _each_alone(
+    opened: Sequence[Opened], state: State, progress: Callable[[str], None]
+) -> list[_Alone]:
+    """Each robot with what may set some robot apart tried on it."""
+    states = {i: _alone_state(opened, state, i) for i in _ids(opened)}
+    names = _suspects(states, progress)
+    alone = []
+    for i, own in states.items():
+        progress(f"robot {i} alone")
+        before = fitted(own)
+        alone.append(_Alone(i, before, {n: _attempt(before, n) for n in names}))
+    return alone
+
+
+def _alone_state(opened: Sequence[Opened], state: State, robot_id: int) -> State:
+    """One robot's data with the state's model; of its own only the clock is free."""
     own = [i for i, o in enumerate(opened) if o.floor and o.measurement.track.robot_id == robot_id]
     data, models = [], []
     for i in own:
         clock = tuple(p for p in opened[i].data.own if p.name not in GAINS)
         data.append(replace(opened[i].data, own=clock))
-        model = done.last.state.models[i].copy()
+        model = state.models[i].copy()
         for name in GAINS:
             model.set(name, 1.0)
         models.append(model)
-    last = done.last.state
-    return State(data, models, (), (), last.excluded)
+    return State(data, models, (), (), state.excluded)
 
 
 def _suspects(states: dict[int, State], progress: Callable[[str], None]) -> list[str]:

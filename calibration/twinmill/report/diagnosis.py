@@ -110,7 +110,9 @@ def each_robot(diagnosis: Diagnosis) -> Table:
     """What is said of each robot, and what its logs would have shown of it."""
     off = {o.robot_id: _said_of(o.sentence) for o in diagnosis.robots_off}
     count = len(diagnosis.robots)
-    usual = "alone" if count == 1 else "as all" if count >= FEWEST else "not compared"
+    too_few = 1 < count < FEWEST and not off
+    usual = "alone" if count == 1 else "not compared" if too_few else "as all"
+    usual = "as the model" if off and count < FEWEST else usual
     rows = [
         [
             Cell(f"R{r.robot_id:02d}", "bad" if r.robot_id in off else ""),
@@ -124,7 +126,7 @@ def each_robot(diagnosis: Diagnosis) -> Table:
         ["robot", "it is", "would show\nin speed", "in turning"],
         rows,
         "Would show: the smallest difference from the model that these logs would have put beyond "
-        "doubt; a smaller one is not excluded." + (f" {TOO_FEW}" if 1 < count < FEWEST else ""),
+        "doubt; a smaller one is not excluded." + (f" {TOO_FEW}" if too_few else ""),
         words=(1,),
     )
 

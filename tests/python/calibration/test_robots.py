@@ -40,11 +40,11 @@ WHEELS = "[[effect]]\nname = 'wheel_gain'\nfl = 0\nfr = 0\nrl = 0\nrr = 0\n"
 def logged(tmp_path, model_text):
     """Measurements of robots that a model with planted effects drives, and the plain model."""
 
-    def make(planted: str, seed: int = 5):
+    def make(planted: str, seed: int = 5, usual: str = REAL):
         script, model, log = (tmp_path / n for n in ("s.csv", "real.toml", "run.lcmlog"))
         write_rich_script(script, DURATION_S, 3)
         plain_text = model_text("plain")
-        model.write_text(plain_text + REAL + planted)
+        model.write_text(plain_text + usual + planted)
         plain = tmp_path / "plain.toml"
         plain.write_text(plain_text)
         command = [TWIN_RUN, "--plant", "planar", "--model", model, "--n", ROBOTS, "--seed", seed]
@@ -61,9 +61,25 @@ def test_robots_with_gains_of_their_own_are_not_off(logged):
     assert found.found == []
 
 
-def test_of_two_robots_none_is_said_to_be_as_the_other(logged):
+WEAK_R01 = WHEELS + "[robots.R01]\nwheel_gain.fl = -0.1\n"
+
+
+def test_of_two_robots_the_one_that_the_model_misses_is_odd(logged):
+    """The model is the truth of R00, so that it tells which of the two is the weak one."""
+    measurements, plain = logged(WEAK_R01, usual="")
+    found = diagnose(measurements[:2], plain)
+    assert [(r.robot_id, r.effect) for r in found.robots_off] == [(1, "wheel_gain")]
+    size = {e.name: e.value for e in found.robots_off[0].parameters}
+    assert size["wheel_gain.fl"] == pytest.approx(-0.1, abs=0.02)
+    assert found.found == []
+    words = [row[1].text for row in each_robot(found).rows]
+    assert words[0] == "as the model" and "weak" in words[1]
+
+
+def test_of_two_robots_that_the_model_misses_none_is_said_to_be_as_the_other(logged):
     """Which of two is the odd one nothing tells, so a weak one must not stand there as like it."""
-    measurements, plain = logged(WHEELS + "[robots.R01]\nwheel_gain.fl = -0.1\n")
+    both = "[[effect]]\nname = 'motor_lag'\nextra_s = 0.15\n"
+    measurements, plain = logged(both + WEAK_R01)
     found = diagnose(measurements[:2], plain)
     assert found.robots_off == ()
     table = each_robot(found)
