@@ -754,7 +754,7 @@ def fit(log: Log | str | Path, model: Model | str | None = None) -> Fit:
         >>> fitted.score <= fitted.before.score
         True
         >>> list(fitted.table().columns)
-        ['name', 'value', 'std', 'unit', 'at_bound', 'seen']
+        ['name', 'value', 'std', 'unit', 'at_bound', 'seen', 'together']
     """
     start = _model(model)
     measurements = _log(log).measurements(start)

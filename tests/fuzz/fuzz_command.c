@@ -10,6 +10,7 @@
 #include "hal_stub/stub_clock.h"
 #include "hal_stub/stub_panel.h"
 #include "loop.h"
+#include "loop_link.h"
 #include "radio/lcm_packet.h"
 #include "radio/wire.h"
 
