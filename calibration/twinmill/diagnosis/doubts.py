@@ -47,6 +47,7 @@ BY = {
     CHANGE: {"changes"},
 }
 SLIGHT = 0.3  # of the squared score that is left: what a second finding must at least take
+MUCH_LEFT = 0.3  # of what was to be explained, beyond which no name is sure
 LAG_LEAVES = 0.25  # at most, of what was to be explained, where nothing else is late
 SAME, SAME_FALL = 0.8, 0.85  # cosine of what two take of the errors, and share that one takes
 NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
@@ -279,7 +280,7 @@ def _when_s(finding: Finding) -> list[float]:
 
 
 def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
-    """Findings, doubtful where more is left than all of them take, and it is no noise.
+    """Findings, doubtful where much is left, or more than all of them take, and it is no noise.
 
     A lag is doubtful where much is left at all: something else at changes of the command is late,
     too.
@@ -287,15 +288,17 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
     taken = sum(f.share for f in found if f.effect != REFIT)
 
     def judged(finding: Finding) -> Finding:
-        if finding.effect == REFIT or not (rest.firm or rest.depends_on):
+        if finding.effect == REFIT:
             return finding
-        if rest.share > taken:
+        if rest.share > taken and (rest.firm or rest.depends_on):
             why = "more is left than it takes, so that it may be a part of something else"
             on = next((on for of_kind, on, *_ in KINDS if of_kind(finding.effect)), "")
             return doubted(finding, why, depends_on=on)
         if rest.firm and rest.share > LAG_LEAVES and _is_late(finding.effect):
             why = "much is left: something else at changes of the command may be late"
             return doubted(finding, why, wrong_form=True)
+        if rest.share > MUCH_LEFT:
+            return doubted(finding, "much is left, so that it may be a part of something else")
         return finding
 
     return [judged(f) for f in found]

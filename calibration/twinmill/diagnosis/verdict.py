@@ -64,15 +64,11 @@ class VerdictInputs:
         return "cannot_tell" if unsure else "model_adequate"
 
     @property
-    def _passes(self) -> bool:
-        """The model as given misses no more than `compare` calls good."""
-        return self.score <= GOOD
-
-    @property
     def _maybe(self) -> list[Finding]:
         """Effects of which none is beyond doubt, where the model as given misses nothing."""
         doubtful = all(f.certainty == "doubtful" for f in self.effects)
-        well = self._passes and not (self.rest.depends_on or self.noises or self.silent)
+        passes = self.score <= GOOD  # as compare says
+        well = passes and not (self.rest.depends_on or self.noises or self.silent)
         return self.effects if doubtful and well else []
 
     @property
@@ -102,7 +98,7 @@ class VerdictInputs:
     @property
     def _outside(self) -> bool:
         """Something is left that no effect takes: it depends on something, or it is much."""
-        depends = bool(self.rest.again or (self._continuous and not self._passes))
+        depends = bool(self.rest.again or self._continuous)
         return depends or self.last > WORSE * self.known
 
     @property
@@ -143,9 +139,7 @@ class VerdictInputs:
         if verdict == "model_adequate":
             maybe = f" {' or '.join(f.effect for f in self._maybe)}" if self._maybe else ""
             there = f"{maybe} may be there, and is too small to be sure." if maybe else ""
-            on = " and ".join(self._continuous)
-            little = f" What little is left depends on {on}." if on else ""
-            return f"Nothing is missing that these logs would show.{there}{little}{self._as_before}"
+            return f"Nothing is missing that these logs would show.{there}{self._as_before}"
         if verdict == "cannot_tell" and self._left_in_the_dark:
             return (
                 f"The model misses by more than the noise (score {self.last:.2f}), and these logs "

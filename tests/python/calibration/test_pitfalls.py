@@ -615,10 +615,10 @@ def test_a_lag_that_hangs_on_the_duty_is_not_parted_from_another(second, certain
     [
         ("input_delay", 0.1, True, "sure"),
         ("input_delay", 0.4, True, "doubtful"),  # something else is late
-        ("input_delay", 0.4, False, "sure"),  # noise
-        ("floor_tilt", 0.4, True, "sure"),
+        ("input_delay", 0.2, False, "sure"),
+        ("floor_tilt", 0.2, True, "sure"),
+        ("floor_tilt", 0.4, False, "doubtful"),  # half of such names were wrong
         ("floor_tilt", 0.7, True, "doubtful"),  # more is left than it takes
-        ("floor_tilt", 0.7, False, "sure"),
     ],
 )
 def test_beside_a_rest_that_is_no_noise_a_name_is_doubtful(effect, left, firm, certainty):

@@ -180,18 +180,3 @@ def test_a_doubtful_effect_is_not_missing_where_nothing_is_missed(score, certain
     weighed = VerdictInputs(score, score, score, 1.0, found, Rest(0.0, False, []), [], [], [], 1.0)
     assert weighed.verdict == verdict
     assert "speed_curve" in weighed.sentence
-
-
-@pytest.mark.parametrize(
-    ("score", "on", "again", "verdict"),
-    [
-        (1.04, "time", 0.0, "model_adequate"),  # as compare says: good
-        (1.4, "time", 0.0, "outside_catalogue"),
-        (1.04, "place", 0.3, "outside_catalogue"),  # no score shows what repeats at places
-    ],
-)
-def test_what_little_is_left_depends_on_is_told_and_is_not_outside(score, on, again, verdict):
-    rest = Rest(1.0, False, [on], again=again)
-    weighed = VerdictInputs(score, score, score, score, [], rest, [], [], [], 1.0)
-    assert weighed.verdict == verdict
-    assert on in weighed.sentence
