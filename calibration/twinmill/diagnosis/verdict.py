@@ -11,7 +11,7 @@ from twinmill.diagnosis.search import NEWS, REFIT, of_levels
 from twinmill.fitting.compare import GOOD, MISSING
 
 DRIFTED = 0.85  # share of the score as given that drifting gains leave, where they were stale
-MUCH = 0.1  # share of the squared error that is left, beyond which doubtful findings are not all
+MUCH = 0.1  # share of the squared error that is much: left beside doubtful findings, or found
 WORSE = 1.5  # score over the usual one, beyond which it is a finding
 
 
@@ -115,7 +115,9 @@ class VerdictInputs:
 
     @property
     def _of_another_form(self) -> bool:
-        """Most of what was found stands for something else of another form."""
+        """Most of what was found stands for something else of another form, and no more is sure."""
+        if any(f.certainty != "doubtful" and f.share > MUCH for f in self.effects):
+            return False
         return sum(f.share for f in self.effects if f.wrong_form) > self._taken / 2
 
     @property

@@ -180,3 +180,16 @@ def test_a_doubtful_effect_is_not_missing_where_nothing_is_missed(score, certain
     weighed = VerdictInputs(score, score, score, 1.0, found, Rest(0.0, False, []), [], [], [], 1.0)
     assert weighed.verdict == verdict
     assert "speed_curve" in weighed.sentence
+
+
+@pytest.mark.parametrize(
+    ("share", "verdict"), [(0.34, "effect_missing"), (0.02, "outside_catalogue")]
+)
+def test_what_is_sure_and_takes_much_is_missing_beside_what_has_another_form(share, verdict):
+    """Robots with a limit of their speed, beside whose lag something else is late, too."""
+    late = Finding("motor_lag", None, [], 0.5, "doubtful", "much is left", wrong_form=True)
+    found = [Finding("speed_limit", None, [], share, "sure"), late]
+    rest = Rest(0.27, True, ["place"])
+    weighed = VerdictInputs(2.9, 2.9, 2.3, 1.5, found, rest, [], [], [], 1.0)
+    assert weighed.verdict == verdict
+    assert "speed_limit" in weighed.sentence and "place" in weighed.sentence
