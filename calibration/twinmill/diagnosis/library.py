@@ -70,16 +70,17 @@ def library(
     """
     middles = _middles(opened)
     pairs = list(zip(opened, models, strict=True))
-    values = [_named_terms(own, model, middles) for own, model in pairs]
+    velocities = [body_velocity_at(own.data, m, own.floor.response.points) for own, m in pairs]
+    values = [_named_terms(own, v, middles) for own, v in zip(opened, velocities, strict=True)]
     sizes = _sizes(values)
     terms = [Term(g, CHANNELS[a], f, s) for (g, f), s in sizes.items() for a in range(3)]
     of_wheels = _wheel_terms(opened, models[0])
     of_all, parts = _terms_of_all_speeds(terms)
     waves, rates_radps = _waves(opened)
     columns = []
-    for (own, model), v in zip(pairs, values, strict=True):
-        body = _body_columns(own, model, v, sizes)
-        swell = _wave_columns(own, model, waves, rates_radps)
+    for (own, model), velocity, named in zip(pairs, velocities, values, strict=True):
+        body = _body_columns(own, velocity, named, sizes)
+        swell = _wave_columns(own, velocity, waves, rates_radps)
         of_wheel = _wheel_columns(own, model, of_wheels)
         columns.append(np.hstack([body, body @ parts, swell, of_wheel]))
     return [*terms, *of_all, *waves, *of_wheels], columns
@@ -123,11 +124,10 @@ def _waves(opened: Sequence[Opened]) -> tuple[list[Term], np.ndarray]:
 
 
 def _wave_columns(
-    own: Opened, model: native.Model, waves: Sequence[Term], rates_radps: np.ndarray
+    own: Opened, velocity: np.ndarray, waves: Sequence[Term], rates_radps: np.ndarray
 ) -> np.ndarray:
-    """(R, n) change of the rows by each wave."""
+    """(R, n) change of the rows by each wave, as (N, 3) `velocity` moves the robot."""
     response = own.floor.response
-    velocity = body_velocity_at(own.data, model, response.points)
     angle = response.middle_s[:, None] * rates_radps
     gains = SWELL * np.stack([np.cos(angle), np.sin(angle)], axis=-1).reshape(len(angle), -1)
     parts = [_displaced(response, velocity, velocity[:, [k]] * gains, k) for k in range(3)]
@@ -167,10 +167,9 @@ def _middles(opened: Sequence[Opened]) -> dict[str, float]:
     return {name: float(f"{value:.4g}") for name, value in found.items()}
 
 
-def _body_columns(own: Opened, model: native.Model, terms: dict, sizes: dict) -> np.ndarray:
-    """(R, 3 T) change of the rows by each term in each body axis."""
+def _body_columns(own: Opened, velocity: np.ndarray, terms: dict, sizes: dict) -> np.ndarray:
+    """(R, 3 T) change of the rows by each term in each body axis, at (N, 3) `velocity`."""
     response = own.floor.response
-    velocity = body_velocity_at(own.data, model, response.points)
     values = np.stack([terms[key] / sizes[key] for key in sizes], axis=-1)
     parts = [
         _displaced(response, velocity, TYPICAL[channel] * values, axis)
@@ -253,11 +252,10 @@ def _displaced(
 
 
 def _named_terms(
-    own: Opened, model: native.Model, middles: Mapping[str, float]
+    own: Opened, velocity: np.ndarray, middles: Mapping[str, float]
 ) -> dict[tuple[str, str], np.ndarray]:
-    """(group, formula) to values (N,) at the response's points."""
+    """(group, formula) to values (N,) at the response's points, of (N, 3) `velocity` there."""
     response, track = own.floor.response, own.measurement.track
-    velocity = body_velocity_at(own.data, model, response.points)
     vx, vy, turn = np.where(np.abs(velocity) < STILL, 0.0, velocity).T
     theta, t_s = response.heading_rad, response.middle_s
     x, y = response.pose[:, 0], response.pose[:, 1]

@@ -143,13 +143,14 @@ def odd_of_two(
         good: score up to which the model predicts a robot.
         progress: told in words what is being done.
     """
-    if len(_ids(opened)) != 2:
+    ids = _ids(opened)
+    if len(ids) != 2:
+        return []
+    score = {i: fitted(_alone_state(opened, first, i)).held_score for i in ids}
+    if not min(score.values()) <= good < max(score.values()):
         return []
     alone = _each_alone(opened, first, progress)
-    one, other = sorted(alone, key=lambda a: a.before.held_score)
-    if one.before.held_score > good or other.before.held_score <= good:
-        return []
-    off = _judged(other, alone)
+    off = _judged(max(alone, key=lambda a: a.before.held_score), alone)
     return [off] if off and off.effect else []
 
 

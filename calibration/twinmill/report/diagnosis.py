@@ -111,8 +111,8 @@ def each_robot(diagnosis: Diagnosis) -> Table:
     off = {o.robot_id: _said_of(o.sentence) for o in diagnosis.robots_off}
     count = len(diagnosis.robots)
     too_few = 1 < count < FEWEST and not off
-    usual = "alone" if count == 1 else "not compared" if too_few else "as all"
-    usual = "as the model" if off and count < FEWEST else usual
+    of_few = "alone" if count == 1 else "not compared" if too_few else "as the model"
+    usual = of_few if count < FEWEST else "as all"
     rows = [
         [
             Cell(f"R{r.robot_id:02d}", "bad" if r.robot_id in off else ""),
