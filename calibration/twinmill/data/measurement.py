@@ -245,7 +245,7 @@ def _check_length(name: str, track: Track) -> None:
 
 def _played(track: Track, heading_rad: np.ndarray) -> native.Track:
     t_s, command, battery_V = track.command_t_s, track.command, track.battery_V
-    if track.command_kind == "duty":
+    if track.telemetry:
         silent = np.flatnonzero(np.diff(t_s) > SILENCE_S)
         t_s = np.insert(t_s, silent + 1, t_s[silent] + SILENCE_S)
         command = np.insert(command, silent + 1, 0.0, axis=0)

@@ -55,6 +55,8 @@ class Track:
         has_heading: false where the heading was not recorded: it is NaN in `pose`, and nothing
             about it can be judged.
         same_clock: the log says that one clock stamped commands and poses.
+        telemetry: the robot told its commands at each control step: where it falls silent its
+            watchdog stops it. Other commands are held for as long as it takes.
         astray_rad: by which a robot that is driven straight moves to the left of its heading, where
             that is no bias; else 0.
     """
@@ -73,6 +75,7 @@ class Track:
     notes: list[str]
     has_heading: bool = True
     same_clock: bool = False
+    telemetry: bool = False
     astray_rad: float = 0.0
 
     @property
@@ -133,6 +136,7 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
         notes=notes,
         has_heading=robot.has_heading,
         same_clock=robot.same_clock,
+        telemetry=len(robot.mode) > 0,
         astray_rad=astray_rad,
     )
 
