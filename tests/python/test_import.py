@@ -6,6 +6,7 @@ from pathlib import Path
 
 import lcm
 import numpy as np
+import pandas as pd
 import pytest
 import turbopi
 import twinmill_native as native
@@ -14,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+import twinmill as tm
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import LogError, read_log
 from twinmill.model.mixing import duties_from_inputs, duties_from_vendor_move
@@ -77,6 +79,28 @@ def test_poses_come_back_as_written(imported):
     np.testing.assert_allclose(robot.pose[:, 2], [3, 2 * np.pi - 3, 2 * np.pi - 2.5], atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "rows", ["0,4,0.1,0.2,3\n0.5,4,0.3,0.2,-3\n", "0;4;0,1;0,2;3\n0,5;4;0,3;0,2;-3\n"]
+)
+def test_a_table_without_names_is_read_by_the_numbers_of_its_columns(imported, rows):
+    with pytest.raises(LogError, match=r"no names, so its columns are called column_1 to column_5"):
+        imported(poses=rows)
+    ours = ("t_s", "robot_id", "x_m", "y_m", "theta_rad")
+    told = {f"column_{k}": name for k, name in enumerate(ours, 1)}
+    robot = imported(poses=rows, rename=told)
+    np.testing.assert_array_equal(robot.pose_t_s, [0, 0.5])
+    np.testing.assert_array_equal(robot.pose[:, :2], [[0.1, 0.2], [0.3, 0.2]])
+
+
+def test_the_row_that_pandas_writes_over_an_array_is_no_measurement(imported):
+    """`pandas.DataFrame(array).to_csv(index=False)` calls the columns 0, 1, 2 ..."""
+    array = pd.DataFrame(np.array([[0, 4, 0.1, 0.2, 3], [0.5, 4, 0.3, 0.2, -3]]))
+    ours = ("t_s", "robot_id", "x_m", "y_m", "theta_rad")
+    told = {str(k): name for k, name in enumerate(ours)}
+    robot = imported(poses=array.to_csv(index=False), rename=told)
+    np.testing.assert_array_equal(robot.pose[:, :2], [[0.1, 0.2], [0.3, 0.2]])
+
+
 def test_duties_are_held_to_the_last_pose_and_told_every_22_ms(imported):
     robot = imported()
     held = np.concatenate([np.arange(0, 0.1, 0.022), np.arange(0.1, 1.0001, 0.022)])
@@ -87,6 +111,22 @@ def test_duties_are_held_to_the_last_pose_and_told_every_22_ms(imported):
         robot.command[late], np.tile([0.1, -0.2, 0.3, -1.0], (late.sum(), 1))
     )
     assert np.isnan(robot.battery_V).all() and (robot.mode == 2).all()
+
+
+def test_duties_between_whole_percents_are_held_as_long_as_it_takes(
+    put, tmp_path, model_text
+):
+    """A robot that follows at once, told 154 of 255 for 6 s, then 77 for 6 s: way = speed x time."""
+    t_s = np.arange(0, 12, 0.02)
+    x_m = 0.36 / 255 * (154 * np.minimum(t_s, 6) + 77 * np.maximum(t_s - 6, 0))
+    rows = [f"{t:.2f},{x:.6f},0,0\n" for t, x in zip(t_s, x_m, strict=True)]
+    poses = put("p.csv", "t_s,x_m,y_m,theta_rad\n" + "".join(rows))
+    commands = put("c.csv", "t_s,left_pwm,right_pwm\n0,154,154\n6,77,77\n")
+    out = tmp_path / "o.lcmlog"
+    import_log(poses, commands, out, options=ImportOptions(robot_id=4, same_clock=True))
+    model = put("m.toml", model_text("m", motor_lag_s=0.0))
+    errors = tm.compare(out, str(model)).to_json()["errors"]
+    assert max(e["rms"] for e in errors if e["channel"] == "forward") < 0.0005
 
 
 @pytest.mark.parametrize(

@@ -289,7 +289,8 @@ def _lacking(kind: str, columns: list[Guess]) -> list[str]:
     }
     if known:
         return []
-    example = {"poses": "x_m", "commands": "vx_mps"}[kind]
+    timed = any("t_s" in guess.targets for guess in columns)
+    example = {"poses": "x_m", "commands": "vx_mps"}[kind] if timed else "t_s"
     left = next((g.column for g in columns if not g.targets), "NAME")
     return [
         f", and write under [{kind}] what its columns hold, as in "

@@ -27,6 +27,7 @@ TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d")
 DAY_S = 86_400
 UNITLESS = ("-", "1", "#", "id")  # as they stand in a row of units
 FLAGS = {"true": 1.0, "yes": 1.0, "false": 0.0, "no": 0.0}
+UNNAMED = "column_{}"  # what columns are called in a file that does not name them
 BEGINNING_BYTES = 65536  # tell the encoding
 FEWEST_ROWS = 10  # from which on a last cell that is shorter than all above it was cut
 
@@ -198,6 +199,12 @@ class Table:
 
     def missing(self, column: str) -> LogError:
         """The error to raise where this column is needed and not there."""
+        if self.header[:1] == [UNNAMED.format(1)]:
+            return LogError(
+                f"{self.name}: its first line holds numbers and no names, so its columns are "
+                f"called {self.header[0]} to {self.header[-1]}; write a line of names above, or "
+                f"say what each is, as with --rename {self.header[0]}={column}."
+            )
         near = difflib.get_close_matches(column, self.strange, n=1, cutoff=0.0)
         if not near:
             return LogError(f"{self.name}: column {column} is missing; add it.")
@@ -285,22 +292,43 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
 def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str]:
     """Lines from the header on, how many stand before it, and the delimiter.
 
-    The header may be the last comment before rows of numbers, as NumPy's `savetxt` writes it.
+    The header may be the last comment before rows of numbers, as NumPy's `savetxt` writes it. Where
+    there is none the columns are called as UNNAMED says.
     """
     lines, before, comment = iter(text), 0, ""
     for line in lines:
         if not line.strip() or line.lstrip().startswith("#"):
             before, comment = before + 1, line.lstrip("\ufeff #")
             continue
-        if comment.strip():
-            delimiter = _delimiter(comment)
-            cells = line.strip().split(None if delimiter == " " else delimiter)
-            if len(comment.split(None if delimiter == " " else delimiter)) == len(cells) and all(
-                is_number(cell) for cell in cells
-            ):
-                return chain([comment, line], lines), before - 1, delimiter
-        return chain([line], lines), before, _delimiter(line)
+        if not (delimiter := _between_values(line)):
+            return chain([line], lines), before, _delimiter(line)
+        named = _delimiter(comment) if comment.strip() else delimiter
+        if comment.strip() and len(_split(comment, named)) == len(_split(line, named)):
+            return chain([comment, line], lines), before - 1, named
+        columns = range(len(_split(line, delimiter)))
+        if _split(line, delimiter) == list(map(str, columns)):  # as pandas names an array's
+            return chain([line], lines), before, delimiter
+        names = delimiter.join(UNNAMED.format(k + 1) for k in columns) + "\n"
+        return chain([names, line], lines), before - 1, delimiter
     return iter(()), before, ","
+
+
+def _between_values(line: str) -> str:
+    """What stands between numbers or times in a line that holds nothing else; else empty."""
+    for delimiter in (";", "\t", "|", ",", " "):
+        cells = _split(line, delimiter)
+        if len(cells) > 1 and all(map(_is_value, cells)):
+            return delimiter
+    return ""
+
+
+def _is_value(cell: str) -> bool:
+    times = (DECIMAL_COMMA.fullmatch, DATE.match, TIME_OF_DAY.match)
+    return is_number(cell) or any(matches(cell) for matches in times)
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    return line.strip().split(None if delimiter == " " else delimiter)
 
 
 def _delimiter(header: str) -> str:

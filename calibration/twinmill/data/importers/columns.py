@@ -225,9 +225,10 @@ def _guess(table: Table, column: str, known: frozenset[str], new: str | None) ->
         return Guess(column, usual[0], 1.0, "holds dates or times of day", True)
     if usual and usual[0] == ("robot_id",) and not all(map(is_number, table.cells(column))):
         return Guess(column, usual[0], 1.0, "holds names", False)
-    values = _numbers(table, column) if usual and known.issuperset(usual[0]) else np.empty(0)
-    if not len(values):
-        return Guess(column, (), 1.0, "not known: left out", True)
+    values = _numbers(table, column)
+    if not (usual and known.issuperset(usual[0]) and len(values)):
+        span = f" ({_plain(values)[1]})" if len(values) else ""
+        return Guess(column, (), 1.0, f"not known: left out{span}", True)
     targets, unit_of = usual
     factor, why = unit_of(values)
     return Guess(column, targets, factor, why, False)

@@ -71,7 +71,7 @@ def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:
         LogError: as read_table; a wrong value, with its row.
     """
     table = columns.read(path, OF_POSES)
-    (ids, notes), utime_us = _robot_ids(table, columns), _utime_us(table)
+    utime_us, (ids, notes) = _utime_us(table), _robot_ids(table, columns)
     height = table.numbers("z_m", True) if table.has("z_m") else np.zeros(len(ids))
     position = np.column_stack([table.numbers("x_m", True), table.numbers("y_m", True), height])
     orientation = _orientation(table)
@@ -104,7 +104,7 @@ def read_commands(path: Path, columns: Columns) -> list[CommandSeries]:
     table = columns.read(path, OF_COMMANDS)
     kind, world = _kind(table), table.has(*WORLD)
     table = _complete(table, kind)
-    (ids, notes), utime_us = _robot_ids(table, columns), _utime_us(table)
+    utime_us, (ids, notes) = _utime_us(table), _robot_ids(table, columns)
     inputs = (
         np.column_stack([_input(table, name) for name in INPUTS])
         if kind == "duty" and table.has(*INPUTS)
@@ -144,7 +144,7 @@ def read_detections(path: Path, columns: Columns) -> list[DetectionSeries]:
         LogError: as read_table; a wrong value, with its row.
     """
     table = columns.read(path, OF_DETECTIONS)
-    (ids, notes), utime_us = _robot_ids(table, columns), _utime_us(table)
+    utime_us, (ids, notes) = _utime_us(table), _robot_ids(table, columns)
     seen = table.flags("seen")
     table.refuse((seen != 0) & (seen != 1), "seen", seen, "must be 0 or 1")
     more = {
