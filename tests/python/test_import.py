@@ -114,7 +114,7 @@ def test_duties_are_held_to_the_last_pose_and_told_every_22_ms(imported):
 
 
 def test_duties_between_whole_percents_are_held_as_long_as_it_takes(put, tmp_path, model_text):
-    """A robot that follows at once, told 154 of 255 for 6 s, then 77 for 6 s: way = speed x time."""
+    """A robot that follows at once is told 154 of 255, then 77: its way is speed times time."""
     t_s = np.arange(0, 12, 0.02)
     x_m = 0.36 / 255 * (154 * np.minimum(t_s, 6) + 77 * np.maximum(t_s - 6, 0))
     rows = [f"{t:.2f},{x:.6f},0,0\n" for t, x in zip(t_s, x_m, strict=True)]
