@@ -36,11 +36,13 @@ PLACED = ("marker_offset", "heading_bias", "collision", "view_angle", "view_pan"
 DUTIES_PCT = np.arange(-100, 101)
 USUAL_PCT = 75  # a duty between those that robots drive at
 LONG_S = 20.0  # after which no lag is left
+COUPLING = ("mass_offset",)  # linear in the body's velocity, so in the gears
 BY_TABLE = {
     "lag_by_duty": "MuJoCo's filter has one time constant, here that of duty "
     f"{USUAL_PCT} %; set each wheel's actuator_dynprm from lag_s in <custom> with its duty",
     "coasting": "MuJoCo's filter slows down by a share, not evenly; lag_s in <custom> at duty 0 "
-    f"rolls as far, from the speed of duty {USUAL_PCT} %",
+    f"rolls as far, from the speed of duty {USUAL_PCT} %; coasting in <custom>, where it stands, is "
+    "exact: at duty 0 let ctrl fall by its first number, in m/s^2, and its second times the speed",
 }
 
 
@@ -162,7 +164,7 @@ def _about(robot: RobotModel, left: list[Left]) -> str:
 
 
 def _left(robot: RobotModel) -> list[Left]:
-    carried = [*PLACED, "motor_lag", "input_delay"]
+    carried = [*PLACED, *COUPLING, "motor_lag", "input_delay"]
     if robot.model.drive == "duty":
         carried += STATIC
     else:
@@ -187,6 +189,8 @@ def _custom(robot: RobotModel, lags_s: np.ndarray) -> ET.Element:
         for wheel, rim_mps in zip(robot.model.wheels(), rim_table(robot.model).T, strict=True):
             _numeric(custom, f"{wheel['name']}_rim_mps", rim_mps)
         _numeric(custom, "lag_s", lags_s)
+        if (rolls := _values(robot, "coasting")) and not _delay_s(robot):
+            _numeric(custom, "coasting", list(rolls[-1].values()))
     _numeric(custom, "control_period_s", [robot.get("base.control_period_s")])
     for key in ("sensor_m", "sensor_rad", "drive_mps", "drive_s", "drive_radps", "drive_turn_s"):
         _numeric(custom, f"noise_{key}", [robot.get(f"noise.{key}")])
@@ -283,6 +287,7 @@ def _actuators(robot: RobotModel, lag_s: float) -> ET.Element:
     wheels = robot.model.wheels()
     rows = np.array([_grip(w) for w in wheels])
     strafes = bool(np.any(rows[:, 1]))
+    apart = np.linalg.inv(_coupling(robot, strafes))
     kv = robot.get("robot.mass_kg") / SETTLE_S
     actuator = ET.Element("actuator")
     held = kv
@@ -290,10 +295,22 @@ def _actuators(robot: RobotModel, lag_s: float) -> ET.Element:
     unit = robot.get("robot.wheel_radius_m") if robot.model.drive == "wheel_speed" else 1.0
     for k, (wheel, row) in enumerate(zip(wheels, rows, strict=True)):
         own = unit * (1.0 if robot.model.drive == "duty" else wheel_gains(robot)[k])
-        actuator.append(_servo(robot, lag_s, wheel["name"], row / gains, kv, float(own)))
+        actuator.append(_servo(robot, lag_s, wheel["name"], row / gains @ apart, kv, float(own)))
     if not strafes:  # plain wheels hold the robot sideways
-        actuator.append(_servo(robot, lag_s, "left", np.array([0.0, 1, 0]), held, 0.0))
+        actuator.append(_servo(robot, lag_s, "left", apart[1], held, 0.0))
     return actuator
+
+
+def _coupling(robot: RobotModel, strafes: bool) -> np.ndarray:
+    """(3, 3) velocity that comes of each part of the wheels' own (forward, left, turn)."""
+    commands = np.eye(4)
+    plain, coupled = (
+        native.steady(_with(robot.model, effects), commands, [], np.zeros((0, 0)))[0][:, :3]
+        for effects in ((), COUPLING)
+    )
+    if not strafes:
+        plain, coupled = (np.vstack([v, [0.0, 1.0, 0.0]]) for v in (plain, coupled))
+    return np.linalg.lstsq(plain, coupled)[0].T
 
 
 def _pushes(robot: RobotModel, lag_s: float) -> ET.Element:
@@ -313,7 +330,7 @@ def _damping(robot: RobotModel) -> np.ndarray:
 
 def _velocity_gains(robot: RobotModel) -> np.ndarray:
     """(3, 3) velocity that comes of each part of a velocity told, once the lags are over."""
-    still = _with(robot.model, ("wheel_gain",))
+    still = _with(robot.model, ("wheel_gain", *COUPLING))
     told = np.column_stack([np.eye(3), np.zeros(3)])
     return native.steady(still, told, [], np.zeros((0, 0)))[0][:, :3].T
 
@@ -338,13 +355,17 @@ def _servo(
 
 def _signal(robot: RobotModel, lag_s: float, name: str, row: np.ndarray) -> dict[str, str]:
     """Of an actuator along `row` (forward, left, turn), with the robot's lag and delay."""
-    delay_s = sum(v["delay_s"] for v in _values(robot, "input_delay"))
+    delay_s = _delay_s(robot)
     options = {"name": name, "site": "drive", "gear": _n(row[0], row[1], 0, 0, 0, row[2])}
-    if lag_s > 1e-6:
+    if lag_s > 1e-6 or _values(robot, "coasting"):
         options |= {"dyntype": "filterexact", "dynprm": _n(lag_s), "actearly": "true"}
     if delay_s > 0:
         options |= {"delay": _n(delay_s), "nsample": str(round(DELAY_SLOTS_PER_S * delay_s) + 1)}
     return options
+
+
+def _delay_s(robot: RobotModel) -> float:
+    return sum(v["delay_s"] for v in _values(robot, "input_delay"))
 
 
 def _lags_s(robot: RobotModel) -> np.ndarray:
