@@ -41,8 +41,8 @@ BY_TABLE = {
     "lag_by_duty": "MuJoCo's filter has one time constant, here that of duty "
     f"{USUAL_PCT} %; set each wheel's actuator_dynprm from lag_s in <custom> with its duty",
     "coasting": "MuJoCo's filter slows down by a share, not evenly; lag_s in <custom> at duty 0 "
-    f"rolls as far, from the speed of duty {USUAL_PCT} %; coasting in <custom> is exact: at duty 0 let "
-    "ctrl fall by its first number, in m/s^2, and its second times the speed",
+    f"rolls as far, from the speed of duty {USUAL_PCT} %; exact is, if <custom> has coasting, to "
+    "let ctrl fall at duty 0 by its first number, in m/s^2, and its second times ctrl",
 }
 
 
