@@ -27,9 +27,11 @@ check-long: build
 
 # What was published of these swarms, part by part, checked, with figures. Most of it is MuJoCo's: with
 # 20 seeds a cell an hour of two cores. It goes on where it was; MUJOCO_SEEDS=0 leaves it out.
+# ACTUATION=table.csv sets measured speeds of robots beside the published ones.
 MUJOCO_SEEDS ?= 20
 paper: build
-	@.venv/bin/twinmill claims --mujoco-seeds $(MUJOCO_SEEDS) --out paper
+	@.venv/bin/twinmill claims --mujoco-seeds $(MUJOCO_SEEDS) \
+	    $(if $(ACTUATION),--actuation $(ACTUATION)) --out paper
 
 # Installs and builds no more than it shows.
 demo:

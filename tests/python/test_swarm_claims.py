@@ -8,12 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import twinmill_native as native
 from scipy.stats import chi2
 
-from twinmill.claims import bodies, claims, fidelity, paper, prediction, rows
+from twinmill.claims import bodies, claims, fidelity, last_figure, paper, pivot, prediction, rows
 from twinmill.claims.actuation import actuation
 from twinmill.claims.claims import CLAIMS
-from twinmill.claims.swarms import KINDS, run
+from twinmill.claims.swarms import KINDS, run, run_kept
 from twinmill.data.steady_table import read_steady_tables
 from twinmill.model.model_file import ModelFile
 from twinmill_cli import main as cli
@@ -101,9 +102,33 @@ def test_a_page_and_an_exit_code(tmp_path, capsys, monkeypatch):
         cli.run(["claims", "--only", "bullseye", "--odd-turn", "nan"])
 
 
+def test_snapshots_are_at_the_limits_that_were_published():
+    """By the metrics of the twin's own swarms, written in C++ for velocities of the plant."""
+
+    def measured(trace, name):
+        step = np.diff(trace[-2:], axis=0) / pivot.STEP_S
+        heading = trace[-1:, :, 2]
+        ahead = step[..., 0] * np.cos(heading) + step[..., 1] * np.sin(heading)
+        velocity = np.stack([ahead, np.zeros_like(ahead), step[..., 2]], axis=-1)
+        (values,) = native.measure(trace[-1:], velocity, trace.shape[1], pivot.RANGE_M, 0.1)
+        return values[native.METRICS.index(name)]
+
+    for trace, rung in zip(pivot.mills(), pivot.CIRCLINESS, strict=True):
+        assert measured(trace, "circliness") == pytest.approx(rung, rel=0.15)
+    for trace, rung in zip(pivot.diffusings(), pivot.DELTA, strict=True):
+        assert measured(trace, "diffusion") == pytest.approx(rung, abs=0.02)
+
+
+def test_who_goes_straight_is_its_own_turning_centre():
+    trace = np.array([[[0.0, 0, 0.3]], [[0.1, 0, 0.3]]])
+    for sign in pivot.SIGNS.values():
+        np.testing.assert_allclose(pivot._moving_centres(trace, 1.0, sign), [[[0.1, 0]]])
+
+
 def test_every_claim_stands_for_a_part_of_the_paper():
     assert {name for part in paper.PARTS for name in part.claims} == {
-        *CLAIMS, "bodies", "actuation", "process", "prediction_in_mujoco"}  # fmt: skip
+        *CLAIMS, "bodies", "last_figure", "actuation", "process",
+        "prediction_in_mujoco"}  # fmt: skip
     assert all(part.claims or part.elsewhere for part in paper.PARTS)
 
 
@@ -202,13 +227,15 @@ def test_spread_of_measured_robots_is_told_at_each_input(tmp_path):
     expected = np.std([-0.3, -0.1, 0.1, 0.3], ddof=1)
     assert spread["input 100, 90 degrees, turn 0.5"].value == pytest.approx(expected)
     # The paper's factors as facts have them, recomputed from its means: 0.037 over six values.
-    assert claim.agrees and any(row.value == pytest.approx(0.037, abs=5e-4) for row in claim.rows)
+    alone = actuation([])
+    for told in (claim, alone):
+        assert told.agrees and any(row.value == pytest.approx(0.037, abs=5e-4) for row in told.rows)
+    assert len(alone.rows) < len(claim.rows) and "--actuation" in alone.finding
 
 
 def test_maps_in_mujoco_are_kept_and_no_two_of_their_runs_share_a_seed(tmp_path, monkeypatch):
     monkeypatch.setattr(bodies, "MAP", ["v_mps=0.2,0.3"])
     monkeypatch.setattr(bodies, "SECONDS", 0.5)
-    monkeypatch.setattr(bodies, "LAST", bodies.LAST[:1])
     asked = bodies.layers(5)
     assert [(kind, request.seeds) for kind, request in asked[::3]] == [
         ("robot", 2), ("robot", 2), ("robot", 1)]  # fmt: skip
@@ -216,13 +243,28 @@ def test_maps_in_mujoco_are_kept_and_no_two_of_their_runs_share_a_seed(tmp_path,
     assert sorted(seeds) == list(range(1, 31))  # 2 cells, 3 kinds, 5 seeds: each seed once
     told = []
     for count in (1, 1, 3):
-        bodies.run_layers(count, tmp_path, lambda done, of: told.append((done, of)))
+        asked = [request for _, request in bodies.layers(count)]
+        run_kept(asked, tmp_path, lambda done, of: told.append((done, of)))
     assert told[-1] == (18, 18)
     changed = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*/sweep.parquet")}
     claim = bodies.bodies(3, tmp_path)
     assert changed == {path: path.stat().st_mtime_ns for path in changed}
     assert len(changed) == 9  # of one seed, of two and of the one after them, three kinds each
     assert len(claim.rows) == 6 and "of 2 cells differ" in claim.finding
+
+
+def test_swarms_of_the_last_figure_are_counted_in_both_plants(tmp_path, monkeypatch):
+    """Planar ones as the reference has them: 99, 100 and 99 %, an odd robot at 0.76 of it."""
+    planar = {"planar": last_figure.PLANTS["planar"]}
+    monkeypatch.setattr(last_figure, "PLANTS", planar)
+    monkeypatch.setattr(last_figure, "_figure", lambda: None)
+    run_kept(last_figure.requests(20), tmp_path, lambda done, of: None)
+    claim = last_figure.last_figure(20, tmp_path)
+    found = {row.what: row for row in claim.rows}
+    for name in ("milling", "diffusing", "odd robot, -3 times", "odd robot, +3 times"):
+        assert found[f"{name}, planar"].value >= 0.85
+    orbit = found["odd robot, -3 times, planar: its distance over the ring's radius"]
+    assert orbit.value == pytest.approx(0.76, abs=0.04)
 
 
 def test_a_number_that_differs_is_named_with_why():

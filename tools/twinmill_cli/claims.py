@@ -23,11 +23,13 @@ if working():  # not for --help
     from rich.text import Text
 
     from twinmill.claims.actuation import actuation
-    from twinmill.claims.bodies import bodies, run_layers
+    from twinmill.claims.bodies import bodies, layers
     from twinmill.claims.claims import CLAIMS, ODD_TURNS
+    from twinmill.claims.last_figure import last_figure, requests
     from twinmill.claims.paper import Answer, answers
     from twinmill.claims.prediction import prediction_in_mujoco
     from twinmill.claims.rows import Claim, Row
+    from twinmill.claims.swarms import run_kept
     from twinmill.data.steady_table import read_steady_tables
     from twinmill.files import check_new_folder, plain
     from twinmill.model.model_file import ModelFile, write_whole
@@ -104,7 +106,7 @@ def _claims(
             progress(name)
             more = {"turns": tuple(odd_turn or ODD_TURNS)} if name == "bullseye" else {}
             found.append(CHECKED[name](seeds, **more))
-    if actuation_table:
+    if actuation_table or not only:
         found.append(actuation(sheets))
     if mujoco_seeds:
         found += _in_mujoco(mujoco_seeds, out / "mujoco")
@@ -141,9 +143,15 @@ def _in_mujoco(seeds: int, folder: Path) -> list[Claim]:
         predicted = prediction_in_mujoco(
             folder / "laboratories", lambda n, of: progress.update(labs, completed=n, total=of)
         )
-        task = progress.add_task("worlds in MuJoCo", total=None)
-        run_layers(seeds, folder, lambda n, of: progress.update(task, completed=n, total=of))
-    return [predicted, bodies(seeds, folder)]
+        for what, asked in (
+            ("the last figure's swarms", requests(seeds)),
+            ("worlds in MuJoCo", [request for _, request in layers(seeds)]),
+        ):
+            task = progress.add_task(what, total=None)
+            run_kept(
+                asked, folder, lambda n, of, task=task: progress.update(task, completed=n, total=of)
+            )
+    return [predicted, last_figure(seeds, folder), bodies(seeds, folder)]
 
 
 def _command_line(only: list[str] | None, seeds: int, odd_turn: list[float] | None) -> str:

@@ -228,7 +228,7 @@ def region(seeds: int) -> Claim:
     maps = {kind: run([*MAP, *KINDS[kind]], seeds=max(10, seeds // 2)) for kind in KINDS}
     for name in FOUR_CLASSES:
         hits = maps["point"]["class"].ravel() == name
-        rows.append(share(f"{name}, of all runs, point", hits, (0.002, 1.0)))
+        rows.append(share(f"{name}, of all runs, point", hits, None))
     slow = [r.value for r in rows if r.by.get("kind") == "disc, 20 deg/s"]
     fast = [r.value for r in rows if r.by.get("omega", 0) >= 60 and "disc" in r.by["kind"]]
     free_m = V_MPS[-1] / np.radians(20)

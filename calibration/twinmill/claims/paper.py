@@ -53,7 +53,7 @@ PARTS = (
     ),
     Part(
         "Two rules of one bit and their behaviours: milling, diffusing",
-        ("milling", "diffusing"),
+        ("milling", "diffusing", "last_figure"),
         open="Whether a neighbour's centre or any part of it is seen, the step of the simulation, "
         "and whether 0.04 is a standard deviation or a variance: with the first the "
         "reference's share that mills goes from 5 to 98 %.",
@@ -75,7 +75,7 @@ PARTS = (
     ),
     Part(
         "A mill with one odd robot",
-        ("bullseye", "bodies"),
+        ("bullseye", "last_figure"),
         open="Whether its turn has the sign of the text, -3 times; +3 is measured beside it.",
     ),
     Part(
@@ -86,8 +86,8 @@ PARTS = (
         "Measured speeds and turns of the robots",
         ("actuation",),
         open="Whether N(1, 0.04) is a standard deviation or a variance, and at which inputs.",
-        elsewhere="With --actuation TABLE, as the authors' public one, which is no part of this "
-        "project; compare and diagnose take it, too.",
+        elsewhere="A table of yours, or the authors' public one, which is no part of this "
+        "project, stands beside it with --actuation TABLE.",
     ),
 )
 

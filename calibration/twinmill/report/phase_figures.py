@@ -296,6 +296,14 @@ def paint_paths(axes: Axes, trace: np.ndarray, color: str, odd: int = 0) -> None
         spine.set_visible(True)
 
 
+def around(points: np.ndarray) -> dict:
+    """Limits of a square with all (T, n, 2) points in it."""
+    low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
+    half = 0.54 * float((high - low).max())
+    (x, y) = (low + high) / 2
+    return {"xlim": (x - half, x + half), "ylim": (y - half, y + half)}
+
+
 def slider_figure(phase: Phase) -> Figure:
     """A map of all axes, drawn by a script in the page itself: nothing is fetched."""
     data = {
