@@ -74,6 +74,17 @@ def test_the_slope_is_that_of_a_planted_line():
     assert next(iter(found.parts())) == NAMES[0]  # 4 of 5 parts of the variance
 
 
+def test_what_a_known_number_takes_is_what_conditioning_leaves():
+    """Of normal numbers: the variance of the outcome less that given one of them (Schur)."""
+    columns = np.random.default_rng(4).normal(size=(3, 3))
+    covariance, slope = columns @ columns.T, np.array([1.0, -2.0, 0.5])
+    found = Spread(NAMES, covariance, np.array([0.2, 0.8]), slope)
+    for i, name in enumerate(NAMES):
+        given = covariance - np.outer(covariance[:, i], covariance[i]) / covariance[i, i]
+        left = (slope @ given @ slope) / (slope @ covariance @ slope)
+        assert found.known_takes()[name] == pytest.approx(1 - left)
+
+
 def test_a_clock_that_must_be_found_takes_away_what_the_inverse_says():
     """The block of an inverse is the inverse of the Schur complement."""
     columns = np.random.default_rng(2).normal(size=(50, 5))

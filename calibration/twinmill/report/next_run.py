@@ -147,15 +147,16 @@ def _narrowed(found: Narrowing) -> list[str]:
     """What is open, why, and what the run does about it."""
     before, after = found.stds
     share, shares = found.spread.shares.mean(), found.spread.shares
-    parts = [(name, part) for name, part in found.spread.parts().items() if abs(part) > SMALL_SHARE]
-    named = ", ".join(f"{name} ({part:.0%})" for name, part in parts[:MOST_NAMED])
+    takes = list(found.spread.known_takes().items())[:MOST_NAMED]
+    named = ", ".join(f"{name} ({part:.0%})" for name, part in takes if part > SMALL_SHARE)
     moves = [(name, len(list(group))) for name, group in groupby(m.name for m in found.moves)]
     drive = ", ".join(f"{count} x {name}" if count > 1 else name for name, count in moves)
     said = [
-        f"{share:.0%} of runs end as {found.goal}; what the fits leave open makes that +- "
-        f"{before:.1%} ({len(shares)} models drawn, {shares.min():.0%} to {shares.max():.0%}).",
-        f"That depends on {named}.",
-        f"After a fit to this run of {found.rows.end_s:.0f} s it would be +- {after:.1%}: {drive}.",
+        f"{share:.0%} of runs end as {found.goal}, ± {100 * before:.1f} points by what the fits "
+        f"leave open ({len(shares)} models drawn: {shares.min():.0%} to {shares.max():.0%}).",
+        f"Known exactly, one of these would take so much of that variance: {named}.",
+        f"After a fit to this run of {found.rows.end_s:.0f} s it would be ± {100 * after:.1f} "
+        f"points: {drive}.",
     ]
     if found.untold > SMALL_SHARE:
         said.append(

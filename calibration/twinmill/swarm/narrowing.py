@@ -94,6 +94,15 @@ class Spread:
         order = np.argsort(-np.abs(part))
         return {self.names[i]: float(part[i]) for i in order}
 
+    def known_takes(self) -> dict[str, float]:
+        """Share of the variance that goes where a number, and it alone, is known; largest first.
+
+        Numbers that the fits tell together take the same part, so that their sum may exceed 1.
+        """
+        along = self.covariance @ self.slope
+        takes = along**2 / np.maximum(np.diag(self.covariance) * (self.slope @ along), 1e-300)
+        return {self.names[i]: float(takes[i]) for i in np.argsort(-takes)}
+
 
 def spread_of(
     request: Request, goal: str, draws: int, seed: int, tell: Callable[[], None]
@@ -162,6 +171,7 @@ class Narrowing:
             "std_after": after,
             "std_bound": self.spread.std(self.bound),
             "parts": self.spread.parts(),
+            "known_takes": self.spread.known_takes(),
             "untold": self.untold,
             "draws": len(self.spread.shares),
             "moves": [m.name for m in self.moves],
