@@ -5,14 +5,17 @@ Lynch and Park, Modern Robotics (2017), section 13.2.1: four mecanum wheels, one
 """
 
 import csv
+import json
 import math
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 import turbopi
 import twinmill_native as native
 
+from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import LogError
 from twinmill.experiment.wheel_signs import read_signs, script
 from twinmill_cli.main import run
@@ -98,6 +101,41 @@ def test_a_wheel_that_stands_is_seen(said):
 def test_a_log_without_single_wheels_is_refused(driven, model):
     with pytest.raises(LogError, match="no command was alone"):
         read_signs(driven(), model, "made")
+
+
+@pytest.mark.parametrize(
+    ("sign", "exchanged"), [((1, 1), False), ((1, -1), False), ((1, 1), True), ((-1, 1), True)]
+)
+def test_of_two_motors_each_side_is_told_apart(
+    tmp_path, monkeypatch, capsys, model_text, sign, exchanged
+):
+    """From tables, by a two-wheeled robot's equations: v = (r + l) / 2, omega = (r - l) / track."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "m.toml").write_text(model_text("m").replace("mecanum", "differential"))
+    assert run(["wheels", "--model", "m.toml"]) == 0
+    rows = pd.read_csv("wheels.csv")
+    pd.DataFrame({"t_s": rows.t_s, "left_pct": rows.fl_pct, "right_pct": rows.fr_pct}).to_csv(
+        "c.csv", index=False
+    )
+    t_s = np.arange(0, rows.t_s.iloc[-1], 1 / RATE_HZ)
+    told = rows.iloc[np.searchsorted(rows.t_s, t_s, "right") - 1]
+    left, right = sign[0] * told.fl_pct.to_numpy(), sign[1] * told.fr_pct.to_numpy()
+    if exchanged:
+        left, right = right, left
+    theta = np.cumsum(0.0036 * (right - left) / 0.134) / RATE_HZ
+    ahead = 0.0018 * (left + right) * np.exp(1j * theta)
+    place = np.cumsum(ahead) / RATE_HZ
+    poses = {"t_s": t_s, "x_m": place.real, "y_m": place.imag, "theta_rad": theta}
+    pd.DataFrame(poses).to_csv("p.csv", index=False)
+    options = ImportOptions(robot_id=3, same_clock=True)
+    import_log(tmp_path / "p.csv", tmp_path / "c.csv", tmp_path / "w.lcmlog", options=options)
+    capsys.readouterr()
+    right_so = sign == (1, 1) and not exchanged
+    assert run(["wheels", "w.lcmlog", "--model", "m.toml", "--json"]) == (0 if right_so else 1)
+    sides = json.loads(capsys.readouterr().out)["robots"][0]["columns"]
+    assert [c["name"] for c in sides] == ["left_pct", "right_pct"]
+    names = ["right_pct", "left_pct"] if exchanged else ["left_pct", "right_pct"]
+    assert [c["does"] for c in sides] == names and [c["sign"] for c in sides] == list(sign)
 
 
 def test_the_command_writes_the_script_and_reads_its_log(

@@ -21,7 +21,14 @@ if working():  # not for --help
     from rich.text import Text
 
     from twinmill.data.log import read_log
-    from twinmill.experiment.wheel_signs import Column, WheelSigns, csv_text, read_signs, script
+    from twinmill.experiment.wheel_signs import (
+        Column,
+        WheelSigns,
+        columns_that_act,
+        csv_text,
+        read_signs,
+        script,
+    )
     from twinmill.export.script import TwistScript
     from twinmill.files import replacing
     from twinmill.report import show
@@ -52,9 +59,10 @@ def _wheels(
 ) -> int:
     """Write a script that drives one wheel at a time; with its LOG, say what each wheel did.
 
-    Robots that are told velocities drive forward, to the left, and turn
-    instead. The answer is read from the poses: signs that are wrong, cables
-    that are exchanged, wheels that stand, poses that are mirrored or turned.
+    Plain wheels turn side by side: left, right. Robots that are told
+    velocities drive forward, to the left, and turn instead. The answer is
+    read from the poses: signs that are wrong, cables that are exchanged,
+    wheels that stand, poses that are mirrored or turned.
     Exit code 1 says that something is wrong.
 
     Example: twinmill wheels -o wheels.csv; twinmill wheels wheels.lcmlog
@@ -80,7 +88,8 @@ def _write(
         with replacing(output, force) as temporary:
             temporary.write_text(csv_text(names, rows))
     data = {"script": str(output), "columns": names, "duration_s": float(rows[-1, 0])}
-    text = f"Written: {output}, {rows[-1, 0]:g} s, one of {', '.join(names)} at a time."
+    each = ", ".join(columns_that_act(model, model.drive))
+    text = f"Written: {output}, {rows[-1, 0]:g} s, one of {each} at a time."
     deliver(data, text, as_json)
     return 0
 

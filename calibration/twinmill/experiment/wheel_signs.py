@@ -2,7 +2,8 @@
 """One wheel, or one velocity, at a time: the script of it, and what the poses say came of each.
 
 Turned alone, each wheel takes the body another way: which wheel it was and which way it turned
-follow from the signs of three speeds (Lynch and Park 2017, section 13.2.1).
+follow from the signs of three speeds (Lynch and Park 2017, section 13.2.1). Plain wheels of one
+side do the same, and often have one motor: they are turned together.
 """
 
 from dataclasses import dataclass
@@ -22,16 +23,17 @@ RIM_MPS, TURN_RADPS = 0.15, 0.6  # of wheels that are told speeds, of bodies tha
 MARGIN_S = 0.4  # after each change: clocks, lag
 FEWEST = 3  # velocities in which one column was driven
 STANDS = 0.1  # of what the fastest does: this column moves nothing
+SIDES = {"left": (0, 2), "right": (1, 3)}  # places of the columns of plain wheels
 LIKE = 0.7  # cosine, below which a direction is that of no column
 AS_GOOD = 0.1  # cosine that another column must gain: front and rear may do the same
 
 
 @dataclass(frozen=True)
 class Column:
-    """What one column of commands did, as it was driven forward.
+    """What one column of commands, or those of one side, did as it was driven forward.
 
     Attributes:
-        name: of the column.
+        name: of the column; of a side as `import` takes it.
         body: (3,) forward m/s, left m/s, turn rad/s; NaN where it was not driven alone.
         like: the column that does this by the model; empty if it stood, or none does.
         sign: -1 where it went backward.
@@ -69,12 +71,16 @@ class WheelSigns:
         return all(c.right for c in self.columns) and not any(f.fatal for f in self.findings)
 
 
-def columns_that_act(model: native.Model, kind: CommandKind) -> list[int]:
-    """Places of the columns of commands that move this robot."""
+def columns_that_act(model: native.Model, kind: CommandKind) -> dict[str, tuple[int, ...]]:
+    """Columns of commands that move this robot, by name; plain wheels as sides."""
     body = body_by_command(model, kind)
-    if kind == "twist" and model.wheel_kind == "differential":  # told to go sideways, it stays
-        return [0, 2]
-    return [k for k in range(4) if np.any(body[:, k])]
+    if model.wheel_kind == "differential" and kind != "twist":
+        unit = COLUMNS[kind][0].partition("_")[2]
+        return {f"{side}_{unit}": places for side, places in SIDES.items()}
+    places = [k for k in range(4) if np.any(body[:, k])]
+    if model.wheel_kind == "differential":  # told to go sideways, it stays
+        places = [0, 2]
+    return {COLUMNS[kind][k]: (k,) for k in places}
 
 
 def script(model: native.Model, duty_pct: int) -> tuple[list[str], np.ndarray]:
@@ -95,9 +101,9 @@ def script(model: native.Model, duty_pct: int) -> tuple[list[str], np.ndarray]:
         rim_radps = round(RIM_MPS / model.get("robot.wheel_radius_m"), 2)
         size = np.full(4, rim_radps if kind == "wheel_speed" else float(duty_pct))
     rows, t_s = [np.zeros(1 + len(names))], 1.0
-    for k in columns_that_act(model, kind):
+    for places in columns_that_act(model, kind).values():
         for sign in (1, -1):
-            value = np.where(np.arange(len(names)) == k, sign * size, 0.0)
+            value = np.where(np.isin(np.arange(len(names)), places), sign * size, 0.0)
             rows += [np.array([t_s, *value]), np.array([t_s + DRIVEN_S, *np.zeros(len(names))])]
             t_s += DRIVEN_S + STILL_S
     rows.append(np.array([t_s, *np.zeros(len(names))]))
@@ -132,30 +138,32 @@ def read_signs(robot: RobotLog, model: native.Model, label: str) -> WheelSigns:
     if not track.has_heading:
         raise LogError(f"{label}: has no heading, which tells the wheels apart; record it.")
     used = columns_that_act(model, track.command_kind)
-    names = [COLUMNS[track.command_kind][k] for k in used]
-    did = _responses(track, used)
+    did = _responses(track, list(used.values()))
     if np.isnan(did).all():
         raise LogError(
             f"{label}: no command was alone for {2 * MARGIN_S + 0.5:.1f} s; play the script that "
             "`twinmill wheels -o wheels.csv` writes."
         )
-    columns = _named(names, body[:, used], did, track.command_kind)
+    wanted = np.column_stack([body[:, places].sum(axis=1) for places in used.values()])
+    columns = _named(list(used), wanted, did, track.command_kind)
     return WheelSigns(robot.robot_id, columns, check_tracks([(label, track)], model))
 
 
-def _responses(track: Track, used: list[int]) -> np.ndarray:
-    """(3, C) mean velocity of the body while one column alone is driven, by its sign."""
+def _responses(track: Track, used: list[tuple[int, ...]]) -> np.ndarray:
+    """(3, C) mean velocity of the body while some columns alone are driven, by their sign."""
     motion = Motion.of(track)
     at_s = motion.t_s[:, None] + np.linspace(-MARGIN_S, MARGIN_S, 9)
     told = command_at(at_s.ravel(), track.command_t_s, track.command).reshape(*at_s.shape, -1)
     same = (told == told[:, :1]).all(axis=(1, 2))
-    told, body = told[:, 4][:, used], motion.body_mps()
+    told, body = told[:, 4], motion.body_mps()
     speeds = np.column_stack([body.real, body.imag, motion.turn_radps])
     did = np.full((3, len(used)), np.nan)
-    for k in range(len(used)):
-        alone = same & (told[:, k] != 0) & (np.count_nonzero(told, axis=1) == 1)
+    for k, places in enumerate(used):
+        own = told[:, places]
+        alone = same & (own != 0).all(axis=1) & (own == own[:, :1]).all(axis=1)
+        alone &= np.count_nonzero(told, axis=1) == len(places)
         if np.count_nonzero(alone) >= FEWEST:
-            did[:, k] = np.mean(np.sign(told[alone, k])[:, None] * speeds[alone], axis=0)
+            did[:, k] = np.mean(np.sign(own[alone, :1]) * speeds[alone], axis=0)
     return did
 
 
