@@ -543,12 +543,11 @@ class Addition(_Shown):
         'dead_zone.width'
     """
 
-    def __init__(self, result: _add.AddResult | _add.CameraAddResult, model: Model):
+    def __init__(self, result: _add.AddResult, model: Model):
         self._result, self.model = result, model
         self.effect = result.effect
-        told = result.to_json()
-        self.heldout_before = told.get("heldout_refit", told["heldout_before"])
-        self.heldout_after = told["heldout_after"]
+        self.heldout_before = result.heldout_refit.score
+        self.heldout_after = result.heldout_after.score
 
     def table(self) -> pd.DataFrame:
         """Fitted quantities.
@@ -566,7 +565,7 @@ class Addition(_Shown):
             A figure of matplotlib: as of `Comparison.plot`, or shares over range in m and bearing
             in degrees.
         """
-        if isinstance(self._result, _add.CameraAddResult):
+        if self._result.of_camera:
             return detections.field_of_view(self._result.after).svg.picture
         return _errors_drawn([("before", self._result.before), ("after", self._result.after)])
 

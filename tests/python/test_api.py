@@ -119,3 +119,19 @@ def test_importing_needs_no_numbers():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(done.stdout.split()) & {"numpy", "pandas", "matplotlib", "twinmill_native"}
     assert set(tm.__all__) <= set(dir(tm))
+
+
+def test_an_effect_of_the_camera_is_added_from_detections(here, tmp_path):
+    missed = '[[effect]]\nname = "missed_detection"\nrate = 0.3\n'
+    model = tm.Model.load("turbopi.toml")
+    (tmp_path / "hidden.toml").write_text(f"{model.file.text}\n{missed}")
+    log = tm.simulate(tm.Model.load(tmp_path / "hidden.toml"), n=4, duration_s=40)
+    added = model.add("missed_detection", log)
+    (rate,) = added.table().itertuples()
+    assert rate.value == pytest.approx(0.3, abs=3 * rate.std) and rate.std < 0.1
+    assert added.model["missed_detection.rate"] == pytest.approx(rate.value, rel=1e-5)
+    assert added.heldout_after < added.heldout_before
+    assert "held out" in str(added)
+    assert added.plot().axes
+    with pytest.raises(ValueError, match="has it already"):
+        added.model.add("missed_detection", log)

@@ -15,7 +15,7 @@ from twinmill_cli.options import Force, Hold, Logs, Model, NewModel, Out
 from twinmill_cli.output import AsJson, busy
 
 if working():  # not for --help
-    from twinmill.fitting.add import OWN_GAINS, AddResult, CameraAddResult, add
+    from twinmill.fitting.add import OWN_GAINS, AddResult, add
     from twinmill.fitting.compare import Comparison, compare
     from twinmill.fitting.fit import FitResult, fit
     from twinmill.report import (
@@ -122,7 +122,7 @@ def _add(
     ] = None,
     as_json: AsJson = False,
     out: Out = None,
-) -> AddResult | CameraAddResult:
+) -> AddResult:
     """Add an effect to a model, fit it with all the rest, and judge it on data not fitted to.
 
     Example: twinmill add coasting run.lcmlog --model fitted.toml -o better.toml

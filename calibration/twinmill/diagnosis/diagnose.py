@@ -9,7 +9,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
-from twinmill.diagnosis.detections.merge import with_detections
+from twinmill.diagnosis.cameras import with_detections
 from twinmill.diagnosis.doubts import beside_more, of_another_form
 from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_numbers
 from twinmill.diagnosis.notes import geometry_notes, irregularity_notes, time_base_notes
@@ -114,9 +114,7 @@ def diagnose(
             done = search(first, progress, settings, usual)
     progress("looking for what no effect explains")
     found = _concluded(opened, known, first, done, model_file, before, unseen, off)
-    whole = with_detections(
-        found, [r.modelled for r in before.robots], model_file, progress, excluded
-    )
+    whole = with_detections(found, model_file, progress, excluded, settings)
     return replace(whole, sentence=" ".join([whole.sentence, *map(sentence, whole.robots_off)]))
 
 
@@ -222,7 +220,7 @@ def _concluded(
     after = [fitted.get(id(o.measurement), o) for o in opened]
     modelled = [r.modelled.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
     noise = irregularity_notes(opened, [s.noise for s in modelled], model_file.model)
-    faint = _hidden(done, first.model)
+    faint = done.faint
     hidden = [*faint, *unseen.items()]
     refit = _refit(done)
     usual = model_file.usual_score(hashes)
@@ -289,19 +287,6 @@ def _instead_of_drift(score: float, done: Search, first: State, usual: float) ->
     if done.found or not gains or not drifted(score, last, usual):
         return []
     return instead_of_drift(first, done.rounds[0].before, done.settings)
-
-
-def _hidden(done: Search, model: native.Model) -> list[tuple[str, str]]:
-    """Effects that could be there and not be seen."""
-    hidden = []
-    for s in done.rounds[-1].screened:
-        if s.name == REFIT:
-            continue
-        if s.size < 1e-6:
-            hidden.append((s.name, "the data have no drive on which it acts"))
-        elif 9 * s.size < done.settings.faint:
-            hidden.append((s.name, "three times its usual strength would not show"))
-    return hidden
 
 
 def _shown(done: Search, hidden: Sequence[tuple[str, str]]) -> list[str]:

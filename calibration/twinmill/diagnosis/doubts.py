@@ -18,7 +18,6 @@ from twinmill.diagnosis.search import (
     REFIT,
     Search,
     Trial,
-    against,
     in_common,
     of_levels,
 )
@@ -165,7 +164,7 @@ def _stands_alone(done: Search, name: str) -> bool:
 
 def _beats(done: Search, one: Trial, other: Trial) -> bool:
     """Whether one is better by what an addition must bring, also without its best block."""
-    evidence, without_best, _ = against(other.fit, one.fit)
+    evidence, without_best, _ = one.fit.against(other.fit)
     least = done.settings
     return evidence > least.evidence and without_best > least.without_best
 

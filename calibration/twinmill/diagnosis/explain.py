@@ -74,7 +74,7 @@ def explain(
     model = model_file.model.copy()
     own_effects = [e.name.split(".")[0] for r in off for e in r.parameters if e.name not in GAINS]
     moved = diagnosis.model.effects[len(model.effects) :]
-    for effect in dict.fromkeys([*moved, *diagnosis.camera, *own_effects]):
+    for effect in dict.fromkeys([*moved, *(f.effect for f in diagnosis.camera), *own_effects]):
         model.add_effect(effect.split("#")[0])
     estimates = [*fit.shared_estimates(), *diagnosis.detection_estimates]
     for estimate in estimates:

@@ -267,9 +267,8 @@ def _ranked(trial: Trial, name: str, this: Round, first: float, group: int | Non
     own = [e for e in trial.fit.shared_estimates() if e.name.split(".")[0].split("#")[0] == name]
     fall = this.before.held_score**2 - trial.held_score**2
     share = float(np.clip(fall / max(first - 1, fall, 1e-9), 0.0, 1.0))
-    half = trial.evidence / 2
-    p_value = float(min(1.0, len(this.screened) * np.exp(-max(half, 0.0))))
-    return Ranked(name, trial.held_score, share, p_value, float(half), own, group)
+    half = float(trial.evidence / 2)
+    return Ranked(name, trial.held_score, share, this.p_value(trial), half, own, group)
 
 
 def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:

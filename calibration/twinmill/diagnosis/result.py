@@ -68,7 +68,7 @@ class Diagnosis:
     bits_after: DetectionComparison | None = None
     bit_steps: Sequence[tuple[str | None, float]] = ()
     detection_estimates: tuple[ParameterEstimate, ...] = ()
-    camera: tuple[str, ...] = ()
+    camera: tuple[Finding, ...] = ()
     base_names: tuple[str, ...] = ()
     robots: tuple[Resolution, ...] = ()
 
@@ -80,7 +80,7 @@ class Diagnosis:
     @property
     def found(self) -> list[str]:
         """All effects that were found."""
-        return [*self.motion, *self.camera]
+        return [*self.motion, *(f.effect for f in self.camera)]
 
     @property
     def model(self) -> native.Model:
@@ -127,6 +127,7 @@ class Diagnosis:
             ],
             "robots": [r.to_json() for r in self.robots],
             "robots_off": [r.to_json() for r in self.robots_off],
+            "camera": [f.to_json() for f in self.camera],
             "bits": self.bits.to_json() if self.bits else None,
             "bits_after": self.bits_after.to_json() if self.bits_after else None,
             "bit_steps": [{"effect": e, "score_heldout": s} for e, s in self.bit_steps],

@@ -6,21 +6,23 @@ are fitted. One is accepted if its held-out evidence is beyond doubt, blocks agr
 matters. Afterwards those that later ones made needless are dropped.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
 import twinmill_native as native
 
+from twinmill.fitting.detection_fit import DetectionFit
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
+    CAMERA_STAGES,
     GAINS,
     LAG,
     LAG_EFFECT,
-    MOTION_STAGES,
     WHERE_OR_WHEN,
     Parameter,
+    all_effect_parameters,
     base_lag_is_identifiable,
     base_parameters,
     catalogue,
@@ -28,14 +30,17 @@ from twinmill.model.parameters import (
     effect_names,
     effect_parameters,
     making_late,
+    needing,
     newest_instance,
     with_role,
 )
 from twinmill.predict.datasets import Dataset, Trajectory, total_score
+from twinmill.predict.detections import Detections
 
 STRICTEST = 3.0
 COMMON = 1.01  # times a score: no worse
 NEWS = 1.1  # times the known score: less is no news
+TRACED = 3  # times its usual strength, at which an effect must show, or it is faint
 REFIT = "refit"  # the base's numbers were stale: a candidate like any effect
 
 
@@ -67,6 +72,9 @@ class Settings:
         usual: times the evidence where the score is no worse than on the logs that the model was
             fitted to: what it misses there it misses here, too.
         faint: a candidate of less expected evidence at three times its usual size is not shown.
+        bits: share of the detections that an effect of the camera must change ...
+        bits_in_view: ... or of those with a robot in view, or without, if that is less.
+        late_s: a camera's delay below it may be a clock offset that the log itself told.
     """
 
     evidence: float = 16.0
@@ -93,6 +101,9 @@ class Settings:
     group: int = 4
     usual: float = 1.5
     faint: float = 16.0
+    bits: float = 0.005
+    bits_in_view: float = 0.02
+    late_s: float = 0.025
 
     def stricter(self, times: float) -> "Settings":
         """The same with so many times the evidence."""
@@ -126,9 +137,37 @@ class State:
         """Logs have enough errors for a scale of each channel; tables do not."""
         return all(isinstance(d, Trajectory) for d in self.datasets)
 
+    @property
+    def of_cameras(self) -> bool:
+        """Whether the data are detections."""
+        return isinstance(self.datasets[0], Detections)
+
+    def fit_of(self, free: Sequence[Parameter]) -> ScoreFit | DetectionFit:
+        """What fits these parameters to the data, by the kind of data."""
+        if self.of_cameras:
+            return DetectionFit(self.datasets, self.models, free)
+        return ScoreFit(self.datasets, self.models, free, self.by_channel)
+
     def begun(self) -> tuple[Parameter, ...]:
         """Free parameters, begun at the model's values."""
         return tuple(p.at(self.model.get(p.name)) for p in self.free)
+
+
+def camera_state(
+    cameras: Sequence[Detections], model: native.Model, excluded: Collection[str] = ()
+) -> State:
+    """Where a search for what the camera lacks starts: its effects are free, all else is held.
+
+    Args:
+        cameras: frames with poses; at least one robot's.
+        model: of all robots.
+        excluded: effects that are not considered.
+    """
+    raw = all(c.frames.has_raw for c in cameras)
+    hidden = {*excluded, *(() if raw else needing("raw_frames"))}
+    free = tuple(all_effect_parameters(model, CAMERA_STAGES))
+    models = [model.for_robot(c.robot_id) for c in cameras]
+    return State(cameras, models, free, excluded=frozenset(hidden))
 
 
 @dataclass(frozen=True)
@@ -145,7 +184,7 @@ class Trial:
     """
 
     names: tuple[str, ...]
-    fit: ScoreFit
+    fit: ScoreFit | DetectionFit
     state: State
     evidence: float
     without_best: float
@@ -185,6 +224,10 @@ class Round:
     accepted: Trial | None = None
     tied: list[Trial] = field(default_factory=list)
 
+    def p_value(self, trial: Trial) -> float:
+        """Bound of the chance of such evidence if nothing were missing, for all candidates."""
+        return float(min(1.0, len(self.screened) * np.exp(-max(trial.evidence / 2, 0.0))))
+
 
 @dataclass
 class Search:
@@ -206,6 +249,19 @@ class Search:
         return next(r for r in reversed(self.rounds) if r.accepted and name in r.accepted.names)
 
     @property
+    def faint(self) -> list[tuple[str, str]]:
+        """Effects that could be there and not be seen, and why."""
+        hidden = []
+        for s in self.rounds[-1].screened:
+            if s.name == REFIT:
+                continue
+            if s.size < 1e-6:
+                hidden.append((s.name, "the data have no drive on which it acts"))
+            elif TRACED**2 * s.size < self.settings.faint:
+                hidden.append((s.name, "three times its usual strength would not show"))
+        return hidden
+
+    @property
     def passes(self) -> int:
         """How often a plant ran over a whole data set, on the average."""
         fits = [t.fit for r in self.rounds for t in (r.before, *r.trials)]
@@ -224,9 +280,9 @@ def search(
         state: where it starts.
         progress: told in words what is being done.
         settings: numbers that decide.
-        known: score that the model has on the logs that it was fitted to. What it missed there it
-            misses here, too, and in the same way over and over, so that evidence must be stronger
-            where the score is no worse than that.
+        known: score that the model has on the logs that it was fitted to; 0 where none is known.
+            What it missed there it misses here, too, and in the same way over and over, so that
+            evidence must be stronger where the score is no worse than that.
     """
     before = fitted(state)
     if before.held_score < NEWS * known:
@@ -270,7 +326,7 @@ def search(
 
 def fitted(state: State) -> Trial:
     """The state's free parameters fitted."""
-    fit = ScoreFit(state.datasets, state.models, state.begun(), state.by_channel).fit()
+    fit = state.fit_of(state.begun()).fit()
     return Trial((), fit, replace(state, models=fit.models), 0.0, 0.0, 0.0)
 
 
@@ -298,19 +354,10 @@ def grown(state: State, names: Sequence[str], start: dict[str, float] | None = N
 def attempt(before: Trial, names: tuple[str, ...], start: dict[str, float] | None = None) -> Trial:
     """A fit of the state before with something added, judged on held-out parts."""
     state = grown(before.state, names, start)
-    fit = ScoreFit(state.datasets, state.models, state.free, state.by_channel)
+    fit = state.fit_of(state.free)
     fit.begin_at_best(state.free[len(before.state.free) :])
     fit.fit()
-    return Trial(names, fit, replace(state, models=fit.models), *against(before.fit, fit))
-
-
-def against(less: ScoreFit, more: ScoreFit) -> tuple[float, float, float]:
-    """Evidence for the richer fit, the same without the best block, and how well blocks agree."""
-    a, b = less.block_costs(less), more.block_costs(less)
-    falls = (a - b) / np.maximum(a + b, 1e-300)
-    spread = np.std(falls, ddof=1) / np.sqrt(len(falls)) if len(falls) > 1 else np.inf
-    least = float(np.min(less.without_blocks() - more.without_blocks()))
-    return less.held_cost - more.held_cost, least, float(falls.mean() / max(spread, 1e-12))
+    return Trial(names, fit, replace(state, models=fit.models), *fit.against(before.fit))
 
 
 def _best(
@@ -325,12 +372,10 @@ def _best(
         if trial.names == (REFIT,) and _is_common(before, trial, settings):
             good.append(trial)
             continue
-        fall = before.held_score**2 - trial.held_score**2
-        if fall <= 0:
+        if not _matters(before, trial, first_excess, settings):
             continue
-        matters = fall >= _least_fall(before, trial, first_excess, settings) * len(trial.names)
         at_nothing = all(_is_neutral(trial, n) or _began_before(trial, n) for n in trial.names)
-        if matters and not at_nothing and _proven(trial, before.held_score, settings):
+        if not at_nothing and _proven(trial, before.held_score, settings):
             good.append(trial)
     best = min(good, key=lambda t: t.fit.held_cost + settings.each * len(t.fit.x), default=None)
     # Stale numbers of the base are more likely than an effect that does the same.
@@ -381,6 +426,26 @@ def _is_common(before: Trial, refit: Trial, settings: Settings) -> bool:
     own = any(p.name in GAINS for d in before.state.datasets for p in d.own)
     as_good = refit.held_score < COMMON * before.held_score
     return own and as_good and refit.evidence > settings.evidence
+
+
+def _matters(before: Trial, trial: Trial, first_excess: float, settings: Settings) -> bool:
+    """Whether the addition is worth its words: by the fall of the squared score, or by the bits."""
+    if before.state.of_cameras:
+        return _changes_enough_bits(before, trial, settings)
+    fall = before.held_score**2 - trial.held_score**2
+    return fall > 0 and fall >= _least_fall(before, trial, first_excess, settings) * len(
+        trial.names
+    )
+
+
+def _changes_enough_bits(before: Trial, trial: Trial, settings: Settings) -> bool:
+    """A clock that is a few ms wrong, and poses blurred as they are, change some bits as well."""
+    seen = before.fit.in_view
+    least = min(settings.bits, settings.bits_in_view * min(seen, 1 - seen))
+    own = [e for e in trial.fit.shared_estimates() if e.name.split(".")[0] in trial.names]
+    by_clock = any(e.unit == "s" and abs(e.value) < settings.late_s for e in own)
+    by_clock &= any(d.clock_free for d in trial.fit.datasets)
+    return trial.fit.changed(before.fit) > least and not by_clock
 
 
 def _least_fall(before: Trial, trial: Trial, first_excess: float, settings: Settings) -> float:
@@ -474,7 +539,7 @@ def candidates(state: State) -> list[str]:
     if any(n not in {p.name for p in state.free} for n in state.base):
         names.append(REFIT)
     for name, entry in catalogue_of(model).items():
-        usable = entry["stage"] in MOTION_STAGES and not entry["texts"]
+        usable = entry["stage"] in state.datasets[0].stages and not entry["texts"]
         fits = not entry["duty_only"] or model.drive == "duty"
         if usable and fits and name not in moved and name not in state.excluded:
             names.append(name)
@@ -498,6 +563,8 @@ def screen(
         names: of the candidates, where not all that the state can have are meant.
     """
     fit, state = before.fit, before.state
+    if state.of_cameras:
+        return [_screened_bits(name, before) for name in candidates(state)]
     ways = {} if ways is None else ways
     rows, _ = fit.state
     weights = [np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)]
@@ -514,6 +581,14 @@ def screen(
         start = _best_start(*ways[name], weights, rest) if searched else {}
         found.append(_screened(name, state, rows, weights, basis, rest, start))
     return found
+
+
+def _screened_bits(name: str, before: Trial) -> Screened:
+    """By a grid of values: the likelihood of detections has edges, and no signature."""
+    state = grown(before.state, (name,))
+    alone = DetectionFit(state.datasets, state.models, state.free[len(before.state.free) :])
+    gain, trace = alone.promise(), alone.trace(before.fit, TRACED)
+    return Screened(name, np.zeros((0, 0)), gain, trace / TRACED**2)
 
 
 def _reach(name: str, parameters: Sequence[Parameter], start: dict[str, float]) -> np.ndarray:
@@ -737,7 +812,7 @@ def _pairs(before: Trial, screened: list[Screened], settings: Settings) -> list[
     """Pairs by what they explain together beyond the better one alone."""
     fit = before.fit
     top = sorted(screened, key=lambda s: -s.gain)[:10]
-    if before.held_score < 1.0:
+    if before.held_score < 1.0 or before.state.of_cameras:
         return []
     left, *_ = fit.whitened(range(len(fit.datasets)))
     worth = {}
@@ -785,8 +860,7 @@ def _tied(this: Round, settings: Settings) -> list[Trial]:
             continue
         if _began_before(trial, trial.names[0]):
             continue
-        apart = trial.fit.held_cost - accepted.fit.held_cost
-        *_, blocks_t = against(trial.fit, accepted.fit)
+        apart, _, blocks_t = accepted.fit.against(trial.fit)
         same = canonical_correlation(columns[accepted.names[0]], columns[trial.names[0]])
         below = max(accepted.held_score, trial.held_score) < 1.0  # differences there are no news
         close = apart < settings.tie and (blocks_t < 2.0 or below)
@@ -799,7 +873,7 @@ def _tied(this: Round, settings: Settings) -> list[Trial]:
 
 def in_common(before: Trial, one: Trial, other: Trial) -> float:
     """Cosine between what two trials take of the errors: 0 if each explains something else."""
-    rows = [np.concatenate(t.fit.state[0]) for t in (before, one, other)]
+    rows = [t.fit.errors for t in (before, one, other)]
     first, second = rows[0] - rows[1], rows[0] - rows[2]
     size = float(np.linalg.norm(first) * np.linalg.norm(second))
     return float(first @ second) / max(size, 1e-300)
@@ -850,7 +924,7 @@ def _pruned(trial: Trial, names: list[str], settings: Settings) -> tuple[Trial, 
         less = without(trial, name)
         if less is None:
             continue
-        evidence, *_ = against(less.fit, trial.fit)
+        evidence, *_ = trial.fit.against(less.fit)
         if evidence < settings.evidence / 2:
             gone.append(name)
             trial = replace(less, names=trial.names)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Adds an effect to a model, fits it, and judges it on data that it was not fitted to.
 
-An effect on motion is fitted together with the base, one of the camera to detections, alone.
+An effect on motion is fitted together with the base; one of the camera to detections, together with
+the model's other effects of the camera.
 """
 
 from collections.abc import Collection, Sequence
@@ -12,7 +13,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.fitting.compare import Comparison, comparison
-from twinmill.fitting.detection_fit import fit_detections
+from twinmill.fitting.detection_fit import DetectionFit
 from twinmill.fitting.fit import (
     base_names,
     common_clock,
@@ -26,6 +27,7 @@ from twinmill.fitting.opening import Opened, judged, open_measurements, wide_gai
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child
 from twinmill.model.parameters import (
+    CAMERA_STAGES,
     GAINS,
     Parameter,
     ParameterEstimate,
@@ -48,7 +50,9 @@ class AddResult:
 
     Attributes:
         effect: its name, with a number if the model had one already; or `OWN_GAINS`.
-        before: comparison of the model as given; after: with the effect, all refitted.
+        model_name: of the model as given.
+        before: comparison of the model as given; after: with the effect, all refitted. Of an effect
+            of the camera, both compare detections.
         parameters: estimates of all that was fitted.
         heldout_before: the model as given.
         heldout_refit: its quantities refitted without the effect.
@@ -58,14 +62,20 @@ class AddResult:
     """
 
     effect: str
-    before: Comparison
-    after: Comparison
+    model_name: str
+    before: Comparison | DetectionComparison
+    after: Comparison | DetectionComparison
     parameters: list[ParameterEstimate]
     heldout_before: HeldOut
     heldout_refit: HeldOut
     heldout_after: HeldOut
     path: Path
     robot_id: int | None = None
+
+    @property
+    def of_camera(self) -> bool:
+        """Whether the effect is of the camera, so that all scores are those of detections."""
+        return isinstance(self.after, DetectionComparison)
 
     @property
     def label(self) -> str:
@@ -92,42 +102,7 @@ class AddResult:
             "parameters": [e.to_json() for e in self.parameters],
             "heldout_errors_before": self.heldout_before.rows(),
             "heldout_errors_after": self.heldout_after.rows(),
-        }
-
-
-@dataclass(frozen=True)
-class CameraAddResult:
-    """What adding an effect of the camera did; all scores are those of detections.
-
-    Attributes:
-        effect: its name.
-        model_name: of the model as given.
-        before: comparison of the model as given; after: with the effect.
-        heldout_before, heldout_after: scores on frames not fitted to, without it and with it.
-        parameters: estimates of the effect's quantities; nothing else was fitted.
-        path: of the new model.
-    """
-
-    effect: str
-    model_name: str
-    before: DetectionComparison
-    after: DetectionComparison
-    heldout_before: float
-    heldout_after: float
-    parameters: list[ParameterEstimate]
-    path: Path
-
-    def to_json(self) -> dict:
-        """The interface's object."""
-        return {
-            "effect": self.effect,
-            "model": str(self.path),
-            "score_before": self.before.score,
-            "score_after": self.after.score,
-            "heldout_before": self.heldout_before,
-            "heldout_after": self.heldout_after,
-            "parameters": [e.to_json() for e in self.parameters],
-            "bits": self.after.to_json(),
+            **({"bits": self.after.to_json()} if self.of_camera else {}),
         }
 
 
@@ -140,7 +115,7 @@ def add(
     texts: dict[str, str] | None = None,
     held: Collection[str] = (),
     robot_id: int | None = None,
-) -> AddResult | CameraAddResult:
+) -> AddResult:
     """Adds an effect and writes the new model.
 
     Args:
@@ -150,7 +125,8 @@ def add(
         out: the new model file.
         command: recorded in it.
         texts: the effect's formula and the like, by name.
-        held: names of quantities that keep their values; beside an effect of the camera all do.
+        held: names of quantities that keep their values; beside an effect of the camera all of the
+            motion do.
         robot_id: of the robot that alone has it; by default all have.
 
     Raises:
@@ -162,7 +138,7 @@ def add(
     if is_of_camera(effect):
         if robot_id is not None:
             raise ValueError(f"{effect}: is of the camera, and is added to all robots alike.")
-        return _add_to_camera(effect, measurements, model_file, out, command)
+        return _add_to_camera(effect, measurements, model_file, out, command, held)
     richer, name, fresh = with_effect(model_file.model, effect, texts or {}, robot_id)
     opened = open_measurements(measurements, model_file)
     logs = {m.log_name: m.log_sha256 for m in measurements}
@@ -196,12 +172,18 @@ def add(
         out,
         command,
     )
-    return AddResult(name, before, after, [*estimates, *own], *held, Path(out), robot_id)
+    estimates += own
+    return AddResult(name, before.model_name, before, after, estimates, *held, Path(out), robot_id)
 
 
 def _add_to_camera(
-    effect: str, measurements: list[Measurement], model_file: ModelFile, out: Path, command: str
-) -> CameraAddResult:
+    effect: str,
+    measurements: list[Measurement],
+    model_file: ModelFile,
+    out: Path,
+    command: str,
+    held: Collection[str],
+) -> AddResult:
     if effect in model_file.model.effects:
         raise ValueError(
             f"effect '{effect}': {model_file.path.name} has it already; remove its [[effect]]."
@@ -212,22 +194,22 @@ def _add_to_camera(
             f"effect '{effect}': acts on the camera's bit, and no log has bits of a robot and the "
             "poses of another one beside it; record telemetry and poses of two robots or more."
         )
-    without, found = (fit_detections(cameras, model_file.model, name) for name in (None, effect))
-    before, after = (compare_detections(cameras, m) for m in (model_file.model, found.model))
-    logs = {m.log_name: m.log_sha256 for m in measurements}
-    estimates = list(found.added)
-    fitted_model = Fitted(found.model, estimates, logs, before.score, after.score)
-    write_child(model_file, fitted_model, out, command)
-    return CameraAddResult(
-        effect=effect,
-        model_name=model_file.path.name,
-        before=before,
-        after=after,
-        heldout_before=without.score,
-        heldout_after=found.score,
-        parameters=estimates,
-        path=Path(out),
+    model = model_file.model
+    richer, _, fresh = with_effect(model, effect, {}, None)
+    old = [p for p in all_effect_parameters(model, CAMERA_STAGES) if p.name not in held]
+    given, without, found = (
+        DetectionFit(cameras, [m.for_robot(c.robot_id) for c in cameras], free)
+        for m, free in ((model, []), (model, old), (richer, [*old, *fresh]))
     )
+    found.begin_at_best(fresh)
+    heldout = [HeldOut.of(fit.fit()) for fit in (given, without, found)]
+    fitted_model = with_estimates(richer, found.estimates)
+    before, after = (compare_detections(cameras, m) for m in (model, fitted_model))
+    logs = {m.log_name: m.log_sha256 for m in measurements}
+    child = Fitted(fitted_model, found.estimates, logs, before.score, after.score)
+    write_child(model_file, child, out, command)
+    name = model_file.path.name
+    return AddResult(effect, name, before, after, found.estimates, *heldout, Path(out))
 
 
 def with_effect(

@@ -1,28 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits quantities of the camera to detections, and judges them on frames that were not fitted to.
 
-A detection is drawn with a chance that the model tells, so that the fit is by maximum likelihood:
-there is no floor of errors as `ScoreFit` has it. The likelihood has edges where a frame leaves the
-cone, hence no slopes: a grid finds where to begin, and Powell's method goes on from there.
+`DetectionFit` answers what a search asks of `ScoreFit`. Its inside differs, since a detection is a
+draw with a chance that the model predicts: it has a likelihood, and no noise floor over which an
+error could be whitened. The likelihood has edges where a frame leaves the cone, hence no slopes: a
+grid finds where to begin, and Powell's method goes on from there. Each half of the frames is judged
+by a fit to the other.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from functools import cached_property
 from itertools import product
 
 import numpy as np
 import twinmill_native as native
 from scipy.optimize import minimize
 
-from twinmill.model.parameters import (
-    CAMERA_STAGES,
-    Parameter,
-    ParameterEstimate,
-    all_effect_parameters,
-    effect_parameters,
-)
-from twinmill.predict.detection_errors import brier_ratio
-from twinmill.predict.detections import SURE, Detections
+from twinmill.fitting.detection_evidence import VOTE_WEIGHT, HeldOutFrames, weigh
+from twinmill.model.parameters import Parameter, ParameterEstimate, stated_names
+from twinmill.predict.detections import Detections
 
 MOST_FRAMES = 10000  # a fit takes every Nth frame beyond
 STRENGTHS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0)  # times the usual one: where a fit may begin
@@ -33,125 +29,197 @@ FALL = 1.0  # of the log likelihood on both sides together: less may be the grai
 REACH = 0.5  # times the usual strength: how far a fit goes from where it begins
 
 
-@dataclass(frozen=True)
-class HeldOutFrames:
-    """What a model fitted to the other half says of each robot's frames; a list of (K,) each.
-
-    Attributes:
-        log_likelihood: of what was reported; NaN where nothing can be said.
-        chance: probability of the bit, raw or voted.
-        voted: the bit that the vote must give by the raw ones.
-    """
-
-    log_likelihood: list[np.ndarray]
-    chance: list[np.ndarray]
-    voted: list[np.ndarray]
-
-    @classmethod
-    def of(
-        cls, cameras: Sequence[Detections], models: tuple[native.Model, native.Model]
-    ) -> "HeldOutFrames":
-        """Each half of the frames by the model in its place."""
-        rows = []
-        for camera in cameras:
-            both = [_of_robot(camera, m.for_robot(camera.robot_id)) for m in models]
-            first = camera.half == 0
-            rows.append([np.where(first, a, b) for a, b in zip(*both, strict=True)])
-        return cls(*(list(column) for column in zip(*rows, strict=True)))
-
-    def score(self, cameras: Sequence[Detections]) -> float:
-        """RMS error of the chances over what such chances must err, in all frames that count."""
-        chance = [c[s.usable] for s, c in zip(cameras, self.chance, strict=True)]
-        bits = [(s.frames.raw if s.frames.has_raw else s.frames.voted)[s.usable] for s in cameras]
-        return brier_ratio(np.concatenate(chance), np.concatenate(bits))
-
-
-def _of_robot(camera: Detections, own: native.Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    chance = np.clip(camera.reported(own, camera.frames.has_raw), SURE, 1 - SURE)
-    return camera.likelihood(own), chance, camera.voted(int(own.detection_model()["vote_frames"]))
-
-
-@dataclass(frozen=True)
 class DetectionFit:
-    """A model of the camera, perhaps with one effect more, fitted to all frames and to each half.
-
-    Attributes:
-        effect: what was added; None if nothing.
-        model: fitted to all frames.
-        values: of all camera parameters.
-        heldout: what fits to either half say of the other.
-        score: of these.
-        added: estimates of the added effect's quantities.
-    """
-
-    effect: str | None
-    model: native.Model
-    values: np.ndarray
-    heldout: HeldOutFrames
-    score: float
-    added: tuple[ParameterEstimate, ...]
-
-
-def fit_detections(
-    cameras: Sequence[Detections], model: native.Model, effect: str | None = None
-) -> DetectionFit:
-    """Fits the model's camera effects, and `effect`, which it has not, to all frames.
+    """A model of the camera fitted to detections; `x` holds the values, the models have them.
 
     Args:
-        cameras: frames with poses; at least one.
-        model: of all robots; it is copied.
-        effect: of the catalogue, at a stage of the camera; None adds none.
+        datasets: frames with poses.
+        models: one for each data set (of its own robot).
+        shared: parameters of all robots, but for what the model states of a robot.
     """
-    richer = model.copy()
-    fresh = []
-    if effect:
-        richer.add_effect(effect)
-        fresh = effect_parameters(richer, effect)
-    free = all_effect_parameters(richer, CAMERA_STAGES)
-    likelihood = Likelihood(cameras, richer, free)
-    values = np.array([richer.get(k.name) for k in free])
-    if fresh:
-        values = start(likelihood, fresh, values)
-    values = climb(likelihood, values) if free else values
-    fits = [climb(likelihood, values, 1 - half) if free else values for half in (0, 1)]
-    heldout = HeldOutFrames.of(cameras, tuple(likelihood.set(own).copy() for own in fits))
-    added = [e for e in estimates(likelihood, values) if effect and e.name.startswith(f"{effect}.")]
-    model = likelihood.set(values)
-    return DetectionFit(effect, model, values, heldout, heldout.score(cameras), tuple(added))
 
+    def __init__(
+        self,
+        datasets: Sequence[Detections],
+        models: Sequence[native.Model],
+        shared: Sequence[Parameter],
+    ) -> None:
+        self.datasets, self.shared = list(datasets), list(shared)
+        self.models = [m.copy() for m in models]
+        self.x = np.array([p.value for p in shared], float)
+        self.passes = 0
+        self._stated = [
+            stated_names(m, d.robot_id) for d, m in zip(self.datasets, self.models, strict=True)
+        ]
+        self._halves: list[np.ndarray] = []
+        count = sum(len(d.frames.t_s) for d in self.datasets)
+        raw = all(d.frames.has_raw for d in self.datasets)  # else few frames count as it is
+        self._thin = slice(None, None, max(1, -(-count // MOST_FRAMES)) if raw else 1)
 
-class Likelihood:
-    """Of bits, given values of some parameters."""
+    # -- fit ------------------------------------------------------------------------------------
 
-    def __init__(self, cameras: Sequence[Detections], model: native.Model, free: list[Parameter]):
-        """Takes frames of all robots; the model is copied."""
-        self.cameras, self.free = cameras, free
-        self.model = model.copy()
-        count = sum(len(s.frames.t_s) for s in cameras)
-        raw = all(s.frames.has_raw for s in cameras)  # else few frames count as it is
-        self.thin = slice(None, None, max(1, -(-count // MOST_FRAMES)) if raw else 1)
+    def begin_at_best(self, fresh: Sequence[Parameter]) -> None:
+        """Begins with what is new, the last ones, at the best of a grid of values."""
+        head = self.x[: len(self.x) - len(fresh)]
+        grids = [_grid(p, far=len(fresh) == 1) for p in fresh]
+        rows = [np.concatenate([head, row]) for row in product(*grids)]
+        self.x = max(rows, key=self.likelihood)
 
-    def set(self, values: np.ndarray) -> native.Model:
-        """The model with these values."""
-        for p, value in zip(self.free, values, strict=True):
-            self.model.set(p.name, float(np.clip(value, p.min, p.max)))
-        return self.model
+    def fit(self) -> "DetectionFit":
+        """Maximises the likelihood of all frames and of each half; the models have the former."""
+        self.x = self._climb(self.x)
+        self._halves = [self._climb(self.x, 1 - half) for half in (0, 1)]
+        self._put(self.x)
+        return self
 
-    def frames(self, values: np.ndarray, thin: bool = False) -> list[np.ndarray]:
-        """(K,) log likelihoods per robot; of every Nth frame if `thin`."""
-        model = self.set(values)
-        return [s.likelihood(model, self.thin if thin else slice(None)) for s in self.cameras]
-
-    def total(self, values: np.ndarray, half: int | None = None, thin: bool = True) -> float:
-        """Sum over the frames of one half, or of both."""
-        pick = self.thin if thin else slice(None)
+    def likelihood(self, x: np.ndarray, half: int | None = None, thin: bool = True) -> float:
+        """Log likelihood at (P,) values, of the frames of one half or of both."""
+        self._put(x)
+        self.passes += 1
+        pick = self._thin if thin else slice(None)
         total = 0.0
-        for camera, told in zip(self.cameras, self.frames(values, thin), strict=True):
-            total += np.nansum(told if half is None else told[camera.half[pick] == half])
-        return float(total) * (self.thin.step if thin else 1)
+        for data, model in zip(self.datasets, self.models, strict=True):
+            told = data.likelihood(model, pick)
+            total += np.nansum(told if half is None else told[data.half[pick] == half])
+        return float(total) * (self._thin.step if thin else 1)
+
+    def _put(self, x: np.ndarray) -> None:
+        """Puts values into the models."""
+        for model, stated in zip(self.models, self._stated, strict=True):
+            for p, value in zip(self.shared, x, strict=True):
+                if p.name not in stated:
+                    model.set(p.name, float(np.clip(value, p.min, p.max)))
+
+    def _climb(self, begin: np.ndarray, half: int | None = None) -> np.ndarray:
+        """Values near `begin` with the greatest likelihood (Powell 1964: edges have no slope)."""
+        if not len(begin):
+            return begin
+        unit = np.array([abs(p.strength) for p in self.shared])
+        low, high = (np.array([getattr(p, k) for p in self.shared]) for k in ("min", "max"))
+        low, high = np.maximum(low, begin - REACH * unit), np.minimum(high, begin + REACH * unit)
+        found = minimize(
+            lambda x: -self.likelihood(x * unit, half),
+            np.clip(begin, low, high) / unit,
+            method="Powell",
+            bounds=list(zip(low / unit, high / unit, strict=True)),
+            options={"xtol": 1e-2, "ftol": 1e-6, "maxiter": 3},
+        )
+        values = found.x * unit
+        return values if self.likelihood(values, half) > self.likelihood(begin, half) else begin
+
+    # -- held out -------------------------------------------------------------------------------
+
+    @cached_property
+    def held_out(self) -> HeldOutFrames:
+        """What the fits to either half say of the other."""
+        models = []
+        for values in self._halves:
+            self._put(values)
+            models.append([m.copy() for m in self.models])
+        self._put(self.x)
+        return HeldOutFrames.of(self.datasets, models)
+
+    @property
+    def held_scores(self) -> np.ndarray:
+        """(1,) RMS error of all chances over what such chances must err."""
+        return np.array([self.held_out.score(self.datasets)])
+
+    @property
+    def held_cost(self) -> float:
+        """-2 times the held-out log likelihood."""
+        return -2.0 * sum(float(np.nansum(told)) for told in self.held_out.log_likelihood)
+
+    @property
+    def errors(self) -> np.ndarray:
+        """(R,) reported bits less their chances, in all frames that count."""
+        pairs = zip(self.datasets, self.models, strict=True)
+        return np.concatenate(
+            [(d.bits - d.reported(m, d.frames.has_raw))[d.usable] for d, m in pairs]
+        )
+
+    def against(self, less: "DetectionFit") -> tuple[float, float, float]:
+        """As `ScoreFit.against`, over the excess with which blocks scatter."""
+        found = weigh(self.datasets, self.held_out, less.held_out)
+        return (
+            2 * found.gain / found.excess,
+            2 * found.log_ratio / found.excess,
+            found.blocks_t,
+        )
+
+    # -- what the parameters change ---------------------------------------------------------------
+
+    def promise(self) -> float:
+        """What the best of a grid of all values gains over neutral ones: fall of the cost."""
+        neutral = self.likelihood(np.array([p.usual for p in self.shared]))
+        self.begin_at_best(self.shared)
+        return 2 * (self.likelihood(self.x) - neutral)
+
+    def trace(self, without: "DetectionFit", times: float) -> float:
+        """Expected fall of the cost were the parameters so many times their usual strength.
+
+        Twice the divergence (Kullback and Leibler 1951) from a fit without them, of the better
+        sign.
+        """
+        told = []
+        for sign in (-1, 1):
+            self._put(np.array([p.usual + times * sign * p.strength for p in self.shared]))
+            told.append(sum(_divergence(*each) for each in self._beside(without)))
+        return 2 * max(told)
+
+    def changed(self, before: "DetectionFit") -> float:
+        """Share of the bits, raw or voted, that the difference to another fit changes."""
+        raw, voted, count = 0.0, 0.0, 0
+        for data, own, other in self._beside(before):
+            raw += float(np.abs(data.chance(own) - data.chance(other))[data.usable].sum())
+            voted += _votes_that_differ(data, own, other)
+            count += int(data.usable.sum())
+        return max(raw, voted) / count
+
+    @property
+    def in_view(self) -> float:
+        """Share of the frames that have another robot in view, by the models' geometry."""
+        pairs = zip(self.datasets, self.models, strict=True)
+        return float(np.mean(np.concatenate([d.view(m)[d.usable] for d, m in pairs])))
+
+    def _beside(self, other: "DetectionFit") -> Iterable[tuple]:
+        """Each data set with its model here and there."""
+        return zip(self.datasets, self.models, other.models, strict=True)
+
+    # -- uncertainty ----------------------------------------------------------------------------
+
+    @cached_property
+    def estimates(self) -> list[ParameterEstimate]:
+        """Values with standard errors from the curvature of the likelihood, one by one."""
+        made = []
+        middle = self.likelihood(self.x, thin=False)
+        for i, p in enumerate(self.shared):
+            value, std = float(self.x[i]), self._std(i, middle)
+            at_bound, known = bool(value in (p.min, p.max)), bool(np.isfinite(std))
+            made.append(ParameterEstimate(p.name, value, std, p.unit, at_bound, known))
+        self._put(self.x)
+        return made
+
+    def shared_estimates(self) -> list[ParameterEstimate]:
+        """The same: no robot has a camera parameter of its own that is fitted."""
+        return self.estimates
+
+    def _std(self, i: int, middle: float) -> float:
+        """Of one value: from the shortest steps to both sides that fall by more than the grain."""
+        p = self.shared[i]
+        for k in range(WIDER):
+            step = 0.1 * abs(p.strength) * 2**k
+            sides = np.clip(self.x[i] + np.array([-step, step]), p.min, p.max)
+            fall = 2 * middle
+            for side in sides:
+                moved = self.x.copy()
+                moved[i] = side
+                fall -= self.likelihood(moved, thin=False)
+            if fall > FALL:
+                return float(np.sqrt(np.sum((sides - self.x[i]) ** 2) / (2 * fall)))
+        return float("nan")
 
 
-def grid(parameter: Parameter, far: bool) -> list[float]:
+def _grid(parameter: Parameter, far: bool) -> list[float]:
     """Neutral and values on both sides of it, within bounds."""
     p = parameter
     if p.name.endswith("_frames"):  # whole numbers
@@ -161,59 +229,16 @@ def grid(parameter: Parameter, far: bool) -> list[float]:
     return sorted({float(np.clip(v, p.min, p.max)) for v in values})
 
 
-def start(likelihood: Likelihood, fresh: list[Parameter], values: np.ndarray) -> np.ndarray:
-    """The best of a grid of values of `fresh`, the last ones; the rest as given."""
-    head = values[: len(values) - len(fresh)]
-    grids = [grid(p, far=len(fresh) == 1) for p in fresh]
-    rows = [np.concatenate([head, row]) for row in product(*grids)]
-    return max(rows, key=likelihood.total)
+def _divergence(data: Detections, own: native.Model, other: native.Model) -> float:
+    """Expected log likelihood ratio of a model to another one, were it true."""
+    p, q = (data.chance(m)[data.usable] for m in (own, other))
+    raw = float(np.sum(p * np.log(p / q) + (1 - p) * np.log((1 - p) / (1 - q))))
+    return raw + VOTE_WEIGHT * _votes_that_differ(data, own, other)
 
 
-def climb(likelihood: Likelihood, begin: np.ndarray, half: int | None = None) -> np.ndarray:
-    """Values near `begin` with the greatest likelihood (Powell 1964: edges have no slope)."""
-    free = likelihood.free
-    low = np.array(
-        [max(k.min, b - REACH * abs(k.strength)) for k, b in zip(free, begin, strict=True)]
-    )
-    high = np.array(
-        [min(k.max, b + REACH * abs(k.strength)) for k, b in zip(free, begin, strict=True)]
-    )
-    unit = np.array([abs(k.strength) for k in free])
-    found = minimize(
-        lambda x: -likelihood.total(x * unit, half),
-        np.clip(begin, low, high) / unit,
-        method="Powell",
-        bounds=list(zip(low / unit, high / unit, strict=True)),
-        options={"xtol": 1e-2, "ftol": 1e-6, "maxiter": 3},
-    )
-    values = found.x * unit
-    return values if likelihood.total(values, half) > likelihood.total(begin, half) else begin
-
-
-def estimates(likelihood: Likelihood, values: np.ndarray) -> list[ParameterEstimate]:
-    """Values with standard errors from the curvature of the likelihood, one by one."""
-    made = []
-    middle = likelihood.total(values, thin=False)
-    for i, p in enumerate(likelihood.free):
-        std = _std(likelihood, values, i, middle)
-        at_bound = bool(values[i] in (p.min, p.max))
-        known = bool(np.isfinite(std))
-        made.append(ParameterEstimate(p.name, float(values[i]), std, p.unit, at_bound, known))
-    likelihood.set(values)
-    return made
-
-
-def _std(likelihood: Likelihood, values: np.ndarray, i: int, middle: float) -> float:
-    """Of one value: from the shortest steps to both sides that fall by more than the grain."""
-    p = likelihood.free[i]
-    for k in range(WIDER):
-        step = 0.1 * abs(p.strength) * 2**k
-        sides = np.clip(values[i] + np.array([-step, step]), p.min, p.max)
-        fall = 2 * middle
-        for side in sides:
-            moved = values.copy()
-            moved[i] = side
-            fall -= likelihood.total(moved, thin=False)
-        if fall > FALL:
-            return float(np.sqrt(np.sum((sides - values[i]) ** 2) / (2 * fall)))
-    return float("nan")
+def _votes_that_differ(data: Detections, own: native.Model, other: native.Model) -> int:
+    """Number of frames in which the raw bits give one vote by a model and another by the other."""
+    frames = [int(m.detection_model()["vote_frames"]) for m in (own, other)]
+    if not data.frames.has_raw or frames[0] == frames[1]:
+        return 0
+    return int((data.voted(frames[0]) != data.voted(frames[1]))[data.usable].sum())

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinmill.fitting.detection_fit import DetectionFit
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.predict.datasets import Trajectory, total_score
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
@@ -16,16 +17,18 @@ class HeldOut:
     """Held-out errors.
 
     Attributes:
-        scores: of each data set.
-        errors: (W, H, 3) of each log: m, m, rad.
+        scores: of each data set; of detections one of all together.
+        errors: (W, H, 3) of each log: m, m, rad; none of tables and detections.
     """
 
     scores: np.ndarray
     errors: Sequence[np.ndarray]
 
     @classmethod
-    def of(cls, fit: ScoreFit) -> "HeldOut":
+    def of(cls, fit: ScoreFit | DetectionFit) -> "HeldOut":
         """Of a fit's left-out parts."""
+        if isinstance(fit, DetectionFit):
+            return cls(fit.held_scores, [])
         errors = [
             d.as_errors(rows)
             for d, rows in zip(fit.datasets, fit.held_out, strict=True)

@@ -26,7 +26,7 @@ from twinmill.model.parameters import (
     ParameterEstimate,
     stated_names,
 )
-from twinmill.predict.datasets import PARTS, Dataset, Trajectory
+from twinmill.predict.datasets import PARTS, ErrorDataset, Trajectory
 
 ROUNDS = 12
 CONVERGED = 1e-2  # change of the cost that decides nothing
@@ -50,7 +50,7 @@ class Unknown:
 class _LeftOut:
     """A data set of which some rows count and others do not."""
 
-    def __init__(self, whole: Dataset, kept: np.ndarray) -> None:
+    def __init__(self, whole: ErrorDataset, kept: np.ndarray) -> None:
         self._whole, self._kept = whole, kept
         self.judged = whole.judged * kept
         self.n_eff = max(whole.n_eff * self.judged.sum() / whole.judged.sum(), 1e-9)
@@ -74,7 +74,7 @@ class ScoreFit:
 
     def __init__(
         self,
-        datasets: Sequence[Dataset],
+        datasets: Sequence[ErrorDataset],
         models: Sequence[native.Model],
         shared: Sequence[Parameter],
         by_channel: bool = False,
@@ -391,6 +391,24 @@ class ScoreFit:
         """The cost on held-out parts."""
         return self.cost(self.held_out, self.x)
 
+    @property
+    def errors(self) -> np.ndarray:
+        """(R,) rows of all data sets at the values found."""
+        return np.concatenate(self.state[0])
+
+    def against(self, less: "ScoreFit") -> tuple[float, float, float]:
+        """Evidence for this fit against one of a poorer model.
+
+        Returns:
+            Fall of the held-out cost, the same without the block with the most evidence, and how
+            well blocks agree: t of the relative fall.
+        """
+        a, b = less.block_costs(less), self.block_costs(less)
+        falls = (a - b) / np.maximum(a + b, 1e-300)
+        spread = np.std(falls, ddof=1) / np.sqrt(len(falls)) if len(falls) > 1 else np.inf
+        least = float(np.min(less.without_blocks() - self.without_blocks()))
+        return less.held_cost - self.held_cost, least, float(falls.mean() / max(spread, 1e-12))
+
     # -- uncertainty ----------------------------------------------------------------------------
 
     @cached_property
@@ -531,7 +549,7 @@ class ScoreFit:
         return {self.estimates[c].name: self.estimates[c] for c in self.columns[i] if c >= count}
 
 
-def _divisions(data: Dataset) -> list[np.ndarray]:
+def _divisions(data: ErrorDataset) -> list[np.ndarray]:
     """(R,) blocks of a data set; of a log also those that begin half a block later."""
     if not isinstance(data, Trajectory):
         return [data.block]

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Data sets that a model is scored on: rows of error over floor.
+"""Data sets that a model is fitted to and judged on.
 
-`ScoreFit` and the search see a data set through `Dataset` alone. Two kinds have errors and a
-floor: `Trajectory`, one robot in one log, and `SteadyStates`, one robot of a table. The third,
-`Detections`, has events with chances: it is fitted by likelihood (`fitting.detection_fit`).
+The search sees a data set through `Dataset` alone. Two kinds have errors over a floor
+(`ErrorDataset`), which `ScoreFit` fits: `Trajectory`, one robot in one log, and `SteadyStates`, one
+robot of a table. The third, `Detections`, has draws with chances and no floor: `DetectionFit` fits
+it by likelihood.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -14,7 +15,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
-from twinmill.model.parameters import Parameter
+from twinmill.model.parameters import MOTION_STAGES, Parameter
 from twinmill.predict.windows import HORIZONS_S, Windows, difference
 
 BLOCK_S = 8.0  # errors of different blocks count as independent
@@ -24,23 +25,33 @@ INDEPENDENT_S = 2.0  # predictions that start so far apart share nothing
 
 
 class Dataset(Protocol):
-    """What a fit needs of a data set.
+    """What all kinds have.
 
     Attributes:
         label: short name.
         robot_id: of the robot.
+        stages: of the catalogue, whose effects this kind of data shows.
+        block: (R,) number of the block that each row belongs to; blocks count as independent.
+    """
+
+    label: str
+    robot_id: int
+    stages: Collection[str]
+    block: np.ndarray
+
+
+class ErrorDataset(Dataset, Protocol):
+    """One that has errors over a floor.
+
+    Attributes:
         own: quantities of this data set alone (its clock, its robot's gains), fitted with the rest.
-        block: (R,) number of the block that each row belongs to.
         part: (R,) number of the part of the data with which each row is left out.
         channel: (R,) number of the channel that each row belongs to.
         judged: (R,) share of the squared score that each row would make up if all were 1.
         n_eff: number of independent errors.
     """
 
-    label: str
-    robot_id: int
     own: Sequence[Parameter]
-    block: np.ndarray
     part: np.ndarray
     channel: np.ndarray
     judged: np.ndarray
@@ -61,7 +72,7 @@ class Trajectory:
         measured: (W, H, 3) displacements seen from the start; m, m, rad.
         floor: (H, 3) errors that count as one; infinite where a channel is not judged.
         keep: (W,) bool: windows that are judged.
-        own: see Dataset.
+        own: see ErrorDataset.
         first_part: part that the log begins with. Logs often begin alike, so that of several each
             begins with another one: else a drive of all of them is left out at once.
     """
@@ -78,6 +89,7 @@ class Trajectory:
     part: np.ndarray = field(init=False, repr=False)
     channel: np.ndarray = field(init=False, repr=False)
     judged: np.ndarray = field(init=False, repr=False)
+    stages = MOTION_STAGES
 
     def __post_init__(self) -> None:
         counted = np.isfinite(self.measured) & self.keep[:, None, None]
@@ -143,7 +155,7 @@ class Trajectory:
 
     @property
     def n_eff(self) -> float:
-        """See Dataset."""
+        """See ErrorDataset."""
         channels = np.count_nonzero(np.isfinite(self.floor).any(axis=0))
         return max(channels * self.covered_s / INDEPENDENT_S, 1.0)
 
@@ -152,7 +164,7 @@ class Trajectory:
         return difference(self.measured, self.windows.predicted(self.measurement, model))
 
     def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
-        """See Dataset."""
+        """See ErrorDataset."""
         ahead = native.windows_batch(
             model, self.measurement.started, self.windows.starts, self.windows.ends, names, values
         )

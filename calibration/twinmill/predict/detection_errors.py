@@ -170,13 +170,13 @@ def _of_robot(camera: Detections, model: native.Model, raw: bool) -> tuple[np.nd
     """Predicted, in view, measured, range and bearing; and whether each vote follows, if `raw`."""
     use, frames = camera.usable, int(model.detection_model()["vote_frames"])
     poses = camera.poses(0.0)
-    gap = poses[:, :, :2] - poses[:, camera.own : camera.own + 1, :2]
+    gap = poses[:, :, :2] - poses[:, camera.place : camera.place + 1, :2]
     distance_m = np.hypot(gap[..., 0], gap[..., 1])
-    distance_m[:, camera.own] = np.inf
+    distance_m[:, camera.place] = np.inf
     nearest = distance_m[use].argmin(axis=1)
     row = np.arange(len(nearest))
     to = gap[use][row, nearest]
-    bearing = np.arctan2(to[:, 1], to[:, 0]) - poses[use, camera.own, 2]
+    bearing = np.arctan2(to[:, 1], to[:, 0]) - poses[use, camera.place, 2]
     return (
         camera.reported(model, raw)[use],
         camera.view(model)[use] > 0.5,

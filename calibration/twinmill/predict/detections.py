@@ -9,7 +9,7 @@ import twinmill_native as native
 
 from twinmill.data.camera_frames import Frames
 from twinmill.data.track import Track
-from twinmill.model.parameters import CLOCK, CLOCK_RATE
+from twinmill.model.parameters import CAMERA_STAGES, CLOCK, CLOCK_RATE
 from twinmill.predict.modelled_log import ModelledLog
 
 BLOCK_S = 4.0  # errors of detections within a block are correlated
@@ -26,7 +26,7 @@ class Detections:
 
     Attributes:
         label, robot_id, log_sha256: which.
-        own: place of the robot among `tracks`.
+        place: of the robot among `tracks`.
         tracks: of all robots in the log.
         frames: of this robot.
         usable: (K,) bool, every robot is tracked.
@@ -39,7 +39,7 @@ class Detections:
     label: str
     robot_id: int
     log_sha256: str
-    own: int
+    place: int
     tracks: list[Track]
     frames: Frames
     usable: np.ndarray
@@ -51,6 +51,13 @@ class Detections:
     half: np.ndarray
     _seen: tuple = field(default=(None, None), repr=False)
     _placed: tuple = field(default=(None, None), repr=False)
+
+    stages = CAMERA_STAGES  # see Dataset
+
+    @property
+    def bits(self) -> np.ndarray:
+        """(K,) bool that were reported: raw, or voted where the log has no others."""
+        return self.frames.raw if self.frames.has_raw else self.frames.voted
 
     def poses(self, age_s: float, pick: slice = slice(None)) -> np.ndarray:
         """(K, N, 3) poses of all robots when the pictures were taken; NaN where untracked."""
@@ -69,7 +76,7 @@ class Detections:
         key = (pick.step, age_s, *(detection[g] for g in geometry))
         if self._seen[0] != key:
             poses = self.poses(age_s, pick)
-            self._seen = (key, native.in_view(model, self.own, poses, *self.blur))
+            self._seen = (key, native.in_view(model, self.place, poses, *self.blur))
         return self._seen[1]
 
     def chance(self, model: native.Model, pick: slice = slice(None)) -> np.ndarray:
@@ -89,8 +96,11 @@ class Detections:
 
         Raw bits are independent draws, and voted ones follow from them. Without raw bits only
         every Nth frame counts, of a vote of N: neighbouring votes share their frames.
+
+        Args:
+            model: of this robot.
+            pick: of the frames.
         """
-        model = model.for_robot(self.robot_id)
         frames = int(model.detection_model()["vote_frames"])
         if not self.frames.has_raw:
             return self._voted_alone(model, frames)[pick]
@@ -182,7 +192,7 @@ def detections_of(together: list[ModelledLog], own: int) -> Detections:
         label=modelled.measurement.label,
         robot_id=modelled.measurement.track.robot_id,
         log_sha256=modelled.measurement.log_sha256,
-        own=own,
+        place=own,
         tracks=[s.measurement.track for s in together],
         frames=frames,
         usable=np.ones(len(frames.t_s), bool),

@@ -9,6 +9,7 @@ import twinmill_native as native
 from twinmill.data.log import LogError
 from twinmill.data.steady_table import STILL_MPS, SteadyTable
 from twinmill.model.mixing import duties_from_vendor_move
+from twinmill.model.parameters import MOTION_STAGES
 from twinmill.predict.datasets import PARTS
 
 CHANNELS = (("speed", "m/s"), ("turn", "rad/s"), ("standing side", "m/s"))
@@ -30,6 +31,7 @@ class SteadyStates:
     own: tuple = ()
     noise: None = None
     clock_free: bool = False
+    stages = MOTION_STAGES
 
     @classmethod
     def of(cls, sheet: SteadyTable, model: native.Model) -> "SteadyStates":

@@ -4,7 +4,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from twinmill.fitting.add import AddResult, CameraAddResult
+from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import Comparison, RobotComparison
 from twinmill.fitting.fit import FitResult
 from twinmill.report import comparisons, detections, steady, tables
@@ -56,9 +56,9 @@ def fit_section(result: FitResult) -> Section:
     )
 
 
-def added_section(result: AddResult | CameraAddResult) -> Section:
+def added_section(result: AddResult) -> Section:
     """The page of an added effect: scores on data fitted to and held out, and estimates."""
-    if isinstance(result, CameraAddResult):
+    if result.of_camera:
         return _camera_section(result)
     before, after = _same_robot(result)
     scores = [
@@ -85,8 +85,8 @@ def added_section(result: AddResult | CameraAddResult) -> Section:
     )
 
 
-def _camera_section(result: CameraAddResult) -> Section:
-    before, after = number(result.heldout_before), number(result.heldout_after)
+def _camera_section(result: AddResult) -> Section:
+    before, after = number(result.heldout_refit.score), number(result.heldout_after.score)
     return Section(
         f"{result.effect} added to {result.model_name}",
         [_score("bits before", result.before.score), _score("bits after", result.after.score)],

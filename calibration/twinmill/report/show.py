@@ -7,7 +7,7 @@ from rich.padding import Padding
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from twinmill.fitting.add import AddResult, CameraAddResult
+from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import Comparison
 from twinmill.fitting.fit import FitResult
 from twinmill.report import comparisons, detections, tables
@@ -49,9 +49,9 @@ def fit(result: FitResult) -> RenderableType:
     )
 
 
-def added(result: AddResult | CameraAddResult) -> RenderableType:
+def added(result: AddResult) -> RenderableType:
     """What `twinmill add` prints: scores fitted and held out, the effect's estimates."""
-    if isinstance(result, CameraAddResult):
+    if result.of_camera:
         return _added_to_camera(result)
     own = result.added
     rest = len(result.parameters) - len(own)
@@ -77,11 +77,14 @@ def added(result: AddResult | CameraAddResult) -> RenderableType:
     )
 
 
-def _added_to_camera(result: CameraAddResult) -> RenderableType:
+def _added_to_camera(result: AddResult) -> RenderableType:
     return Group(
-        Text(
-            f"bits' score {number(result.before.score)} → {number(result.after.score)}, held out "
-            f"{number(result.heldout_before)} → {number(result.heldout_after)} without and with it"
+        _change("bits", result.before.score, result.after.score),
+        _change(
+            "held out",
+            result.heldout_refit.score,
+            result.heldout_after.score,
+            "without and with the effect, the camera's others refitted",
         ),
         Text(),
         table(tables.parameters(result.parameters)),

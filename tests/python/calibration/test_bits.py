@@ -10,8 +10,9 @@ import twinmill_native as native
 
 from twinmill.data.camera_frames import Frames, frames_of
 from twinmill.data.track import make_track
-from twinmill.diagnosis.detections.robots import odd_cameras
-from twinmill.diagnosis.detections.search import search_detections
+from twinmill.diagnosis.camera_outliers import odd_cameras
+from twinmill.diagnosis.cameras import camera_findings, not_shown
+from twinmill.diagnosis.search import Search, camera_state, search
 from twinmill.predict.detection_errors import compare_detections
 from twinmill.predict.detections import BLOCK_S, Detections, majority, thue_morse
 
@@ -66,6 +67,10 @@ def vote(raw: np.ndarray, frames: int) -> np.ndarray:
     """The newest bits, more than half of them 1, one frame after the other."""
     return np.array([2 * sum(raw[max(0, k - frames + 1) : k + 1]) > min(k + 1, frames)
                      for k in range(len(raw))])  # fmt: skip
+
+
+def searched(cameras: list[Detections], given: native.Model, excluded=()) -> Search:
+    return search(camera_state(cameras, given, excluded), known=0.0)
 
 
 @pytest.fixture
@@ -175,11 +180,9 @@ TRUE = {
 
 @pytest.mark.parametrize("effect", HIDDEN)
 def test_a_hidden_effect_is_named_with_its_value(effect, make_scenes):
-    done = search_detections(
-        make_scenes(50 + list(HIDDEN).index(effect), **HIDDEN[effect]), model()
-    )
+    done = searched(make_scenes(50 + list(HIDDEN).index(effect), **HIDDEN[effect]), model())
     assert done.found == [effect]
-    first = done.rounds[0].accepted.fit.added[0]
+    first = camera_findings(done)[0].parameters[0]
     true, sampling = TRUE[first.name], 4 * first.std if np.isfinite(first.std) else 0.0
     assert first.value == pytest.approx(true, abs=max(0.05 * abs(true), sampling))
     assert sampling < 0.5 * abs(true)
@@ -189,14 +192,14 @@ def test_a_hidden_effect_is_named_with_its_value(effect, make_scenes):
                                                ("missed_detection", "miss")])  # fmt: skip
 def test_a_camera_better_than_the_model_is_named_too(effect, clean, make_scenes):
     worse = native.Model.from_toml(MODEL.replace("rate = 0.05", "rate = 0.15"), "test")
-    done = search_detections(make_scenes(64, **{"miss": 0.15, clean: 0.0}), worse)
+    done = searched(make_scenes(64, **{"miss": 0.15, clean: 0.0}), worse)
     assert done.found == [effect]
-    assert done.rounds[0].accepted.fit.added[0].value == pytest.approx(-1, abs=0.05)
+    assert camera_findings(done)[0].parameters[0].value == pytest.approx(-1, abs=0.05)
 
 
 def test_nothing_is_named_where_nothing_is_hidden(make_scenes):
     """Each log may name something with a chance of 5 %: 2 of 5 would be one case in 45."""
-    named = [search_detections(make_scenes(seed), model()).found for seed in range(70, 75)]
+    named = [searched(make_scenes(seed), model()).found for seed in range(70, 75)]
     assert sum(bool(n) for n in named) < 2
 
 
@@ -211,6 +214,6 @@ def test_a_blind_camera_is_told_from_its_sisters(make_scenes):
 def test_without_raw_bits_the_vote_is_not_judged(make_scenes):
     others = set(HIDDEN) - {"view_range", "vote"}
     scenes = make_scenes(90, range_m=0.7, has_raw=False)
-    done = search_detections(scenes, model(), excluded={*others, "occlusion"})
-    assert "vote" in dict(done.hidden)
+    done = searched(scenes, model(), excluded={*others, "occlusion"})
+    assert "vote" in dict(not_shown(done, scenes))
     assert done.found[:1] == ["view_range"]

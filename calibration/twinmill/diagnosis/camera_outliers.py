@@ -7,8 +7,8 @@ import numpy as np
 import twinmill_native as native
 from scipy.stats import t
 
-from twinmill.diagnosis.detections.search import search_detections
 from twinmill.diagnosis.outliers import ODD, Outlier, middle_and_scale, odd_ones
+from twinmill.diagnosis.search import camera_state, search
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import Detections
@@ -67,7 +67,7 @@ def judge_cameras(
         odd: frames of the odd ones.
         model: with all effects that were found for the others.
         progress: told in words what is being done.
-        excluded: effects that are not to be thought of.
+        excluded: effects that are not considered.
     """
     away = camera_outliers([*alike, *odd], model)
     others = float(np.sqrt(np.mean(np.square(_scores(alike, model)))))
@@ -89,22 +89,16 @@ def _judge_camera(
     others: float,
 ) -> Outlier:
     robot_id, count = own[0].robot_id, len(away)
-    done = search_detections(own, model.for_robot(robot_id), excluded=excluded)
-    before, after = done.rounds[0].before, done.rounds[-1].before
+    done = search(camera_state(own, model.for_robot(robot_id), excluded), known=0.0)
+    before, after = (trial.held_score for trial in (done.rounds[0].before, done.last))
     first = done.rounds[0].accepted
-    p_value = (
-        count * first.evidence.p_value(len(done.candidates))
-        if first
-        else count * t.sf(away[robot_id], count - 1)
-    )
-    parameters: list[ParameterEstimate] = [
-        e for e in done.estimates if e.name.split(".")[0] in done.found
-    ]
-    told = f"the bits of its camera err {before.score:.2f} times as much as they should with the "
+    p_value = count * (done.rounds[0].p_value(first) if first else t.sf(away[robot_id], count - 1))
+    parameters = [e for e in done.last.fit.estimates if e.name.split(".")[0] in done.found]
+    told = f"the bits of its camera err {before:.2f} times as much as they should with the "
     told += f"model of all, those of the others {others:.2f} times; "
     told += (
-        f"{' and '.join(done.found)} of its own makes it {after.score:.2f}"
-        + "".join(f"; {trial.fit.effect} would do as well" for trial in done.rounds[0].tied)
+        f"{' and '.join(done.found)} of its own makes it {after:.2f}"
+        + "".join(f"; {trial.names[0]} would do as well" for trial in done.rounds[0].tied)
         if done.found
         else "no effect of the catalogue explains it"
     )
@@ -112,8 +106,8 @@ def _judge_camera(
         robot_id=robot_id,
         effect=" + ".join(done.found) or None,
         parameters=parameters,
-        score_before=before.score,
-        score_after=after.score,
+        score_before=before,
+        score_after=after,
         p_value=float(min(1.0, p_value)),
         sentence=_plain(robot_id, parameters),
         why=told,

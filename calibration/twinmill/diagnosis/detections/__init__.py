@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: Apache-2.0
-"""The camera's bit: predicted from measured poses, compared with what robots reported."""
