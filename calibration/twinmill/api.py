@@ -90,9 +90,15 @@ class Log(_Shown):
         ['log', 'robot_id', 't_s', 'x_m', 'y_m', 'theta_rad', 'valid']
     """
 
-    def __init__(self, paths: Iterable[str | Path], folder: TemporaryDirectory | None = None):
+    def __init__(
+        self,
+        paths: Iterable[str | Path],
+        folder: TemporaryDirectory | None = None,
+        said: Iterable[str] = (),
+    ):
         self.paths = [Path(path) for path in paths]
         self._folder = folder  # removed with the last reference to a simulated run
+        self._said = list(said)  # by the twin
         self._measurements: dict[str, Measurements] = {}  # by the model's hash
         self._logs = [read_log(path) for path in self.paths if not is_steady_table(path)]
 
@@ -136,8 +142,8 @@ class Log(_Shown):
 
     @property
     def warnings(self) -> list[str]:
-        """Sentences on what is odd in the files."""
-        return [text for log in self._logs for text in log.warnings]
+        """Sentences on what is odd in the files, or that the twin said of a simulated run."""
+        return [*self._said, *(text for log in self._logs for text in log.warnings)]
 
     def table(self) -> pd.DataFrame:
         """All measured poses, as they were recorded.
@@ -847,7 +853,8 @@ def simulate(
     )
     if done.returncode:
         raise ValueError(done.stderr.strip().removeprefix("twin_run: ") or "twin_run failed.")
-    return Log([place / "simulated.lcmlog"], folder)
+    said = [line.removeprefix("twin_run: ") for line in done.stderr.splitlines()]
+    return Log([place / "simulated.lcmlog"], folder, said)
 
 
 def _log(log: Log | str | Path) -> Log:

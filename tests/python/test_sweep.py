@@ -203,6 +203,13 @@ def test_a_wrong_axis_is_told_in_one_sentence(text: str, says: str):
         parse_axis(text, native.Model.load("paper.toml"))
 
 
+def test_an_axis_that_cannot_act_is_refused():
+    mass = ["robot.mass_kg=1,1.5"]
+    with pytest.raises(ValueError, match="robot.mass_kg: changes nothing here: the planar plant"):
+        make_request("milling", "turbopi.toml", mass)
+    assert make_request("milling", "turbopi.toml", mass, plant="mujoco").axes
+
+
 def test_speeds_need_a_drive_where_they_can_be_chosen():
     with pytest.raises(ValueError, match="'twist'"):
         request(model="turbopi_nominal.toml")

@@ -42,6 +42,9 @@ def make_request(
         raise ValueError(f"--plant {request.plant}: must be {' or '.join(PLANTS)}.")
     for point in request.points:
         request.cell(point)
+        inert = dict(request.cell_model(point).inert(request.plant))
+        for name in set(names) & set(inert):
+            raise ValueError(f"the axis {name}: changes nothing here: {inert[name]}.")
     return request
 
 
