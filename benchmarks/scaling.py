@@ -1,25 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws what `build/bin/bench_scaling` prints: ... | python benchmarks/scaling.py docs."""
 
-import csv
 import sys
+from io import StringIO
 from pathlib import Path
 
 import matplotlib
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 BLUE, ORANGE, GREY = "#0072b2", "#d55e00", "#808080"
 
 
-def read(text: str) -> dict[str, list[float]]:
-    """Columns of a CSV by name."""
-    rows = list(csv.DictReader(text.splitlines()))
-    return {name: [float(row[name]) for row in rows] for name in rows[0]}
-
-
 def draw(
-    table: dict[str, list[float]], labels: dict[str, tuple[str, str]], ylabel: str
+    table: pd.DataFrame, labels: dict[str, tuple[str, str]], ylabel: str
 ) -> tuple[Figure, Axes]:
     """One line for each column but the first, both axes logarithmic."""
     figure = Figure(figsize=(6, 3.6), layout="constrained")
@@ -36,7 +31,7 @@ def main() -> None:
     """Writes scaling.svg and cost.svg into the folder."""
     matplotlib.rcParams["svg.hashsalt"] = "scaling"
     folder = Path(sys.argv[1])
-    scaling, cost = (read(part) for part in sys.stdin.read().strip().split("\n\n"))
+    scaling, cost = (pd.read_csv(StringIO(part)) for part in sys.stdin.read().strip().split("\n\n"))
     figure, _ = draw(
         scaling,
         {"all_pairs_us": ("all pairs", ORANGE), "grid_us": ("grid", BLUE)},

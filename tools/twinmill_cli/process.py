@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import tomlkit
 
 from twinmill.challenge.script import write_rich_script
@@ -90,10 +91,8 @@ def _drive(folder: Path) -> None:
 def _laboratory(folder: Path) -> int:
     """Makes the runs of the plan with the true robots in MuJoCo, and writes down their classes."""
     plan, _ = read_plan(folder / "plan", None)
-    head, *rows = (folder / "plan" / FORM).read_text().splitlines()
-    place = head.split(",").index("class")
-    lines = [head]
-    for number, (cell, row) in enumerate(zip(plan.order, rows, strict=True)):
+    seen = []
+    for number, cell in enumerate(plan.order):
         point = zip(plan.names, plan.expected.points[cell], strict=True)
         request = replace(
             plan.request,
@@ -103,11 +102,11 @@ def _laboratory(folder: Path) -> int:
             first_seed=LABORATORY_SEED + number,
             plant="mujoco",
         )
-        columns = row.split(",")
-        columns[place] = run_part(request, range(1))["class"][0]
-        lines.append(",".join(columns))
-    (folder / "plan" / FORM).write_text("\n".join([*lines, ""]))
-    return len(rows)
+        seen.append(run_part(request, range(1))["class"][0])
+    form = folder / "plan" / FORM
+    table = pd.read_csv(form, dtype=str, keep_default_na=False)
+    table.assign(**{"class": seen}).to_csv(form, index=False)
+    return len(table)
 
 
 def _typed(line: str, folder: Path) -> str:
