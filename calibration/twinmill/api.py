@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `import twinmill as tm` gives: logs, models, and what one tells of the other.
 
-Lengths in m, angles in rad, times in s; frames, signs and clocks as in the page Conventions. All
+Lengths in m, angles in rad, times in s; frames, signs and clocks as in the page Conventions. The
+example of a method goes on where that of its class, or of the function that made it, ends. All
 functions leave their arguments and the disk as they are: a fit returns a new `Model`, which
 `Model.save` writes.
 """
@@ -129,12 +130,22 @@ class Log(_Shown):
 
     @property
     def robots(self) -> list[int]:
-        """Numbers of all robots in the logs."""
+        """Numbers of all robots in the logs.
+
+        Examples:
+            >>> tm.load("run.lcmlog").robots
+            [0]
+        """
         return sorted({number for log in self._logs for number in log.robots})
 
     @property
     def duration_s(self) -> float:
-        """Of the longest log."""
+        """Of the longest log.
+
+        Examples:
+            >>> tm.load("run.lcmlog").duration_s > 59
+            True
+        """
         ends = [
             r.pose_t_s[-1] for log in self._logs for r in log.robots.values() if r.pose_t_s.size
         ]
@@ -142,7 +153,12 @@ class Log(_Shown):
 
     @property
     def warnings(self) -> list[str]:
-        """Sentences on what is odd in the files, or that the twin said of a simulated run."""
+        """Sentences on what is odd in the files, or that the twin said of a simulated run.
+
+        Examples:
+            >>> tm.load("run.lcmlog").warnings
+            []
+        """
         return [*self._said, *(text for log in self._logs for text in log.warnings)]
 
     def table(self) -> pd.DataFrame:
@@ -201,6 +217,10 @@ class Log(_Shown):
 
         Returns:
             A figure of matplotlib, axes in m of the world frame.
+
+        Examples:
+            >>> tm.load("run.lcmlog").plot().axes[0].get_xlabel()
+            'x (m)'
         """
         robots = [recorded for log in self._logs for recorded in read_multi_log(log.path).robots]
         return draw(4.6, Drawing(robots).paths).picture
@@ -214,6 +234,10 @@ class Log(_Shown):
 
         Raises:
             ValueError: it is there, cannot be written, or these are several logs.
+
+        Examples:
+            >>> from tempfile import mkdtemp
+            >>> log.save(Path(mkdtemp()) / "kept.lcmlog")
         """
         if len(self.paths) > 1:
             raise ValueError(f"{path}: one file cannot hold {len(self.paths)} logs; save each.")
@@ -221,7 +245,12 @@ class Log(_Shown):
             temporary.write_bytes(self.paths[0].read_bytes())
 
     def to_json(self) -> dict:
-        """paths, robots, duration_s, warnings."""
+        """paths, robots, duration_s, warnings.
+
+        Examples:
+            >>> tm.load("run.lcmlog").to_json()["robots"]
+            [0]
+        """
         return {
             "paths": [str(path) for path in self.paths],
             "robots": self.robots,
@@ -276,12 +305,22 @@ class Model(_Shown):
 
     @property
     def name(self) -> str:
-        """Of its file; of a model that was not saved, what it was made from."""
+        """Of its file; of a model that was not saved, what it was made from.
+
+        Examples:
+            >>> tm.Model.load("turbopi.toml").name
+            'turbopi.toml'
+        """
         return self.file.path.name
 
     @property
     def effects(self) -> list[str]:
-        """Names of its effects in their order."""
+        """Names of its effects in their order.
+
+        Examples:
+            >>> tm.Model.load("hidden.toml").effects
+            ['coasting']
+        """
         return list(self.file.model.effects)
 
     def __getitem__(self, quantity: str) -> float:
@@ -302,7 +341,12 @@ class Model(_Shown):
         return pd.DataFrame(self.file.model.values())
 
     def to_json(self) -> dict:
-        """name, sha256, effects, values by full name."""
+        """name, sha256, effects, values by full name.
+
+        Examples:
+            >>> tm.Model.load("turbopi.toml").to_json()["values"]["robot.wheel_radius_m"]
+            0.0325
+        """
         values = {v["name"]: v["value"] for v in self.file.model.values()}
         return plain(
             {
@@ -339,6 +383,10 @@ class Model(_Shown):
 
         Returns:
             As `compare`, which says more.
+
+        Examples:
+            >>> tm.Model.load("turbopi.toml").compare("run.lcmlog").score > 1.3
+            True
         """
         return compare(log, self)
 
@@ -350,6 +398,10 @@ class Model(_Shown):
 
         Returns:
             As `fit`, which says more.
+
+        Examples:
+            >>> tm.Model.load("turbopi.toml").fit("run.lcmlog").model.name
+            'turbopi_fitted.toml'
         """
         return fit(log, self)
 
@@ -402,6 +454,11 @@ class Model(_Shown):
 
         Returns:
             As `diagnose`.
+
+        Examples:
+            >>> d = tm.Model.load("fitted.toml").diagnose("run.lcmlog", without=["coasting"])
+            >>> "coasting" in [finding.effect for finding in d.found]
+            False
         """
         return diagnose(log, self, **options)
 
@@ -420,10 +477,8 @@ class Comparison(_Shown):
 
     Examples:
         >>> found = tm.compare("run.lcmlog", "turbopi.toml")
-        >>> found.table().loc[0, ["channel", "unit"]].tolist()
-        ['forward', 'm']
-        >>> len(found.plot().axes)  # forward, left, heading
-        3
+        >>> found.score > 1.3
+        True
     """
 
     def __init__(self, result: _compare.Comparison):
@@ -435,6 +490,10 @@ class Comparison(_Shown):
 
         Returns:
             channel, unit, horizon_s, rms, floor (both in the unit), ratio.
+
+        Examples:
+            >>> found.table()["horizon_s"].unique().tolist()
+            [0.1, 0.2, 0.5, 1.0, 2.0]
         """
         return pd.DataFrame(self._result.main.to_json()["errors"])
 
@@ -443,6 +502,10 @@ class Comparison(_Shown):
 
         Returns:
             A figure of matplotlib: m for forward and left, degrees for heading, over s.
+
+        Examples:
+            >>> len(found.plot().axes)  # forward, left, heading
+            3
         """
         return _errors_drawn([("this model", self._result)])
 
@@ -454,6 +517,11 @@ class Comparison(_Shown):
 
         Returns:
             Path of the page, folder/index.html.
+
+        Examples:
+            >>> from tempfile import mkdtemp
+            >>> found.report(mkdtemp()).name
+            'index.html'
         """
         section = report.comparison_section(self._result)
         return _report(folder, section, "twinmill.compare")
@@ -478,8 +546,6 @@ class Fit(_Shown):
         >>> fitted = tm.fit("run.lcmlog", "turbopi.toml")
         >>> fitted.model.effects, fitted.score < fitted.before.score
         ([], True)
-        >>> fitted.table().set_index("name").loc["base.motor_lag_s", "unit"]
-        's'
     """
 
     def __init__(self, result: _fit.FitResult, model: Model):
@@ -493,6 +559,10 @@ class Fit(_Shown):
         Returns:
             name, value, std (half a 95 % interval over 1.96), unit, at_bound, seen (false where
             the log does not tell the quantity, and the prior holds it).
+
+        Examples:
+            >>> fitted.table().set_index("name").loc["base.motor_lag_s", "unit"]
+            's'
         """
         return pd.DataFrame([e.to_json() for e in self._result.parameters])
 
@@ -501,6 +571,10 @@ class Fit(_Shown):
 
         Returns:
             A figure of matplotlib, as of `Comparison.plot`.
+
+        Examples:
+            >>> len(fitted.plot().axes)  # forward, left, heading
+            3
         """
         return _errors_drawn([("before", self._result.before), ("after", self._result.after)])
 
@@ -512,6 +586,10 @@ class Fit(_Shown):
 
         Returns:
             As `compare`.
+
+        Examples:
+            >>> fitted.compare("run.lcmlog").score < fitted.before.score
+            True
         """
         return self.model.compare(log)
 
@@ -523,6 +601,11 @@ class Fit(_Shown):
 
         Returns:
             Path of the page, folder/index.html.
+
+        Examples:
+            >>> from tempfile import mkdtemp
+            >>> fitted.report(mkdtemp()).name
+            'index.html'
         """
         return _report(folder, report.fit_section(self._result), "twinmill.fit")
 
@@ -561,6 +644,10 @@ class Addition(_Shown):
         Returns:
             name, value, std (half a 95 % interval over 1.96), unit, at_bound, seen (false where
             the log does not tell the quantity, and the prior holds it).
+
+        Examples:
+            >>> list(added.table().columns)[:4]
+            ['name', 'value', 'std', 'unit']
         """
         return pd.DataFrame([e.to_json() for e in self._result.parameters])
 
@@ -570,6 +657,10 @@ class Addition(_Shown):
         Returns:
             A figure of matplotlib: as of `Comparison.plot`, or shares over range in m and bearing
             in degrees.
+
+        Examples:
+            >>> len(added.plot().axes)  # forward, left, heading
+            3
         """
         if self._result.of_camera:
             return detections.field_of_view(self._result.after).svg.picture
@@ -583,6 +674,11 @@ class Addition(_Shown):
 
         Returns:
             Path of the page, folder/index.html.
+
+        Examples:
+            >>> from tempfile import mkdtemp
+            >>> added.report(mkdtemp()).name
+            'index.html'
         """
         return _report(folder, report.added_section(self._result), "twinmill.add")
 
@@ -603,6 +699,10 @@ class Finding(_Shown):
         effect: its name.
         parameters: estimates by name.
         score_heldout: of the model with it, on data that was not fitted to.
+
+    Examples:
+        >>> d.best.parameters["deceleration_mps2"] > 0
+        True
     """
 
     def __init__(self, ranked: Ranked, log: Log):
@@ -621,6 +721,10 @@ class Finding(_Shown):
 
         Raises:
             ValueError: the effect is made for another drive, or, of the camera, it is there.
+
+        Examples:
+            >>> d.best.add_to(tm.Model.load("fitted.toml")).effects
+            ['coasting']
         """
         return model.add(self.effect.split("#")[0], self._log).model
 
@@ -629,6 +733,10 @@ class Finding(_Shown):
 
         Returns:
             name, value, std, unit, at_bound, seen, as of `Fit.table`.
+
+        Examples:
+            >>> d.best.table()["name"].tolist()
+            ['coasting.deceleration_mps2', ...]
         """
         return pd.DataFrame([e.to_json() for e in self._result.parameters])
 
@@ -646,6 +754,11 @@ class Diagnosis(_Shown):
         sentence: the same for people.
         found: the missing effects, most important first.
         best: the first of them; None if none is named.
+
+    Examples:
+        >>> d = tm.diagnose("run.lcmlog", "fitted.toml")
+        >>> d.verdict
+        'effect_missing'
     """
 
     def __init__(self, result: _diagnose.Diagnosis, log: Log):
@@ -661,6 +774,10 @@ class Diagnosis(_Shown):
         Returns:
             effect, found, score_heldout, share_explained, p_value, group (effects of one number
             look alike in this log).
+
+        Examples:
+            >>> d.table().loc[0, "effect"]
+            'coasting'
         """
         keys = ("effect", "score_heldout", "share_explained", "p_value", "group")
         table = pd.DataFrame([{k: getattr(r, k) for k in keys} for r in self._result.ranking])
@@ -673,6 +790,10 @@ class Diagnosis(_Shown):
 
         Returns:
             A figure of matplotlib; where robots reported detections, what their cameras see.
+
+        Examples:
+            >>> d.plot().axes[0].get_xlabel()
+            'score: error over noise floor'
         """
         return diagnosis_report.section(self._result).figures[0].svg.picture
 
@@ -684,6 +805,11 @@ class Diagnosis(_Shown):
 
         Returns:
             Path of the page, folder/index.html.
+
+        Examples:
+            >>> from tempfile import mkdtemp
+            >>> d.report(mkdtemp()).name
+            'index.html'
         """
         return _report(folder, diagnosis_report.section(self._result), "twinmill.diagnose")
 

@@ -53,11 +53,25 @@ def here(folder, monkeypatch) -> Path:
 
 def test_the_examples_of_the_documentation_run(here):
     options = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-    done = doctest.testmod(api, extraglobs={"tm": tm}, optionflags=options)
-    assert done.attempted > 20 and done.failed == 0
+    log, model = tm.load("run.lcmlog"), tm.Model.load("turbopi.toml")
+    made = {
+        "found": tm.compare(log, model),
+        "fitted": tm.fit(log, model),
+        "added": model.add("coasting", log),
+        "d": tm.diagnose(log, "fitted.toml"),
+    }
+    names = {"tm": tm, "Path": Path, "log": log, **made}
+    done = doctest.testmod(api, extraglobs=names, optionflags=options)
+    assert done.attempted > 60 and done.failed == 0
     assert sorted(p.name for p in here.iterdir()) == [
         *("fitted.toml", "hidden.toml", "run.lcmlog", "script.csv")
     ]
+
+
+def test_everything_public_has_an_example():
+    for found in doctest.DocTestFinder(exclude_empty=False).find(api, "tm"):
+        private = any(part.startswith("_") for part in found.name.split("."))
+        assert private or found.name in ("tm", "tm.Result") or found.examples, found.name
 
 
 def test_a_comparison_is_that_of_the_command(here, capsys):

@@ -13,6 +13,7 @@ from twinmill.diagnosis.search import Round, Screened, Settings, _tied, canonica
 from twinmill.fitting.add import add
 from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
 
 TABLE = """
@@ -136,8 +137,11 @@ def test_what_can_do_all_that_another_does_stands_in_one_group_with_it(behind, t
     assert canonical_correlation(line, np.eye(6)[:, [0]]) == pytest.approx(np.sqrt(0.5))
     squares = np.array([1.0, 1.1, 0.9, 1.05])
 
+    class FitOf(SimpleNamespace):
+        against = ScoreFit.against
+
     def fit_of(cost, factor):
-        return SimpleNamespace(
+        return FitOf(
             held_cost=cost,
             block_costs=lambda _: squares * factor,
             without_blocks=lambda: cost - squares,
