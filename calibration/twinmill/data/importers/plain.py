@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import turbopi
 
+from twinmill.data.importers.beat import at_even_beat
 from twinmill.data.importers.columns import Mapping, read_mapped
 from twinmill.data.importers.series import (
     CommandSeries,
@@ -83,6 +84,11 @@ def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:
     if table.has("theta_rad"):
         _refuse_degrees(table, ids)
     position[~valid] = orientation[~valid] = np.nan
+    for number in np.unique(ids):
+        utime_us[ids == number], said = at_even_beat(
+            utime_us[ids == number], f"{table.name}: robot {number}"
+        )
+        notes = notes + said
     return [
         PoseSeries(number, utime_us[rows], position[rows], orientation[rows], valid[rows], notes)
         for number, rows, notes in _by_robot(table, ids, utime_us, notes)

@@ -11,7 +11,7 @@ from array import array
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import turbopi
 
+from twinmill.data.importers.beat import at_even_beat
 from twinmill.data.importers.ros_cut import is_cut, write_whole
 from twinmill.data.importers.ros_frames import Frames, on_floor
 from twinmill.data.importers.ros_messages import (
@@ -546,6 +547,8 @@ def _stamps(
 def _poses(robot_id: int, given: _Rows) -> PoseSeries:
     if given.kind not in POSES and given.kind not in MANY:
         raise LogError(f"--pose: {given.topic} holds {given.kind}, which is no pose.")
+    utime_us, evened = at_even_beat(given.utime_us, given.topic)
+    given = replace(given, utime_us=utime_us, notes=given.notes + evened)
     rows, notes = given.ordered()
     value = given.value[rows]
     norm = np.linalg.norm(value[:, 3:], axis=1)
