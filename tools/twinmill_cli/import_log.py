@@ -149,6 +149,14 @@ def _command(
         float,
         typer.Option(help=("From the tracked body's x axis to the robot's front, left positive.")),
     ] = 0.0,
+    path_heading: Annotated[
+        bool,
+        typer.Option(
+            "--heading-from-path",
+            help="Of positions alone: the heading is the way of the path while the robot is told "
+            "to drive ahead or straight aside.",
+        ),
+    ] = False,
     same_clock: Annotated[
         bool,
         typer.Option(
@@ -194,6 +202,7 @@ def _command(
             },
             up=up,
             pose_shift_s=pose_shift_s,
+            path_heading=path_heading,
             same_clock=same_clock,
             force=force,
             heading_offset_rad=float(np.radians(heading_offset_deg)),

@@ -186,7 +186,8 @@ def _no_heading(checked: CheckedTrack, share: float) -> InputFinding:
     return checked.finding(
         "the heading is not recorded, and the commands turn the robot",
         f"in {share:.0%} of the time",
-        "record the heading, since positions alone tell only of a robot that holds it",
+        "positions alone tell only of a robot that holds it: record the heading, or import with "
+        "--heading-from-path, which takes it from the path while the robot drives ahead",
     )
 
 

@@ -13,6 +13,7 @@ from twinmill.data.importers.columns import Guess, check_renames, explain, read_
 from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
 from twinmill.data.importers.motive import read_motive
+from twinmill.data.importers.path_heading import with_path_heading
 from twinmill.data.importers.plain import (
     KNOWN,
     OF_COMMANDS,
@@ -55,6 +56,7 @@ class ImportOptions:
         pose_shift_s: added to the stamps of all poses.
         pose_clock_ppm: by which the poses' clock gains on the commands', taken out.
         heading_offset_rad: from the tracked body's x axis to the robot's front, left positive.
+        path_heading: take the heading from the path, where positions alone were recorded.
         same_clock: one clock stamped poses and commands: no offset is estimated.
         pose_topics, command_topics: of a ROS bag, one of each for each robot.
         receive_stamps: of a ROS bag, take the times of receipt, not those in the headers.
@@ -72,6 +74,7 @@ class ImportOptions:
     pose_shift_s: float = 0.0
     pose_clock_ppm: float = 0.0
     heading_offset_rad: float = 0.0
+    path_heading: bool = False
     same_clock: bool = False
     pose_topics: tuple[str, ...] = ()
     command_topics: tuple[str, ...] = ()
@@ -152,6 +155,8 @@ def import_log(
     pose_series = [_moved(series, options) for series in pose_series]
     shift = not bag or options.receive_stamps
     _check_times(pose_series, command_series, shift)
+    if options.path_heading:
+        pose_series = _headed(pose_series, command_series)
     by_robot = {series.robot_id: series for series in pose_series}
     command_series = [
         in_body_frame(series, by_robot.get(series.robot_id)) if series.world else series
@@ -261,6 +266,20 @@ def _moved(series: PoseSeries, options: ImportOptions) -> PoseSeries:
     )
 
 
+def _headed(poses: list[PoseSeries], commands: list[CommandSeries]) -> list[PoseSeries]:
+    """Poses with the headings of their paths, of robots whose commands are known."""
+    told = {series.robot_id: series for series in commands}
+    if any(series.world for series in commands):
+        raise LogError(
+            "--heading-from-path: world-frame velocities do not tell along which axis the robot "
+            "goes; leave the option out."
+        )
+    return [
+        with_path_heading(series, told[series.robot_id]) if series.robot_id in told else series
+        for series in poses
+    ]
+
+
 def _on_our_clock(utime_us: np.ndarray, options: ImportOptions) -> np.ndarray:
     """Stamps without the drift, counted from the first, and shifted."""
     since_us = (utime_us - utime_us[0]) / (1 + 1e-6 * options.pose_clock_ppm)
@@ -318,6 +337,7 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
             "import": {
                 "files": files,
                 "up": options.up or "",
+                "path_heading": options.path_heading,
                 "same_clock": options.same_clock,
                 "pose_shift_s": options.pose_shift_s,
                 "pose_clock_ppm": options.pose_clock_ppm,
