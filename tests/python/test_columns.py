@@ -77,6 +77,35 @@ def test_velocities_of_the_room_are_asked_about_as_such(imported):
         imported(commands=rows)
 
 
+@pytest.mark.parametrize(
+    ("column", "rest", "ahead", "back"),
+    [("left_pwm", 128, 192, 0), ("left", 90, 135, 0), ("left", 1500, 1750, 1000)],
+    ids=["a byte", "a servo by its angle", "a servo by its pulse in us"],
+)
+def test_duties_about_a_middle_are_asked_about_and_kept(
+    imported, tmp_path, monkeypatch, column, rest, ahead, back
+):
+    """Half ahead, then all back: 0.5 and -1 of full duty, and standstill is nothing at all."""
+    monkeypatch.chdir(tmp_path)
+    right = column.replace("left", "right")
+    rows = [f"{k},{v},{v}\n" for k, v in enumerate((ahead, rest, back, rest))]
+    commands = f"t_s,{column},{right}\n" + "".join(rows)
+    with pytest.raises(LogError, match=f"ends at {rest}, so it looks as if that were standstill"):
+        imported(commands=commands)
+    options = ["--poses", "p.csv", "--commands", "c.csv", "--explain-columns", "m.toml"]
+    assert CliRunner().invoke(app, ["import", *options]).exit_code == 0
+    robot, _ = imported(commands=commands, mapping=tmp_path / "m.toml")
+    told = robot.command[np.searchsorted(robot.command_t_s, [0, 1, 2, 3])]
+    np.testing.assert_allclose(told[:, 0], [0.5, 0, -1, 0], atol=0.005)
+    assert not told[[1, 3]].any()
+
+
+def test_forward_duties_that_stop_at_zero_are_no_middle(imported):
+    rows = "0,255,255\n1,128,128\n2,0,0\n3,64,64\n4,0,0\n"
+    robot, _ = imported(commands="t_s,left_pwm,right_pwm\n" + rows)
+    np.testing.assert_allclose(robot.command[:2, 0], [1, 128 / 255])
+
+
 def test_time_without_a_unit_looks_the_same_in_any_order_of_rows(imported):
     rows = [f"{0.02 * k:.2f},4,{k},0,0\n" for k in np.random.default_rng(1).permutation(200)]
     with pytest.raises(LogError, match=r"rows are 0\.02 apart, so it looks like s"):

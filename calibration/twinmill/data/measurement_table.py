@@ -76,6 +76,7 @@ class Table:
     line: list[int]
     known: frozenset[str]  # columns that have a meaning: never proposed for renaming
     factor: dict[str, float] = field(default_factory=dict)  # of columns in another unit
+    zero: dict[str, float] = field(default_factory=dict)  # what stands for nothing, if not 0
     notes: list[str] = field(default_factory=list)  # sentences on how the file was read
 
     def under(self, sources: dict, flips: frozenset[str]) -> "Table":
@@ -96,7 +97,8 @@ class Table:
         factor = {
             name: source.factor * (-1 if name in flips else 1) for name, source in sources.items()
         }
-        return replace(self, header=[*sources, *rest], rows=rows, factor=factor)
+        zero = {name: source.zero for name, source in sources.items()}
+        return replace(self, header=[*sources, *rest], rows=rows, factor=factor, zero=zero)
 
     def has(self, *columns: str) -> bool:
         """Whether all these columns are there."""
@@ -138,7 +140,8 @@ class Table:
         if empty_is_nan:
             cells = [cell or "nan" for cell in cells]
         try:
-            return np.array([float(cell) for cell in cells]) * self.factor.get(column, 1.0)
+            values = np.array([float(cell) for cell in cells])
+            return (values - self.zero.get(column, 0.0)) * self.factor.get(column, 1.0)
         except ValueError:
             bad = next(k for k, cell in enumerate(cells) if not is_number(cell))
             raise LogError(

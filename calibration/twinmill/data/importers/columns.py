@@ -22,11 +22,12 @@ from twinmill.data.units import UNITS, plain_name, split_unit
 
 @dataclass(frozen=True)
 class Source:
-    """Where one of our columns comes from: a column of the file times a factor, or a constant."""
+    """Where one of our columns comes from: a column less `zero`, times a factor; or a constant."""
 
     column: str | None
     factor: float = 1.0
     value: float | None = None
+    zero: float = 0.0
 
 
 Mapping = dict[str, Source]
@@ -44,6 +45,7 @@ class Guess:
         sure: its name says so; else a person must.
         note: what an import is to say about it.
         rival: the column before it that holds the same quantity.
+        zero: what stands for nothing there.
     """
 
     column: str
@@ -53,6 +55,7 @@ class Guess:
     sure: bool
     note: str = ""
     rival: str = ""
+    zero: float = 0.0
 
 
 def by_name(column: str, known: frozenset[str]) -> tuple[tuple[str, ...], float] | None:
@@ -126,6 +129,27 @@ def _turn(values: np.ndarray) -> tuple[float, str]:
 
 def _plain(values: np.ndarray) -> tuple[float, str]:
     return 1.0, f"goes from {values.min():g} to {values.max():g}"
+
+
+# Standstill, and what goes to full duty from there: bytes, servos by angle and by pulse.
+CENTRED = ((127.5, 127.5), (90.0, 90.0), (1500.0, 500.0))
+AT_REST = 0.02  # of the latter
+
+
+def _centred(column: str, targets: tuple[str, ...], values: np.ndarray) -> Guess | None:
+    """What duties look like that stand still in the middle of their range."""
+    for middle, span in CENTRED if len(values) else ():
+        off, zero = (values - middle) / span, float(values[-1])
+        within = np.all(np.abs(off) <= 1) and np.any(off < -AT_REST) and np.any(off > AT_REST)
+        rests = np.count_nonzero(np.abs(off) <= AT_REST)
+        if within and abs(off[-1]) <= AT_REST and rests >= np.count_nonzero(values == 0):
+            why = (
+                f"goes from {values.min():g} to {values.max():g} and ends at {zero:g}, so it looks "
+                "as if that were standstill"
+            )
+            full = span + abs(zero - middle)
+            return Guess(column, targets, 100 / full, why, False, zero=zero)
+    return None
 
 
 LEFT, RIGHT = ("fl_pct", "rl_pct"), ("fr_pct", "rr_pct")
@@ -213,6 +237,9 @@ def _guess(table: Table, column: str, known: frozenset[str], new: str | None) ->
     name = new or column
     if found := by_name(name, known):
         targets, factor = found
+        centred = _centred(column, targets, _numbers(table, column))
+        if split_unit(name)[1] == "pwm" and centred:
+            return centred
         if math.isnan(factor):
             return Guess(column, targets, factor, f"of the rim; {RADIUS}", False)
         note = ""
@@ -230,6 +257,8 @@ def _guess(table: Table, column: str, known: frozenset[str], new: str | None) ->
         span = f" ({_plain(values)[1]})" if len(values) else ""
         return Guess(column, (), 1.0, f"not known: left out{span}", True)
     targets, unit_of = usual
+    if unit_of is _duty and (centred := _centred(column, targets, values)):
+        return centred
     factor, why = unit_of(values)
     return Guess(column, targets, factor, why, False)
 
@@ -290,7 +319,9 @@ def _numbers(table: Table, column: str) -> np.ndarray:
 def mapping_of(guesses: list[Guess]) -> Mapping:
     """Where each of our columns comes from."""
     return {
-        target: Source(g.column, g.factor) if g.column else Source(None, value=g.factor)
+        target: Source(g.column, g.factor, zero=g.zero)
+        if g.column
+        else Source(None, value=g.factor)
         for g in guesses
         for target in g.targets
     }
@@ -307,6 +338,7 @@ def to_toml(mappings: dict[str, list[Guess]]) -> str:
                 entry = tomlkit.inline_table()
                 if guess.column:
                     entry.update({"column": guess.column, "factor": guess.factor})
+                    entry.update({"zero": guess.zero} if guess.zero else {})
                 else:
                     entry.update({"value": guess.factor})
                 section.add(target, entry)
@@ -328,19 +360,23 @@ def read_mapping(path: Path, kind: str, known: frozenset[str]) -> Mapping:
     mapping: Mapping = {}
     for target, entry in section.items():
         keys = set(entry) if isinstance(entry, dict) else set()
-        numbers = [entry[k] for k in keys & {"factor", "value"}]
+        numbers = [entry[k] for k in keys & {"factor", "value", "zero"}]
         if any(isinstance(n, float) and math.isnan(n) for n in numbers):
             raise LogError(
                 f"{path}: [{kind}] {target}: has no factor yet; {RADIUS}: write it there."
             )
-        good = keys in ({"column"}, {"column", "factor"}, {"value"})
+        good = keys == {"value"} or {"column"} <= keys <= {"column", "factor", "zero"}
         if target not in known or not good or not all(_is_real(n) for n in numbers):
             raise LogError(
                 f"{path}: [{kind}] {target}: must be one of our columns with "
-                '{ column = "name in the file", factor = 1.0 } or { value = 0.0 }; correct it.'
+                '{ column = "name in the file", factor = 1.0, zero = 0.0 } or { value = 0.0 }; '
+                "correct it."
             )
         mapping[target] = Source(
-            entry.get("column"), float(entry.get("factor", 1)), entry.get("value")
+            entry.get("column"),
+            float(entry.get("factor", 1)),
+            entry.get("value"),
+            float(entry.get("zero", 0)),
         )
     return mapping
 
@@ -406,6 +442,11 @@ def _unsure(table: str, guess: Guess) -> LogError:
             f"{table}: column '{guess.column}' is a speed of the wheel's rim, and we take rad/s; "
             f"let --explain-columns FILE write down all columns, write the factor there "
             f"({RADIUS}), and give that to --mapping."
+        )
+    if guess.zero:
+        return LogError(
+            f"{table}: column '{guess.column}' {guess.why}; let --explain-columns FILE write down "
+            "all columns, check factor and zero there, and give that to --mapping."
         )
     stem, ours = split_unit(target)
     if len(guess.targets) > 1:  # both wheels of a side
