@@ -51,7 +51,7 @@ def measure(build: Path) -> Iterator[Ratio]:
         write_rich_script(folder / "script.csv", DURATION_S, 1)
         base = _base(build, folder)
         for seed, (hidden, effect) in enumerate(HIDDEN.items(), 2):
-            (run,) = _drive(build, folder, hidden, effect, seed)
+            (run,) = _drive(build, folder, hidden, effect, seed=seed)
             runs = _from_rest(run, base)
             ours_s, found = _timed(lambda run=run: diagnose([run], base))
             theirs_s, theirs = _timed(lambda runs=runs: _sysid(runs, base))
@@ -74,11 +74,11 @@ def _base(build: Path, folder: Path) -> ModelFile:
     rough.write_text(
         f"[base]\nduty_pct = {DUTY_PCT}\nwheel_speed_mps = [0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4]\n"
     )
-    fit(_drive(build, folder, "base", "", 1), ModelFile.load(str(rough)), fitted, "")
+    fit(_drive(build, folder, "base", "", seed=1), ModelFile.load(str(rough)), fitted, "")
     return ModelFile.load(str(fitted))
 
 
-def _drive(build: Path, folder: Path, name: str, effect: str, seed: int) -> list[Measurement]:
+def _drive(build: Path, folder: Path, name: str, effect: str, *, seed: int) -> list[Measurement]:
     """Lets the twin drive the script."""
     model, log = folder / f"{name}.toml", folder / f"{name}.lcmlog"
     model.write_text(ROBOT + effect)

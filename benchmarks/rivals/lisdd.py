@@ -119,7 +119,7 @@ def discoveries(
     for channel in range(missed.shape[1]):
         known = _known(features[:, :3], missed[:, channel], inside)
         for k in _flagged(known.left, inside):
-            found = _tested(regions[k], channel, terms, known, block, inside[k])
+            found = _tested(regions[k], channel, terms, known, block=block, own=inside[k])
             tested += [found] if found else []
     if not tested:
         return []
@@ -160,7 +160,7 @@ def _flagged(y: np.ndarray, inside: np.ndarray) -> np.ndarray:
 
 
 def _tested(
-    region: Region, channel: int, terms: np.ndarray, known: Known, block: np.ndarray, own
+    region: Region, channel: int, terms: np.ndarray, known: Known, *, block: np.ndarray, own
 ) -> Found | None:
     """Terms by held-out blocks of the region, and their F test on blocks that chose nothing."""
     y = known.left

@@ -62,7 +62,7 @@ class Steps:
         body = _seen(pose[start], ahead, heading_rad) / span_s
         missed = _seen(pose[start], pose[end], heading_rad) / span_s - body
         t_s = (track.pose_t_s[start] + track.pose_t_s[end]) / 2
-        known, columns, groups = _known(measurement, model, t_s, body, step_s)
+        known, columns, groups = _known(measurement, model, t_s, body, step_s=step_s)
         return cls(
             step_s,
             t_s,
@@ -105,7 +105,7 @@ def corrected(
         steps = Steps.of(measurement, model, step_s)
         fine_s = HORIZONS_S[0]
         count = round(HORIZONS_S[-1] / fine_s)
-        base = _fine(measurement, model, windows, fine_s, count)
+        base = _fine(measurement, model, windows, fine_s, count=count)
         t_s = measurement.track.pose_t_s[windows.starts]
         first_rad = measurement.track.heading_smooth[windows.starts]
         begin = np.column_stack([measurement.track.pose[windows.starts, :2], first_rad])
@@ -154,7 +154,7 @@ def _with_pose(known: np.ndarray, pose: np.ndarray) -> np.ndarray:
     return np.column_stack([known, np.sin(heading), np.cos(heading), pose[:, :2]])
 
 
-def _known(measurement, model, t_s, body, step_s):
+def _known(measurement, model, t_s, body, *, step_s):
     """What commands, battery and clock tell of each step: columns, their names and groups."""
     axes = ("forward", "left", "turn")
     change = np.diff(body, axis=0, prepend=body[:1]) / step_s
@@ -188,7 +188,7 @@ def _wheel_angles(model: native.Model, body: np.ndarray, step_s: float) -> np.nd
     return turned - turned[:1] / 2
 
 
-def _fine(measurement, model, windows, fine_s, count) -> np.ndarray:
+def _fine(measurement, model, windows, fine_s, *, count) -> np.ndarray:
     """(W, count, 3) what the base moves in each fine step of each window, in its own frame."""
     track = measurement.track
     half_s = track.timing.pose_period_s / 2

@@ -440,7 +440,7 @@ class Model(_Shown):
         result, file = _made(
             name,
             lambda out: _add.add(
-                effect, measurements, self.file, out, command, texts, robot_id=robot
+                effect, measurements, self.file, out, command, texts=texts, robot_id=robot
             ),
         )
         return Addition(result, Model(file))

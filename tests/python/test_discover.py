@@ -106,7 +106,7 @@ def test_a_name_that_bodies_do_not_allow_is_taken_back():
     ]
     confirm(hunt, found, start_m2, 10)
     assert {entry.kind for entry in offer(found, False)} == {"aggregation", "diffusion"}
-    confirm_in_mujoco(hunt, found, start_m2, 2, 1)
+    confirm_in_mujoco(hunt, found, start_m2, 2, enough=1)
     assert found[0].mujoco == 0 and found[1].mujoco > 0.5
     assert offer(found, True) == [found[1]]
 

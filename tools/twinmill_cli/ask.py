@@ -89,7 +89,7 @@ def _ask(
             for curve, sentence in zip(curves, sentences, strict=True)
         ],
     )
-    report = write_report(out, section.title, source, [section], NOTE) if out else None
+    report = write_report(out, section.title, source, [section], note=NOTE) if out else None
     data = {
         "question": str(question),
         "goal": wanted,

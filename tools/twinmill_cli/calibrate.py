@@ -87,7 +87,7 @@ def _fit(
     check_output(output, model_file, force)
     with busy(f"fitting {model}"):
         measurements = load(logs, model_file, as_json)
-        result = fit(measurements, model_file, output, source.command, held)
+        result = fit(measurements, model_file, output, source.command, held=held)
     section = partial(fit_section, result)
     data = {**result.to_json(), **told(measurements)}
     finish(data, show.fit(result), source, section, as_json, out)

@@ -102,7 +102,7 @@ def _challenge(
     digest = hashlib.sha256(answers.encode()).hexdigest()
     Console(stderr=True).print(f"sealed answers: sha256 {digest}", soft_wrap=True)
     driven = sorted({case.robot for case in cases})
-    bases = {k: base_of(out, k, robots[k], seed, duration_s) for k in driven}
+    bases = {k: base_of(out, k, robots[k], seed, duration_s=duration_s) for k in driven}
     results, times_s = {}, {}
     for number, result, time_s in _all(out, bases, cases, workers):
         results[number], times_s[number] = result, time_s
@@ -118,7 +118,7 @@ def _challenge(
     return found
 
 
-def base_of(folder: Path, number: int, robot: Robot, seed: int, duration_s: float) -> Path:
+def base_of(folder: Path, number: int, robot: Robot, seed: int, *, duration_s: float) -> Path:
     """The model that a user of the robot has: its sheet, then by turns a fit or an explanation.
 
     Args:
@@ -167,6 +167,7 @@ def _intervals(
     count: int,
     seed: int,
     duration_s: float,
+    *,
     workers: int,
     command: str,
     as_json: bool,

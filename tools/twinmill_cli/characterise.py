@@ -135,7 +135,14 @@ def _characterise(
 
 
 def _for_ros(
-    script: Path, form: ScriptForm, out: Path, model: str, cap_pct: int, force: bool, as_json: bool
+    script: Path,
+    form: ScriptForm,
+    out: Path,
+    model: str,
+    *,
+    cap_pct: int,
+    force: bool,
+    as_json: bool,
 ) -> int:
     """Writes the script as a bag or a publisher."""
     if not script.exists():
@@ -148,7 +155,7 @@ def _for_ros(
         t_s, duties_pct = read_script(script)
         twists = TwistScript.of(ModelFile.load(model).model, Rows(t_s, duties_pct / 100, end_s))
     words = ["twinmill", "characterise", "--script", str(script), "--script-as", form]
-    write_script(twists, form, out, force, shlex.join([*words, "--model", model]))
+    write_script(twists, form, out, force, command=shlex.join([*words, "--model", model]))
     deliver({"script_as": str(out), "duration_s": end_s}, f"Written: {out}", as_json)
     return 0
 

@@ -183,7 +183,7 @@ def _numbers(claim: Claim) -> str:
 def _write(out: Path, source: Provenance, found: list[Claim], data: dict) -> Path:
     counts = np.sum([claim.count for claim in found], axis=0)
     title = "Published claims, run again: {} of {} numbers agree".format(*counts)
-    report = write_report(out, title, source, [_paper(found), *_sections(found)], NOTE)
+    report = write_report(out, title, source, [_paper(found), *_sections(found)], note=NOTE)
     write_whole(out / "claims.json", json.dumps(plain(data), indent=1, allow_nan=False) + "\n")
     for claim in found:
         for k, figure in enumerate(claim.figures, 1):

@@ -158,10 +158,15 @@ def _compare_swarm(
         recorded = read_log(log)
         series = swarm_metrics(recorded, *scale, robot_ids(odd))
     result = compare_swarm(
-        recorded, series, model_file.model, scale, range(first_seed, first_seed + seeds), behavior
+        recorded,
+        series,
+        model_file.model,
+        scale,
+        seeds=range(first_seed, first_seed + seeds),
+        behavior=behavior,
     )
     section = _section(result, series)
-    report = write_report(out, section.title, source, [section], NOTE) if out else None
+    report = write_report(out, section.title, source, [section], note=NOTE) if out else None
     data = {**result.to_json(), **source.to_json(), "report": str(report) if report else None}
     lines = [result.verdict, *([f"Next: {section.next_step}"] if section.next_step else [])]
     lines += [f"Report: {report}"] if report else []
@@ -174,6 +179,7 @@ def compare_swarm(
     series: SwarmSeries,
     model: native.Model,
     scale: tuple[float, float],
+    *,
     seeds: range,
     behavior: str | None = None,
 ) -> SwarmComparison:
@@ -198,7 +204,7 @@ def compare_swarm(
     cell = native.Cell(model, tables, ring, poses=series.pose[begin].tolist())
     twins = []
     with _progress(len(seeds)) as tell, ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        for one in pool.map(lambda seed: twin_values(cell, seed, ring, scale, count), seeds):
+        for one in pool.map(lambda seed: twin_values(cell, seed, ring, scale, count=count), seeds):
             twins.append(blocks(one, names))
             tell()
     runs = np.array(twins)

@@ -122,7 +122,7 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
     scale = model.get("sensor.range_m"), model.get("robot.body_radius_m")
     try:
         series = swarm_metrics(log, *scale)
-        found = compare_swarm(log, series, model, scale, range(1, TWIN_RUNS + 1))
+        found = compare_swarm(log, series, model, scale, seeds=range(1, TWIN_RUNS + 1))
     except ValueError as error:
         return f"Each robot was judged by itself; the swarm as a whole cannot be: {error}", None
     done = "with what was found" if result.found else "with this model, its base refitted"

@@ -101,7 +101,7 @@ def _discover(
             found,
             start_m2,
             confirm_runs,
-            lambda done, planned: progress.update(task, completed=done, total=planned),
+            tell=lambda done, planned: progress.update(task, completed=done, total=planned),
         )
     if mujoco_runs:
         with progress_bar() as progress:
@@ -111,8 +111,8 @@ def _discover(
                 found,
                 start_m2,
                 mujoco_runs,
-                show,
-                lambda tried: progress.update(task, completed=tried),
+                enough=show,
+                tell=lambda tried: progress.update(task, completed=tried),
             )
     with busy("drawing"):
         offered = offer(found, mujoco_runs > 0)
@@ -127,8 +127,8 @@ def _discover(
         page = section(hunt, found, offered, shown, tried, elites.cells)
         limits = {"generations": generations, "show": show, "confirm": confirm_runs}
         limits["mujoco"] = mujoco_runs
-        source = _source(hunt, model, change or [], limits, out)
-        report = write_report(out, page.title, source, [page], NOTE)
+        source = _source(hunt, model, change or [], limits, out=out)
+        report = write_report(out, page.title, source, [page], note=NOTE)
     data = {
         "tried": tried,
         "kept": len(found),
@@ -156,7 +156,7 @@ def _best(found: list[Entry], show: int) -> list[Entry]:
 
 
 def _source(
-    hunt: Hunt, model: str, change: list[str], limits: dict[str, int], out: Path
+    hunt: Hunt, model: str, change: list[str], limits: dict[str, int], *, out: Path
 ) -> Provenance:
     request = hunt.request
     words = ["twinmill", "discover", "--model", model]

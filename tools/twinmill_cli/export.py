@@ -94,7 +94,7 @@ def _export(
             files = [out]
         else:
             writer = write_csv if to is Format.CSV else write_parquet
-            files = _write_tables(tables_of(recording, provenance), out, to, writer, force)
+            files = _write_tables(tables_of(recording, provenance), out, to, writer, force=force)
     warnings = list(recording.warnings)
     if to is Format.ROSBAG2 and (strange := left_out(recording)):
         warnings.append(f"ROS has no messages for {', '.join(strange)}: left out.")
@@ -116,6 +116,7 @@ def _write_tables(
     folder: Path,
     suffix: str,
     write: Callable[[pa.Table, Path], None],
+    *,
     force: bool,
 ) -> list[Path]:
     """One file per table: all are there in the end, or none is new."""

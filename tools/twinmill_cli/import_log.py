@@ -178,7 +178,9 @@ def _command(
             raise LogError(f"--up {up}: must be y or z.")
         if explain_columns_to:
             asked = {"poses": poses, "commands": commands}
-            _explain(asked, explain_columns(poses, commands), explain_columns_to, robot_id, force)
+            _explain(
+                asked, explain_columns(poses, commands), explain_columns_to, robot_id, force=force
+            )
             return
         if bag and not pose and not command:
             _list(bag, list_topics(bag), as_json)
@@ -260,6 +262,7 @@ def _explain(
     explained: dict[str, tuple[TableFile, list[Guess]]],
     out: Path,
     robot_id: int | None,
+    *,
     force: bool,
 ) -> None:
     """What each column was taken for, here and as a mapping file, and what to type then."""

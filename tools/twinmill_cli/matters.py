@@ -138,7 +138,7 @@ def _matters(
                 for name, asked in asked_maps.items()
             }
     section = present.section(found, maps) if out else None
-    report = write_report(out, section.title, source, [section], present.NOTE) if out else None
+    report = write_report(out, section.title, source, [section], note=present.NOTE) if out else None
     data = {**to_json(found), **source.to_json(), "report": str(report) if report else None}
     deliver(data, _terminal(found, report), as_json)
     return found

@@ -96,7 +96,7 @@ def _metrics(
     with busy(f"reading {log}"):
         series = swarm_metrics(read_log(log), *scale, robot_ids(odd))
     section = _section(series)
-    report = write_report(out, section.title, source, [section], NOTE) if out else None
+    report = write_report(out, section.title, source, [section], note=NOTE) if out else None
     data = {**series.to_json(), **source.to_json(), "report": str(report) if report else None}
     text = section.verdict + (f"\nReport: {report}" if report else "")
     deliver(data, text, as_json)

@@ -105,7 +105,9 @@ def _next(
         from twinmill.swarm.sweep import make_request  # needs more packages than `make demo` has
 
         swarm = make_request(behavior, model, [], n=n, seeds=seeds, duration_s=swarm_s, full=True)
-        narrowing = _narrowing(load(logs, model_file, as_json), model_file, limits, swarm, draws)
+        narrowing = _narrowing(
+            load(logs, model_file, as_json), model_file, limits, swarm, draws=draws
+        )
         write_whole(output, csv_text(narrowing.rows))
         how = _how(narrowing, logs, model, output)
         data = {"script": str(output), **narrowing.to_json(), **source.to_json()}
@@ -121,14 +123,14 @@ def _next(
     if script_as:
         data["script_as"] = str(ros_path(script_as, output))
         twists = TwistScript.of(model_file.model, plan.rows)
-        write_script(twists, script_as, Path(data["script_as"]), force, source.command)
+        write_script(twists, script_as, Path(data["script_as"]), force, command=source.command)
     section = partial(present.section, plan, how)
     finish(data, present.terminal(plan, how), source, section, as_json, out)
     return plan
 
 
 def _narrowing(
-    measurements: Measurements, model_file: ModelFile, limits: Limits, swarm: Request, draws: int
+    measurements: Measurements, model_file: ModelFile, limits: Limits, swarm: Request, *, draws: int
 ) -> Narrowing:
     """Runs the swarms, then designs the drive."""
     from twinmill.swarm.narrowing import design_for, spread_of

@@ -92,8 +92,8 @@ def _phase(
         hashlib.sha256(request.model_text.encode()).hexdigest(),
     )
     with busy("drawing"):
-        section = _section(phase, place, runs, match, worth, bool(rival))
-        report = write_report(target, section.title, source, [section], NOTE)
+        section = _section(phase, place, runs, match, worth=worth, has_rival=bool(rival))
+        report = write_report(target, section.title, source, [section], note=NOTE)
     data = {
         "goal": phase.goal,
         "axes": {axis.name: list(axis.values) for axis in phase.axes},
@@ -132,6 +132,7 @@ def _section(
     place: dict[str, float],
     runs: list[Experiment],
     match: dict | None,
+    *,
     worth: list[dict],
     has_rival: bool,
 ) -> Section:

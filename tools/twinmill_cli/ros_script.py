@@ -25,7 +25,7 @@ def check_new_script(form: ScriptForm, path: Path, force: bool) -> None:
 
 
 def write_script(
-    script: TwistScript, form: ScriptForm, path: Path, force: bool, command: str
+    script: TwistScript, form: ScriptForm, path: Path, force: bool, *, command: str
 ) -> None:
     """Whole or not at all."""
     if form is ScriptForm.BAG:

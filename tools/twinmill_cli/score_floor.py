@@ -63,7 +63,7 @@ def _score_floor(
         hashlib.sha256(plan.request.model_text.encode()).hexdigest(),
     )
     page = section(found, plan, cell, seen, missing)
-    report = write_report(out, page.title, source, [page], NOTE) if out else None
+    report = write_report(out, page.title, source, [page], note=NOTE) if out else None
     data = {
         "sha256": digest,
         "runs": found.runs,

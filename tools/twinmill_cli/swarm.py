@@ -125,7 +125,7 @@ def _start(
             ok = all(a.accepted and a.signed and a.mode != "stopped" for a in begun.answers)
             data = {"start_utime_us": begun.utime_us, "called_off": begun.called_off}
             words = _start_words(begun, ok, untethered)
-            code = _finish("start", begun.answers, ok, words, data, as_json)
+            code = _finish("start", begun.answers, ok, words, data=data, as_json=as_json)
             if begun.called_off or untethered:
                 return code
             return max(code, _hold(fleet, asked))
@@ -202,7 +202,7 @@ def _arm(
     given = tell.arm(fleet, asked)
     ok = all(answer.accepted and answer.signed for answer in given)
     words = "All are armed." if ok else "Not all are armed: see above."
-    return _finish("arm", given, ok, words, {}, as_json)
+    return _finish("arm", given, ok, words, data={}, as_json=as_json)
 
 
 def _stop(
@@ -235,7 +235,7 @@ def _stop(
         given = tell.stop(fleet, asked, timeout_s, host or ())
     _tell_fault(fault)
     words = _stop_words(given, timeout_s)
-    return _finish("stop", given, _all_stand(given), words, {}, as_json)
+    return _finish("stop", given, _all_stand(given), words, data={}, as_json=as_json)
 
 
 @contextmanager
@@ -301,7 +301,7 @@ def _select(
     given = tell.tell(fleet, command, asked, time.monotonic() + 5)
     ok = all(answer.accepted and answer.signed for answer in given)
     words = f"All chose {behavior}." if ok else f"Not all did{_hint(given)}."
-    return _finish("select", given, ok, words, {}, as_json)
+    return _finish("select", given, ok, words, data={}, as_json=as_json)
 
 
 def refuse_doubles(fleet: Fleet, robots: set[int]) -> None:
@@ -340,7 +340,7 @@ def _hint(given: list[tell.Answer]) -> str:
 
 
 def _finish(
-    verb: str, given: list[tell.Answer], ok: bool, words: str, data: dict, as_json: bool
+    verb: str, given: list[tell.Answer], ok: bool, words: str, *, data: dict, as_json: bool
 ) -> int:
     table = Table(box=box.SIMPLE_HEAD)
     for column in ("robot", "acknowledged", "now"):

@@ -89,7 +89,7 @@ def _threshold(
     size_px = _parse_size(size)
     remote = Remote(robot, ssh_config) if robot else None
     with busy("looking"):
-        taken = _take(images or [], camera, remote, count, size_px)
+        taken = _take(images or [], camera, remote, count, size_px=size_px)
         balls = _balls(taken, ball or [])
         fitted = fit_box(taken, balls, min_blob_px)
         before = [evaluate(*both, native.green_box()) for both in zip(taken, balls, strict=True)]
@@ -102,7 +102,7 @@ def _threshold(
         if write:
             remote.run("configure", *(f"{key}={value}" for key, value in settings.items()))
             remote.run("restart")
-    _tell(taken, balls, fitted, before, as_json)
+    _tell(taken, balls, fitted, before, as_json=as_json)
     return 1 if fitted.problem else 0
 
 
@@ -114,7 +114,7 @@ def _parse_size(text: str) -> tuple[int, int]:
 
 
 def _take(
-    images: list[Path], camera: str, remote: Remote | None, count: int, size_px: tuple[int, int]
+    images: list[Path], camera: str, remote: Remote | None, count: int, *, size_px: tuple[int, int]
 ) -> list[Picture]:
     if images:
         return source.read_pictures(images, size_px)
@@ -160,7 +160,7 @@ def write_settings(path: Path, settings: dict[str, int]) -> None:
 
 
 def _tell(
-    pictures: list[Picture], balls: list[Ball], fitted: Fitted, before: list, as_json: bool
+    pictures: list[Picture], balls: list[Ball], fitted: Fitted, before: list, *, as_json: bool
 ) -> None:
     rows = [
         {

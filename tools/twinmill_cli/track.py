@@ -166,7 +166,7 @@ def _track(
         _check_size(str(film.path), film.size_px, eye)
     only = next(iter(wanted)) if wanted and len(wanted) == 1 else None
     orders = read_commands(commands, Columns(robot_id=only)) if commands else []
-    found = _found(films, eyes, measured, tags, starts_s)
+    found = _found(films, eyes, measured, tags, starts_s=starts_s)
     paths, begins_s = found.paths, found.starts_s[0]
     if orders:
         begins_s = align(paths, orders)
@@ -254,6 +254,7 @@ def _found(
     eyes: list[Camera],
     measured: list[Floor],
     tags: Tags,
+    *,
     starts_s: list[float],
 ) -> _Found:
     """Looks for tags, puts each film on the floor and all on the first's clock, and joins them."""
@@ -379,6 +380,7 @@ def _live(
     eyes: list[Camera],
     floors: list[Path],
     tags: Tags,
+    *,
     lcm_url: str,
     duration_s: float | None,
     port: int,

@@ -75,7 +75,7 @@ def _watch(
         check_new_file(save, force)
     batches = from_log(log, warnings) if log else from_bus(lcm_url, duration_s, _warn)
     with replacing(save, force) if save else nullcontext() as file:
-        show = _show(batches, model_file, log.name if log else None, file, connect)
+        show = _show(batches, model_file, log.name if log else None, file, url=connect)
     command = shlex.join(["twinmill", "watch", *([str(log)] if log else []), "--model", model])
     source = {"command": command, "version": f"twinmill {version('twinmill')}"}
     data = {
@@ -103,7 +103,7 @@ def _need_rerun() -> None:
         )
 
 
-def _show(batches, model_file: ModelFile, log_name: str | None, file: Path | None, url: str):
+def _show(batches, model_file: ModelFile, log_name: str | None, file: Path | None, *, url: str):
     """Shows all batches, with progress for a log, until they end or Ctrl-C."""
     from twinmill.watch.show import Show, open_stream
 

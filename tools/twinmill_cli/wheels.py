@@ -69,7 +69,7 @@ def _wheels(
     """
     robot_model = open_model(model, None).model
     if log is None:
-        return _write(robot_model, output, duty_pct, script_as, force, as_json)
+        return _write(robot_model, output, duty_pct, script_as, force=force, as_json=as_json)
     found = [read_signs(robot, robot_model, log.name) for robot in read_log(log).robots.values()]
     right = all(signs.right for signs in found)
     data = {"log": str(log), "right": right, "robots": [_json(signs) for signs in found]}
@@ -78,12 +78,12 @@ def _wheels(
 
 
 def _write(
-    model: native.Model, output: Path, duty_pct: int, form: ScriptAs, force: bool, as_json: bool
+    model: native.Model, output: Path, duty_pct: int, form: ScriptAs, *, force: bool, as_json: bool
 ) -> int:
     names, rows = script(model, duty_pct)
     if form:
         twists = _twists(model, rows[:-1, 0], rows[:-1, 1:], float(rows[-1, 0]))
-        write_script(twists, form, output, force, f"twinmill wheels --script-as {form}")
+        write_script(twists, form, output, force, command=f"twinmill wheels --script-as {form}")
     else:
         with replacing(output, force) as temporary:
             temporary.write_text(csv_text(names, rows))

@@ -71,6 +71,7 @@ def pack_prediction(
     model: native.Model,
     beside: tuple[str, native.Model] | None,
     bits: Detections | None,
+    *,
     every: int = 1,
     **facts: object,
 ) -> bytes:

@@ -139,7 +139,7 @@ def said_before(folder: Path, model: str = MODEL) -> tuple[Request, Forecast]:
     request = make_request("milling", str(folder / "m.toml"), AXES, seeds=40, duration_s=SECONDS)
     run_missing(request, folder / "sweep", lambda worlds: None)
     request, table = read_sweep(folder / "sweep")
-    whole = forecast(request, table, 60, 6, 1, folder / "draws")
+    whole = forecast(request, table, 60, 6, seed=1, folder=folder / "draws")
     return request, whole.cells([cell for cell, _ in choose(whole, CELLS, 1, seed=1)])
 
 

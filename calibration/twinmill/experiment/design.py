@@ -351,7 +351,7 @@ class _Outlook:
         logs = [*(s for s, _ in driven), *planned]
         floors = [*(f for _, f in driven), *(driven[0][1] for _ in planned)]
         scores += [max(1.0, self.usual, *scores) for _ in planned]
-        matter = relevance(logs, floors, scores, self.fisher, grams, self.wanted)
+        matter = relevance(logs, floors, scores, self.fisher, grams=grams, richer=self.wanted)
         entries = [catalogue()[candidate_effects[i].name] for i in self.wanted]
         return margins, power(
             margins,

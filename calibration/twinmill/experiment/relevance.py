@@ -44,6 +44,7 @@ def relevance(
     floors: list[np.ndarray],
     scores: list[float],
     fisher: FisherInformation,
+    *,
     grams: np.ndarray,
     richer: dict[int, native.Model],
 ) -> Relevance:

@@ -73,7 +73,7 @@ def screen(
     signatures = [s - basis @ (basis.T @ s) for s in signatures]
     flips = np.random.default_rng(1).choice([-1.0, 1.0], (SIGNS, blocks.max() + 1))
     tests = [
-        _test(s, c.strength, left, blocks, flips)
+        _test(s, c.strength, left, blocks, flips=flips)
         for s, c in zip(signatures, candidates, strict=True)
     ]
     highest = np.max([null for *_, null in tests], axis=0)
@@ -109,6 +109,7 @@ def _test(
     strength: np.ndarray,
     left: np.ndarray,
     blocks: np.ndarray,
+    *,
     flips: np.ndarray,
 ) -> tuple[float, float, np.ndarray, np.ndarray]:
     """Gain, excess, estimate, and (SIGNS,) gains over excess under flipped signs of blocks."""

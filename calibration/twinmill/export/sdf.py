@@ -126,6 +126,7 @@ def _solid(
     name: str,
     pose: tuple[float, ...],
     radius_m: float,
+    *,
     length_m: float,
     mass_kg: float,
     inertia_kgm2: tuple[float, float, float],

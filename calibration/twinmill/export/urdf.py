@@ -20,7 +20,7 @@ def urdf(robot: RobotModel) -> tuple[str, list[Left]]:
     root.append(ET.Comment(f"\n    {text}\n  "))
     wheel_m, body_m = robot.get("robot.wheel_radius_m"), robot.get("robot.body_radius_m")
     ET.SubElement(root, "link", name="base_footprint")
-    _joint(root, "base_joint", "fixed", "base_footprint", "base_link", (0, 0, wheel_m))
+    _joint(root, "base_joint", "fixed", "base_footprint", child="base_link", place=(0, 0, wheel_m))
     _solid(
         root=root,
         name="base_link",
@@ -92,6 +92,7 @@ def _solid(
     name: str,
     place: tuple[float, ...],
     turned: tuple[float, ...],
+    *,
     radius_m: float,
     length_m: float,
     mass_kg: float,
@@ -116,6 +117,7 @@ def _joint(
     name: str,
     kind: str,
     parent: str,
+    *,
     child: str,
     place: tuple[float, ...],
     turned: tuple[float, ...] = (0, 0, 0),

@@ -112,6 +112,7 @@ def add(
     model_file: ModelFile,
     out: Path,
     command: str,
+    *,
     texts: dict[str, str] | None = None,
     held: Collection[str] = (),
     robot_id: int | None = None,
@@ -138,7 +139,7 @@ def add(
     if is_of_camera(effect):
         if robot_id is not None:
             raise ValueError(f"{effect}: is of the camera, and is added to all robots alike.")
-        return _add_to_camera(effect, measurements, model_file, out, command, held)
+        return _add_to_camera(effect, measurements, model_file, out, command=command, held=held)
     richer, name, fresh = with_effect(model_file.model, effect, texts or {}, robot_id)
     opened = open_measurements(measurements, model_file)
     logs = {m.log_name: m.log_sha256 for m in measurements}
@@ -181,6 +182,7 @@ def _add_to_camera(
     measurements: list[Measurement],
     model_file: ModelFile,
     out: Path,
+    *,
     command: str,
     held: Collection[str],
 ) -> AddResult:

@@ -132,6 +132,7 @@ def fit(
     model_file: ModelFile,
     out: Path,
     command: str,
+    *,
     held: Collection[str] = (),
 ) -> FitResult:
     """Fits all free quantities of the model to all measurements and writes the new model.

@@ -81,6 +81,7 @@ def write_report(
     title: str,
     source: Provenance,
     sections: list[Section],
+    *,
     note: str = SCORE_NOTE,
 ) -> Path:
     """Writes index.html into a folder, which is made if need be.

@@ -84,7 +84,7 @@ def map_figure(
 
     def paint(axes: Axes) -> None:
         _paint_cells(axes, phase, (cells, x, y))
-        _mark(axes, phase, cells, runs, worth)
+        _mark(axes, phase, cells, runs, worth=worth)
         _label(axes, phase)
         seen = {CLASSES.index(run.observed) for run in runs if run.observed in CLASSES}
         shown = sorted(seen | set(phase.mode[cells.flat].tolist()))
@@ -139,7 +139,7 @@ def _paint_cells(axes: Axes, phase: Phase, grid: tuple[np.ndarray, np.ndarray, n
     cells, x, y = grid
     for r, row in enumerate(cells):
         for c, cell in enumerate(row):
-            _paint_cell(axes, phase, cell, (x[c], y[r]), (x[c + 1] - x[c], y[r + 1] - y[r]))
+            _paint_cell(axes, phase, cell, (x[c], y[r]), size=(x[c + 1] - x[c], y[r + 1] - y[r]))
             if cells.size <= MOST_NUMBERS:
                 axes.text(
                     (x[c] + x[c + 1]) / 2,
@@ -154,7 +154,7 @@ def _paint_cells(axes: Axes, phase: Phase, grid: tuple[np.ndarray, np.ndarray, n
 
 
 def _paint_cell(
-    axes: Axes, phase: Phase, cell: int, corner: tuple[float, float], size: tuple[float, float]
+    axes: Axes, phase: Phase, cell: int, corner: tuple[float, float], *, size: tuple[float, float]
 ) -> None:
     k = phase.mode[cell]
     share = phase.share[cell, k]
@@ -172,7 +172,7 @@ def _paint_cell(
 
 
 def _mark(
-    axes: Axes, phase: Phase, cells: np.ndarray, runs: list[Experiment], worth: list[dict]
+    axes: Axes, phase: Phase, cells: np.ndarray, runs: list[Experiment], *, worth: list[dict]
 ) -> None:
     shown = set(cells.flat)
 

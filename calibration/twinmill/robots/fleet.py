@@ -285,7 +285,7 @@ class Fleet:
                     self.send_signed(command, robot, robot.link.session, 0)
 
     def send_signed(
-        self, command: Any, robot: Robot, session: int, counter: int, link_timeout_ms: int = -1
+        self, command: Any, robot: Robot, session: int, counter: int, *, link_timeout_ms: int = -1
     ) -> None:
         """Says a command once to one robot that has been heard, with the operator's signature.
 

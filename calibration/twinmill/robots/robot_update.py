@@ -99,7 +99,7 @@ def update(
     """
     outcome = Outcome(target)
     try:
-        _update(target, request, fleet, progress, outcome)
+        _update(target, request, fleet, progress, outcome=outcome)
         outcome.ok = True
     except RemoteError as error:
         outcome.kind, outcome.sentence = error.kind, str(error)
@@ -123,6 +123,7 @@ def _update(
     request: UpdateRequest,
     fleet: Fleet,
     progress: Callable[[str], None],
+    *,
     outcome: Outcome,
 ) -> None:
     remote = Remote(target.host, request.ssh_config)
@@ -155,7 +156,7 @@ def _update(
     remote.run("restart")
     progress("waiting for telemetry")
     version = package.version if package else found["previous"]
-    _hear(target, version, restarted_s, request.wait_s, fleet, outcome)
+    _hear(target, version, restarted_s, request.wait_s, fleet=fleet, outcome=outcome)
 
 
 def _choose(
@@ -234,6 +235,7 @@ def _hear(
     version: str,
     since_s: float,
     wait_s: float,
+    *,
     fleet: Fleet,
     outcome: Outcome,
 ) -> None:

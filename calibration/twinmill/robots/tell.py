@@ -138,7 +138,9 @@ def _say_signed(fleet: Fleet, order: Order, robot_id: int) -> None:
         order.counter = max(time.time_ns() // 1000, *(counter + 1 for counter in known))
     session = order.sessions.setdefault(robot_id, robot.link.session)
     if session == robot.link.session:
-        fleet.send_signed(order.message, robot, session, order.counter, order.link_timeout_ms)
+        fleet.send_signed(
+            order.message, robot, session, order.counter, link_timeout_ms=order.link_timeout_ms
+        )
 
 
 def arm(fleet: Fleet, robots: set[int], timeout_s: float = 5.0) -> list[Answer]:

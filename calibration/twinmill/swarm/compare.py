@@ -121,7 +121,7 @@ def first_motion(series: SwarmSeries) -> int:
     return int(max(moving[0] - 1, 0)) if len(moving) else 0
 
 
-def twin_values(cell: native.Cell, seed: int, ring: int, scale: tuple[float, float], count: int):
+def twin_values(cell: native.Cell, seed: int, ring: int, scale: tuple[float, float], *, count: int):
     """(T, METRICS) of one seed, measured like a log: `count` samples STEP_S apart.
 
     Args:

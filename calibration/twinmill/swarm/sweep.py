@@ -78,7 +78,7 @@ def sweep(
     begin_s = time.monotonic()
     with progress_bar() as progress:
         task = progress.add_task("worlds", total=request.world_count)
-        done = run_missing(request, folder, lambda n: progress.advance(task, n), workers, dask)
+        done = run_missing(request, folder, lambda n: progress.advance(task, n), workers, dask=dask)
     return {
         **_summary(request, folder, begin_s),
         "parts": len(request.parts()),
@@ -91,6 +91,7 @@ def run_missing(
     folder: Path,
     tell: Callable[[int], None],
     workers: int | None = None,
+    *,
     dask: str | None = None,
 ) -> int:
     """The same without a word.

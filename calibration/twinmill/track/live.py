@@ -111,7 +111,7 @@ def publish(
     count = LiveCount()
     last: dict[int, _Held] = {}
     for k, stamp_s, picture, (numbers, corners) in _detected(_merged(cameras)):
-        seen = _seen(k, stamp_s, views[k], tags, (numbers, corners), last)
+        seen = _seen(k, stamp_s, views[k], tags, found=(numbers, corners), last=last)
         camera = views[k].camera
         middle_s = stamp_s + camera.exposure_s / 2 + camera.line_delay_s * camera.size_px[1] / 2
         last |= seen
@@ -119,7 +119,7 @@ def publish(
         for robot_id in mine:
             held = seen.get(robot_id)
             at_s, pose = (held.t_s, held.pose) if held else (middle_s, None)
-            message = _message(robot_id, count.frames, at_s, pose, tags.height_m)
+            message = _message(robot_id, count.frames, at_s, pose, height_m=tags.height_m)
             say(f"R{robot_id:02d}_POSE", message.encode())
             if held:
                 count.poses[robot_id] = count.poses.get(robot_id, 0) + 1
@@ -196,7 +196,7 @@ def _detected(
 
 
 def _seen(
-    k: int, stamp_s: float, view: View, tags: Tags, found: Found, last: dict[int, _Held]
+    k: int, stamp_s: float, view: View, tags: Tags, *, found: Found, last: dict[int, _Held]
 ) -> dict[int, _Held]:
     """Robots that a picture of camera `k` shows, without those that another camera follows."""
     numbers, corners = found
@@ -220,7 +220,7 @@ def _seen(
 
 
 def _message(
-    robot_id: int, seq: int, t_s: float, pose: np.ndarray | None, height_m: float
+    robot_id: int, seq: int, t_s: float, pose: np.ndarray | None, *, height_m: float
 ) -> turbopi.pose_t:
     message = turbopi.pose_t()
     message.utime_us, message.robot_id, message.seq = round(1e6 * t_s), robot_id, seq

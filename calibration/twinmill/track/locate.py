@@ -38,11 +38,11 @@ def locate(view: View, corners_px: np.ndarray, size_m: float, height_m: float) -
         height_m: of the tags over the floor.
     """
     met = view.on_plane(corners_px.reshape(-1, 2), height_m).reshape(-1, 4, 2)
-    return fit_squares(view, corners_px, met, size_m, height_m)
+    return fit_squares(view, corners_px, met, size_m, height_m=height_m)
 
 
 def fit_squares(
-    view: View, corners_px: np.ndarray, met_m: np.ndarray, size_m: float, height_m: float
+    view: View, corners_px: np.ndarray, met_m: np.ndarray, size_m: float, *, height_m: float
 ) -> Squares:
     """The same from (N, 4, 2) m, the corners on the plane."""
     middle = met_m.mean(axis=1)

@@ -121,6 +121,7 @@ def _one(
     stamp_s: np.ndarray,
     seen: Sightings,
     squares: Squares,
+    *,
     good: np.ndarray,
     view: View,
     tags: Tags,
@@ -138,7 +139,7 @@ def _one(
     t_s[frame] += camera.line_delay_s * (row_px - camera.size_px[1] / 2)
     pose = squares.pose[kept]
     if camera.line_delay_s and len(kept) > 2:
-        pose = _unrolled(t_s[frame], pose, seen.corners_px[kept], view, tags)
+        pose = _unrolled(t_s[frame], pose, seen.corners_px[kept], view, tags=tags)
     sane = ~_jumps(t_s[frame], pose)
     frame, pose, kept = frame[sane], pose[sane], kept[sane]
     full = np.full((len(stamp_s), 3), np.nan)
@@ -149,7 +150,7 @@ def _one(
 
 
 def _unrolled(
-    t_s: np.ndarray, pose: np.ndarray, corners_px: np.ndarray, view: View, tags: Tags
+    t_s: np.ndarray, pose: np.ndarray, corners_px: np.ndarray, view: View, *, tags: Tags
 ) -> np.ndarray:
     """Poses from corners moved to the time of the tag's middle row: a shutter shears what moves."""
     straight = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])])
@@ -161,7 +162,7 @@ def _unrolled(
     arm = met - met.mean(axis=1, keepdims=True)
     turning = speed[:, 2, None, None] * np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
     moved = met - late_s[..., None] * (speed[:, None, :2] + turning)
-    return fit_squares(view, corners_px, moved, tags.size_m, tags.height_m).pose
+    return fit_squares(view, corners_px, moved, tags.size_m, height_m=tags.height_m).pose
 
 
 def _jumps(t_s: np.ndarray, pose: np.ndarray) -> np.ndarray:

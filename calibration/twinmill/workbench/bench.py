@@ -283,7 +283,7 @@ class Bench:
         revision = self.changes["prediction"]
         view, bits = self.session.robots[index], self.session.bits(index)
         every = RESTARTS if self.session.is_dragged else 1
-        return pack_prediction(view, shown, beside, bits, every, revision=revision)
+        return pack_prediction(view, shown, beside, bits, every=every, revision=revision)
 
     def swarm_bytes(self) -> bytes:
         """Poses of the twin's swarms."""

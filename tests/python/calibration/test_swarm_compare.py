@@ -47,7 +47,9 @@ def pool(text):
     """Blocks of 160 runs of one model from one start."""
     cell, names = cell_of(text), compared(False)
     count = SECONDS * 20
-    return np.array([blocks(twin_values(cell, s, 6, SCALE, count), names) for s in range(160)])
+    return np.array(
+        [blocks(twin_values(cell, s, 6, SCALE, count=count), names) for s in range(160)]
+    )
 
 
 def test_true_models_are_called_wrong_at_the_stated_rate(pool):
@@ -68,7 +70,9 @@ def test_one_blind_robot_is_seen(text, pool):
     blind = cell_of(text + "\n[robots.R02]\nrange_m = 0.0\n")
     found = 0
     for seed in range(10):
-        floor = blocks(twin_values(blind, 500 + seed, 6, SCALE, SECONDS * 20), compared(False))
+        floor = blocks(
+            twin_values(blind, 500 + seed, 6, SCALE, count=SECONDS * 20), compared(False)
+        )
         result = judge(floor, pool[seed : seed + 50], LEAST)
         found += result.differs and result.left is not None
     print(found, "of 10 found")

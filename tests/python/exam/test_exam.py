@@ -25,7 +25,7 @@ def results(tmp_path_factory) -> list[dict]:
     found = []
     for number in range(CASES):
         case = draw(number, SEED, robots, SECONDS)
-        base = base_of(folder, case.robot, robots[case.robot], SEED, SECONDS)
+        base = base_of(folder, case.robot, robots[case.robot], SEED, duration_s=SECONDS)
         found.append(diagnosed(folder, base, case)[0])
     return found
 

@@ -109,6 +109,7 @@ def confirm(
     found: list[Entry],
     start_m2: float,
     runs: int,
+    *,
     tell: Callable[[int, int], None] = lambda done, planned: None,
 ) -> None:
     """Runs entries again with seeds that the search has not seen, and in twins drawn.
@@ -145,6 +146,7 @@ def confirm_in_mujoco(
     found: list[Entry],
     start_m2: float,
     runs: int,
+    *,
     enough: int,
     tell: Callable[[int], None] = lambda tried: None,
 ) -> None:

@@ -63,6 +63,7 @@ def forecast(
     table: pa.Table,
     count: int,
     seeds: int,
+    *,
     seed: int,
     folder: Path,
     tell: Callable[[int, int], None] = lambda done, planned: None,

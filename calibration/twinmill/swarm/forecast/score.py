@@ -106,7 +106,7 @@ def score(
         p_value=float((1 + np.sum(imagined <= logs.mean())) / (1 + LABS)),
         rivals=rivals,
         hits=int(np.sum(~missed)),
-        misses=_common(expected, cell, seen, missed, axes),
+        misses=_common(expected, cell, seen, missed, axes=axes),
     )
 
 
@@ -156,7 +156,12 @@ def _imagined(expected: Forecast, cell: np.ndarray, seed: int) -> np.ndarray:
 
 
 def _common(
-    expected: Forecast, cell: np.ndarray, seen: np.ndarray, missed: np.ndarray, axes: Sequence[str]
+    expected: Forecast,
+    cell: np.ndarray,
+    seen: np.ndarray,
+    missed: np.ndarray,
+    *,
+    axes: Sequence[str],
 ) -> list[str]:
     """Sentences: classes that are mistaken for each other, and where along the axes misses lie."""
     if not missed.any():

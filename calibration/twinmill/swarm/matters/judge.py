@@ -153,7 +153,7 @@ def judge(
         before = bench.runs(request.model_text, look)
         for k in going:
             outcomes = [
-                _outcome(before, bench.runs(change.text, look), change, goal, level)
+                _outcome(before, bench.runs(change.text, look), change, goal, level=level)
                 for change in factors[k].changes
             ]
             judged[k] = Judged(factors[k], outcomes, _verdict(outcomes, margin))
@@ -216,7 +216,9 @@ class _Bench:
         self.tell(self.done, self.planned)
 
 
-def _outcome(before: pa.Table, after: pa.Table, change: Change, goal: str, level: float) -> Outcome:
+def _outcome(
+    before: pa.Table, after: pa.Table, change: Change, goal: str, *, level: float
+) -> Outcome:
     was, now = reached(before, goal), reached(after, goal)
     metrics = {
         name: median_difference(_values(before, name, was), _values(after, name, now), seed=1)
