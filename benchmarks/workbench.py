@@ -87,10 +87,10 @@ def _session(log: Path, given: ModelFile, folder: Path) -> Iterator[Ratio]:
         session.judge(index)
     session.heed([])
     session.conclude()
-    answer_s, foreseen = _timed(lambda: session.foresee(EFFECT, 0))
+    answer_s, previewed = _timed(lambda: session.preview(EFFECT, 0))
     out = folder / "added.toml"
     added_s, added = _timed(lambda: add(EFFECT, measurements, given, out, ""))
-    session.show(foreseen)
+    session.show(previewed)
     says = f"score {session.passing_score(0):.3g}, in full {added.after.score:.3g}, "
     says += f"before {added.before.score:.3g}"
     yield single("first answer : add", answer_s, added_s, "s", says=says)

@@ -325,20 +325,20 @@ TEST(MujocoPlant, VisualsDoNotChangeTheMotion)
 
 // What sweeps leave out does not show in a drive: to a fifth of what either is off ten free
 // rollers.
-TEST(MujocoPlant, ALeanWorldMovesLikeAWholeOne)
+TEST(MujocoPlant, ASimplifiedWorldMovesLikeAWholeOne)
 {
     for (const Twist &twist : {Twist{0.3, 0, 0}, Twist{0, 0.3, 0}, Twist{0, 0, 2},
                                Twist{0.25, 0, 0.8}, Twist{0.2, 0.1, -0.5}})
     {
         MujocoPlant whole = MakePlant({{0, 0, 0.3}}, {.timestep_s = 0.005});
-        MujocoPlant lean = MakePlant({{0, 0, 0.3}}, {.timestep_s = 0.005, .lean = true});
-        EXPECT_EQ(whole.model()->nv, lean.model()->nv + 2);  // pan and tilt
-        for (MujocoPlant *plant : {&whole, &lean})
+        MujocoPlant simple = MakePlant({{0, 0, 0.3}}, {.timestep_s = 0.005, .simplified = true});
+        EXPECT_EQ(whole.model()->nv, simple.model()->nv + 2);  // pan and tilt
+        for (MujocoPlant *plant : {&whole, &simple})
         {
             plant->SetCommand(0, Ideal(twist));
             Simulate(*plant, 20);
         }
-        const Pose2 &a = whole.State(0).pose, &b = lean.State(0).pose;
+        const Pose2 &a = whole.State(0).pose, &b = simple.State(0).pose;
         const double way_m = 20 * Rim(twist);
         EXPECT_LT(std::hypot(a.x_m - b.x_m, a.y_m - b.y_m), 2e-3 * way_m);
         EXPECT_NEAR(a.theta_rad, b.theta_rad, 2e-3 * way_m / kHalfTrack_m);

@@ -102,7 +102,7 @@ std::unique_ptr<Plant> MakeMujoco(const std::vector<Model> &models,
     const bool installed = wheels == WheelKind::kMecanum || wheels == WheelKind::kNone;
     return std::make_unique<MujocoPlant>(
         installed ? FindModelFile("turbopi.xml") : "", models, starts,
-        MujocoOptions{.timestep_s = 0.005, .seed = seed, .lean = true});
+        MujocoOptions{.timestep_s = 0.005, .seed = seed, .simplified = true});
 }
 
 void CheckPlant(const std::string &plant)

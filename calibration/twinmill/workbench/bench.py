@@ -164,9 +164,9 @@ class Bench:
         self.changed("work")
         if kind in ("fit", "add") and moves(effect):
             asked = (effect, self.picked, work.robot_id)
-            foreseen = await asyncio.to_thread(self.session.foresee, *asked)
+            previewed = await asyncio.to_thread(self.session.preview, *asked)
             if self.doing is work:  # not done or cancelled before
-                self.session.show(foreseen)
+                self.session.show(previewed)
                 self.changed("score", "prediction", "beside")
         self._next()
 
@@ -220,7 +220,7 @@ class Bench:
         for finding in (self.session.diagnosis or {"findings": ()})["findings"]:
             of = "" if finding["effect"] == REFIT else finding["effect"]
             if self.ready and moves(of):
-                await asyncio.to_thread(self.session.foresee, of, self.picked)
+                await asyncio.to_thread(self.session.preview, of, self.picked)
 
     async def _settled(self) -> None:
         """The session stands at another model: its prediction first, then what takes longer."""

@@ -131,11 +131,11 @@ class Session:
         self._files = {0: self.given}
         self._bits: dict[int, Detections | None] = {}
         self._dragged: dict[str, float] = {}
-        self._foreseen: dict[int, Opened] = {}
+        self._previewed: dict[int, Opened] = {}
         self._passing: dict[int, Opened] = {}
         self._clocks: dict[int, float] = {}  # as the hand goes on, they come nearer to the best
         self._settled: dict[tuple[int, int], Opened] = {}
-        self._foresights: dict[tuple, dict[int, Opened]] = {}
+        self._previews: dict[tuple, dict[int, Opened]] = {}
 
     # -- opening --------------------------------------------------------------------------------
 
@@ -176,7 +176,7 @@ class Session:
         places = {id(m): k for k, m in enumerate(self.measurements)}
         kept = {k: places[id(m)] for k, m in enumerate(before) if id(m) in places}
         self.robots = {kept[k]: view for k, view in self.robots.items() if k in kept}
-        for known in (self._bits, self._settled, self._foresights):
+        for known in (self._bits, self._settled, self._previews):
             known.clear()
         self.beside = None
         self.forget()
@@ -188,7 +188,7 @@ class Session:
             on_clock = on_clock_of_others(view.opened, all_opened)
             if on_clock is not view.opened:
                 self.robots[k] = OpenedView(on_clock)
-        self._foresights.clear()
+        self._previews.clear()
         self.score_now(exact=self.tree.current.number == 0)
 
     def raw(self, index: int) -> RobotLog:
@@ -223,7 +223,7 @@ class Session:
     @property
     def is_passing(self) -> bool:
         """Whether the model shown is not in the tree: a hand holds a knob, or a fit goes on."""
-        return bool(self._dragged or self._foreseen)
+        return bool(self._dragged or self._previewed)
 
     def knobs(self) -> list[Knob]:
         """Of the model where the tree stands."""
@@ -244,7 +244,7 @@ class Session:
             raise ModelError(
                 f"{name} = {value:g}: must be within {bounds['min']:g} to {bounds['max']:g}."
             )
-        self._foreseen, self.beside = {}, None
+        self._previewed, self.beside = {}, None
         self._dragged = {**self._dragged, name: value}
         self._passing = {}
 
@@ -257,35 +257,35 @@ class Session:
 
     def forget(self) -> None:
         """Shows the model where the tree stands."""
-        self._dragged, self._passing, self._clocks, self._foreseen = {}, {}, {}, {}
+        self._dragged, self._passing, self._clocks, self._previewed = {}, {}, {}, {}
 
     def try_beside(self, effect: str, index: int, robot_id: int | None = None) -> None:
         """Draws what an effect would change beside the model where the tree stands."""
-        self.beside = Beside(beside_label(effect, robot_id), self.foresee(effect, index, robot_id))
+        self.beside = Beside(beside_label(effect, robot_id), self.preview(effect, index, robot_id))
 
-    def show(self, foreseen: dict[int, Opened]) -> None:
-        """Shows what `foresee` gave until something else is shown, beside the model as it is."""
+    def show(self, previewed: dict[int, Opened]) -> None:
+        """Shows what `preview` gave until something else is shown, beside the model as it is."""
         self.forget()
-        self._foreseen = foreseen
+        self._previewed = previewed
         self.beside = self._before(self.tree.current.number)
 
     def _before(self, number: int) -> Beside:
         return Beside("before", {k: self.settled(number, k) for k in self.robots})
 
-    def foresee(self, effect: str, index: int, robot_id: int | None = None) -> dict[int, Opened]:
+    def preview(self, effect: str, index: int, robot_id: int | None = None) -> dict[int, Opened]:
         """About what a fit, or the addition of an effect, will come to: all robots by index.
 
         A few steps of the fit to as many robots as an answer at once can be about; `index` is one.
-        What was foreseen once is known from then on. With `robot_id` that robot alone has the
+        What was previewed once is known from then on. With `robot_id` that robot alone has the
         effect.
         """
         held, seen = frozenset(self.held), len(self.robots)
         asked = (self.tree.current.number, held, seen, effect, index, robot_id)
-        if asked not in self._foresights:
-            self._foresights[asked] = self._foresee(effect, index, robot_id)
-        return self._foresights[asked]
+        if asked not in self._previews:
+            self._previews[asked] = self._preview_of(effect, index, robot_id)
+        return self._previews[asked]
 
-    def _foresee(self, effect: str, index: int, robot_id: int | None) -> dict[int, Opened]:
+    def _preview_of(self, effect: str, index: int, robot_id: int | None) -> dict[int, Opened]:
         number = self.tree.current.number
         model, fresh = self._file(number).model.copy(), []
         free = [p for p in self._free(model) if p.name not in self.held]
@@ -386,8 +386,8 @@ class Session:
 
     def shown(self, index: int) -> Opened:
         """One robot with the model shown: in the tree, to come, or under a hand."""
-        if index in self._foreseen:
-            return self._foreseen[index]
+        if index in self._previewed:
+            return self._previewed[index]
         settled = self.settled(self.tree.current.number, index)
         dragged, passing = self._dragged, self._passing  # a hand goes on meanwhile
         if not dragged:

@@ -287,7 +287,7 @@ mjModel *CompileWorld(const std::string &mjcf, const std::vector<Model> &models,
     const Spec robot = Parse(mjcf, models[0]);
     const std::vector<Wheel> wheels = models[0].MakeWheels();
     FindBase(mjcf, robot.get(), wheels);
-    if (options.lean)
+    if (options.simplified)
         Strip(robot.get(), wheels);
     const Spec world = MakeSurroundings(mjcf, robot.get(), models[0]);
     CopyRollerDrag(world.get(), robot.get());
@@ -297,9 +297,9 @@ mjModel *CompileWorld(const std::string &mjcf, const std::vector<Model> &models,
         AddWalls(world.get(), *options.arena_half_width_m);
     if (!options.visuals)
         mjs_discardVisual(world.get(), nullptr);
-    if (options.lean)
+    if (options.simplified)
         world->compiler.fusestatic = true;
-    if (options.lean && wheels[0].tread != Tread::kPlain)
+    if (options.simplified && wheels[0].tread != Tread::kPlain)
         world->option.cone = mjCONE_PYRAMIDAL;
     mjModel *model = mj_compile(world.get(), nullptr);
     if (!model)

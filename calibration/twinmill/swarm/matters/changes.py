@@ -196,19 +196,19 @@ def _hidden(file: ModelFile, hidden: Hidden) -> list[Factor]:
     The log tells of the robot that was recorded; another may have what that one has not.
     """
     card = catalogue_of(file.model)[hidden.effect]
-    everyone, one = [], []
+    for_all, one = [], []
     bare = with_effect(file.text, hidden.effect, _at(card, 0.0))
     for sign in (1.0, -1.0):
         most, usual = _at(card, sign * hidden.times), _at(card, sign)
         if _acts(card, most):
             text = with_effect(file.text, hidden.effect, most)
-            everyone.append(Change(_words(card, most), text, _named(hidden.effect, most)))
+            for_all.append(Change(_words(card, most), text, _named(hidden.effect, most)))
         if _acts(card, usual):
             text = with_robot(bare, 0, hidden.effect, usual)
             values = {f"R00.{k}": v for k, v in _named(hidden.effect, usual).items()}
             one.append(Change(f"one robot with {_words(card, usual)}", text, values))
     return [
-        Factor(hidden.effect, "hidden", hidden.why, everyone),
+        Factor(hidden.effect, "hidden", hidden.why, for_all),
         Factor(hidden.effect, "one_robot", "one robot with it, as strong as is usual", one),
     ]
 

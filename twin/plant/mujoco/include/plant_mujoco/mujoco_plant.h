@@ -24,7 +24,7 @@ struct MujocoOptions
     bool visuals = false;  // keep what is only looked at: for a viewer or a video
     // For many worlds: servos stand still, sensors of the file read nothing, and wheels with
     // rollers have pyramids for friction cones, which differ where no such wheel grips.
-    bool lean = false;
+    bool simplified = false;
 };
 
 // How `name` of the MJCF file is called for one robot of the world: "r03_cam".
