@@ -94,6 +94,10 @@ def _track(
     size_m: Annotated[
         float, typer.Option("--size", metavar="M", help="Side of the tags' black square.")
     ] = 0.10,
+    family: Annotated[
+        str,
+        typer.Option("--family", metavar="NAME", help="Of tags, as in OpenCV: 4x4_50, 5x5_100 ..."),
+    ] = "apriltag_36h11",
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="CSV", help="The poses; default: VIDEO's name."),
@@ -139,7 +143,8 @@ def _track(
     wanted = frozenset(parse_numbers("--robots", robots, ROBOTS)) if robots else None
     if not 0.01 <= size_m <= 1 or not 0 <= height_m <= 5:
         raise ValueError("track: --size must be in 0.01..1 m, --height in 0..5 m.")
-    tags, count = Tags(size_m, height_m, wanted), len(videos or camera)
+    tags, count = Tags(size_m, height_m, wanted, family), len(videos or camera)
+    Detector(family)  # a wrong name is told before the films are read
     eyes = [
         _shutter(read_camera(path), exposure_ms, line_delay_us)
         for path in _each("--lens", lens, count)
@@ -258,7 +263,7 @@ def _found(
     starts_s: list[float],
 ) -> _Found:
     """Looks for tags, puts each film on the floor and all on the first's clock, and joins them."""
-    stamps_s, seen = zip(*map(_looked, films), strict=True)
+    stamps_s, seen = zip(*(_looked(film, tags.family) for film in films), strict=True)
     views = [look(*row) for row in zip(eyes, measured, seen, strict=True)]
     numbers = {n for tagged in seen for n in tagged.number.tolist()}
     if len(films) > 1 and (missing := (tags.robots or set()) - numbers):
@@ -285,9 +290,9 @@ def _found(
     )
 
 
-def _looked(film: Film) -> tuple[np.ndarray, Sightings]:
+def _looked(film: Film, family: str) -> tuple[np.ndarray, Sightings]:
     """Stamps of a film's frames, and the tags in them."""
-    detector, stamp_s, found = Detector(), [], []
+    detector, stamp_s, found = Detector(family), [], []
     for at_s, picture in _shown(f"looking for tags in {film.path}", film):
         stamp_s.append(at_s)
         found.append(detector.find(picture))
@@ -395,7 +400,7 @@ def _live(
             sources.append(LiveCamera(name, eye.size_px))
             _check_size(f"--camera {name}", sources[-1].size_px, eye)
         frames = [source.frames() for source in sources]
-        views = [find_view(*row) for row in zip(frames, eyes, measured, strict=True)]
+        views = [find_view(*row, tags.family) for row in zip(frames, eyes, measured, strict=True)]
         console.print(f"What the cameras see: {page.url}", soft_wrap=True)
         count, start_s = None, time.monotonic()
         with console.status("waiting for frames") as status:

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tags in a picture, found by OpenCV: AprilTag 36h11 (Wang and Olson 2016)."""
+"""Tags in a picture, found by OpenCV: AprilTag 36h11 (Wang and Olson 2016), or another family."""
 
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-FAMILY = cv2.aruco.DICT_APRILTAG_36h11
+# By its name in OpenCV: `apriltag_36h11`, `4x4_50` and others of ArUco.
+FAMILIES = {
+    name.removeprefix("DICT_").lower(): number
+    for name, number in vars(cv2.aruco).items()
+    if name.startswith("DICT_")
+}
+FAMILY = "apriltag_36h11"
 ROBOTS = range(100)  # a robot's tag is its number
 FLOOR = range(500, 504)  # as `twinmill tags --floor` prints them
 TAGS = 587  # in the family
@@ -36,15 +42,21 @@ class Sightings:
 
 
 class Detector:
-    """Finds AprilTags in pictures, their corners to parts of a pixel."""
+    """Finds tags of a family in pictures, their corners to parts of a pixel.
 
-    def __init__(self):
+    Raises:
+        ValueError: there is no such family.
+    """
+
+    def __init__(self, family: str = FAMILY):
+        if family not in FAMILIES:
+            raise ValueError(f"--family {family}: is none of {', '.join(sorted(FAMILIES))}.")
         settings = cv2.aruco.DetectorParameters()
         settings.adaptiveThreshWinSizeMin = settings.adaptiveThreshWinSizeMax = THRESHOLD_PX
         settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         settings.cornerRefinementWinSize = WINDOW_PX
         settings.relativeCornerRefinmentWinSize = WINDOW_MODULES
-        book = cv2.aruco.getPredefinedDictionary(FAMILY)
+        book = cv2.aruco.getPredefinedDictionary(FAMILIES[family])
         self._detector = cv2.aruco.ArucoDetector(book, settings)
 
     def find(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -78,13 +78,13 @@ class _Held:
     camera: int
 
 
-def find_view(frames: Frames, camera: Camera, floor: Floor) -> View:
+def find_view(frames: Frames, camera: Camera, floor: Floor, family: str) -> View:
     """The camera over the floor, from the first frames.
 
     Raises:
         ValueError: as look; the camera gave no frames.
     """
-    detector = Detector()
+    detector = Detector(family)
     found = [detector.find(picture) for _, picture in islice(frames, FLOOR_FRAMES)]
     if not found:
         raise ValueError("--camera: gave no frames; see whether another program has it.")
@@ -110,7 +110,7 @@ def publish(
     """
     count = LiveCount()
     last: dict[int, _Held] = {}
-    for k, stamp_s, picture, (numbers, corners) in _detected(_merged(cameras)):
+    for k, stamp_s, picture, (numbers, corners) in _detected(_merged(cameras), tags.family):
         seen = _seen(k, stamp_s, views[k], tags, found=(numbers, corners), last=last)
         camera = views[k].camera
         middle_s = stamp_s + camera.exposure_s / 2 + camera.line_delay_s * camera.size_px[1] / 2
@@ -174,14 +174,14 @@ def _merged(cameras: Sequence[Frames]) -> Iterator[tuple[int, float, np.ndarray]
 
 
 def _detected(
-    frames: Iterator[tuple[int, float, np.ndarray]],
+    frames: Iterator[tuple[int, float, np.ndarray]], family: str
 ) -> Iterator[tuple[int, float, np.ndarray, Found]]:
     """Frames in their order with the tags in them, looked for on as many cores as there are."""
     own, workers = threading.local(), os.cpu_count() or 1
 
     def find(picture: np.ndarray) -> Found:
         if not hasattr(own, "detector"):
-            own.detector = Detector()
+            own.detector = Detector(family)
         return own.detector.find(picture)
 
     with ThreadPoolExecutor(workers) as pool:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from twinmill.files import replacing
-from twinmill.track.detect import ROBOTS, Sightings, check_single
+from twinmill.track.detect import FAMILY, ROBOTS, Sightings, check_single
 from twinmill.track.floor import View
 from twinmill.track.locate import Squares, fit_squares, locate
 
@@ -26,11 +26,13 @@ class Tags:
         size_m: side of the black square.
         height_m: over the floor.
         robots: which are there; None: all that are seen.
+        family: as OpenCV calls it.
     """
 
     size_m: float
     height_m: float
     robots: frozenset[int] | None = None
+    family: str = FAMILY
 
 
 @dataclass(frozen=True)

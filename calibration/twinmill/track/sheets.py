@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from twinmill.track.boards import Board
-from twinmill.track.detect import FAMILY
+from twinmill.track.detect import FAMILIES, FAMILY
 
 PAPERS_M = {"a4": (0.210, 0.297), "a3": (0.297, 0.420), "letter": (0.2159, 0.2794)}
 MODULES = 8  # a side, black border included
@@ -127,7 +127,7 @@ def _draw_tag(page: _Page, number: int, size_m: float, paper: str) -> float:
             f"--size {size_m:g}: does not fit on {paper}, the largest is {room_m / CUT:.3f} m; "
             "choose a larger --paper."
         )
-    book = cv2.aruco.getPredefinedDictionary(FAMILY)
+    book = cv2.aruco.getPredefinedDictionary(FAMILIES[FAMILY])
     tag = book.generateImageMarker(number, MODULES, borderBits=1)
     x_m, y_m = page.middle
     page.picture(np.kron(tag, np.ones((DOTS, DOTS), np.uint8)), x_m, y_m, size_m, size_m)

@@ -91,6 +91,7 @@ class Tag:
         size_m, height_m: of the black square; over the floor.
         hidden_s: from when until when something is held over it.
         lies: it never moves.
+        family: OpenCV's number of it; all have MODULES.
     """
 
     number: int
@@ -99,11 +100,12 @@ class Tag:
     height_m: float = 0.12
     hidden_s: tuple[tuple[float, float], ...] = ()
     lies: bool = False
+    family: int = cv2.aruco.DICT_APRILTAG_36h11
 
     @cached_property
     def bits(self) -> np.ndarray:
         """(MODULES, MODULES) bool, white; the first row is the front."""
-        book = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+        book = cv2.aruco.getPredefinedDictionary(self.family)
         return book.generateImageMarker(self.number, MODULES, borderBits=1) > 127
 
 

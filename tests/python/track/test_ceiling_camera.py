@@ -117,6 +117,28 @@ def test_poses_are_within_3_mm_and_1_degree(tracked, tag):
     assert np.degrees(np.sqrt(np.mean(miss[:, 2] ** 2))) < 1
 
 
+def test_tags_of_aruco_are_followed_too(tmp_path):
+    def of_aruco(tag, number):
+        return replace(tag, number=number, family=cv2.aruco.DICT_6X6_250)
+
+    floor = [of_aruco(tag, tag.number - 400) for tag in FLOOR]
+    robots = [of_aruco(tag, tag.number + 40) for tag in ROBOTS[:2]]
+    (tmp_path / "camera.toml").write_text(camera_toml(LENS))
+    (tmp_path / "floor.toml").write_text(floor_toml(floor))
+    scene = Scene(LENS, floor + robots, RATE_HZ, exposure_s=0.003, line_delay_s=25e-6)
+    scene.write(str(tmp_path / "run.mp4"), 4)
+    track(tmp_path, "--family", "6x6_250", "--out", tmp_path / "p.csv")
+    rows = np.genfromtxt(tmp_path / "p.csv", delimiter=",", names=True)
+    for tag in robots:
+        own = rows[rows["robot_id"] == tag.number]
+        columns = ("t_s", "x_m", "y_m", "theta_rad", "valid")
+        _, miss = errors(tag, np.column_stack([own[name] for name in columns]))
+        assert len(miss) == 4 and np.abs(miss[:, :2]).max() < 3e-3
+        assert np.degrees(np.abs(miss[:, 2]).max()) < 1.5
+    with pytest.raises(ValueError, match="--family 6x6: is none of 4x4_100"):
+        track(tmp_path, "--family", "6x6", "--out", tmp_path / "q.csv")
+
+
 def test_stamps_are_the_middle_of_the_exposure_of_the_tags_rows(tracked):
     # A stamp late by t puts the robot ahead by t times its speed, all the way round.
     tag = ROBOTS[2]
