@@ -302,16 +302,20 @@ def _smallest(own: _Alone) -> dict[str, float]:
 
 
 def _plain(robot_id: int, parameters: Sequence[ParameterEstimate]) -> str:
-    label = f"R{robot_id:02d}"
+    return f"R{robot_id:02d}: {in_words(parameters)}."
+
+
+def in_words(parameters: Sequence[ParameterEstimate]) -> str:
+    """What the parameters of an effect do to a robot; those that say something."""
     told = [e for e in parameters if abs(_away(e)) > max(2 * e.std, _least(e))]
     told = told or sorted(parameters, key=lambda e: -abs(_away(e)) / max(e.std, 1e-9))[:1]
     gains = {e.name: e.value - 1 for e in told if e.name in GAINS}
     if gains:
-        return f"{label}: {' and '.join(_gain_words(gains))}."
+        return " and ".join(_gain_words(gains))
     wheels = {e.name.split(".")[1]: e.value for e in told if e.name.startswith("wheel_gain.")}
     if wheels:
-        return f"{label}: {_wheel_words(wheels)}."
-    return f"{label}: {'; '.join(_effect_words(e) for e in told)}."
+        return _wheel_words(wheels)
+    return "; ".join(_effect_words(e) for e in told)
 
 
 def _away(estimate: ParameterEstimate) -> float:

@@ -9,9 +9,9 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from twinmill.diagnosis.explain import Explanation, steps
-from twinmill.diagnosis.outliers import FEWEST, Outlier
+from twinmill.diagnosis.outliers import FEWEST, Outlier, in_words
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.model.parameters import ParameterEstimate
+from twinmill.model.parameters import ParameterEstimate, catalogue
 from twinmill.report import Figure, Section, comparisons, detections, show, tables
 from twinmill.report.charted import charts
 from twinmill.report.error_figures import waterfall
@@ -111,7 +111,7 @@ def each_robot(diagnosis: Diagnosis) -> Table:
     off = {o.robot_id: _said_of(o.sentence) for o in diagnosis.robots_off}
     count = len(diagnosis.robots)
     too_few = 1 < count < FEWEST and not off
-    of_few = "alone" if count == 1 else "not compared" if too_few else "as the model"
+    of_few = _alone(diagnosis) if count == 1 else "not compared" if too_few else "as the model"
     usual = of_few if count < FEWEST else "as all"
     rows = [
         [
@@ -129,6 +129,16 @@ def each_robot(diagnosis: Diagnosis) -> Table:
         "doubt; a smaller one is not excluded." + (f" {TOO_FEW}" if too_few else ""),
         words=(1,),
     )
+
+
+def _alone(diagnosis: Diagnosis) -> str:
+    """What is beyond doubt of the only robot, in words."""
+    if diagnosis.verdict == "model_adequate":
+        return "as the model"
+    told = [f for f in diagnosis.findings if f.effect in catalogue() and f.certainty != "doubtful"]
+    others = [f" or {' or '.join(f.group[1:])}" if f.group else "" for f in told]
+    words = [in_words(f.parameters) + other for f, other in zip(told, others, strict=True)]
+    return "; ".join(words) or "alone"
 
 
 def _said_of(sentence: str) -> str:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What misleads a diagnosis, each with a robot that is not the twin or with algebra."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from twinmill.fitting.opening import open_measurements
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import ParameterEstimate, base_parameters, effect_parameters
+from twinmill.report.diagnosis import each_robot
 
 
 @pytest.fixture(scope="module")
@@ -314,6 +316,8 @@ def test_a_weakness_that_is_always_there_is_a_gain(tanh_robot, measure, fitted):
     found = diagnose([measure(_weak_left_from(tanh_robot, 0.0), 22, 40.0)], fitted)
     (gain,) = (f for f in found.findings if f.effect == "wheel_gain")
     assert gain.certainty == "sure"
+    ((_, said, *_),) = each_robot(found).rows
+    assert re.search(r"left wheels \d+ % weak", said.text)
 
 
 def test_a_weakness_that_comes_later_is_told_with_its_moment(tanh_robot, measure, fitted):
