@@ -140,7 +140,7 @@ def design(
     logs = [o for o in diagnosis.opened if o.floor]
     hashes = [o.measurement.log_sha256 for o in logs]
     usual = model_file.usual_score(hashes)
-    moves = family(_axes([o.measurement for o in logs], model_file.model.drive, limits))
+    moves = family(_axes([o.measurement for o in logs], model_file.model, limits))
     progress("playing the moves in the twin")
     names = base_names(model_file.model, logs, model_file.known_from_other_logs(hashes))
     asked = hypotheses_of(diagnosis, base_parameters(model_file.model, names))
@@ -206,7 +206,7 @@ def check(
             f"a run of {limits.duration_s:g} s is too short: no model is judged on less than "
             f"{SHORTEST_LOG_S:g} s, and moves come whole; allow {SHORTEST_RUN_S:g} s."
         )
-    floor, axes = Floor(limits, modelled, []), _axes(logs, modelled.model.drive, limits)
+    floor, axes = Floor(limits, modelled, []), _axes(logs, modelled.model, limits)
     if not any(floor.holds([m]) for m in family(axes)):
         size = "x".join(f"{side:g}" for side in limits.floor_m)
         need_m = 2 * (modelled.model.get("robot.body_radius_m") + WANDER_M)
@@ -216,14 +216,14 @@ def check(
         )
 
 
-def _axes(logs: Sequence[Measurement], drive: str, limits: Limits) -> list[Axis]:
+def _axes(logs: Sequence[Measurement], model: native.Model, limits: Limits) -> list[Axis]:
     """Ways to drive within the limits; velocities as high as any in the logs are known to be safe.
 
     Raises:
         ValueError: the logs tell the robot no velocity.
     """
-    if drive == "duty":
-        return duty_axes(limits.max_duty)
+    if model.drive == "duty":
+        return duty_axes(limits.max_duty, model.wheel_kind)
     told = np.vstack([log.track.command[:, :3] for log in logs])
     axes = twist_axes(limits.max_duty * np.abs(told).max(axis=0))
     if not axes:

@@ -44,9 +44,10 @@ class Axis:
         return f"{100 * size:.0f} %" if self.unit == "%" else f"{size:.2g} {self.unit}"
 
 
-def duty_axes(max_duty: float) -> list[Axis]:
-    """Of a robot told duties of at most `max_duty` (0..1)."""
-    return [Axis(name, max_duty * wheels) for name, wheels in AXES.items()]
+def duty_axes(max_duty: float, wheels: str = "mecanum") -> list[Axis]:
+    """Of a robot told duties of at most `max_duty` (0..1); plain wheels do not go sideways."""
+    names = [name for name in AXES if name != "strafe" or wheels != "differential"]
+    return [Axis(name, max_duty * AXES[name]) for name in names]
 
 
 def twist_axes(highest: np.ndarray) -> list[Axis]:

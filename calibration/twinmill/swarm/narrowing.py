@@ -206,7 +206,10 @@ def design_for(
             f"what the swarm does depends on {names}, which no drive of one robot shows; measure "
             "these by themselves (twinmill effects NAME)."
         )
-    moves, floor = family(duty_axes(limits.max_duty)), Floor(limits, modelled, [])
+    moves, floor = (
+        family(duty_axes(limits.max_duty, modelled.model.wheel_kind)),
+        Floor(limits, modelled, []),
+    )
     prior = np.linalg.inv(spread.covariance)
 
     def left(grams: np.ndarray) -> np.ndarray:

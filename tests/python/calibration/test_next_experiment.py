@@ -118,6 +118,11 @@ def test_each_move_comes_to_rest_and_keeps_the_duty_cap():
         assert np.abs(move.command).max() <= 0.6
 
 
+def test_plain_wheels_of_a_side_are_told_alike_as_two_motors_are():
+    for move in family(duty_axes(1.0, "differential")):
+        np.testing.assert_array_equal(move.command[:, :2], move.command[:, 2:])
+
+
 @dataclass(frozen=True)
 class Designed:
     """A heading bias that milling alone cannot name: the first log's diagnosis and the plan."""
