@@ -7,8 +7,9 @@ import numpy as np
 import twinmill_native as native
 from scipy.stats import t
 
-from twinmill.diagnosis.outliers import ODD, Outlier, middle_and_scale, odd_ones
+from twinmill.diagnosis.outliers import Outlier, middle_and_scale, odd_ones
 from twinmill.diagnosis.search import camera_state, search
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import Detections
@@ -73,7 +74,7 @@ def judge_cameras(
     others = float(np.sqrt(np.mean(np.square(_scores(alike, model)))))
     off = []
     for robot_id in sorted({s.robot_id for s in odd}):
-        if away[robot_id] < ODD:
+        if away[robot_id] < SETTINGS.odd:
             continue
         progress(f"the camera of robot {robot_id} differs: looking for what it is")
         own = [s for s in odd if s.robot_id == robot_id]

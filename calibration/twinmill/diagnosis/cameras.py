@@ -13,7 +13,7 @@ from twinmill.diagnosis.camera_outliers import judge_cameras, odd_cameras
 from twinmill.diagnosis.finding import Finding, Ranked
 from twinmill.diagnosis.findings import ranking_of
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.search import SETTINGS, Search, Settings, camera_state, search
+from twinmill.diagnosis.search import Search, camera_state, search
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import ParameterEstimate, needing, newest_instance
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
@@ -27,7 +27,6 @@ def with_detections(
     model_file: ModelFile,
     progress: Callable[[str], None],
     excluded: Collection[str] = (),
-    settings: Settings = SETTINGS,
 ) -> Diagnosis:
     """The diagnosis with the camera's effects in it; unchanged if no robot reported detections.
 
@@ -36,7 +35,6 @@ def with_detections(
         model_file: the model as given.
         progress: told in words what is being done.
         excluded: effects that are not considered.
-        settings: numbers that decide.
     """
     cameras = all_detections([r.modelled for r in diagnosis.before.robots])
     if not cameras:
@@ -49,7 +47,7 @@ def with_detections(
     def tell(text: str) -> None:
         progress(f"cameras, {text}")
 
-    done = search(camera_state(alike, model_file.model, excluded), tell, settings, known=0.0)
+    done = search(camera_state(alike, model_file.model, excluded), tell, known=0.0)
     found, model = camera_findings(done), done.last.state.model
     off = judge_cameras(alike, odd, model, progress, excluded)
     ranking = _ranked_by_likelihood(done, found, diagnosis.ranking)

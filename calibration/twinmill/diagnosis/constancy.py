@@ -13,14 +13,12 @@ import numpy as np
 from twinmill.data.track import command_at
 from twinmill.diagnosis.library import TIME
 from twinmill.diagnosis.search import Trial
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.model.parameters import Parameter, effect_names
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
 HORIZON = HORIZONS_S.index(0.5)
-EVIDENCE = 9.0  # least fall of the cost that the companion would bring
-BLOCKS_T = 3.0  # and over blocks its mean is so many standard errors from zero
-RELATIVE = 0.15  # least change of the parameter per standard deviation of what it changes with
 
 
 @dataclass(frozen=True)
@@ -136,8 +134,11 @@ def _change(
     by_block = np.bincount(blocks, products)
     error = float(np.sqrt(np.sum((by_block - by_block.mean()) ** 2))) + 1e-12
     change = Change(parameter.name, on, -total / energy / size, total**2 / energy)
-    proven = change.evidence >= EVIDENCE and abs(total) >= BLOCKS_T * error
-    return change if proven and abs(change.relative) >= RELATIVE else None
+    proven = (
+        change.evidence >= SETTINGS.companion_evidence
+        and abs(total) >= SETTINGS.companion_t * error
+    )
+    return change if proven and abs(change.relative) >= SETTINGS.companion_change else None
 
 
 def _size(trial: Trial, parameter: Parameter) -> float:

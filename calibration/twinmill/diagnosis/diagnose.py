@@ -20,9 +20,7 @@ from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.rivals import less_each
 from twinmill.diagnosis.search import (
     REFIT,
-    SETTINGS,
     Search,
-    Settings,
     State,
     attempt,
     instead_of_drift,
@@ -78,7 +76,6 @@ def diagnose(
     model_file: ModelFile,
     progress: Callable[[str], None] = lambda _: None,
     excluded: Collection[str] = (),
-    settings: Settings = SETTINGS,
 ) -> Diagnosis:
     """Diagnoses all measurements with one model.
 
@@ -87,7 +84,6 @@ def diagnose(
         model_file: the model; what other logs told of it is held, its gains may drift.
         progress: told in words what is being done.
         excluded: effects that are not to be thought of.
-        settings: numbers that decide.
 
     Raises:
         LogError: no measurement can be judged.
@@ -103,7 +99,7 @@ def diagnose(
     if off:
         known = _without(judged(opened), off)
         first = first_state(known, model_file, {*excluded, *unseen})
-    done = search(first, progress, settings, usual)
+    done = search(first, progress, known=usual)
     if not off:
         progress("looking for robots that differ")
         off = outliers(known, done, progress)
@@ -111,10 +107,10 @@ def diagnose(
             known = _without(known, off)
             progress("looking again without them")
             first = first_state(known, model_file, {*excluded, *unseen})
-            done = search(first, progress, settings, usual)
+            done = search(first, progress, known=usual)
     progress("looking for what no effect explains")
     found = _concluded(opened, known, first, done, model_file, before, unseen, off)
-    whole = with_detections(found, model_file, progress, excluded, settings)
+    whole = with_detections(found, model_file, progress, excluded)
     return replace(whole, sentence=" ".join([whole.sentence, *map(sentence, whole.robots_off)]))
 
 

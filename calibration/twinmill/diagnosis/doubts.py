@@ -21,6 +21,7 @@ from twinmill.diagnosis.search import (
     in_common,
     of_levels,
 )
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.compare import GOOD
 from twinmill.model.parameters import (
     WHERE_OR_WHEN,
@@ -33,11 +34,7 @@ from twinmill.model.parameters import (
 )
 from twinmill.predict.datasets import Trajectory
 
-WITHIN = 2.0  # standard deviations: what differs by less is an error
-BEYOND = 3.0  # usual sizes, or standard deviations from it at a bound: doubtful beyond ...
-NEAR = 0.5  # ... if another leaves less than this more of the squared score, or a rest is left
 AWAY_S = 2.0  # between two visits of a place
-WEIGHTY = 0.1  # share of what the visit brings that speaks loudest for a place
 # Groups of a rest, and what the cards of effects that act by them need or are shown by.
 BY = {
     "place": {"places", "place"},
@@ -45,11 +42,6 @@ BY = {
     TIME: {"history", "battery"},
     CHANGE: {"changes"},
 }
-SLIGHT = 0.3  # of the squared score that is left: what a second finding must at least take
-MUCH_LEFT = 0.3  # of what was to be explained, beyond which no name is sure
-LAG_LEAVES = 0.25  # at most, of what was to be explained, where nothing else is late
-SAME, SAME_FALL = 0.8, 0.85  # cosine of what two take of the errors, and share that one takes
-NOTHING = 0.01  # chance of sizes like these if there were no effect, beyond which it is doubtful
 
 
 def of_one(done: Search, name: str, own: Sequence[ParameterEstimate], change: Change | None) -> str:
@@ -68,7 +60,10 @@ def of_one(done: Search, name: str, own: Sequence[ParameterEstimate], change: Ch
         return doubt
     if change:
         return change.why
-    if done.last.fit.chance_of_none(newest_instance(done.last.state.model, name)) > NOTHING:
+    if (
+        done.last.fit.chance_of_none(newest_instance(done.last.state.model, name))
+        > SETTINGS.nothing
+    ):
         return f"parts of these logs do not agree that {name} is there: its size may be nothing"
     return ""
 
@@ -102,7 +97,7 @@ def _sizes(
 def _at_bound(card: dict, own: Sequence[ParameterEstimate]) -> str:
     """A doubt where an estimate ended at its bound, and a usual one is excluded; else empty."""
     for e, p, away in _sizes(card, own):
-        excluded = e.std is None or abs(e.value - p["default"]) > BEYOND * e.std
+        excluded = e.std is None or abs(e.value - p["default"]) > SETTINGS.beyond * e.std
         if e.at_bound and away > 1e-3 and excluded:
             return f"{e.name} is at its bound ({e.value:.3g}): another effect may be behind it"
     return ""
@@ -111,7 +106,7 @@ def _at_bound(card: dict, own: Sequence[ParameterEstimate]) -> str:
 def _unusual(card: dict, own: Sequence[ParameterEstimate]) -> str:
     """A doubt where an estimate is far larger than is usual; else empty."""
     for e, p, away in _sizes(card, own):
-        if p["role"] == "size" and away > BEYOND * p["usual_size"]:
+        if p["role"] == "size" and away > SETTINGS.beyond * p["usual_size"]:
             return (
                 f"{e.name} = {e.value:.3g} is far beyond what is usual: another effect may be "
                 "behind it"
@@ -123,7 +118,7 @@ def _faster(name: str, own: Sequence[ParameterEstimate]) -> str:
     """A doubt where a loss at a place or a moment makes the robot faster; else empty."""
     loss, *_ = own
     placed = any(with_role(name, role) for role in WHERE_OR_WHEN)
-    if placed and loss.value < -WITHIN * loss.std:
+    if placed and loss.value < -SETTINGS.within * loss.std:
         return (
             f"{loss.name} = {loss.value:.3g} makes the robot faster, which few floors or faults do"
         )
@@ -133,7 +128,8 @@ def _faster(name: str, own: Sequence[ParameterEstimate]) -> str:
 def _visits(last: Trial, less: Trial, instance: str) -> int | None:
     """How many visits of an effect's place speak for it, in all logs; None for one without a place.
 
-    By the fall of the squared errors in windows that begin there: at least WEIGHTY of the largest.
+    By the fall of the squared errors in windows that begin there: at least `weighty` of the
+    largest.
     """
     fit = last.fit
     if f"{instance}.radius_m" not in {v["name"] for v in last.state.model.values()}:
@@ -148,7 +144,7 @@ def _visits(last: Trial, less: Trial, instance: str) -> int | None:
             visit = np.cumsum(np.diff(data.start_s[there], prepend=-np.inf) > AWAY_S) - 1
             fall = (before**2 - after**2).reshape(len(there), -1).sum(axis=1)[there]
             falls += list(np.bincount(visit, fall))
-    return int(np.sum(np.array(falls) > WEIGHTY * max(falls, default=0.0)))
+    return int(np.sum(np.array(falls) > SETTINGS.weighty * max(falls, default=0.0)))
 
 
 def _stands_alone(done: Search, name: str) -> bool:
@@ -157,7 +153,7 @@ def _stands_alone(done: Search, name: str) -> bool:
     Then it is right though its size is none that is usual.
     """
     this = done.round_of(name)
-    most = this.accepted.held_score**2 + NEAR
+    most = this.accepted.held_score**2 + SETTINGS.near
     near = [t for t in this.trials if t is not this.accepted and t.held_score**2 < most]
     return done.last.held_score < GOOD and all(_beats(done, this.accepted, t) for t in near)
 
@@ -180,8 +176,8 @@ def _same(done: Search, name: str) -> list[str]:
         for t in this.trials
         if len(t.names) == 1
         and t.names[0] not in (name, REFIT)
-        and this.before.held_score**2 - t.held_score**2 > SAME_FALL * taken
-        and in_common(this.before, this.accepted, t) > SAME
+        and this.before.held_score**2 - t.held_score**2 > SETTINGS.same_fall * taken
+        and in_common(this.before, this.accepted, t) > SETTINGS.same
     ]
 
 
@@ -202,7 +198,11 @@ def stand_in(done: Search, name: str) -> str | None:
 def beside_larger(finding: Finding, larger: str | None, before: Trial, after: Trial) -> Finding:
     """The finding, doubtful where it takes little of what a larger one leaves."""
     left = after.held_score**2
-    if larger is None or finding.effect == REFIT or before.held_score**2 - left >= SLIGHT * left:
+    if (
+        larger is None
+        or finding.effect == REFIT
+        or before.held_score**2 - left >= SETTINGS.slight * left
+    ):
         return finding
     return doubted(finding, f"it takes little of what {larger} leaves, which may have another form")
 
@@ -256,9 +256,9 @@ def _alike_losses(found: Sequence[Finding]) -> list[Finding]:
     def as_large(finding: Finding) -> bool:
         own, *_ = finding.parameters
         losses = [f.parameters[0] for f in events]
-        known = own.value > WITHIN * own.std
+        known = own.value > SETTINGS.within * own.std
         return known and any(
-            abs(own.value - e.value) < WITHIN * np.hypot(own.std, e.std) for e in losses
+            abs(own.value - e.value) < SETTINGS.within * np.hypot(own.std, e.std) for e in losses
         )
 
     places = [f for f in found if with_role(f.effect, "place") and as_large(f)]
@@ -293,10 +293,10 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
             why = "more is left than it takes, so that it may be a part of something else"
             on = next((on for of_kind, on, *_ in KINDS if of_kind(finding.effect)), "")
             return doubted(finding, why, depends_on=on)
-        if rest.firm and rest.share > LAG_LEAVES and _is_late(finding.effect):
+        if rest.firm and rest.share > SETTINGS.lag_leaves and _is_late(finding.effect):
             why = "much is left: something else at changes of the command may be late"
             return doubted(finding, why, wrong_form=True)
-        if rest.share > MUCH_LEFT:
+        if rest.share > SETTINGS.much_left:
             return doubted(finding, "much is left, so that it may be a part of something else")
         return finding
 

@@ -9,7 +9,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.constancy import Change, changes_of
-from twinmill.diagnosis.doubts import WITHIN, beside_larger, of_one, seen_once, stand_in
+from twinmill.diagnosis.doubts import beside_larger, of_one, seen_once, stand_in
 from twinmill.diagnosis.finding import Finding, Late, Ranked, doubted
 from twinmill.diagnosis.library import TIME
 from twinmill.diagnosis.search import (
@@ -22,6 +22,7 @@ from twinmill.diagnosis.search import (
     fitted,
     grown,
 )
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.model.parameters import (
     LAG,
     LAG_EFFECT,
@@ -35,7 +36,6 @@ from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
 HORIZON = HORIZONS_S.index(0.5)
-MISSES = 1.5  # score of a final model whose errors are not noise
 
 
 def findings_of(
@@ -126,7 +126,7 @@ def _stale_numbers(
     """What a finding changes, if the model may well have all of it by its own error; else none."""
     if finding.effect == LAG_EFFECT and not finding.group and lag_std_s > 0:
         extra = finding.parameters[0]
-        if abs(extra.value) <= WITHIN * np.hypot(extra.std, lag_std_s):
+        if abs(extra.value) <= SETTINGS.within * np.hypot(extra.std, lag_std_s):
             return [replace(extra, name=LAG, value=model.get(LAG) + extra.value)]
     known = finding.again and all(_is_error(e, model, stds) for e in finding.parameters)
     return finding.parameters if known else []
@@ -138,7 +138,7 @@ def _is_error(own: ParameterEstimate, model: native.Model, stds: Mapping[str, fl
     name = instance.split("#")[0]
     card = next(p for p in catalogue_of(model)[name]["parameters"] if p["name"] == key)
     known = stds.get(f"{name}.{key}", 0.0)
-    return abs(own.value - card["neutral"]) <= WITHIN * np.hypot(own.std, known)
+    return abs(own.value - card["neutral"]) <= SETTINGS.within * np.hypot(own.std, known)
 
 
 def _chain(names: Sequence[str], first: State, last: Trial) -> list[Trial]:
@@ -199,7 +199,7 @@ def _rivals(done: Search, name: str) -> list[Trial]:
     """
     this = done.round_of(name)
     rivals = list(this.tied)
-    if done.last.held_score > MISSES and len(this.accepted.names) == 1 and name != REFIT:
+    if done.last.held_score > SETTINGS.misses and len(this.accepted.names) == 1 and name != REFIT:
         fall = this.before.held_score**2 - this.accepted.held_score**2
         rivals += [
             t

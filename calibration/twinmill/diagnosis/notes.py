@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import twinmill_native as native
 
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import ChannelNoise, Noise
@@ -13,7 +14,6 @@ from twinmill.predict.windows import HORIZONS_S, rms
 
 NOTABLE = 0.01  # change of a gain that is worth a sentence
 LEAST_DRIVE = (2e-3, 2e-2)  # m/s, rad/s: no robot follows more regularly
-IRREGULAR = 2.2  # floor over what the model file's noise makes, beyond which it is a finding
 
 
 def time_base_notes(logs: list[ModelledLog]) -> list[str]:
@@ -69,7 +69,7 @@ def irregularity_notes(
     notes = []
     for own, noise in zip(opened, noises, strict=True):
         ratio = irregularity(own, noise, model) if noise and own.data else 0.0
-        if ratio > IRREGULAR:
+        if ratio > SETTINGS.irregular:
             notes.append(
                 f"{own.measurement.label}: what no smooth response to the commands follows is "
                 f"{ratio:.1f} times what the noise in the model file makes (more random "

@@ -15,6 +15,7 @@ import twinmill_native as native
 from scipy.stats import chi2
 
 from twinmill.diagnosis.search import REFIT, Search, State, Trial, attempt, fitted, screen
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened, wide_gains
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
@@ -24,12 +25,8 @@ from twinmill.model.parameters import (
 )
 from twinmill.predict.datasets import total_score
 
-ODD = 3.5  # robust standard deviations from the median
 FEWEST = 3  # robots, below which none can be called the odd one
 TRIED = 3
-EVIDENCE = 16.0  # as in the search, for one robot
-SPREAD = 0.01  # by which robots of a kind differ at least
-ALPHA = 0.001  # chance that one of robots that are alike is called different
 SIDES = {
     ("fl", "rl"): "left wheels",
     ("fr", "rr"): "right wheels",
@@ -45,9 +42,9 @@ def middle_and_scale(values: list[float]) -> tuple[float, float]:
 
 
 def odd_ones(away: dict[int, float]) -> set[int]:
-    """Those that are more than ODD scales off: the worst, and always fewer than half."""
+    """Those that are more than `odd` scales off: the worst, and always fewer than half."""
     worst = sorted(away, key=lambda i: -away[i])[: max(len(away) - 1, 0) // 2]
-    return {i for i in worst if away[i] > ODD}
+    return {i for i in worst if away[i] > SETTINGS.odd}
 
 
 @dataclass(frozen=True)
@@ -196,7 +193,8 @@ def _suspects(states: dict[int, State], progress: Callable[[str], None]) -> list
     # What all robots would take alike is no difference.
     apart = {n: max(g) - np.median(g) for n, g in worth.items()}
     best = sorted(
-        (n for n in apart if apart[n] > EVIDENCE / 2 and n != REFIT), key=lambda n: -apart[n]
+        (n for n in apart if apart[n] > SETTINGS.odd_evidence / 2 and n != REFIT),
+        key=lambda n: -apart[n],
     )
     return ["gains", *best[:TRIED]]
 
@@ -221,11 +219,11 @@ def _judged(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
     """The robot as an outlier, or None: of what sets it apart the most probable."""
     best, best_name, best_p = None, "", 1.0
     for name, trial in own.trials.items():
-        if trial.evidence < EVIDENCE:
+        if trial.evidence < SETTINGS.odd_evidence:
             continue
         p_value = _p_value(own, name, alone)
         better = best is None or trial.fit.held_cost < best.fit.held_cost
-        if p_value < ALPHA and better:
+        if p_value < SETTINGS.odd_chance and better:
             best, best_name, best_p = trial, name, p_value
     if best is None:
         return _unexplained(own, alone)
@@ -257,7 +255,9 @@ def _p_value(own: _Alone, name: str, alone: Sequence[_Alone]) -> float:
     middle = np.median(theirs, axis=0)
     scale = np.array([middle_and_scale(list(column))[1] for column in theirs.T])
     usual = np.array([p.std for p in own.trials[name].state.free])
-    least = SPREAD * np.ones(len(mine)) if name in ("gains", "wheel_gain") else 0.03 * usual
+    least = (
+        SETTINGS.spread * np.ones(len(mine)) if name in ("gains", "wheel_gain") else 0.03 * usual
+    )
     total = spread + np.diag(np.maximum(scale, least) ** 2)
     away = float((mine - middle) @ np.linalg.solve(total, mine - middle))
     return float(min(1.0, len(alone) * len(own.trials) * chi2.sf(away, len(mine))))
@@ -268,7 +268,7 @@ def _unexplained(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
     sizes = [np.log(max(a.before.held_score, 1.0)) for a in alone]
     middle, scale = middle_and_scale(sizes)
     mine = np.log(max(own.before.held_score, 1.0))
-    if mine - middle < max(ODD * max(scale, 0.06), np.log(1.5)):
+    if mine - middle < max(SETTINGS.odd * max(scale, 0.06), np.log(1.5)):
         return None
     before = own.before.held_score
     others = float(np.exp(middle))
@@ -278,7 +278,7 @@ def _unexplained(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
         parameters=[],
         score_before=before,
         score_after=before,
-        p_value=ALPHA,
+        p_value=SETTINGS.odd_chance,
         sentence=f"R{own.robot_id:02d} differs, and no effect of the catalogue explains how.",
         why=f"its errors are {before:.2f} times the floor, those of the others {others:.2f}; "
         "pushes and bumps by others would look so",
@@ -334,7 +334,11 @@ def _entry(effect: str, key: str) -> dict:
 
 def _least(estimate: ParameterEstimate) -> float:
     """Less is not worth a word."""
-    return 2 * SPREAD if estimate.name in GAINS or estimate.name.startswith("wheel_gain.") else 0.0
+    return (
+        2 * SETTINGS.spread
+        if estimate.name in GAINS or estimate.name.startswith("wheel_gain.")
+        else 0.0
+    )
 
 
 def _gain_words(gains: dict[str, float]) -> list[str]:

@@ -13,10 +13,8 @@ import numpy as np
 from twinmill.diagnosis.library import Term
 from twinmill.diagnosis.rest import Formulas, formulas_of
 from twinmill.diagnosis.search import REFIT, Search, Trial, without
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened
-
-TIMES, MORE = 1.15, 6.0  # a formula that takes so many times as much, and so much more, outdoes it
-KEPT = 0.5  # share of what an effect takes that it takes beside a formula for something else
 
 
 def less_each(done: Search, opened: Sequence[Opened]) -> tuple[dict[str, Trial], Formulas | None]:
@@ -53,10 +51,10 @@ def better_formula(formulas: Formulas, less: Trial, whole: Trial) -> Term | None
     products = formulas.products(less.fit, effect)
     own, *gains = products.each_held_out()
     for k in np.argsort(gains)[::-1]:
-        if gains[k] <= max(TIMES * own, own + MORE):
+        if gains[k] <= max(SETTINGS.outdoes * own, own + SETTINGS.outdoes_by):
             return None
         both = np.isin(np.arange(1 + len(gains)), [0, 1 + k])
         beside = products.held_out(both, 0)[0] - gains[k]
-        if beside < KEPT * own:
+        if beside < SETTINGS.kept * own:
             return formulas.terms[k]
     return None

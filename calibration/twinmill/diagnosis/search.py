@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 import twinmill_native as native
 
+from twinmill.diagnosis.settings import SETTINGS, Settings
 from twinmill.fitting.detection_fit import DetectionFit
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
@@ -37,82 +38,7 @@ from twinmill.model.parameters import (
 from twinmill.predict.datasets import Dataset, Trajectory, total_score
 from twinmill.predict.detections import Detections
 
-STRICTEST = 3.0
-COMMON = 1.01  # times a score: no worse
-NEWS = 1.1  # times the known score: less is no news
-TRACED = 3  # times its usual strength, at which an effect must show, or it is faint
 REFIT = "refit"  # the base's numbers were stale: a candidate like any effect
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Numbers that decide a search; printed in reports.
-
-    Attributes:
-        evidence: least fall of the held-out cost (twice a log likelihood ratio) of one addition ...
-        without_best: ... and without the block with the most evidence for it.
-        without_visit: the same for an effect of a place, which speaks where the robot comes by.
-        drowned, less_evidence, blocks_t: the same from this score on, where what the model lacks
-            besides drowns the evidence, and blocks agree: t of the relative fall over blocks.
-        worth: least share of the first excess that one takes ...
-        enough: ... or this fall of the squared score, if that is less.
-        below: the same share once the score is below 1, where differences are hardly news ...
-        least_below, most_below: ... but so much of the squared score at least, and at most.
-        strong, least_strong: times the evidence with which less than that is enough there.
-        fitted: so many candidates are fitted in each round.
-        pairs: so many pairs are tried where no single candidate is accepted.
-        most: rounds.
-        alike: canonical correlation of signatures from which two candidates are one group.
-        unlike: cosine of what two take of the errors, up to which they explain different things.
-        tie: difference of the held-out cost that decides nothing within a group.
-        each: what a number that was fitted costs besides, where candidates are compared.
-        imitates: share of the squared score taken by other numbers of the base that an effect must
-            take to be as good an answer.
-        group: most members of a group, the most alike: more is no answer.
-        usual: times the evidence where the score is no worse than on the logs that the model was
-            fitted to: what it misses there it misses here, too.
-        faint: a candidate of less expected evidence at three times its usual size is not shown.
-        bits: share of the detections that an effect of the camera must change ...
-        bits_in_view: ... or of those with a robot in view, or without, if that is less.
-        late_s: a camera's delay below it may be a clock offset that the log itself told.
-    """
-
-    evidence: float = 16.0
-    without_best: float = 8.0
-    without_visit: float = 4.0
-    drowned: float = 1.15
-    less_evidence: float = 9.0
-    blocks_t: float = 3.7
-    worth: float = 0.01
-    enough: float = 0.1
-    below: float = 0.1
-    least_below: float = 0.2
-    most_below: float = 0.5
-    strong: float = 1.5
-    least_strong: float = 0.08
-    fitted: int = 7
-    pairs: int = 3
-    most: int = 6
-    alike: float = 0.95
-    unlike: float = 0.3
-    tie: float = 6.0
-    each: float = 2.0
-    imitates: float = 0.95
-    group: int = 4
-    usual: float = 1.5
-    faint: float = 16.0
-    bits: float = 0.005
-    bits_in_view: float = 0.02
-    late_s: float = 0.025
-
-    def stricter(self, times: float) -> "Settings":
-        """The same with so many times the evidence."""
-        times = min(max(times, 1.0), STRICTEST)
-        raised = ("evidence", "without_best", "without_visit", "less_evidence")
-        return replace(self, **{k: times * getattr(self, k) for k in raised})
-
-
-SETTINGS = Settings()
 
 
 @dataclass(frozen=True)
@@ -257,7 +183,7 @@ class Search:
                 continue
             if s.size < 1e-6:
                 hidden.append((s.name, "the data have no drive on which it acts"))
-            elif TRACED**2 * s.size < self.settings.faint:
+            elif self.settings.traced**2 * s.size < self.settings.faint:
                 hidden.append((s.name, "three times its usual strength would not show"))
         return hidden
 
@@ -285,7 +211,7 @@ def search(
             evidence must be stronger where the score is no worse than that.
     """
     before = fitted(state)
-    if before.held_score < NEWS * known:
+    if before.held_score < settings.news * known:
         settings = settings.stricter(settings.usual * known)
     rounds: list[Round] = []
     dropped: list[str] = []
@@ -424,7 +350,7 @@ def _is_common(before: Trial, refit: Trial, settings: Settings) -> bool:
     ones.
     """
     own = any(p.name in GAINS for d in before.state.datasets for p in d.own)
-    as_good = refit.held_score < COMMON * before.held_score
+    as_good = refit.held_score < settings.common * before.held_score
     return own and as_good and refit.evidence > settings.evidence
 
 
@@ -587,8 +513,8 @@ def _screened_bits(name: str, before: Trial) -> Screened:
     """By a grid of values: the likelihood of detections has edges, and no signature."""
     state = grown(before.state, (name,))
     alone = DetectionFit(state.datasets, state.models, state.free[len(before.state.free) :])
-    gain, trace = alone.promise(), alone.trace(before.fit, TRACED)
-    return Screened(name, np.zeros((0, 0)), gain, trace / TRACED**2)
+    gain, trace = alone.promise(), alone.trace(before.fit, SETTINGS.traced)
+    return Screened(name, np.zeros((0, 0)), gain, trace / SETTINGS.traced**2)
 
 
 def _reach(name: str, parameters: Sequence[Parameter], start: dict[str, float]) -> np.ndarray:

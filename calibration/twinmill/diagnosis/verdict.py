@@ -7,12 +7,9 @@ from dataclasses import dataclass
 from twinmill.diagnosis import moments
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.rest import LEAST, MOMENTS, Rest
-from twinmill.diagnosis.search import NEWS, REFIT, of_levels
+from twinmill.diagnosis.search import REFIT, of_levels
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.compare import GOOD, MISSING
-
-DRIFTED = 0.85  # share of the score as given that drifting gains leave, where they were stale
-MUCH = 0.1  # share of the squared error that is much: left beside doubtful findings, or found
-WORSE = 1.5  # score over the usual one, beyond which it is a finding
 
 
 @dataclass(frozen=True)
@@ -99,7 +96,7 @@ class VerdictInputs:
     def _outside(self) -> bool:
         """Something is left that no effect takes: it depends on something, or it is much."""
         depends = bool(self.rest.again or self._continuous)
-        return depends or self.last > WORSE * self.known
+        return depends or self.last > SETTINGS.worse * self.known
 
     @property
     def _left_in_the_dark(self) -> bool:
@@ -116,7 +113,7 @@ class VerdictInputs:
     @property
     def _of_another_form(self) -> bool:
         """Most of what was found stands for something else of another form, and no more is sure."""
-        if any(f.certainty != "doubtful" and f.share > MUCH for f in self.effects):
+        if any(f.certainty != "doubtful" and f.share > SETTINGS.much for f in self.effects):
             return False
         return sum(f.share for f in self.effects if f.wrong_form) > self._taken / 2
 
@@ -125,7 +122,7 @@ class VerdictInputs:
         """No effect is beyond doubt, and much is left that is no noise."""
         if not all(f.certainty == "doubtful" for f in self.effects):
             return False
-        if self._continuous and self.rest.share > MUCH:
+        if self._continuous and self.rest.share > SETTINGS.much:
             return True
         return self.rest.firm and self.rest.share > self._taken
 
@@ -179,7 +176,7 @@ class VerdictInputs:
         """What the model left in the logs that it was fitted to, it leaves here, too."""
         if self.last <= GOOD:
             return ""
-        if self.last > NEWS * self.known:
+        if self.last > SETTINGS.news * self.known:
             return (
                 f" The model misses by a little more than the noise (score {self.last:.2f}): more "
                 "of these drives would tell why."
@@ -249,7 +246,7 @@ def drifted(score: float, last: float, known: float) -> bool:
         last: held out, with drifted gains and what was found.
         known: that is no news.
     """
-    return score > GOOD * known and last < DRIFTED * score
+    return score > GOOD * known and last < SETTINGS.drifted * score
 
 
 def _in_turn(names: list[str]) -> str:

@@ -276,7 +276,18 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
         commands=[(f"{why}:", command) for why, command in commands],
         notes=lines(diagnosis),
         warnings=before.warnings,
+        folded=[deciding(diagnosis)],
     )
+
+
+def deciding(diagnosis: Diagnosis) -> Table:
+    """The numbers that decided, with what each means."""
+    rows = [
+        [Cell(name), Cell(f"{value:g}"), Cell(what)]
+        for name, value, what in diagnosis.search.settings.listed()
+    ]
+    note = "Scores are over the noise floor: 1.0 is right. Costs are -2 log likelihoods."
+    return Table("Numbers that decided", ["name", "value", "what"], rows, note, words=(0, 2))
 
 
 def found_models(diagnosis: Diagnosis) -> list[tuple[str, native.Model] | None]:

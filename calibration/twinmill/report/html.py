@@ -52,6 +52,7 @@ class Section:
         transcript: titles, each with commands and what they printed, below the facts.
         notes: sentences on the result, below the verdict.
         warnings: sentences.
+        folded: tables that are opened when they are asked for, at the end.
     """
 
     title: str
@@ -67,6 +68,7 @@ class Section:
     transcript: list[tuple[str, str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    folded: list[Table] = field(default_factory=list)
 
 
 SCORE_NOTE = (
