@@ -15,8 +15,9 @@ from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.moments import _events
 from twinmill.diagnosis.rest import Rest
-from twinmill.diagnosis.search import Settings, attempt
+from twinmill.diagnosis.search import attempt
 from twinmill.diagnosis.search import fitted as fitted_state
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.compare import GOOD, compare
 from twinmill.fitting.fit import base_names, fit
 from twinmill.fitting.opening import open_measurements
@@ -179,7 +180,7 @@ def test_a_patch_of_the_floor_wins_on_fit_and_is_no_evidence(tanh_robot, measure
         before = fitted_state(first_state(opened, fitted, ()))
         trial = attempt(before, ("floor_patch",))
         assert trial.fit.scores[0] <= before.fit.scores[0] + 1e-6
-        assert trial.evidence < Settings().evidence
+        assert trial.evidence < SETTINGS.evidence
 
 
 ORIGIN_M = np.array([-40.0, 25.0])

@@ -10,10 +10,11 @@ import twinmill_native as native
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.findings import with_stale_numbers
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
-from twinmill.diagnosis.notes import IRREGULAR, irregularity
+from twinmill.diagnosis.notes import irregularity
 from twinmill.diagnosis.place import HORIZON, comes_again
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import REFIT
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.verdict import VerdictInputs
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.noise import ChannelNoise, Noise
@@ -103,7 +104,7 @@ def test_a_floor_as_the_noise_makes_it_is_regular_and_one_three_times_as_high_is
         own = SimpleNamespace(data=data, floor=SimpleNamespace(rms=times * floor))
         found = irregularity(own, Noise(*channels), model)
         assert found == pytest.approx(times)
-        assert (found > IRREGULAR) == (times > 1)
+        assert (found > SETTINGS.irregular) == (times > 1)
 
 
 def test_each_wheel_with_a_command_of_its_own_has_its_formulas():
