@@ -22,7 +22,7 @@ from twinmill.diagnosis.search import (
     REFIT,
     Search,
     State,
-    attempt,
+    cross_validate,
     instead_of_drift,
     search,
 )
@@ -272,7 +272,7 @@ def _refit(done: Search) -> float:
     start = done.rounds[0].before
     trial = next((t for t in done.rounds[0].trials if t.names == (REFIT,)), None)
     if trial is None and start.state.base:
-        trial = attempt(start, (REFIT,))
+        trial = cross_validate(start, (REFIT,))
     return min(start.held_score, trial.held_score) if trial else start.held_score
 
 

@@ -20,7 +20,7 @@ from twinmill.diagnosis.search import (
     Trial,
     comes_again,
     fitted,
-    grown,
+    with_effects,
 )
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.model.parameters import (
@@ -145,7 +145,7 @@ def _chain(names: Sequence[str], first: State, last: Trial) -> list[Trial]:
     """Fits of the first state, and of it with one effect more each time."""
     state, chain = first, [fitted(first)]
     for name in names:
-        state = grown(state, [name])
+        state = with_effects(state, [name])
         chain.append(_from_final(state, last))
     return chain
 

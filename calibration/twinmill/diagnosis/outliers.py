@@ -14,7 +14,7 @@ import numpy as np
 import twinmill_native as native
 from scipy.stats import chi2
 
-from twinmill.diagnosis.search import REFIT, Search, State, Trial, attempt, fitted, screen
+from twinmill.diagnosis.search import REFIT, Search, State, Trial, cross_validate, fitted, screen
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened, wide_gains
 from twinmill.fitting.score_fit import ScoreFit
@@ -165,7 +165,7 @@ def _each_alone(
     for i, own in states.items():
         progress(f"robot {i} alone")
         before = fitted(own)
-        alone.append(_Alone(i, before, {n: _attempt(before, n) for n in names}))
+        alone.append(_Alone(i, before, {n: _cross_validate(before, n) for n in names}))
     return alone
 
 
@@ -199,9 +199,9 @@ def _suspects(states: dict[int, State], progress: Callable[[str], None]) -> list
     return ["gains", *best[:TRIED]]
 
 
-def _attempt(before: Trial, name: str) -> Trial:
+def _cross_validate(before: Trial, name: str) -> Trial:
     if name != "gains":
-        return attempt(before, (name,))
+        return cross_validate(before, (name,))
     free = wide_gains(before.state.model)
     state = replace(before.state, free=free)
     fit = ScoreFit(state.datasets, state.models, free, state.by_channel).fit()

@@ -12,7 +12,7 @@ import numpy as np
 
 from twinmill.diagnosis.library import Term
 from twinmill.diagnosis.rest import Formulas, formulas_of
-from twinmill.diagnosis.search import REFIT, Search, Trial, without
+from twinmill.diagnosis.search import REFIT, Search, Trial, without_effect
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened
 
@@ -26,13 +26,13 @@ def less_each(done: Search, opened: Sequence[Opened]) -> tuple[dict[str, Trial],
         done: what is outdone moves from its findings to what was dropped.
         opened: its measurements, in its order.
     """
-    less = {n: without(done.last, n) for n in dict.fromkeys(done.found) if n != REFIT}
+    less = {n: without_effect(done.last, n) for n in dict.fromkeys(done.found) if n != REFIT}
     formulas = formulas_of(opened, done.last.fit)
     for name in list(less):
         if formulas and better_formula(formulas, less[name], done.last):
             done.last = less[name]
             done.dropped.append(name)
-            less = {n: without(done.last, n) for n in less if n != name}
+            less = {n: without_effect(done.last, n) for n in less if n != name}
             formulas = formulas_of(opened, done.last.fit)
     return less, formulas
 

@@ -224,12 +224,12 @@ def search(
         rounds.append(this)
         for candidate in _promising(screened, settings)[: settings.fitted]:
             progress(f"round {number + 1}: trying {candidate.name}")
-            this.trials.append(attempt(before, (candidate.name,), candidate.start))
+            this.trials.append(cross_validate(before, (candidate.name,), candidate.start))
         this.accepted = _best(before, this.trials, first_excess, settings)
         if this.accepted is None:
             progress(f"round {number + 1}: trying pairs")
             for pair in _pairs(before, screened, settings):
-                this.trials.append(attempt(before, pair))
+                this.trials.append(cross_validate(before, pair))
             this.accepted = _best(before, this.trials, first_excess, settings)
         this.trials.sort(key=lambda t: t.fit.held_cost)
         if this.accepted is None:
@@ -256,7 +256,9 @@ def fitted(state: State) -> Trial:
     return Trial((), fit, replace(state, models=fit.models), 0.0, 0.0, 0.0)
 
 
-def grown(state: State, names: Sequence[str], start: dict[str, float] | None = None) -> State:
+def with_effects(
+    state: State, names: Sequence[str], start: dict[str, float] | None = None
+) -> State:
     """The state with effects added at where their fit begins, or the base set free."""
     models = [m.copy() for m in state.models]
     free = list(state.begun())
@@ -277,9 +279,11 @@ def grown(state: State, names: Sequence[str], start: dict[str, float] | None = N
     return replace(state, models=models, free=tuple(free))
 
 
-def attempt(before: Trial, names: tuple[str, ...], start: dict[str, float] | None = None) -> Trial:
+def cross_validate(
+    before: Trial, names: tuple[str, ...], start: dict[str, float] | None = None
+) -> Trial:
     """A fit of the state before with something added, judged on held-out parts."""
-    state = grown(before.state, names, start)
+    state = with_effects(before.state, names, start)
     fit = state.fit_of(state.free)
     fit.begin_at_best(state.free[len(before.state.free) :])
     fit.fit()
@@ -336,7 +340,7 @@ def comes_again(done: Search, name: str) -> tuple[float, float] | None:
     if name not in done.found or len(with_role(name, "moment")) < 2:
         return None
     (again,) = screen(done.last, names=[name])
-    trial = attempt(done.last, (name,), again.start)
+    trial = cross_validate(done.last, (name,), again.start)
     (begin_s, end_s), (again_s, over_s) = _when_s(done.last, name), _when_s(trial, name)
     apart_s = max(again_s - end_s, begin_s - over_s)
     fresh = _proven(trial, done.last.held_score, done.settings) and not _began_before(trial, name)
@@ -397,10 +401,10 @@ def _with_best_lateness(
     """
     gone = []
     for name in [n for n in found if with_role(n, "lateness")]:
-        base = without(last, name)
+        base = without_effect(last, name)
         others = candidates(base.state) if base else []
         others = [n for n in others if with_role(n, "lateness") and n != name]
-        trials = [attempt(base, (n,)) for n in others]
+        trials = [cross_validate(base, (n,)) for n in others]
         trials = [t for t in trials if t.fit.held_cost < last.fit.held_cost + settings.tie]
         if not trials:
             continue
@@ -511,7 +515,7 @@ def screen(
 
 def _screened_bits(name: str, before: Trial) -> Screened:
     """By a grid of values: the likelihood of detections has edges, and no signature."""
-    state = grown(before.state, (name,))
+    state = with_effects(before.state, (name,))
     alone = DetectionFit(state.datasets, state.models, state.free[len(before.state.free) :])
     gain, trace = alone.promise(), alone.trace(before.fit, SETTINGS.traced)
     return Screened(name, np.zeros((0, 0)), gain, trace / SETTINGS.traced**2)
@@ -839,7 +843,7 @@ def instead_of_drift(state: State, drifted: Trial, settings: Settings) -> list[s
         settings: numbers that decide.
     """
     held = fitted(replace(state, free=()))
-    trials = [attempt(held, (n,)) for n in of_levels() if n in candidates(held.state)]
+    trials = [cross_validate(held, (n,)) for n in of_levels() if n in candidates(held.state)]
     return [t.names[0] for t in _imitators(drifted, held, trials, settings)]
 
 
@@ -847,7 +851,7 @@ def _pruned(trial: Trial, names: list[str], settings: Settings) -> tuple[Trial, 
     """Drops effects that the latest made needless."""
     gone = []
     for name in [n for n in names if n != REFIT and n not in trial.names]:
-        less = without(trial, name)
+        less = without_effect(trial, name)
         if less is None:
             continue
         evidence, *_ = trial.fit.against(less.fit)
@@ -857,7 +861,7 @@ def _pruned(trial: Trial, names: list[str], settings: Settings) -> tuple[Trial, 
     return trial, gone
 
 
-def without(trial: Trial, name: str) -> Trial | None:
+def without_effect(trial: Trial, name: str) -> Trial | None:
     """The trial's state without an effect, refitted; None if it is not in the model."""
     names = effect_names(trial.state.model)
     own = [i for i, n in enumerate(names) if n.split("#")[0] == name]

@@ -7,7 +7,7 @@ import numpy as np
 
 from twinmill.diagnosis.finding import Ranked
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.search import without
+from twinmill.diagnosis.search import without_effect
 from twinmill.experiment.candidates import Candidate, candidates
 from twinmill.experiment.information import CandidateEffect
 from twinmill.experiment.screen import screen
@@ -131,7 +131,7 @@ def _without(diagnosis: Diagnosis, names: list[str], base: list[Parameter]) -> S
     """The diagnosis' model without these effects, the rest refitted; its logs alone."""
     last = diagnosis.search.last
     for name in names:
-        last = without(last, name) or last
+        last = without_effect(last, name) or last
     model = last.state.model
     logs = [o for o in diagnosis.opened if o.floor and o.data is not None]
     free = [p.at(model.get(p.name)) for p in [*base, *all_effect_parameters(model)]]

@@ -15,7 +15,7 @@ from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.moments import _events
 from twinmill.diagnosis.rest import Rest
-from twinmill.diagnosis.search import attempt
+from twinmill.diagnosis.search import cross_validate
 from twinmill.diagnosis.search import fitted as fitted_state
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.compare import GOOD, compare
@@ -178,7 +178,7 @@ def test_a_patch_of_the_floor_wins_on_fit_and_is_no_evidence(tanh_robot, measure
     for seed in range(300, 304):
         opened = open_measurements([measure(tanh_robot(), seed, 20.0)], fitted)
         before = fitted_state(first_state(opened, fitted, ()))
-        trial = attempt(before, ("floor_patch",))
+        trial = cross_validate(before, ("floor_patch",))
         assert trial.fit.scores[0] <= before.fit.scores[0] + 1e-6
         assert trial.evidence < SETTINGS.evidence
 
