@@ -66,7 +66,8 @@ def headline(found: Matters) -> str:
     if own:
         text += f" Of what is in the model, {_list(own)} matter{'s' if len(own) == 1 else ''} most."
     if idle:
-        text += f" {len(idle)} of its effects and numbers do not matter."
+        do = "does" if len(idle) == 1 else "do"
+        text += f" {len(idle)} of its effects and numbers {do} not matter."
     if found.together:
         least, most = found.together.shares
         text += (
@@ -116,8 +117,13 @@ def _besides(worst: Outcome) -> str:
         d = worst.metrics[name]
         moved = d.low > 0 or d.high < 0
         if moved and abs(d.change) > TELLS * abs(d.before):
-            told.append(f"{word} {d.before * scale:.2g} to {d.after * scale:.2g}{unit}")
+            told.append(f"{word} {_two(d.before * scale)} to {_two(d.after * scale)}{unit}")
     return f"; {', '.join(told)}" if told else ""
+
+
+def _two(value: float) -> str:
+    """Two significant digits, without an exponent."""
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def _list(judged: Sequence[Judged]) -> str:
