@@ -91,9 +91,7 @@ int Held(const std::string &mjcf, const std::vector<Cell> &cells)
 {
     const auto make = [&](const std::vector<Model> &models, const std::vector<Pose2> &starts,
                           uint64_t seed) {
-        return std::make_unique<MujocoPlant>(
-            mjcf, models, starts,
-            MujocoOptions{.timestep_s = 0.005, .seed = seed, .simplified = true});
+        return std::make_unique<MujocoPlant>(mjcf, models, starts, SweepOptions(seed));
     };
     int held = 0;
     for (size_t k = 0; k < cells.size(); ++k)

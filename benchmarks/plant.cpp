@@ -46,7 +46,7 @@ int main()
         const char *name;
         MujocoOptions options;
         std::vector<double> real_time{}, rollers{};
-    } uses[] = {{"twin_run", {}}, {"a sweep", {.timestep_s = 0.005, .simplified = true}}};
+    } uses[] = {{"twin_run", {}}, {"a sweep", SweepOptions(0)}};
     std::vector<std::unique_ptr<MujocoPlant>> plants;
     for (const Use &use : uses)
         plants.push_back(std::make_unique<MujocoPlant>(

@@ -330,8 +330,8 @@ TEST(MujocoPlant, ASimplifiedWorldMovesLikeAWholeOne)
     for (const Twist &twist : {Twist{0.3, 0, 0}, Twist{0, 0.3, 0}, Twist{0, 0, 2},
                                Twist{0.25, 0, 0.8}, Twist{0.2, 0.1, -0.5}})
     {
-        MujocoPlant whole = MakePlant({{0, 0, 0.3}}, {.timestep_s = 0.005});
-        MujocoPlant simple = MakePlant({{0, 0, 0.3}}, {.timestep_s = 0.005, .simplified = true});
+        MujocoPlant whole = MakePlant({{0, 0, 0.3}}, {.timestep_s = kSweepStep_s});
+        MujocoPlant simple = MakePlant({{0, 0, 0.3}}, SweepOptions(0));
         EXPECT_EQ(whole.model()->nv, simple.model()->nv + 2);  // pan and tilt
         for (MujocoPlant *plant : {&whole, &simple})
         {

@@ -19,6 +19,7 @@ from twinmill.swarm.axes import parse_axis
 from twinmill.swarm.request import Request
 from twinmill.swarm.store import Store, read_sweep
 from twinmill.swarm.sweep import make_request, sweep
+from twinmill.swarm.workers import _run_remote
 
 AXES = ["v_mps=0.1:0.3:3", "omega_degps=30:90:2"]
 
@@ -114,6 +115,20 @@ def test_mujoco_sweeps_have_the_same_bytes_on_any_number_of_workers(tmp_path: Pa
         sweep(request(["n=2,3"], model="turbopi.toml", seeds=1, duration_s=0.3), tmp_path / "one")
     with pytest.raises(ValueError, match="--plant moon"):
         request(plant="moon")
+
+
+def test_a_sweep_of_other_physics_is_neither_continued_nor_shared(tmp_path: Path, monkeypatch):
+    asked = request(["n=2,3"], model="turbopi.toml", plant="mujoco", seeds=1, duration_s=0.3)
+    planar = request()
+    sweep(asked, tmp_path / "s")
+    here, planar_here = asked.to_json(), planar.sha256
+    monkeypatch.setattr(native, "MUJOCO_PHYSICS", "steps of at most 5 ms, pyramids")
+    with pytest.raises(ValueError, match="version or physics"):
+        sweep(asked, tmp_path / "s")
+    with pytest.raises(ValueError, match=r"a worker simulates with .* pyramids"):
+        _run_remote(here, range(1))
+    assert read_sweep(tmp_path / "s")[0] == asked  # what is finished can be read
+    assert planar.sha256 == planar_here
 
 
 KILLED = """

@@ -93,16 +93,15 @@ Cell MakeCell(const Model &model, const Tables &rows, size_t ring_size, const st
     return {model, std::move(tables), ring_size, StartNamed(start), spread_m, std::move(starts)};
 }
 
-// In steps of 5 ms at most, of which many worlds are made. Robots with other wheels than the
+// Robots with other wheels than the
 // installed one's are made of their models' numbers.
 std::unique_ptr<Plant> MakeMujoco(const std::vector<Model> &models,
                                   const std::vector<Pose2> &starts, uint64_t seed)
 {
     const WheelKind wheels = models[0].base.wheels;
     const bool installed = wheels == WheelKind::kMecanum || wheels == WheelKind::kNone;
-    return std::make_unique<MujocoPlant>(
-        installed ? FindModelFile("turbopi.xml") : "", models, starts,
-        MujocoOptions{.timestep_s = 0.005, .seed = seed, .simplified = true});
+    return std::make_unique<MujocoPlant>(installed ? FindModelFile("turbopi.xml") : "", models,
+                                         starts, SweepOptions(seed));
 }
 
 void CheckPlant(const std::string &plant)
@@ -204,6 +203,7 @@ void BindSwarms(nb::module_ &m)
         outcomes.append(name);
     m.attr("METRICS") = names;
     m.attr("OUTCOMES") = outcomes;
+    m.attr("MUJOCO_PHYSICS") = std::string("MuJoCo ") + mj_versionString() + ", " + kSweepPhysics;
     m.def("species", &Species, "text"_a, "n"_a = nb::none(), "own"_a = NamedTables(),
           "Per robot the behaviour's name and (unseen speed, turn, seen speed, turn) inputs, turn "
           "in thousandths. `own`: tables beside the firmware's.");

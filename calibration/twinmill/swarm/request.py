@@ -55,13 +55,17 @@ class Request:
     plant: str = "planar"
 
     def to_json(self) -> str:
-        """One line, the same for the same request."""
-        return json.dumps(asdict(self), sort_keys=True, allow_nan=False)
+        """One line, the same for the same request; in MuJoCo with the physics that runs here."""
+        data = asdict(self)
+        if self.plant == "mujoco":
+            data["physics"] = native.MUJOCO_PHYSICS
+        return json.dumps(data, sort_keys=True, allow_nan=False)
 
     @classmethod
     def from_json(cls, text: str) -> "Request":
-        """The inverse of to_json."""
+        """The inverse of to_json, but for the physics: a request runs in those of the machine."""
         data = json.loads(text)
+        data.pop("physics", None)
         data["axes"] = [Axis(axis["name"], tuple(axis["values"])) for axis in data["axes"]]
         data["tables"] = [(name, row) for name, row in data["tables"]]
         return cls(**data)

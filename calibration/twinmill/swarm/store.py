@@ -40,8 +40,8 @@ class Store:
         if self._manifest.exists():
             if self.read_manifest()["sha256"] != request.sha256:
                 raise ValueError(
-                    f"{self.folder}: holds a sweep with other parameters, another model or "
-                    "version; choose another --out, or remove it."
+                    f"{self.folder}: holds a sweep with other parameters, another model, "
+                    "version or physics; choose another --out, or remove it."
                 )
         elif self.folder.exists() and any(self.folder.iterdir()):
             raise ValueError(f"{self.folder}: is not empty and holds no sweep; choose another.")

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from importlib.metadata import version
 
+import twinmill_native as native
+
 from twinmill.swarm.request import Request, run_part
 
 Done = tuple[int, dict[str, list]]
@@ -40,6 +42,11 @@ def _run_remote(text: str, worlds: range) -> dict[str, list]:
         raise ValueError(
             f"a worker has twinmill {version('twinmill')}, but this is {request.version}: "
             "install the same on both."
+        )
+    if request.to_json() != text:
+        raise ValueError(
+            f"a worker simulates with {native.MUJOCO_PHYSICS}, and this machine otherwise: install "
+            "the same on both."
         )
     return run_part(request, worlds)
 

@@ -299,8 +299,6 @@ mjModel *CompileWorld(const std::string &mjcf, const std::vector<Model> &models,
         mjs_discardVisual(world.get(), nullptr);
     if (options.simplified)
         world->compiler.fusestatic = true;
-    if (options.simplified && wheels[0].tread != Tread::kPlain)
-        world->option.cone = mjCONE_PYRAMIDAL;
     mjModel *model = mj_compile(world.get(), nullptr);
     if (!model)
         Fail(mjcf,

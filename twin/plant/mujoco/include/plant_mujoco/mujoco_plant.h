@@ -18,14 +18,22 @@ namespace twin
 
 struct MujocoOptions
 {
-    double timestep_s = 0.002;                   // longest physics step; 0.005 is fine for sweeps
+    double timestep_s = 0.002;                   // longest physics step
     std::optional<double> arena_half_width_m{};  // walls of a square arena around the origin
     uint64_t seed = 0;                           // of the drive noise
     bool visuals = false;  // keep what is only looked at: for a viewer or a video
-    // For many worlds: servos stand still, sensors of the file read nothing, and wheels with
-    // rollers have pyramids for friction cones, which differ where no such wheel grips.
+    // For many worlds: servos stand still, and sensors of the file read nothing.
     bool simplified = false;
 };
+
+// What sweeps run; kSweepPhysics names all of it that changes a result, and stands in every sweep's
+// hash: a change here is a change there.
+constexpr double kSweepStep_s = 0.005;
+constexpr const char *kSweepPhysics = "steps of at most 5 ms, elliptic cones";
+inline MujocoOptions SweepOptions(uint64_t seed)
+{
+    return {.timestep_s = kSweepStep_s, .seed = seed, .simplified = true};
+}
 
 // How `name` of the MJCF file is called for one robot of the world: "r03_cam".
 std::string NameInWorld(int robot, const std::string &name);
