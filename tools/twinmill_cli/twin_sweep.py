@@ -75,7 +75,11 @@ def _command(
         bool, typer.Option("--full", help="Each robot its firmware and plant, always.")
     ] = False,
     plant: Annotated[
-        str, typer.Option("--plant", help="planar, or mujoco: wheels that slip, bodies with mass.")
+        str,
+        typer.Option(
+            "--plant",
+            help="planar, or mujoco: wheels that slip, bodies with mass; steps of 5 ms at most.",
+        ),
     ] = "planar",
     as_json: AsJson = False,
 ) -> None:

@@ -67,7 +67,7 @@ def bodies(seeds: int, folder: Path) -> Claim:
         f"Planar and MuJoCo. {told}. In the planar plant points pass through each other and discs "
         "slide off; in MuJoCo all have the robot's hull, and those that meet head-on hold each "
         "other, which depends on the hull's shape, not on its friction or the motors' torque "
-        "(bench_jams). A sweep's longer steps let go of some that hold in twin_run.",
+        "(bench_jams).",
         rows,
         [
             maps_figure(
