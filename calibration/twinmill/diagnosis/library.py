@@ -19,14 +19,17 @@ from twinmill.model.parameters import CLOCK, effect_names, words
 
 STILL = (0.002, 0.002, 0.01)  # m/s, m/s, rad/s: below it an axis does not move; wheels differ
 CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
+SPEEDS = ("vx", "vy", "omega")
 # m/s, m/s, rad/s, m/s: what a term of full size may add.
 TYPICAL = {"vx_mps": 0.01, "vy_mps": 0.01, "omega_radps": 0.05, "rim_mps": 0.01}
 # Rates, voltage, history: not at hand in a body's formula.
-NO_NAMES = {"dvx", "dvy", "domega", "V", "after_reversal"}
+NO_NAMES = {"dvx", "dvy", "domega", "V", "way", "after_reversal", "after_start"}
 SWELL = 0.05  # share of all speeds: a usual loss
 CHANGE = "change of the command"
 TIME = "time"
+WAY = "way driven"
 REVERSAL_S = 0.15  # how long a reversal is felt
+START_S = 0.4  # the same of a start from rest
 # Of one wheel's command, with its half `h`; in proportion to u is a wheel's gain.
 SHAPES = ("u*abs(u)", "abs(u)", "sign(u)*max(0, abs(u) - h)")
 
@@ -68,27 +71,32 @@ def library(
         opened: logs over their floors.
         models: with what was found, one for each.
     """
-    middles = _middles(opened)
     pairs = list(zip(opened, models, strict=True))
     velocities = [body_velocity_at(own.data, m, own.floor.response.points) for own, m in pairs]
+    middles = _middles(opened) | _bends(velocities)
     values = [_named_terms(own, v, middles) for own, v in zip(opened, velocities, strict=True)]
     sizes = _sizes(values)
     terms = [Term(g, CHANNELS[a], f, s) for (g, f), s in sizes.items() for a in range(3)]
     of_wheels = _wheel_terms(opened, models[0])
     of_all, parts = _terms_of_all_speeds(terms)
-    waves, rates_radps = _waves(opened)
+    times_s = [own.floor.response.middle_s for own in opened]
+    ways_m = [_way_m(own, v) for own, v in zip(opened, velocities, strict=True)]
+    waves = [Waves.along(times_s, TIME, "t", WAVE_S), Waves.along(ways_m, WAY, "way", WAVE_M)]
     columns = []
-    for (own, model), velocity, named in zip(pairs, velocities, values, strict=True):
-        body = _body_columns(own, velocity, named, sizes)
-        swell = _wave_columns(own, velocity, waves, rates_radps)
+    for k, (own, model) in enumerate(pairs):
+        body = _body_columns(own, velocities[k], values[k], sizes)
+        swells = [
+            w.columns(own, velocities[k], a[k])
+            for w, a in zip(waves, (times_s, ways_m), strict=True)
+        ]
         of_wheel = _wheel_columns(own, model, of_wheels)
-        columns.append(np.hstack([body, body @ parts, swell, of_wheel]))
-    return [*terms, *of_all, *waves, *of_wheels], columns
+        columns.append(np.hstack([body, body @ parts, *swells, of_wheel]))
+    return [*terms, *of_all, *waves[0].terms, *waves[1].terms, *of_wheels], columns
 
 
 def _terms_of_all_speeds(terms: Sequence[Term]) -> tuple[list[Term], np.ndarray]:
     """What changes all speeds alike with time, and (T, n) its parts among the body's terms."""
-    carriers = dict(zip(CHANNELS, ("vx", "vy", "omega"), strict=True))
+    carriers = dict(zip(CHANNELS, SPEEDS, strict=True))
     found: dict[str, dict[int, Term]] = {}
     for k, term in enumerate(terms):
         factor, _, carrier = term.formula.rpartition("*")
@@ -103,36 +111,57 @@ def _terms_of_all_speeds(terms: Sequence[Term]) -> tuple[list[Term], np.ndarray]
     return of_all, parts
 
 
-WAVE_S = 12.0  # the shortest: blocks left out in its midst are told by those beside
-MOST_WAVES = 12
-SWELLS = "swells"
+WAVE_S = 6.0  # the shortest
+WAVE_M = 1.5  # the same of way driven
+MOST_WAVES = 20
 
 
-def _waves(opened: Sequence[Opened]) -> tuple[list[Term], np.ndarray]:
-    """What changes all speeds alike and comes and goes with time, and the (n,) rates of pairs."""
-    times_s = np.concatenate([own.floor.response.middle_s for own in opened])
-    longest_s = 1.1 * np.ptp(times_s)
-    count = int(np.clip(longest_s / WAVE_S, 0, MOST_WAVES))
-    rates_radps = np.array([float(f"{2 * np.pi * k / longest_s:.4g}") for k in range(1, 1 + count)])
-    size = TYPICAL["rim_mps"] / SWELL
-    terms = [
-        Term(TIME, "rim_mps", f"{wave}({rate:g}*t)*rim", size, SWELLS)
-        for rate in rates_radps
-        for wave in ("cos", "sin")
-    ]
-    return terms, rates_radps
+@dataclass(frozen=True)
+class Waves:
+    """What changes all speeds alike, or one, and comes and goes with time or way.
+
+    Attributes:
+        terms: pairs, cosine and sine, of all speeds and of each.
+        rates: (n,) of the pairs, 1/s or 1/m.
+    """
+
+    terms: list[Term]
+    rates: np.ndarray
+
+    @staticmethod
+    def along(every: Sequence[np.ndarray], group: str, name: str, shortest: float) -> "Waves":
+        """Over what all logs span."""
+        longest = 1.1 * np.ptp(np.concatenate(every))
+        count = int(np.clip(longest / shortest, 0, MOST_WAVES))
+        rates = np.array([float(f"{2 * np.pi * k / longest:.4g}") for k in range(1, 1 + count)])
+        terms = [
+            Term(
+                group,
+                to,
+                f"{wave}({rate:g}*{name})*{speed}",
+                TYPICAL[to] / SWELL,
+                f"swells {speed}",
+            )
+            for to, speed in zip(("rim_mps", *CHANNELS), ("rim", *SPEEDS), strict=True)
+            for rate in rates
+            for wave in ("cos", "sin")
+        ]
+        return Waves(terms, rates)
+
+    def columns(self, own: Opened, velocity: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """(R, 8 n) change of a log's rows, as (N, 3) `velocity` moves the robot."""
+        angle = along[:, None] * self.rates
+        gains = SWELL * np.stack([np.cos(angle), np.sin(angle)], axis=-1).reshape(len(angle), -1)
+        response = own.floor.response
+        parts = [_displaced(response, velocity, velocity[:, [k]] * gains, k) for k in range(3)]
+        weight = np.nan_to_num(own.data.weight)[..., None]
+        columns = [part * weight for part in (sum(parts), *parts)]
+        return np.concatenate(columns, axis=-1).reshape(-1, len(self.terms))
 
 
-def _wave_columns(
-    own: Opened, velocity: np.ndarray, waves: Sequence[Term], rates_radps: np.ndarray
-) -> np.ndarray:
-    """(R, n) change of the rows by each wave, as (N, 3) `velocity` moves the robot."""
-    response = own.floor.response
-    angle = response.middle_s[:, None] * rates_radps
-    gains = SWELL * np.stack([np.cos(angle), np.sin(angle)], axis=-1).reshape(len(angle), -1)
-    parts = [_displaced(response, velocity, velocity[:, [k]] * gains, k) for k in range(3)]
-    columns = sum(parts) * np.nan_to_num(own.data.weight)[..., None]
-    return columns.reshape(-1, len(waves))
+def _way_m(own: Opened, velocity: np.ndarray) -> np.ndarray:
+    """(N,) driven since the log's begin, at (N, 3) `velocity`."""
+    return np.cumsum(np.hypot(velocity[:, 0], velocity[:, 1]) * own.floor.response.step_s)
 
 
 def _sizes(values: list[dict]) -> dict[tuple[str, str], float]:
@@ -144,6 +173,19 @@ def _sizes(values: list[dict]) -> dict[tuple[str, str], float]:
         large = float(np.percentile(np.abs(every), 95))
         sizes[key] = max(large, float(np.sqrt(np.mean(every**2))), 1e-9)
     return sizes
+
+
+BENDS = (0.3, 0.6, 0.85)  # quantiles of a speed at which its curve may bend
+
+
+def _bends(velocities: Sequence[np.ndarray]) -> dict[str, float]:
+    """Speeds over all logs at which curves may bend: `vx0` to `omega2`, to three digits."""
+    found = {}
+    for name, still, speed in zip(SPEEDS, STILL, np.abs(np.concatenate(velocities)).T, strict=True):
+        if (speed > still).any():
+            bends = np.quantile(speed[speed > still], BENDS)
+            found |= {f"{name}{k}": float(f"{b:.3g}") for k, b in enumerate(bends)}
+    return found
 
 
 PARTS = (0.2, 0.35, 0.5, 0.65, 0.8)  # of the time of all logs: where something may have changed
@@ -268,10 +310,10 @@ def _named_terms(
         ("direction of rotation", "abs(omega)"): np.abs(turn),
         ("speed", "vx*abs(vx)"): vx * np.abs(vx),
         ("speed", "vy*abs(vy)"): vy * np.abs(vy),
-        ("speed", "omega*abs(omega)"): turn * np.abs(turn),
+        ("turning rate", "omega*abs(omega)"): turn * np.abs(turn),
         ("speed", "sign(vx)"): np.tanh(vx / 0.02),
         ("speed", "sign(vy)"): np.tanh(vy / 0.02),
-        ("speed", "sign(omega)"): np.tanh(turn / 0.1),
+        ("turning rate", "sign(omega)"): np.tanh(turn / 0.1),
         ("coupling of the axes", "vx*omega"): vx * turn,
         ("coupling of the axes", "vy*omega"): vy * turn,
         ("coupling of the axes", "vx*vy"): vx * vy,
@@ -293,6 +335,12 @@ def _named_terms(
         term = _after_reversal(values, t_s)
         if term.any():
             terms["reversals", f"after_reversal({name})"] = term
+        terms["starts", f"after_start({name})"] = values * _since_start(moving, t_s)
+        bends = [middles[f"{name}{k}"] for k in range(len(BENDS)) if f"{name}{k}" in middles]
+        for bend in bends:
+            above = np.maximum(np.abs(values) - bend, 0.0) * np.sign(values)
+            group = "turning rate" if name == "omega" else "speed"
+            terms[group, f"sign({name})*max(0, abs({name}) - {bend:g})"] = above
     if np.ptp(theta) > 0.1:
         for n in (1, 2, 3):
             for name, wave in (("cos", np.cos(n * theta)), ("sin", np.sin(n * theta))):
@@ -319,6 +367,16 @@ def _rate(values: np.ndarray, step_s: np.ndarray) -> np.ndarray:
     """Rate of change; zero where a stretch begins."""
     rate = np.diff(values, prepend=values[0]) / np.where(step_s > 0, step_s, np.inf)
     return rate
+
+
+def _since_start(moving: np.ndarray, t_s: np.ndarray) -> np.ndarray:
+    """1 where the robot starts from rest, fading with the time since."""
+    starts = np.flatnonzero((moving > 0) & (np.r_[1.0, moving[:-1]] == 0))
+    last = np.searchsorted(starts, np.arange(len(t_s)), side="right") - 1
+    if not len(starts):
+        return np.zeros(len(t_s))
+    since_s = t_s - t_s[starts[np.maximum(last, 0)]]
+    return np.where(last >= 0, np.exp(-since_s / START_S), 0.0)
 
 
 def _after_reversal(speed: np.ndarray, t_s: np.ndarray) -> np.ndarray:

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether errors come again where the robot comes by again.
 
-Errors of way at two moments far apart in time are multiplied with each other if the moments are
-near each other in the room: a quadratic form with a Gaussian kernel over places, as in Moran's test
-of spatial correlation (Moran 1950, Biometrika 37). It asks for no formula, so that joints between
-tiles are seen like a patch of carpet. Floors are laid in strips, so that one axis of the room may
-be enough. What all ways of one block of time have in common, as while a battery sinks, is taken out
-before. A drive that repeats its path repeats every error at its place; so the errors of the smooth
-response, which knows commands and headings, must do so as well.
+Errors of way, and of turning, at two moments far apart in time are multiplied with each other if
+the moments are near each other in the room: a quadratic form with a Gaussian kernel over places, as
+in Moran's test of spatial correlation (Moran 1950, Biometrika 37). It asks for no formula, so that
+joints between tiles are seen like a patch of carpet. Floors are laid in strips, so that one axis of
+the room may be enough. What all ways of one block of time have in common, as while a battery sinks,
+is taken out before. A drive that repeats its path repeats every error at its place; so the errors
+of the smooth response, which knows commands and headings, must do so as well: of its first stage,
+since what is added to that may know places, too.
 """
 
 from collections.abc import Sequence
@@ -23,15 +24,16 @@ from twinmill.predict.windows import HORIZONS_S
 HORIZON = HORIZONS_S.index(0.5)
 LENGTHS_M = (0.1, 0.2, 0.4)  # of the kernel
 ACROSS = ([0, 1], [0], [1])  # axes of the room: spots, and strips that run right through it
+WAY, TURNING = 0, 1
 LEAST_WAY_M = 0.01  # a robot that stands tells nothing of its place
 FLIPS = 999
 STRETCH_S = 2.0  # of one random sign, and least time between two moments
 CHANCE, CHANCE_OF_RESPONSE = 0.01, 0.05
-WORTH = 0.1  # share of the squared error of way
+WORTH = 0.1  # share of the squared error of way, or of turning
 
 
 def comes_again(opened: Sequence[Opened], models: Sequence[native.Model]) -> float:
-    """Least share of the squared error of way that repeats at the same places, in all logs.
+    """Least share of the squared error that repeats at the same places, in all logs.
 
     Kernels as wide as what repeats see a part of it.
 
@@ -46,29 +48,31 @@ def comes_again(opened: Sequence[Opened], models: Sequence[native.Model]) -> flo
     chance, share = _repeats(opened, of_model)
     if chance >= CHANCE or share < WORTH:
         return 0.0
-    chance, _ = _repeats(opened, [own.floor.across for own in opened])
+    chance, _ = _repeats(opened, [own.floor.response.unboosted for own in opened])
     return share if chance < CHANCE_OF_RESPONSE else 0.0
 
 
 def _repeats(opened: Sequence[Opened], errors: Sequence[np.ndarray]) -> tuple[float, float]:
     """Chance of so large a form under random signs of stretches, and the share that repeats."""
-    kernels = list(product(LENGTHS_M, ACROSS))
+    kernels = list(product((WAY, TURNING), LENGTHS_M, ACROSS))
     total = np.zeros((len(kernels), 1 + FLIPS))
     weight = np.zeros(len(kernels))
     random = np.random.default_rng(1)
     for own, each in zip(opened, errors, strict=True):
-        ways = _of_way(own, each)
+        ways = _Ways.of(own, each)
         if len(ways.block):
             stretches = ways.stretch.max() + 1
             flips = random.choice([-1.0, 1.0], (FLIPS, stretches))
             signs = np.vstack([np.ones(stretches), flips])
-            for k, (length_m, axes) in enumerate(kernels):
-                pairs, full = _products(ways, length_m, axes)
+            for k, (of, length_m, axes) in enumerate(kernels):
+                pairs, full = _products(ways, ways.errors[of], length_m, axes)
                 total[k] += np.einsum("fi,ij,fj->f", signs, pairs, signs)
                 weight[k] += full
-    spread = total[:, 1:].std(axis=1, keepdims=True)
-    if not spread.all():
+    known = total[:, 1:].any(axis=1)
+    if not known.any():
         return 1.0, 0.0
+    total, weight = total[known], weight[known]
+    spread = total[:, 1:].std(axis=1, keepdims=True)
     highest = (total / spread).max(axis=0)
     best = int(np.argmax(total[:, 0] / spread[:, 0]))
     return float(np.mean(highest[1:] >= highest[0])), float(total[best, 0] / weight[best])
@@ -80,53 +84,57 @@ class _Ways:
 
     Attributes:
         middle_m: (n, 2) where.
-        error: (n,) along the way, over the RMS of all.
+        errors: (2, n) along the way and of turning, each over the RMS of all.
         length: (n,) of the way, over the RMS of all.
         t_s, block, stretch: (n,) when.
     """
 
     middle_m: np.ndarray
-    error: np.ndarray
+    errors: np.ndarray
     length: np.ndarray
     t_s: np.ndarray
     block: np.ndarray
     stretch: np.ndarray
 
-
-def _of_way(own: Opened, errors: np.ndarray) -> _Ways:
-    data, pose = own.data, own.data.measurement.track.pose
-    error, way = errors[:, HORIZON, :2], data.measured[:, HORIZON, :2] - errors[:, HORIZON, :2]
-    length_m = np.hypot(*way.T)
-    usable = data.keep & (np.nan_to_num(length_m) > LEAST_WAY_M)
-    error, way, length_m = error[usable], way[usable], length_m[usable]
-    block = data.block.reshape(data.measured.shape)[usable, 0, 0]
-    along = _without_common(np.sum(error * way, axis=1) / length_m, length_m, block)
-    starts, ends = data.windows.starts[usable], data.windows.ends[usable, HORIZON]
-    t_s = data.start_s[usable]
-    _, stretch = np.unique(t_s // STRETCH_S, return_inverse=True)
-    return _Ways(
-        (pose[starts, :2] + pose[ends, :2]) / 2,
-        _over_rms(along),
-        _over_rms(length_m),
-        t_s,
-        block,
-        stretch,
-    )
+    @staticmethod
+    def of(own: Opened, errors: np.ndarray) -> "_Ways":
+        """Of a log, with the (W, H, 3) errors of a model."""
+        data, pose = own.data, own.data.measurement.track.pose
+        error, way = errors[:, HORIZON], (data.measured - errors)[:, HORIZON, :2]
+        length_m = np.hypot(*way.T)
+        usable = data.keep & (np.nan_to_num(length_m) > LEAST_WAY_M)
+        error, way, length_m = error[usable], way[usable], length_m[usable]
+        block = data.block.reshape(data.measured.shape)[usable, 0, 0]
+        along = np.sum(error[:, :2] * way, axis=1) / length_m
+        both = (along, np.nan_to_num(error[:, 2]))
+        starts, ends = data.windows.starts[usable], data.windows.ends[usable, HORIZON]
+        t_s = data.start_s[usable]
+        _, stretch = np.unique(t_s // STRETCH_S, return_inverse=True)
+        return _Ways(
+            (pose[starts, :2] + pose[ends, :2]) / 2,
+            np.array([_over_rms(_without_common(e, length_m, block)) for e in both]),
+            _over_rms(length_m),
+            t_s,
+            block,
+            stretch,
+        )
 
 
 def _over_rms(values: np.ndarray) -> np.ndarray:
     return values / max(float(np.sqrt(np.mean(values**2))), 1e-12) if len(values) else values
 
 
-def _without_common(along: np.ndarray, length_m: np.ndarray, block: np.ndarray) -> np.ndarray:
+def _without_common(error: np.ndarray, length_m: np.ndarray, block: np.ndarray) -> np.ndarray:
     """Errors without what is in proportion to the way in a whole block."""
     if not len(block):
-        return along
-    moment, energy = np.bincount(block, along * length_m), np.bincount(block, length_m**2)
-    return along - (moment / np.maximum(energy, 1e-12))[block] * length_m
+        return error
+    moment, energy = np.bincount(block, error * length_m), np.bincount(block, length_m**2)
+    return error - (moment / np.maximum(energy, 1e-12))[block] * length_m
 
 
-def _products(ways: _Ways, length_m: float, axes: list[int]) -> tuple[np.ndarray, float]:
+def _products(
+    ways: _Ways, error: np.ndarray, length_m: float, axes: list[int]
+) -> tuple[np.ndarray, float]:
     """(S, S) of sums over the pairs of two stretches, and the sum if all errors were of places.
 
     Places are near each other by these axes of the room, whatever the others are. Pairs of one
@@ -137,7 +145,7 @@ def _products(ways: _Ways, length_m: float, axes: list[int]) -> tuple[np.ndarray
     far = np.abs(ways.t_s[:, None] - ways.t_s[None]) > STRETCH_S
     far &= ways.block[:, None] != ways.block[None]
     near = np.exp(-apart_m2 / (2 * length_m**2)) * far
-    strength = ways.error * ways.length
+    strength = error * ways.length
     member = (ways.stretch[:, None] == np.arange(ways.stretch.max() + 1)).astype(float)
     pairs = member.T @ (near * np.outer(strength, strength)) @ member
     return pairs, float(ways.length**2 @ near @ ways.length**2)

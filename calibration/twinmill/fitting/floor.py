@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import twinmill_native as native
 
+from twinmill.fitting.dependence import known_physics
 from twinmill.fitting.response import Response
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
@@ -70,12 +71,13 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     if reason:
         return _none(data, reason)
     velocity, base = base_response(data, model, same_clock)
+    known = list(known_physics(base, velocity, lambda m: body_velocity_at(data, m, slice(None))))
     offset_s = base.get(CLOCK)
-    response = Response(data, velocity, base.get(LAG), offset_s)
+    response = Response(data, velocity, base.get(LAG), offset_s, known)
     keep = _without_bumps(response.across, response.errors)
     if not keep.all():
         calm = replace(data, measured=np.where(keep[:, None, None], data.measured, np.nan))
-        response = Response(calm, velocity, base.get(LAG), offset_s, response)
+        response = Response(calm, velocity, base.get(LAG), offset_s, known, response)
     within, across = (
         np.where(keep[:, None, None], e, np.nan) for e in (response.within, response.across)
     )

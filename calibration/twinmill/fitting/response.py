@@ -7,18 +7,20 @@ refitted to this very log. A window's displacement is then linear in the same co
 ridge regression on the windows of the score gives them. A ridge for each group of features is
 chosen by the errors of left-out blocks (Hoerl and Kennard 1970; generalised to groups).
 
-A second stage lets the gains of that response wander over time and place. It is fitted to what the
-first one leaves on left-out blocks, since together they would have too many features.
+What that leaves on left-out blocks may depend on much else: a gain that wanders with time, place or
+way, drift, a curve, what follows an event (see dependence.py). All together would be too many
+features, so they are added by componentwise boosting (see boosting.py).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from scipy.signal import lfilter
 
+from twinmill.fitting.boosting import Learner, Parts, boosted
+from twinmill.fitting.dependence import Features, Motion, dependences
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import difference, rms
 
@@ -35,19 +37,15 @@ OUT = 1e5  # ridge over a group's mean square with which nothing of it is left
 LADDER = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, OUT)
 GROUPS = ("base", "own", "cross", "shape", "product", "room", "place")
 FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
-WANDERS = ("quick", "waves", "slow", "hats", "places")  # groups of the second stage
 WORTH = 0.998  # a ridge is taken if it lowers the left-out error to this share
-WORTH_WANDER = 0.97  # the same of the second stage: gains that wander are no usual thing
-WAVE_S = 6.0  # the shortest time over which a gain wanders
-BANDS_S = (0.0, 9.0, 18.0, np.inf)  # of the periods of waves
-MOST_WAVES = 24
-PLACES = 5  # along each side of the floor that was driven
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
 GRID_S = 0.01
 PLACE_SCALE_M = 2.0
 MIXING = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # of four mecanum wheels
 
 
+# (F,) coefficients of all rows and (K, F) without each fold.
+Coefficients = tuple[np.ndarray, np.ndarray]
 # (W,) bool, and (w, F) rows forward, left and of turning for the windows of a horizon.
 Rows = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
@@ -68,6 +66,7 @@ class Response:
         base_mps: (N, 3) velocity of the base model at each pose, refitted to this log.
         lag_s: of that base.
         offset_s: capture's clock less the robot's.
+        known: features of known physics, at each pose.
         begin: a response to the same commands whose ridges and weights are nearly right.
     """
 
@@ -77,19 +76,22 @@ class Response:
         base_mps: np.ndarray,
         lag_s: float,
         offset_s: float,
+        known: Sequence[Features],
         begin: "Response | None" = None,
     ) -> None:
         self.data, self.offset_s = data, offset_s
         self.lag_s = max(SHORTEST_LAG_S, lag_s)
         self._lay_points()
-        self.features, self.groups = self._features(base_mps[self.points])
+        self.base_mps = base_mps[self.points]
+        self.features, self.groups = self._features(self.base_mps)
         self._lay_windows()
         if begin is None:
             self._fit(rms(data.measured), [None, None])
             self._fit(self.errors, self.ridges)
         else:
             self._fit(begin.errors, begin.ridges)
-        self._fit_wandering()
+        self.unboosted = self.across
+        self._boost(known)
 
     # -- where features are taken ---------------------------------------------------------------
 
@@ -297,22 +299,43 @@ class Response:
         self.stages = [(self.features, coefficients)]
         self._judge()
 
-    def _fit_wandering(self) -> None:
-        """The second stage, fitted to what the first leaves."""
-        shapes = self._wandering()
-        groups = np.repeat(np.arange(len(WANDERS)), [s.shape[1] for s in shapes])
-        gain = np.hstack(shapes)
-        features = [gain * own[:, None] for own in self.velocity(None).T]
-        coefficients, _ = self._solved(
-            self._rows(features),
-            self._left(),
-            self.errors,
-            groups=[np.tile(groups, 2), groups],
-            begun=[np.full(len(WANDERS), OUT)] * 2,
-            worth=WORTH_WANDER,
+    def _boost(self, known: Sequence[Features]) -> None:
+        """Adds what the first stage leaves and left-out blocks agree on, a group at a time."""
+        motion = Motion(
+            velocity=self.velocity(None),
+            base=self.base_mps,
+            pose=self.pose,
+            heading_rad=self.heading_rad,
+            t_s=self.middle_s,
+            step_s=self.step_s,
         )
-        self.stages.append((features, coefficients))
+        groups = [*dependences(motion), *([f[self.points] for f in group] for group in known)]
+        left, scale = self._left(), _isotropic(self.errors)
+        for part in (0, 1):
+            used = [_only(part, g) for g in groups]
+            used = [g for g in used if sum(f.shape[1] for f in g)]
+            learners, wanted = self._learners(part, used, scale, left)
+            for number, found in boosted(learners, wanted):
+                coefficients: list[Coefficients | None] = [None, None]
+                coefficients[part] = found
+                self.stages.append((used[number], coefficients))
         self._judge()
+
+    def _learners(
+        self, part: int, groups: Sequence[Features], scale: np.ndarray, left: np.ndarray
+    ) -> tuple[list[Learner], np.ndarray]:
+        """One of each group for the plane (0) or turning (1), and the (R,) values wanted."""
+        learners, wanted = [], np.zeros(0)
+        for group in groups:
+            pieces = list(self._weighted(part, scale, self._rows(group), left))
+            if not pieces:
+                return [], wanted
+            xs, ys, parts = zip(*pieces, strict=True)
+            joined = Parts.joined(parts)
+            order = np.argsort(joined.inside, kind="stable")
+            wanted = np.concatenate(ys)[order]
+            learners.append(Learner(np.concatenate(xs)[order], joined.at(order)))
+        return learners, wanted
 
     def _solved(
         self,
@@ -344,26 +367,6 @@ class Response:
             coefficients.append(found)
         return coefficients, ridges
 
-    def _wandering(self) -> list[np.ndarray]:
-        """(N, k) shapes of each of WANDERS: waves and hats over time, bells over the floor."""
-        t_s = self.middle_s - self.middle_s.min()
-        length_s = 1.1 * t_s.max()
-        waves = np.arange(1, 1 + int(np.clip(length_s / WAVE_S, 2, MOST_WAVES)))
-        angle = 2 * np.pi * t_s[:, None] / length_s * waves
-        knots_s = np.linspace(0, t_s.max(), len(waves) + 1)
-        hats = [np.interp(t_s, knots_s, own) for own in np.eye(len(knots_s))]
-        bells = []
-        for axis in self.pose[:, :2].T:
-            middles = np.linspace(*np.quantile(axis, (0.03, 0.97)), PLACES)
-            width_m = max(middles[1] - middles[0], 0.1)
-            bells.append(np.exp(-(((axis[:, None] - middles) / width_m) ** 2)))
-        x, y = bells
-        places = (x[:, :, None] * y[:, None, :]).reshape(len(t_s), -1)
-        period_s = length_s / waves
-        bands = [(low <= period_s) & (period_s < high) for low, high in pairwise(BANDS_S)]
-        swells = [np.hstack([np.cos(angle[:, own]), np.sin(angle[:, own])]) for own in bands]
-        return [*swells, np.stack(hats, axis=-1), places]
-
     def _left(self) -> np.ndarray:
         """(W, H, 3) what the first stage, fitted to other blocks, leaves of the rows."""
         left = self.data.measured.copy()
@@ -389,6 +392,37 @@ class Response:
     ) -> tuple[tuple[np.ndarray, np.ndarray], list[Fold]] | None:
         """Normal matrices of all rows of the plane (0) or of turning (1), and of each fold."""
         total, folds = None, []
+        for x, y, parts in self._weighted(part, scale, rows, wanted):
+            if total is None:
+                total = [np.zeros((x.shape[1],) * 2), np.zeros(x.shape[1])]
+                folds = [[np.zeros_like(total[0]), np.zeros_like(total[1]),
+                          np.zeros_like(total[0]), np.zeros_like(total[1]), 0.0]
+                         for _ in range(self.folds)]  # fmt: skip
+            for k, sums in enumerate(folds):
+                inside, beside = parts.within(k), parts.beside(k)
+                a, b = x[inside].T @ x[inside], x[inside].T @ y[inside]
+                sums[2] += a
+                sums[3] += b
+                sums[4] += y[inside] @ y[inside]
+                sums[0] += a + x[beside].T @ x[beside]
+                sums[1] += b + x[beside].T @ y[beside]
+                total[0] += a
+                total[1] += b
+        if total is None:
+            return None
+        return (total[0], total[1]), [Fold((s[0], s[1]), (s[2], s[3], s[4])) for s in folds]
+
+    def _weighted(
+        self, part: int, scale: np.ndarray, rows: list[Rows], wanted: np.ndarray
+    ) -> Iterator[tuple[np.ndarray, np.ndarray, Parts]]:
+        """Rows over their errors, wanted values and parts, of each horizon and channel of a part.
+
+        Args:
+            part: the plane (0) or turning (1).
+            scale: (H, 3) errors that count as one.
+            rows: of the features.
+            wanted: (W, H, 3) what they are to make.
+        """
         for h, (ok, along, across, w) in enumerate(rows):
             chosen = ((0, along), (1, across)) if part == 0 else ((2, w),)
             for channel, x in chosen:
@@ -397,29 +431,8 @@ class Response:
                 if not size > 1e-9 or not known.any():
                     continue
                 weight = 1 / (size * np.sqrt(known.sum()))
-                x, y = x[known] * weight, y[known] * weight
-                fold, end, tail = (
-                    f[ok][known] for f in (self.fold, self.end_fold[:, h], self.tail_fold)
-                )
-                if total is None:
-                    total = [np.zeros((x.shape[1],) * 2), np.zeros(x.shape[1])]
-                    folds = [[np.zeros_like(total[0]), np.zeros_like(total[1]),
-                              np.zeros_like(total[0]), np.zeros_like(total[1]), 0.0]
-                             for _ in range(self.folds)]  # fmt: skip
-                for k, sums in enumerate(folds):
-                    inside = fold == k
-                    beside = ((end == k) | (tail == k)) & ~inside
-                    a, b = x[inside].T @ x[inside], x[inside].T @ y[inside]
-                    sums[2] += a
-                    sums[3] += b
-                    sums[4] += y[inside] @ y[inside]
-                    sums[0] += a + x[beside].T @ x[beside]
-                    sums[1] += b + x[beside].T @ y[beside]
-                    total[0] += a
-                    total[1] += b
-        if total is None:
-            return None
-        return (total[0], total[1]), [Fold((s[0], s[1]), (s[2], s[3], s[4])) for s in folds]
+                folds = (f[ok][known] for f in (self.fold, self.end_fold[:, h], self.tail_fold))
+                yield x[known] * weight, y[known] * weight, Parts(*folds, self.folds)
 
     def velocity(self, fold: int | None) -> np.ndarray:
         """(N, 3) forward, left, turning at each point; of the fit without a fold."""
@@ -451,6 +464,13 @@ class Response:
             out[own] = np.where((self.ends[own] >= 0)[..., None], out[own], np.nan)
         out[~np.isfinite(self.data.measured)] = np.nan
         return out
+
+
+def _only(part: int, group: Features) -> Features:
+    """What of a group moves the plane (0) or turns (1)."""
+    forward, left, turning = group
+    none = np.zeros((len(turning), 0))
+    return (forward, left, none) if part == 0 else (none, none, turning)
 
 
 def _isotropic(scale: np.ndarray) -> np.ndarray:

@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a robot's velocity may depend on beside its commands of the last moments.
+
+Each dependence is a group of features of the three velocities of the body. It may scale a velocity
+(a gain that changes with time, place, heading or way), turn one motion into another, drift by
+itself while the robot moves, bend the curve of a speed, or follow an event: a start, a reversal, a
+rise of the speed. Physics that is known is one more group each: what the effects of the catalogue
+would change in a robot that lacks them.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import twinmill_native as native
+from scipy.signal import lfilter
+
+from twinmill.model.parameters import WHERE_OR_WHEN, effect_names, effect_parameters
+
+SHORTEST_S = 4.0  # period of a gain that changes with time
+SHORTEST_M = 0.7  # the same with the way driven
+MOST_WAVES = 36
+PLACES = 5  # along each side of the floor that was driven
+STRIPS = 12
+CURVE = 12  # nodes over a speed
+TURNED = 8  # nodes over the angle turned
+FADES_S = (0.05, 0.15, 0.4, 1.0)  # how long an event is felt
+STILL = 0.03  # share of the largest speed
+MOVES = 0.1  # the same: from here on something drifts as much as it will
+STRENGTHS = (1.0, 0.35)  # of a known effect, times its usual one
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A robot's motion at N points of a log.
+
+    Attributes:
+        velocity: (N, 3) of the body as the commands make it, m/s and rad/s.
+        base: (N, 3) of a model of the robot.
+        pose: (N, 3) measured.
+        heading_rad: (N,) in the middle of the step to each point.
+        t_s: (N,) robot's clock.
+        step_s: (N,) from the point before; 0 where a stretch begins.
+    """
+
+    velocity: np.ndarray
+    base: np.ndarray
+    pose: np.ndarray
+    heading_rad: np.ndarray
+    t_s: np.ndarray
+    step_s: np.ndarray
+
+    @property
+    def speed_mps(self) -> np.ndarray:
+        """(N,) of the model, whatever the direction."""
+        return np.hypot(self.base[:, 0], self.base[:, 1])
+
+    @property
+    def moves(self) -> np.ndarray:
+        """(N,) 0 at rest, 1 in motion."""
+        relative = np.abs(self.base) / np.maximum(np.abs(self.base).max(axis=0), 1e-9)
+        return np.clip(relative.max(axis=1) / MOVES, 0.0, 1.0)
+
+
+Features = Sequence[np.ndarray]  # (N, f) forward, left, turning
+
+
+def dependences(motion: Motion) -> Iterator[Features]:
+    """Groups of features."""
+    where, head = _where(motion), _harmonics(motion.heading_rad)
+    always = np.hstack([np.ones((len(head), 1)), head])
+    turned = np.cumsum(motion.base[:, 2] * motion.step_s)
+    hours = _hats(motion.t_s, motion.t_s.min(), motion.t_s.max(), _count(motion.t_s, 6.0, 24))
+    for gain in (*where, head, hours, _hats(turned, turned.min(), turned.max(), TURNED)):
+        yield _scaled(motion, gain)
+    way = np.cumsum(motion.speed_mps * motion.step_s)
+    for along, shortest in ((motion.t_s - motion.t_s.min(), SHORTEST_S), (way, SHORTEST_M)):
+        for wave in _waves(along, shortest):
+            yield _scaled(motion, wave)
+    for gain in (always, *where, hours):
+        yield from _drifts(motion, gain)
+    for gain in (always, *where):
+        yield _crossed(motion, gain)
+    yield from _curves(motion)
+    yield from _events(motion)
+
+
+def known_physics(
+    base: native.Model, velocity: np.ndarray, predict: Callable[[native.Model], np.ndarray]
+) -> Iterator[Features]:
+    """What each effect of the catalogue would change, but those that are somewhere or sometimes.
+
+    Args:
+        base: a model without effects.
+        velocity: (N, 3) that it predicts.
+        predict: the same of another model.
+    """
+    for card in native.catalogue():
+        parameters = {p["name"]: p["role"] for p in card["parameters"]}
+        if set(parameters.values()) & set(WHERE_OR_WHEN) or not parameters:
+            continue
+        changes = []
+        for strength in STRENGTHS:
+            model = base.copy()
+            try:
+                model.add_effect(card["name"])
+            except ValueError:  # not of such a robot
+                break
+            for p in effect_parameters(model, effect_names(model)[-1], fresh=True):
+                model.set(p.name, p.usual + strength * (p.value - p.usual))
+            changes.append(predict(model) - velocity)
+        if changes and np.abs(changes[0]).max() > 1e-9:
+            forward, left, turning = np.stack(changes, axis=-1).transpose(1, 0, 2)
+            yield forward, left, turning
+
+
+def _scaled(motion: Motion, gain: np.ndarray) -> Features:
+    """Each velocity times (N, k) gains."""
+    forward, left, turning = (gain * own[:, None] for own in motion.velocity.T)
+    return forward, left, turning
+
+
+def _crossed(motion: Motion, gain: np.ndarray) -> Features:
+    """What turning makes of driving and driving of turning, times (N, k) gains."""
+    forward, left, turning = _scaled(motion, gain)
+    return turning, turning, np.hstack([forward, left])
+
+
+def _drifts(motion: Motion, gain: np.ndarray) -> Iterator[Features]:
+    """Motion along the room's axes, and turning, while the robot moves, times (N, k) gains."""
+    drift = gain * motion.moves[:, None]
+    c, s = np.cos(motion.heading_rad)[:, None], np.sin(motion.heading_rad)[:, None]
+    yield np.hstack([drift * c, drift * s]), np.hstack([-drift * s, drift * c]), drift
+    none = np.zeros((len(gain), 0))
+    yield none, none, gain * motion.speed_mps[:, None]
+
+
+def _curves(motion: Motion) -> Iterator[Features]:
+    """Over the own speed, and over that of the other motion."""
+    base = motion.base
+    yield tuple(_levels(np.abs(own)) * np.sign(own)[:, None] for own in base.T)
+    spin, speed = _levels(np.abs(base[:, 2])), _levels(motion.speed_mps)
+    forward, left, turning = motion.velocity.T[..., None]
+    yield spin * forward, spin * left, speed * turning
+    yield spin, spin, np.hstack([speed, speed * np.sign(base[:, :1])])
+
+
+def _events(motion: Motion) -> Iterator[Features]:
+    """What fades after speeds rose, after reversals, and after the robot started from rest."""
+    base, step_s = motion.base, motion.step_s
+    largest = np.maximum(np.abs(base).max(axis=0), 1e-9)
+    rises = np.maximum(np.diff(np.abs(base), axis=0, prepend=np.abs(base[:1])), 0) * np.sign(base)
+    ways = np.where(np.abs(base) > MOVES * largest, np.sign(base), 0.0)
+    reversals = np.column_stack([_reversals(way) for way in ways.T])
+    for event in (rises, reversals):
+        fading = np.hstack([_fading(event, fade_s, step_s) for fade_s in FADES_S])
+        yield fading, fading, fading
+    still = (np.abs(base) < STILL * largest).all(axis=1)
+    starts = np.flatnonzero(~still & np.r_[True, still[:-1]])
+    last = np.searchsorted(starts, np.arange(len(base)), side="right") - 1
+    since_s = np.full(len(base), np.inf)
+    begun = last >= 0
+    since_s[begun] = motion.t_s[begun] - motion.t_s[starts[last[begun]]]
+    slow = np.hstack([np.exp(-since_s / fade_s)[:, None] * base for fade_s in FADES_S])
+    yield slow, slow, slow
+
+
+def _reversals(way: np.ndarray) -> np.ndarray:
+    """(N,) the new sign where the last one that was not 0 was the other, else 0."""
+    moving = np.flatnonzero(way)
+    turned = moving[1:][way[moving[1:]] != way[moving[:-1]]]
+    out = np.zeros(len(way))
+    out[turned] = way[turned]
+    return out
+
+
+def _fading(events: np.ndarray, fade_s: float, step_s: np.ndarray) -> np.ndarray:
+    """(N, n) events that each fade, on steps that are taken to be even."""
+    period_s = float(np.median(step_s[step_s > 0]))
+    return lfilter([1.0], [1.0, -np.exp(-period_s / fade_s)], events, axis=0)
+
+
+def _where(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """(N, k) bells over the floor, and hats along each of its sides."""
+    bells, strips = [], []
+    for axis in motion.pose[:, :2].T:
+        low, high = np.quantile(axis, (0.03, 0.97))
+        middles = np.linspace(low, high, PLACES)
+        width_m = max(middles[1] - middles[0], 0.1)
+        bells.append(np.exp(-(((axis[:, None] - middles) / width_m) ** 2)))
+        strips.append(_hats(axis, low, high, STRIPS))
+    x, y = bells
+    return (x[:, :, None] * y[:, None, :]).reshape(len(axis), -1), np.hstack(strips)
+
+
+def _harmonics(angle: np.ndarray) -> np.ndarray:
+    """(N, 4) of an angle."""
+    return np.stack([np.cos(angle), np.sin(angle), np.cos(2 * angle), np.sin(2 * angle)], axis=-1)
+
+
+def _count(along: np.ndarray, shortest: float, most: int) -> int:
+    return int(np.clip(1.1 * np.ptp(along) / shortest, 2, most))
+
+
+def _waves(along: np.ndarray, shortest: float) -> Iterator[np.ndarray]:
+    """(N, 4) two neighbours of a row of waves, so that one between them is met."""
+    angle = 2 * np.pi * along / max(1.1 * np.ptp(along), 1e-9)
+    for k in range(1, 1 + _count(along, shortest, MOST_WAVES)):
+        yield np.hstack([_harmonics(k * angle)[:, :2], _harmonics((k + 1) * angle)[:, :2]])
+
+
+def _levels(size: np.ndarray) -> np.ndarray:
+    """(N, CURVE - 1) hats over a speed, 0 at rest."""
+    return _hats(size, 0.0, max(size.max(), 1e-9), CURVE)[:, 1:]
+
+
+def _hats(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
+    """(N, count) pieces of a line that is broken at even nodes."""
+    nodes = np.linspace(low, max(high, low + 1e-9), count)
+    return np.stack([np.interp(values, nodes, one) for one in np.eye(count)], axis=-1)
