@@ -45,16 +45,27 @@ def comes_again(opened: Sequence[Opened], models: Sequence[native.Model]) -> flo
         0 where it could be chance, or is little.
     """
     of_model = [own.data.errors(model) for own, model in zip(opened, models, strict=True)]
-    chance, share = _repeats(opened, of_model)
-    if chance >= CHANCE or share < WORTH:
-        return 0.0
-    chance, _ = _repeats(opened, [own.floor.response.unboosted for own in opened])
-    return share if chance < CHANCE_OF_RESPONSE else 0.0
+    of_response = [own.floor.response.unboosted for own in opened]
+    found = [0.0]
+    for of in (WAY, TURNING):
+        chance, share = _repeats(opened, of_model, of)
+        if chance < CHANCE and share > WORTH:
+            chance, _ = _repeats(opened, of_response, of)
+            found.append(share if chance < CHANCE_OF_RESPONSE else 0.0)
+    return max(found)
 
 
-def _repeats(opened: Sequence[Opened], errors: Sequence[np.ndarray]) -> tuple[float, float]:
-    """Chance of so large a form under random signs of stretches, and the share that repeats."""
-    kernels = list(product((WAY, TURNING), LENGTHS_M, ACROSS))
+def _repeats(
+    opened: Sequence[Opened], errors: Sequence[np.ndarray], of: int
+) -> tuple[float, float]:
+    """Chance of so large a form under random signs of stretches, and the share that repeats.
+
+    Args:
+        opened: logs over their floors.
+        errors: (W, H, 3) of each.
+        of: WAY or TURNING.
+    """
+    kernels = list(product(LENGTHS_M, ACROSS))
     total = np.zeros((len(kernels), 1 + FLIPS))
     weight = np.zeros(len(kernels))
     random = np.random.default_rng(1)
@@ -64,15 +75,13 @@ def _repeats(opened: Sequence[Opened], errors: Sequence[np.ndarray]) -> tuple[fl
             stretches = ways.stretch.max() + 1
             flips = random.choice([-1.0, 1.0], (FLIPS, stretches))
             signs = np.vstack([np.ones(stretches), flips])
-            for k, (of, length_m, axes) in enumerate(kernels):
+            for k, (length_m, axes) in enumerate(kernels):
                 pairs, full = _products(ways, ways.errors[of], length_m, axes)
                 total[k] += np.einsum("fi,ij,fj->f", signs, pairs, signs)
                 weight[k] += full
-    known = total[:, 1:].any(axis=1)
-    if not known.any():
-        return 1.0, 0.0
-    total, weight = total[known], weight[known]
     spread = total[:, 1:].std(axis=1, keepdims=True)
+    if not spread.all():
+        return 1.0, 0.0
     highest = (total / spread).max(axis=0)
     best = int(np.argmax(total[:, 0] / spread[:, 0]))
     return float(np.mean(highest[1:] >= highest[0])), float(total[best, 0] / weight[best])

@@ -116,6 +116,8 @@ def boosted(
         wanted: (R,) values.
     """
     wanted = wanted.astype(np.float32)
+    if not learners:
+        return
     for _ in range(MOST_GROUPS):
         gains = [learner.gain(wanted) for learner in learners]
         best = int(np.argmax([fall for fall, _ in gains]))

@@ -23,8 +23,11 @@ from twinmill.predict.windows import HORIZONS_S
 EVERY_S, WINDOWS, BLOCK_S = 0.25, 400, 8.0
 
 
-def wander(seed, gain_at, half_m=1.0):
-    """A log of a robot that wanders over a square; its ways are longer by `gain_at` (x, y, t)."""
+def wander(seed, gain_at, half_m=1.0, turn_at=None):
+    """A log of a robot that wanders over a square; its ways are longer by `gain_at` (x, y, t).
+
+    And it turns by `turn_at` (x, y, t), rad, more than the model says.
+    """
     random = np.random.default_rng(seed)
     t_s = EVERY_S * np.arange(WINDOWS + 2)
     heading = np.cumsum(random.normal(0, 0.5, len(t_s)))
@@ -42,6 +45,8 @@ def wander(seed, gain_at, half_m=1.0):
     middle = (at[starts] + at[starts + 2]) / 2
     errors = random.normal(0, 0.003, way.shape)
     errors[:, HORIZON, 0] += 2 * step_m * gain_at(*middle.T, t_s[starts])
+    if turn_at:
+        errors[:, HORIZON, 2] += turn_at(*middle.T, t_s[starts])
     block = np.repeat((t_s[starts] // BLOCK_S).astype(int), way[0].size)
     ends = np.tile((starts + 2)[:, None], (1, len(HORIZONS_S)))
     track = SimpleNamespace(pose=np.column_stack([at, heading]))
@@ -51,7 +56,8 @@ def wander(seed, gain_at, half_m=1.0):
         block=block, windows=SimpleNamespace(starts=starts, ends=ends),
         measurement=SimpleNamespace(track=track),
     )  # fmt: skip
-    return SimpleNamespace(data=data, floor=SimpleNamespace(across=errors))
+    response = SimpleNamespace(unboosted=errors)
+    return SimpleNamespace(data=data, floor=SimpleNamespace(response=response))
 
 
 def test_joints_between_tiles_come_again_at_their_places():
@@ -69,6 +75,16 @@ def test_strips_across_a_large_room_come_again_though_few_spots_do(seed):
         return 0.05 * np.sin(2 * np.pi * y / 0.6)
 
     assert comes_again([wander(seed, strips, half_m=3.0)], [None]) > 0.1
+
+
+def test_a_strip_that_turns_robots_comes_again():
+    def none(x, y, t):
+        return 0 * x
+
+    def strip(x, y, t):
+        return 0.01 * (np.abs(x - 0.3) < 0.2)
+
+    assert comes_again([wander(2, none, turn_at=strip)], [None]) > 0.1
 
 
 @pytest.mark.parametrize("seed", range(5))
