@@ -23,6 +23,7 @@ from twinmill.fitting.score_fit import ScoreFit
 FOLDS = 5
 FLIPS = 499  # random signs of blocks that make the null distribution
 BESIDE = 0.1  # share by which a group must raise what better groups bring
+ALIKE = 0.9  # share of the best group's gain: these logs do not tell the two apart
 ALPHA = 0.01  # chance of naming anything if nothing is left, over all that is tested
 AGAIN = 2.0  # times what the model left in other logs already: no news
 FIRM_T = 3.0
@@ -239,10 +240,13 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
 def _without_shadows(
     groups: list[Dependence], terms: list[Term], products: "Products"
 ) -> list[Dependence]:
-    """Those groups that bring something beside the better ones."""
+    """Those groups that bring something beside the better ones, or as much as the best."""
     kept: list[Dependence] = []
     gain = 0.0
     for group in groups:
+        if kept and group.gain > ALIKE * kept[0].gain:
+            kept = [*kept, group]
+            continue
         names = {d.group for d in [*kept, group]}
         together, _ = products.held_out(np.array([t.group in names for t in terms]))
         if not kept or together > (1 + BESIDE) * gain:
