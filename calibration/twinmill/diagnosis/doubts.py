@@ -117,8 +117,7 @@ def _unusual(card: dict, own: Sequence[ParameterEstimate]) -> str:
 def _faster(name: str, own: Sequence[ParameterEstimate]) -> str:
     """A doubt where a loss at a place or a moment makes the robot faster; else empty."""
     loss, *_ = own
-    placed = any(with_role(name, role) for role in WHERE_OR_WHEN)
-    if placed and loss.value < -SETTINGS.within * loss.std:
+    if _is_event(name) and loss.value < -SETTINGS.within * loss.std:
         return (
             f"{loss.name} = {loss.value:.3g} makes the robot faster, which few floors or faults do"
         )
@@ -213,7 +212,7 @@ def of_another_form(found: Sequence[Finding], rest: Rest) -> list[Finding]:
     So it is where what is left still depends on what they act by; where one makes the robot later
     and another sooner: a lag below its own and a delay imitate a body that swings; and where a
     second one of KINDS does what a better one does already; and where losses come at several times,
-    or as large ones at a place and at a moment.
+    or as large ones at a place and at a moment, or are doubtful beside single moments.
 
     Args:
         found: in the order of worth.
@@ -231,6 +230,9 @@ def of_another_form(found: Sequence[Finding], rest: Rest) -> list[Finding]:
         if finding in losses and len(losses) > 1:
             why = "losses at several times may be one that comes and goes"
             return doubted(finding, why, wrong_form=True, depends_on=TIME)
+        if rest.moments and finding.certainty == "doubtful" and _is_event(finding.effect):
+            why = "single moments are left, of which this may be some"
+            return doubted(finding, why, wrong_form=True)
         acts_by = _acts_by(finding.effect)
         on = next((group for group in depends_on if BY.get(group, set()) & acts_by), None)
         if on is not None:
@@ -323,6 +325,11 @@ def _bends(effect: str) -> bool:
 def _is_placed(effect: str) -> bool:
     """Whether it changes with the place in the room."""
     return "places" in _acts_by(effect)
+
+
+def _is_event(effect: str) -> bool:
+    """Whether it is at a place or from a moment on."""
+    return any(with_role(effect, role) for role in WHERE_OR_WHEN)
 
 
 def _is_timed(effect: str) -> bool:

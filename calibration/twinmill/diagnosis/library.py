@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
+from scipy.signal import lfilter
 
 from twinmill.data.track import command_at
 from twinmill.fitting.floor import body_velocity_at
@@ -23,13 +24,13 @@ SPEEDS = ("vx", "vy", "omega")
 # m/s, m/s, rad/s, m/s: what a term of full size may add.
 TYPICAL = {"vx_mps": 0.01, "vy_mps": 0.01, "omega_radps": 0.05, "rim_mps": 0.01}
 # Rates, voltage, history: not at hand in a body's formula.
-NO_NAMES = {"dvx", "dvy", "domega", "V", "way", "after_reversal", "after_start"}
+NO_NAMES = {"dvx", "dvy", "domega", "V", "way", "after_reversal", "after_start", "after_rise"}
 SWELL = 0.05  # share of all speeds: a usual loss
 CHANGE = "change of the command"
 TIME = "time"
 WAY = "way driven"
 REVERSAL_S = 0.15  # how long a reversal is felt
-START_S = 0.4  # the same of a start from rest
+START_S = 0.4  # the same of a start from rest, and of a rise of the speed
 # Of one wheel's command, with its half `h`; in proportion to u is a wheel's gain.
 SHAPES = ("u*abs(u)", "abs(u)", "sign(u)*max(0, abs(u) - h)")
 
@@ -335,6 +336,7 @@ def _named_terms(
         term = _after_reversal(values, t_s)
         if term.any():
             terms["reversals", f"after_reversal({name})"] = term
+        terms[CHANGE, f"after_rise({name})"] = _after_rise(values, response.step_s)
         terms["starts", f"after_start({name})"] = values * _since_start(moving, t_s)
         bends = [middles[f"{name}{k}"] for k in range(len(BENDS)) if f"{name}{k}" in middles]
         for bend in bends:
@@ -357,6 +359,9 @@ def _named_terms(
             terms[group, f"{text}*{carrier}"] = away * speed
             if group == "place":
                 terms[group, f"{text}*{text}*{carrier}"] = away**2 * speed
+        if group == "place":
+            for wave, part in (("cos", np.cos(theta)), ("sin", np.sin(theta))):
+                terms[group, f"{text}*{wave}(theta)*moves"] = away * part * moving
     for at_s in (middles[f"t{k}"] for k in range(len(PARTS))):
         for carrier, speed in speeds:
             terms[TIME, f"sign(t - {at_s:g})*{carrier}"] = np.sign(t_s - at_s) * speed
@@ -367,6 +372,13 @@ def _rate(values: np.ndarray, step_s: np.ndarray) -> np.ndarray:
     """Rate of change; zero where a stretch begins."""
     rate = np.diff(values, prepend=values[0]) / np.where(step_s > 0, step_s, np.inf)
     return rate
+
+
+def _after_rise(speed: np.ndarray, step_s: np.ndarray) -> np.ndarray:
+    """By how much a speed rose lately, fading with the time since; its sign is the speed's."""
+    rise = np.maximum(np.diff(np.abs(speed), prepend=np.abs(speed[0])), 0.0) * np.sign(speed)
+    period_s = float(np.median(step_s[step_s > 0]))
+    return lfilter([1.0], [1.0, -np.exp(-period_s / START_S)], rise)
 
 
 def _since_start(moving: np.ndarray, t_s: np.ndarray) -> np.ndarray:
