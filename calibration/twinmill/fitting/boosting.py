@@ -84,13 +84,10 @@ class Learner:
         best = int(np.argmax(falls))
         return float(falls[best]), LADDER[best]
 
-    def fitted(self, wanted: np.ndarray, ridge: float) -> tuple[np.ndarray, np.ndarray]:
-        """(F,) coefficients of all rows and (K, F) without each part."""
-        rise = self.mean * ridge
+    def fitted(self, wanted: np.ndarray, ridge: float) -> np.ndarray:
+        """(K, F) coefficients without each part."""
         _, pull = self._moments(wanted)
-        each = np.einsum("kfg,kg->kf", self.vectors, pull / (self.values + rise))
-        every = np.linalg.solve(self.total + rise * np.eye(len(self.total)), wanted @ self.x)
-        return every, each
+        return np.einsum("kfg,kg->kf", self.vectors, pull / (self.values + self.mean * ridge))
 
     def left(self, wanted: np.ndarray, each: np.ndarray) -> np.ndarray:
         """(R,) what the fits without each part leave of its rows."""
@@ -106,10 +103,8 @@ class Learner:
         return push, pull
 
 
-def boosted(
-    learners: Sequence[Learner], wanted: np.ndarray
-) -> Iterator[tuple[int, tuple[np.ndarray, np.ndarray]]]:
-    """Those taken, in order: number, and coefficients as of `Learner.fitted`.
+def boosted(learners: Sequence[Learner], wanted: np.ndarray) -> Iterator[tuple[int, float]]:
+    """Those taken, in order: number and ridge.
 
     Args:
         learners: of the same rows.
@@ -123,6 +118,6 @@ def boosted(
         best = int(np.argmax([fall for fall, _ in gains]))
         if gains[best][0] < (1 - WORTH) * float(wanted @ wanted):
             return
-        found = learners[best].fitted(wanted, gains[best][1])
-        wanted = learners[best].left(wanted, found[1]).astype(np.float32)
-        yield best, found
+        each = learners[best].fitted(wanted, gains[best][1])
+        wanted = learners[best].left(wanted, each).astype(np.float32)
+        yield best, gains[best][1]

@@ -73,7 +73,7 @@ def dependences(motion: Motion) -> Iterator[Features]:
     hours = _hats(motion.t_s, motion.t_s.min(), motion.t_s.max(), _count(motion.t_s, 6.0, 24))
     for gain in (*where, head, hours, _hats(turned, turned.min(), turned.max(), TURNED)):
         yield _scaled(motion, gain)
-    way = np.cumsum(motion.speed_mps * motion.step_s)
+    way = _way_m(motion)
     for along, shortest in ((motion.t_s - motion.t_s.min(), SHORTEST_S), (way, SHORTEST_M)):
         for wave in _waves(along, shortest):
             yield _scaled(motion, wave)
@@ -112,6 +112,17 @@ def known_physics(
         if changes and np.abs(changes[0]).max() > 1e-9:
             forward, left, turning = np.stack(changes, axis=-1).transpose(1, 0, 2)
             yield forward, left, turning
+
+
+def _way_m(motion: Motion) -> np.ndarray:
+    """(N,) way driven, measured along the direction in which the model drives."""
+    c, s = np.cos(motion.heading_rad), np.sin(motion.heading_rad)
+    forward, left = motion.base[:, 0], motion.base[:, 1]
+    along = np.column_stack([c * forward - s * left, s * forward + c * left])
+    along /= np.maximum(motion.speed_mps, 1e-9)[:, None]
+    step_m = np.diff(motion.pose[:, :2], axis=0, prepend=motion.pose[:1, :2])
+    ahead_m = np.sum(step_m * along, axis=1)
+    return np.cumsum(np.where((motion.step_s > 0) & (motion.moves > 0), ahead_m, 0.0))
 
 
 def _scaled(motion: Motion, gain: np.ndarray) -> Features:
@@ -204,8 +215,8 @@ def _count(along: np.ndarray, shortest: float, most: int) -> int:
 
 def _waves(along: np.ndarray, shortest: float) -> Iterator[np.ndarray]:
     """(N, 4) two neighbours of a row of waves, so that one between them is met."""
-    angle = 2 * np.pi * along / max(1.1 * np.ptp(along), 1e-9)
-    for k in range(1, 1 + _count(along, shortest, MOST_WAVES)):
+    angle = np.pi * along / max(1.1 * np.ptp(along), 1e-9)
+    for k in range(2, 2 * _count(along, shortest, MOST_WAVES)):
         yield np.hstack([_harmonics(k * angle)[:, :2], _harmonics((k + 1) * angle)[:, :2]])
 
 

@@ -293,10 +293,9 @@ class Response:
         first = np.array([FIRST_RIDGE.get(g, OUT) for g in GROUPS])
         begun = [first if ridge is None else ridge for ridge in ridges]
         groups = [np.concatenate(self.groups[:2]), self.groups[2]]
-        coefficients, self.ridges = self._solved(
+        self.coefficients, self.ridges = self._solved(
             self.rows, self.data.measured, scale, groups=groups, begun=begun, worth=WORTH
         )
-        self.stages = [(self.features, coefficients)]
         self._judge()
 
     def _boost(self, known: Sequence[Features]) -> None:
@@ -310,16 +309,27 @@ class Response:
             step_s=self.step_s,
         )
         groups = [*dependences(motion), *([f[self.points] for f in group] for group in known)]
-        left, scale = self._left(), _isotropic(self.errors)
+        scale = self.errors
+        left, chosen = self._left(), []
         for part in (0, 1):
             used = [_only(part, g) for g in groups]
             used = [g for g in used if sum(f.shape[1] for f in g)]
-            learners, wanted = self._learners(part, used, scale, left)
-            for number, found in boosted(learners, wanted):
-                coefficients: list[Coefficients | None] = [None, None]
-                coefficients[part] = found
-                self.stages.append((used[number], coefficients))
-        self._judge()
+            learners, wanted = self._learners(part, used, _isotropic(scale), left)
+            chosen += [(used[n], ridge) for n, ridge in boosted(learners, wanted)]
+        if chosen:
+            self._fit_with(chosen, scale)
+
+    def _fit_with(self, chosen: Sequence[tuple[Features, float]], scale: np.ndarray) -> None:
+        """Fits the first features and chosen groups together, each group at its own ridge."""
+        first = len(GROUPS)
+        for k, (group, _) in enumerate(chosen):
+            for axis, features in enumerate(group):
+                number = np.full(features.shape[1], first + k)
+                self.features[axis] = np.hstack([self.features[axis], features])
+                self.groups[axis] = np.concatenate([self.groups[axis], number])
+        fresh = [ridge for _, ridge in chosen]
+        self.rows = self._rows(self.features)
+        self._fit(scale, [np.concatenate([own, fresh]) for own in self.ridges])
 
     def _learners(
         self, part: int, groups: Sequence[Features], scale: np.ndarray, left: np.ndarray
@@ -370,7 +380,7 @@ class Response:
     def _left(self) -> np.ndarray:
         """(W, H, 3) what the first stage, fitted to other blocks, leaves of the rows."""
         left = self.data.measured.copy()
-        plane, turn = self.stages[0][1]
+        plane, turn = self.coefficients
         for h, (ok, along, across, w) in enumerate(self.rows):
             for channel, x, found in ((0, along, plane), (1, across, plane), (2, w, turn)):
                 if found is not None:
@@ -437,14 +447,14 @@ class Response:
     def velocity(self, fold: int | None) -> np.ndarray:
         """(N, 3) forward, left, turning at each point; of the fit without a fold."""
         found = np.zeros((len(self.points), 3))
-        for features, (plane, turn) in self.stages:
-            width = features[0].shape[1]
-            if plane is not None:
-                beta = plane[0] if fold is None else plane[1][fold]
-                found[:, 0] += features[0] @ beta[:width]
-                found[:, 1] += features[1] @ beta[width:]
-            if turn is not None:
-                found[:, 2] += features[2] @ (turn[0] if fold is None else turn[1][fold])
+        plane, turn = self.coefficients
+        if plane is not None:
+            beta = plane[0] if fold is None else plane[1][fold]
+            width = self.features[0].shape[1]
+            found[:, 0] = self.features[0] @ beta[:width]
+            found[:, 1] = self.features[1] @ beta[width:]
+        if turn is not None:
+            found[:, 2] = self.features[2] @ (turn[0] if fold is None else turn[1][fold])
         return found
 
     def predict(self, fold: np.ndarray | None) -> np.ndarray:

@@ -75,6 +75,10 @@ class TanhRobot:
             speeds[k] = now
         return speeds
 
+    def hindered(self, motion: np.ndarray) -> np.ndarray:
+        """(K, 3) velocities of the body to those that are left of them: all."""
+        return motion
+
     def poses(self, duty: np.ndarray, seed: int) -> np.ndarray:
         """(K, 4) duties to (K, 3) poses as seen at the end of each step."""
         random = np.random.default_rng(seed)
@@ -85,9 +89,12 @@ class TanhRobot:
             drift[k + 1] = keep * drift[k] + np.sqrt(1 - keep**2) * fresh
         drift *= (self.drive_mps, self.drive_mps, self.drive_radps)
         drift[np.abs([fl, fr, rl, rr]).max(axis=0) < STANDSTILL_MPS] = 0
-        forward = (fl + fr + rl + rr) / 4 + drift[:, 0]
-        left = self.sideways * (-fl + fr + rl - rr) / 4 + drift[:, 1]
-        turn = self.yaw * (-fl + fr - rl + rr) / 4 / self.lever_m + drift[:, 2]
+        motion = np.column_stack([
+            (fl + fr + rl + rr) / 4,
+            self.sideways * (-fl + fr + rl - rr) / 4,
+            self.yaw * (-fl + fr - rl + rr) / 4 / self.lever_m,
+        ])  # fmt: skip
+        forward, left, turn = (self.hindered(motion) + drift).T
         heading = np.cumsum(turn) * STEP_S
         c, s = np.cos(heading), np.sin(heading)
         x, y = (np.cumsum(v) * STEP_S for v in (c * forward - s * left, s * forward + c * left))

@@ -96,6 +96,43 @@ def test_a_gain_that_swells_and_ebbs_is_not_all_noise(tanh_robot, measure, model
     assert np.all(opened.floor.rms[2:, 0] < 0.65 * swell)
 
 
+def sticks(motion):
+    """Slow turning sticks."""
+    turn = motion[:, 2]
+    return np.column_stack([motion[:, :2], np.where(np.abs(turn) < 1.2, 0.3 * turn, turn)])
+
+
+def worn(motion):
+    """A gear that is worn at one place of a slow wheel: 0.3 more and less, over 3 m of way."""
+    way_m = np.cumsum(np.hypot(motion[:, 0], motion[:, 1])) * EULER_S
+    gain = 1 + 0.3 * np.cos(2 * np.pi * way_m / 3)
+    return motion * np.column_stack([gain, gain, np.ones(len(gain))])
+
+
+@pytest.mark.parametrize("hidden", [sticks, worn])
+def test_physics_that_no_model_has_is_no_noise(hidden, tanh_robot, measure, model_file):
+    """The noise is known from the same drive without it, what is hidden from one without both.
+
+    At 1 and 2 s the hidden physics takes the robot five times as far as the noise or more.
+    """
+
+    class Hindered(tanh_robot):
+        def hindered(self, motion):
+            return hidden(motion)
+
+    (opened,) = open_measurements([measure(Hindered(), 2, 120.0)], model_file())
+
+    def away(robot):
+        path = opened.data.windows.measured(measure(robot, 2, 120.0))
+        return np.sqrt(np.mean(rms(difference(opened.data.measured, path))[3:] ** 2, axis=0))
+
+    noise, without = away(Hindered(**NO_NOISE)), away(tanh_robot(**NO_NOISE))
+    floor = np.sqrt(np.mean(opened.floor.rms[3:] ** 2, axis=0))
+    hurt = np.argmax(without / noise)
+    assert without[hurt] > 5 * noise[hurt]
+    assert floor[hurt] < 2 * noise[hurt]
+
+
 def test_the_right_model_scores_one_and_a_wrong_one_more(drive, true_model, model_file):
     right = compare([drive], true_model).score
     assert 0.85 <= right <= 1.1
