@@ -297,7 +297,7 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
             return doubted(finding, why, depends_on=on)
         if rest.firm and rest.share > SETTINGS.lag_leaves and _is_late(finding.effect):
             why = "much is left: something else at changes of the command may be late"
-            return doubted(finding, why, wrong_form=True)
+            return doubted(finding, why, wrong_form=not rest.moments)
         if rest.share > SETTINGS.much_left:
             return doubted(finding, "much is left, so that it may be a part of something else")
         return finding
