@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 LADDER = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # ridges over a group's mean square
-WORTH = 0.97  # a group is taken if it lowers the left-out error to this share
+WORTH = 0.03  # share of the left-out error that a group must take at least
 MOST_GROUPS = 8
 
 
@@ -103,20 +103,25 @@ class Learner:
         return push, pull
 
 
-def boosted(learners: Sequence[Learner], wanted: np.ndarray) -> Iterator[tuple[int, float]]:
+def boosted(
+    learners: Sequence[Learner], wanted: np.ndarray, independent: float
+) -> Iterator[tuple[int, float]]:
     """Those taken, in order: number and ridge.
 
     Args:
         learners: of the same rows.
         wanted: (R,) values.
+        independent: how many of the values are. The best of so many groups takes about
+            2 ln(groups) / independent of an error that is noise: less than that is none.
     """
+    least = max(WORTH, 2 * np.log(max(len(learners), 1)) / independent)
     wanted = wanted.astype(np.float32)
     if not learners:
         return
     for _ in range(MOST_GROUPS):
         gains = [learner.gain(wanted) for learner in learners]
         best = int(np.argmax([fall for fall, _ in gains]))
-        if gains[best][0] < (1 - WORTH) * float(wanted @ wanted):
+        if gains[best][0] < least * float(wanted @ wanted):
             return
         each = learners[best].fitted(wanted, gains[best][1])
         wanted = learners[best].left(wanted, each).astype(np.float32)

@@ -22,7 +22,7 @@ from scipy.signal import lfilter
 from twinmill.fitting.boosting import Learner, Parts, boosted
 from twinmill.fitting.dependence import Features, Motion, dependences
 from twinmill.predict.datasets import Trajectory
-from twinmill.predict.windows import difference, rms
+from twinmill.predict.windows import EVERY_S, difference, rms
 
 # Edges of the averages, s before the motion; the coarse ones for poses slower than 10 Hz.
 EDGES_S = np.array([0.0, 0.03, 0.07, 0.12, 0.18, 0.26, 0.36, 0.50, 0.70, 1.0, 1.5])
@@ -40,6 +40,7 @@ FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
 WORTH = 0.998  # a ridge is taken if it lowers the left-out error to this share
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
 GRID_S = 0.01
+MEMORY_S = 0.3  # between errors that are independent
 PLACE_SCALE_M = 2.0
 MIXING = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # of four mecanum wheels
 
@@ -311,11 +312,12 @@ class Response:
         groups = [*dependences(motion), *([f[self.points] for f in group] for group in known)]
         scale = self.errors
         left, chosen = self._left(), []
+        independent = len(self.starts) * EVERY_S / MEMORY_S
         for part in (0, 1):
             used = [_only(part, g) for g in groups]
             used = [g for g in used if sum(f.shape[1] for f in g)]
             learners, wanted = self._learners(part, used, _isotropic(scale), left)
-            chosen += [(used[n], ridge) for n, ridge in boosted(learners, wanted)]
+            chosen += [(used[n], ridge) for n, ridge in boosted(learners, wanted, independent)]
         if chosen:
             self._fit_with(chosen, scale)
 

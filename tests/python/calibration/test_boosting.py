@@ -22,13 +22,13 @@ def test_takes_the_groups_that_made_the_values_the_larger_first(seed):
     wide, narrow = random.normal(size=10), random.normal(size=4)
     wide, narrow = 2 * wide / np.linalg.norm(wide), narrow / np.linalg.norm(narrow)
     wanted = groups[1].x @ wide + groups[3].x @ narrow + NOISE * random.normal(size=ROWS)
-    assert [number for number, _ in boosted(groups, wanted)][:2] == [1, 3]
+    assert [number for number, _ in boosted(groups, wanted, ROWS)][:2] == [1, 3]
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_takes_nothing_from_noise(seed):
     random = np.random.default_rng(100 + seed)
-    assert not list(boosted(learners(random), random.normal(size=ROWS)))
+    assert not list(boosted(learners(random), random.normal(size=ROWS), ROWS))
 
 
 def test_what_is_left_of_a_part_is_predicted_without_it():
