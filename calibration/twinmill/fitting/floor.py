@@ -26,6 +26,7 @@ from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import rms
 
 BUMP = 20.0  # times the median squared error: pushed, slipped, or a lost pose
+BUMP_ROUNDS = 3  # a large one hides the errors of windows that see a part of it
 MOST_BUMPS = 0.25  # share of the windows
 FEWEST_WINDOWS = 40  # 10 s
 FEWEST_LONG = 20  # windows of the longest horizon, below which nothing is held out
@@ -71,13 +72,19 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     if reason:
         return _none(data, reason)
     velocity, base = base_response(data, model, same_clock)
-    known = list(known_physics(base, velocity, lambda m: body_velocity_at(data, m, slice(None))))
     offset_s = base.get(CLOCK)
-    response = Response(data, velocity, base.get(LAG), offset_s, known)
-    keep = _without_bumps(response.across, response.errors)
-    if not keep.all():
-        calm = replace(data, measured=np.where(keep[:, None, None], data.measured, np.nan))
-        response = Response(calm, velocity, base.get(LAG), offset_s, known, response)
+    response = Response(data, velocity, base.get(LAG), offset_s)
+    keep = np.ones(len(data.measured), bool)
+    for _ in range(BUMP_ROUNDS):
+        calm = keep & _without_bumps(response.across, response.errors)
+        if calm.sum() == keep.sum():
+            break
+        keep = calm
+        kept = replace(data, measured=np.where(keep[:, None, None], data.measured, np.nan))
+        response = Response(kept, velocity, base.get(LAG), offset_s, response)
+    response.boost(
+        list(known_physics(base, velocity, lambda m: body_velocity_at(data, m, slice(None))))
+    )
     within, across = (
         np.where(keep[:, None, None], e, np.nan) for e in (response.within, response.across)
     )

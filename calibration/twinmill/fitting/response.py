@@ -67,7 +67,6 @@ class Response:
         base_mps: (N, 3) velocity of the base model at each pose, refitted to this log.
         lag_s: of that base.
         offset_s: capture's clock less the robot's.
-        known: features of known physics, at each pose.
         begin: a response to the same commands whose ridges and weights are nearly right.
     """
 
@@ -77,7 +76,6 @@ class Response:
         base_mps: np.ndarray,
         lag_s: float,
         offset_s: float,
-        known: Sequence[Features],
         begin: "Response | None" = None,
     ) -> None:
         self.data, self.offset_s = data, offset_s
@@ -92,7 +90,6 @@ class Response:
         else:
             self._fit(begin.errors, begin.ridges)
         self.unboosted = self.across
-        self._boost(known)
 
     # -- where features are taken ---------------------------------------------------------------
 
@@ -299,8 +296,12 @@ class Response:
         )
         self._judge()
 
-    def _boost(self, known: Sequence[Features]) -> None:
-        """Adds what the first stage leaves and left-out blocks agree on, a group at a time."""
+    def boost(self, known: Sequence[Features]) -> None:
+        """Adds what the first stage leaves and left-out blocks agree on, a group at a time.
+
+        Args:
+            known: features of known physics, at each pose.
+        """
         motion = Motion(
             velocity=self.velocity(None),
             base=self.base_mps,
