@@ -2,6 +2,9 @@
 """Fixtures that several test files share."""
 
 import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do, before numpy is loaded
+
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path

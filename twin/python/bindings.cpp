@@ -373,6 +373,9 @@ NB_MODULE(twinmill_native, m)
         .def("inert", &InertList, "plant"_a,
              "(name, why) of the numbers that were stated and do not act in 'planar' or 'mujoco'.")
         .def("for_robot", &Model::ForRobot, "robot_id"_a)
+        .def("form", &Model::Form,
+             "The robot's form alone: no effect, gains of 1, a usual lag, speeds in proportion to "
+             "the duty.")
         .def(
             "stated_of",
             [](const Model &model, int robot_id) {

@@ -135,13 +135,14 @@ class Waves:
         longest = 1.1 * np.ptp(np.concatenate(every))
         count = int(np.clip(longest / shortest, 0, MOST_WAVES))
         rates = np.array([float(f"{2 * np.pi * k / longest:.4g}") for k in range(1, 1 + count)])
+        quick = np.pi / shortest
         terms = [
             Term(
                 group,
                 to,
                 f"{wave}({rate:g}*{name})*{speed}",
                 TYPICAL[to] / SWELL,
-                f"swells {speed}",
+                f"{speed} swells {'quickly' if rate > quick else 'slowly'}",
             )
             for to, speed in zip(("rim_mps", *CHANNELS), ("rim", *SPEEDS), strict=True)
             for rate in rates

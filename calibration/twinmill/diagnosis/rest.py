@@ -216,8 +216,6 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
     for group, family in dict.fromkeys((t.group, t.family) for t in terms):
         together = np.array([(t.group, t.family) == (group, family) for t in terms])
         tested.append((group, together))
-        if family:
-            continue
         own = dict.fromkeys(t.formula for t, used in zip(terms, together, strict=True) if used)
         tested += [(group, np.array([t.formula == f for t in terms])) for f in own]
     if not tested:

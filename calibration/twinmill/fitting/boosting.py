@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 LADDER = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # ridges over a group's mean square
-WORTH = 0.03  # share of the left-out error that a group must take at least
+WORTH = 0.04  # share of the left-out error that a group must take at least
 MOST_GROUPS = 8
 
 
@@ -112,9 +112,9 @@ def boosted(
         learners: of the same rows.
         wanted: (R,) values.
         independent: how many of the values are. The best of so many groups takes about
-            2 ln(groups) / independent of an error that is noise: less than that is none.
+            2 ln(groups) / independent of an error that is noise: below twice that nothing is taken.
     """
-    least = max(WORTH, 2 * np.log(max(len(learners), 1)) / independent)
+    least = max(WORTH, 4 * np.log(max(len(learners), 1)) / independent)
     wanted = wanted.astype(np.float32)
     if not learners:
         return

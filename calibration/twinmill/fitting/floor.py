@@ -5,7 +5,7 @@ It is a property of the log. Of the model file only the robot's form is used (dr
 geometry), with numbers refitted to this very log. So better predictions never get a worse score.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
@@ -14,6 +14,7 @@ from twinmill.fitting.dependence import known_physics
 from twinmill.fitting.response import Response
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
+    ALIGNMENT,
     BASE_GAINS,
     CLOCK,
     HEADING,
@@ -30,6 +31,7 @@ BUMP_ROUNDS = 3  # a large one hides the errors of windows that see a part of it
 MOST_BUMPS = 0.25  # share of the windows
 FEWEST_WINDOWS = 40  # 10 s
 FEWEST_LONG = 20  # windows of the longest horizon, below which nothing is held out
+ARM_M = 0.1  # at which a turn counts as way
 REACH_S = 1.0  # delays and offsets that are looked for
 
 
@@ -80,8 +82,7 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
         if calm.sum() == keep.sum():
             break
         keep = calm
-        kept = replace(data, measured=np.where(keep[:, None, None], data.measured, np.nan))
-        response = Response(kept, velocity, base.get(LAG), offset_s, response)
+        response = response.of_windows(keep)
     response.boost(
         list(known_physics(base, velocity, lambda m: body_velocity_at(data, m, slice(None))))
     )
@@ -107,9 +108,10 @@ def base_response(
     data: Trajectory, model: native.Model, same_clock: bool
 ) -> tuple[np.ndarray, native.Model]:
     """(N, 3) velocity at each pose, m/s and rad/s, of the base refitted to this log; that base."""
-    base = model.copy()
-    while len(base.effects):
-        base.remove_effect(0)
+    base = model.form()
+    for name in [HEADING] if same_clock else ALIGNMENT:
+        base.set(name, 0.0)
+    scale_speeds(data, base)
     names = [n for n in BASE_GAINS if _acts(data, n)] + [LAG]
     table = duty_table(base)
     if len(table) > 1:
@@ -129,6 +131,20 @@ def base_response(
         free = [p.at(base.get(p.name)) for p in base_parameters(base, names) + late]
         base = ScoreFit([own], [base], free).fit(8).models[0]
     return body_velocity_at(data, base, slice(None)), base
+
+
+def scale_speeds(data: Trajectory, base: native.Model) -> None:
+    """Speeds of a duty robot at which the base drives as far as the log; it is changed."""
+    table = duty_table(base)
+    if not table:
+        return
+    ways_m = [
+        np.linalg.norm(rms(own)[0] * (1.0, 1.0, ARM_M))
+        for own in (data.measured, data.measured - data.errors(base))
+    ]
+    if min(ways_m) > 0:
+        for name in table:
+            base.set(name, base.get(name) * ways_m[0] / ways_m[1])
 
 
 def body_velocity_at(

@@ -13,7 +13,8 @@ features, so they are added by componentwise boosting (see boosting.py).
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -40,6 +41,7 @@ FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
 WORTH = 0.998  # a ridge is taken if it lowers the left-out error to this share
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
 GRID_S = 0.01
+CHOICE_EVERY = 2  # horizons: those between would choose the same groups
 MEMORY_S = 0.3  # between errors that are independent
 PLACE_SCALE_M = 2.0
 MIXING = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # of four mecanum wheels
@@ -47,8 +49,9 @@ MIXING = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # of four
 
 # (F,) coefficients of all rows and (K, F) without each fold.
 Coefficients = tuple[np.ndarray, np.ndarray]
-# (W,) bool, and (w, F) rows forward, left and of turning for the windows of a horizon.
-Rows = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+# Number of a horizon, (W,) bool: windows that have it, and their (w, F) rows forward, left and of
+# turning.
+Rows = tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -67,16 +70,10 @@ class Response:
         base_mps: (N, 3) velocity of the base model at each pose, refitted to this log.
         lag_s: of that base.
         offset_s: capture's clock less the robot's.
-        begin: a response to the same commands whose ridges and weights are nearly right.
     """
 
     def __init__(
-        self,
-        data: Trajectory,
-        base_mps: np.ndarray,
-        lag_s: float,
-        offset_s: float,
-        begin: "Response | None" = None,
+        self, data: Trajectory, base_mps: np.ndarray, lag_s: float, offset_s: float
     ) -> None:
         self.data, self.offset_s = data, offset_s
         self.lag_s = max(SHORTEST_LAG_S, lag_s)
@@ -84,12 +81,18 @@ class Response:
         self.base_mps = base_mps[self.points]
         self.features, self.groups = self._features(self.base_mps)
         self._lay_windows()
-        if begin is None:
-            self._fit(rms(data.measured), [None, None])
-            self._fit(self.errors, self.ridges)
-        else:
-            self._fit(begin.errors, begin.ridges)
+        self._fit(rms(data.measured), [None, None])
+        self._fit(self.errors, self.ridges)
         self.unboosted = self.across
+
+    def of_windows(self, keep: np.ndarray) -> "Response":
+        """The same fitted to some windows alone, (W,) bool."""
+        other = copy(self)
+        measured = np.where(keep[:, None, None], self.data.measured, np.nan)
+        other.data = replace(self.data, measured=measured)
+        other._fit(self.errors, self.ridges)
+        other.unboosted = other.across
+        return other
 
     # -- where features are taken ---------------------------------------------------------------
 
@@ -260,8 +263,8 @@ class Response:
         self.tail_fold = self._part(start_s - 2.0)
         self.rows = self._rows(self.features)
 
-    def _rows(self, features: Sequence[np.ndarray]) -> list[Rows]:
-        """Of each horizon the windows that have it, and (w, F) rows of each channel."""
+    def _rows(self, features: Sequence[np.ndarray], every: int = 1) -> list[Rows]:
+        """Of every so manyth horizon."""
         data = self.data
         c, s = np.cos(self.heading_rad) * self.step_s, np.sin(self.heading_rad) * self.step_s
         forward, left, turn = features
@@ -272,13 +275,13 @@ class Response:
         track = data.measurement.track
         heading = np.nan_to_num(track.heading_smooth[data.windows.starts])
         rows = []
-        for h in range(self.ends.shape[1]):
+        for h in range(0, self.ends.shape[1], every):
             ok = (self.ends[:, h] >= 0) & np.isfinite(data.measured[:, h, :2]).all(axis=1)
             cx, sx, cy, sy, w = (q[self.ends[ok, h]] - q[self.starts[ok]] for q in sums)
             ch, sh = np.cos(heading[ok])[:, None], np.sin(heading[ok])[:, None]
             along = np.concatenate([ch * cx + sh * sx, -ch * sy + sh * cy], axis=1)
             across = np.concatenate([ch * sx - sh * cx, ch * cy + sh * sy], axis=1)
-            rows.append((ok, along, across, w))
+            rows.append((h, ok, along, across, w))
         return rows
 
     def _part(self, t_s: np.ndarray) -> np.ndarray:
@@ -324,12 +327,11 @@ class Response:
 
     def _fit_with(self, chosen: Sequence[tuple[Features, float]], scale: np.ndarray) -> None:
         """Fits the first features and chosen groups together, each group at its own ridge."""
-        first = len(GROUPS)
-        for k, (group, _) in enumerate(chosen):
-            for axis, features in enumerate(group):
-                number = np.full(features.shape[1], first + k)
-                self.features[axis] = np.hstack([self.features[axis], features])
-                self.groups[axis] = np.concatenate([self.groups[axis], number])
+        axes, first = range(3), len(GROUPS)
+        added = [[group[axis] for group, _ in chosen] for axis in axes]
+        numbers = [[np.full(f.shape[1], first + k) for k, f in enumerate(own)] for own in added]
+        self.features = [np.hstack([self.features[axis], *added[axis]]) for axis in axes]
+        self.groups = [np.concatenate([self.groups[axis], *numbers[axis]]) for axis in axes]
         fresh = [ridge for _, ridge in chosen]
         self.rows = self._rows(self.features)
         self._fit(scale, [np.concatenate([own, fresh]) for own in self.ridges])
@@ -340,7 +342,7 @@ class Response:
         """One of each group for the plane (0) or turning (1), and the (R,) values wanted."""
         learners, wanted = [], np.zeros(0)
         for group in groups:
-            pieces = list(self._weighted(part, scale, self._rows(group), left))
+            pieces = list(self._weighted(part, scale, self._rows(group, CHOICE_EVERY), left))
             if not pieces:
                 return [], wanted
             xs, ys, parts = zip(*pieces, strict=True)
@@ -384,7 +386,7 @@ class Response:
         """(W, H, 3) what the first stage, fitted to other blocks, leaves of the rows."""
         left = self.data.measured.copy()
         plane, turn = self.coefficients
-        for h, (ok, along, across, w) in enumerate(self.rows):
+        for h, ok, along, across, w in self.rows:
             for channel, x, found in ((0, along, plane), (1, across, plane), (2, w, turn)):
                 if found is not None:
                     left[ok, h, channel] -= np.sum(x * found[1][self.fold[ok]], axis=1)
@@ -436,7 +438,7 @@ class Response:
             rows: of the features.
             wanted: (W, H, 3) what they are to make.
         """
-        for h, (ok, along, across, w) in enumerate(rows):
+        for h, ok, along, across, w in rows:
             chosen = ((0, along), (1, across)) if part == 0 else ((2, w),)
             for channel, x in chosen:
                 size, y = scale[h, channel], wanted[ok, h, channel]
