@@ -218,7 +218,7 @@ def of_another_form(found: Sequence[Finding], rest: Rest) -> list[Finding]:
         found: in the order of worth.
         rest: what is left.
     """
-    depends_on = rest.depends_on if rest.share > LEAST else ()
+    depends_on = [g for g in rest.depends_on if _much_left_by(rest, g)]
     late_s = [_lateness_s(f) for f in found]
     swings = min(late_s, default=0.0) < 0 < max(late_s, default=0.0)
     losses = _alike_losses(found)
@@ -245,6 +245,12 @@ def of_another_form(found: Sequence[Finding], rest: Rest) -> list[Finding]:
         return finding
 
     return [judged(f) for f in found]
+
+
+def _much_left_by(rest: Rest, group: str) -> bool:
+    """Whether a group takes much of what is left; of one without formulas that is not known."""
+    taken = (rest.left_over or {}).get(group, 1.0)
+    return rest.share > LEAST and taken > SETTINGS.form_takes
 
 
 def _alike_losses(found: Sequence[Finding]) -> list[Finding]:

@@ -158,7 +158,7 @@ class Waves:
         parts = [_displaced(response, velocity, velocity[:, [k]] * gains, k) for k in range(3)]
         weight = np.nan_to_num(own.data.weight)[..., None]
         columns = [part * weight for part in (sum(parts), *parts)]
-        return np.concatenate(columns, axis=-1).reshape(-1, len(self.terms))
+        return np.concatenate(columns, axis=-1).reshape(weight.size, len(self.terms))
 
 
 def _way_m(own: Opened, velocity: np.ndarray) -> np.ndarray:

@@ -64,6 +64,7 @@ class Settings:
     slight: float = _number(0.3, "share of what is left that a second finding must take")
     much_left: float = _number(0.3, "share left, beyond which no name is sure")
     lag_leaves: float = _number(0.25, "share left, beyond which no lag is sure")
+    form_takes: float = _number(0.15, "share of what is left, by which a finding has another form")
     same: float = _number(0.8, "cosine of what two take, from which they take the same errors ...")
     same_fall: float = _number(0.85, "... if one takes this share of what the other takes")
     nothing: float = _number(0.01, "chance of such sizes if there were no effect")

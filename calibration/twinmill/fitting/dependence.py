@@ -85,6 +85,12 @@ def dependences(motion: Motion) -> Iterator[Features]:
     yield from _events(motion)
 
 
+def place_gains(motion: Motion) -> Iterator[Features]:
+    """Those of `dependences` that scale the velocities by the place."""
+    for gain in _where(motion):
+        yield _scaled(motion, gain)
+
+
 def known_physics(
     base: native.Model, velocity: np.ndarray, predict: Callable[[native.Model], np.ndarray]
 ) -> Iterator[Features]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
-from twinmill.fitting.dependence import known_physics
+from twinmill.fitting.dependence import dependences, known_physics, place_gains
 from twinmill.fitting.response import Response
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
@@ -27,7 +27,6 @@ from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import rms
 
 BUMP = 20.0  # times the median squared error: pushed, slipped, or a lost pose
-BUMP_ROUNDS = 3  # a large one hides the errors of windows that see a part of it
 MOST_BUMPS = 0.25  # share of the windows
 FEWEST_WINDOWS = 40  # 10 s
 FEWEST_LONG = 20  # windows of the longest horizon, below which nothing is held out
@@ -76,16 +75,13 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     velocity, base = base_response(data, model, same_clock)
     offset_s = base.get(CLOCK)
     response = Response(data, velocity, base.get(LAG), offset_s)
-    keep = np.ones(len(data.measured), bool)
-    for _ in range(BUMP_ROUNDS):
-        calm = keep & _without_bumps(response.across, response.errors)
-        if calm.sum() == keep.sum():
-            break
-        keep = calm
+    response.boost(list(place_gains(response.motion)))
+    keep = _without_bumps(response)
+    if not keep.all():
         response = response.of_windows(keep)
-    response.boost(
-        list(known_physics(base, velocity, lambda m: body_velocity_at(data, m, slice(None))))
-    )
+    points = response.points
+    known = known_physics(base, velocity[points], lambda m: body_velocity_at(data, m, points))
+    response.boost([*dependences(response.motion), *known])
     within, across = (
         np.where(keep[:, None, None], e, np.nan) for e in (response.within, response.across)
     )
@@ -191,8 +187,9 @@ def _acts(data: Trajectory, name: str) -> bool:
     return bool(track.command[:, BASE_GAINS.index(name)].any())
 
 
-def _without_bumps(across: np.ndarray, floor: np.ndarray) -> np.ndarray:
-    keep = ~is_far(across, floor, BUMP)
+def _without_bumps(response: Response) -> np.ndarray:
+    """(W,) bool: windows without a bump."""
+    keep = ~is_far(response.across, response.errors, BUMP)
     return keep if (~keep).mean() <= MOST_BUMPS else np.ones(len(keep), bool)
 
 

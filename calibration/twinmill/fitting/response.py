@@ -21,7 +21,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from twinmill.fitting.boosting import Learner, Parts, boosted
-from twinmill.fitting.dependence import Features, Motion, dependences
+from twinmill.fitting.dependence import Features, Motion
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import EVERY_S, difference, rms
 
@@ -91,7 +91,7 @@ class Response:
         measured = np.where(keep[:, None, None], self.data.measured, np.nan)
         other.data = replace(self.data, measured=measured)
         other._fit(self.errors, self.ridges)
-        other.unboosted = other.across
+        other.unboosted = np.where(keep[:, None, None], self.unboosted, np.nan)
         return other
 
     # -- where features are taken ---------------------------------------------------------------
@@ -299,13 +299,10 @@ class Response:
         )
         self._judge()
 
-    def boost(self, known: Sequence[Features]) -> None:
-        """Adds what the first stage leaves and left-out blocks agree on, a group at a time.
-
-        Args:
-            known: features of known physics, at each pose.
-        """
-        motion = Motion(
+    @property
+    def motion(self) -> Motion:
+        """At each point, as fitted so far."""
+        return Motion(
             velocity=self.velocity(None),
             base=self.base_mps,
             pose=self.pose,
@@ -313,7 +310,9 @@ class Response:
             t_s=self.middle_s,
             step_s=self.step_s,
         )
-        groups = [*dependences(motion), *([f[self.points] for f in group] for group in known)]
+
+    def boost(self, groups: Sequence[Features]) -> None:
+        """Adds what is left and left-out blocks agree on, a group of features at a time."""
         scale = self.errors
         left, chosen = self._left(), []
         independent = len(self.starts) * EVERY_S / MEMORY_S
@@ -326,8 +325,8 @@ class Response:
             self._fit_with(chosen, scale)
 
     def _fit_with(self, chosen: Sequence[tuple[Features, float]], scale: np.ndarray) -> None:
-        """Fits the first features and chosen groups together, each group at its own ridge."""
-        axes, first = range(3), len(GROUPS)
+        """Fits the features so far and chosen groups together, each group at its own ridge."""
+        axes, first = range(3), len(self.ridges[0])
         added = [[group[axis] for group, _ in chosen] for axis in axes]
         numbers = [[np.full(f.shape[1], first + k) for k, f in enumerate(own)] for own in added]
         self.features = [np.hstack([self.features[axis], *added[axis]]) for axis in axes]
