@@ -24,7 +24,7 @@ std::string InstanceName(const std::vector<EffectInstance> &effects, size_t inde
 }
 
 constexpr double kSpeedPrior_mps = 0.15;  // of a speed of the duty table
-constexpr double kUsualLag_s = 0.06;  // of a small geared motor
+constexpr double kUsualLag_s = 0.06;      // of a small geared motor
 constexpr std::string_view kTable = "base.wheel_speed_mps.";
 
 // Speed `i` of the duty table.
