@@ -48,19 +48,16 @@ def true_model(tanh_robot, model_file):
 
 
 def test_two_models_have_the_same_floor_on_one_log(opened, drive, model_file):
-    """A model too slow by a half, with an effect and a lag of a third of a second.
-
-    Each starts another search for the response: 5 % in all, 20 % a cell.
-    """
+    """A model too slow by a half, with other nodes, an effect and a lag of a third of a second."""
     bad = model_file(
-        ("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.02, 0.05, 0.1, 0.2]"),
+        ("[0, 25, 50, 75, 100]", "[0, 30, 100]"),
+        ("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.03, 0.2]"),
         ("motor_lag_s = 0.05", "motor_lag_s = 0.3\nyaw_gain = 1.4"),
         extra='[[effect]]\nname = "dead_zone"\nwidth = 0.2\n',
     )
     (other,) = open_measurements([drive], bad)
-    ratio = other.floor.rms / opened.floor.rms
-    assert np.exp(np.mean(np.log(ratio))) == pytest.approx(1, abs=0.05)
-    assert ratio == pytest.approx(1, abs=0.2)
+    assert other.floor.kind == opened.floor.kind == "response"
+    assert np.array_equal(other.floor.rms, opened.floor.rms, equal_nan=True)
     assert np.array_equal(other.floor.keep, opened.floor.keep)
     assert other.score > 1.5 * opened.score
 
