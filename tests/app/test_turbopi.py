@@ -201,6 +201,7 @@ def played(tmp_path_factory):
             f"height_px={HEIGHT_PX}",
         ),
         *("--set", "rate_Hz=100", "--set", "frame_timeout_ms=5000", "--set", "robot_id=7"),
+        *("--set", "watchdog_ms=5000"),  # a busy machine is no fault of the robot
         *("--lcm-url", f"file://{log}?mode=w", "--io-tsv", str(io_tsv)),
     )
     assert done.returncode == 0, done.stderr
