@@ -24,9 +24,11 @@ from twinmill.model.parameters import (
     effect_parameters,
 )
 from twinmill.predict.datasets import Trajectory
-from twinmill.predict.windows import rms
+from twinmill.predict.windows import HORIZONS_S, rms
 
 BUMP = 20.0  # times the median squared error: pushed, slipped, or a lost pose
+BUMP_PART = 4.0  # the same of windows that overlap such a one
+RARE_BUMPS = 0.1  # share of the windows, parts included, up to which these are left out
 MOST_BUMPS = 0.25  # share of the windows
 FEWEST_WINDOWS = 40  # 10 s
 FEWEST_LONG = 20  # windows of the longest horizon, below which nothing is held out
@@ -76,7 +78,7 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     offset_s = base.get(CLOCK)
     response = Response(data, velocity, base.get(LAG), offset_s)
     response.boost(list(place_gains(response.motion)))
-    keep = _without_bumps(response)
+    keep = _without_bumps(data, response)
     if not keep.all():
         response = response.of_windows(keep)
     points = response.points
@@ -187,10 +189,17 @@ def _acts(data: Trajectory, name: str) -> bool:
     return bool(track.command[:, BASE_GAINS.index(name)].any())
 
 
-def _without_bumps(response: Response) -> np.ndarray:
-    """(W,) bool: windows without a bump."""
-    keep = ~is_far(response.across, response.errors, BUMP)
-    return keep if (~keep).mean() <= MOST_BUMPS else np.ones(len(keep), bool)
+def _without_bumps(data: Trajectory, response: Response) -> np.ndarray:
+    """(W,) windows without bumps, nor a part of one.
+
+    What bumps often does so by itself: its parts are left in.
+    """
+    bumps = is_far(response.across, response.errors, BUMP)
+    if not bumps.any() or bumps.mean() > MOST_BUMPS:
+        return np.ones(len(bumps), bool)
+    apart_s = np.abs(data.start_s[:, None] - data.start_s[bumps]).min(axis=1)
+    parts = is_far(response.across, response.errors, BUMP_PART) & (apart_s < HORIZONS_S[-1])
+    return ~bumps & ~parts if (bumps | parts).mean() < RARE_BUMPS else ~bumps
 
 
 def is_far(errors: np.ndarray, floor: np.ndarray, times: float) -> np.ndarray:
