@@ -12,7 +12,7 @@ import numpy as np
 from twinmill.diagnosis.constancy import Change
 from twinmill.diagnosis.finding import Finding, doubted
 from twinmill.diagnosis.library import CHANGE, TIME
-from twinmill.diagnosis.rest import LEAST, Rest
+from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import (
     PAUSE_S,
     REFIT,
@@ -250,7 +250,7 @@ def of_another_form(found: Sequence[Finding], rest: Rest) -> list[Finding]:
 def _much_left_by(rest: Rest, group: str) -> bool:
     """Whether a group takes much of what is left; of one without formulas that is not known."""
     taken = (rest.left_over or {}).get(group, 1.0)
-    return rest.share > LEAST and taken > SETTINGS.form_takes
+    return rest.share > SETTINGS.nothing_left and taken > SETTINGS.form_takes
 
 
 def _alike_losses(found: Sequence[Finding]) -> list[Finding]:

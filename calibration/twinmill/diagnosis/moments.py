@@ -12,12 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.floor import is_far
 from twinmill.fitting.opening import Opened
 from twinmill.predict.windows import HORIZONS_S
 
-FAR = 10.0  # times the median squared error; with nothing but noise the largest is 3 to 7
-SEVERAL = 3  # of one log: fewer are an accident
 APART_S = 1.0  # between the starts of windows of two moments
 SEEN = 2  # windows overlap, so that more than one sees what lasts
 HORIZON = HORIZONS_S.index(0.5)
@@ -63,11 +62,11 @@ def moments_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> list
 def _of_log(own: Opened, model: native.Model) -> list[Moment]:
     data = own.data
     missed = np.flatnonzero(
-        is_far(data.errors(model), data.floor, FAR)
-        & (is_far(own.floor.across, data.floor, FAR) | ~own.floor.keep)
+        is_far(data.errors(model), data.floor, SETTINGS.far)
+        & (is_far(own.floor.across, data.floor, SETTINGS.far) | ~own.floor.keep)
     )
     events = _events(missed, data.start_s)
-    if len(events) < SEVERAL:
+    if len(events) < SETTINGS.several:
         return []
     predicted = data.windows.predicted(data.measurement, model)
     way = _way(data.measured[:, HORIZON], predicted[:, HORIZON])

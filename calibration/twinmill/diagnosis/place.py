@@ -18,6 +18,7 @@ from itertools import product
 import numpy as np
 import twinmill_native as native
 
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened
 from twinmill.predict.windows import HORIZONS_S
 
@@ -28,8 +29,6 @@ WAY, TURNING = 0, 1
 LEAST_WAY_M = 0.01  # a robot that stands tells nothing of its place
 FLIPS = 999
 STRETCH_S = 2.0  # of one random sign, and least time between two moments
-CHANCE, CHANCE_OF_RESPONSE = 0.01, 0.05
-WORTH = 0.1  # share of the squared error of way, or of turning
 
 
 def comes_again(opened: Sequence[Opened], models: Sequence[native.Model]) -> float:
@@ -49,9 +48,9 @@ def comes_again(opened: Sequence[Opened], models: Sequence[native.Model]) -> flo
     found = [0.0]
     for of in (WAY, TURNING):
         chance, share = _repeats(opened, of_model, of)
-        if chance < CHANCE and share > WORTH:
+        if chance < SETTINGS.place_chance and share > SETTINGS.place_share:
             chance, _ = _repeats(opened, of_response, of)
-            found.append(share if chance < CHANCE_OF_RESPONSE else 0.0)
+            found.append(share if chance < SETTINGS.place_chance_of_floor else 0.0)
     return max(found)
 
 

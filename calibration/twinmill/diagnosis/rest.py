@@ -17,19 +17,14 @@ import numpy as np
 from twinmill.diagnosis.library import Term, library
 from twinmill.diagnosis.moments import Moment, moments_of
 from twinmill.diagnosis.place import comes_again
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
 
 FOLDS = 5
 FLIPS = 499  # random signs of blocks that make the null distribution
-BESIDE = 0.1  # share by which a group must raise what better groups bring
-ALIKE = 0.9  # share of the best group's gain: these logs do not tell the two apart
-ALPHA = 0.01  # chance of naming anything if nothing is left, over all that is tested
-AGAIN = 2.0  # times what the model left in other logs already: no news
-FIRM_T = 3.0
 MOMENTS = "single moments"
 PLACE = "place"
-LEAST = 0.02  # share of what was to be explained, below which nothing is left
 LEFT_OVER = 0.02  # share of a term's norm that must survive the projection
 
 
@@ -176,7 +171,7 @@ def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:
     falls = np.array(falls)
     if len(falls) < 3:
         return False
-    return bool(falls.mean() > FIRM_T * np.std(falls, ddof=1) / np.sqrt(len(falls)))
+    return bool(falls.mean() > SETTINGS.firm_t * np.std(falls, ddof=1) / np.sqrt(len(falls)))
 
 
 # -- what it depends on ----------------------------------------------------------------------------
@@ -193,7 +188,7 @@ def _verdict(
 ) -> Rest:
     every = _tested(terms, products)
     left_over = {d.group: d.gain / total for d in every if d.gain > 0}
-    news = [d for d in every if d.gain / total > AGAIN * known.get(d.group, 0.0)]
+    news = [d for d in every if d.gain / total > SETTINGS.again * known.get(d.group, 0.0)]
     sure = [d for d in news if d.sure]
     old = tuple(d.group for d in every if d.sure and d not in news)
     groups = _without_shadows(sure, terms, products)
@@ -221,12 +216,12 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
     if not tested:
         return []
     gains = np.array([products.held_out(own, 0)[0] for _, own in tested])
-    sure = gains > 2 * np.log(len(tested) / ALPHA)
+    sure = gains > 2 * np.log(len(tested) / SETTINGS.dependence_chance)
     if sure.any():
         nulls = np.array([products.held_out(own)[1] for _, own in tested])
         spread = np.maximum(nulls.std(axis=1), 1e-12)
         highest = (nulls / spread[:, None]).max(axis=0)
-        sure &= gains / spread > np.quantile(highest, 1 - ALPHA)
+        sure &= gains / spread > np.quantile(highest, 1 - SETTINGS.dependence_chance)
     best: dict[str, Dependence] = {}
     for (group, _), gain, beyond in zip(tested, gains, sure, strict=True):
         this = Dependence(group, float(gain), bool(beyond))
@@ -242,12 +237,12 @@ def _without_shadows(
     kept: list[Dependence] = []
     gain = 0.0
     for group in groups:
-        if kept and group.gain > ALIKE * kept[0].gain:
+        if kept and group.gain > SETTINGS.as_much * kept[0].gain:
             kept = [*kept, group]
             continue
         names = {d.group for d in [*kept, group]}
         together, _ = products.held_out(np.array([t.group in names for t in terms]))
-        if not kept or together > (1 + BESIDE) * gain:
+        if not kept or together > (1 + SETTINGS.beside) * gain:
             kept, gain = [*kept, group], together
     return kept
 

@@ -72,6 +72,19 @@ class Settings:
     companion_t: float = _number(3.0, "the same over blocks: standard errors from zero")
     companion_change: float = _number(0.15, "least change of the size per standard deviation")
 
+    # What is left.
+    nothing_left: float = _number(0.02, "share of the first excess: where less is left, nothing is")
+    dependence_chance: float = _number(0.01, "that a dependence is named where nothing is left")
+    beside: float = _number(0.1, "by which a dependence must raise what better ones take ...")
+    as_much: float = _number(0.9, "... unless it takes this share of what the best one takes")
+    again: float = _number(2.0, "times what the model left in other logs: less is no news")
+    firm_t: float = _number(3.0, "t over blocks: the smooth response predicts better")
+    far: float = _number(10.0, "times the median squared error: a single moment ...")
+    several: int = _number(3, "... of which so many are no accident")
+    place_chance: float = _number(0.01, "that errors repeat so at a place, of the model ...")
+    place_chance_of_floor: float = _number(0.05, "... and of the smooth response, too ...")
+    place_share: float = _number(0.1, "... if this share of their square repeats")
+
     # Robots that differ.
     odd: float = _number(3.5, "robust standard deviations from the median")
     odd_evidence: float = _number(16.0, "least fall of the held-out cost, for one robot")

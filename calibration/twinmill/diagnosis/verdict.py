@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from twinmill.diagnosis import moments
 from twinmill.diagnosis.finding import Finding
-from twinmill.diagnosis.rest import LEAST, MOMENTS, Rest
+from twinmill.diagnosis.rest import MOMENTS, Rest
 from twinmill.diagnosis.search import REFIT, of_levels
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.compare import GOOD, MISSING
@@ -190,7 +190,7 @@ class VerdictInputs:
     def _left(self) -> str:
         """What is left, where it is more than the noise."""
         events = f" {moments.sentence(self.rest.moments)}" if self.rest.moments else ""
-        if self.last <= GOOD or self.rest.share < LEAST:
+        if self.last <= GOOD or self.rest.share < SETTINGS.nothing_left:
             return events
         on = self._continuous
         depends = f", and depends on {' and '.join(on)}" if on else ""
