@@ -583,6 +583,14 @@ def test_what_leaves_a_rest_of_its_own_kind_has_another_form(effect, depends_on,
     assert bool(judged.why) == judged.wrong_form == (certainty == "doubtful")
 
 
+@pytest.mark.parametrize(("taken", "certainty"), [(0.05, "sure"), (0.5, "doubtful")])
+def test_a_rest_that_hardly_depends_on_what_an_effect_acts_by_leaves_it_its_form(taken, certainty):
+    """A real robot's lag is never quite of first order; half of the rest at changes is another."""
+    rest = Rest(0.4, True, ["change of the command"], left_over={"change of the command": taken})
+    (judged,) = of_another_form([Finding("motor_lag", None, [], 0.5, "sure")], rest)
+    assert judged.certainty == certainty
+
+
 @pytest.mark.parametrize(
     ("extra_s", "certainty"), [(-0.06, ["doubtful"] * 2), (0.06, ["sure", "doubtful"])]
 )
