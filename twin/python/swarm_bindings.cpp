@@ -93,8 +93,7 @@ Cell MakeCell(const Model &model, const Tables &rows, size_t ring_size, const st
     return {model, std::move(tables), ring_size, StartNamed(start), spread_m, std::move(starts)};
 }
 
-// Robots with other wheels than the
-// installed one's are made of their models' numbers.
+// Robots with other wheels than the installed one's are made of their models' numbers.
 std::unique_ptr<Plant> MakeMujoco(const std::vector<Model> &models,
                                   const std::vector<Pose2> &starts, uint64_t seed)
 {

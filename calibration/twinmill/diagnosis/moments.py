@@ -13,7 +13,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.fitting.floor import is_far
+from twinmill.fitting.floor import ARM_M, is_far
 from twinmill.fitting.opening import Opened
 from twinmill.predict.windows import HORIZONS_S
 
@@ -21,7 +21,6 @@ APART_S = 1.0  # between the starts of windows of two moments
 SEEN = 2  # windows overlap, so that more than one sees what lasts
 HORIZON = HORIZONS_S.index(0.5)
 LESS, MORE = 0.9, 1.1  # of the predicted way
-ARM_M = 0.1  # a turn counts as the way of a point so far from the middle
 
 
 @dataclass(frozen=True)

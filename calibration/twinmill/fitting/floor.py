@@ -32,7 +32,7 @@ RARE_BUMPS = 0.1  # share of the windows, parts included, up to which these are 
 MOST_BUMPS = 0.25  # share of the windows
 FEWEST_WINDOWS = 40  # 10 s
 FEWEST_LONG = 20  # windows of the longest horizon, below which nothing is held out
-ARM_M = 0.1  # at which a turn counts as way
+ARM_M = 0.1  # a turn counts as the way of a point so far from the middle
 REACH_S = 1.0  # delays and offsets that are looked for
 
 

@@ -382,7 +382,7 @@ class Response:
         return coefficients, ridges
 
     def _left(self) -> np.ndarray:
-        """(W, H, 3) what the first stage, fitted to other blocks, leaves of the rows."""
+        """(W, H, 3) what the features so far, fitted to other blocks, leave of the rows."""
         left = self.data.measured.copy()
         plane, turn = self.coefficients
         for h, ok, along, across, w in self.rows:
