@@ -89,7 +89,7 @@ def _session(log: Path, given: ModelFile, folder: Path) -> Iterator[Ratio]:
     session.conclude()
     answer_s, previewed = _timed(lambda: session.preview(EFFECT, 0))
     out = folder / "added.toml"
-    added_s, added = _timed(lambda: add(EFFECT, measurements, given, out, ""))
+    added_s, added = _timed(lambda: add(EFFECT, measurements, given, out=out, command=""))
     session.show(previewed)
     says = f"score {session.passing_score(0):.3g}, in full {added.after.score:.3g}, "
     says += f"before {added.before.score:.3g}"

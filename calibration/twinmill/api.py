@@ -440,7 +440,13 @@ class Model(_Shown):
         result, file = _made(
             name,
             lambda out: _add.add(
-                effect, measurements, self.file, out, command, texts=texts, robot_id=robot
+                effect,
+                measurements,
+                self.file,
+                out=out,
+                command=command,
+                texts=texts,
+                robot_id=robot,
             ),
         )
         return Addition(result, Model(file))

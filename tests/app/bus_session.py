@@ -55,12 +55,12 @@ def main(folder: Path, program: list[str]) -> dict:
         fleet = Fleet(URL, key=key)
         heard_again(fleet)
         result["stands_before_start"] = robot.duties() == ZERO
-        begun = tell.start(fleet, {ID}, "", 1.0, partial=False, link_timeout_ms=0)
+        begun = tell.start(fleet, {ID}, "", ahead_s=1.0, partial=False, link_timeout_ms=0)
         robot.wait_for(LEFT)
         moved_s = min(t for t, duties in robot.rows() if duties == LEFT)
         result["start_delay_s"] = moved_s + (time.time() - time.monotonic()) - begun.utime_us / 1e6
         dance = tell.make_command(turbopi.swarm_command_t.VERB_SELECT, "dance")
-        (refused,) = tell.tell(fleet, dance, {ID}, time.monotonic() + 5)
+        (refused,) = tell.tell(fleet, dance, {ID}, until_s=time.monotonic() + 5)
 
         network(up=False)
         cut_s = time.monotonic()

@@ -102,7 +102,7 @@ def recorded_start(robot: Robot, key: bytes) -> dict[str, list[bytes]]:
         fleet = Fleet(URL, key=key)
         tell.find(fleet, {ID})
         tell.arm(fleet, {ID})
-        tell.start(fleet, {ID}, "", 0.5, partial=False)
+        tell.start(fleet, {ID}, "", ahead_s=0.5, partial=False)
         assert robot.wait_for(LEFT)
         tell.stop(fleet, {ID})
     return ear.heard
@@ -181,7 +181,7 @@ def flood_of_nonsense(robot: Robot, key: bytes) -> dict:
     fleet, over = Fleet(URL, key=key), threading.Event()
     tell.find(fleet, {ID})
     tell.arm(fleet, {ID})
-    tell.start(fleet, {ID}, "", 0.5, partial=False, link_timeout_ms=0)
+    tell.start(fleet, {ID}, "", ahead_s=0.5, partial=False, link_timeout_ms=0)
 
     def shouts():
         attacker = UdpBus(URL)
@@ -205,7 +205,7 @@ def forged_stands(robot: Robot, heard: dict, key: bytes) -> dict:
     fleet = Fleet(URL, key=key)
     tell.find(fleet, {ID})
     tell.arm(fleet, {ID})
-    tell.start(fleet, {ID}, "", 0.5, partial=False, link_timeout_ms=0)
+    tell.start(fleet, {ID}, "", ahead_s=0.5, partial=False, link_timeout_ms=0)
     attacker, over = UdpBus(URL), threading.Event()
     said: list = []
     stopping = Fleet(URL, key=key)
@@ -277,7 +277,7 @@ def unknown_mode(robot: Robot, key_file: Path, key: bytes) -> dict:
     fleet, over = Fleet(URL, key=key), threading.Event()
     tell.find(fleet, {ID})
     tell.arm(fleet, {ID})
-    tell.start(fleet, {ID}, "", 0.5, partial=False, link_timeout_ms=0)
+    tell.start(fleet, {ID}, "", ahead_s=0.5, partial=False, link_timeout_ms=0)
     telemetry = turbopi.telemetry_t()
     telemetry.robot_id, telemetry.mode = ID + 2, 77
 
@@ -342,7 +342,7 @@ def lost_operator(robot: Robot, key: bytes) -> dict:
     fleet = Fleet(URL, key=key)
     tell.find(fleet, {ID})
     tell.arm(fleet, {ID})
-    tell.start(fleet, {ID}, "", 0.5, partial=False, link_timeout_ms=800)
+    tell.start(fleet, {ID}, "", ahead_s=0.5, partial=False, link_timeout_ms=800)
     fleet.listen(2)
     held = robot.duties() == LEFT
     fleet.held.clear()

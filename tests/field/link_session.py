@@ -75,7 +75,7 @@ def drive(robot: Robot, key: bytes) -> Fleet:
     fleet = Fleet(URL, key=key)
     fleet.listen(10, lambda: ID in fleet.robots and fleet.robots[ID].link)
     tell.arm(fleet, {ID})
-    tell.start(fleet, {ID}, "", 0.5, partial=False, link_timeout_ms=0)
+    tell.start(fleet, {ID}, "", ahead_s=0.5, partial=False, link_timeout_ms=0)
     assert robot.wait_for(LEFT)
     return fleet
 

@@ -54,7 +54,7 @@ def lossy_round(robots: dict, seed: int) -> dict:
     found = tell.find(fleet, set())
     armed = tell.arm(fleet, found)
     begin_s = time.monotonic()
-    begun = tell.start(fleet, found, "milling", AHEAD_S, partial=False)
+    begun = tell.start(fleet, found, "milling", ahead_s=AHEAD_S, partial=False)
     instant_s = begun.utime_us / 1e6 - (time.time() - time.monotonic())
     late_s = [first_move_s(robot, begin_s) - instant_s for robot in robots.values()]
     stop_s = time.monotonic()
@@ -78,7 +78,7 @@ def deaf_round(robots: dict) -> dict:
     fleet = Fleet(URL, connect=lambda url: DeafBus(url, deaf), key=KEY)
     fleet.listen(0.5)
     begin_s = time.monotonic()
-    begun = tell.start(fleet, IDS, "", AHEAD_S, partial=False)
+    begun = tell.start(fleet, IDS, "", ahead_s=AHEAD_S, partial=False)
     time.sleep(0.5)
     moved = {duties for r in robots.values() for t, duties in r.rows() if t > begin_s} - {ZERO}
     return {
@@ -92,7 +92,7 @@ def one_robot_round(robots: dict) -> list:
     """Robot 1 alone is told to start, with another behaviour."""
     fleet = Fleet(URL, key=KEY)
     tell.arm(fleet, IDS)
-    tell.start(fleet, {1}, "diffusing_v2", 0.5, partial=False)
+    tell.start(fleet, {1}, "diffusing_v2", ahead_s=0.5, partial=False)
     duties = [robot.duties() for robot in robots.values()]
     tell.stop(fleet, set())
     return duties
@@ -102,9 +102,9 @@ def own_table_round() -> dict:
     """Robots 1 and 2 know a table of the user's own by name; robot 3 does not."""
     fleet = Fleet(URL, key=KEY)
     tell.arm(fleet, IDS)
-    refused = tell.start(fleet, IDS, "ahead", 0.5, partial=False)
+    refused = tell.start(fleet, IDS, "ahead", ahead_s=0.5, partial=False)
     tell.arm(fleet, IDS)
-    begun = tell.start(fleet, {1, 2}, "ahead", 0.5, partial=False)
+    begun = tell.start(fleet, {1, 2}, "ahead", ahead_s=0.5, partial=False)
     fleet.listen(0.3)
     return {
         "refused": {a.robot_id: a.reason for a in refused.answers if not a.accepted},
@@ -121,12 +121,12 @@ def answers_to_bad_commands(prefix: str, robot_id: int) -> dict:
     given = {}
     tell.arm(fleet, {robot_id})
     first = tell.make_command(2, "milling")
-    tell.tell(fleet, first, {robot_id}, time.monotonic() + 5)
+    tell.tell(fleet, first, {robot_id}, until_s=time.monotonic() + 5)
     for name, (verb, behavior, ahead_us, age_us) in PROTOCOL.items():
         command = tell.make_command(verb, behavior)
         command.start_utime_us = command.utime_us + ahead_us if ahead_us else 0
         command.utime_us -= age_us
-        (answer,) = tell.tell(fleet, command, {robot_id}, time.monotonic() + 5)
+        (answer,) = tell.tell(fleet, command, {robot_id}, until_s=time.monotonic() + 5)
         given[name] = [answer.accepted, answer.reason]
     return given
 
@@ -140,7 +140,7 @@ def unheard_round(robots: dict) -> list:
     """`twinmill swarm stop` whose key is no key and whose messages nobody reads."""
     fleet = Fleet(URL, key=KEY)
     tell.arm(fleet, IDS)
-    tell.start(fleet, IDS, "diffusing_v2", 0.5, partial=False, link_timeout_ms=0)
+    tell.start(fleet, IDS, "diffusing_v2", ahead_s=0.5, partial=False, link_timeout_ms=0)
     moved = [robot.duties() for robot in robots.values()]
     read_end, write_end = full_pipe()
     command = [sys.executable, "-c", STOP, "swarm", "stop", "--key", "/dev/null"]
@@ -157,7 +157,7 @@ def twin_round() -> dict:
     result = {"twin_answers": answers_to_bad_commands("TWIN_", 1)}
     fleet = Fleet(URL, "TWIN_", key=KEY)
     tell.arm(fleet, tell.find(fleet, set()))
-    begun = tell.start(fleet, tell.find(fleet, set()), "ahead", 0.5, partial=False)
+    begun = tell.start(fleet, tell.find(fleet, set()), "ahead", ahead_s=0.5, partial=False)
     result["twin_modes"] = [a.mode for a in begun.answers]
     fleet.listen(6, lambda: behaviors(fleet) == ["ahead"] * 2)
     result["twin_behaviors"] = behaviors(fleet)

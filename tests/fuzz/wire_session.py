@@ -103,7 +103,7 @@ def main(folder: Path, seconds: float, seed: int) -> dict:
         fleet = Fleet(URL, key=key)
         tell.find(fleet, {ID})
         tell.arm(fleet, {ID})
-        drives = tell.start(fleet, {ID}, "", 0.5, partial=False).answers[0].accepted
+        drives = tell.start(fleet, {ID}, "", ahead_s=0.5, partial=False).answers[0].accepted
         robot_stands = tell.stop(fleet, {ID})[0].stands
         twins.listen(0.5)
         twin_stands = [a.stands for a in tell.stop(twins, {0, 1})]

@@ -58,7 +58,9 @@ def test_calibrated_on_a_hundred_laboratories_of_another_plant(swept: Path):
     assert claim.agrees and claim.count == (len(claim.rows) - 1,) * 2 and len(claim.rows) > 4
     assert claim.rows[-1].low > 0  # more is known than how often each class comes
     cell = np.arange(len(said.points))
-    p = np.array([score(said, cell, ended, ["cone_deg", "range_m"], 1).p_value for ended in saw])
+    p = np.array(
+        [score(said, cell, ended, axes=["cone_deg", "range_m"], seed=1).p_value for ended in saw]
+    )
     assert np.mean(p < 0.05) < 0.05 + 3.5 * np.sqrt(0.05 * 0.95 / LABS)
 
 
@@ -66,7 +68,7 @@ def test_scores_are_those_of_their_definitions():
     """Two cells, by hand: log of what was said, and Brier's sum over the classes."""
     said = np.array([[[0.7, 0.1, 0.1, 0.05, 0.05], [0.2, 0.2, 0.2, 0.2, 0.2]]])
     expected = Forecast(np.array([[1.0], [2.0]]), said[0], said)
-    found = score(expected, np.array([0, 1]), np.array([0, 3]), ["x"], 1)
+    found = score(expected, np.array([0, 1]), np.array([0, 3]), axes=["x"], seed=1)
     assert found.log_score.value == pytest.approx((np.log(0.7) + np.log(0.2)) / 2)
     first = 0.3**2 + 2 * 0.1**2 + 2 * 0.05**2
     assert found.brier.value == pytest.approx((first + 0.8**2 + 4 * 0.2**2) / 2)
@@ -84,10 +86,10 @@ def test_intervals_of_scores_stay_in_their_range(sure):
     expected = Forecast(np.arange(6.0)[:, None], said[0], said)
     cell = np.repeat(np.arange(6), 2)
     seen = np.where(np.arange(12) == 0, 1, 0)
-    found = score(expected, cell, seen, ["x"], 1)
+    found = score(expected, cell, seen, axes=["x"], seed=1)
     assert 0 <= found.brier.low < found.brier.value < found.brier.high <= 2
     assert found.log_score.low < found.log_score.value < found.log_score.high <= 0
-    few = score(expected, cell[:8], seen[:8], ["x"], 1)
+    few = score(expected, cell[:8], seen[:8], axes=["x"], seed=1)
     assert np.isnan([few.brier.low, few.brier.high, few.log_score.low]).all()
 
 
@@ -98,11 +100,11 @@ def test_a_wrong_model_scores_worse_than_it_expects_and_its_misses_are_told():
     expected = Forecast(np.arange(6.0)[:, None], sure[0], sure)
     cell = np.repeat(np.arange(6), 4)
     seen = np.where(cell >= 3, OUTCOMES.index("separated"), OUTCOMES.index("milling"))
-    found = score(expected, cell, seen, ["v_mps"], 1)
+    found = score(expected, cell, seen, axes=["v_mps"], seed=1)
     assert found.p_value < 0.001 and found.hits == 12
     assert found.misses[0].startswith("12 of 12 misses ended 'separated' where 'milling'")
     assert "high v_mps" in found.misses[1]
-    right = score(expected, cell, np.zeros(24, int), ["v_mps"], 1)
+    right = score(expected, cell, np.zeros(24, int), axes=["v_mps"], seed=1)
     assert right.p_value > 0.05 and right.misses == ["Every run ended in its most probable class."]
 
 

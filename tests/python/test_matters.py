@@ -78,9 +78,9 @@ def planted(tmp_path_factory) -> Matters:
     (folder / "planted.toml").write_text(planted_text())
     name = str(folder / "planted.toml")
     request = make_request("milling", name, [], seeds=SEEDS, duration_s=SECONDS, full=True)
-    asked, left = factors(ModelFile.load(name), [], 0, 1)
+    asked, left = factors(ModelFile.load(name), [], drawn=0, seed=1)
     only = [s for s in asked if s.kind == "effect"]
-    return judge(request, only, left, "milling", 0.1, folder)
+    return judge(request, only, left, goal="milling", margin=0.1, folder=folder)
 
 
 def test_of_six_effects_the_one_that_decides_comes_first_and_five_do_not_matter(planted: Matters):
@@ -117,7 +117,7 @@ def test_an_effect_that_does_nothing_changes_no_run(tmp_path: Path):
     request = replace(request, n=3)
     neutral = bare + '[[effect]]\nname = "speed_slip"\nloss_s_per_m = 0.0\n'
     asked = [Factor("speed_slip", "effect", "", [Change("nothing", neutral, {})])]
-    found = judge(request, asked, [], "milling", 0.1, tmp_path / "out")
+    found = judge(request, asked, [], goal="milling", margin=0.1, folder=tmp_path / "out")
     outcome = found.ranked[0].worst
     assert outcome.share.change == 0
     circliness = outcome.metrics["circliness"]
@@ -189,7 +189,7 @@ def test_what_goes_together_moves_along(tmp_path: Path):
         "values = [[0.0004, -0.00016], [-0.00016, 0.0001]]\n"
     )
     (tmp_path / "m.toml").write_text(text)
-    asked, _ = factors(ModelFile.load(str(tmp_path / "m.toml")), [], 0, 1)
+    asked, _ = factors(ModelFile.load(str(tmp_path / "m.toml")), [], drawn=0, seed=1)
     forward = next(s for s in asked if s.name == "base.forward_gain")
     high = native.Model.from_toml(forward.changes[1].text, "high")
     assert high.get("base.forward_gain") == pytest.approx(1 + 1.96 * 0.02)

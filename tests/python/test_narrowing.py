@@ -94,8 +94,12 @@ def test_a_clock_that_must_be_found_takes_away_what_the_inverse_says():
 
 
 def test_the_run_tells_the_number_that_decides(modelled, file):
-    forward = design_for(spread([3, 0, 0]), "milling", file, modelled, LIMITS, 1.0)
-    yaw = design_for(spread([0, 3, 0]), "milling", file, modelled, LIMITS, 1.0)
+    forward = design_for(
+        spread([3, 0, 0]), "milling", file=file, modelled=modelled, limits=LIMITS, excess=1.0
+    )
+    yaw = design_for(
+        spread([0, 3, 0]), "milling", file=file, modelled=modelled, limits=LIMITS, excess=1.0
+    )
     assert turning(yaw) > 0.6 > 0.4 > turning(forward)
     assert forward.untold == 0 and forward.rows.end_s <= LIMITS.duration_s
     for own, other in ((forward, yaw), (yaw, forward)):
@@ -106,11 +110,15 @@ def test_the_run_tells_the_number_that_decides(modelled, file):
 
 
 def test_what_no_drive_shows_is_said(modelled, file):
-    found = design_for(spread([3, 0, 6]), "milling", file, modelled, LIMITS, 1.0)
+    found = design_for(
+        spread([3, 0, 6]), "milling", file=file, modelled=modelled, limits=LIMITS, excess=1.0
+    )
     assert found.untold == pytest.approx(0.5)
     assert found.stds[1] == pytest.approx(0.3, rel=0.05)  # what the range leaves open stays
     with pytest.raises(ValueError, match=r"sensor.range_m.*no drive of one robot shows"):
-        design_for(spread([0, 0, 6]), "milling", file, modelled, LIMITS, 1.0)
+        design_for(
+            spread([0, 0, 6]), "milling", file=file, modelled=modelled, limits=LIMITS, excess=1.0
+        )
 
 
 @pytest.fixture
@@ -181,8 +189,12 @@ def test_a_refit_knows_the_outcome_best_after_the_run_that_was_designed_for_it(m
     truths = 1 + STDS[:2] * random.normal(size=(40, 2))
     slope = np.array([0.3, 3.0])
     limits = Limits(13.0, (3.0, 3.0), 1.0)
-    own = design_for(spread([*slope, 0]), "milling", file, modelled, limits, 1.0)
-    other = design_for(spread([3, 0, 0]), "milling", file, modelled, limits, 1.0)
+    own = design_for(
+        spread([*slope, 0]), "milling", file=file, modelled=modelled, limits=limits, excess=1.0
+    )
+    other = design_for(
+        spread([3, 0, 0]), "milling", file=file, modelled=modelled, limits=limits, excess=1.0
+    )
     moves = family(duty_axes(1.0))
     runs = {"own": own.moves, "other": other.moves}
     for k in range(3):
@@ -205,7 +217,9 @@ def test_fits_to_the_run_come_as_near_as_was_promised(modelled, file):
     Errors are squared over what was promised: chi squared, if the promise is no better than true.
     """
     slope = np.array([0.3, 3.0])
-    own = design_for(spread([*slope, 0]), "milling", file, modelled, LIMITS, 1.0)
+    own = design_for(
+        spread([*slope, 0]), "milling", file=file, modelled=modelled, limits=LIMITS, excess=1.0
+    )
     planned = narrowing.driven(own.moves, modelled)
     truths = 1 + STDS[:2] * np.random.default_rng(5).normal(size=(6, 2))
     off = []

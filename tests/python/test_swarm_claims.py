@@ -79,7 +79,7 @@ def test_two_samples_of_one_share_differ_as_often_as_they_should():
 
 def test_the_interval_of_a_median_holds_it_as_often_as_it_says():
     draws = np.random.default_rng(2).normal(3, 1, (500, 101))
-    made = [rows.median("", draw, None, 0) for draw in draws]
+    made = [rows.median("", draw, None, margin=0) for draw in draws]
     assert 0.92 < np.mean([row.low <= 3 <= row.high for row in made]) < 0.99
 
 

@@ -303,7 +303,12 @@ class Run:
 
     def _start(self, script: str, countdown_s: float) -> None:
         begun = tell.start(
-            self.fleet, {self.robot_id}, script, countdown_s, False, tell.VERBS.VERB_SCRIPT
+            self.fleet,
+            {self.robot_id},
+            script,
+            ahead_s=countdown_s,
+            partial=False,
+            verb=tell.VERBS.VERB_SCRIPT,
         )
         (answer,) = begun.answers
         if begun.called_off:

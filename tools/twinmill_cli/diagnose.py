@@ -149,7 +149,9 @@ def _explain(
     check_output(output, model_file, force)
     with telling(f"explaining with {model}") as progress:
         measurements = load(logs, model_file, as_json)
-        result = explain(measurements, model_file, output, source.command, progress)
+        result = explain(
+            measurements, model_file, out=output, command=source.command, progress=progress
+        )
     then = _settling(result.diagnosis, logs, str(output))
     section = partial(present.section, result.diagnosis, then)
     data = {**result.to_json(), **told(measurements)}

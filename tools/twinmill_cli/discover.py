@@ -124,7 +124,7 @@ def _discover(
         shown = _best(offered, show)
         write_entries(out, hunt, found)
         tried = generations * PER_GENERATION
-        page = section(hunt, found, offered, shown, tried, elites.cells)
+        page = section(hunt, found, offered, shown=shown, tried=tried, cells=elites.cells)
         limits = {"generations": generations, "show": show, "confirm": confirm_runs}
         limits["mujoco"] = mujoco_runs
         source = _source(hunt, model, change or [], limits, out=out)

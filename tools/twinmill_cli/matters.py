@@ -120,7 +120,7 @@ def _matters(
         folder = out or Path(scratch)
         hidden = _hidden(logs or [], model_file, folder, as_json)
         with busy("writing the changed models"):
-            asked, left = factors(model_file, hidden, draws, first_seed, only or [])
+            asked, left = factors(model_file, hidden, drawn=draws, seed=first_seed, only=only or [])
         with progress_bar() as progress:
             task = progress.add_task("runs", total=None)
             found = judge(

@@ -143,11 +143,15 @@ def _narrowing(
         )
     with progress_bar() as progress:
         task = progress.add_task("swarms of models drawn", total=draws)
-        spread = spread_of(swarm, goal_of(swarm), draws, 1, lambda: progress.advance(task))
+        spread = spread_of(
+            swarm, goal_of(swarm), draws=draws, seed=1, tell=lambda: progress.advance(task)
+        )
     logs = [o for o in open_measurements(measurements, model_file) if o.floor]
     excess = model_file.usual_score([o.measurement.log_sha256 for o in logs]) ** 2
     modelled = log_of([o.modelled() for o in logs])
-    return design_for(spread, goal_of(swarm), model_file, modelled, limits, excess)
+    return design_for(
+        spread, goal_of(swarm), file=model_file, modelled=modelled, limits=limits, excess=excess
+    )
 
 
 def _sides(text: str) -> tuple[float, float]:

@@ -55,14 +55,14 @@ def _score_floor(
         check_new_folder(out)
     plan, digest = read_plan(folder, sha256)
     cell, seen, missing = read_outcomes(outcomes, plan)
-    found = score(plan.expected, cell, seen, plan.names, plan.seed)
+    found = score(plan.expected, cell, seen, axes=plan.names, seed=plan.seed)
     told = sentences(found, missing)
     source = Provenance(
         shlex.join(["twinmill", "score-floor", str(folder), str(outcomes), "--sha256", digest]),
         f"twinmill {version('twinmill')}",
         hashlib.sha256(plan.request.model_text.encode()).hexdigest(),
     )
-    page = section(found, plan, cell, seen, missing)
+    page = section(found, plan, cell=cell, seen=seen, missing=missing)
     report = write_report(out, page.title, source, [page], note=NOTE) if out else None
     data = {
         "sha256": digest,

@@ -120,7 +120,9 @@ def _start(
         tell.arm(fleet, asked)
     timeout_ms = 0 if untethered else round(1e3 * link_timeout_s) if link_timeout_s else -1
     with ended_by_signals():
-        begun = tell.start(fleet, asked, behavior, in_s, partial, link_timeout_ms=timeout_ms)
+        begun = tell.start(
+            fleet, asked, behavior, ahead_s=in_s, partial=partial, link_timeout_ms=timeout_ms
+        )
         with stopped_if_it_fails(fleet, asked):
             ok = all(a.accepted and a.signed and a.mode != "stopped" for a in begun.answers)
             data = {"start_utime_us": begun.utime_us, "called_off": begun.called_off}
@@ -298,7 +300,7 @@ def _select(
     fleet = Fleet(lcm_url, channel_prefix, key=load(key))
     asked = tell.find(fleet, parse_robots(robots))
     command = tell.make_command(tell.VERBS.VERB_SELECT, behavior)
-    given = tell.tell(fleet, command, asked, time.monotonic() + 5)
+    given = tell.tell(fleet, command, asked, until_s=time.monotonic() + 5)
     ok = all(answer.accepted and answer.signed for answer in given)
     words = f"All chose {behavior}." if ok else f"Not all did{_hint(given)}."
     return _finish("select", given, ok, words, data={}, as_json=as_json)

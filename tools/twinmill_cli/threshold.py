@@ -94,7 +94,7 @@ def _threshold(
         fitted = fit_box(taken, balls, min_blob_px)
         before = [evaluate(*both, native.green_box()) for both in zip(taken, balls, strict=True)]
         if picture:
-            draw(picture, taken, balls, before, fitted.results)
+            draw(picture, taken, balls, before=before, after=fitted.results)
     settings = dict(zip(KEYS, fitted.box, strict=True))
     if not fitted.problem:
         if config:

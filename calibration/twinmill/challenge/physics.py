@@ -374,7 +374,7 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
     wheels = ("fl", "fr", "rl", "rr")[: robot.to_wheels.shape[0]]
     found: list[Hidden] = []
 
-    def form(name: str, kind: str, stage: str, act: Act, grows=None, most=5.0, **values: float):
+    def form(name: str, kind: str, stage: str, act: Act, *, grows=None, most=5.0, **values: float):
         grows = tuple(values) if grows is None else grows
         found.append(
             Hidden(
@@ -395,16 +395,24 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
         left, right = 0.04 * u(0.4, 1.4) * sign(), 0.04 * u(0.4, 1.4) * sign()
         form("reverse_asymmetry", "plain", "target", _reverse, left=left, right=right)
         form("lag_by_duty", "plain", "lag", _lag_by_duty, extra_s=0.08)
-        form("coasting", "plain", "lag", _coasting, (), deceleration_mps2=0.6, viscous_per_s=0.4)
+        form(
+            "coasting",
+            "plain",
+            "lag",
+            _coasting,
+            grows=(),
+            deceleration_mps2=0.6,
+            viscous_per_s=0.4,
+        )
     if robot.drive != "wheel_speed":
         at = {"moment": float(u(0.3, 0.7)), "loss": 0.05}
         both, slowly = at | {"side": 0.0}, at | {"takes_s": 6.0}
         if robot.drive == "duty":
             both["side"] = 0.05 * float(random.choice([-1, 0, 1]))
-        form("abrupt_loss", "plain", "target", _from_a_moment, ("loss", "side"), **both)
-        form("abrupt_loss", "cousin", "target", _over_seconds, ("loss",), **slowly)
-        form("transient_loss", "plain", "target", _for_a_while, ("loss",), **at)
-        form("transient_loss", "cousin", "target", _swelling, ("loss",), **at)
+        form("abrupt_loss", "plain", "target", _from_a_moment, grows=("loss", "side"), **both)
+        form("abrupt_loss", "cousin", "target", _over_seconds, grows=("loss",), **slowly)
+        form("transient_loss", "plain", "target", _for_a_while, grows=("loss",), **at)
+        form("transient_loss", "cousin", "target", _swelling, grows=("loss",), **at)
         if robot.plant == "planar":  # before motors with a lag of their own it is a second one
             form("motor_lag", "plain", "lag", _lag, extra_s=0.03)
         form("motor_lag", "cousin", "lag", _second_order, second_s=0.03)

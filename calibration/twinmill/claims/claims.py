@@ -173,7 +173,9 @@ def bullseye(seeds: int, turns: tuple[float, ...] = ODD_TURNS) -> Claim:
             reference = ODD_RATIO.get(turn, {}).get(kind) if n == 6 else None
             what = f"{turn:+g} times, {n} robots, {kind}"
             ratio = runs["odd_ratio"][0]
-            rows.append(median(what, ratio, reference, ODD_MARGIN, kind=kind, turn=turn, n=n))
+            rows.append(
+                median(what, ratio, reference, margin=ODD_MARGIN, kind=kind, turn=turn, n=n)
+            )
             runs_of[turn, kind, n] = ratio
         typical[f"{turn:+g} times"] = run(
             ["theta_a=0", *KINDS["disc"]], "milling:5,odd:1", tables=table, seeds=1
@@ -263,7 +265,9 @@ def alike(seeds: int) -> Claim:
             what = f"circliness at spread {spread:g}"
             rows.append(mean(what, held, ALIKE[spread], 0.001, at=spread))
         else:
-            rows.append(median(f"circliness at spread {spread:g}", circliness, None, 0, at=spread))
+            rows.append(
+                median(f"circliness at spread {spread:g}", circliness, None, margin=0, at=spread)
+            )
     slope = mean("circliness over spread", np.concatenate(locked), LOCKED)
     return Claim(
         "alike",

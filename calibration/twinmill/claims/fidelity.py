@@ -95,13 +95,13 @@ def _levels(folder: Path) -> tuple[list[Level], np.ndarray]:
         numbers = more + (levels[-1].numbers if levels else 0)
         levels.append(Level(added, numbers, score, _alike(_shares(path, 1), true_shares)))
 
-    added = add(EFFECTS[0], drive, file, folder / "first.toml", COMMAND)
+    added = add(EFFECTS[0], drive, file, out=folder / "first.toml", command=COMMAND)
     judge("data sheet", 0, added.heldout_before.score)
     base = fit(drive, file, folder / "fitted.toml", COMMAND)
     file = ModelFile.load(str(folder / "fitted.toml"))
     judge("numbers fitted", len(base.parameters), added.heldout_refit.score)
     for effect in EFFECTS:
-        added = add(effect, drive, file, folder / f"{effect}.toml", COMMAND)
+        added = add(effect, drive, file, out=folder / f"{effect}.toml", command=COMMAND)
         file = ModelFile.load(str(folder / f"{effect}.toml"))
         own = sum(p.name.startswith(f"{effect}.") for p in added.parameters)
         judge(effect, own, added.heldout_after.score)

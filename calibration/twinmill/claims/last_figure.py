@@ -79,7 +79,7 @@ def last_figure(seeds: int, folder: Path) -> Claim:
             rows.append(share(f"{swarm.name}, {plant}", _ended(swarm, runs), None))
             if swarm.turn:
                 what = f"{swarm.name}, {plant}: its distance over the ring's radius"
-                rows.append(median(what, runs["odd_ratio"][0], None, 0))
+                rows.append(median(what, runs["odd_ratio"][0], None, margin=0))
     told = "; ".join(f"{r.what} {_percent(r)}" for r in rows if r.unit == "%")
     return Claim(
         "last_figure",

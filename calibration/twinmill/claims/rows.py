@@ -146,6 +146,7 @@ def median(
     what: str,
     values: np.ndarray,
     reference: float | tuple[float, float] | None,
+    *,
     margin: float,
     unit: str = "",
     **by,
@@ -163,7 +164,7 @@ def median(
 
 def length(what: str, values_m: np.ndarray, reference_m: float, **by) -> Row:
     """Median of lengths against a reference, with a fixed share of it as tolerance."""
-    return median(what, values_m, reference_m, LENGTH_OFF * reference_m, "m", **by)
+    return median(what, values_m, reference_m, margin=LENGTH_OFF * reference_m, unit="m", **by)
 
 
 def _bounds(reference: float | tuple[float, float]) -> tuple[float, float]:

@@ -58,6 +58,7 @@ def judge_cameras(
     alike: list[Detections],
     odd: list[Detections],
     model: native.Model,
+    *,
     progress: Callable[[str], None],
     excluded: Collection[str] = (),
 ) -> list[Outlier]:
@@ -78,13 +79,14 @@ def judge_cameras(
             continue
         progress(f"the camera of robot {robot_id} differs: looking for what it is")
         own = [s for s in odd if s.robot_id == robot_id]
-        off.append(_judge_camera(own, model, excluded, away, others))
+        off.append(_judge_camera(own, model, excluded=excluded, away=away, others=others))
     return off
 
 
 def _judge_camera(
     own: list[Detections],
     model: native.Model,
+    *,
     excluded: Collection[str],
     away: dict[int, float],
     others: float,

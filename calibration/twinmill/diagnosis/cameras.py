@@ -49,7 +49,7 @@ def with_detections(
 
     done = search(camera_state(alike, model_file.model, excluded), tell, known=0.0)
     found, model = camera_findings(done), done.last.state.model
-    off = judge_cameras(alike, odd, model, progress, excluded)
+    off = judge_cameras(alike, odd, model, progress=progress, excluded=excluded)
     ranking = _ranked_by_likelihood(done, found, diagnosis.ranking)
     verdict = diagnosis.verdict
     if found and verdict in (*ADEQUATE, "effect_missing"):

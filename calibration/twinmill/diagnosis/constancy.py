@@ -110,6 +110,7 @@ def _doing(data: Trajectory) -> dict[tuple[str, str], np.ndarray]:
 def _change(
     trial: Trial,
     c: int,
+    *,
     on: str,
     values: np.ndarray,
     left: np.ndarray,

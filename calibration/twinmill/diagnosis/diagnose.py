@@ -109,7 +109,16 @@ def diagnose(
             first = first_state(known, model_file, {*excluded, *unseen})
             done = search(first, progress, known=usual)
     progress("looking for what no effect explains")
-    found = _concluded(opened, known, first, done, model_file, before, unseen, off)
+    found = _concluded(
+        opened,
+        known=known,
+        first=first,
+        done=done,
+        model_file=model_file,
+        before=before,
+        unseen=unseen,
+        off=off,
+    )
     whole = with_detections(found, model_file, progress, excluded)
     return replace(whole, sentence=" ".join([whole.sentence, *map(sentence, whole.robots_off)]))
 
@@ -191,6 +200,7 @@ def _unseen(opened: Sequence[Opened]) -> dict[str, str]:
 
 def _concluded(
     opened: Sequence[Opened],
+    *,
     known: Sequence[Opened],
     first: State,
     done: Search,

@@ -58,6 +58,7 @@ def steps(diagnosis: Diagnosis) -> list[dict]:
 def explain(
     measurements: Sequence[Measurement | SteadyTable],
     model_file: ModelFile,
+    *,
     out: Path,
     command: str,
     progress: Callable[[str], None] = lambda _: None,

@@ -69,7 +69,7 @@ def findings_of(
     changes = changes_of(done.last)
     found = []
     for k, name in enumerate(names):
-        finding = _finding(done, name, less.get(name), shares[name], changes)
+        finding = _finding(done, name, less=less.get(name), share=shares[name], changes=changes)
         if again := comes_again(done, name):
             why = f"it comes more than once: from {again[0]:.0f} to {again[1]:.0f} s, too"
             finding = doubted(finding, why, wrong_form=True, depends_on=TIME)
@@ -215,6 +215,7 @@ def _rivals(done: Search, name: str) -> list[Trial]:
 def _finding(
     done: Search,
     name: str,
+    *,
     less: Trial | None,
     share: float,
     changes: Mapping[str, Change],
@@ -252,18 +253,24 @@ def ranking_of(done: Search, found: Sequence[Finding]) -> list[Ranked]:
             number += 1
             group = number
         for trial in [this.accepted, *rivals]:
-            entries = [_ranked(trial, n, this, first, group) for n in trial.names if n != REFIT]
+            entries = [
+                _ranked(trial, n, this=this, first=first, group=group)
+                for n in trial.names
+                if n != REFIT
+            ]
             ranking += [
                 e for e in entries if e.effect == finding.effect or trial is not this.accepted
             ]
     named = {r.effect for r in ranking}
     for trial in done.rounds[0].trials:
         if len(trial.names) == 1 and trial.names[0] not in {*named, REFIT}:
-            ranking.append(_ranked(trial, trial.names[0], done.rounds[0], first, None))
+            ranking.append(
+                _ranked(trial, trial.names[0], this=done.rounds[0], first=first, group=None)
+            )
     return ranking
 
 
-def _ranked(trial: Trial, name: str, this: Round, first: float, group: int | None) -> Ranked:
+def _ranked(trial: Trial, name: str, *, this: Round, first: float, group: int | None) -> Ranked:
     own = [e for e in trial.fit.shared_estimates() if e.name.split(".")[0].split("#")[0] == name]
     fall = this.before.held_score**2 - trial.held_score**2
     share = float(np.clip(fall / max(first - 1, fall, 1e-9), 0.0, 1.0))

@@ -509,7 +509,9 @@ def screen(
         if searched and (name not in ways or with_role(name, "limit")):
             ways[name] = _ways(name, state, rows)
         start = _best_start(*ways[name], weights, rest) if searched else {}
-        found.append(_screened(name, state, rows, weights, basis, rest, start))
+        found.append(
+            _screened(name, state, rows=rows, weights=weights, basis=basis, rest=rest, start=start)
+        )
     return found
 
 
@@ -584,6 +586,7 @@ def _best_start(
 def _screened(
     name: str,
     state: State,
+    *,
     rows: list[np.ndarray],
     weights: list[np.ndarray],
     basis: np.ndarray,
@@ -591,7 +594,7 @@ def _screened(
     start: dict[str, float],
 ) -> Screened:
     """Slopes at neutral, or the way to the usual strength where these say nothing of it."""
-    parameters, small, whole = _signatures(name, state, rows, weights, start)
+    parameters, small, whole = _signatures(name, state, rows=rows, weights=weights, start=start)
     pad = len(rest) - len(small)
     small, whole = (np.vstack([c, np.zeros((pad, c.shape[1]))]) for c in (small, whole))
     small, whole = (c - basis @ (basis.T @ c) for c in (small, whole))
@@ -613,6 +616,7 @@ def _screened(
 def _signatures(
     name: str,
     state: State,
+    *,
     rows: list[np.ndarray],
     weights: list[np.ndarray],
     start: dict[str, float],

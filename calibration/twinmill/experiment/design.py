@@ -146,7 +146,9 @@ def design(
     asked = hypotheses_of(diagnosis, base_parameters(model_file.model, names))
     modelled = log_of(asked.state.logs)
     predicted = Played.of([[m] for m in moves], modelled).modelled(modelled, CENTRE)
-    known = candidate_effects(asked.state.logs, predicted, asked.state, asked, usual)
+    known = candidate_effects(
+        asked.state.logs, predicted, state=asked.state, asked=asked, usual=usual
+    )
     fisher = FisherInformation(asked.state.free, known)
     told = np.sum([fisher.told(s) for s in asked.state.logs], axis=0)
     names, why = question(asked, known, _tempered(fisher, told), ENOUGH_CHI2)
@@ -156,7 +158,7 @@ def design(
     progress("choosing moves")
     floor = Floor(limits, modelled, list(wanted.values()))
     worth = partial(_worth, fisher, wanted=list(wanted))
-    chosen = choose(moves, worth, told, fisher.predicted(predicted), floor)
+    chosen = choose(moves, worth, told=told, predicted=fisher.predicted(predicted), floor=floor)
     progress("checking the whole script")
     whole = Played.of([chosen], modelled)
     planned = whole.modelled(modelled, CENTRE)
@@ -264,6 +266,7 @@ def with_effect(model: native.Model, effect: CandidateEffect) -> native.Model:
 def choose(
     moves: list[Move],
     worth_of: Callable[[np.ndarray], np.ndarray],
+    *,
     told: np.ndarray,
     predicted: np.ndarray,
     floor: Floor,
@@ -356,7 +359,7 @@ class _Outlook:
         return margins, power(
             margins,
             np.array([len(e["parameters"]) for e in entries]),
-            len(candidate_effects),
-            matter,
-            np.array([e["name"] in self.asked.fitted for e in entries]),
+            candidates=len(candidate_effects),
+            relevance=matter,
+            fitted=np.array([e["name"] in self.asked.fitted for e in entries]),
         )

@@ -95,7 +95,7 @@ def question(
 
 
 def candidate_effects(
-    logs: list[ModelledLog], planned: ModelledLog, state: State, asked: Hypotheses, usual: float
+    logs: list[ModelledLog], planned: ModelledLog, *, state: State, asked: Hypotheses, usual: float
 ) -> list[CandidateEffect]:
     """Every effect that the logs or the planned run show, at its fitted or its usual strength.
 

@@ -16,6 +16,7 @@ STRENGTHS = (0.4, 1.0, 2.5)  # times the usual, each as probable
 def power(
     margins: np.ndarray,
     parameters: np.ndarray,
+    *,
     candidates: int,
     relevance: Relevance,
     fitted: np.ndarray,

@@ -295,9 +295,13 @@ def _actuators(robot: RobotModel, lag_s: float) -> ET.Element:
     unit = robot.get("robot.wheel_radius_m") if robot.model.drive == "wheel_speed" else 1.0
     for k, (wheel, row) in enumerate(zip(wheels, rows, strict=True)):
         own = unit * (1.0 if robot.model.drive == "duty" else wheel_gains(robot)[k])
-        actuator.append(_servo(robot, lag_s, wheel["name"], row / gains @ apart, kv, float(own)))
+        actuator.append(
+            _servo(
+                robot, lag_s, name=wheel["name"], row=row / gains @ apart, kv=kv, gain=float(own)
+            )
+        )
     if not strafes:  # plain wheels hold the robot sideways
-        actuator.append(_servo(robot, lag_s, "left", apart[1], held, 0.0))
+        actuator.append(_servo(robot, lag_s, name="left", row=apart[1], kv=held, gain=0.0))
     return actuator
 
 
@@ -342,7 +346,7 @@ def _grip(wheel: dict) -> np.ndarray:
 
 
 def _servo(
-    robot: RobotModel, lag_s: float, name: str, row: np.ndarray, kv: float, gain: float
+    robot: RobotModel, lag_s: float, *, name: str, row: np.ndarray, kv: float, gain: float
 ) -> ET.Element:
     """Pulls along `row` (forward, left, turn) until the speed there is `gain` times its filter."""
     options = _signal(robot, lag_s, name, row)

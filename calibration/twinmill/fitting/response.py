@@ -377,7 +377,7 @@ class Response:
             if equations is None:
                 coefficients.append(None)
                 continue
-            ridges[part], *found = _ridge(*equations, groups[part], begun[part], worth)
+            ridges[part], *found = _ridge(*equations, groups[part], ridge=begun[part], worth=worth)
             coefficients.append(found)
         return coefficients, ridges
 
@@ -576,6 +576,7 @@ def _ridge(
     total: tuple[np.ndarray, np.ndarray],
     folds: list[Fold],
     groups: np.ndarray,
+    *,
     ridge: np.ndarray,
     worth: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

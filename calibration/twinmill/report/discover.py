@@ -26,6 +26,7 @@ def section(
     hunt: Hunt,
     found: list[Entry],
     offered: list[Entry],
+    *,
     shown: list[Entry],
     tried: int,
     cells: int,

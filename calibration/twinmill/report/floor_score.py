@@ -63,7 +63,7 @@ def sentences(found: Score, missing: list[int]) -> list[str]:
 
 
 def section(
-    found: Score, plan: Plan, cell: np.ndarray, seen: np.ndarray, missing: list[int]
+    found: Score, plan: Plan, *, cell: np.ndarray, seen: np.ndarray, missing: list[int]
 ) -> Section:
     """The page of a score: verdict, each cell beside its prediction, and what is missing."""
     bad = found.p_value < ALPHA

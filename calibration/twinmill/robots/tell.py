@@ -107,7 +107,7 @@ def _all_linked(fleet: Fleet, robots: set[int]) -> bool:
 
 
 def tell(
-    fleet: Fleet, command, robots: set[int], until_s: float, link_timeout_ms: int = -1
+    fleet: Fleet, command, robots: set[int], *, until_s: float, link_timeout_ms: int = -1
 ) -> list[Answer]:
     """Repeats one command to some robots until each has answered, or time.monotonic() is until_s.
 
@@ -146,7 +146,7 @@ def _say_signed(fleet: Fleet, order: Order, robot_id: int) -> None:
 def arm(fleet: Fleet, robots: set[int], timeout_s: float = 5.0) -> list[Answer]:
     """Lets robots that were stopped be started again."""
     command = make_command(SIGNED_VERBS.VERB_ARM)
-    return tell(fleet, command, robots, time.monotonic() + timeout_s)
+    return tell(fleet, command, robots, until_s=time.monotonic() + timeout_s)
 
 
 def stop(
@@ -231,6 +231,7 @@ def start(
     fleet: Fleet,
     robots: set[int],
     behavior: str,
+    *,
     ahead_s: float,
     partial: bool,
     verb: int = VERBS.VERB_START,
@@ -254,7 +255,9 @@ def start(
     instant_s = time.monotonic() + ahead_s
     fleet.held |= robots if link_timeout_ms else set()
     try:
-        given = tell(fleet, command, robots, instant_s - CALL_OFF_S, link_timeout_ms)
+        given = tell(
+            fleet, command, robots, until_s=instant_s - CALL_OFF_S, link_timeout_ms=link_timeout_ms
+        )
         called_off = not partial and not all(a.accepted and a.signed for a in given)
         if called_off:
             stop(fleet, robots)

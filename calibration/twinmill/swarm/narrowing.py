@@ -105,7 +105,7 @@ class Spread:
 
 
 def spread_of(
-    request: Request, goal: str, draws: int, seed: int, tell: Callable[[], None]
+    request: Request, goal: str, *, draws: int, seed: int, tell: Callable[[], None]
 ) -> Spread:
     """Runs models drawn from the request's uncertainty, with the same seeds, on all cores.
 
@@ -180,7 +180,13 @@ class Narrowing:
 
 
 def design_for(
-    spread: Spread, goal: str, file: ModelFile, modelled: ModelledLog, limits: Limits, excess: float
+    spread: Spread,
+    goal: str,
+    *,
+    file: ModelFile,
+    modelled: ModelledLog,
+    limits: Limits,
+    excess: float,
 ) -> Narrowing:
     """Designs the run.
 
@@ -227,10 +233,14 @@ def design_for(
         Played.of([[m] for m in moves], modelled).modelled(modelled, CENTRE), free
     )
     chosen = _exchanged(
-        choose(moves, worth, nothing, predicted, floor), moves, worth, predicted, floor
+        choose(moves, worth, told=nothing, predicted=predicted, floor=floor),
+        moves,
+        worth_of=worth,
+        predicted=predicted,
+        floor=floor,
     )
     (whole,) = _products(Played.of([chosen], modelled).modelled(modelled, CENTRE), free)
-    fits = _left_by_fits(spread, file, modelled, chosen, excess)
+    fits = _left_by_fits(spread, file, modelled, moves=chosen, excess=excess)
     robot_id = modelled.measurement.track.robot_id
     return Narrowing(
         spread=spread,
@@ -245,7 +255,7 @@ def design_for(
 
 
 def _left_by_fits(
-    spread: Spread, file: ModelFile, modelled: ModelledLog, moves: list[Move], excess: float
+    spread: Spread, file: ModelFile, modelled: ModelledLog, *, moves: list[Move], excess: float
 ) -> np.ndarray:
     """(P, P) covariance that fits to the run leave, mean over REPLICAS of it with noise."""
     planned = driven(moves, modelled)
@@ -285,6 +295,7 @@ def _fit_to(seen: Measurement, file: ModelFile, names: list[str]) -> Covariance:
 def _exchanged(
     chosen: list[Move],
     moves: list[Move],
+    *,
     worth_of: Callable[[np.ndarray], np.ndarray],
     predicted: np.ndarray,
     floor: Floor,

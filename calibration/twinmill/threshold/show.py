@@ -19,6 +19,7 @@ def draw(
     path: Path,
     pictures: list[Picture],
     balls: list[Ball],
+    *,
     before: list[PictureResult],
     after: list[PictureResult],
 ) -> None:

@@ -35,11 +35,11 @@ def robot_sheet(number: int, size_m: float, paper: str) -> Figure:
     x_m, y_m = page.middle
     top_m, edge_m = y_m + QUIET / 2 * size_m, y_m + side_m / 2
     page.axes.plot([x_m, x_m], [top_m, edge_m], color="black", linewidth=2.5)
-    page.write(x_m + 0.003, (top_m + edge_m) / 2, "front", 10, ha="left")
-    page.write(x_m, y_m - (QUIET + CUT) / 4 * size_m, f"robot {number}", 14)
-    page.write(x_m, edge_m + 0.02, f"Robot {number}", 40)
+    page.write(x_m + 0.003, (top_m + edge_m) / 2, "front", points=10, ha="left")
+    page.write(x_m, y_m - (QUIET + CUT) / 4 * size_m, f"robot {number}", points=14)
+    page.write(x_m, edge_m + 0.02, f"Robot {number}", points=40)
     advice = "The line goes to the robot's front, the square's middle over its centre."
-    page.write(x_m, edge_m + 0.008, advice, 9)
+    page.write(x_m, edge_m + 0.008, advice, points=9)
     _draw_ruler(page, f"tag 36h11 no. {number}, black square {1e3 * size_m:g} mm")
     return page.figure
 
@@ -57,8 +57,10 @@ def floor_sheet(number: int, size_m: float, paper: str) -> Figure:
     for sign in (-1, 1):
         page.axes.plot([x_m] * 2, [y_m + sign * near_m, y_m + sign * far_m], color="black", lw=1)
         page.axes.plot([x_m + sign * near_m, x_m + sign * far_m], [y_m] * 2, color="black", lw=1)
-    page.write(x_m, y_m + far_m + 0.02, f"Floor {number}", 40)
-    page.write(x_m, y_m + far_m + 0.008, "Flat on the floor; measure where the four lines meet.", 9)
+    page.write(x_m, y_m + far_m + 0.02, f"Floor {number}", points=40)
+    page.write(
+        x_m, y_m + far_m + 0.008, "Flat on the floor; measure where the four lines meet.", points=9
+    )
     _draw_ruler(page, f"tag 36h11 no. {number}, black square {1e3 * size_m:g} mm")
     return page.figure
 
@@ -79,7 +81,7 @@ def board_sheet(board: Board, paper: str) -> Figure:
             f"the board is {1e3 * width_m:.0f} by {1e3 * height_m:.0f} mm and does not fit on "
             f"{paper}; choose a larger --paper."
         )
-    page.picture(board.drawn(8 * DOTS), x_m, y_m, width_m, height_m)
+    page.picture(board.drawn(8 * DOTS), x_m, y_m, w_m=width_m, h_m=height_m)
     across, down = board.squares
     _draw_ruler(page, f"ChArUco {across} by {down}, square {1e3 * board.square_m:g} mm", 0.009)
     return page.figure
@@ -107,10 +109,12 @@ class _Page:
         self.size_m = size_m
         self.middle = (size_m[0] / 2, size_m[1] / 2)
 
-    def write(self, x_m: float, y_m: float, words: str, points: float, ha: str = "center") -> None:
+    def write(
+        self, x_m: float, y_m: float, words: str, *, points: float, ha: str = "center"
+    ) -> None:
         self.axes.text(x_m, y_m, words, fontsize=points, ha=ha, va="center")
 
-    def picture(self, grey: np.ndarray, x_m: float, y_m: float, w_m: float, h_m: float) -> None:
+    def picture(self, grey: np.ndarray, x_m: float, y_m: float, *, w_m: float, h_m: float) -> None:
         self.axes.imshow(
             grey, cmap="gray", vmin=0, vmax=255, interpolation="none", aspect="auto",
             extent=(x_m - w_m / 2, x_m + w_m / 2, y_m - h_m / 2, y_m + h_m / 2),
@@ -130,7 +134,7 @@ def _draw_tag(page: _Page, number: int, size_m: float, paper: str) -> float:
     book = cv2.aruco.getPredefinedDictionary(FAMILIES[FAMILY])
     tag = book.generateImageMarker(number, MODULES, borderBits=1)
     x_m, y_m = page.middle
-    page.picture(np.kron(tag, np.ones((DOTS, DOTS), np.uint8)), x_m, y_m, size_m, size_m)
+    page.picture(np.kron(tag, np.ones((DOTS, DOTS), np.uint8)), x_m, y_m, w_m=size_m, h_m=size_m)
     corner = (x_m - CUT / 2 * size_m, y_m - CUT / 2 * size_m)
     page.axes.add_patch(
         Rectangle(corner, CUT * size_m, CUT * size_m, fill=False, color="0.6", lw=0.6, ls="--")
@@ -147,5 +151,5 @@ def _draw_ruler(page: _Page, what: str, y_m: float = RULER_Y_M) -> None:
     page.write(
         page.middle[0], y_m - 0.005,
         f"This line is {1e3 * RULER_M:.0f} mm long: if yours is not, print at 100 %, not fitted to "
-        f"the page.  ({what})", 7,
+        f"the page.  ({what})", points=7,
     )  # fmt: skip

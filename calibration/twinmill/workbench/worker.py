@@ -204,8 +204,8 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
                 work.effect,
                 measurements,
                 model_file,
-                out,
-                work.command,
+                out=out,
+                command=work.command,
                 held=work.held,
                 robot_id=work.robot_id,
             )

@@ -44,7 +44,9 @@ def case(data_dir):
 @pytest.fixture(scope="module")
 def explained(calibrated, case, tmp_path_factory):
     """Case f, whose explanation begins with its diagnosis."""
-    return explain(case("f"), calibrated, tmp_path_factory.mktemp("f") / "explained.toml", "test")
+    return explain(
+        case("f"), calibrated, out=tmp_path_factory.mktemp("f") / "explained.toml", command="test"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +112,7 @@ def test_one_score_for_one_log_and_model(calibrated, case, diagnosed, tmp_path):
     told = [
         compare(logs, calibrated).score,
         fit(logs, calibrated, tmp_path / "f.toml", "").before.score,
-        add("marker_offset", logs, calibrated, tmp_path / "a.toml", "").before.score,
+        add("marker_offset", logs, calibrated, out=tmp_path / "a.toml", command="").before.score,
         diagnosed("d").to_json()["score"],
     ]
     assert told == pytest.approx([told[0]] * 4, rel=0.01)

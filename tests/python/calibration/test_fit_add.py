@@ -92,7 +92,11 @@ def coasting(tanh_robot, measure, fitted, tmp_path_factory):
     robot = tanh_robot(offset_s=OFFSET_S, coast_mps2=0.7)
     path = tmp_path_factory.mktemp("add") / "coasting.toml"
     return add(
-        "coasting", [measure(robot, 31, 60.0)], ModelFile.load(str(fitted.path)), path, "add it"
+        "coasting",
+        [measure(robot, 31, 60.0)],
+        ModelFile.load(str(fitted.path)),
+        out=path,
+        command="add it",
     )
 
 
@@ -112,7 +116,9 @@ def test_added_effect_helps_where_it_was_not_fitted(coasting):
 
 def test_added_effect_that_is_not_there_does_not_help(tanh_robot, measure, fitted, tmp_path):
     run = measure(tanh_robot(offset_s=OFFSET_S), 41, 60.0)
-    found = add("dead_zone", [run], ModelFile.load(str(fitted.path)), tmp_path / "m.toml", "")
+    found = add(
+        "dead_zone", [run], ModelFile.load(str(fitted.path)), out=tmp_path / "m.toml", command=""
+    )
     (width,) = (e for e in found.parameters if e.name == "dead_zone.width")
     assert width.value < 3 * width.std + 0.002
     assert found.heldout_after.score > 0.97 * found.heldout_refit.score

@@ -44,7 +44,7 @@ def added(folder, base, tmp_path):
 
     def run(case, effect):
         logs = load_measurements([folder / f"case_{case}.lcmlog"])
-        found = add(effect, logs, base[1], tmp_path / "added.toml", "")
+        found = add(effect, logs, base[1], out=tmp_path / "added.toml", command="")
         return found.heldout_after.score, {
             e.name: e for e in found.parameters if e.name.startswith(effect)
         }

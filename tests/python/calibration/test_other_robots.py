@@ -144,7 +144,9 @@ def test_a_real_encoder_log_shows_its_time_base(omni4):
 
 
 def test_a_real_mecanum_robot_loses_sideways_and_its_tracked_point_is_off(omni4, tmp_path):
-    result = add("marker_offset", omni4, model_file(tmp_path, OMNI4), tmp_path / "m2.toml", "")
+    result = add(
+        "marker_offset", omni4, model_file(tmp_path, OMNI4), out=tmp_path / "m2.toml", command=""
+    )
     assert result.heldout_after.score < 0.6 * result.heldout_refit.score
     model = ModelFile.load(str(tmp_path / "m2.toml")).model
     # By hand, from distances alone, which need no common clock.

@@ -452,7 +452,7 @@ def test_an_effect_that_the_model_has_is_named_again_where_it_changed(
         return lambda pose, valid: (pose + np.array([0, 0, bias_rad]), valid)
 
     first = measure(tanh_robot(), 26, 40.0, spoil=turned(0.1))
-    explain([first], fitted, tmp_path / "explained.toml", "explain")
+    explain([first], fitted, out=tmp_path / "explained.toml", command="explain")
     model = ModelFile.load(str(tmp_path / "explained.toml"))
     assert model.model.effects == ["heading_bias"]
     found = diagnose([measure(tanh_robot(), 27, 40.0, spoil=turned(0.3))], model)

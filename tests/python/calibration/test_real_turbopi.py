@@ -42,7 +42,7 @@ def chain(measurements, tmp_path_factory):
     for effect in EFFECTS:
         model = ModelFile.load(str(path))
         path = folder / f"{effect}.toml"
-        results.append(add(effect, measurements, model, path, ""))
+        results.append(add(effect, measurements, model, out=path, command=""))
     return results, ModelFile.load(str(path)).model
 
 

@@ -150,7 +150,7 @@ def test_what_was_put_in_is_found_first_with_its_size(kind, effect, values, mode
 def test_explained_model_predicts_another_log_better(model, replica, tmp_path):
     extra = '[[effect]]\nname = "turn_asymmetry"\nasymmetry = 0.08\n'
     true, plain = model("twist", extra), model("twist")
-    explain([replica(true, "twist", 60, 60, 41)], plain, tmp_path / "m.toml", "")
+    explain([replica(true, "twist", 60, 60, 41)], plain, out=tmp_path / "m.toml", command="")
     other = [replica(true, "twist", 60, 60, 42)]
     explained = compare(other, ModelFile.load(str(tmp_path / "m.toml"))).score
     assert explained < 0.7 * compare(other, plain).score
@@ -159,7 +159,9 @@ def test_explained_model_predicts_another_log_better(model, replica, tmp_path):
 
 def test_explain_does_not_spoil_a_right_model(model, replica, tmp_path):
     right = model("twist")
-    told = explain([replica(right, "twist", 60, 60, 51)], right, tmp_path / "m.toml", "")
+    told = explain(
+        [replica(right, "twist", 60, 60, 51)], right, out=tmp_path / "m.toml", command=""
+    )
     other = [replica(right, "twist", 60, 60, 52)]
     explained = compare(other, ModelFile.load(str(tmp_path / "m.toml"))).score
     assert explained <= 1.05 * compare(other, right).score

@@ -142,7 +142,7 @@ def test_a_wheel_of_one_robot_is_named_beside_what_all_lack(logged):
 def test_explain_writes_the_difference_as_that_robots_own(logged, tmp_path):
     planted = "[[effect]]\nname = 'motor_lag'\nextra_s = 0\n"
     measurements, plain = logged(planted + "[robots.R02]\nmotor_lag.extra_s = 0.06\n")
-    told = explain(measurements, plain, tmp_path / "own.toml", "test")
+    told = explain(measurements, plain, out=tmp_path / "own.toml", command="test")
     assert [r.robot_id for r in told.diagnosis.robots_off] == [2]
     model = ModelFile.load(str(tmp_path / "own.toml"))
     lag_s = [

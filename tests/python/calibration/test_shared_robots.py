@@ -133,7 +133,10 @@ def test_a_fit_never_makes_a_real_score_worse(text, imported, model_of, tmp_path
 def test_explained_model_predicts_other_runs_far_better(imported, model_of, tmp_path):
     """README: 26 mm at 2 s without, 10 mm with; of the squared error that is 85 %."""
     told = explain(
-        imported("omni3_joystick", "run-01", "run-03"), model_of(OMNI3), tmp_path / "m.toml", ""
+        imported("omni3_joystick", "run-01", "run-03"),
+        model_of(OMNI3),
+        out=tmp_path / "m.toml",
+        command="",
     )
     other = imported("omni3_joystick", "run-02", "run-04")
     before = compare(other, model_of(OMNI3))
@@ -191,7 +194,7 @@ def fleet(imported, model_of, tmp_path_factory):
     """The fleet's diagnosis on the log in which each drive comes twice."""
     logs = imported("fleet_weak_left", "twice", same_clock=True)
     path = tmp_path_factory.mktemp("fleet") / "explained.toml"
-    return explain(logs, model_of(FLEET), path, "").diagnosis
+    return explain(logs, model_of(FLEET), out=path, command="").diagnosis
 
 
 def test_the_weak_robot_is_said_in_plain_words(fleet):
@@ -220,7 +223,9 @@ def test_drives_in_order_of_duty_name_the_same_robot(imported, model_of):
 
 def test_an_effect_of_one_robot_alone_leaves_the_others_as_they_are(imported, model_of, tmp_path):
     logs = imported("fleet_weak_left", "sorted", same_clock=True)
-    added = add("wheel_gain", logs, model_of(FLEET), tmp_path / "own.toml", "", robot_id=3)
+    added = add(
+        "wheel_gain", logs, model_of(FLEET), out=tmp_path / "own.toml", command="", robot_id=3
+    )
     model = ModelFile.load(str(tmp_path / "own.toml")).model
     own, other = model.for_robot(3), model.for_robot(1)
     for wheel, size in (("fl", -0.08), ("rl", -0.08), ("fr", 0.0), ("rr", 0.0)):
@@ -236,7 +241,7 @@ def test_an_effect_of_one_robot_alone_leaves_the_others_as_they_are(imported, mo
 def test_a_robot_that_is_not_in_the_logs_is_refused(imported, model_of, tmp_path):
     logs = imported("fleet_weak_left", "sorted", same_clock=True)
     with pytest.raises(ModelError, match=r"R07.*R01, R02, R03, R04"):
-        add("wheel_gain", logs, model_of(FLEET), tmp_path / "own.toml", "", robot_id=7)
+        add("wheel_gain", logs, model_of(FLEET), out=tmp_path / "own.toml", command="", robot_id=7)
     assert not (tmp_path / "own.toml").exists()
 
 

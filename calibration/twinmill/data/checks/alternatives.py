@@ -212,7 +212,9 @@ class Search:
             by_pose.setdefault((a.heading_sign, a.mirrored, a.turned), []).append(a)
         for (sign, mirrored, turned), group in by_pose.items():
             keys = self._likely[sign, mirrored]
-            found += self._best_of(group, sign, mirrored, turned, [*keys, *self._own_key])
+            found += self._best_of(
+                group, sign=sign, mirrored=mirrored, turned=turned, keys=[*keys, *self._own_key]
+            )
         return found
 
     def at_rate(self, own: Explained, rate: float) -> Explained:
@@ -245,6 +247,7 @@ class Search:
     def _best_of(
         self,
         group: list[Alternative],
+        *,
         sign: int,
         mirrored: bool,
         turned: bool,

@@ -388,6 +388,7 @@ def _is_real(number: object) -> bool:
 def read_mapped(
     path: Path,
     known: frozenset[str],
+    *,
     mapping: Mapping | None,
     rename: dict[str, str],
     flips: frozenset[str],

@@ -147,7 +147,7 @@ def import_log(
         )
         pose_series, command_series = read_bag(bag, *topics, how)
     else:
-        pose_series = _read_poses(poses, motive, vicon, options, absolute=bool(io_tsv))
+        pose_series = _read_poses(poses, motive, vicon, options=options, absolute=bool(io_tsv))
         numbers = {series.robot_id for series in pose_series}
         only = numbers.pop() if len(numbers) == 1 else None
         command_series = _read_commands(commands, io_tsv, options, only)
@@ -167,7 +167,7 @@ def import_log(
     sources = [path for path in paths if path is not None]
     with replacing(out, options.force) as temporary:
         provenance = _provenance(sources, options)
-        write_log(temporary, pose_series, command_series, provenance, seen)
+        write_log(temporary, pose_series, command_series, config_toml=provenance, detections=seen)
         warnings = [w for series in (*pose_series, *command_series, *seen) for w in series.warnings]
         return _summary(read_log(temporary), out, warnings)
 
@@ -176,6 +176,7 @@ def _read_poses(
     poses: Path | None,
     motive: Path | None,
     vicon: Path | None,
+    *,
     options: ImportOptions,
     absolute: bool,
 ) -> list[PoseSeries]:

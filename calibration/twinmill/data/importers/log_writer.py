@@ -22,6 +22,7 @@ def write_log(
     path: Path,
     poses: list[PoseSeries],
     commands: list[CommandSeries],
+    *,
     config_toml: str,
     detections: list[DetectionSeries] | None = None,
 ) -> None:

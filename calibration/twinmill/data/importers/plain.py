@@ -57,7 +57,7 @@ class Columns:
 
     def read(self, path: Path, known: frozenset[str]) -> Table:
         """The table under our names."""
-        return read_mapped(path, known, self.mapping, self.rename, self.flips)
+        return read_mapped(path, known, mapping=self.mapping, rename=self.rename, flips=self.flips)
 
 
 def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:

@@ -456,7 +456,7 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
         for connection, received_ns, raw in _shown(path, count, reader.messages(chosen)):
             message, name = reader.deserialize(raw, connection.msgtype), connection.topic
             if connection.msgtype == TF:
-                _put(frames, message, name, received_ns, found)
+                _put(frames, message, name=name, received_ns=received_ns, found=found)
                 continue
             kind = connection.msgtype
             if kind in TAGS:
@@ -482,7 +482,7 @@ def _shown(path: Path, count: int, messages: Iterator) -> Iterator:
 
 
 def _put(
-    frames: Frames, message: object, name: str, received_ns: int, found: dict[str, _Messages]
+    frames: Frames, message: object, *, name: str, received_ns: int, found: dict[str, _Messages]
 ) -> None:
     """Adds a message of tf to the tree, and the places of the frames that are wanted."""
     for transform in message.transforms:

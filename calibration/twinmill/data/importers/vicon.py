@@ -103,13 +103,15 @@ def _part(lines: list[str], name: str) -> _Part:
             "names and 'Frame,Sub Frame,RX,...'; export again as CSV."
         )
     end = next((k for k, row in enumerate(frames) if not any(row)), len(frames))
-    numbers = _numbers(frames[:end], len(axes), delimiter, parts[0] + 6, name)
+    numbers = _numbers(
+        frames[:end], width=len(axes), delimiter=delimiter, first_row=parts[0] + 6, name=name
+    )
     units += [""] * (len(axes) - len(units))
     return _Part(rate_hz, _bodies(bodies, axes, name), [u.lower() for u in units], numbers)
 
 
 def _numbers(
-    frames: list[list[str]], width: int, delimiter: str, first_row: int, name: str
+    frames: list[list[str]], *, width: int, delimiter: str, first_row: int, name: str
 ) -> np.ndarray:
     """(N, width), NaN where a cell is empty."""
     if not frames:

@@ -72,7 +72,7 @@ class Score:
 
 
 def score(
-    expected: Forecast, cell: np.ndarray, seen: np.ndarray, axes: Sequence[str], seed: int
+    expected: Forecast, cell: np.ndarray, seen: np.ndarray, *, axes: Sequence[str], seed: int
 ) -> Score:
     """Scores runs.
 

@@ -60,6 +60,7 @@ class Factor:
 def factors(
     file: ModelFile,
     hidden: Sequence[Hidden],
+    *,
     drawn: int,
     seed: int,
     only: Collection[str] = (),

@@ -121,6 +121,7 @@ def judge(
     request: Request,
     factors: Sequence[Factor],
     left: list[tuple[str, str]],
+    *,
     goal: str,
     margin: float,
     folder: Path,
