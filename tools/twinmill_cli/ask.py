@@ -36,6 +36,7 @@ def register(app: typer.Typer) -> None:
 
 def _ask(
     question: Annotated[Question, typer.Argument(show_default=False)],
+    *,
     behavior: Annotated[str, typer.Option("--behavior")] = "milling",
     model: Annotated[str, typer.Option("--model", "-m", metavar="M")] = "paper.toml",
     n: Annotated[

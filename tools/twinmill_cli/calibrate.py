@@ -62,13 +62,14 @@ def _compare(
         result = compare(measurements, model_file)
     section = partial(comparison_section, result)
     data = {**result.to_json(), **told(measurements)}
-    finish(data, show.comparison(result), source, section, as_json, out)
+    finish(data, show.comparison(result), source, section=section, as_json=as_json, out=out)
     return result
 
 
 def _fit(
     logs: Logs,
     output: NewModel,
+    *,
     model: Model = DEFAULT_MODEL,
     hold: Hold = None,
     force: Force = False,
@@ -90,7 +91,7 @@ def _fit(
         result = fit(measurements, model_file, output, source.command, held=held)
     section = partial(fit_section, result)
     data = {**result.to_json(), **told(measurements)}
-    finish(data, show.fit(result), source, section, as_json, out)
+    finish(data, show.fit(result), source, section=section, as_json=as_json, out=out)
     return result
 
 
@@ -105,6 +106,7 @@ def _add(
     ],
     logs: Logs,
     output: NewModel,
+    *,
     model: Model = DEFAULT_MODEL,
     force: Force = False,
     adds_to: Annotated[
@@ -155,5 +157,5 @@ def _add(
         )
     section = partial(added_section, result)
     data = {**result.to_json(), **told(measurements)}
-    finish(data, show.added(result), source, section, as_json, out)
+    finish(data, show.added(result), source, section=section, as_json=as_json, out=out)
     return result

@@ -48,6 +48,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _challenge(
+    *,
     count: Annotated[int, typer.Option("--n", min=1, help="Cases.")] = 60,
     seed: Annotated[int, typer.Option(help="Same seed, same cases.")] = 1,
     duration_s: Annotated[

@@ -77,6 +77,7 @@ def _characterise(
             "--out", "-o", metavar="LOG", help="The log to write; with --script-as, that file."
         ),
     ],
+    *,
     host: Annotated[
         str, typer.Option("--host", help="Copy the script there first, by ssh: pi@robot03.local.")
     ] = "",
@@ -242,6 +243,7 @@ class Run:
         script: str,
         end_s: float | None,
         countdown_s: float,
+        *,
         pressed: Callable[[], bool],
     ) -> str:
         """Plays the script and stops the robot, whatever happens.

@@ -57,6 +57,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _claims(
+    *,
     only: Annotated[
         list[str] | None,
         typer.Option("--only", metavar="NAME", help="One of them; a wrong name lists all."),

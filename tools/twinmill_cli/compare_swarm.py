@@ -123,6 +123,7 @@ def register(app: typer.Typer) -> None:
 
 def _compare_swarm(
     log: Annotated[Path, typer.Argument(metavar="LOG", show_default=False)],
+    *,
     model: Model = DEFAULT_MODEL,
     seeds: Annotated[
         int, typer.Option("--seeds", min=least_seeds(), help="Runs of the twin.")

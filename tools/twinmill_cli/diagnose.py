@@ -68,7 +68,7 @@ def _diagnose(
     if data["next_experiment"]:
         data["next_experiment"]["command"] = then[-1][1]
     section = partial(present.section, result, then)
-    finish(data, present.terminal(result, then), source, section, as_json, out)
+    finish(data, present.terminal(result, then), source, section=section, as_json=as_json, out=out)
     return result
 
 
@@ -134,6 +134,7 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
 def _explain(
     logs: Logs,
     output: NewModel,
+    *,
     model: Model = DEFAULT_MODEL,
     force: Force = False,
     as_json: AsJson = False,
@@ -157,5 +158,12 @@ def _explain(
     data = {**result.to_json(), **told(measurements)}
     if then:
         data["next_experiment"]["command"] = then[-1][1]
-    finish(data, present.terminal_explanation(result, then), source, section, as_json, out)
+    finish(
+        data,
+        present.terminal_explanation(result, then),
+        source,
+        section=section,
+        as_json=as_json,
+        out=out,
+    )
     return result

@@ -52,6 +52,7 @@ def _discover(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", show_default=False, help="Of the archive.")
     ],
+    *,
     model: Annotated[str, typer.Option("--model", "-m", metavar="M")] = "paper.toml",
     change: Annotated[
         list[str] | None,

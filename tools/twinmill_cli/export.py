@@ -49,6 +49,7 @@ def register(app: typer.Typer) -> None:
 def _export(
     log: Annotated[Path, typer.Argument(metavar="LOG", show_default=False)],
     to: Annotated[Format, typer.Option("--to", show_default=False, help="What to write.")],
+    *,
     out: Annotated[
         Path | None,
         typer.Option(

@@ -65,6 +65,7 @@ def _export_model(
             metavar="M", show_default=False, help="Model file, here or among the installed models."
         ),
     ],
+    *,
     to: Annotated[
         Target | None, typer.Option("--to", show_default=False, help="What to write.")
     ] = None,

@@ -52,6 +52,7 @@ def _flash(
             help="Robots by ssh name; ID: the number in the name, if not given.",
         ),
     ],
+    *,
     behavior: Annotated[
         str, typer.Option("--behavior", "-b", help="Play it: milling, or one of behaviors.toml.")
     ] = "",

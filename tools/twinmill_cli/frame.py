@@ -85,6 +85,7 @@ def finish(
     data: dict,
     text: RenderableType,
     source: Provenance,
+    *,
     section: Callable[[], Section],
     as_json: bool,
     out: Path | None,

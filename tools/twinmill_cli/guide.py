@@ -143,6 +143,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _guide(
+    *,
     poses: Annotated[Poses | None, typer.Option("--poses", show_default=False)] = None,
     robot: Annotated[Robot | None, typer.Option("--robot", show_default=False)] = None,
     drive: Annotated[Drive | None, typer.Option("--drive", show_default=False)] = None,

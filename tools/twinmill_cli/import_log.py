@@ -35,6 +35,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _command(
+    *,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="The log to write (.lcmlog).")
     ] = None,

@@ -54,6 +54,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _matters(
+    *,
     logs: Annotated[
         list[Path] | None,
         typer.Argument(metavar="LOG", show_default=False, help="Logs that the model was fitted to"),

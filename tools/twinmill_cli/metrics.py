@@ -48,6 +48,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _metrics(
+    *,
     log: Annotated[Path | None, typer.Argument(metavar="LOG", show_default=False)] = None,
     live: Annotated[
         bool, typer.Option("--live", help="The robots on the bus instead of a log.")
@@ -90,7 +91,7 @@ def _metrics(
         swarm = ["--channel-prefix", channel_prefix] if channel_prefix else []
         verb = shlex.join(["metrics", "--live", *swarm, *not_of_ring])
         source = provenance(command_line(verb, [], model), model_file)
-        return follow(lcm_url, duration_s, question, source.to_json(), as_json)
+        return follow(lcm_url, duration_s, question, source=source.to_json(), as_json=as_json)
     verb = shlex.join(["metrics", *not_of_ring])
     source = provenance(command_line(verb, [log], model), model_file)
     with busy(f"reading {log}"):

@@ -33,7 +33,7 @@ ROWS = {  # name: what people read, format
 }
 
 
-def follow(url: str, duration_s: float, question: Question, source: dict, as_json: bool) -> int:
+def follow(url: str, duration_s: float, question: Question, *, source: dict, as_json: bool) -> int:
     """Shows what is heard until Ctrl-C, or for some time.
 
     Returns:

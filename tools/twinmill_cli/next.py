@@ -45,6 +45,7 @@ def register(app: typer.Typer) -> None:
 
 def _next(
     logs: Logs,
+    *,
     model: Model = DEFAULT_MODEL,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="SCRIPT", help="The new script (.csv).")
@@ -125,7 +126,7 @@ def _next(
         twists = TwistScript.of(model_file.model, plan.rows)
         write_script(twists, script_as, Path(data["script_as"]), force, command=source.command)
     section = partial(present.section, plan, how)
-    finish(data, present.terminal(plan, how), source, section, as_json, out)
+    finish(data, present.terminal(plan, how), source, section=section, as_json=as_json, out=out)
     return plan
 
 

@@ -26,6 +26,7 @@ def register(app: typer.Typer) -> None:
 
 def _open(
     logs: Logs,
+    *,
     model: Model = DEFAULT_MODEL,
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Of this machine; 0: any that is free.")

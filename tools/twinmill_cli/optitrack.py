@@ -37,6 +37,7 @@ def register(app: typer.Typer) -> None:
 
 def _optitrack(
     server: Annotated[str, typer.Option("--server", metavar="IP", help="Of Motive's computer.")],
+    *,
     local: Annotated[
         str, typer.Option("--local", metavar="IP", help="Of this machine, on Motive's network.")
     ] = "",

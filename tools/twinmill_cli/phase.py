@@ -45,6 +45,7 @@ def _phase(
     folder: Annotated[
         Path, typer.Argument(metavar="SWEEP", show_default=False, help="Folder of twin_sweep.")
     ],
+    *,
     goal: Annotated[
         str | None, typer.Option("--goal", help="Class that is wanted; default: the behaviour's.")
     ] = None,

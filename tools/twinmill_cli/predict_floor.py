@@ -35,6 +35,7 @@ def _predict_floor(
         Path,
         typer.Option("--output", "-o", metavar="DIR", show_default=False, help="Of the plan."),
     ],
+    *,
     cells: Annotated[int, typer.Option("--cells", min=1, help="That are to be run.")] = 9,
     repeats: Annotated[int, typer.Option("--repeats", min=1, help="Runs of each cell.")] = 3,
     draws: Annotated[

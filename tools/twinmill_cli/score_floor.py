@@ -37,6 +37,7 @@ def _score_floor(
         Path,
         typer.Argument(show_default=False, help="CSV: run, and class or log (a path beside it)."),
     ],
+    *,
     sha256: Annotated[
         str | None,
         typer.Option("--sha256", metavar="HEX", help="As published; default: as plan.md says."),

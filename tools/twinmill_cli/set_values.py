@@ -32,6 +32,7 @@ def _set(
         ),
     ],
     output: NewModel,
+    *,
     model: Model = DEFAULT_MODEL,
     force: Force = False,
     as_json: AsJson = False,

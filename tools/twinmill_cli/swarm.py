@@ -76,6 +76,7 @@ def parse_robots(text: str) -> set[int]:
 
 
 def _start(
+    *,
     robots: Robots = "",
     behavior: Behavior = "",
     in_s: Annotated[
@@ -188,6 +189,7 @@ def ended_by_signals() -> Iterator[None]:
 
 
 def _arm(
+    *,
     robots: Robots = "",
     key: KeyFile = None,
     lcm_url: LcmUrl = URL,
@@ -208,6 +210,7 @@ def _arm(
 
 
 def _stop(
+    *,
     robots: Robots = "",
     timeout_s: Annotated[float, typer.Option("--timeout-s", min=0.5, help="Give up after.")] = 10.0,
     host: Annotated[
@@ -287,6 +290,7 @@ def _stop_words(given: list[tell.Answer], timeout_s: float) -> str:
 
 def _select(
     behavior: Annotated[str, typer.Argument(metavar="BEHAVIOR", help="As milling.")],
+    *,
     robots: Robots = "",
     key: KeyFile = None,
     lcm_url: LcmUrl = URL,
@@ -358,6 +362,7 @@ def _finish(
 
 
 def _status(
+    *,
     once: Annotated[bool, typer.Option("--once", help="Print one table and end.")] = False,
     key: KeyFile = None,
     lcm_url: LcmUrl = URL,

@@ -28,6 +28,7 @@ def _tags(
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="PDF", show_default=False, help="The sheets.")
     ],
+    *,
     robots: Annotated[str, typer.Option("--robots", metavar="IDS", help="As 1-8,12.")] = "1-8",
     size_m: Annotated[
         float, typer.Option("--size", metavar="M", help="Side of the black square.")

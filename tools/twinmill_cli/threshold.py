@@ -38,6 +38,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _threshold(
+    *,
     images: Annotated[
         list[Path] | None,
         typer.Argument(metavar="[IMAGE...]", help="PNG, JPEG, or raw YUYV frames (*.yuyv)."),

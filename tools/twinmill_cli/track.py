@@ -81,6 +81,7 @@ def _track(
         float,
         typer.Option("--height", metavar="M", show_default=False, help="Of the tags over it."),
     ],
+    *,
     videos: Annotated[
         list[Path] | None, typer.Argument(metavar="[VIDEO]...", show_default=False)
     ] = None,
@@ -435,6 +436,7 @@ def _live(
 
 def _calibrate(
     video: Annotated[Path, typer.Argument(metavar="VIDEO", show_default=False)],
+    *,
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="TOML", help="The camera's file.")
     ] = Path("camera.toml"),

@@ -40,6 +40,7 @@ def _command(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", show_default=False, help="Folder of the sweep.")
     ],
+    *,
     y: Annotated[str | None, typer.Option("--y", help=AXIS_HELP)] = None,
     z: Annotated[list[str] | None, typer.Option("--z", help="More axes.")] = None,
     behavior: Annotated[

@@ -39,6 +39,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _watch(
+    *,
     log: Annotated[
         Path | None,
         typer.Argument(metavar="[LOG]", show_default=False, help="A log instead of the bus."),

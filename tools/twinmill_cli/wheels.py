@@ -45,6 +45,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _wheels(
+    *,
     log: Annotated[
         Path | None, typer.Argument(metavar="[LOG]", show_default=False, help="Of the script.")
     ] = None,
