@@ -13,6 +13,7 @@ from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.search import REFIT, Search
 from twinmill.fitting.compare import Comparison
 from twinmill.fitting.opening import Opened
+from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.detection_errors import DetectionComparison
 
@@ -133,5 +134,6 @@ class Diagnosis:
             "bit_steps": [{"effect": e, "score_heldout": s} for e, s in self.bit_steps],
             "notes": self.notes,
             "settings": asdict(self.search.settings),
+            "floor_settings": asdict(FLOOR_SETTINGS),
             "passes": self.search.passes,
         }

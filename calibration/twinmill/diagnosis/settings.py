@@ -2,110 +2,103 @@
 """The numbers that decide a diagnosis, in one record: reports and JSON output print it.
 
 A step that needs another number to be quick or exact (a grid, a count of random signs) keeps it to
-itself; here is what moves a verdict.
+itself; here is what moves a verdict. Those of the noise floor: `fitting/settings.py`.
 """
 
-from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
-
-def _number(value: Any, what: str) -> Any:
-    return field(default=value, metadata={"what": what})
+from twinmill.fitting.settings import Numbers, number
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Numbers):
     """What each number means stands beside it; scores are over the noise floor, 1.0 is right."""
 
     # The search: which effect is accepted.
-    evidence: float = _number(16.0, "least fall of the held-out cost (-2 log likelihood)")
-    without_best: float = _number(8.0, "the same without the block with the most evidence")
-    without_visit: float = _number(4.0, "the same of an effect of a place, seen at visits alone")
-    drowned: float = _number(1.15, "score from which on what else is missing drowns evidence ...")
-    less_evidence: float = _number(9.0, "... so that this much is enough ...")
-    blocks_t: float = _number(3.7, "... if blocks agree: t of the relative fall over blocks")
-    worth: float = _number(0.01, "least share of the first excess that an effect takes ...")
-    enough: float = _number(0.1, "... or this fall of the squared score, if that is less")
-    below: float = _number(0.1, "the same share once the score is below 1 ...")
-    least_below: float = _number(0.2, "... but so much of the squared score at least ...")
-    most_below: float = _number(0.5, "... and at most")
-    strong: float = _number(1.5, "times the evidence with which less is enough below 1 ...")
-    least_strong: float = _number(0.08, "... namely this share of the squared score")
-    fitted: int = _number(7, "candidates that are fitted in each round")
-    pairs: int = _number(3, "pairs that are tried where no single candidate is accepted")
-    most: int = _number(6, "rounds")
-    usual: float = _number(1.5, "times the evidence where the known score is no worse")
-    strictest: float = _number(3.0, "the evidence is raised at most so many times")
-    common: float = _number(1.01, "times a score: no worse")
-    news: float = _number(1.1, "times the known score: less is no news")
-    traced: float = _number(3.0, "times its usual strength, at which an effect must show ...")
-    faint: float = _number(16.0, "... by this fall of the cost, or these logs cannot show it")
-    bits: float = _number(0.005, "share of detections that an effect of the camera changes ...")
-    bits_in_view: float = _number(0.02, "... or of those with a robot in view, or without")
-    late_s: float = _number(0.025, "delay of a camera that may be a clock offset, s")
+    evidence: float = number(16.0, "least fall of the held-out cost (-2 log likelihood)")
+    without_best: float = number(8.0, "the same without the block with the most evidence")
+    without_visit: float = number(4.0, "the same of an effect of a place, seen at visits alone")
+    drowned: float = number(1.15, "score from which on what else is missing drowns evidence ...")
+    less_evidence: float = number(9.0, "... so that this much is enough ...")
+    blocks_t: float = number(3.7, "... if blocks agree: t of the relative fall over blocks")
+    worth: float = number(0.01, "least share of the first excess that an effect takes ...")
+    enough: float = number(0.1, "... or this fall of the squared score, if that is less")
+    below: float = number(0.1, "the same share once the score is below 1 ...")
+    least_below: float = number(0.2, "... but so much of the squared score at least ...")
+    most_below: float = number(0.5, "... and at most")
+    strong: float = number(1.5, "times the evidence with which less is enough below 1 ...")
+    least_strong: float = number(0.08, "... namely this share of the squared score")
+    fitted: int = number(7, "candidates that are fitted in each round")
+    pairs: int = number(3, "pairs that are tried where no single candidate is accepted")
+    most: int = number(6, "rounds")
+    usual: float = number(1.5, "times the evidence where the known score is no worse")
+    strictest: float = number(3.0, "the evidence is raised at most so many times")
+    common: float = number(1.01, "times a score: no worse")
+    news: float = number(1.1, "times the known score: less is no news")
+    traced: float = number(3.0, "times its usual strength, at which an effect must show ...")
+    faint: float = number(16.0, "... by this fall of the cost, or these logs cannot show it")
+    bits: float = number(0.005, "share of detections that an effect of the camera changes ...")
+    bits_in_view: float = number(0.02, "... or of those with a robot in view, or without")
+    late_s: float = number(0.025, "delay of a camera that may be a clock offset, s")
 
     # What stands in one group.
-    alike: float = _number(0.95, "canonical correlation of signatures from which two are one")
-    unlike: float = _number(0.3, "cosine of what two take, up to which they explain other things")
-    tie: float = _number(6.0, "difference of the held-out cost that decides nothing")
-    each: float = _number(2.0, "what a fitted number costs where candidates are compared")
-    imitates: float = _number(0.95, "share of what the base takes, that another answer takes")
-    group: int = _number(4, "most members of a group")
-    misses: float = _number(1.5, "score of a final model whose errors are not noise")
-    outdoes: float = _number(1.15, "a formula outdoes an effect that takes so many times more ...")
-    outdoes_by: float = _number(6.0, "... and so much more of the cost ...")
-    kept: float = _number(0.5, "... unless the effect keeps this share beside the formula")
+    alike: float = number(0.95, "canonical correlation of signatures from which two are one")
+    unlike: float = number(0.3, "cosine of what two take, up to which they explain other things")
+    tie: float = number(6.0, "difference of the held-out cost that decides nothing")
+    each: float = number(2.0, "what a fitted number costs where candidates are compared")
+    imitates: float = number(0.95, "share of what the base takes, that another answer takes")
+    group: int = number(4, "most members of a group")
+    misses: float = number(1.5, "score of a final model whose errors are not noise")
+    outdoes: float = number(1.15, "a formula outdoes an effect that takes so many times more ...")
+    outdoes_by: float = number(6.0, "... and so much more of the cost ...")
+    kept: float = number(0.5, "... unless the effect keeps this share beside the formula")
 
     # Doubts.
-    within: float = _number(2.0, "standard deviations: what differs by less is an error")
-    beyond: float = _number(3.0, "usual sizes, or standard deviations at a bound: too far ...")
-    near: float = _number(0.5, "... if another leaves less than this more of the squared score")
-    weighty: float = _number(0.1, "share of the loudest visit that another must bring to count")
-    slight: float = _number(0.3, "share of what is left that a second finding must take")
-    much_left: float = _number(0.3, "share left, beyond which no name is sure")
-    lag_leaves: float = _number(0.25, "share left, beyond which no lag is sure")
-    form_takes: float = _number(0.15, "share of what is left, by which a finding has another form")
-    same: float = _number(0.8, "cosine of what two take, from which they take the same errors ...")
-    same_fall: float = _number(0.85, "... if one takes this share of what the other takes")
-    nothing: float = _number(0.01, "chance of such sizes if there were no effect")
-    companion_evidence: float = _number(9.0, "fall of the cost if a size changed with the drive")
-    companion_t: float = _number(3.0, "the same over blocks: standard errors from zero")
-    companion_change: float = _number(0.15, "least change of the size per standard deviation")
+    within: float = number(2.0, "standard deviations: what differs by less is an error")
+    beyond: float = number(3.0, "usual sizes, or standard deviations at a bound: too far ...")
+    near: float = number(0.5, "... if another leaves less than this more of the squared score")
+    weighty: float = number(0.1, "share of the loudest visit that another must bring to count")
+    slight: float = number(0.3, "share of what is left that a second finding must take")
+    much_left: float = number(0.3, "share left, beyond which no name is sure")
+    lag_leaves: float = number(0.25, "share left, beyond which no lag is sure")
+    form_takes: float = number(0.15, "share of what is left, by which a finding has another form")
+    same: float = number(0.8, "cosine of what two take, from which they take the same errors ...")
+    same_fall: float = number(0.85, "... if one takes this share of what the other takes")
+    nothing: float = number(0.01, "chance of such sizes if there were no effect")
+    companion_evidence: float = number(9.0, "fall of the cost if a size changed with the drive")
+    companion_t: float = number(3.0, "the same over blocks: standard errors from zero")
+    companion_change: float = number(0.15, "least change of the size per standard deviation")
 
     # What is left.
-    nothing_left: float = _number(0.02, "share of the first excess: where less is left, nothing is")
-    dependence_chance: float = _number(0.01, "that a dependence is named where nothing is left")
-    beside: float = _number(0.1, "by which a dependence must raise what better ones take ...")
-    as_much: float = _number(0.9, "... unless it takes this share of what the best one takes")
-    again: float = _number(2.0, "times what the model left in other logs: less is no news")
-    firm_t: float = _number(3.0, "t over blocks: the smooth response predicts better")
-    far: float = _number(10.0, "times the median squared error: a single moment ...")
-    several: int = _number(3, "... of which so many are no accident")
-    place_chance: float = _number(0.01, "that errors repeat so at a place, of the model ...")
-    place_chance_of_floor: float = _number(0.05, "... and of the smooth response, too ...")
-    place_share: float = _number(0.1, "... if this share of their square repeats")
+    nothing_left: float = number(0.02, "share of the first excess: where less is left, nothing is")
+    dependence_chance: float = number(0.01, "that a dependence is named where nothing is left")
+    beside: float = number(0.1, "by which a dependence must raise what better ones take ...")
+    as_much: float = number(0.9, "... unless it takes this share of what the best one takes")
+    again: float = number(2.0, "times what the model left in other logs: less is no news")
+    firm_t: float = number(3.0, "t over blocks: the smooth response predicts better")
+    far: float = number(10.0, "times the median squared error: a single moment ...")
+    several: int = number(3, "... of which so many are no accident")
+    place_chance: float = number(0.01, "that errors repeat so at a place, of the model ...")
+    place_chance_of_floor: float = number(0.05, "... and of the smooth response, too ...")
+    place_share: float = number(0.1, "... if this share of their square repeats")
 
     # Robots that differ.
-    odd: float = _number(3.5, "robust standard deviations from the median")
-    odd_evidence: float = _number(16.0, "least fall of the held-out cost, for one robot")
-    odd_chance: float = _number(0.001, "that one of robots that are alike is called different")
-    spread: float = _number(0.01, "by which robots of a kind differ at least")
+    odd: float = number(3.5, "robust standard deviations from the median")
+    odd_evidence: float = number(16.0, "least fall of the held-out cost, for one robot")
+    odd_chance: float = number(0.001, "that one of robots that are alike is called different")
+    spread: float = number(0.01, "by which robots of a kind differ at least")
 
     # The verdict.
-    drifted: float = _number(0.85, "share of the score that drifting gains leave, if stale")
-    much: float = _number(0.1, "share of the squared error that is much")
-    worse: float = _number(1.5, "score over the usual one, beyond which it is a finding")
-    irregular: float = _number(2.2, "noise floor over the model's noise, beyond which it is said")
+    drifted: float = number(0.85, "share of the score that drifting gains leave, if stale")
+    much: float = number(0.1, "share of the squared error that is much")
+    worse: float = number(1.5, "score over the usual one, beyond which it is a finding")
+    irregular: float = number(2.2, "noise floor over the model's noise, beyond which it is said")
 
     def stricter(self, times: float) -> "Settings":
         """The same with so many times the evidence."""
         times = min(max(times, 1.0), self.strictest)
         raised = ("evidence", "without_best", "without_visit", "less_evidence")
         return replace(self, **{k: times * getattr(self, k) for k in raised})
-
-    def listed(self) -> list[tuple[str, float, str]]:
-        """Name, value and meaning of each, as reports print them."""
-        return [(f.name, getattr(self, f.name), f.metadata["what"]) for f in fields(self)]
 
 
 SETTINGS = Settings()

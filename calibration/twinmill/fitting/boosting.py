@@ -12,9 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from twinmill.fitting.settings import FLOOR_SETTINGS
+
 LADDER = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # ridges over a group's mean square
-WORTH = 0.04  # share of the left-out error that a group must take at least
-MOST_GROUPS = 8
 
 
 @dataclass(frozen=True)
@@ -114,11 +114,12 @@ def boosted(
         independent: how many of the values are. The best of so many groups takes about
             2 ln(groups) / independent of an error that is noise: below twice that nothing is taken.
     """
-    least = max(WORTH, 4 * np.log(max(len(learners), 1)) / independent)
+    by_chance = np.log(max(len(learners), 1)) / independent
+    least = max(FLOOR_SETTINGS.group_worth, FLOOR_SETTINGS.group_chance * by_chance)
     wanted = wanted.astype(np.float32)
     if not learners:
         return
-    for _ in range(MOST_GROUPS):
+    for _ in range(FLOOR_SETTINGS.most_groups):
         gains = [learner.gain(wanted) for learner in learners]
         best = int(np.argmax([fall for fall, _ in gains]))
         if gains[best][0] < least * float(wanted @ wanted):

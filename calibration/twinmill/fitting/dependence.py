@@ -10,6 +10,7 @@ would change in a robot that lacks them.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import twinmill_native as native
@@ -55,6 +56,19 @@ class Motion:
         """(N,) of the model, whatever the direction."""
         return np.hypot(self.base[:, 0], self.base[:, 1])
 
+    @cached_property
+    def where(self) -> tuple[np.ndarray, np.ndarray]:
+        """(N, k) bells over the floor, and hats along each of its sides."""
+        bells, strips = [], []
+        for axis in self.pose[:, :2].T:
+            low, high = np.quantile(axis, (0.03, 0.97))
+            middles = np.linspace(low, high, PLACES)
+            width_m = max(middles[1] - middles[0], 0.1)
+            bells.append(np.exp(-(((axis[:, None] - middles) / width_m) ** 2)))
+            strips.append(_hats(axis, low, high, STRIPS))
+        x, y = bells
+        return (x[:, :, None] * y[:, None, :]).reshape(len(axis), -1), np.hstack(strips)
+
     @property
     def moves(self) -> np.ndarray:
         """(N,) 0 at rest, 1 in motion."""
@@ -67,27 +81,28 @@ Features = Sequence[np.ndarray]  # (N, f) forward, left, turning
 
 def dependences(motion: Motion) -> Iterator[Features]:
     """Groups of features."""
-    where, head = _where(motion), _harmonics(motion.heading_rad)
+    head = _harmonics(motion.heading_rad)
     always = np.hstack([np.ones((len(head), 1)), head])
     turned = np.cumsum(motion.base[:, 2] * motion.step_s)
     hours = _hats(motion.t_s, motion.t_s.min(), motion.t_s.max(), _count(motion.t_s, 6.0, 24))
-    for gain in (*where, head, hours, _hats(turned, turned.min(), turned.max(), TURNED)):
+    yield from place_gains(motion)
+    for gain in (head, hours, _hats(turned, turned.min(), turned.max(), TURNED)):
         yield _scaled(motion, gain)
     way = _way_m(motion)
     for along, shortest in ((motion.t_s - motion.t_s.min(), SHORTEST_S), (way, SHORTEST_M)):
         for wave in _waves(along, shortest):
             yield _scaled(motion, wave)
-    for gain in (always, *where, hours):
+    for gain in (always, *motion.where, hours):
         yield from _drifts(motion, gain)
-    for gain in (always, *where):
+    for gain in (always, *motion.where):
         yield _crossed(motion, gain)
     yield from _curves(motion)
     yield from _events(motion)
 
 
 def place_gains(motion: Motion) -> Iterator[Features]:
-    """Those of `dependences` that scale the velocities by the place."""
-    for gain in _where(motion):
+    """Those of `dependences` that scale the velocities, as fitted so far, by the place."""
+    for gain in motion.where:
         yield _scaled(motion, gain)
 
 
@@ -195,19 +210,6 @@ def _fading(events: np.ndarray, fade_s: float, step_s: np.ndarray) -> np.ndarray
     """(N, n) events that each fade, on steps that are taken to be even."""
     period_s = float(np.median(step_s[step_s > 0]))
     return lfilter([1.0], [1.0, -np.exp(-period_s / fade_s)], events, axis=0)
-
-
-def _where(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """(N, k) bells over the floor, and hats along each of its sides."""
-    bells, strips = [], []
-    for axis in motion.pose[:, :2].T:
-        low, high = np.quantile(axis, (0.03, 0.97))
-        middles = np.linspace(low, high, PLACES)
-        width_m = max(middles[1] - middles[0], 0.1)
-        bells.append(np.exp(-(((axis[:, None] - middles) / width_m) ** 2)))
-        strips.append(_hats(axis, low, high, STRIPS))
-    x, y = bells
-    return (x[:, :, None] * y[:, None, :]).reshape(len(axis), -1), np.hstack(strips)
 
 
 def _harmonics(angle: np.ndarray) -> np.ndarray:

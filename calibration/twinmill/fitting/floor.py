@@ -13,6 +13,7 @@ import twinmill_native as native
 from twinmill.fitting.dependence import dependences, known_physics, place_gains
 from twinmill.fitting.response import Response
 from twinmill.fitting.score_fit import ScoreFit
+from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.model.parameters import (
     ALIGNMENT,
     BASE_GAINS,
@@ -26,12 +27,6 @@ from twinmill.model.parameters import (
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S, rms
 
-BUMP = 20.0  # times the median squared error: pushed, slipped, or a lost pose
-BUMP_PART = 4.0  # the same of windows that overlap such a one
-RARE_BUMPS = 0.1  # share of the windows, parts included, up to which these are left out
-MOST_BUMPS = 0.25  # share of the windows
-FEWEST_WINDOWS = 40  # 10 s
-FEWEST_LONG = 20  # windows of the longest horizon, below which nothing is held out
 ARM_M = 0.1  # a turn counts as the way of a point so far from the middle
 REACH_S = 1.0  # delays and offsets that are looked for
 
@@ -194,12 +189,14 @@ def _without_bumps(data: Trajectory, response: Response) -> np.ndarray:
 
     What bumps often does so by itself: its parts are left in.
     """
-    bumps = is_far(response.across, response.errors, BUMP)
-    if not bumps.any() or bumps.mean() > MOST_BUMPS:
+    bumps = is_far(response.across, response.errors, FLOOR_SETTINGS.bump)
+    if not bumps.any() or bumps.mean() > FLOOR_SETTINGS.most_bumps:
         return np.ones(len(bumps), bool)
     apart_s = np.abs(data.start_s[:, None] - data.start_s[bumps]).min(axis=1)
-    parts = is_far(response.across, response.errors, BUMP_PART) & (apart_s < HORIZONS_S[-1])
-    return ~bumps & ~parts if (bumps | parts).mean() < RARE_BUMPS else ~bumps
+    parts = is_far(response.across, response.errors, FLOOR_SETTINGS.bump_part)
+    parts &= apart_s < HORIZONS_S[-1]
+    rare = (bumps | parts).mean() < FLOOR_SETTINGS.rare_bumps
+    return ~bumps & ~parts if rare else ~bumps
 
 
 def is_far(errors: np.ndarray, floor: np.ndarray, times: float) -> np.ndarray:
@@ -221,7 +218,8 @@ def is_far(errors: np.ndarray, floor: np.ndarray, times: float) -> np.ndarray:
 def _too_poor(data: Trajectory) -> str:
     """Why a log can give no floor; empty if it can."""
     whole = np.count_nonzero(np.isfinite(data.measured[:, -1, 0]))
-    if len(data.windows.starts) < FEWEST_WINDOWS or whole < FEWEST_LONG:
+    few = len(data.windows.starts) < FLOOR_SETTINGS.fewest_windows
+    if few or whole < FLOOR_SETTINGS.fewest_long:
         return (
             f"{data.label}: {len(data.windows.starts) * 0.25:.0f} s of unbroken poses are too "
             "short to tell the noise from the motion; record half a minute or more"

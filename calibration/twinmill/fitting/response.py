@@ -22,6 +22,7 @@ from scipy.signal import lfilter
 
 from twinmill.fitting.boosting import Learner, Parts, boosted
 from twinmill.fitting.dependence import Features, Motion
+from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import EVERY_S, difference, rms
 
@@ -38,7 +39,6 @@ OUT = 1e5  # ridge over a group's mean square with which nothing of it is left
 LADDER = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, OUT)
 GROUPS = ("base", "own", "cross", "shape", "product", "room", "place")
 FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
-WORTH = 0.998  # a ridge is taken if it lowers the left-out error to this share
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
 GRID_S = 0.01
 CHOICE_EVERY = 2  # horizons: those between would choose the same groups
@@ -295,7 +295,12 @@ class Response:
         begun = [first if ridge is None else ridge for ridge in ridges]
         groups = [np.concatenate(self.groups[:2]), self.groups[2]]
         self.coefficients, self.ridges = self._solved(
-            self.rows, self.data.measured, scale, groups=groups, begun=begun, worth=WORTH
+            self.rows,
+            self.data.measured,
+            scale,
+            groups=groups,
+            begun=begun,
+            worth=FLOOR_SETTINGS.ridge_worth,
         )
         self._judge()
 

@@ -11,6 +11,7 @@ from rich.text import Text
 from twinmill.diagnosis.explain import Explanation, steps
 from twinmill.diagnosis.outliers import FEWEST, Outlier, in_words
 from twinmill.diagnosis.result import Diagnosis
+from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.model.parameters import ParameterEstimate, catalogue
 from twinmill.report import Figure, Section, comparisons, detections, show, tables
 from twinmill.report.charted import charts
@@ -281,11 +282,9 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
 
 
 def deciding(diagnosis: Diagnosis) -> Table:
-    """The numbers that decided, with what each means."""
-    rows = [
-        [Cell(name), Cell(f"{value:g}"), Cell(what)]
-        for name, value, what in diagnosis.search.settings.listed()
-    ]
+    """The numbers that decided, with what each means: the search's, then the noise floor's."""
+    numbers = [*diagnosis.search.settings.listed(), *FLOOR_SETTINGS.listed()]
+    rows = [[Cell(name), Cell(f"{value:g}"), Cell(what)] for name, value, what in numbers]
     note = "Scores are over the noise floor: 1.0 is right. Costs are -2 log likelihoods."
     return Table("Numbers that decided", ["name", "value", "what"], rows, note, words=(0, 2))
 

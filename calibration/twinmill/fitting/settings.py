@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers that decide the noise floor, in one record: reports and JSON output print it.
+
+Which features a response may use, and the grids that are searched, stand where they are used.
+"""
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+
+def number(value: Any, what: str) -> Any:
+    """A field of a record with its value and what it means."""
+    return field(default=value, metadata={"what": what})
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A record of numbers that decide, each with what it means."""
+
+    def listed(self) -> list[tuple[str, float, str]]:
+        """Name, value and meaning of each, as reports print them."""
+        return [(f.name, getattr(self, f.name), f.metadata["what"]) for f in fields(self)]
+
+
+@dataclass(frozen=True)
+class FloorSettings(Numbers):
+    """What each number means stands beside it."""
+
+    fewest_windows: int = number(40, "windows below which a log has no floor: 10 s")
+    fewest_long: int = number(20, "the same of windows that have the longest horizon")
+
+    # Disturbances: pushed, slipped, or a lost pose.
+    bump: float = number(20.0, "times the median squared error: a window that is left out ...")
+    bump_part: float = number(4.0, "... and so many times, of windows that overlap such a one ...")
+    rare_bumps: float = number(0.1, "... if all these are less than this share of the windows")
+    most_bumps: float = number(0.25, "share of bumped windows, beyond which none is left out")
+
+    # The smooth response.
+    ridge_worth: float = number(0.998, "a ridge is taken if it lowers the error to this share")
+    group_worth: float = number(0.04, "share of the left-out error that a group must take ...")
+    group_chance: float = number(4.0, "... or so many times ln(groups) / independent errors")
+    most_groups: int = number(8, "groups that are added for the plane, and for turning")
+
+
+FLOOR_SETTINGS = FloorSettings()
