@@ -16,9 +16,9 @@ namespace
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // Half a minute of random commands; poses that a robot could have had, but no robot had.
-struct Course
+struct RandomDrive
 {
-    Course()
+    RandomDrive()
     {
         std::mt19937_64 engine(5);
         std::uniform_real_distribution<double> duty(-1, 1), jitter(0, 0.01);
@@ -53,7 +53,7 @@ struct Course
 };
 
 // Moves in millisecond steps cut at each command.
-void Drive(const DriveChain &chain, const Course &run, double from_s, double to_s,
+void Drive(const DriveChain &chain, const RandomDrive &run, double from_s, double to_s,
            RobotState &state)
 {
     for (double t_s = from_s; t_s < to_s;)
@@ -76,7 +76,7 @@ void Drive(const DriveChain &chain, const Course &run, double from_s, double to_
 }
 
 // Each window by itself: the wheels from the first command on, the body from the measured pose.
-std::vector<double> OneByOne(const Model &model, const Course &run)
+std::vector<double> OneByOne(const Model &model, const RandomDrive &run)
 {
     const DriveChain chain(model);
     std::vector<double> predicted(3 * run.ends.size(), kNaN);
@@ -131,7 +131,7 @@ Model Base(double motor_lag_s = 0.08)
 // are right to second order in their length.
 TEST(Windows, AreWhatThePlantDoesFromEachStart)
 {
-    const Course run;
+    const RandomDrive run;
     const Model model = Base(0);
     ASSERT_TRUE(DriveChain(model).IsHomogeneous());
     ExpectNear(PredictWindows(model, run.track(), run.starts, run.ends), OneByOne(model, run),
@@ -143,7 +143,7 @@ TEST(Windows, AreWhatThePlantDoesFromEachStart)
 // Effects of the room are right to second order in the step of 20 ms.
 TEST(Windows, AreWhatThePlantDoesWhereTheRoomMatters)
 {
-    const Course run;
+    const RandomDrive run;
     const Model model =
         With("floor_patch", {0.3, 0.2, 0.4, 0.3}, With("carpet_grain", {0.1, 0.05}, Base()));
     ASSERT_FALSE(DriveChain(model).IsHomogeneous());
@@ -157,7 +157,7 @@ const std::vector<std::string> kNames{"wheel_gain.fr", "base.yaw_gain", "marker_
 
 TEST(Windows, AreTheSameInABatchAsAlone)
 {
-    const Course run;
+    const RandomDrive run;
     const std::vector<double> rows{0,    1,   0.03, 0.03, 0.08, 0.1, 1,   0.03, 0.03, 0.08,
                                    0,    0.8, 0.03, 0.03, 0.08, 0,   1.1, 0.01, 0.03, 0.08,
                                    -0.1, 1,   0.03, 0.05, 0.08, 0,   1,   0.03, 0.03, 0.2};

@@ -13,7 +13,7 @@ from twinmill.claims.published import Points
 from twinmill.model.model_file import ModelFile
 from twinmill.swarm.matters.changes import Change, Factor, factors
 from twinmill.swarm.matters.differences import median_difference, share_difference
-from twinmill.swarm.matters.judge import MATTERS, NOTHING, Matters, judge
+from twinmill.swarm.matters.sensitivity import MATTERS, NOTHING, Sensitivity, rank_factors
 from twinmill.swarm.matters.sentences import sentence
 from twinmill.swarm.sweep import make_request
 from twinmill_cli.main import run
@@ -73,27 +73,29 @@ def independent(without: str | None) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def planted(tmp_path_factory) -> Matters:
+def planted(tmp_path_factory) -> Sensitivity:
     folder = tmp_path_factory.mktemp("planted")
     (folder / "planted.toml").write_text(planted_text())
     name = str(folder / "planted.toml")
     request = make_request("milling", name, [], seeds=SEEDS, duration_s=SECONDS, full=True)
     asked, left = factors(ModelFile.load(name), [], drawn=0, seed=1)
     only = [s for s in asked if s.kind == "effect"]
-    return judge(request, only, left, goal="milling", margin=0.1, folder=folder)
+    return rank_factors(request, only, left, goal="milling", margin=0.1, folder=folder)
 
 
-def test_of_six_effects_the_one_that_decides_comes_first_and_five_do_not_matter(planted: Matters):
+def test_of_six_effects_the_one_that_decides_comes_first_and_five_do_not_matter(
+    planted: Sensitivity,
+):
     truth = {name: independent(name) for name in (None, *EFFECTS)}
     moved = {name: abs(truth[name].mean() - truth[None].mean()) for name in EFFECTS}
     assert moved.pop("view_angle") > 0.8 and max(moved.values()) < 0.06  # the case is as planted
-    names = [judged.factor.name for judged in planted.ranked]
+    names = [result.factor.name for result in planted.ranked]
     assert names[0] == "view_angle" and set(names) == set(EFFECTS)
-    verdicts = [judged.verdict for judged in planted.ranked]
+    verdicts = [result.verdict for result in planted.ranked]
     assert verdicts == [MATTERS] + [NOTHING] * 5
 
 
-def test_shares_are_those_of_the_independent_program(planted: Matters):
+def test_shares_are_those_of_the_independent_program(planted: Sensitivity):
     """Within 3.5 standard deviations of two binomial samples, held off 0 and 1 by one success."""
     first = planted.ranked[0]
     for ours, n, without in (
@@ -117,7 +119,7 @@ def test_an_effect_that_does_nothing_changes_no_run(tmp_path: Path):
     request = replace(request, n=3)
     neutral = bare + '[[effect]]\nname = "speed_slip"\nloss_s_per_m = 0.0\n'
     asked = [Factor("speed_slip", "effect", "", [Change("nothing", neutral, {})])]
-    found = judge(request, asked, [], goal="milling", margin=0.1, folder=tmp_path / "out")
+    found = rank_factors(request, asked, [], goal="milling", margin=0.1, folder=tmp_path / "out")
     outcome = found.ranked[0].worst
     assert outcome.share.change == 0
     circliness = outcome.metrics["circliness"]
@@ -169,14 +171,14 @@ def test_the_command_tells_the_same_twice_and_goes_on_where_it_was(
     data = json.loads(told[0])
     assert told[0] == told[1] and told[0] == told[2].replace('"b/', '"a/')
     assert Path("a/index.html").read_bytes() == Path("b/index.html").read_bytes()
-    kinds = {judged["kind"] for judged in data["ranking"]}
+    kinds = {result["kind"] for result in data["ranking"]}
     assert kinds == {"effect", "parameter", "hidden", "one_robot"}
     own = next(j for j in data["ranking"] if j["kind"] == "parameter")
     # 95 % of a normal: 1.96 standard deviations to both sides.
     ends = [change["values"]["base.forward_gain"] for change in own["changes"]]
     assert ends == pytest.approx([1 - 1.96 * 0.02, 1 + 1.96 * 0.02])
     assert len(data["together"]["changes"]) == 2
-    assert all(judged["sentence"].endswith(").") for judged in data["ranking"])
+    assert all(result["sentence"].endswith(").") for result in data["ranking"])
 
 
 FITTED = "forward_gain = 1.0\n[base.std]\nforward_gain = 0.02\n[sensor]"

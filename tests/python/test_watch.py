@@ -19,7 +19,7 @@ from twinmill.data.multi_log import RecordedRobot, multi_log_of
 from twinmill.data.stream import Window, from_log
 from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
-from twinmill.watch.judge import WINDOW_S, Judge
+from twinmill.watch.live_score import WINDOW_S, LiveScorer
 from twinmill_cli import watch as command
 from twinmill_cli.main import run
 
@@ -111,16 +111,16 @@ def test_the_viewers_own_program_finds_no_fault(log, tmp_path):
 
 
 def scores(log, model):
-    """By `Judge`, every 4 s of a log."""
-    judge, window, found = Judge(ModelFile.load(str(model))), Window(WINDOW_S), []
+    """By `LiveScorer`, every 4 s of a log."""
+    scorer, window, found = LiveScorer(ModelFile.load(str(model))), Window(WINDOW_S), []
     batches = from_log(log, [])
     for number, (now_us, batch) in enumerate(batches, start=1):
         window.add(now_us, batch)
         if number % 40 == 0 and number * 0.1 >= WINDOW_S:
             (recorded,) = multi_log_of(window.events(), log).robots
-            judgement = judge.judge(recorded)
-            found.append(judgement.score)
-            error_m = np.linalg.norm(judgement.predicted[-1, :2] - recorded.log.pose[-1, :2])
+            live = scorer.score(recorded)
+            found.append(live.score)
+            error_m = np.linalg.norm(live.predicted[-1, :2] - recorded.log.pose[-1, :2])
             assert error_m < 0.2
     return np.array(found)
 
@@ -136,7 +136,7 @@ def test_score_is_one_for_the_model_that_drove_and_more_without_its_effect(coast
 def test_a_robot_that_stands_has_no_score(driven):
     robot = driven()
     robot.command[:] = 0
-    assert Judge(ModelFile.load("turbopi.toml")).judge(RecordedRobot("", robot)) is None
+    assert LiveScorer(ModelFile.load("turbopi.toml")).score(RecordedRobot("", robot)) is None
 
 
 def test_window_forgets_what_is_old(log):
@@ -175,4 +175,4 @@ def test_the_score_is_that_of_compare(brief_coasting_robot):
     model = ModelFile.load(str(brief_coasting_robot.model))
     said = compare(load_measurements([brief_coasting_robot.log], model.model), model).score
     robot = read_log(brief_coasting_robot.log).robots[3]
-    assert Judge(model).judge(RecordedRobot("", robot)).score == pytest.approx(said, rel=0.03)
+    assert LiveScorer(model).score(RecordedRobot("", robot)).score == pytest.approx(said, rel=0.03)

@@ -31,13 +31,13 @@ if working():  # not for --help
     from twinmill.swarm.compare import (
         BLOCK_S,
         COMPARED,
-        Judgement,
+        RankTest,
         blocks,
         compared,
         first_motion,
-        judge,
         least_spread,
         plain,
+        rank_test,
         twin_values,
     )
     from twinmill.swarm.metrics import STEP_S, SwarmSeries, swarm_metrics
@@ -66,18 +66,18 @@ class SwarmComparison:
         t_s: (B,) middle of each block, since the swarm began to move.
         floor: (B, K) in the metrics' own units.
         twins: (S, B, K) the same.
-        judgement: how they compare.
+        test: how they compare.
     """
 
     names: list[str]
     t_s: np.ndarray
     floor: np.ndarray
     twins: np.ndarray
-    judgement: Judgement
+    test: RankTest
 
     def to_json(self) -> dict:
         """Verdict, tests and bands."""
-        j, left = self.judgement, self.judgement.left
+        j, left = self.test, self.test.left
         low, middle, high = (plain(part, self.names) for part in (j.low, j.middle, j.high))
         return {
             "differs": j.differs,
@@ -103,7 +103,7 @@ class SwarmComparison:
     @property
     def verdict(self) -> str:
         """One or two sentences."""
-        j = self.judgement
+        j = self.test
         tests = f"(energy distance p = {j.p_value:.3f}, band p = {j.p_band:.3f})"
         if not j.differs:
             return f"The floor's run could be one of the twin's {len(self.twins)} {tests}."
@@ -211,7 +211,11 @@ def compare_swarm(
     runs = np.array(twins)
     t_s = (np.arange(len(floor)) + 0.5) * BLOCK_S
     return SwarmComparison(
-        names, t_s, plain(floor, names), plain(runs, names), judge(floor, runs, least_spread(names))
+        names,
+        t_s,
+        plain(floor, names),
+        plain(runs, names),
+        rank_test(floor, runs, least_spread(names)),
     )
 
 
@@ -232,7 +236,7 @@ def _progress(total: int) -> Iterator:
 
 
 def _section(result: SwarmComparison, series: SwarmSeries) -> Section:
-    j = result.judgement
+    j = result.test
     return Section(
         title="The swarm on the floor and the twin's",
         score=[
@@ -251,7 +255,7 @@ def _section(result: SwarmComparison, series: SwarmSeries) -> Section:
 
 
 def _bands(result: SwarmComparison) -> Figure:
-    j, names = result.judgement, result.names
+    j, names = result.test, result.names
     low, high = plain(j.low, names), plain(j.high, names)
 
     def paint(panels) -> None:

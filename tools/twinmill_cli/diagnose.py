@@ -126,7 +126,7 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
     except ValueError as error:
         return f"Each robot was judged by itself; the swarm as a whole cannot be: {error}", None
     done = "with what was found" if result.found else "with this model, its base refitted"
-    if not found.judgement.differs:
+    if not found.test.differs:
         return f"The swarm as a whole, {done}: {found.verdict}", found.to_json()
     return f"The swarm as a whole, {done}: {found.verdict} {LOOK.capitalize()}", found.to_json()
 

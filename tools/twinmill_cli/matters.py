@@ -35,8 +35,15 @@ if working():  # not for --help
     from twinmill.swarm.classes import check_goal, goal_of
     from twinmill.swarm.matters.changes import factors
     from twinmill.swarm.matters.hidden import Hidden, hidden_effects, unseen_effects
-    from twinmill.swarm.matters.judge import MATTERS, NOTHING, UNSURE, Matters, folder_of, judge
     from twinmill.swarm.matters.maps import map_requests
+    from twinmill.swarm.matters.sensitivity import (
+        MATTERS,
+        NOTHING,
+        UNSURE,
+        Sensitivity,
+        folder_of,
+        rank_factors,
+    )
     from twinmill.swarm.matters.sentences import headline, next_step, sentence, to_json
     from twinmill.swarm.phase import phase_of
     from twinmill.swarm.request import Request
@@ -90,7 +97,7 @@ def _matters(
     ] = None,
     as_json: AsJson = False,
     out: Out = None,
-) -> Matters:
+) -> Sensitivity:
     """Tell which effects and numbers of a model matter for what the swarm does.
 
     Each is changed alone: an effect is left out, a number goes to both ends of
@@ -124,7 +131,7 @@ def _matters(
             asked, left = factors(model_file, hidden, drawn=draws, seed=first_seed, only=only or [])
         with progress_bar() as progress:
             task = progress.add_task("runs", total=None)
-            found = judge(
+            found = rank_factors(
                 request=request,
                 factors=asked,
                 left=left,
@@ -204,7 +211,7 @@ def _command_line(given: dict) -> str:
     return shlex.join(words)
 
 
-def _terminal(found: Matters, report: Path | None) -> RenderableType:
+def _terminal(found: Sensitivity, report: Path | None) -> RenderableType:
     styles = {MATTERS: "bold red", UNSURE: "yellow", NOTHING: ""}
     lines = [Text(headline(found)), Text()]
     lines += [Text(sentence(j), styles[j.verdict]) for j in found.ranked[:SHOWN]]

@@ -27,7 +27,7 @@ if working():  # not for --help
     from twinmill.data.stream import from_bus, from_log
     from twinmill.files import check_new_file, replacing
     from twinmill.model.model_file import ModelFile
-    from twinmill.watch.judge import WINDOW_S
+    from twinmill.watch.live_score import WINDOW_S
     from twinmill_cli.frame import open_model
 
 RERUN = "rerun-sdk==0.41.0"

@@ -26,15 +26,15 @@ public:
         for (size_t i = 0; i < n_; ++i)
         {
             const RobotState &r = robots[i];
-            const Course course = CourseOf(r.vx_mps, r.vy_mps, r.omega_radps);
+            const Motion motion = MotionOf(r.vx_mps, r.vy_mps, r.omega_radps);
             const double row[]{r.pose.x_m,
                                r.pose.y_m,
                                std::cos(r.pose.theta_rad),
                                std::sin(r.pose.theta_rad),
-                               course[kTravelX],
-                               course[kTravelY],
-                               course[kTurnX],
-                               course[kTurnY]};
+                               motion[kTravelX],
+                               motion[kTravelY],
+                               motion[kTurnX],
+                               motion[kTurnY]};
             for (size_t column = 0; column < std::size(row); ++column)
                 values_[column * n_ + i] = row[column];
         }
@@ -52,19 +52,19 @@ private:
 
 }  // namespace
 
-Course CourseOf(double vx_mps, double vy_mps, double omega_radps)
+Motion MotionOf(double vx_mps, double vy_mps, double omega_radps)
 {
-    static_assert(std::tuple_size<Course>() == kCourse);
+    static_assert(std::tuple_size<Motion>() == kMotion);
     const double speed_mps = std::hypot(vx_mps, vy_mps);
-    Course course{};
+    Motion motion{};
     if (speed_mps > 0)
-        course = {vx_mps / speed_mps, vy_mps / speed_mps, 0, 0};
+        motion = {vx_mps / speed_mps, vy_mps / speed_mps, 0, 0};
     if (omega_radps != 0)
     {
-        course[kTurnX] = -vy_mps / omega_radps;
-        course[kTurnY] = vx_mps / omega_radps;
+        motion[kTurnX] = -vy_mps / omega_radps;
+        motion[kTurnY] = vx_mps / omega_radps;
     }
-    return course;
+    return motion;
 }
 
 Metrics Measure(std::span<const RobotState> robots, size_t ring_size, const MetricScale &scale)

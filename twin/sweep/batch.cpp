@@ -148,8 +148,8 @@ private:
             At(kDice, i, lane) =
                 std::bit_cast<double>(Random(world.seed, static_cast<int>(i), "sensor").State());
             const DriveChain chain(robots[i]);
-            FillRow(i, lane, kUnseenX, kUnseenCourse, chain, robots[i].base, cell.tables[i].unseen);
-            FillRow(i, lane, kSeenX, kSeenCourse, chain, robots[i].base, cell.tables[i].seen);
+            FillRow(i, lane, kUnseenX, kUnseenMotion, chain, robots[i].base, cell.tables[i].unseen);
+            FillRow(i, lane, kSeenX, kSeenMotion, chain, robots[i].base, cell.tables[i].seen);
         }
         Number(BatchLayout(plan_).range, lane) = cell.model.sensor.range_m;
         Sum(kLeastDiffusion, lane) = std::numeric_limits<double>::infinity();
@@ -169,9 +169,9 @@ private:
         plan_.errors |= sensor.false_negative_rate > 0 || sensor.false_positive_rate > 0;
     }
 
-    // The course that a row of the table gives this robot, and one substep of it: the chord of the
+    // The motion that a row of the table gives this robot, and one substep of it: the chord of the
     // arc, in the body frame, and the turn.
-    void FillRow(size_t robot, size_t lane, int move, int course, const DriveChain &chain,
+    void FillRow(size_t robot, size_t lane, int move, int motion, const DriveChain &chain,
                  const Base &base, const fw_input &input)
     {
         const double dt_s = StepS(base);
@@ -185,9 +185,9 @@ private:
         At(move + 1, robot, lane) = state.pose.y_m;
         At(move + 2, robot, lane) = std::cos(state.pose.theta_rad);
         At(move + 3, robot, lane) = std::sin(state.pose.theta_rad);
-        const Course taken = CourseOf(state.vx_mps, state.vy_mps, state.omega_radps);
+        const Motion taken = MotionOf(state.vx_mps, state.vy_mps, state.omega_radps);
         for (size_t k = 0; k < taken.size(); ++k)
-            At(course + static_cast<int>(k), robot, lane) = taken[k];
+            At(motion + static_cast<int>(k), robot, lane) = taken[k];
     }
 
     std::span<const World> worlds_;

@@ -163,14 +163,14 @@ private:
     void Measure(bool moves)
     {
         const Mask *seen = BitsAt(at_.seen);
-        Real *course = Column(kCourseNow);
+        Real *motion = Column(kMotionNow);
         for (int i = 0; i < n_; ++i)
-            for (int k = 0; k < kCourse; ++k)
-                course[k * n_ + i] = !moves    ? Real{}
-                                     : seen[i] ? Column(kSeenCourse + k)[i]
-                                               : Column(kUnseenCourse + k)[i];
+            for (int k = 0; k < kMotion; ++k)
+                motion[k * n_ + i] = !moves    ? Real{}
+                                     : seen[i] ? Column(kSeenMotion + k)[i]
+                                               : Column(kUnseenMotion + k)[i];
         const MetricLanes<W> m = MetricFormulas<W>::Measure(
-            {n_, p_.ring, Column(kX), Column(kY), Column(kCos), Column(kSin), course,
+            {n_, p_.ring, Column(kX), Column(kY), Column(kCos), Column(kSin), motion,
              Column(kScratch), Column(kScratch + 1), Column(kScratch + 2), numbers_[at_.range],
              p_.touch_m});
         Real *sums = numbers_ + at_.sums;

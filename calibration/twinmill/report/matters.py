@@ -11,7 +11,14 @@ from twinmill.report import Figure, Section
 from twinmill.report.canvas import FLOOR, MEASURED, PREDICTED, draw
 from twinmill.report.phase_figures import TRACE_EVERY_S, TRACE_S, maps_figure, paint_paths
 from twinmill.report.tables import Cell, Table, Tone, number
-from twinmill.swarm.matters.judge import MATTERS, METRICS, NOTHING, UNSURE, Judged, Matters
+from twinmill.swarm.matters.sensitivity import (
+    MATTERS,
+    METRICS,
+    NOTHING,
+    UNSURE,
+    FactorResult,
+    Sensitivity,
+)
 from twinmill.swarm.matters.sentences import headline, label, next_step, sentence
 from twinmill.swarm.phase import Phase
 
@@ -45,7 +52,7 @@ TOLD = 12  # sentences
 PAIRS = 3  # of runs shown before and after
 
 
-def section(found: Matters, maps: dict[str, Phase]) -> Section:
+def section(found: Sensitivity, maps: dict[str, Phase]) -> Section:
     """Everything on one page.
 
     Args:
@@ -73,7 +80,7 @@ def section(found: Matters, maps: dict[str, Phase]) -> Section:
             ("margin", f"{100 * found.margin:g} points"),
             ("interval", f"{100 * low:.0f} to {100 * high:.0f} % of runs end '{found.goal}'"),
             ("circliness, radius, time to form", _medians(found)),
-            *((judged.verdict, sentence(judged)) for judged in found.ranked[:TOLD]),
+            *((result.verdict, sentence(result)) for result in found.ranked[:TOLD]),
         ],
         figures=[share_figure(found), *_turned_figure(found), *_maps_figure(maps)],
         tables=_tables(found),
@@ -81,7 +88,7 @@ def section(found: Matters, maps: dict[str, Phase]) -> Section:
     )
 
 
-def _medians(found: Matters) -> str:
+def _medians(found: Sensitivity) -> str:
     m = found.medians
     return (
         f"{number(m['circliness'], 2)}, {number(m['radius_m'], 2)} m, {number(m['settled_s'], 2)} "
@@ -89,13 +96,13 @@ def _medians(found: Matters) -> str:
     )
 
 
-def share_figure(found: Matters) -> Figure:
+def share_figure(found: Sensitivity) -> Figure:
     """The share before and after each change, what moves it most first."""
     shown = found.ranked[:BARS]
 
     def paint(axes: Axes) -> None:
-        for y, judged in enumerate(reversed(shown)):
-            d, color = judged.worst.share, COLORS[judged.verdict]
+        for y, result in enumerate(reversed(shown)):
+            d, color = result.worst.share, COLORS[result.verdict]
             span = [100 * (d.before + d.low), 100 * (d.before + d.high)]
             axes.plot(np.clip(span, 0, 100), [y, y], color=color, lw=4, alpha=0.3)
             axes.plot(100 * d.after, y, "o", ms=5, color=color)
@@ -104,7 +111,7 @@ def share_figure(found: Matters) -> Figure:
         margin = 100 * found.margin
         axes.axvspan(share - margin, share + margin, color=MEASURED, alpha=0.06, lw=0)
         axes.set(xlim=(-2, 102), ylim=(-0.6, len(shown) - 0.4), yticks=range(len(shown)))
-        axes.set_yticklabels([label(judged) for judged in reversed(shown)], fontsize=7.5)
+        axes.set_yticklabels([label(result) for result in reversed(shown)], fontsize=7.5)
         axes.set_xlabel(f"runs that end '{found.goal}' (%)")
 
     return Figure(
@@ -116,15 +123,15 @@ def share_figure(found: Matters) -> Figure:
     )
 
 
-def _turned_figure(found: Matters) -> list[Figure]:
+def _turned_figure(found: Sensitivity) -> list[Figure]:
     """One run before and after each of the changes that matter most."""
     picked = [j for j in found.of(MATTERS, UNSURE) if j.worst.turned is not None][:PAIRS]
     if not picked:
         return []
 
     def paint(panels) -> None:
-        for pair, judged in zip(panels.T, picked, strict=True):
-            outcome = judged.worst
+        for pair, result in zip(panels.T, picked, strict=True):
+            outcome = result.worst
             for axes, text in zip(
                 pair, (found.request.model_text, outcome.change.text), strict=True
             ):
@@ -132,7 +139,7 @@ def _turned_figure(found: Matters) -> list[Figure]:
                 length_s = found.request.duration_s
                 trace = native.trace_world(cell, outcome.turned, length_s, TRACE_EVERY_S)
                 paint_paths(axes, trace[-int(TRACE_S / TRACE_EVERY_S) :], FLOOR)
-            pair[0].set_title(f"{label(judged)}\nbefore", fontsize=7.5)
+            pair[0].set_title(f"{label(result)}\nbefore", fontsize=7.5)
             pair[1].set_title("after", fontsize=7.5)
 
     return [
@@ -160,10 +167,10 @@ def _maps_figure(maps: dict[str, Phase]) -> list[Figure]:
     ]
 
 
-def _tables(found: Matters) -> list[Table]:
+def _tables(found: Sensitivity) -> list[Table]:
     made = []
     for kind, title in KINDS.items():
-        rows = [_row(judged) for judged in found.ranked if judged.factor.kind == kind]
+        rows = [_row(result) for result in found.ranked if result.factor.kind == kind]
         if rows:
             made.append(Table(title.capitalize(), COLUMNS, rows, words=(0, 1)))
     if found.left:
@@ -172,9 +179,9 @@ def _tables(found: Matters) -> list[Table]:
     return made
 
 
-def _row(judged: Judged) -> list[Cell]:
+def _row(result: FactorResult) -> list[Cell]:
     """The change that moves the share most; medians that do not move beyond doubt are pale."""
-    worst = judged.worst
+    worst = result.worst
     share = worst.share
     cells = []
     for name in METRICS:
@@ -183,8 +190,8 @@ def _row(judged: Judged) -> list[Cell]:
         words = f"{number(d.before, 2)} to {number(d.after, 2)}"
         cells.append(Cell("-" if np.isnan([d.before, d.after]).all() else words, tone))
     return [
-        Cell(judged.verdict, TONES[judged.verdict]),
-        Cell(label(judged)),
+        Cell(result.verdict, TONES[result.verdict]),
+        Cell(label(result)),
         Cell(f"{100 * share.before:.0f} to {100 * share.after:.0f}"),
         Cell(f"{100 * share.low:+.0f} to {100 * share.high:+.0f}", "dim"),
         Cell(str(worst.seeds)),

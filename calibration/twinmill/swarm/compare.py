@@ -31,8 +31,8 @@ COMPARED = {
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """How the floor's run stands among the twin's.
+class RankTest:
+    """Monte Carlo rank tests of the floor's run among the twin's.
 
     Attributes:
         p_value: of the energy distance between the floor's run and the twin's.
@@ -55,7 +55,7 @@ class Judgement:
         return min(self.p_value, self.p_band) <= FALSE_ALARMS / 2
 
 
-def judge(floor: np.ndarray, twins: np.ndarray, least: np.ndarray) -> Judgement:
+def rank_test(floor: np.ndarray, twins: np.ndarray, least: np.ndarray) -> RankTest:
     """Ranks the floor's run among the twin's.
 
     Args:
@@ -75,7 +75,7 @@ def judge(floor: np.ndarray, twins: np.ndarray, least: np.ndarray) -> Judgement:
     alarms = int(FALSE_ALARMS / 2 * len(runs) + 1e-9)
     allowed = np.sort(worst[1:])[-max(alarms, 1)]
     out = np.argwhere(np.abs(off[0]) > allowed)
-    return Judgement(
+    return RankTest(
         float(np.mean(apart >= apart[0])),
         float(np.mean(worst >= worst[0])),
         (int(out[0, 0]), int(out[0, 1])) if len(out) else None,

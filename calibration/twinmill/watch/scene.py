@@ -16,7 +16,7 @@ from twinmill.data.log import heading_rad
 from twinmill.data.multi_log import TWIN
 from twinmill.model.outlines import BLIND, SEES, Body
 from twinmill.report.canvas import BEFORE, PREDICTED
-from twinmill.watch.judge import Judgement
+from twinmill.watch.live_score import LiveScore
 
 TIME = "time"
 PATH_S, POINT_S = 10.0, 0.05  # of the path behind a robot: its length, and between its points
@@ -108,12 +108,10 @@ class Shown:
                 self._log(f"{self.entity}/view", at_s, view)
                 self._log(f"bits/{self.label}", at_s, rr.StateChange(state=WORDS[bit != 0]))
 
-    def judged(self, now_s: float, judgement: Judgement) -> None:
+    def scored(self, now_s: float, found: LiveScore) -> None:
         """Its score, and where the model would have it go."""
-        self._log(f"score/{self.label}", now_s, rr.Scalars(judgement.score))
-        line = rr.LineStrips3D(
-            [_flat(judgement.predicted[:, :2])], colors=_rgb(PREDICTED), radii=WIDE
-        )
+        self._log(f"score/{self.label}", now_s, rr.Scalars(found.score))
+        line = rr.LineStrips3D([_flat(found.predicted[:, :2])], colors=_rgb(PREDICTED), radii=WIDE)
         self._log(f"{GROUPS[self.prefix]}/predicted/{self.name}", now_s, line)
 
     def _log(self, entity: str, at_s: float, what: rr.AsComponents) -> None:

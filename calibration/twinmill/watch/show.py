@@ -13,10 +13,10 @@ from twinmill.data.multi_log import multi_log_of
 from twinmill.data.stream import Batch, Window
 from twinmill.model.model_file import ModelFile
 from twinmill.model.outlines import Body
-from twinmill.watch.judge import WINDOW_S, Judge
+from twinmill.watch.live_score import WINDOW_S, LiveScorer
 from twinmill.watch.scene import GROUPS, Shown, layout
 
-JUDGE_EVERY_S = 1.0
+SCORE_EVERY_S = 1.0
 PATH_EVERY_S = 0.2
 ROBOT = re.compile(rf"({'|'.join(p for p in GROUPS if p)})?(R\d{{2,4}})_(TELEMETRY|POSE|DRIVE|RUN)")
 
@@ -61,10 +61,10 @@ class Show:
         self.messages = 0
         self._to, self._model_file = to, model_file
         self._body = Body.of(model_file.model)
-        self._judges: dict[str, Judge] = {}
+        self._scorers: dict[str, LiveScorer] = {}
         self._window = Window(WINDOW_S)
         self._start_us: int | None = None
-        self._judged_s = self._drawn_s = 0.0
+        self._scored_s = self._drawn_s = 0.0
 
     def run(self, batches: Iterable[tuple[int, Batch]]) -> None:
         """Shows all batches, one after the other."""
@@ -76,9 +76,9 @@ class Show:
                 self._drawn_s = now_s
                 for shown in self.shown.values():
                     shown.path(now_s)
-            if now_s >= self._judged_s + JUDGE_EVERY_S:
-                self._judged_s = now_s
-                self._judge(now_s)
+            if now_s >= self._scored_s + SCORE_EVERY_S:
+                self._scored_s = now_s
+                self._score(now_s)
 
     def _take(self, batch: Batch) -> None:
         for channel, payloads in batch.by_channel.items():
@@ -98,7 +98,7 @@ class Show:
             elif kind == "TELEMETRY":
                 self.shown[prefix + name].telemetry(t_s, payloads)
 
-    def _judge(self, now_s: float) -> None:
+    def _score(self, now_s: float) -> None:
         """Robots' scores; the twins' where there is no robot."""
         try:
             robots = multi_log_of(self._window.events(), Path("the bus")).robots
@@ -106,8 +106,8 @@ class Show:
             return  # nobody has said enough
         robots = [recorded for recorded in robots if not recorded.prefix] or robots
         for recorded in robots:
-            judge = self._judges.setdefault(recorded.name, Judge(self._model_file))
-            judgement = judge.judge(recorded)
-            if judgement is not None:
-                self.scores[recorded.name] = judgement.score
-                self.shown[recorded.name].judged(now_s, judgement)
+            scorer = self._scorers.setdefault(recorded.name, LiveScorer(self._model_file))
+            found = scorer.score(recorded)
+            if found is not None:
+                self.scores[recorded.name] = found.score
+                self.shown[recorded.name].scored(now_s, found)

@@ -15,9 +15,9 @@ from twinmill.model.model_file import ModelFile
 from twinmill.swarm.compare import (
     blocks,
     compared,
-    judge,
     least_spread,
     plain,
+    rank_test,
     twin_values,
 )
 from twinmill_cli.main import run
@@ -57,7 +57,7 @@ def test_true_models_are_called_wrong_at_the_stated_rate(pool):
     random, results = np.random.default_rng(7), []
     for floor in range(PAIRS):
         others = random.choice(np.delete(np.arange(len(pool)), floor), SEEDS, replace=False)
-        results.append(judge(pool[floor], pool[others], LEAST))
+        results.append(rank_test(pool[floor], pool[others], LEAST))
     alarms = sum(result.differs for result in results)
     p_values = np.array([(r.p_value, r.p_band) for r in results])
     print(alarms, "of", PAIRS, "false alarms; mean p", p_values.mean(axis=0))
@@ -73,7 +73,7 @@ def test_one_blind_robot_is_seen(text, pool):
         floor = blocks(
             twin_values(blind, 500 + seed, 6, SCALE, count=SECONDS * 20), compared(False)
         )
-        result = judge(floor, pool[seed : seed + 50], LEAST)
+        result = rank_test(floor, pool[seed : seed + 50], LEAST)
         found += result.differs and result.left is not None
     print(found, "of 10 found")
     assert found >= 9
@@ -84,7 +84,7 @@ def test_the_moment_of_leaving_is_the_first_outside_the_band():
     twins = random.normal(size=(60, 20, 2))
     floor = random.normal(size=(20, 2)) * 0.3
     floor[12:, 1] += 30
-    result = judge(floor, twins, np.full(2, 0.1))
+    result = rank_test(floor, twins, np.full(2, 0.1))
     assert result.left == (12, 1) and result.differs
     inside = (floor[:12] > result.low[:12]) & (floor[:12] < result.high[:12])
     assert inside.all()
@@ -123,8 +123,8 @@ def test_a_log_against_the_model_that_made_it_and_one_with_a_blind_robot(
         subprocess.run(made, check=True, capture_output=True)
     same = run(["compare-swarm", "true.lcmlog", "--model", "true.toml"])
     other = run(["compare-swarm", "blind.lcmlog", "--model", "true.toml", "--out", "report"])
-    assert not same.judgement.differs
-    assert other.judgement.differs and other.judgement.left
+    assert not same.test.differs
+    assert other.test.differs and other.test.left
     assert "band" in Path("report/index.html").read_text()
     with pytest.raises(ValueError, match="no behaviour 'mill'"):
         run(["compare-swarm", "true.lcmlog", "--model", "true.toml", "--behavior", "mill"])

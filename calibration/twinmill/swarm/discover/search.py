@@ -107,8 +107,8 @@ def _scheduler(seed: int) -> Scheduler:
     return Scheduler(archive, emitters)
 
 
-class Ledger:
-    """What every generation gave, one file each: who goes on replays them."""
+class GenerationStore:
+    """Results of each generation, one file each: a search that goes on reads them again."""
 
     def __init__(self, folder: Path, hunt: Hunt) -> None:
         """Makes the folder, or opens one of the same hunt.
@@ -152,16 +152,16 @@ def search(hunt: Hunt, folder: Path, generations: int, tell: Callable[[int, int]
 
     Args:
         hunt: what is searched.
-        folder: of the ledger.
+        folder: of the generations that are kept.
         generations: in all, those that are kept included.
         tell: is given candidates tried and cells found after each.
     """
-    ledger, scheduler, kept = Ledger(folder, hunt), _scheduler(hunt.seed), []
+    store, scheduler, kept = GenerationStore(folder, hunt), _scheduler(hunt.seed), []
     seeds = range(hunt.request.first_seed, hunt.request.first_seed + hunt.request.seeds)
     for generation in range(generations):
         genes = scheduler.ask()
         mixes = [decode(one, hunt.n) for one in genes]
-        rows = ledger.rows(generation, genes, lambda mixes=mixes: hunt.run(mixes, seeds))
+        rows = store.rows(generation, genes, lambda mixes=mixes: hunt.run(mixes, seeds))
         found, alike = measures(rows)
         scheduler.tell(alike, found, place=len(kept) * PER_GENERATION + np.arange(len(genes)))
         kept.append(rows)

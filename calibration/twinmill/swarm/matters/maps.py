@@ -4,7 +4,7 @@
 from dataclasses import replace
 
 from twinmill.swarm.axes import Axis
-from twinmill.swarm.matters.judge import Judged, Matters
+from twinmill.swarm.matters.sensitivity import FactorResult, Sensitivity
 from twinmill.swarm.matters.sentences import label
 from twinmill.swarm.request import Request
 
@@ -12,7 +12,7 @@ MOST = 5  # changes
 KINDS = ("effect", "hidden", "one_robot")
 
 
-def map_requests(found: Matters, axes: list[Axis], seeds: int) -> dict[str, Request]:
+def map_requests(found: Sensitivity, axes: list[Axis], seeds: int) -> dict[str, Request]:
     """Sweeps by what they are of: the model as it is first.
 
     All effects of the model come first, then what moves the share most.
@@ -26,7 +26,7 @@ def map_requests(found: Matters, axes: list[Axis], seeds: int) -> dict[str, Requ
         return {}
     own = [j for j in found.ranked if j.factor.kind == "effect"]
     others = [j for j in found.ranked if j.factor.kind in KINDS and j not in own]
-    chosen: list[Judged] = [*own, *others][:MOST]
+    chosen: list[FactorResult] = [*own, *others][:MOST]
     base = replace(found.request, axes=axes, seeds=seeds, n=None, same_seeds=True)
     if all(axis.name != "n" for axis in axes):
         base = replace(base, n=found.request.n)

@@ -4,7 +4,14 @@
 from collections.abc import Sequence
 
 from twinmill.swarm.matters.differences import Difference
-from twinmill.swarm.matters.judge import MATTERS, NOTHING, UNSURE, Judged, Matters, Outcome
+from twinmill.swarm.matters.sensitivity import (
+    MATTERS,
+    NOTHING,
+    UNSURE,
+    FactorResult,
+    Outcome,
+    Sensitivity,
+)
 
 VERBS = {MATTERS: "matters", UNSURE: "may matter", NOTHING: "does not matter"}
 TELLS = 0.1  # relative change of a median that is worth a word
@@ -16,11 +23,11 @@ WORDS = {
 NAMED = 4  # of a list in a sentence
 
 
-def sentence(judged: Judged) -> str:
+def sentence(result: FactorResult) -> str:
     """Whether one thing matters to the swarm, with the shares that say so."""
-    factor, worst = judged.factor, judged.worst
-    verb = VERBS[judged.verdict]
-    low, high = judged.shares
+    factor, worst = result.factor, result.worst
+    verb = VERBS[result.verdict]
+    low, high = result.shares
     before, after = percent(worst.share.before), percent(worst.share.after)
     if factor.kind == "effect":
         text = f"{factor.name} {verb}: {before} with it, {after} without"
@@ -28,7 +35,7 @@ def sentence(judged: Judged) -> str:
         span = f"{100 * low:.0f} to {percent(high)}"
         text = f"{factor.name} {verb} {factor.about}: {span}"
     elif factor.kind == "hidden":
-        even = " even" if judged.verdict == NOTHING else ""
+        even = " even" if result.verdict == NOTHING else ""
         text = f"{factor.name} {verb},{even} at {_inside(worst)}: {before} become {after}"
     elif factor.kind == "robots":
         text = f"That robots differ {verb}: {before} as they are, {after} were they alike"
@@ -39,9 +46,9 @@ def sentence(judged: Judged) -> str:
     return f"{text} ({points(worst.share)}, {worst.seeds} runs{_besides(worst)})."
 
 
-def label(judged: Judged) -> str:
+def label(result: FactorResult) -> str:
     """What was changed, in few words."""
-    factor = judged.factor
+    factor = result.factor
     if factor.kind == "effect":
         return f"{factor.name} left out"
     if factor.kind == "hidden":
@@ -50,11 +57,11 @@ def label(judged: Judged) -> str:
         return "robots all alike"
     if factor.about == "one robot without it":
         return f"one robot without {factor.name}"
-    what = judged.worst.change.what
+    what = result.worst.change.what
     return what if factor.kind == "parameter" else what.partition(" (")[0]
 
 
-def headline(found: Matters) -> str:
+def headline(found: Sensitivity) -> str:
     """The whole in one or two sentences."""
     share, low, high = found.before
     text = (
@@ -76,7 +83,7 @@ def headline(found: Matters) -> str:
     return text
 
 
-def next_step(found: Matters) -> str:
+def next_step(found: Sensitivity) -> str:
     """What to measure next, and what not to."""
     worth = found.of(MATTERS, kinds=("parameter", "hidden"))
     idle = found.of(NOTHING, kinds=("parameter", "hidden"))
@@ -126,8 +133,8 @@ def _two(value: float) -> str:
     return f"{float(f'{value:.2g}'):g}"
 
 
-def _list(judged: Sequence[Judged]) -> str:
-    names = list(dict.fromkeys(j.factor.name for j in judged))
+def _list(result: Sequence[FactorResult]) -> str:
+    names = list(dict.fromkeys(j.factor.name for j in result))
     shown = names[:NAMED]
     rest = len(names) - len(shown)
     more = [f"{rest} more"] if rest else []
@@ -139,7 +146,7 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def to_json(found: Matters) -> dict:
+def to_json(found: Sensitivity) -> dict:
     """The interface's object."""
     share, low, high = found.before
     request = found.request
@@ -156,20 +163,20 @@ def to_json(found: Matters) -> dict:
         **found.medians,
         "sentence": headline(found),
         "next": next_step(found),
-        "ranking": [_judged_json(judged) for judged in found.ranked],
-        "together": _judged_json(found.together) if found.together else None,
+        "ranking": [_result_json(result) for result in found.ranked],
+        "together": _result_json(found.together) if found.together else None,
         "left_out": [{"name": name, "why": why} for name, why in found.left],
     }
 
 
-def _judged_json(judged: Judged) -> dict:
-    factor = judged.factor
+def _result_json(result: FactorResult) -> dict:
+    factor = result.factor
     return {
         "name": factor.name,
         "kind": factor.kind,
         "about": factor.about,
-        "verdict": judged.verdict,
-        "sentence": sentence(judged) if factor.kind != "together" else None,
-        "change": judged.worst.share.change,
-        "changes": [outcome.to_json() for outcome in judged.outcomes],
+        "verdict": result.verdict,
+        "sentence": sentence(result) if factor.kind != "together" else None,
+        "change": result.worst.share.change,
+        "changes": [outcome.to_json() for outcome in result.outcomes],
     }

@@ -41,9 +41,9 @@ struct MetricScale
     double body_radius_m;  // 0: nothing touches
 };
 
-// How a robot with this velocity in its own frame moves, see CourseColumn.
-using Course = std::array<double, 4>;
-Course CourseOf(double vx_mps, double vy_mps, double omega_radps);
+// How a robot with this velocity in its own frame moves, see MotionColumn.
+using Motion = std::array<double, 4>;
+Motion MotionOf(double vx_mps, double vy_mps, double omega_radps);
 
 // Which robots make the ring: the first `size` of `order`, which has all robots.
 struct Ring

@@ -10,23 +10,23 @@ namespace twin
 
 // How a robot moves, in its own frame: the unit vector of its travel (0 if it stands) and where the
 // centre of its turn is (0 if it does not turn), ahead and left each.
-enum CourseColumn
+enum MotionColumn
 {
     kTravelX,
     kTravelY,
     kTurnX,
     kTurnY,
-    kCourse,
+    kMotion,
 };
 
-// Arrays of n robots; `course`: kCourse of them in turn. Scratch: centre_x, centre_y, label.
+// Arrays of n robots; `motion`: kMotion of them in turn. Scratch: centre_x, centre_y, label.
 template <int W>
 struct SwarmLanes
 {
     using Real = typename Lanes<W>::Real;
     int n, ring;
     const Real *x_m, *y_m, *cos_theta, *sin_theta;
-    const Real *course;
+    const Real *motion;
     Real *centre_x_m, *centre_y_m, *label;
     Real range_m;
     double touch_m;  // bodies whose centres are nearer touch
@@ -63,7 +63,7 @@ struct MetricFormulas
         for (int i = 0; i < s.ring; ++i)
         {
             const Real rx = s.x_m[i] - mean_x, ry = s.y_m[i] - mean_y, r2 = rx * rx + ry * ry;
-            const Real along = s.course[kTravelX * s.n + i], left = s.course[kTravelY * s.n + i];
+            const Real along = s.motion[kTravelX * s.n + i], left = s.motion[kTravelY * s.n + i];
             const Real ux = s.cos_theta[i] * along - s.sin_theta[i] * left;
             const Real uy = s.sin_theta[i] * along + s.cos_theta[i] * left;
             const Real r = L::Sqrt(r2);
@@ -87,7 +87,7 @@ struct MetricFormulas
     {
         for (int i = 0; i < s.n; ++i)
         {
-            const Real ahead = s.course[kTurnX * s.n + i], left = s.course[kTurnY * s.n + i];
+            const Real ahead = s.motion[kTurnX * s.n + i], left = s.motion[kTurnY * s.n + i];
             s.centre_x_m[i] = s.x_m[i] + s.cos_theta[i] * ahead - s.sin_theta[i] * left;
             s.centre_y_m[i] = s.y_m[i] + s.sin_theta[i] * ahead + s.cos_theta[i] * left;
         }

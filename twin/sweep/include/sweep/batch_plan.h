@@ -40,12 +40,12 @@ enum BatchColumn
     kSeenY,
     kSeenCos,
     kSeenSin,
-    // And its course, see swarm/metrics_lanes.h.
-    kUnseenCourse,
-    kSeenCourse = kUnseenCourse + kCourse,
-    kCourseNow = kSeenCourse + kCourse,
+    // And its motion, see swarm/metrics_lanes.h.
+    kUnseenMotion,
+    kSeenMotion = kUnseenMotion + kMotion,
+    kMotionNow = kSeenMotion + kMotion,
     // Scratch.
-    kScratch = kCourseNow + kCourse,
+    kScratch = kMotionNow + kMotion,
     kBatchColumns = kScratch + 3,
 };
 

@@ -24,8 +24,8 @@ POINTS = 20  # of a prediction's line
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """One robot's last seconds.
+class LiveScore:
+    """Score and prediction of one robot's last seconds.
 
     Attributes:
         score: as of `twinmill compare`, over the window; 1 is as good as noise allows.
@@ -37,8 +37,8 @@ class Judgement:
 
 
 @dataclass
-class Judge:
-    """Judges one robot by its model again and again.
+class LiveScorer:
+    """Scores the predictions of one robot's model again and again.
 
     The floor is that of the first whole window, as `twinmill compare` finds it.
     """
@@ -47,7 +47,7 @@ class Judge:
     _floor: NoiseFloor | None = None
     _offset_s: float | None = None  # of the clock, where the model predicted best last
 
-    def judge(self, recorded: RecordedRobot) -> Judgement | None:
+    def score(self, recorded: RecordedRobot) -> LiveScore | None:
         """None while poses and commands are too few, or the robot stands."""
         try:
             measurement = Measurement.live(make_track(recorded.log))
@@ -68,7 +68,7 @@ class Judge:
             self._offset_s = own.model.get(CLOCK)
         except (LogError, ValueError):
             return None
-        return Judgement(own.score, _ahead(measurement, own.model))
+        return LiveScore(own.score, _ahead(measurement, own.model))
 
     def _own(self, measurement: Measurement) -> tuple[native.Model, bool]:
         """The robot's model, and whether its clock is known."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a model and its changes with the same seeds, and judges which of them matter."""
+"""One-at-a-time sensitivity analysis: runs a model and its changes with the same seeds."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -55,8 +55,8 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Judged:
-    """What is asked about, with the answer.
+class FactorResult:
+    """A factor with what its changes do.
 
     Attributes:
         outcomes: of its changes, in their order.
@@ -80,8 +80,8 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Matters:
-    """All answers, what matters most first.
+class Sensitivity:
+    """Results of all factors, what matters most first.
 
     Attributes:
         request: of the model as it is.
@@ -89,7 +89,7 @@ class Matters:
         margin: change of the share that would not matter.
         before: share that reaches the goal with its 95 % interval.
         medians: of METRICS.
-        ranked: answers.
+        ranked: results.
         together: of all numbers drawn at once; None where the model knows no errors.
         left: what was left out, and why.
     """
@@ -99,12 +99,12 @@ class Matters:
     margin: float
     before: tuple[float, float, float]
     medians: dict[str, float]
-    ranked: list[Judged]
-    together: Judged | None
+    ranked: list[FactorResult]
+    together: FactorResult | None
     left: list[tuple[str, str]]
 
-    def of(self, *verdicts: str, kinds: Sequence[str] = ()) -> list[Judged]:
-        """Answers of these verdicts, of these kinds or of all."""
+    def of(self, *verdicts: str, kinds: Sequence[str] = ()) -> list[FactorResult]:
+        """Results of these verdicts, of these kinds or of all."""
         return [
             j
             for j in self.ranked
@@ -117,7 +117,7 @@ def folder_of(request: Request, folder: Path) -> Path:
     return folder / "runs" / request.sha256[:16]
 
 
-def judge(
+def rank_factors(
     request: Request,
     factors: Sequence[Factor],
     left: list[tuple[str, str]],
@@ -126,8 +126,8 @@ def judge(
     margin: float,
     folder: Path,
     tell: Callable[[int, int], None] = lambda done, planned: None,
-) -> Matters:
-    """Runs what is missing and judges.
+) -> Sensitivity:
+    """Runs what is missing, and orders the factors by what they change.
 
     A quarter of the seeds comes first, then what is open after it has the second, then the rest.
 
@@ -143,12 +143,12 @@ def judge(
     bench = _Bench(request, folder, tell)
     asked = sum(len(s.changes) for s in factors if s.kind != "together")
     level = 1 - SURE / max(asked, 1) / len(LOOKS)
-    judged: dict[int, Judged] = {}
+    results: dict[int, FactorResult] = {}
     for look, most in enumerate(LOOKS):
         going = [
             k
             for k, s in enumerate(factors)
-            if k not in judged or (judged[k].verdict == UNSURE and s.kind != "together")
+            if k not in results or (results[k].verdict == UNSURE and s.kind != "together")
         ]
         bench.plan(look, [factors[k] for k in going])
         before = bench.runs(request.model_text, look)
@@ -157,16 +157,16 @@ def judge(
                 _outcome(before, bench.runs(change.text, look), change, goal, level=level)
                 for change in factors[k].changes
             ]
-            judged[k] = Judged(factors[k], outcomes, _verdict(outcomes, margin))
-        if most == LOOKS[-1] or not any(judged[k].verdict == UNSURE for k in going):
+            results[k] = FactorResult(factors[k], outcomes, _verdict(outcomes, margin))
+        if most == LOOKS[-1] or not any(results[k].verdict == UNSURE for k in going):
             break
     before = bench.runs(request.model_text, len(LOOKS) - 1)
     hits = reached(before, goal)
     order = (MATTERS, UNSURE, NOTHING)
     ranked = sorted(
-        judged.values(), key=lambda j: (order.index(j.verdict), -abs(j.worst.share.change))
+        results.values(), key=lambda j: (order.index(j.verdict), -abs(j.worst.share.change))
     )
-    return Matters(
+    return Sensitivity(
         request=request,
         goal=goal,
         margin=margin,
