@@ -207,44 +207,70 @@ def beside_larger(finding: Finding, larger: str | None, before: Trial, after: Tr
 
 
 def of_another_form(found: Sequence[Finding], rest: Rest) -> list[Finding]:
-    """Findings, doubtful where their form is wrong.
-
-    So it is where what is left still depends on what they act by; where one makes the robot later
-    and another sooner: a lag below its own and a delay imitate a body that swings; and where a
-    second one of KINDS does what a better one does already; and where losses come at several times,
-    or as large ones at a place and at a moment, or are doubtful beside single moments.
+    """Findings, doubtful where their form is wrong: by the first of FORM_RULES that says so.
 
     Args:
         found: in the order of worth.
         rest: what is left.
     """
-    depends_on = [g for g in rest.depends_on if _much_left_by(rest, g)]
-    late_s = [_lateness_s(f) for f in found]
-    swings = min(late_s, default=0.0) < 0 < max(late_s, default=0.0)
-    losses = _alike_losses(found)
 
     def judged(finding: Finding) -> Finding:
-        if swings and _lateness_s(finding):
-            why = "sooner by one lag and later by another is what a body does that swings"
-            return doubted(finding, why, wrong_form=True, depends_on=CHANGE)
-        if finding in losses and len(losses) > 1:
-            why = "losses at several times may be one that comes and goes"
-            return doubted(finding, why, wrong_form=True, depends_on=TIME)
-        if rest.moments and finding.certainty == "doubtful" and _is_event(finding.effect):
-            why = "single moments are left, of which this may be some"
-            return doubted(finding, why, wrong_form=True)
-        acts_by = _acts_by(finding.effect)
-        on = next((group for group in depends_on if BY.get(group, set()) & acts_by), None)
-        if on is not None:
-            why = f"what is left still depends on {on}, so that it may have another form"
-            return doubted(finding, why, wrong_form=True)
-        for of_kind, _, does, what in KINDS:
-            first, *others = [f for f in found if of_kind(f.effect)] or [None]
-            if finding in others:
-                return doubted(finding, f"{first.effect} {does}, too: both may be one other {what}")
-        return finding
+        doubts = (rule(finding, found, rest) for rule in FORM_RULES)
+        return next((d for d in doubts if d is not None), finding)
 
     return [judged(f) for f in found]
+
+
+def _swings(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
+    """One finding makes the robot later and another sooner.
+
+    A lag below its own and a delay imitate a body that swings.
+    """
+    late_s = [_lateness_s(f) for f in found]
+    if not _lateness_s(finding) or not min(late_s) < 0 < max(late_s):
+        return None
+    why = "sooner by one lag and later by another is what a body does that swings"
+    return doubted(finding, why, wrong_form=True, depends_on=CHANGE)
+
+
+def _comes_and_goes(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
+    """Losses come at several times, or as large ones at a place and at a moment."""
+    losses = _alike_losses(found)
+    if finding not in losses or len(losses) < 2:
+        return None
+    why = "losses at several times may be one that comes and goes"
+    return doubted(finding, why, wrong_form=True, depends_on=TIME)
+
+
+def _is_some_moments(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
+    """A loss at a place or a moment is doubtful already, and single moments are left."""
+    if not rest.moments or finding.certainty != "doubtful" or not _is_event(finding.effect):
+        return None
+    why = "single moments are left, of which this may be some"
+    return doubted(finding, why, wrong_form=True)
+
+
+def _leaves_its_own(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
+    """What is left still depends on what the finding acts by."""
+    acts_by = _acts_by(finding.effect)
+    for group in rest.depends_on:
+        if BY.get(group, set()) & acts_by and _much_left_by(rest, group):
+            why = f"what is left still depends on {group}, so that it may have another form"
+            return doubted(finding, why, wrong_form=True)
+    return None
+
+
+def _is_second(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
+    """A better finding of the same of KINDS does already what this one does."""
+    for of_kind, _, does, what in KINDS:
+        alike = [f for f in found if of_kind(f.effect)]
+        if finding in alike[1:]:
+            first = alike[0].effect
+            return doubted(finding, f"{first} {does}, too: both may be one other {what}")
+    return None
+
+
+FORM_RULES = (_swings, _comes_and_goes, _is_some_moments, _leaves_its_own, _is_second)
 
 
 def _much_left_by(rest: Rest, group: str) -> bool:
