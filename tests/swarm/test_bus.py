@@ -28,7 +28,7 @@ from twinmill.robots.key import load
 
 fleet = Fleet(sys.argv[1], key=load(Path(sys.argv[2])))
 fleet.listen(10, lambda: len(fleet.here()) == 4)
-tell.tell(fleet, tell.make_command(2, "diffusing"), {0, 1, 2, 3}, time.monotonic() + 5)
+tell.tell(fleet, tell.make_command(2, "diffusing"), {0, 1, 2, 3}, until_s=time.monotonic() + 5)
 """
 SETTLE_S = 0.5  # for a logger to subscribe, and to take what is under way
 
