@@ -85,7 +85,7 @@ def _session(log: Path, given: ModelFile, folder: Path) -> Iterator[Ratio]:
     yield single("first robot : all four", first_s, all_s, "s", at_most=0.5)
     for index in session.unjudged:
         session.judge(index)
-    session.heed([])
+    session.exclude_wrong([])
     session.conclude()
     answer_s, previewed = _timed(lambda: session.preview(EFFECT, 0))
     out = folder / "added.toml"

@@ -191,7 +191,7 @@ def test_laboratories_in_mujoco_go_on_where_they_were(tmp_path, monkeypatch):
     monkeypatch.setattr(prediction, "SECONDS", 2.0)
     monkeypatch.setattr(prediction, "CELLS", 2)
     monkeypatch.setattr(prediction, "LABS", 3)
-    request, said = prediction.said_before(tmp_path, prediction.BODIED)
+    request, said = prediction.sealed_prediction(tmp_path, prediction.BODIED)
     told, run_once = [], prediction.run_part
 
     def stops(*words):

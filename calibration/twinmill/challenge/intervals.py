@@ -49,7 +49,7 @@ class Known:
 
 
 def draw_known(number: int, seed: int, duration_s: float) -> Known:
-    """The same numbers give the same drive."""
+    """Draws a drive whose numbers are known; the same arguments give the same drive."""
     random = np.random.default_rng([seed, 4, number])
     robot = replace(draw_robot(0, random), bend=STRAIGHT)  # planar, duties, mecanum
     plain = {h.name: h for h in catalogue_forms(robot, random) if h.kind == "plain"}

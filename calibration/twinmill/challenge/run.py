@@ -23,7 +23,7 @@ ROUNDS = 6  # until a path agrees with forces that depend on the place
 
 @dataclass(frozen=True)
 class Plan:
-    """What a log consists of besides what is hidden.
+    """A drive of a robot, without what is hidden.
 
     Attributes:
         robot: who drives.

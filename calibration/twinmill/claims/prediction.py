@@ -133,7 +133,7 @@ def laboratories_in_mujoco(
     return np.vectorize(OUTCOMES.index)(table["class"].to_pylist()).reshape(LABS, len(cells))
 
 
-def said_before(folder: Path, model: str = MODEL) -> tuple[Request, Forecast]:
+def sealed_prediction(folder: Path, model: str = MODEL) -> tuple[Request, Forecast]:
     """Sweeps and predicts in a folder of its own, by predict-floor's steps."""
     (folder / "m.toml").write_text(model)
     request = make_request("milling", str(folder / "m.toml"), AXES, seeds=40, duration_s=SECONDS)
@@ -145,7 +145,7 @@ def said_before(folder: Path, model: str = MODEL) -> tuple[Request, Forecast]:
 
 def trial(folder: Path) -> Trial:
     """Predicts, and lets all laboratories run."""
-    _, said = said_before(folder)
+    _, said = sealed_prediction(folder)
     return Trial(said, laboratories(said.points))
 
 
@@ -158,7 +158,7 @@ def prediction(_seeds: int) -> Claim:
 def prediction_in_mujoco(folder: Path, tell: Callable[[int, int], None]) -> Claim:
     """The same of laboratories whose robots are bodies in MuJoCo, by a planar model with bodies."""
     with tempfile.TemporaryDirectory(prefix="twinmill.") as swept:
-        request, said = said_before(Path(swept), BODIED)
+        request, said = sealed_prediction(Path(swept), BODIED)
     found = reliability(Trial(said, laboratories_in_mujoco(request, said.points, folder, tell)))
     return replace(found, name="prediction_in_mujoco", title="The same, of robots in MuJoCo")
 

@@ -122,7 +122,7 @@ class Measurements(list[Measurement | SteadyTable]):
         """Name of the log and track of each robot."""
         return [(m.log_name, m.track) for m in self if isinstance(m, Measurement)]
 
-    def heeding(self, findings: Sequence[InputFinding]) -> "Measurements":
+    def excluding_wrong(self, findings: Sequence[InputFinding]) -> "Measurements":
         """These without the robots that more findings say to be wrong.
 
         Raises:
@@ -166,7 +166,7 @@ def load_measurements(
         LogError: nothing could be read that could be judged; why not the first.
     """
     cleaned = clean_measurements(paths, model)
-    return cleaned.heeding(check_driven(cleaned.tracks, model))
+    return cleaned.excluding_wrong(check_driven(cleaned.tracks, model))
 
 
 def clean_measurements(
@@ -198,7 +198,7 @@ def clean_measurements(
     if not (judged or findings):
         raise excluded[0]
     read = Measurements(judged, [f"Left out: {error}" for error in excluded], [])
-    return read.heeding([*findings, *check_recorded(read.tracks, model)])
+    return read.excluding_wrong([*findings, *check_recorded(read.tracks, model)])
 
 
 def _measured(log: Log, robot: RobotLog, runs: int) -> Measurement:

@@ -25,7 +25,7 @@ from twinmill.predict.datasets import total_score
 
 @dataclass(frozen=True)
 class Explanation:
-    """What was done.
+    """A model with the effects that were found, and the diagnosis behind it.
 
     Attributes:
         diagnosis: with its steps on held-out data.

@@ -319,7 +319,7 @@ def in_words(parameters: Sequence[ParameterEstimate]) -> str:
 
 
 def _away(estimate: ParameterEstimate) -> float:
-    """From where nothing happens."""
+    """Distance of a value from neutral."""
     if estimate.name in GAINS:
         return estimate.value - 1
     effect, key = estimate.name.split("#")[0].split(".")[0], estimate.name.split(".")[1]
@@ -333,7 +333,7 @@ def _entry(effect: str, key: str) -> dict:
 
 
 def _least(estimate: ParameterEstimate) -> float:
-    """Less is not worth a word."""
+    """Least distance from neutral that is put into words."""
     return (
         2 * SETTINGS.spread
         if estimate.name in GAINS or estimate.name.startswith("wheel_gain.")
@@ -350,7 +350,7 @@ def _gain_words(gains: dict[str, float]) -> list[str]:
 
 
 def _wheel_words(wheels: dict[str, float]) -> str:
-    """Two wheels of a side that agree are one thing."""
+    """Wheels in words; two of one side that agree are named together."""
     for pair, side in SIDES.items():
         values = [wheels.get(w) for w in pair]
         if set(wheels) == set(pair) and values[0] * values[1] > 0:

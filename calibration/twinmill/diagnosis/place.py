@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether errors come again where the robot comes by again.
+"""Whether errors repeat at the same places.
 
 Errors of way, and of turning, at two moments far apart in time are multiplied with each other if
 the moments are near each other in the room: a quadratic form with a Gaussian kernel over places, as

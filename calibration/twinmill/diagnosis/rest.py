@@ -134,7 +134,7 @@ def rest_of(
     first: ScoreFit,
     known: Mapping[str, float],
 ) -> Rest:
-    """Tests what a fit leaves.
+    """Tests whether the residuals of a fit are noise, and on what they depend.
 
     Args:
         formulas: over the fit's logs, as the final model moves.
@@ -191,7 +191,7 @@ def _verdict(
     news = [d for d in every if d.gain / total > SETTINGS.again * known.get(d.group, 0.0)]
     sure = [d for d in news if d.sure]
     old = tuple(d.group for d in every if d.sure and d not in news)
-    groups = _without_shadows(sure, terms, products)
+    groups = _without_redundant(sure, terms, products)
     if not groups:
         return Rest(0.0, False, [], left_over=left_over, old=old)
     best, coefficient = _best_term(terms, products, groups[0].group)
@@ -230,7 +230,7 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
     return sorted(best.values(), key=lambda d: -d.gain)
 
 
-def _without_shadows(
+def _without_redundant(
     groups: list[Dependence], terms: list[Term], products: "Products"
 ) -> list[Dependence]:
     """Those groups that bring something beside the better ones, or as much as the best."""

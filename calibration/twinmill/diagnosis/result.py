@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a diagnosis tells."""
+"""The result of a diagnosis, for reports and JSON."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass

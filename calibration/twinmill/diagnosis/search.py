@@ -369,7 +369,7 @@ def _matters(before: Trial, trial: Trial, first_excess: float, settings: Setting
 
 
 def _changes_enough_bits(before: Trial, trial: Trial, settings: Settings) -> bool:
-    """A clock that is a few ms wrong, and poses blurred as they are, change some bits as well."""
+    """Whether it changes more detections than clock errors of a few ms and blurred poses do."""
     seen = before.fit.in_view
     least = min(settings.bits, settings.bits_in_view * min(seen, 1 - seen))
     own = [e for e in trial.fit.shared_estimates() if e.name.split(".")[0] in trial.names]
@@ -456,7 +456,7 @@ def _is_neutral(trial: Trial, name: str) -> bool:
 
 
 def candidates(state: State) -> list[str]:
-    """What could be added.
+    """Effects that could be added to the model.
 
     An effect that the model has with numbers that are held can be there once more: they changed.
     """
@@ -717,7 +717,7 @@ def _moments(name: str, state: State) -> list[dict[str, float]]:
 
 
 def _times_s(state: State) -> np.ndarray:
-    """Starts of all windows of all logs."""
+    """Times at which the windows of all logs start, s."""
     return np.concatenate([d.start_s for d in state.datasets if isinstance(d, Trajectory)])
 
 
@@ -759,7 +759,7 @@ def _pairs(before: Trial, screened: list[Screened], settings: Settings) -> list[
     return [p for p in best if worth[p] > settings.evidence][: settings.pairs]
 
 
-# -- what cannot be told apart --------------------------------------------------------------------
+# -- what is indistinguishable --------------------------------------------------------------------
 
 
 def canonical_correlation(a: np.ndarray, b: np.ndarray) -> float:

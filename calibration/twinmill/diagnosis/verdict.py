@@ -14,7 +14,7 @@ from twinmill.fitting.compare import GOOD, MISSING
 
 @dataclass(frozen=True)
 class VerdictInputs:
-    """What the verdict rests on.
+    """Scores, findings and rest that decide the verdict.
 
     Attributes:
         score: of the model as given, as `compare` has it.
@@ -45,7 +45,7 @@ class VerdictInputs:
     @property
     def verdict(self) -> str:
         """One of the verdicts that `Diagnosis.verdict` lists."""
-        if self._maybe:
+        if self._all_doubtful:
             return "model_adequate"
         outweighed = self._noise_outweighs or self._rest_outweighs or self._of_another_form
         if self.effects and not outweighed:
@@ -53,7 +53,7 @@ class VerdictInputs:
             return "ambiguous" if top.group else "effect_missing"
         if self._outside or self.rest.moments or self.effects:
             return "outside_catalogue"
-        if self._left_in_the_dark or self.noises:
+        if self._unexplained or self.noises:
             return "cannot_tell"
         if self._stale and not self.silent and not self._instead:
             return "refit_enough"
@@ -61,7 +61,7 @@ class VerdictInputs:
         return "cannot_tell" if unsure else "model_adequate"
 
     @property
-    def _maybe(self) -> list[Finding]:
+    def _all_doubtful(self) -> list[Finding]:
         """Effects of which none is beyond doubt, where the model as given misses nothing."""
         doubtful = all(f.certainty == "doubtful" for f in self.effects)
         passes = self.score <= GOOD  # as compare says
@@ -99,8 +99,8 @@ class VerdictInputs:
         return depends or self.last > SETTINGS.worse * self.known
 
     @property
-    def _left_in_the_dark(self) -> bool:
-        """More is left than is usual, and nothing tells what it is."""
+    def _unexplained(self) -> bool:
+        """More is left than is usual, and neither an effect nor a formula takes it."""
         return self.last > MISSING * self.known
 
     @property
@@ -136,10 +136,10 @@ class VerdictInputs:
         """The verdict for people."""
         verdict = self.verdict
         if verdict == "model_adequate":
-            maybe = f" {' or '.join(f.effect for f in self._maybe)}" if self._maybe else ""
-            there = f"{maybe} may be there, and is too small to be sure." if maybe else ""
+            maybe = " or ".join(f.effect for f in self._all_doubtful)
+            there = f" {maybe} may be there, and is too small to be sure." if maybe else ""
             return f"Nothing is missing that these logs would show.{there}{self._as_before}"
-        if verdict == "cannot_tell" and self._left_in_the_dark:
+        if verdict == "cannot_tell" and self._unexplained:
             return (
                 f"The model misses by more than the noise (score {self.last:.2f}), and these logs "
                 "do not tell why: no effect and no formula that was tried takes it."

@@ -106,7 +106,7 @@ class Learner:
 def boosted(
     learners: Sequence[Learner], wanted: np.ndarray, independent: float
 ) -> Iterator[tuple[int, float]]:
-    """Those taken, in order: number and ridge.
+    """Number and ridge of each group taken, in order.
 
     Args:
         learners: of the same rows.

@@ -80,7 +80,7 @@ Features = Sequence[np.ndarray]  # (N, f) forward, left, turning
 
 
 def dependences(motion: Motion) -> Iterator[Features]:
-    """Groups of features."""
+    """Groups of features, one of each dependence that is tried."""
     head = _harmonics(motion.heading_rad)
     always = np.hstack([np.ones((len(head), 1)), head])
     turned = np.cumsum(motion.base[:, 2] * motion.step_s)
@@ -153,7 +153,7 @@ def _scaled(motion: Motion, gain: np.ndarray) -> Features:
 
 
 def _crossed(motion: Motion, gain: np.ndarray) -> Features:
-    """What turning makes of driving and driving of turning, times (N, k) gains."""
+    """Turning added to driving and driving to turning, times (N, k) gains."""
     forward, left, turning = _scaled(motion, gain)
     return turning, turning, np.hstack([forward, left])
 
@@ -168,7 +168,7 @@ def _drifts(motion: Motion, gain: np.ndarray) -> Iterator[Features]:
 
 
 def _curves(motion: Motion) -> Iterator[Features]:
-    """Over the own speed, and over that of the other motion."""
+    """Each velocity bent over its own speed, and scaled over the speed of the other motion."""
     base = motion.base
     yield tuple(_levels(np.abs(own)) * np.sign(own)[:, None] for own in base.T)
     spin, speed = _levels(np.abs(base[:, 2])), _levels(motion.speed_mps)
@@ -222,7 +222,7 @@ def _count(along: np.ndarray, shortest: float, most: int) -> int:
 
 
 def _waves(along: np.ndarray, shortest: float) -> Iterator[np.ndarray]:
-    """(N, 4) two neighbours of a row of waves, so that one between them is met."""
+    """(N, 4) two neighbouring frequencies at a time, so that one between them is matched."""
     angle = np.pi * along / max(1.1 * np.ptp(along), 1e-9)
     for k in range(2, 2 * _count(along, shortest, MOST_WAVES)):
         yield np.hstack([_harmonics(k * angle)[:, :2], _harmonics((k + 1) * angle)[:, :2]])
@@ -234,6 +234,6 @@ def _levels(size: np.ndarray) -> np.ndarray:
 
 
 def _hats(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
-    """(N, count) pieces of a line that is broken at even nodes."""
+    """(N, count) weights of linear interpolation between even nodes."""
     nodes = np.linspace(low, max(high, low + 1e-9), count)
     return np.stack([np.interp(values, nodes, one) for one in np.eye(count)], axis=-1)

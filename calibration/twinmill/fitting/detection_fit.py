@@ -67,8 +67,8 @@ class DetectionFit:
 
     def fit(self) -> "DetectionFit":
         """Maximises the likelihood of all frames and of each half; the models have the former."""
-        self.x = self._climb(self.x)
-        self._halves = [self._climb(self.x, 1 - half) for half in (0, 1)]
+        self.x = self._maximised(self.x)
+        self._halves = [self._maximised(self.x, 1 - half) for half in (0, 1)]
         self._put(self.x)
         return self
 
@@ -90,8 +90,8 @@ class DetectionFit:
                 if p.name not in stated:
                     model.set(p.name, float(np.clip(value, p.min, p.max)))
 
-    def _climb(self, begin: np.ndarray, half: int | None = None) -> np.ndarray:
-        """Values near `begin` with the greatest likelihood (Powell 1964: edges have no slope)."""
+    def _maximised(self, begin: np.ndarray, half: int | None = None) -> np.ndarray:
+        """Values near `begin` with the greatest likelihood, without derivatives (Powell 1964)."""
         if not len(begin):
             return begin
         unit = np.array([abs(p.strength) for p in self.shared])

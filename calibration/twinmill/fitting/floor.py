@@ -59,7 +59,7 @@ class NoiseFloor:
 
 
 def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> NoiseFloor:
-    """Finds the floor.
+    """Finds the noise floor of one robot in one log.
 
     Args:
         data: windows.

@@ -77,10 +77,10 @@ class Response:
     ) -> None:
         self.data, self.offset_s = data, offset_s
         self.lag_s = max(SHORTEST_LAG_S, lag_s)
-        self._lay_points()
+        self._choose_points()
         self.base_mps = base_mps[self.points]
         self.features, self.groups = self._features(self.base_mps)
-        self._lay_windows()
+        self._index_windows()
         self._fit(rms(data.measured), [None, None])
         self._fit(self.errors, self.ridges)
         self.unboosted = self.across
@@ -96,7 +96,7 @@ class Response:
 
     # -- where features are taken ---------------------------------------------------------------
 
-    def _lay_points(self) -> None:
+    def _choose_points(self) -> None:
         """Poses at windows' ends and some between: points, steps to each from the one before."""
         track, windows = self.data.measurement.track, self.data.windows
         wanted = [windows.starts, windows.ends[windows.ends >= 0]]
@@ -249,7 +249,7 @@ class Response:
 
     # -- windows --------------------------------------------------------------------------------
 
-    def _lay_windows(self) -> None:
+    def _index_windows(self) -> None:
         """Blocks and parts of windows, and the features' rows."""
         data = self.data
         start_s = data.start_s - data.start_s[0]
@@ -264,7 +264,7 @@ class Response:
         self.rows = self._rows(self.features)
 
     def _rows(self, features: Sequence[np.ndarray], every: int = 1) -> list[Rows]:
-        """Of every so manyth horizon."""
+        """Of every Nth horizon."""
         data = self.data
         c, s = np.cos(self.heading_rad) * self.step_s, np.sin(self.heading_rad) * self.step_s
         forward, left, turn = features

@@ -419,7 +419,7 @@ class ScoreFit:
         than the curvature of the cost: their model is not whole yet, and of its base they hold what
         other logs told. Nor are those to tables, whose inputs are few.
         """
-        told = self._scatter + self._pulled
+        told = self._scatter_covariance + self._prior_covariance
         if not self.by_channel and all(isinstance(d, Trajectory) for d in self.datasets):
             return told
         return _no_less(told, np.linalg.pinv(self._curvature))
@@ -430,13 +430,13 @@ class ScoreFit:
         return self._normal(*self.state, self.x)[0]
 
     @cached_property
-    def _pulled(self) -> np.ndarray:
-        """(P, P) covariance of what a prior of precision D pulls, G^-1 D G^-1 with curvature G."""
+    def _prior_covariance(self) -> np.ndarray:
+        """(P, P) covariance due to a prior of precision D: G^-1 D G^-1 with curvature G."""
         pull = np.linalg.pinv(self._curvature) / self.std
         return pull @ pull.T
 
     @cached_property
-    def _scatter(self) -> np.ndarray:
+    def _scatter_covariance(self) -> np.ndarray:
         """(P, P) covariance of what the data scatter: the jackknife over blocks.
 
         Of a log the mean over two divisions into blocks, half a block apart, which scatters less
@@ -476,7 +476,7 @@ class ScoreFit:
     def _intervals(self) -> np.ndarray:
         """(P, P) the same, its scatter widened by Student's t for so few blocks."""
         widening = student.ppf(0.975, max(self.blocks - 1, 1)) / NORMAL_95
-        return self.covariance + (widening**2 - 1) * self._scatter
+        return self.covariance + (widening**2 - 1) * self._scatter_covariance
 
     @property
     def stds(self) -> np.ndarray:
@@ -558,7 +558,7 @@ def _divisions(data: ErrorDataset) -> list[np.ndarray]:
 
 
 def _no_less(wide: np.ndarray, least: np.ndarray) -> np.ndarray:
-    """(P, P) a covariance, raised in each direction in which another one is wider."""
+    """(P, P) a covariance `wide`, raised to `least` in each direction in which that is wider."""
     scale = np.sqrt(np.diag(least))
     over = np.outer(scale, scale)
     ratio, ways = eigh(wide / over, least / over)

@@ -24,7 +24,7 @@ class Numbers:
 
 @dataclass(frozen=True)
 class FloorSettings(Numbers):
-    """What each number means stands beside it."""
+    """Numbers of the noise floor, in the order in which it is found."""
 
     fewest_windows: int = number(40, "windows below which a log has no floor: 10 s")
     fewest_long: int = number(20, "the same of windows that have the longest horizon")

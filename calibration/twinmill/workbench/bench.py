@@ -83,25 +83,25 @@ class Bench:
             if not self._reading:
                 self._reading = True
                 self.worker.start(self.session.work("read"))
-            self._heed()
+            self._exclude_wrong()
         self._show_worst()
         self.opening = "checking the commands against the motion"
         self.changed("work")
         await self._read.wait()
-        self._heed()
+        self._exclude_wrong()
         await asyncio.to_thread(self.session.conclude)
         self.opening = ""
         self.changed("work", "model", "score", "prediction")
         await self._look_ahead()
 
-    def _heed(self) -> None:
+    def _exclude_wrong(self) -> None:
         """Leaves out the robots whose commands the worker found to be wrong, once it told."""
         if self._checks is None or self.session.checked:
             return
         if self._checks.failure:
             raise LogError(self._checks.failure)
         picked = self.session.measurements[self.picked]
-        self.session.heed(self._checks.result["findings"])
+        self.session.exclude_wrong(self._checks.result["findings"])
         places = [k for k, m in enumerate(self.session.measurements) if m is picked]
         if "robot" in self.view:
             self.view["robot"] = places[0] if places else 0

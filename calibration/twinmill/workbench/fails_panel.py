@@ -7,7 +7,7 @@ from nicegui import events, ui
 
 from twinmill.fitting.compare import GOOD, MISSING
 from twinmill.predict.regimes import Regime
-from twinmill.workbench.panel import Hands, scored
+from twinmill.workbench.panel import PageActions, scored
 
 ROW_PX = 21
 TONES = ("#009e73", "#e69f00", "#d55e00")  # good, warn, bad
@@ -18,7 +18,7 @@ BEFORE_S = 0.5  # the worst moment is shown from so long before it
 class FailsPanel:
     """Error over noise floor by what the picked robot was doing."""
 
-    def __init__(self, page: Hands) -> None:
+    def __init__(self, page: PageActions) -> None:
         self.page, self.bench = page, page.bench
         self._regimes: list[Regime] = []
         ui.label(

@@ -4,13 +4,13 @@
 from nicegui import events, ui
 
 from twinmill.workbench.knobs import Knob
-from twinmill.workbench.panel import Hands
+from twinmill.workbench.panel import PageActions
 
 
 class KnobsPanel:
     """Draws the knobs of the model where the tree stands."""
 
-    def __init__(self, page: Hands) -> None:
+    def __init__(self, page: PageActions) -> None:
         self.page, self.bench = page, page.bench
         self._rows: dict[str, _Row] = {}
         with ui.element("div").classes("buttons"):

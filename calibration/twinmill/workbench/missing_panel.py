@@ -9,7 +9,7 @@ from twinmill.diagnosis.search import REFIT
 from twinmill.fitting.add import OWN_GAINS
 from twinmill.model.parameters import catalogue
 from twinmill.workbench.bench import moves
-from twinmill.workbench.panel import Hands, estimate, scored, tone
+from twinmill.workbench.panel import PageActions, estimate, scored, tone
 from twinmill.workbench.session import beside_label, effect_of
 from twinmill.workbench.typeset import typeset
 
@@ -19,7 +19,7 @@ OTHERS = 8  # effects of the ranking that are shown beside the findings
 class MissingPanel:
     """Draws the last diagnosis."""
 
-    def __init__(self, page: Hands) -> None:
+    def __init__(self, page: PageActions) -> None:
         self.page, self.bench = page, page.bench
         self._adding: list[ui.button] = []
         self._trying: dict[str, list[ui.button]] = {}  # by the words of what is drawn beside

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from nicegui import ui
 
-from twinmill.workbench.panel import Hands, check_free, scored, tone
+from twinmill.workbench.panel import PageActions, check_free, scored, tone
 from twinmill.workbench.tree import Tried
 
 INDENT_PX = 14
@@ -15,7 +15,7 @@ INDENT_PX = 14
 class ModelsPanel:
     """Draws the tree."""
 
-    def __init__(self, page: Hands) -> None:
+    def __init__(self, page: PageActions) -> None:
         self.page, self.bench = page, page.bench
         self.body = ui.element("div").classes("stack").props('data-testid="models"')
         with ui.element("div").classes("buttons"):

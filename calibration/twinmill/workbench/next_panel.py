@@ -8,7 +8,7 @@ from nicegui import ui
 
 from twinmill.experiment.power import percent
 from twinmill.files import replacing
-from twinmill.workbench.panel import Hands, check_free
+from twinmill.workbench.panel import PageActions, check_free
 
 FLOOR_PX = 300  # the longer side of the floor, as drawn
 
@@ -16,7 +16,7 @@ FLOOR_PX = 300  # the longer side of the floor, as drawn
 class NextPanel:
     """Asks for time and floor, draws the run."""
 
-    def __init__(self, page: Hands) -> None:
+    def __init__(self, page: PageActions) -> None:
         self.page, self.bench = page, page.bench
         ui.label(
             "The run that best tells apart what these logs leave open, as the command twinmill "

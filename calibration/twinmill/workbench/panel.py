@@ -10,8 +10,8 @@ from twinmill.report.tables import rounded
 from twinmill.workbench.bench import Bench
 
 
-class Hands(Protocol):
-    """The page.
+class PageActions(Protocol):
+    """What a panel may ask of the page that shows it.
 
     Attributes:
         bench: what all pages show.

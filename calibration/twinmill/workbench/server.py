@@ -59,7 +59,7 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
     url = f"http://{HOST}:{port}/?token={bench.state.token}"
     app.add_middleware(Guard, token=bench.state.token, port=port)
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
-    logging.getLogger("uvicorn.error").addFilter(_is_no_farewell)
+    logging.getLogger("uvicorn.error").addFilter(_is_worth_reporting)
     app.add_static_files("/look", STATIC, max_cache_age=0)
     app.add_static_files("/charts", CHARTS, max_cache_age=0)
     _add_data(bench)
@@ -201,7 +201,7 @@ def _refused() -> Response:
     return PlainTextResponse(REFUSED, status_code=403)
 
 
-def _is_no_farewell(record: logging.LogRecord) -> bool:
+def _is_worth_reporting(record: logging.LogRecord) -> bool:
     """False of what Starlette reports when a page is left before it is whole."""
     error = record.exc_info[1] if record.exc_info else None
     return str(error) != "No response returned."

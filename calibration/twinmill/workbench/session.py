@@ -3,7 +3,7 @@
 
 Opened in stages, each slower than the one before: `read` gives the paths, `measure` what can be
 predicted, `judge` the floor and the clock of one robot at a time. The checks of the commands take
-longest: they are made elsewhere, and `heed` takes in what they found.
+longest: they are made elsewhere, and `exclude_wrong` takes in what they found.
 """
 
 import hashlib
@@ -98,7 +98,7 @@ class Session:
 
     Attributes:
         robots: views of the robots that were judged, by place in `measurements`.
-        checked: the commands were held against the motion, and `heed` was told.
+        checked: the commands were held against the motion, and `exclude_wrong` was told.
         held: names that a fit leaves alone.
         diagnosis: as `diagnose --json` gives it, and of which model; None before.
         plan: the next run, as the worker told it, or None.
@@ -165,14 +165,16 @@ class Session:
         (opened,) = open_measurements([self.measurements[index]], self.given)
         self.robots = {**self.robots, index: OpenedView(opened)}
 
-    def heed(self, findings: Sequence[InputFinding]) -> None:
+    def exclude_wrong(self, findings: Sequence[InputFinding]) -> None:
         """Leaves out the robots that the checks of the commands found to be wrong.
 
         Raises:
             BadInputError: none is left.
         """
         before, self.checked = self.measurements, True
-        self.measurements = before.heeding([f for f in findings if f not in before.findings])
+        self.measurements = before.excluding_wrong(
+            [f for f in findings if f not in before.findings]
+        )
         places = {id(m): k for k, m in enumerate(self.measurements)}
         kept = {k: places[id(m)] for k, m in enumerate(before) if id(m) in places}
         self.robots = {kept[k]: view for k, view in self.robots.items() if k in kept}
@@ -335,7 +337,7 @@ class Session:
         return [*base, *all_effect_parameters(model)]
 
     def set(self, name: str, value: float) -> None:
-        """Both at once."""
+        """Drags a quantity to a value and keeps it."""
         self.drag(name, value)
         self.keep()
 

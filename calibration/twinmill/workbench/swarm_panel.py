@@ -6,7 +6,7 @@ import html
 from nicegui import ui
 
 from twinmill.swarm.classes import COLORS
-from twinmill.workbench.panel import Hands, scored
+from twinmill.workbench.panel import PageActions, scored
 from twinmill.workbench.swarm import STARTS, has_poses
 
 AXIS = {
@@ -28,7 +28,7 @@ KEPT = "Run the twin once more to see the swarms from above; their numbers were 
 class SwarmPanel:
     """Runs the twin and shows what its swarms do."""
 
-    def __init__(self, page: Hands) -> None:
+    def __init__(self, page: PageActions) -> None:
         self.page, self.bench = page, page.bench
         asked = self.bench.view.get("swarm", {})
         ui.label("What a swarm would do: the same starts with both models.").classes("soft")

@@ -28,7 +28,7 @@ def opened(brief_coasting_robot, tmp_path_factory):
     session.read()
     session.measure()
     session.judge(0)
-    session.heed([])
+    session.exclude_wrong([])
     session.conclude()
     yield session
     os.chdir(before)
@@ -157,13 +157,17 @@ def test_a_robot_that_the_checks_find_wrong_is_left_out_of_the_scores(session, c
     two.measure()
     two.judge(1)
     number = two.measurements[0].track.robot_id
-    two.heed([InputFinding("exchanged", "by 9 %", "mend it", True, "wrong.lcmlog", number)])
+    two.exclude_wrong(
+        [InputFinding("exchanged", "by 9 %", "mend it", True, "wrong.lcmlog", number)]
+    )
     two.conclude()
     assert [m.log_name for m in two.measurements] == ["run.lcmlog"]
     assert two.notes == [f"Left out: wrong.lcmlog R{number:02d}: exchanged: by 9 %; mend it."]
     assert two.tree.scores[0].fitted == pytest.approx(compared.score, rel=1e-9)
     with pytest.raises(LogError, match="exchanged"):
-        two.heed([InputFinding("exchanged", "by 9 %", "mend it", True, "run.lcmlog", number)])
+        two.exclude_wrong(
+            [InputFinding("exchanged", "by 9 %", "mend it", True, "run.lcmlog", number)]
+        )
 
 
 def test_a_log_that_is_not_there_is_one_sentence(session):

@@ -24,8 +24,8 @@ FEWEST = 0.2  # share of the poses
 
 
 @dataclass(frozen=True)
-class _Told:
-    """What the commands ask for.
+class _CommandedMotion:
+    """Motion that the commands ask for.
 
     Attributes:
         axes: beginning and end in s, and the complex unit along which the body is to move; 0 for
@@ -77,7 +77,7 @@ def with_path_heading(poses: PoseSeries, commands: CommandSeries) -> PoseSeries:
     )
 
 
-def _told(commands: CommandSeries, last_s: float, who: str) -> _Told:
+def _told(commands: CommandSeries, last_s: float, who: str) -> _CommandedMotion:
     """By the commands, each held until the next."""
     value = commands.value
     if commands.kind == "twist":
@@ -102,7 +102,7 @@ def _told(commands: CommandSeries, last_s: float, who: str) -> _Told:
     end_s = np.append(begin_s[1:], max(last_s, begin_s[-1]) + BEFORE_S)
     first = np.flatnonzero(np.append(True, np.diff(axis) != 0))
     last = np.append(first[1:], len(axis)) - 1
-    return _Told(
+    return _CommandedMotion(
         list(zip(begin_s[first], end_s[last], axis[first], strict=True)),
         np.column_stack([begin_s, end_s])[turns],
     )
@@ -119,7 +119,7 @@ def _way_mps(t_s: np.ndarray, poses: PoseSeries) -> np.ndarray:
 
 
 def _fill_straights(
-    t_s: np.ndarray, heading_rad: np.ndarray, stretches: list[np.ndarray], told: _Told
+    t_s: np.ndarray, heading_rad: np.ndarray, stretches: list[np.ndarray], told: _CommandedMotion
 ) -> None:
     """Puts the heading into gaps in which the robot was not told to turn."""
     for before, after in zip([None, *stretches], [*stretches, None], strict=True):

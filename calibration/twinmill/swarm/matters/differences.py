@@ -34,7 +34,7 @@ class Difference:
 
 
 def share_difference(before: np.ndarray, after: np.ndarray, level: float = 0.95) -> Difference:
-    """Of two shares over the same seeds.
+    """Difference of two shares over the same seeds.
 
     The interval is that of Newcombe 1998 (Statistics in Medicine 17:2635, method 10): Wilson's
     intervals of both shares, joined by how the pairs go together.
