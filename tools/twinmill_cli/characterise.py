@@ -243,7 +243,6 @@ class Run:
         script: str,
         end_s: float | None,
         countdown_s: float,
-        *,
         pressed: Callable[[], bool],
     ) -> str:
         """Plays the script and stops the robot, whatever happens.
