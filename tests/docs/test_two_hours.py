@@ -45,22 +45,28 @@ def test_what_takes_seconds_runs(tmp_path):
     compile((tmp_path / "drive.py").read_text(), "drive.py", "exec")
 
 
-@pytest.mark.parametrize("kind", ["mecanum", "differential"])
-def test_the_table_says_where_one_wheel_alone_takes_the_robot(kind):
-    """By the least squares of rolling without slip."""
+def body_velocity(kind, driven):
+    """Of a robot whose driven wheels roll forward at 1 rad/s: the least squares without slip."""
     text = (
         f'name = "m"\n[base]\ndrive = "wheel_speed"\nwheels = "{kind}"\ncontrol_period_s = 0.02\n'
     )
     model = native.Model.from_toml(text, "m")
-    rows = re.findall(
-        r"^\| (front|rear) (left|right) \| ([^|]*) \| ([^|]*) \|$", PAGE, re.MULTILINE
-    )
+    return model.body_velocity([float(driven(wheel["words"])) for wheel in model.wheels()])
+
+
+def test_the_table_says_where_one_mecanum_wheel_alone_takes_the_robot():
+    rows = re.findall(r"^\| (front|rear) (left|right) \| ([^|]*) \|$", PAGE, re.MULTILINE)
     assert len(rows) == 4
-    names = [wheel["words"] for wheel in model.wheels()]
-    for end, side, mecanum, differential in rows:
-        (k,) = (k for k, words in enumerate(names) if words.startswith(f"{end} {side}"))
-        vx, vy, omega = model.body_velocity([float(i == k) for i in range(4)])
-        said = mecanum if kind == "mecanum" else differential
+    for end, side, said in rows:
+        vx, vy, omega = body_velocity("mecanum", lambda w, at=f"{end} {side}": w.startswith(at))
         assert vx > 0 and said.startswith("forward")
         assert ("to the left" in said, "to the right" in said) == (vy > 1e-9, vy < -1e-9)
         assert ("turns left" in said, "turns right" in said) == (omega > 0, omega < 0)
+
+
+def test_the_page_says_how_a_side_of_plain_wheels_alone_turns_the_robot():
+    sides = re.findall(r"(left|right) alone turns (left|right)", PAGE)
+    assert len(sides) == 2
+    for side, said in sides:
+        _, _, omega = body_velocity("differential", lambda w, side=side: f" {side} " in w)
+        assert said == ("left" if omega > 0 else "right")
