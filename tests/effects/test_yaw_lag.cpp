@@ -71,6 +71,18 @@ TEST(YawLag, SplitsTheLagThatAllOthersLeave)
     }
 }
 
+// The difference that a second log tells of stands beside the first log's number.
+TEST(YawLag, AddsToTheOneThatTheModelHas)
+{
+    const Model twice = With("yaw_lag", {0.06}, With("yaw_lag", {-0.05}, Lagging(kLag_s)));
+    for (const double dt_s : {0.004, 0.022, 0.1})
+    {
+        Player player(twice, dt_s);
+        player.Play(kTurnLeft, dt_s);
+        EXPECT_NEAR(player.state.rim_mps[1], kFull_mps * (1 - std::exp(-dt_s / 0.09)), 1e-12);
+    }
+}
+
 // Two lags in a row, a and b, answer a step by 1 - (a exp(-t/a) - b exp(-t/b)) / (a - b).
 TEST(YawLag, ComesBehindAFilterBeforeTheMotors)
 {

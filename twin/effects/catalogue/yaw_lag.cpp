@@ -36,11 +36,14 @@ double Decay(double dt_s, double tau_s)
 }
 
 // Sets targets at which wheels with their own time constant end the step where the part of their
-// speeds that turns the body ends with the other.
+// speeds that turns the body ends with the other. A second one adds to the first: the targets have
+// that one's part already.
 void Step(WheelSignals &s, const Numbers &v, double *)
 {
     if (v[0] == 0)
         return;
+    const double before_s = s.turn_extra_s;
+    s.turn_extra_s += v[0];
     double turn_mps = 0, wanted_mps = 0;  // along s.robot.spin
     for (int k = 0; k < s.robot.wheels; ++k)
     {
@@ -51,9 +54,10 @@ void Step(WheelSignals &s, const Numbers &v, double *)
     }
     for (int k = 0; k < s.robot.wheels; ++k)
     {
-        const double own = Decay(s.dt_s, s.tau_s[k]), other = Decay(s.dt_s, s.tau_s[k] + v[0]);
+        const double before = Decay(s.dt_s, s.tau_s[k] + before_s);
+        const double after = Decay(s.dt_s, s.tau_s[k] + s.turn_extra_s);
         const double gap_mps = s.robot.spin[k] * (turn_mps - wanted_mps);
-        s.target_mps[k] += gap_mps * (other - own) / (1 - own);
+        s.target_mps[k] += gap_mps * (after - before) / (1 - before);
     }
 }
 
