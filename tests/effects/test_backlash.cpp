@@ -37,6 +37,16 @@ TEST(Backlash, StandsWithinThePlay)
     EXPECT_NEAR(player.state.wheel_rad[0], 0.9 * kGap_rad, 0.02 * kGap_rad);
 }
 
+// Gears in a row: the second play opens when the first one is taken up.
+TEST(Backlash, AddsToTheOneThatTheModelHas)
+{
+    Player player(With("backlash", {0.1}, With("backlash", {kGap_rad})), 0.01);
+    player.Play(kForward, 1);
+    EXPECT_NEAR(player.state.pose.x_m, kFull_mps - (0.1 + kGap_rad) * kRadius_m, 1e-12);
+    player.Play(kBack, 1);
+    EXPECT_NEAR(player.state.pose.x_m, 0, 1e-12);
+}
+
 // A turn on the spot drives two wheels back: their play is open already.
 TEST(Backlash, IsEachWheelsOwn)
 {
