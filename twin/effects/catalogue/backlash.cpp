@@ -35,16 +35,15 @@ int StateSize(const Numbers &v)
     return v[0] > 0 ? kMaxWheels : 0;
 }
 
-// The part of the step's turn that takes up play moves nothing. What a play before this one takes up
-// does not reach it: two add.
+// The part of the step's turn that takes up play moves nothing. What a play before this one takes
+// up does not reach it: two add.
 void Roll(RollSignals &s, const Numbers &v, double *play_rad)
 {
     if (v[0] <= 0)
         return;
     for (int k = 0; k < s.robot.wheels; ++k)
     {
-        const double turn_rad =
-            s.mean_mps[k] * s.radius_ratio[k] * s.dt_s / s.robot.wheel_radius_m;
+        const double turn_rad = s.mean_mps[k] * s.radius_ratio[k] * s.dt_s / s.robot.wheel_radius_m;
         if (turn_rad == 0)
             continue;
         const double before_rad = play_rad[k];
