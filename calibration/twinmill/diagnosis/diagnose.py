@@ -103,7 +103,7 @@ def diagnose(
     if not off:
         progress("looking for robots that differ")
         off = outliers(known, done, progress)
-        if off and done.found:
+        if off:
             known = _without(known, off)
             progress("looking again without them")
             first = first_state(known, model_file, {*excluded, *unseen})

@@ -128,5 +128,5 @@ def _own_values(diagnosis: Diagnosis, fit: ScoreFit) -> dict[int, list[Parameter
         if gains:
             values.setdefault(data.robot_id, {}).update(gains)
     for robot in diagnosis.robots_off:
-        values[robot.robot_id] = {e.name: e for e in robot.parameters}
+        values[robot.robot_id] = {e.name: e for e in [*robot.gains, *robot.parameters]}
     return {robot_id: list(own.values()) for robot_id, own in values.items()}

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots that differ from the others of their kind, how, and what difference would have shown.
 
-The common model is held. On each robot alone its own gains and every effect of the catalogue are
-tried. What a robot would take sets it apart if it is far from what each of the others would take:
-far over its own uncertainty and over the spread of the others, all parameters of an effect together
-(Mahalanobis 1936).
+The common model is held. On each robot alone its own gains are tried, and, beside gains of its own
+within the spread of a kind, every effect of the catalogue. What a robot would take sets it apart if
+it is far from what each of the others would take: far over its own uncertainty and over the spread
+of the others, all parameters of an effect together (Mahalanobis 1936).
 """
 
 from collections.abc import Callable, Sequence
@@ -27,6 +27,7 @@ from twinmill.predict.datasets import total_score
 
 FEWEST = 3  # robots, below which none can be called the odd one
 TRIED = 3
+WHEELS = "wheel_gain"
 SIDES = {
     ("fl", "rl"): "left wheels",
     ("fr", "rr"): "right wheels",
@@ -98,9 +99,16 @@ def sentence(off: Outlier) -> str:
 
 @dataclass(frozen=True)
 class _Alone:
-    """One robot alone: the common model held, its clock free, and its trials by name."""
+    """One robot alone: the common model held, its clock free.
+
+    Attributes:
+        as_all: without gains of its own.
+        before: with gains of its own, as far as robots of a kind differ.
+        trials: by name; effects beside such gains.
+    """
 
     robot_id: int
+    as_all: Trial
     before: Trial
     trials: dict[str, Trial]
 
@@ -159,23 +167,29 @@ def _each_alone(
     opened: Sequence[Opened], state: State, progress: Callable[[str], None]
 ) -> list[_Alone]:
     """Each robot with what may set some robot apart tried on it."""
-    states = {i: _alone_state(opened, state, i) for i in _ids(opened)}
-    names = _suspects(states, progress)
-    alone = []
-    for i, own in states.items():
+    before = {}
+    for i in _ids(opened):
         progress(f"robot {i} alone")
-        before = fitted(own)
-        alone.append(_Alone(i, before, {n: _cross_validate(before, n) for n in names}))
+        before[i] = fitted(_alone_state(opened, state, i, gains=True))
+    names = _suspects(before, progress)
+    alone = []
+    for i, own in before.items():
+        progress(f"robot {i} alone")
+        as_all = fitted(_alone_state(opened, state, i))
+        trials = {n: cross_validate(own, (n,)) for n in names}
+        alone.append(_Alone(i, as_all, own, {"gains": _with_gains(as_all), **trials}))
     return alone
 
 
-def _alone_state(opened: Sequence[Opened], state: State, robot_id: int) -> State:
-    """One robot's data with the state's model; of its own only the clock is free."""
+def _alone_state(
+    opened: Sequence[Opened], state: State, robot_id: int, gains: bool = False
+) -> State:
+    """One robot's data with the state's model; free are its clock and, if asked, its gains."""
     own = [i for i, o in enumerate(opened) if o.floor and o.measurement.track.robot_id == robot_id]
     data, models = [], []
     for i in own:
-        clock = tuple(p for p in opened[i].data.own if p.name not in GAINS)
-        data.append(replace(opened[i].data, own=clock))
+        free = tuple(p for p in opened[i].data.own if gains or p.name not in GAINS)
+        data.append(replace(opened[i].data, own=free))
         model = state.models[i].copy()
         for name in GAINS:
             model.set(name, 1.0)
@@ -183,12 +197,15 @@ def _alone_state(opened: Sequence[Opened], state: State, robot_id: int) -> State
     return State(data, models, (), (), state.excluded)
 
 
-def _suspects(states: dict[int, State], progress: Callable[[str], None]) -> list[str]:
-    """What some robot would take beyond doubt, by the linear screening: few, the surest first."""
+def _suspects(before: dict[int, Trial], progress: Callable[[str], None]) -> list[str]:
+    """What some robot would take beyond doubt, by the linear screening: few, the surest first.
+
+    A weak wheel is the most frequent fault, and is always tried.
+    """
     worth: dict[str, list[float]] = {}
-    for robot_id, state in states.items():
+    for robot_id, trial in before.items():
         progress(f"screening robot {robot_id}")
-        for s in screen(fitted(state)):
+        for s in screen(trial):
             worth.setdefault(s.name, []).append(s.gain)
     # What all robots would take alike is no difference.
     apart = {n: max(g) - np.median(g) for n, g in worth.items()}
@@ -196,23 +213,40 @@ def _suspects(states: dict[int, State], progress: Callable[[str], None]) -> list
         (n for n in apart if apart[n] > SETTINGS.odd_evidence / 2 and n != REFIT),
         key=lambda n: -apart[n],
     )
-    return ["gains", *best[:TRIED]]
+    wheels = [WHEELS] if WHEELS in apart else []
+    return [*wheels, *[n for n in best if n != WHEELS][:TRIED]]
 
 
-def _cross_validate(before: Trial, name: str) -> Trial:
-    if name != "gains":
-        return cross_validate(before, (name,))
-    free = wide_gains(before.state.model)
-    state = replace(before.state, free=free)
+def _with_gains(as_all: Trial) -> Trial:
+    """Gains of its own, however large."""
+    free = wide_gains(as_all.state.model)
+    state = replace(as_all.state, free=free)
     fit = ScoreFit(state.datasets, state.models, free, state.by_channel).fit()
-    evidence = before.fit.held_cost - fit.held_cost
+    evidence = as_all.fit.held_cost - fit.held_cost
     return Trial(("gains",), fit, replace(state, models=fit.models), evidence, evidence, 0.0)
 
 
 def _values(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
-    """(k,) values and (k, k) covariance of what a trial added."""
+    """(k,) values and (k, k) covariance of what a trial added.
+
+    Wheels have all that they lack: what they have in common may have gone into the robot's gains.
+    """
     count = len(trial.state.free)
-    return trial.fit.x[:count], trial.fit.covariance[:count, :count]
+    total = np.eye(count, len(trial.fit.x))
+    speed = [c for c, u in enumerate(trial.fit.unknowns) if u.parameter.name == GAINS[0]]
+    if trial.names == (WHEELS,) and speed:
+        total[:, speed] = 1 / len(speed)
+    values = total @ trial.fit.x - total[:, count:].sum(axis=1)
+    return values, total @ trial.fit.covariance @ total.T
+
+
+def _apart(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+    """The same for comparing robots: of wheels how they differ, since speed is the robots' own."""
+    values, spread = _values(trial)
+    if trial.names != (WHEELS,):
+        return values, spread
+    centred = np.eye(len(values)) - 1 / len(values)
+    return centred @ values, centred @ spread @ centred
 
 
 def _judged(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
@@ -227,10 +261,10 @@ def _judged(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
             best, best_name, best_p = trial, name, p_value
     if best is None:
         return _unexplained(own, alone)
-    parameters = best.fit.shared_estimates()
+    parameters = _estimates(best)
     after = best.held_score
-    before = own.before.held_score
-    others = total_score([a.before.held_score for a in alone if a is not own])
+    before = own.as_all.held_score
+    others = total_score([a.as_all.held_score for a in alone if a is not own])
     effect = best_name if best_name != "gains" else " + ".join(e.name for e in parameters)
     return Outlier(
         robot_id=own.robot_id,
@@ -243,24 +277,55 @@ def _judged(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
         why=f"its errors are {before:.2f} times the floor with the model of all, those of the "
         f"others {others:.2f}; with {effect} of its own {after:.2f}",
         smallest_shown=_smallest(own),
-        gains=parameters if best_name == "gains" else [],
-        models=best.fit.models,
+        gains=parameters if best_name == "gains" else _own_gains(best),
+        models=_models(best, parameters),
     )
+
+
+def _own_gains(trial: Trial) -> list[ParameterEstimate]:
+    """Gains beside which an effect was told; none beside wheels, which have them in theirs."""
+    own = trial.fit.own_estimates(0) if trial.names != (WHEELS,) else {}
+    return [own[name] for name in GAINS if name in own]
+
+
+def _models(trial: Trial, parameters: Sequence[ParameterEstimate]) -> list[native.Model]:
+    """Of each log, with these values; the gains that wheels were told beside are in theirs."""
+    if trial.names != (WHEELS,):
+        return trial.fit.models
+    models = [m.copy() for m in trial.fit.models]
+    for model in models:
+        for name, value in [(g, 1.0) for g in GAINS] + [(e.name, e.value) for e in parameters]:
+            model.set(name, value)
+    return models
 
 
 def _p_value(own: _Alone, name: str, alone: Sequence[_Alone]) -> float:
     """Chance that a robot like the others is so far from them, for all robots and trials."""
-    mine, spread = _values(own.trials[name])
-    theirs = np.array([_values(a.trials[name])[0] for a in alone if a is not own])
+    mine, spread = _apart(own.trials[name])
+    theirs = np.array([_apart(a.trials[name])[0] for a in alone if a is not own])
     middle = np.median(theirs, axis=0)
     scale = np.array([middle_and_scale(list(column))[1] for column in theirs.T])
     usual = np.array([p.std for p in own.trials[name].state.free])
-    least = (
-        SETTINGS.spread * np.ones(len(mine)) if name in ("gains", "wheel_gain") else 0.03 * usual
+    least = {"gains": SETTINGS.spread, WHEELS: SETTINGS.spread / 2}.get(
+        name, SETTINGS.spread_of_effects * usual
     )
     total = spread + np.diag(np.maximum(scale, least) ** 2)
     away = float((mine - middle) @ np.linalg.solve(total, mine - middle))
-    return float(min(1.0, len(alone) * len(own.trials) * chi2.sf(away, len(mine))))
+    free = len(mine) - (name == WHEELS)
+    return float(min(1.0, len(alone) * len(own.trials) * chi2.sf(away, free)))
+
+
+def _estimates(trial: Trial) -> list[ParameterEstimate]:
+    """Of what a trial added."""
+    found = trial.fit.shared_estimates()
+    if trial.names != (WHEELS,):
+        return found
+    values, spread = _values(trial)
+    stds = np.sqrt(np.diag(spread))
+    return [
+        replace(e, value=float(v), std=float(s), seen=True)
+        for e, v, s in zip(found, values, stds, strict=True)
+    ]
 
 
 def _unexplained(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
@@ -307,15 +372,22 @@ def _plain(robot_id: int, parameters: Sequence[ParameterEstimate]) -> str:
 
 def in_words(parameters: Sequence[ParameterEstimate]) -> str:
     """What the parameters of an effect do to a robot; those that say something."""
+    sides = _side_words({e.name.split(".")[1]: e.value for e in parameters if _of_wheel(e)})
+    if sides:
+        return sides
     told = [e for e in parameters if abs(_away(e)) > max(2 * e.std, _least(e))]
     told = told or sorted(parameters, key=lambda e: -abs(_away(e)) / max(e.std, 1e-9))[:1]
     gains = {e.name: e.value - 1 for e in told if e.name in GAINS}
     if gains:
         return " and ".join(_gain_words(gains))
-    wheels = {e.name.split(".")[1]: e.value for e in told if e.name.startswith("wheel_gain.")}
+    wheels = {e.name.split(".")[1]: e.value for e in told if _of_wheel(e)}
     if wheels:
         return _wheel_words(wheels)
     return "; ".join(_effect_words(e) for e in told)
+
+
+def _of_wheel(estimate: ParameterEstimate) -> bool:
+    return estimate.name.startswith(f"{WHEELS}.")
 
 
 def _away(estimate: ParameterEstimate) -> float:
@@ -334,11 +406,7 @@ def _entry(effect: str, key: str) -> dict:
 
 def _least(estimate: ParameterEstimate) -> float:
     """Least distance from neutral that is put into words."""
-    return (
-        2 * SETTINGS.spread
-        if estimate.name in GAINS or estimate.name.startswith("wheel_gain.")
-        else 0.0
-    )
+    return 2 * SETTINGS.spread if estimate.name in GAINS or _of_wheel(estimate) else 0.0
 
 
 def _gain_words(gains: dict[str, float]) -> list[str]:
@@ -347,6 +415,25 @@ def _gain_words(gains: dict[str, float]) -> list[str]:
         "theta_a2": ("turns {:.0f} % more", "turns {:.0f} % less"),
     }
     return [words[n][v < 0].format(100 * abs(v)) + " than the others" for n, v in gains.items()]
+
+
+def _side_words(wheels: dict[str, float]) -> str:
+    """Wheels of a side that are alike, as those of two-wheeled robots are, are one thing."""
+    left, right = (
+        [wheels[w] for w in side if w in wheels] for side in (("fl", "rl"), ("fr", "rr"))
+    )
+    if not left or not right:
+        return ""
+    means = {"left": float(np.mean(left)), "right": float(np.mean(right))}
+    apart = abs(means["left"] - means["right"])
+    if apart < 2 * SETTINGS.spread or max(np.ptp(left), np.ptp(right)) > apart / 3:
+        return ""
+    small, large = sorted(means, key=lambda side: abs(means[side]))
+    if abs(means[small]) < apart / 4:
+        weak = "weak" if means[large] < 0 else "strong"
+        return f"{large} wheels {100 * abs(means[large]):.0f} % {weak}"
+    weak, other = sorted(means, key=means.get)
+    return f"{weak} wheels {100 * apart:.0f} % weaker than the {other} ones"
 
 
 def _wheel_words(wheels: dict[str, float]) -> str:

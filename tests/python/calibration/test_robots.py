@@ -13,9 +13,11 @@ from twinmill.challenge.script import write_rich_script
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
+from twinmill.diagnosis.outliers import in_words
 from twinmill.fitting.compare import MISSING, compare
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import ParameterEstimate
 from twinmill.report.diagnosis import each_robot, found_models
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -186,3 +188,23 @@ def test_a_robot_that_stands_is_no_hindrance_to_what_others_tell(tanh_robot, mea
 def mute(track):
     """The track without the rests at its ends."""
     return replace(track, command=np.tile(track.command[100], (len(track.command), 1)))
+
+
+def test_wheels_of_a_side_are_one_thing_in_words():
+    def words(**gains):
+        unit = {"std": 0.02, "unit": "1", "at_bound": False, "seen": True}
+        wheels = [ParameterEstimate(f"wheel_gain.{w}", v, **unit) for w, v in gains.items()]
+        return in_words(wheels)
+
+    assert words(fl=-0.08, fr=0.0, rl=-0.078, rr=0.002) == "left wheels 8 % weak"
+    # Speed and turning of its own hide how much each side lacks: the difference is what is told.
+    assert words(fl=0.02, fr=-0.05) == "right wheels 7 % weaker than the left ones"
+    assert "left" not in words(fl=0.0, fr=0.0, rl=0.0, rr=-0.07)
+
+
+def test_the_verdict_is_on_the_robots_that_are_alike(logged):
+    """One robot is late; nothing is missing in the model of the others."""
+    late = "[[effect]]\nname = 'motor_lag'\nextra_s = 0\n[robots.R02]\nmotor_lag.extra_s = 0.1\n"
+    found = diagnose(*logged(late))
+    assert [r.robot_id for r in found.robots_off] == [2]
+    assert found.verdict in ("model_adequate", "refit_enough") and not found.findings
