@@ -209,3 +209,37 @@ def test_a_table_of_several_robots_is_no_swarm(data_dir):
     measurements = load_measurements([sheet])
     assert len(measurements) == 4  # by the table's description
     assert robots_recorded(sheet, measurements) == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_turn_of_the_wrong_sign_is_named_where_the_robot_seldom_turns(robot, seed):
+    """Unicycle by algebra: each drive an arc of its own; the log tells every turn mirrored."""
+    rng = np.random.default_rng(seed)
+    told_s, drive_s, count = 0.05, 3.0, 20
+    v_mps, w_radps = rng.uniform(0.1, 0.3, count), rng.uniform(-1.2, 1.2, count)
+    w_radps[rng.random(count) < 0.6] = 0
+    per = round(drive_s / told_s)
+    v, w = np.repeat(v_mps, per), np.repeat(w_radps, per)
+    theta = np.cumsum(np.r_[0, w[:-1]]) * told_s
+    middle = theta + w * told_s / 2
+    steps = np.column_stack([v * np.cos(middle), v * np.sin(middle)]) * told_s
+    xy = np.vstack([np.zeros(2), np.cumsum(steps, axis=0)[:-1]])
+    pose = np.column_stack([xy, theta]) + rng.normal(size=(len(v), 3)) * [0.001, 0.001, 0.004]
+    t_s = np.arange(len(v)) * told_s
+    nan, flags = np.full(len(v), np.nan), np.zeros(len(v), np.int8)
+    command = np.column_stack([v, 0 * v, -w, 0 * v])
+    log = replace(
+        robot,
+        **dict.fromkeys(("battery_V", "frame_t_s", "speed_input", "turn_input"), nan),
+        **dict.fromkeys(("mode", "detected_raw", "detected"), flags),
+        command_kind="twist",
+        command_t_s=t_s,
+        command=command,
+        pose_t_s=t_s,
+        pose=pose,
+        valid=np.ones(len(v), bool),
+        z_m=np.zeros(len(v)),
+    )
+    found = _findings([log], "twist")
+    assert any("omega_radps has the wrong sign" in f.what for f in found), found
+    assert _findings([replace(log, command=command * [1, 1, -1, 1])], "twist") == []

@@ -8,6 +8,7 @@ import sqlite3
 import struct
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from typer.testing import CliRunner
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.importers.ros_bag import _rows, guess_pairs, list_topics, numbering
+from twinmill.data.importers.ros_messages import COMMANDS
 from twinmill.data.log import LogError, read_log
 from twinmill_cli.main import app
 
@@ -510,3 +512,14 @@ def test_memory_does_not_grow_with_the_length_of_a_bag(tmp_path):
         peak_bytes.append(1024 * int(subprocess.check_output(command, text=True)))
     assert peak_bytes[1] - peak_bytes[0] < 3 * PICTURE_BYTES
     assert len(read_log(tmp_path / "11.lcmlog").robots[3].pose) == 200
+
+
+def test_joints_beside_the_wheels_are_none():
+    """An arm's joint came first, and was taken for the first wheel."""
+    _, row_of = COMMANDS["sensor_msgs/msg/JointState"]
+    arm = SimpleNamespace(
+        name=["arm", "right_wheel_joint", "left_wheel_joint"], velocity=[0.5, 2.0, 1.0]
+    )
+    assert row_of(arm) == (1.0, 2.0)
+    unnamed = SimpleNamespace(name=["a", "b"], velocity=[3.0, 4.0])
+    assert row_of(unnamed) == (3.0, 4.0)

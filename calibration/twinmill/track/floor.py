@@ -15,6 +15,7 @@ from twinmill.track.detect import ROBOTS, TAGS, Sightings, centres, check_single
 
 FEWEST = 4  # three leave two places for the camera, and nothing to check by
 FLAT = 0.05  # points are on a line if they stretch less than this share across it
+MIRRORED = 0.5  # of `_turned_alike`; points that are exchanged make less
 WORST_PX, WORST_M = 2.0, 0.005  # beyond both it is no tape measure's error
 
 
@@ -156,24 +157,58 @@ def look(camera: Camera, floor: Floor, seen: Sightings) -> View:
 
 
 def _pose(camera: Camera, place_m: np.ndarray, pixel: np.ndarray) -> View:
-    """From (N, 2) m and (N, 2) px."""
+    """From (N, 2) m and (N, 2) px.
+
+    Planar pose has no answer where the camera looks exactly straight down; the homography has.
+    """
+    flat = camera.rays(pixel)[:, :2]
+    mirrored = ValueError(
+        "floor: the points are mirrored, the camera would be under the floor; x to y must turn "
+        "counter-clockwise, seen from above."
+    )
+    if _turned_alike(place_m, flat) > MIRRORED:
+        raise mirrored
     solid = np.column_stack([place_m, np.zeros(len(place_m))])
     lens = camera.matrix, camera.distortion
     found, turns, shifts, _ = cv2.solvePnPGeneric(solid, pixel, *lens, flags=cv2.SOLVEPNP_IPPE)
     views = []
-    for turn, shift in zip(turns[:found], shifts[:found], strict=True):
+    starts = [*_start(place_m, flat), *zip(turns[:found], shifts[:found], strict=True)]
+    for turn, shift in starts:
+        if not (np.isfinite(turn).all() and np.isfinite(shift).all()):
+            continue
         turn, shift = cv2.solvePnPRefineLM(solid, pixel, *lens, turn.copy(), shift.copy())
         rotation, _ = cv2.Rodrigues(turn)
         view = View(camera, rotation, -rotation.T @ shift.ravel(), 0.0)
         miss = np.sqrt(np.mean(np.sum((view.project(solid) - pixel) ** 2, axis=1)))
-        if view.position_m[2] > 0:
+        if np.isfinite(miss) and view.position_m[2] > 0:
             views.append(View(camera, rotation, view.position_m, float(miss)))
     if not views:
-        raise ValueError(
-            "floor: the points are mirrored, the camera would be under the floor; x to y must turn "
-            "counter-clockwise, seen from above."
-        )
+        raise mirrored
     return min(views, key=lambda view: view.error_px)
+
+
+def _turned_alike(place_m: np.ndarray, flat: np.ndarray) -> float:
+    """From -1 to 1: whether triangles of points turn the same way on the floor and in the picture.
+
+    The sum over all triangles of the products of their areas (Cauchy-Binet), as a share of the
+    most that it can be. Seen from above the picture's axes, x right and y down, turn them over.
+    """
+    floor, seen = place_m - place_m.mean(axis=0), flat - flat.mean(axis=0)
+    most = np.sqrt(np.linalg.det(floor.T @ floor) * np.linalg.det(seen.T @ seen))
+    return float(np.linalg.det(floor.T @ seen) / most) if most > 0 else 0.0
+
+
+def _start(place_m: np.ndarray, flat: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Turn and shift, (3, 1) each, by the floor's homography (Zhang 2000, section 3.1)."""
+    middle_m = place_m.mean(axis=0)
+    h, _ = cv2.findHomography(place_m - middle_m, flat)
+    if h is None:
+        return []
+    h *= np.sign(h[2, 2]) / np.sqrt(np.linalg.norm(h[:, 0]) * np.linalg.norm(h[:, 1]))
+    u, _, v = np.linalg.svd(np.column_stack([h[:, 0], h[:, 1], np.cross(h[:, 0], h[:, 1])]))
+    rotation = u @ v
+    turn, _ = cv2.Rodrigues(rotation)
+    return [(turn, (h[:, 2] - rotation[:, :2] @ middle_m).reshape(3, 1))]
 
 
 def _error_m(view: View, place_m: np.ndarray) -> float:

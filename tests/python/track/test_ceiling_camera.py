@@ -470,6 +470,26 @@ def test_points_measured_by_tape_do_as_well_as_tags(folder, tmp_path):
     assert found["floor_error_px"] < 1e-2
 
 
+@pytest.mark.parametrize("moved_px", [0.0, 0.01])
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (2, 0, 3, 1), (0, 1, 2, 3, 4)])
+@pytest.mark.parametrize("turn_rad", [0.0, 0.3, np.pi / 2])
+def test_a_camera_that_looks_exactly_straight_down_is_found(moved_px, order, turn_rad):
+    """A pinhole 2.5 m over the floor: u = 640 + 900 x / 2.5, v = 360 - 900 y / 2.5."""
+    lens = np.array([[900.0, 0, 640], [0, 900, 360], [0, 0, 1]])
+    camera = Camera((1280, 720), lens, np.zeros(5))
+    place_m = np.array([[-1, -0.7], [1, -0.7], [1, 0.7], [-1, 0.7], [0, 0]])[list(order)]
+    c, s = np.cos(turn_rad), np.sin(turn_rad)
+    pixel = [640, 360] + 360 * (place_m @ [[c, s], [-s, c]]) * [1, -1]
+    pixel[0, 0] += moved_px
+    tag = np.full(len(order), -1)
+    nothing = Sightings(*np.empty((2, 0), int), np.empty((0, 4, 2)))
+    view = look(camera, Floor(place_m, pixel, tag), nothing)
+    np.testing.assert_allclose(view.position_m, [0, 0, 2.5], atol=1e-6 + 0.1 * moved_px)
+    assert view.error_px < 1e-3 + moved_px
+    with pytest.raises(ValueError, match="mirrored"):
+        look(camera, Floor(place_m * [1, -1], pixel, tag), nothing)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

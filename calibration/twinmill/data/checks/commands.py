@@ -22,6 +22,7 @@ from twinmill.data.track import Track
 GOOD = 0.03  # share of the motion left unexplained at which no mistake is looked for
 FAR_BETTER = 0.5  # times what is left: physics explains that much more, a mistake more still
 SURE = 4.0  # standard errors over stretches of the log
+CLEAR, CLEAR_SURE = 0.1, 2.0  # times what is left, if that is GOOD: then fewer errors are enough
 TURNED_RAD = 0.35  # more than any heading bias
 ALIKE, ALIKE_LEFT = 1.3, 0.003  # times and beside what the best leaves: as good as the best
 UNRELATED = 0.85  # share left at which commands and poses have nothing to do with each other
@@ -151,11 +152,17 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
 
 
 def far_better(best: Explained, own: Explained) -> bool:
-    """Whether an alternative explains so much more that it is no matter of physics."""
+    """Whether an alternative explains so much more that it is no matter of physics.
+
+    Where it leaves next to nothing, its gain by stretch differs only as the motion does: a robot
+    that turns in a few stretches gains there alone by a sign of the turn.
+    """
     if best.left > FAR_BETTER * own.left or own.left - best.left < GOOD:
         return False
     gained = own.by_block - best.by_block
-    return gained.sum() > SURE * gained.std() * np.sqrt(len(gained))
+    clear = best.left < min(GOOD, CLEAR * own.left)
+    sure = CLEAR_SURE if clear else SURE
+    return gained.sum() > sure * gained.std() * np.sqrt(len(gained))
 
 
 def _is_bias(e: Explained) -> bool:

@@ -62,11 +62,17 @@ def _duties(message: Any) -> Row:
 
 
 def _wheel_speeds(message: Any) -> Row:
-    """In our order where all joints' names tell the wheel, else as they stand."""
+    """In our order where the joints' names tell the wheel, else as they stand.
+
+    Where some joints are called wheels, the others (an arm, a pan) are none.
+    """
     speeds = tuple(map(float, message.velocity))
-    places = [_wheel(name) for name in message.name]
-    if len(places) != len(speeds):
+    names = list(message.name)
+    if len(names) != len(speeds):
         return speeds
+    wheels = [k for k, name in enumerate(names) if "wheel" in name.lower()] or range(len(names))
+    speeds = tuple(speeds[k] for k in wheels)
+    places = [_wheel(names[k]) for k in wheels]
     if len(places) == 2:
         places = [place and (1, place[1]) for place in places]
     if not all(place and all(place) for place in places) or len(set(places)) < len(places):
