@@ -383,7 +383,10 @@ def in_words(parameters: Sequence[ParameterEstimate]) -> str:
     wheels = {e.name.split(".")[1]: e.value for e in told if _of_wheel(e)}
     if wheels:
         return _wheel_words(wheels)
-    return "; ".join(_effect_words(e) for e in told)
+    said: dict[str, list[str]] = {}
+    for e in told:
+        said.setdefault(_effect_words(e), []).append(_number(e))
+    return "; ".join(f"{words} ({', '.join(numbers)})" for words, numbers in said.items())
 
 
 def _of_wheel(estimate: ParameterEstimate) -> bool:
@@ -454,6 +457,9 @@ def _wheel_words(wheels: dict[str, float]) -> str:
 def _effect_words(estimate: ParameterEstimate) -> str:
     effect, key = estimate.name.split("#")[0].split(".")[0], estimate.name.split(".")[1]
     p = _entry(effect, key)
-    words = p["above" if _away(estimate) > 0 else "below"] or catalogue()[effect]["phrase"]
+    return p["above" if _away(estimate) > 0 else "below"] or catalogue()[effect]["phrase"]
+
+
+def _number(estimate: ParameterEstimate) -> str:
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    return f"{words} ({estimate.name} {estimate.value:.3g}{unit})"
+    return f"{estimate.name} {estimate.value:.3g}{unit}"

@@ -202,6 +202,16 @@ def test_wheels_of_a_side_are_one_thing_in_words():
     assert "left" not in words(fl=0.0, fr=0.0, rl=0.0, rr=-0.07)
 
 
+def test_an_effect_of_several_numbers_is_said_once():
+    same = {"std": 0.01, "at_bound": False, "seen": True}
+    numbers = [
+        ParameterEstimate("transient_loss.loss", 0.142, unit="1", **same),
+        ParameterEstimate("transient_loss.from_s", 38.0, unit="s", **same),
+    ]
+    assert in_words(numbers).count("slower for a while") == 1
+    assert "transient_loss.from_s 38 s" in in_words(numbers)
+
+
 def test_the_verdict_is_on_the_robots_that_are_alike(logged):
     """One robot is late; nothing is missing in the model of the others."""
     late = "[[effect]]\nname = 'motor_lag'\nextra_s = 0\n[robots.R02]\nmotor_lag.extra_s = 0.1\n"

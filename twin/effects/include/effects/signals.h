@@ -51,8 +51,8 @@ struct WheelSignals
     const Wheels &wheel_rad;  // angle turned since the start
     Wheels target_mps{};      // rim speed that the wheel tends to
     Wheels tau_s{};           // time constant with which it gets there
-    double turn_extra_s = 0;  // time constant of turning the body together, less tau_s
     Wheels max_decel_mps2{kNoLimit, kNoLimit, kNoLimit, kNoLimit};  // limit on slowing down
+    double turn_extra_s = 0;  // time constant of turning the body together, less tau_s
 
     // True while a wheel rolls freely, slowed down by friction alone: its motor's lag does not act
     // then, whichever of the two effects stands first in the model.
