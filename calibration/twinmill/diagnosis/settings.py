@@ -85,7 +85,7 @@ class Settings(Numbers):
     # Robots that differ.
     odd: float = number(3.5, "robust standard deviations from the median")
     odd_evidence: float = number(16.0, "least fall of the held-out cost, for one robot")
-    odd_chance: float = number(0.001, "that one of robots that are alike is called different")
+    odd_chance: float = number(0.005, "that one of robots that are alike is called different")
     spread: float = number(0.01, "by which robots of a kind differ at least")
     spread_of_effects: float = number(
         0.03, "by which they differ at least in an effect, of its usual size"
