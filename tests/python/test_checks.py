@@ -192,6 +192,15 @@ def test_drift_of_the_clocks_is_measured(robot, ppm):
     assert abs(told - ppm) < 4 * std + 20
 
 
+@pytest.mark.parametrize("late_s", [-3.0, 1.7, 4.4])
+def test_clocks_far_apart_are_told_with_the_shift(robot, late_s):
+    """The remedy leaves a shift that the search of a clock offset reaches."""
+    (f,) = _findings([replace(robot, pose_t_s=robot.pose_t_s + late_s)])
+    assert f.fatal and ("late" if late_s > 0 else "early") in f.what
+    shift_s = float(f.remedy.split("--pose-shift-s=")[1].split(";")[0])
+    assert abs(late_s + shift_s) < 0.2
+
+
 def test_too_few_poses_are_told(robot):
     lost = np.random.default_rng(1).random(len(robot.pose)) < 1 / 3
     pose = np.where(lost[:, None], np.nan, robot.pose)

@@ -12,8 +12,21 @@ from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.cameras import with_detections
 from twinmill.diagnosis.doubts import beside_more, of_another_form
 from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_numbers
-from twinmill.diagnosis.notes import geometry_notes, irregularity_notes, time_base_notes
-from twinmill.diagnosis.outliers import Outlier, odd_of_two, outliers, sentence
+from twinmill.diagnosis.notes import (
+    geometry_notes,
+    irregularity_notes,
+    lag_notes,
+    marker_notes,
+    time_base_notes,
+)
+from twinmill.diagnosis.outliers import (
+    Outlier,
+    odd_of_two,
+    one_by_one,
+    outliers,
+    sentence,
+    spread_of_lags_s,
+)
 from twinmill.diagnosis.resolution import resolutions
 from twinmill.diagnosis.rest import rest_of
 from twinmill.diagnosis.result import Diagnosis
@@ -29,7 +42,13 @@ from twinmill.diagnosis.search import (
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
 from twinmill.fitting.compare import GOOD, comparison
 from twinmill.fitting.fit import base_names
-from twinmill.fitting.opening import Opened, judged, open_measurements, with_own_gains
+from twinmill.fitting.opening import (
+    Opened,
+    judged,
+    open_measurements,
+    with_own_gains,
+    with_own_lags,
+)
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
     BASE_GAINS,
@@ -100,12 +119,17 @@ def diagnose(
         known = _without(judged(opened), off)
         first = first_state(known, model_file, {*excluded, *unseen})
     done = search(first, progress, known=usual)
+    lags_s = 0.0
     if not off:
         progress("looking for robots that differ")
-        off = outliers(known, done, progress)
-        if off:
+        alone = one_by_one(known, done, progress)
+        off = outliers(alone)
+        gone = {r.robot_id for r in off}
+        lags_s = spread_of_lags_s([a for a in alone if a.robot_id not in gone])
+        if off or lags_s:
             known = _without(known, off)
-            progress("looking again without them")
+            known = with_own_lags(known, lags_s) if lags_s else known
+            progress("looking again without them" if off else "looking again, each with its lag")
             first = first_state(known, model_file, {*excluded, *unseen})
             done = search(first, progress, known=usual)
     progress("looking for what no effect explains")
@@ -118,6 +142,7 @@ def diagnose(
         before=before,
         unseen=unseen,
         off=off,
+        lags_s=lags_s,
     )
     whole = with_detections(found, model_file, progress, excluded)
     return replace(whole, sentence=" ".join([whole.sentence, *map(sentence, whole.robots_off)]))
@@ -141,7 +166,8 @@ def first_state(
     model = model_file.model
     hashes = [o.measurement.log_sha256 for o in opened]
     told = model_file.known_from_other_logs(hashes)
-    names = base_names(model, opened, told)
+    owned = {p.name for o in opened for p in o.data.own}
+    names = [n for n in base_names(model, opened, told) if n not in owned]
     free = []
     if told and model.drive == "duty":
         gains = [n for n in BASE_GAINS if n in names]
@@ -208,6 +234,7 @@ def _concluded(
     before,
     unseen: dict[str, str],
     off: Sequence[Outlier],
+    lags_s: float,
 ) -> Diagnosis:
     """What the search of the motion tells, before cameras are looked at."""
     hashes = [o.measurement.log_sha256 for o in known]
@@ -263,6 +290,8 @@ def _concluded(
             *time_base_notes(modelled),
             *geometry_notes(last.state.model),
             *noise,
+            *lag_notes(lags_s),
+            *marker_notes(modelled),
             *weighed.notes,
         ],
         next_experiment=_next(findings, drives, faint, weighed.verdict),

@@ -224,9 +224,10 @@ def of_another_form(found: Sequence[Finding], rest: Rest) -> list[Finding]:
 def _swings(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
     """One finding makes the robot later and another sooner.
 
-    A lag below its own and a delay imitate a body that swings.
+    A lag below its own and a delay imitate a body that swings. One that takes next to nothing is a
+    correction of the other.
     """
-    late_s = [_lateness_s(f) for f in found]
+    late_s = [_lateness_s(f) if f.share > SETTINGS.nothing_left else 0.0 for f in found]
     if not _lateness_s(finding) or not min(late_s) < 0 < max(late_s):
         return None
     why = "sooner by one lag and later by another is what a body does that swings"

@@ -109,7 +109,8 @@ def _polished(diagnosis: Diagnosis) -> ScoreFit:
     last = diagnosis.search.last
     state = last.state
     known = {p.name for p in state.free}
-    held = set() if base_lag_is_identifiable(state.model) else {LAG}
+    held = {p.name for d in state.datasets for p in d.own}
+    held |= set() if base_lag_is_identifiable(state.model) else {LAG}
     base = [n for n in diagnosis.base_names if n not in known | held]
     free = [*state.begun(), *base_parameters(state.model, base)]
     whole = ScoreFit(state.datasets, state.models, free).fit()
@@ -121,12 +122,12 @@ def _polished(diagnosis: Diagnosis) -> ScoreFit:
 
 
 def _own_values(diagnosis: Diagnosis, fit: ScoreFit) -> dict[int, list[ParameterEstimate]]:
-    """By robot, what [robots.Rnn] states: its gains, and the effects that only it has."""
+    """By robot, what [robots.Rnn] states: its gains and lag, and the effects that only it has."""
     values: dict[int, dict[str, ParameterEstimate]] = {}
     for i, data in enumerate(fit.datasets):
-        gains = {n: e for n, e in fit.own_estimates(i).items() if n in GAINS}
-        if gains:
-            values.setdefault(data.robot_id, {}).update(gains)
+        own = {n: e for n, e in fit.own_estimates(i).items() if n in (*GAINS, LAG)}
+        if own:
+            values.setdefault(data.robot_id, {}).update(own)
     for robot in diagnosis.robots_off:
         values[robot.robot_id] = {e.name: e for e in [*robot.gains, *robot.parameters]}
     return {robot_id: list(own.values()) for robot_id, own in values.items()}

@@ -293,7 +293,8 @@ def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:
         offsets = [m.get("clock.offset_s") for m in done.last.state.models]
         value["clock"] += float(np.median(offsets))
         every.append("clock.offset_s")
-    mask = np.array([n in every for n in names], float)
+    # Of what each log or robot has of its own, the mean.
+    mask = np.array([(n in every) / names.count(n) for n in names])
     free = bool(mask.any())
     std = float(np.sqrt(mask @ fit.covariance @ mask)) if free else None
     kinds = [{late[0] for n in f.group or () if (late := late_part(n))} for f in found]

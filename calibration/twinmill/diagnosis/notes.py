@@ -78,6 +78,42 @@ def irregularity_notes(
     return notes
 
 
+def lag_notes(spread_s: float) -> list[str]:
+    """A sentence on motor lags that differ among robots of a kind; none where they may be one.
+
+    Args:
+        spread_s: their standard deviation; 0 where they may be one.
+    """
+    if not spread_s:
+        return []
+    ms = 1000 * spread_s
+    return [
+        f"The robots' motor lags differ by {ms:.1f} ms (one standard deviation); each has its own."
+    ]
+
+
+def marker_notes(logs: Sequence[ModelledLog]) -> list[str]:
+    """Sentences on robots whose poses are far noisier than those of the others.
+
+    Args:
+        logs: of several robots; of one or two nothing is said.
+    """
+    noises = {s.measurement.track.robot_id: s.noise for s in logs if s.noise}
+    if len(noises) < 3:
+        return []
+    notes = []
+    for channel, unit, size in (("position", "mm", 1e3), ("heading", "degrees", 180 / np.pi)):
+        sensor = {i: getattr(n, channel).sensor for i, n in noises.items()}
+        usual = float(np.median(list(sensor.values())))
+        notes += [
+            f"R{i:02d}: its {channel}s are {own / usual:.0f} times as noisy as those of the others "
+            f"({size * own:.2g} {unit} against {size * usual:.2g}): look at its marker or tag."
+            for i, own in sensor.items()
+            if own > SETTINGS.noisy * usual
+        ]
+    return notes
+
+
 def irregularity(own: Opened, noise: Noise, model: native.Model) -> float:
     """Floor of a log over what the sensor's noise and the model's disturbance make.
 

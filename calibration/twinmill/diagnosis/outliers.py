@@ -20,6 +20,7 @@ from twinmill.fitting.opening import Opened, wide_gains
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     GAINS,
+    LAG_EFFECT,
     ParameterEstimate,
     catalogue,
 )
@@ -98,7 +99,7 @@ def sentence(off: Outlier) -> str:
 
 
 @dataclass(frozen=True)
-class _Alone:
+class Alone:
     """One robot alone: the common model held, its clock free.
 
     Attributes:
@@ -113,23 +114,41 @@ class _Alone:
     trials: dict[str, Trial]
 
 
-def outliers(
+def one_by_one(
     opened: Sequence[Opened], done: Search, progress: Callable[[str], None] = lambda _: None
-) -> list[Outlier]:
-    """Robots of logs that differ; none among fewer than three, and never as many as half.
+) -> list[Alone]:
+    """Each robot alone with the common model; none where they are fewer than three.
 
     Args:
         opened: of the search, in its order.
         done: the common search.
         progress: told in words what is being done.
     """
-    count = len(_ids(opened))
-    if count < FEWEST:
+    if len(_ids(opened)) < FEWEST:
         return []
-    alone = _each_alone(opened, done.last.state, progress)
+    return _each_alone(opened, done.last.state, progress)
+
+
+def outliers(alone: Sequence[Alone]) -> list[Outlier]:
+    """Robots that differ; never as many as half."""
     found = [off for a in alone if (off := _judged(a, alone))]
     found.sort(key=lambda off: off.p_value)
-    return found[: max(count - 1, 0) // 2]
+    return found[: max(len(alone) - 1, 0) // 2]
+
+
+def spread_of_lags_s(alone: Sequence[Alone]) -> float:
+    """Standard deviation of the motor lags among robots of a kind; 0 where they may be one.
+
+    By the chi2 test of one common value, and if lags of their own explain more than chance in two
+    robots at least.
+    """
+    trials = [a.trials[LAG_EFFECT] for a in alone if LAG_EFFECT in a.trials]
+    if sum(t.evidence > SETTINGS.odd_evidence for t in trials) < 2:
+        return 0.0
+    lags_s, variances = np.array([(v[0], s[0, 0]) for v, s in map(_values, trials)]).T
+    middle_s = np.average(lags_s, weights=1 / variances)
+    one_lag = chi2.sf(np.sum((lags_s - middle_s) ** 2 / variances), len(trials) - 1)
+    return float(np.std(lags_s, ddof=1)) if one_lag < SETTINGS.odd_chance else 0.0
 
 
 def odd_of_two(
@@ -165,7 +184,7 @@ def _ids(opened: Sequence[Opened]) -> list[int]:
 
 def _each_alone(
     opened: Sequence[Opened], state: State, progress: Callable[[str], None]
-) -> list[_Alone]:
+) -> list[Alone]:
     """Each robot with what may set some robot apart tried on it."""
     before = {}
     for i in _ids(opened):
@@ -177,7 +196,7 @@ def _each_alone(
         progress(f"robot {i} alone")
         as_all = fitted(_alone_state(opened, state, i))
         trials = {n: cross_validate(own, (n,)) for n in names}
-        alone.append(_Alone(i, as_all, own, {"gains": _with_gains(as_all), **trials}))
+        alone.append(Alone(i, as_all, own, {"gains": _with_gains(as_all), **trials}))
     return alone
 
 
@@ -200,7 +219,7 @@ def _alone_state(
 def _suspects(before: dict[int, Trial], progress: Callable[[str], None]) -> list[str]:
     """What some robot would take beyond doubt, by the linear screening: few, the surest first.
 
-    A weak wheel is the most frequent fault, and is always tried.
+    A weak wheel is the most frequent fault, and lags of motors differ most: both are always tried.
     """
     worth: dict[str, list[float]] = {}
     for robot_id, trial in before.items():
@@ -213,8 +232,8 @@ def _suspects(before: dict[int, Trial], progress: Callable[[str], None]) -> list
         (n for n in apart if apart[n] > SETTINGS.odd_evidence / 2 and n != REFIT),
         key=lambda n: -apart[n],
     )
-    wheels = [WHEELS] if WHEELS in apart else []
-    return [*wheels, *[n for n in best if n != WHEELS][:TRIED]]
+    always = [n for n in (WHEELS, LAG_EFFECT) if n in apart]
+    return [*always, *[n for n in best if n not in always][:TRIED]]
 
 
 def _with_gains(as_all: Trial) -> Trial:
@@ -249,7 +268,7 @@ def _apart(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     return centred @ values, centred @ spread @ centred
 
 
-def _judged(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
+def _judged(own: Alone, alone: Sequence[Alone]) -> Outlier | None:
     """The robot as an outlier, or None: of what sets it apart the most probable."""
     best, best_name, best_p = None, "", 1.0
     for name, trial in own.trials.items():
@@ -299,7 +318,7 @@ def _models(trial: Trial, parameters: Sequence[ParameterEstimate]) -> list[nativ
     return models
 
 
-def _p_value(own: _Alone, name: str, alone: Sequence[_Alone]) -> float:
+def _p_value(own: Alone, name: str, alone: Sequence[Alone]) -> float:
     """Chance that a robot like the others is so far from them, for all robots and trials."""
     mine, spread = _apart(own.trials[name])
     theirs = np.array([_apart(a.trials[name])[0] for a in alone if a is not own])
@@ -328,7 +347,7 @@ def _estimates(trial: Trial) -> list[ParameterEstimate]:
     ]
 
 
-def _unexplained(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
+def _unexplained(own: Alone, alone: Sequence[Alone]) -> Outlier | None:
     """A robot whose errors stand out although nothing that was tried explains them."""
     sizes = [np.log(max(a.before.held_score, 1.0)) for a in alone]
     middle, scale = middle_and_scale(sizes)
@@ -353,7 +372,7 @@ def _unexplained(own: _Alone, alone: Sequence[_Alone]) -> Outlier | None:
     )
 
 
-def _smallest(own: _Alone) -> dict[str, float]:
+def _smallest(own: Alone) -> dict[str, float]:
     """Four standard deviations of each first parameter: less would not have been beyond doubt."""
     shown = {}
     for trial in own.trials.values():

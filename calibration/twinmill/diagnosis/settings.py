@@ -90,6 +90,7 @@ class Settings(Numbers):
     spread_of_effects: float = number(
         0.03, "by which they differ at least in an effect, of its usual size"
     )
+    noisy: float = number(4.0, "times the sensor noise of the others, from which it is said")
 
     # The verdict.
     drifted: float = number(0.85, "share of the score that drifting gains leave, if stale")

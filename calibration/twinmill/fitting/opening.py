@@ -19,6 +19,7 @@ from twinmill.model.parameters import (
     CLOCK_RATE,
     GAINS,
     HEADING,
+    LAG,
     Parameter,
     base_parameters,
 )
@@ -202,6 +203,22 @@ def with_own_gains(opened: Sequence[Opened]) -> list[Opened]:
     if len({o.measurement.track.robot_id for o in logs}) < 2:
         return list(opened)
     return [_with_gains(o) if o.floor else o for o in opened]
+
+
+def with_own_lags(opened: Sequence[Opened], spread_s: float) -> list[Opened]:
+    """Each robot with a motor lag of its own.
+
+    Args:
+        opened: of several robots.
+        spread_s: standard deviation of the lags among them.
+    """
+    return [_with_lag(o, spread_s) if o.floor else o for o in opened]
+
+
+def _with_lag(own: Opened, spread_s: float) -> Opened:
+    (lag,) = base_parameters(own.model, [LAG])
+    lag = replace(lag, usual=lag.value, std=spread_s)
+    return replace(own, data=replace(own.data, own=(*own.data.own, lag)))
 
 
 def _with_gains(own: Opened) -> Opened:

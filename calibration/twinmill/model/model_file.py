@@ -280,7 +280,7 @@ def _write_robots(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
         robots = document.setdefault("robots", tomlkit.table(is_super_table=True))
         own = robots.setdefault(f"R{robot_id:02d}", tomlkit.table())
         for estimate in estimates:
-            *effect, key = estimate.name.split(".")
+            *effect, key = estimate.name.removeprefix("base.").split(".")
             place = own.setdefault(effect[0], tomlkit.inline_table()) if effect else own
             place[key] = _short(estimate.value)
 

@@ -159,6 +159,34 @@ def test_explain_writes_the_difference_as_that_robots_own(logged, tmp_path):
     assert compare(measurements, model).score < MISSING
 
 
+def test_a_robot_of_noisier_poses_is_told_and_is_as_the_others(logged):
+    """White noise of 3 mm and 17 mrad on one robot, ten times that of the sensor of all."""
+    measurements, plain = logged("")
+    rng = np.random.default_rng(3)
+    pose = measurements[1].track.pose
+    noisy = measurements[1].with_pose(pose + rng.normal(size=pose.shape) * [0.003, 0.003, 0.017])
+    found = diagnose([measurements[0], noisy, measurements[2]], plain)
+    assert found.robots_off == () and found.found == []
+    told = [note for note in found.notes if "as noisy" in note]
+    assert len(told) == 2 and all(note.startswith("R01") for note in told)
+
+
+def test_lags_that_differ_as_robots_do_are_no_effect(logged, tmp_path):
+    """Lags of 46, 60 and 74 ms: each robot gets its own, and nothing is said to be missing."""
+    lags_s = [0.046, 0.060, 0.074]
+    planted = "".join(f"[robots.R0{k}]\nmotor_lag_s = {lag}\n" for k, lag in enumerate(lags_s))
+    measurements, plain = logged(planted)
+    on_one_clock = [replace(m, track=replace(m.track, same_clock=True)) for m in measurements]
+    told = explain(on_one_clock, plain, out=tmp_path / "own.toml", command="test")
+    found = told.diagnosis
+    assert found.found == [] and found.robots_off == ()
+    assert found.verdict in ("model_adequate", "refit_enough")
+    assert any("motor lags differ by 1" in note for note in found.notes)
+    model = ModelFile.load(str(tmp_path / "own.toml")).model
+    own_s = np.array([model.for_robot(k).get("base.motor_lag_s") for k in range(ROBOTS)])
+    assert np.diff(own_s) == pytest.approx(np.diff(lags_s), abs=0.004)
+
+
 def test_a_robot_of_one_command_takes_the_clock_of_the_others(tanh_robot, measure, model_file):
     robot = tanh_robot(offset_s=0.06)
     lively = measure(robot, 1, 30.0)

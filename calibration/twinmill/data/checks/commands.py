@@ -25,6 +25,8 @@ SURE = 4.0  # standard errors over stretches of the log
 CLEAR, CLEAR_SURE = 0.1, 2.0  # times what is left, if that is GOOD: then fewer errors are enough
 TURNED_RAD = 0.35  # more than any heading bias
 ALIKE, ALIKE_LEFT = 1.3, 0.003  # times and beside what the best leaves: as good as the best
+POOR = 0.25  # share left from which clocks far apart are looked for
+FAR_S = np.arange(-6.0, 6.0 + 1e-9, 0.06)
 UNRELATED = 0.85  # share left at which commands and poses have nothing to do with each other
 LEAST_MPS = 0.01  # RMS speed below which nothing is said of a robot that hardly moves
 FEWEST_BLOCKS = 8
@@ -131,6 +133,9 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
     found = search.best(wheel_alternatives(columns_in_use(checked.body)) + poses)
     found = [e for e in found if not _is_bias(e)]
     best = min(found, key=lambda e: e.left)
+    shifted = _shifted(checked, search, own, best)
+    if shifted:
+        return [shifted]
     if not far_better(best, own):
         if min(own.left, best.left) > UNRELATED:
             return [_unrelated(checked, min(own.left, best.left))]
@@ -149,6 +154,33 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
         ),
         *_units(checked, simplest[0]),
     ]
+
+
+def _shifted(
+    checked: CheckedTrack, search: Search, own: Explained, best: Explained
+) -> InputFinding | None:
+    """Poses by far later or sooner than the commands, where that explains more than any mistake.
+
+    Args:
+        checked: one robot's track.
+        search: of its mistakes.
+        own: how well the commands explain the motion at shifts of usual delays and clocks.
+        best: the best mistake of signs, columns and axes.
+    """
+    at_end = own.late_s in (search.lates_s[0], search.lates_s[-1])
+    if own.left < POOR and not at_end:
+        return None
+    far = Search(search.motion, search.wheels, search.felt, FAR_S).own()
+    if far.left > ALIKE * best.left + ALIKE_LEFT or not far_better(far, own):
+        return None
+    late = "late" if far.late_s > 0 else "early"
+    return checked.finding(
+        f"the poses come {abs(far.late_s):.1f} s {late} against the commands",
+        f"the commands explain {1 - own.left:.0%} of the motion as it is stamped, and "
+        f"{1 - far.left:.0%} with that shift",
+        "stamp both with one clock, or import anew with "
+        f"--pose-shift-s={0.1 - far.late_s:.1f}; what is then left of the shift is searched",
+    )
 
 
 def far_better(best: Explained, own: Explained) -> bool:
@@ -174,8 +206,8 @@ def _unrelated(checked: CheckedTrack, left: float) -> InputFinding:
     return checked.finding(
         "the commands do not explain the motion",
         f"under no order and sign of the columns and no turn of the axes more than {1 - left:.0%}",
-        "check that commands and poses are of the same robot and run, and shifted by less than a "
-        "second against each other (--pose-shift-s)",
+        "check that commands and poses are of the same robot and run, and shifted by less than "
+        "six seconds against each other (--pose-shift-s)",
     )
 
 
