@@ -13,6 +13,7 @@ from twinmill.diagnosis.cameras import with_detections
 from twinmill.diagnosis.doubts import beside_more, of_another_form
 from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_numbers
 from twinmill.diagnosis.notes import (
+    few_commands_notes,
     geometry_notes,
     irregularity_notes,
     lag_notes,
@@ -292,6 +293,7 @@ def _concluded(
             *noise,
             *lag_notes(lags_s),
             *marker_notes(modelled),
+            *few_commands_notes(known),
             *weighed.notes,
         ],
         next_experiment=_next(findings, drives, faint, weighed.verdict),

@@ -252,8 +252,13 @@ def _is_some_moments(finding: Finding, found: Sequence[Finding], rest: Rest) -> 
 
 
 def _leaves_its_own(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
-    """What is left still depends on what the finding acts by."""
+    """What is left still depends on what the finding acts by.
+
+    A robot comes to other places as time goes by, so that a place may stand for the time.
+    """
     acts_by = _acts_by(finding.effect)
+    if _is_placed(finding.effect):
+        acts_by |= BY[TIME]
     for group in rest.depends_on:
         if BY.get(group, set()) & acts_by and _much_left_by(rest, group):
             why = f"what is left still depends on {group}, so that it may have another form"

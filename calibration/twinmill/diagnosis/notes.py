@@ -7,7 +7,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.fitting.opening import Opened
+from twinmill.fitting.opening import Opened, of_few_commands
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S, rms
@@ -90,6 +90,12 @@ def lag_notes(spread_s: float) -> list[str]:
     return [
         f"The robots' motor lags differ by {ms:.1f} ms (one standard deviation); each has its own."
     ]
+
+
+def few_commands_notes(opened: Sequence[Opened]) -> list[str]:
+    """A sentence where the logs have few commands: the model at others is a guess."""
+    few = of_few_commands(opened)
+    return [f"{few[0].upper()}{few[1:]}."] if few else []
 
 
 def marker_notes(logs: Sequence[ModelledLog]) -> list[str]:

@@ -11,7 +11,7 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.heldout import HeldOut
-from twinmill.fitting.opening import Opened, judged, open_measurements
+from twinmill.fitting.opening import Opened, judged, of_few_commands, open_measurements
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child
 from twinmill.model.parameters import (
@@ -41,6 +41,7 @@ class FitResult:
         parameters: estimates.
         clock: offset that all logs share, or None.
         path: of the new model.
+        notes: sentences on where it holds.
     """
 
     before: Comparison
@@ -49,6 +50,7 @@ class FitResult:
     parameters: list[ParameterEstimate]
     clock: ParameterEstimate | None
     path: Path
+    notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict:
         """The interface's object."""
@@ -59,6 +61,7 @@ class FitResult:
             "heldout_after": self.heldout.score,
             "parameters": [e.to_json() for e in self.parameters],
             "time_offset_s": self.clock.value if self.clock else None,
+            "notes": list(self.notes),
         }
 
 
@@ -173,7 +176,9 @@ def fit(
         command,
     )
     heldout = HeldOut.of(found)
-    return FitResult(before, after, heldout, estimates, clock.get(CLOCK), Path(out))
+    few = of_few_commands(judged(opened))
+    notes = (few,) if few else ()
+    return FitResult(before, after, heldout, estimates, clock.get(CLOCK), Path(out), notes)
 
 
 def noise_of(after: Comparison):

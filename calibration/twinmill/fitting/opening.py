@@ -29,6 +29,7 @@ from twinmill.predict.steady_states import SteadyStates
 
 CLOCK_REACH_S = 1.0  # how far from its start an offset of the clocks is looked for
 RATE_REACH_PPM = 500.0
+FEW_COMMANDS = 4  # different ones, below which a log tells nothing of others
 SPREAD = 0.03  # standard deviation of gains among robots of a kind where the model states none
 WIDE_STD = 0.15  # of a robot's gains where they are in question
 
@@ -190,6 +191,33 @@ def judged(opened: Sequence[Opened]) -> list[Opened]:
     if not known:
         raise LogError(f"{' '.join(o.floor.reason for o in opened if o.floor)}.")
     return known
+
+
+def of_few_commands(opened: Sequence[Opened]) -> str:
+    """A sentence where logs have so few commands that a fit holds at these alone; else empty.
+
+    A command counts if it was in force for a hundredth of the time, and moved the robot.
+
+    Args:
+        opened: measurements; of tables nothing is said.
+    """
+    tracks = [o.measurement.track for o in opened if o.floor]
+    if not tracks or len(tracks) < len(opened):
+        return ""
+    commands = np.concatenate([t.command[:-1] for t in tracks])
+    shares = np.concatenate([np.diff(t.command_t_s) for t in tracks])
+    shares = shares / max(shares.sum(), 1e-9)
+    top = max(np.abs(commands).max(), 1e-9)
+    kinds, which = np.unique((commands / top).round(2), axis=0, return_inverse=True)
+    long = np.bincount(which.ravel(), shares) > 0.01
+    count = int(np.sum(long & kinds.any(axis=1)))
+    if count >= FEW_COMMANDS:
+        return ""
+    told = "one command" if count == 1 else f"{count} different commands"
+    return (
+        f"these logs have {told}, and what is fitted to them holds at such commands alone: drive "
+        "all axes at five levels or more before the model is used at others"
+    )
 
 
 def wide_gains(model: native.Model) -> tuple[Parameter, ...]:

@@ -43,7 +43,7 @@ def fit(result: FitResult) -> RenderableType:
         Text(),
         table(tables.parameters(result.parameters)),
         *(table(t) for t in tables.robots(result.after, result.before)),
-        *_warnings(result.after.warnings),
+        *_warnings([*result.notes, *result.after.warnings]),
         _written(result.path),
         _next(result.after, fitted=True),
     )

@@ -176,6 +176,19 @@ def test_commands_that_never_change_give_no_score_and_say_why(
         fit([run], model_file(), tmp_path / "m.toml", "")
 
 
+def test_a_fit_to_few_commands_says_that_it_holds_there_alone(
+    tanh_robot, measure, model_file, tmp_path
+):
+    """As a robot that mills has them: one while it sees nobody, and another while it does."""
+    two = np.repeat([[50, 100, 50, 100], [40, 40, 40, 40]], 100, axis=0)
+    for k, (script, told) in enumerate([(np.tile(two, (7, 1)), True), (None, False)]):
+        robot = tanh_robot()
+        run = measure(robot, 2, 30.0) if script is None else measure(robot, 2, script_pct=script)
+        result = fit([run], model_file(), tmp_path / f"{k}.toml", "test")
+        assert bool(result.notes) == told
+        assert all("2 different commands" in note for note in result.notes)
+
+
 def test_a_robot_at_rest_gives_no_score_on_a_known_clock_either(measure, model_file, tanh_robot):
     run = measure(tanh_robot(), 91, script_pct=np.zeros((960, 4), int))
     known = model_file(extra="[clock]\noffset_s = 0.0\n")

@@ -26,13 +26,13 @@ constexpr Card kCard = {
 };
 
 constexpr ParameterSpec kParameters[] = {
-    {"delay_s", "s", 0, 0.02, 0, 1,
-     "from the time stamp of a command to its effect on the motors", "commands act late",
-     "commands act early", 0.2, Role::kLateness},
+    {"delay_s", "s", 0, 0.02, 0, 1, "from the time stamp of a command to its effect on the motors",
+     "commands act late", "commands act early", 0.2, Role::kLateness},
 };
 
-// A ring of the last commands, each with the time at which it was given. It holds a delay of 0.3 s at
-// one command per 5 ms, and the longest at one per 16 ms; at more the oldest kept takes effect early.
+// A ring of the last commands, each with the time at which it was given. It holds a delay of 0.3 s
+// at one command per 5 ms, and the longest at one per 16 ms; at more the oldest kept takes effect
+// early.
 constexpr int kSlots = 64;
 constexpr int kSlotSize = 1 + kMaxWheels;
 
