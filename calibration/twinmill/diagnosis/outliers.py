@@ -106,12 +106,14 @@ class Alone:
         as_all: without gains of its own.
         before: with gains of its own, as far as robots of a kind differ.
         trials: by name; effects beside such gains.
+        lag: with a motor lag of its own beside such gains.
     """
 
     robot_id: int
     as_all: Trial
     before: Trial
     trials: dict[str, Trial]
+    lag: Trial
 
 
 def one_by_one(
@@ -142,7 +144,7 @@ def spread_of_lags_s(alone: Sequence[Alone]) -> float:
     By the chi2 test of one common value, and if lags of their own explain more than chance in two
     robots at least.
     """
-    trials = [a.trials[LAG_EFFECT] for a in alone if LAG_EFFECT in a.trials]
+    trials = [a.lag for a in alone]
     if sum(t.evidence > SETTINGS.odd_evidence for t in trials) < 2:
         return 0.0
     lags_s, variances = np.array([(v[0], s[0, 0]) for v, s in map(_values, trials)]).T
@@ -196,7 +198,8 @@ def _each_alone(
         progress(f"robot {i} alone")
         as_all = fitted(_alone_state(opened, state, i))
         trials = {n: cross_validate(own, (n,)) for n in names}
-        alone.append(Alone(i, as_all, own, {"gains": _with_gains(as_all), **trials}))
+        lag = trials.get(LAG_EFFECT) or cross_validate(own, (LAG_EFFECT,))
+        alone.append(Alone(i, as_all, own, {"gains": _with_gains(as_all), **trials}, lag))
     return alone
 
 
@@ -219,7 +222,7 @@ def _alone_state(
 def _suspects(before: dict[int, Trial], progress: Callable[[str], None]) -> list[str]:
     """What some robot would take beyond doubt, by the linear screening: few, the surest first.
 
-    A weak wheel is the most frequent fault, and lags of motors differ most: both are always tried.
+    A weak wheel is the most frequent fault, and is always tried.
     """
     worth: dict[str, list[float]] = {}
     for robot_id, trial in before.items():
@@ -232,8 +235,8 @@ def _suspects(before: dict[int, Trial], progress: Callable[[str], None]) -> list
         (n for n in apart if apart[n] > SETTINGS.odd_evidence / 2 and n != REFIT),
         key=lambda n: -apart[n],
     )
-    always = [n for n in (WHEELS, LAG_EFFECT) if n in apart]
-    return [*always, *[n for n in best if n not in always][:TRIED]]
+    wheels = [WHEELS] if WHEELS in apart else []
+    return [*wheels, *[n for n in best if n != WHEELS][:TRIED]]
 
 
 def _with_gains(as_all: Trial) -> Trial:
