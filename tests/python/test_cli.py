@@ -204,6 +204,22 @@ def test_wrong_command_line_is_exit_code_two(twinmill, arguments):
     assert (code, out, err.count("\n")) == (2, "", 1)
 
 
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf"])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("import", "a", "--heading-offset-deg"),
+        ("import", "a", "--pose-shift-s"),
+        ("optitrack", "--heading-offset-deg"),
+        ("claims", "--odd-turn"),
+    ],
+)
+def test_an_option_that_is_no_finite_number_is_refused_by_name(twinmill, arguments, value):
+    code, out, err = twinmill(*arguments, value)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert arguments[-1] in err and f"{value} is no finite number" in err
+
+
 def test_truncated_log_is_read_with_a_warning(twinmill, coasting_robot, tmp_path):
     cut = tmp_path / "cut.lcmlog"
     cut.write_bytes(coasting_robot.log.read_bytes()[:-7])

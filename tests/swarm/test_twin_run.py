@@ -35,6 +35,14 @@ def read(path):
     return messages, stamps
 
 
+@pytest.mark.parametrize("option", ["--duration-s", "--dt-s", "--tilt-rad", "--pose-rate-hz"])
+def test_nan_is_refused_by_the_name_of_its_option(tmp_path, option):
+    result = run("--n", 1, "--log", tmp_path / "a.lcmlog", option, "nan")
+    assert (result.returncode, result.stdout, result.stderr.count("\n")) == (2, "", 1)
+    assert option in result.stderr and "nan is no number" in result.stderr
+    assert not list(tmp_path.iterdir())
+
+
 def test_log_holds_what_real_robots_would_say(tmp_path):
     log = tmp_path / "a.lcmlog"
     result = run("--n", 3, "--behavior", "milling", "--duration-s", 11, "--log", log)

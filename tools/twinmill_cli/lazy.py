@@ -14,23 +14,14 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
+import twinmill_cli.typer_options  # noqa: F401 changes Typer's options
+
 _working = True
 
 
 def working() -> bool:
     """Whether a command's module is imported to work, and not to show its help alone."""
     return _working
-
-
-_display_type = TyperOption.display_type_rich
-
-
-def _type_shown(option: TyperOption, ctx: typer.Context) -> str | None:
-    """Typer's, but nothing of a flag: it writes `<bool>`, and nobody is to type one."""
-    return None if option.is_flag else _display_type(option, ctx=ctx)
-
-
-TyperOption.display_type_rich = _type_shown
 
 
 class CommandGroup(TyperGroup):

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+import twinmill_cli.typer_options  # noqa: F401 changes Typer's options
 from twinmill.swarm.axes import ALIASES, QUANTITIES
 from twinmill.swarm.sweep import make_request, sweep
 from twinmill_cli.options import SpreadM, Start

@@ -2,6 +2,7 @@
 #include "options.h"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <map>
 #include <sstream>
 
@@ -107,6 +108,21 @@ void AddOutput(CLI::App &app, Options &o)
     app.add_flag("--json", o.json, "one JSON object on stdout, the rest on stderr");
 }
 
+// NaN passes every range, since no comparison with it is true.
+std::string RefuseNan(const std::string &text)
+{
+    double value = 0;
+    const bool is_nan = CLI::detail::lexical_cast(text, value) && std::isnan(value);
+    return is_nan ? text + " is no number; give one" : "";
+}
+
+void RefuseNanEverywhere(CLI::App &app)
+{
+    for (CLI::Option *option : app.get_options())
+        if (option->get_type_name().rfind("FLOAT", 0) == 0)
+            option->check(RefuseNan);
+}
+
 std::string FirstLine(const std::string &text)
 {
     return text.substr(0, text.find('\n'));
@@ -126,6 +142,7 @@ Options ParseOptions(int argc, const char *const *argv)
     AddCameraOptions(app, options.camera);
     AddHilOptions(app, options.hil);
     AddOutput(app, options);
+    RefuseNanEverywhere(app);
     try
     {
         app.parse(argc, argv);

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What Typer's options do otherwise in all programs here, once this module is imported."""
+
+import math
+from typing import Any
+
+import typer
+from typer.core import TyperOption
+
+_display_type = TyperOption.display_type_rich
+_process_value = TyperOption.process_value
+
+
+def _type_shown(option: TyperOption, ctx: typer.Context) -> str | None:
+    """Typer's, but nothing of a flag: it writes `<bool>`, and nobody is to type one."""
+    return None if option.is_flag else _display_type(option, ctx=ctx)
+
+
+def _finite(option: TyperOption, ctx: typer.Context, value: Any) -> Any:
+    """Typer's, but NaN and infinity are refused: NaN passes every range."""
+    found = _process_value(option, ctx, value)
+    for number in found if isinstance(found, list | tuple) else [found]:
+        odd = isinstance(number, float) and not math.isfinite(number)
+        if odd and number != option.default:
+            raise typer.BadParameter(f"{number} is no finite number.", ctx=ctx, param=option)
+    return found
+
+
+TyperOption.display_type_rich = _type_shown
+TyperOption.process_value = _finite
