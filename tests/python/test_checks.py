@@ -201,6 +201,20 @@ def test_clocks_far_apart_are_told_with_the_shift(robot, late_s):
     assert abs(late_s + shift_s) < 0.2
 
 
+@pytest.mark.parametrize("noise_m", [0.0, 0.0004, 0.003])
+def test_poses_that_do_not_move_although_commands_do_are_named(robot, noise_m):
+    still = np.full(robot.pose.shape, 0.3)
+    noise = np.random.default_rng(1).normal(size=still.shape) * [noise_m, noise_m, 5 * noise_m]
+    _one([replace(robot, pose=still + noise)], "do not move although the robot is driven")
+
+
+def test_a_robot_that_stands_as_it_is_told_is_no_mistake(robot):
+    noise = np.random.default_rng(1).normal(size=robot.pose.shape) * 0.0004
+    assert check_poses(replace(robot, pose=noise, command=0.1 * robot.command), "log") == []
+    turns_alone = _with_pose(robot, x=noise[:, 0], y=noise[:, 1])
+    assert check_poses(turns_alone, "log") == []
+
+
 def test_too_few_poses_are_told(robot):
     lost = np.random.default_rng(1).random(len(robot.pose)) < 1 / 3
     pose = np.where(lost[:, None], np.nan, robot.pose)

@@ -5,7 +5,7 @@ import numpy as np
 
 from twinmill.data.checks.finding import InputFinding
 from twinmill.data.log import RobotLog
-from twinmill.data.track import Track
+from twinmill.data.track import Track, command_at
 
 FASTEST_MPS = 25.0  # half a second of it at least: no robot in a laboratory
 MM_MPS = 100.0  # faster still, even centimetres would make it 1 m/s
@@ -15,6 +15,11 @@ LOST_SHARE = 0.2
 SLOW_S = 0.15
 SHORT_S = 13.0
 STILL_RAD = 1e-6
+# Commands from here on move any robot on a floor, and for how long they must: in all, and of it.
+STRONG = {"duty": (0.3,) * 4, "wheel_speed": (2.0,) * 4, "twist": (0.05, 0.05, 0.3, np.inf)}
+DRIVEN_S, DRIVEN_SHARE = 3.0, 0.05
+# Nothing moves within this much, nor within five times the noise where that is as little as this.
+STANDS, STANDS_NOISY = np.array([0.005, 0.005, 0.035]), np.array([0.05, 0.05, 0.2])
 
 
 def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
@@ -26,6 +31,14 @@ def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
     def finding(what: str, evidence: str, remedy: str) -> InputFinding:
         return InputFinding(what, evidence, remedy, True, label, robot.robot_id)
 
+    if stands := _stands(robot, t_s, pose):
+        return [
+            finding(
+                "the poses do not move although the robot is driven",
+                stands,
+                "check that the tracked body is this robot, and that its motors are on",
+            )
+        ]
     span_m = np.ptp(np.column_stack([pose[:, :2], z_m]), axis=0)
     x_m, y_m, height_m = (float(v) for v in span_m)
     fast_mps = _usual_top_speed(t_s, pose)
@@ -131,6 +144,28 @@ def _usual_top_speed(t_s: np.ndarray, pose: np.ndarray) -> float:
     return float(np.quantile(speed, 0.95))
 
 
+def _stands(robot: RobotLog, t_s: np.ndarray, pose: np.ndarray) -> str:
+    """How long strong commands leave the poses within their noise; empty if they do not."""
+    if robot.command_kind not in STRONG or not len(robot.command_t_s):
+        return ""
+    known = np.isfinite(pose).all(axis=0)
+    span = np.ptp(np.quantile(pose[:, known], (0.01, 0.99), axis=0), axis=0)
+    noise = _noise(np.diff(pose[:, known], n=2, axis=0))
+    if (span > np.clip(5 * noise, STANDS[known], STANDS_NOISY[known])).any():
+        return ""
+    command = command_at(t_s, robot.command_t_s, robot.command)
+    share = float((np.abs(command) > STRONG[robot.command_kind]).any(axis=1).mean())
+    driven_s = share * float(np.ptp(t_s))
+    if driven_s < DRIVEN_S or share < DRIVEN_SHARE:
+        return ""
+    return f"they stay within {1000 * span[:2].max():.1f} mm in {driven_s:.0f} s of strong commands"
+
+
+def _noise(bends: np.ndarray) -> np.ndarray:
+    """Standard deviation of white noise with such second differences, by column."""
+    return np.median(np.abs(bends), axis=0) / 0.6745 / np.sqrt(6)
+
+
 def _heading_is_constant(robot: RobotLog, pose: np.ndarray) -> bool:
     """The heading never changes, though positions have noise: so it is no measurement."""
     bend = np.median(np.abs(np.diff(pose[:, :2], n=2, axis=0)))
@@ -147,4 +182,4 @@ def _heading_noise_rad(track: Track) -> float:
     bend = np.diff(track.pose[index, 2], n=2)
     same = np.diff(track.segment[index])
     bend = bend[(same[1:] == 0) & (same[:-1] == 0)]
-    return float(np.median(np.abs(bend)) / 0.6745 / np.sqrt(6)) if len(bend) else 0.0
+    return float(_noise(bend)) if len(bend) else 0.0
