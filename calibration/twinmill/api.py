@@ -4,17 +4,25 @@
 Lengths in m, angles in rad, times in s; frames, signs and clocks as in the page Conventions. The
 example of a method goes on where that of its class, or of the function that made it, ends. All
 functions leave their arguments and the disk as they are: a fit returns a new `Model`, which
-`Model.save` writes.
+`Model.save` writes. An argument of another kind than is asked for is a TypeError.
+
+Notebooks show what `plot` returns. In a script `matplotlib.pyplot.figure(result.plot())` and then
+`matplotlib.pyplot.show()` open a window, and `result.plot().savefig("plot.png")` writes a file.
+
+Objects cannot be pickled: give paths to other processes, and let them return what `to_json` or
+`table` gives.
 """
 
 import html
 import subprocess
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib.metadata import version
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import NoneType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -24,14 +32,15 @@ from rich.console import Console, RenderableType
 from threadpoolctl import threadpool_limits
 
 from twinmill import report
-from twinmill.data.log import read_log
+from twinmill.arguments import checked, in_python, known
+from twinmill.data.log import LogError, read_log
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.multi_log import read_multi_log
-from twinmill.data.steady_table import is_steady_table
+from twinmill.data.steady_table import is_steady_table, read_steady_tables
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill.diagnosis import diagnose as _diagnose
 from twinmill.diagnosis.finding import Ranked
-from twinmill.files import plain, replacing
+from twinmill.files import check_new_folder, plain, replacing
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
@@ -45,6 +54,8 @@ from twinmill.report.log_figures import Drawing
 from twinmill.swarm.metrics import swarm_metrics
 
 TERMINAL_COLUMNS = 100
+A_PATH = "the path of a file"
+NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
 Result = TypeVar("Result")
 
 # The threads of a BLAS wait in loops: on matrices as narrow as ours, two take many times the
@@ -73,6 +84,12 @@ class _Shown:
         Console(file=out, width=TERMINAL_COLUMNS, color_system=None).print(self._text())
         return out.getvalue().rstrip()
 
+    def __reduce__(self) -> str:
+        raise TypeError(
+            f"{type(self).__name__}: cannot be pickled; give paths to other processes, and return "
+            "what to_json() or table() gives."
+        )
+
     def _repr_html_(self) -> str:
         return f"<p><b>{html.escape(repr(self))}</b></p>{self.table()._repr_html_()}"
 
@@ -97,13 +114,16 @@ class Log(_Shown):
         folder: TemporaryDirectory | None = None,
         said: Iterable[str] = (),
     ):
-        self.paths = [Path(path) for path in paths]
+        several = checked("paths", paths, (list, tuple), "a list of paths; `load` takes names")
+        self.paths = [Path(checked("log", path, (str, Path), A_PATH)) for path in several]
         self._folder = folder  # removed with the last reference to a simulated run
         self._said = list(said)  # by the twin
         self._measurements: dict[str, Measurements] = {}  # by the model's hash
+        for path in filter(is_steady_table, self.paths):
+            read_steady_tables(path)  # refuses other tables
         self._logs = [read_log(path) for path in self.paths if not is_steady_table(path)]
 
-    def measurements(self, model: "Model | None" = None) -> Measurements:
+    def measurements(self, model: "Model | str | Path | None" = None) -> Measurements:
         """Cleaned runs, one for each robot in each log.
 
         Args:
@@ -121,6 +141,7 @@ class Log(_Shown):
             >>> [run.label for run in tm.load("run.lcmlog").measurements()]
             ['run.lcmlog R00']
         """
+        model = None if model is None else _model(model)
         key = model.file.hash if model else ""
         if key not in self._measurements:
             self._measurements[key] = load_measurements(
@@ -188,7 +209,7 @@ class Log(_Shown):
         """
         return pd.concat([_commands(log) for log in self._logs], ignore_index=True)
 
-    def metrics(self, model: "Model | str | None" = None) -> pd.DataFrame:
+    def metrics(self, model: "Model | str | Path | None" = None) -> pd.DataFrame:
         """What the swarm does over time.
 
         Args:
@@ -241,7 +262,7 @@ class Log(_Shown):
         """
         if len(self.paths) > 1:
             raise ValueError(f"{path}: one file cannot hold {len(self.paths)} logs; save each.")
-        with replacing(Path(path), force) as temporary:
+        with _replacing(path, force) as temporary:
             temporary.write_bytes(self.paths[0].read_bytes())
 
     def to_json(self) -> dict:
@@ -282,14 +303,14 @@ class Model(_Shown):
     """
 
     def __init__(self, file: ModelFile):
-        self.file = file
+        self.file = checked("file", file, ModelFile, "a model file; `Model.load` takes its name")
 
     @classmethod
     def load(cls, name: str | Path = DEFAULT_MODEL) -> "Model":
         """Reads a model file, here or among the installed models.
 
         Args:
-            name: path, or name of an installed model.
+            name: path, or name of an installed model; `.toml` may be left out.
 
         Returns:
             The model; a file that is missing or wrong is refused before anything else is done.
@@ -301,7 +322,7 @@ class Model(_Shown):
             >>> tm.Model.load("turbopi.toml").effects
             []
         """
-        return cls(ModelFile.load(str(name)))
+        return cls(ModelFile.load(str(checked("model", name, (str, Path), "the name of a model"))))
 
     @property
     def name(self) -> str:
@@ -324,8 +345,13 @@ class Model(_Shown):
         return list(self.file.model.effects)
 
     def __getitem__(self, quantity: str) -> float:
-        """A quantity by its full name, such as `base.motor_lag_s` or `coasting.decel_mps2`."""
-        return self.file.model.get(quantity)
+        """A quantity by its full name, as `base.motor_lag_s` or `coasting.deceleration_mps2`.
+
+        Raises:
+            ValueError: the model has none of that name; the sentence has the nearest.
+        """
+        (name,) = known("quantity", (quantity,), {v["name"] for v in self.file.model.values()})
+        return self.file.model.get(name)
 
     def table(self) -> pd.DataFrame:
         """All quantities of base, camera and effects.
@@ -370,9 +396,9 @@ class Model(_Shown):
         Examples:
             >>> tm.Model.load("fitted.toml").save("fitted.toml")
             Traceback (most recent call last):
-            ValueError: fitted.toml: exists; choose another name, or replace it with --force.
+            ValueError: fitted.toml: exists; choose another name, or replace it with force=True.
         """
-        with replacing(Path(path), force) as temporary:
+        with _replacing(path, force) as temporary:
             temporary.write_text(self.file.text)
 
     def compare(self, log: "Log | str | Path") -> "Comparison":
@@ -431,9 +457,11 @@ class Model(_Shown):
             >>> added.heldout_after < added.heldout_before
             True
         """
-        gains = robot is not None and effect == _add.OWN_GAINS
-        if effect not in catalogue() and not gains:
-            raise ValueError(f"{effect}: no such effect; `twinmill effects` lists them.")
+        checked("robot", robot, (int, NoneType), "the number of a robot")
+        own = () if robot is None else (_add.OWN_GAINS,)
+        known("effect", (effect,), {*catalogue(), *own})
+        for key, text in texts.items():
+            checked(key, text, str, "a text of the effect `equation`; numbers are fitted")
         measurements = _log(log).measurements(self)
         name = f"{self.file.path.stem}+{effect}.toml"
         command = f"twinmill.add {effect}"
@@ -492,19 +520,26 @@ class Comparison(_Shown):
         self.score, self.verdict = result.score, result.verdict
 
     def table(self) -> pd.DataFrame:
-        """Errors of the robot with most data.
+        """Errors of each robot in each log.
 
         Returns:
-            channel, unit, horizon_s, rms, floor (both in the unit), ratio.
+            log, robot_id, channel, unit, horizon_s, rms, floor (both in the unit), ratio.
 
         Examples:
             >>> found.table()["horizon_s"].unique().tolist()
             [0.1, 0.2, 0.5, 1.0, 2.0]
         """
-        return pd.DataFrame(self._result.main.to_json()["errors"])
+        robots = [robot.to_json() for robot in self._result.robots]
+        return pd.DataFrame(
+            {"log": robot["log"], "robot_id": robot["robot_id"], **row}
+            for robot in robots
+            for row in robot["errors"]
+        )
 
     def plot(self) -> Figure:
         """Errors over the time predicted ahead, with the noise floor; of a table, its values.
+
+        Of several robots it is the one that the model misses most.
 
         Returns:
             A figure of matplotlib: m for forward and left, degrees for heading, over s.
@@ -536,8 +571,8 @@ class Comparison(_Shown):
         return show.comparison(self._result)
 
     def __repr__(self) -> str:
-        log = self._result.main.measurement.log_name
-        return f"Comparison({self._result.model_name}, {log}: score {self.score:.3g})"
+        logs = ", ".join(dict.fromkeys(r.measurement.log_name for r in self._result.robots))
+        return f"Comparison({self._result.model_name}, {logs}: score {self.score:.3g})"
 
 
 class Fit(_Shown):
@@ -616,7 +651,7 @@ class Fit(_Shown):
         return _report(folder, report.fit_section(self._result), "twinmill.fit")
 
     def _text(self) -> RenderableType:
-        return show.fit(self._result)
+        return show.fit(self._result, NOT_WRITTEN)
 
     def __repr__(self) -> str:
         name, before = self._result.before.model_name, self.before.score
@@ -689,7 +724,7 @@ class Addition(_Shown):
         return _report(folder, report.added_section(self._result), "twinmill.add")
 
     def _text(self) -> RenderableType:
-        return show.added(self._result)
+        return show.added(self._result, NOT_WRITTEN)
 
     def __repr__(self) -> str:
         return (
@@ -836,17 +871,19 @@ def load(*paths: str | Path) -> Log:
         All of them together; fits and comparisons take them all.
 
     Raises:
-        LogError: a file cannot be read or is no log; one sentence.
+        LogError: none is named, or a file cannot be read or is no log; one sentence.
 
     Examples:
         >>> tm.load("run.lcmlog").robots
         [0]
     """
+    if not paths:
+        raise LogError("load: name one log at least.")
     return Log(paths)
 
 
 @_one_thread
-def compare(log: Log | str | Path, model: Model | str | None = None) -> Comparison:
+def compare(log: Log | str | Path, model: Model | str | Path | None = None) -> Comparison:
     """Tells how well a model predicts a log.
 
     Predictions start from measured poses and are judged 0.1, 0.2, 0.5, 1 and 2 s later.
@@ -860,20 +897,21 @@ def compare(log: Log | str | Path, model: Model | str | None = None) -> Comparis
 
     Raises:
         LogError: the log cannot be judged; one sentence.
+        ModelError: the model cannot be read.
 
     Examples:
         >>> found = tm.compare("run.lcmlog", "turbopi.toml")
         >>> found.verdict
         'Something is missing in the model, or its parameters are stale.'
         >>> list(found.table().columns)
-        ['channel', 'unit', 'horizon_s', 'rms', 'floor', 'ratio']
+        ['log', 'robot_id', 'channel', 'unit', 'horizon_s', 'rms', 'floor', 'ratio']
     """
     model = _model(model)
     return Comparison(_compare.compare(_log(log).measurements(model), model.file))
 
 
 @_one_thread
-def fit(log: Log | str | Path, model: Model | str | None = None) -> Fit:
+def fit(log: Log | str | Path, model: Model | str | Path | None = None) -> Fit:
     """Fits all free quantities of a model, and the parameters of its effects, to a log.
 
     Args:
@@ -885,6 +923,7 @@ def fit(log: Log | str | Path, model: Model | str | None = None) -> Fit:
 
     Raises:
         LogError: the log cannot be used; one sentence.
+        ModelError: the model cannot be read.
 
     Examples:
         >>> fitted = tm.fit("run.lcmlog", "turbopi.toml")
@@ -905,7 +944,7 @@ def fit(log: Log | str | Path, model: Model | str | None = None) -> Fit:
 @_one_thread
 def diagnose(
     log: Log | str | Path,
-    model: Model | str | None = None,
+    model: Model | str | Path | None = None,
     *,
     without: Iterable[str] = (),
     progress: Callable[[str], None] | None = None,
@@ -923,6 +962,8 @@ def diagnose(
 
     Raises:
         LogError: the log cannot be used; one sentence.
+        ModelError: the model cannot be read.
+        ValueError: there is no such effect as is named in `without`.
 
     Examples:
         >>> d = tm.diagnose("run.lcmlog", "fitted.toml")
@@ -932,14 +973,16 @@ def diagnose(
         ['coasting']
     """
     log, model = _log(log), _model(model)
+    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
+    excluded = known("without", without, catalogue())
     result = _diagnose.diagnose(
-        log.measurements(model), model.file, progress or (lambda _: None), tuple(without)
+        log.measurements(model), model.file, progress or (lambda _: None), excluded
     )
     return Diagnosis(result, log)
 
 
 def simulate(
-    model: Model | str | None = None,
+    model: Model | str | Path | None = None,
     n: int = 8,
     *,
     behavior: str = "milling_cmaes",
@@ -963,6 +1006,7 @@ def simulate(
         A log like a robot's own; its file goes with the object unless it is saved.
 
     Raises:
+        ModelError: the model cannot be read.
         ValueError: the twin refuses; its own sentence.
 
     Examples:
@@ -972,6 +1016,7 @@ def simulate(
         >>> swarm.metrics().shape[0] > 0
         True
     """
+    checked("script", script, (str, Path, NoneType), "the path of a CSV file")
     folder = TemporaryDirectory(prefix="twinmill.")
     place, file = Path(folder.name), _model(model).file
     (place / "model.toml").write_text(file.text)
@@ -984,17 +1029,31 @@ def simulate(
         [str(word) for word in command], cwd=place, capture_output=True, text=True, check=False
     )
     if done.returncode:
-        raise ValueError(done.stderr.strip().removeprefix("twin_run: ") or "twin_run failed.")
+        said = done.stderr.strip().removeprefix("twin_run: ") or "twin_run failed."
+        raise ValueError(in_python(said))
     said = [line.removeprefix("twin_run: ") for line in done.stderr.splitlines()]
     return Log([place / "simulated.lcmlog"], folder, said)
 
 
 def _log(log: Log | str | Path) -> Log:
+    log = checked("log", log, (Log, str, Path), f"a log, or {A_PATH}; `load` joins several")
     return log if isinstance(log, Log) else load(log)
 
 
-def _model(model: Model | str | None) -> Model:
+def _model(model: Model | str | Path | None) -> Model:
+    wanted = "a model, or the name of one"
+    model = checked("model", model, (Model, str, Path, NoneType), wanted)
     return model if isinstance(model, Model) else Model.load(model or DEFAULT_MODEL)
+
+
+@contextmanager
+def _replacing(path: str | Path, force: bool) -> Iterator[Path]:
+    """As `replacing`, in the words of the library."""
+    try:
+        with replacing(Path(checked("path", path, (str, Path), A_PATH)), force) as temporary:
+            yield temporary
+    except ValueError as error:
+        raise ValueError(in_python(str(error))) from error
 
 
 def _made(name: str, make: Callable[[Path], Result]) -> tuple[Result, ModelFile]:
@@ -1040,12 +1099,14 @@ def _commands(log: Any) -> pd.DataFrame:
 
 def _errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
     last = results[-1][1]
-    if last.main in (tables := comparisons.steady_comparisons(last)):
+    if last.worst in (tables := comparisons.steady_comparisons(last)):
         return steady.values(tables).svg.picture
-    mains = [(label, result.main) for label, result in results]
-    return error_figures.error_growth(mains).svg.picture
+    robot = last.robots.index(last.worst)
+    same = [(label, result.robots[robot]) for label, result in results]
+    return error_figures.error_growth(same).svg.picture
 
 
 def _report(folder: str | Path, section: report.Section, call: str) -> Path:
+    check_new_folder(Path(checked("folder", folder, (str, Path), "the path of a folder")))
     source = report.Provenance(call, f"twinmill {version('twinmill')}", "")
     return report.write_report(Path(folder), section.title, source, [section])

@@ -57,6 +57,17 @@ TEST_F(Installed, ModelIsFoundByItsPath)
     EXPECT_EQ(Model::Load((folder_ / "kind" / "first_test.toml").string()).robot.mass_kg, 3);
 }
 
+TEST_F(Installed, ModelIsFoundWithoutItsEndingAlsoBesideAFolderOfThatName)
+{
+    std::filesystem::create_directories(folder_ / "first_test");
+    EXPECT_EQ(Model::Load("first_test").robot.mass_kg, 3);
+}
+
+TEST_F(Installed, NameLongerThanAnyFilesIsRefused)
+{
+    EXPECT_NE(LoadComplaint(std::string(5000, 'x')).find("no such file"), std::string::npos);
+}
+
 TEST_F(Installed, MissingModelListsThoseThereAre)
 {
     const std::string complaint = LoadComplaint("third_test.toml");

@@ -4,11 +4,14 @@
 import doctest
 import json
 import os
+import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from matplotlib import pyplot
 
 import twinmill as tm
 from twinmill import api
@@ -120,12 +123,100 @@ def test_a_simulated_log_goes_with_its_object_unless_it_is_saved(here, tmp_path)
 def test_what_is_wrong_is_said_in_a_sentence(here):
     with pytest.raises(tm.ModelError, match="no such file"):
         tm.Model.load("turbopy.toml")
+    with pytest.raises(tm.ModelError, match="no such file"):
+        tm.Model.load("x" * 5000)
     with pytest.raises(tm.LogError):
         tm.load("absent.lcmlog")
-    with pytest.raises(ValueError, match="no such effect"):
+    with pytest.raises(tm.LogError, match="one log"):
+        tm.load()
+    with pytest.raises(tm.LogError, match="column"):
+        tm.load("script.csv")
+    with pytest.raises(ValueError, match="nearest is 'coasting'"):
         tm.Model.load().add("coastin", "run.lcmlog")
+    with pytest.raises(ValueError, match=r"nearest is 'base\.motor_lag_s'"):
+        tm.Model.load()["base.motor_lagg_s"]
     with pytest.raises(ValueError, match="nobody"):
         tm.simulate(behavior="nobody", duration_s=1)
+    with pytest.raises(ValueError, match=r"^n: ((?!--).)*$"):
+        tm.simulate(n=0)
+    with pytest.raises(ValueError, match=r"^duration_s: nan ((?!--).)*$"):
+        tm.simulate(n=1, duration_s=float("nan"))
+    with pytest.raises(ValueError, match="nearest is 'dead_zone'"):
+        tm.diagnose("run.lcmlog", without=["dead_zon"])
+    with pytest.raises(ValueError, match="cannot be written"):
+        tm.compare("run.lcmlog").report("run.lcmlog")
+
+
+WRONG_TYPES = {  # what is called, and what the sentence says
+    "no log": (lambda log, model: tm.compare(None), "log: must be a log"),
+    "swapped": (lambda log, model: tm.compare(model, log), "model: .* not Log"),
+    "table": (lambda log, model: tm.fit(log.table()), "log: .* not DataFrame"),
+    "list": (lambda log, model: tm.load(["run.lcmlog"]), "log: .* not list"),
+    "class": (lambda log, model: tm.Log("run.lcmlog"), "paths: .*`load`"),
+    "script": (lambda log, model: tm.simulate(script=log.table()), "script: .* not DataFrame"),
+    "no model": (lambda log, model: tm.Model.load(None), "model: must be the name"),
+    "number": (lambda log, model: tm.compare(log, 5), "model: .* not 5"),
+    "not the model of it": (lambda log, model: tm.compare(log, _Holder(model)), "`model` is"),
+    "file": (lambda log, model: tm.Model("turbopi.toml"), "file: .*`Model.load`"),
+    "quantity": (lambda log, model: model[0], "quantity: .* not 0"),
+    "width": (lambda log, model: model.add("dead_zone", log, width=0.1), "width: .* not 0.1"),
+    "robot": (lambda log, model: model.add("dead_zone", log, robot="1"), "robot: .* not '1'"),
+    "effects": (lambda log, model: model.add(["dead_zone"], log), "effect: .* not list"),
+    "letters": (lambda log, model: tm.diagnose(log, without="dead_zone"), "without: .*list"),
+    "progress": (lambda log, model: tm.diagnose(log, progress=True), "progress: .* not True"),
+}
+
+
+class _Holder:
+    """Has a model, as a Fit has."""
+
+    def __init__(self, model: tm.Model):
+        self.model = model
+
+
+@pytest.mark.parametrize(("call", "said"), WRONG_TYPES.values(), ids=WRONG_TYPES)
+def test_an_argument_of_another_kind_is_refused_by_name(here, call, said):
+    with pytest.raises(TypeError, match=said) as refused:
+        call(tm.load("run.lcmlog"), tm.Model.load("turbopi"))
+    assert "\n" not in str(refused.value)
+
+
+def test_what_cannot_be_pickled_says_what_to_do(here):
+    for thing in (tm.load("run.lcmlog"), tm.Model.load("turbopi")):
+        with pytest.raises(TypeError, match="give paths"):
+            pickle.dumps(thing)
+
+
+def test_a_plot_opens_in_the_window_of_a_script(here):
+    shown = pyplot.figure(tm.load("run.lcmlog").plot())
+    assert pyplot.gcf() is shown
+    pyplot.close(shown)
+
+
+def test_of_several_logs_all_views_show_the_same_robot(here, tmp_path):
+    """The second is of a robot as the model says: the first, which coasts, is missed most."""
+    other = tm.simulate("fitted.toml", n=1, duration_s=30, script="script.csv")
+    other.save(tmp_path / "other.lcmlog")
+    found = tm.compare(tm.load(tmp_path / "other.lcmlog", "run.lcmlog"), "fitted.toml")
+    rows = found.table()
+    assert set(rows["log"]) == {"run.lcmlog", "other.lcmlog"}
+    data = found.to_json()
+    worst = max(data["robots"], key=lambda robot: robot["score"])
+    assert data["log"] == "run.lcmlog" and data["errors"] == worst["errors"]
+    assert f"{data['log']}, robot 0, which the model misses most" in str(found)
+    mine = rows[rows["log"] == data["log"]]
+    assert mine["rms"].tolist() == [row["rms"] for row in data["errors"]]
+    assert "run.lcmlog" in repr(found) and "other.lcmlog" in repr(found)
+
+
+def test_a_fit_is_shown_with_its_own_clock_and_name_and_says_that_nothing_is_written(here):
+    fitted = tm.fit("run.lcmlog", "turbopi.toml")
+    text = " ".join(str(fitted).split())
+    ms = abs(1000 * fitted.after.to_json()["time_offset_s"])
+    clock_ms = float(re.search(r"motion capture ([\d.]+) ms", text)[1])
+    assert clock_ms == pytest.approx(ms, rel=0.01)
+    assert "model turbopi_fitted.toml" in text
+    assert "Not written yet" in text and "Written:" not in text
 
 
 def test_importing_needs_no_numbers():

@@ -404,20 +404,24 @@ Model Model::Load(const std::string &name)
 std::string FindModelFile(const std::string &name)
 {
     namespace fs = std::filesystem;
-    if (fs::is_regular_file(name))
-        return name;
+    const std::string file = fs::path(name).has_extension() ? name : name + ".toml";
+    std::error_code unreadable;
+    for (const std::string &here : {name, file})
+        if (fs::is_regular_file(here, unreadable))
+            return here;
     const char *from_environment = std::getenv("TWINMILL_MODELS");
     const fs::path installed = from_environment ? from_environment
                                : fs::is_directory(TWINMILL_MODELS_DIR)
                                    ? TWINMILL_MODELS_DIR
                                    : TWINMILL_INSTALLED_MODELS_DIR;
     std::set<std::string> others;
-    std::error_code unreadable;
     for (const auto &entry : fs::recursive_directory_iterator(installed, unreadable))
     {
-        if (entry.path().filename() == name)
+        if (!entry.is_regular_file(unreadable))
+            continue;
+        if (entry.path().filename() == file)
             return entry.path().string();
-        if (entry.path().extension() == fs::path(name).extension())
+        if (entry.path().extension() == fs::path(file).extension())
             others.insert(entry.path().filename().string());
     }
     std::string list;

@@ -122,12 +122,15 @@ class Comparison:
 
     @property
     def main(self) -> RobotComparison | SteadyComparison:
-        """The robot with the most predictions, whose errors are shown."""
+        """The robot with the most predictions."""
         return max(self.robots, key=lambda r: r.size)
 
     @property
     def worst(self) -> RobotComparison | SteadyComparison:
-        """The robot that the model misses most; tables stand for all their robots."""
+        """The robot that the model misses most, whose errors are shown.
+
+        Tables stand for all their robots.
+        """
         if isinstance(self.main, SteadyComparison):
             return self.main
         logs = [r for r in self.robots if not isinstance(r, SteadyComparison)]
@@ -156,7 +159,7 @@ class Comparison:
         """The interface's object."""
         return {
             "model": self.model_name,
-            **self.main.to_json(),
+            **self.worst.to_json(),
             "score": self.score,
             "verdict": self.verdict,
             "robots": [r.to_json() for r in self.robots],
@@ -176,11 +179,14 @@ def compare_robot(own: Opened) -> RobotComparison | SteadyComparison:
     return RobotComparison(modelled, windows, errors, own.floor, own.score, regimes)
 
 
-def comparison(model_file: ModelFile, opened: Sequence[Opened]) -> Comparison:
-    """Of measurements as they stand."""
+def comparison(
+    model_file: ModelFile, opened: Sequence[Opened], fitted_name: str = ""
+) -> Comparison:
+    """Of measurements as they stand; of a model that was fitted to them, by its new name."""
     warnings = [f"{o.measurement.label}: {w}" for o in opened for w in o.measurement.warnings]
     warnings += [f"{o.floor.reason}." for o in opened if o.floor and o.floor.reason]
-    return Comparison(model_file.path.name, [compare_robot(o) for o in opened], warnings)
+    name = fitted_name or model_file.path.name
+    return Comparison(name, [compare_robot(o) for o in opened], warnings)
 
 
 def compare(measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile) -> Comparison:

@@ -157,7 +157,7 @@ def fit(
     free = without_held([*base, *all_effect_parameters(model)], held)
     moved, found = fitted(opened, free)
     before = comparison(model_file, opened)
-    after = comparison(model_file, [o.realigned() for o in moved])
+    after = comparison(model_file, [o.realigned() for o in moved], Path(out).name)
     estimates = found.shared_estimates()
     clock = common_clock(found)
     write_child(

@@ -33,10 +33,15 @@ def comparison(result: Comparison) -> RenderableType:
     )
 
 
-def fit(result: FitResult) -> RenderableType:
-    """What `twinmill fit` prints: score before and after, estimates, the new file."""
+def fit(result: FitResult, not_written: str = "") -> RenderableType:
+    """What `twinmill fit` prints: score before and after, estimates, the new file.
+
+    Args:
+        result: of the fit.
+        not_written: said in place of the new file where there is none.
+    """
     return Group(
-        _facts(comparisons.facts(result.before)),
+        _facts(comparisons.facts(result.after)),
         Text(),
         _change("score", result.before.score, result.after.score),
         score_line("", result.after, number_too=False),
@@ -44,19 +49,24 @@ def fit(result: FitResult) -> RenderableType:
         table(tables.parameters(result.parameters)),
         *(table(t) for t in tables.robots(result.after, result.before)),
         *_warnings([*result.notes, *result.after.warnings]),
-        _written(result.path),
+        _written(result.path, not_written),
         _next(result.after, fitted=True),
     )
 
 
-def added(result: AddResult) -> RenderableType:
-    """What `twinmill add` prints: scores fitted and held out, the effect's estimates."""
+def added(result: AddResult, not_written: str = "") -> RenderableType:
+    """What `twinmill add` prints: scores fitted and held out, the effect's estimates.
+
+    Args:
+        result: of the addition.
+        not_written: as of `fit`.
+    """
     if result.of_camera:
-        return _added_to_camera(result)
+        return _added_to_camera(result, not_written)
     own = result.added
     rest = len(result.parameters) - len(own)
     return Group(
-        _facts(comparisons.facts(result.before)),
+        _facts(comparisons.facts(result.after)),
         Text(),
         _change("score", result.before.score, result.after.score),
         _change(
@@ -72,12 +82,12 @@ def added(result: AddResult) -> RenderableType:
         *(table(t) for t in tables.robots(result.after, result.before)),
         *(table(t) for t in tables.held_out(result)),
         *_warnings(result.after.warnings),
-        _written(result.path),
+        _written(result.path, not_written),
         _next(result.after, fitted=True),
     )
 
 
-def _added_to_camera(result: AddResult) -> RenderableType:
+def _added_to_camera(result: AddResult, not_written: str) -> RenderableType:
     return Group(
         _change("bits", result.before.score, result.after.score),
         _change(
@@ -89,7 +99,7 @@ def _added_to_camera(result: AddResult) -> RenderableType:
         Text(),
         table(tables.parameters(result.parameters)),
         *(table(t) for t in detections.confusion_tables(result.after)),
-        _written(result.path),
+        _written(result.path, not_written),
     )
 
 
@@ -183,8 +193,8 @@ def _warnings(warnings: list[str]) -> list[RenderableType]:
     return lines
 
 
-def _written(path: object) -> Text:
-    return Text(f"Written: {path}")
+def _written(path: object, not_written: str) -> Text:
+    return Text(not_written or f"Written: {path}")
 
 
 def _next(result: Comparison, fitted: bool = False) -> RenderableType:
