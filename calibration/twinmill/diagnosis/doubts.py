@@ -262,7 +262,7 @@ def _leaves_its_own(finding: Finding, found: Sequence[Finding], rest: Rest) -> F
     for group in rest.depends_on:
         if BY.get(group, set()) & acts_by and _much_left_by(rest, group):
             why = f"what is left still depends on {group}, so that it may have another form"
-            return doubted(finding, why, wrong_form=True)
+            return doubted(finding, why, wrong_form=finding.share < SETTINGS.nearly_all)
     return None
 
 

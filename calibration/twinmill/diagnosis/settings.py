@@ -62,6 +62,7 @@ class Settings(Numbers):
     much_left: float = number(0.3, "share left, beyond which no name is sure")
     lag_leaves: float = number(0.25, "share left, beyond which no lag is sure")
     form_takes: float = number(0.15, "share of what is left, by which a finding has another form")
+    nearly_all: float = number(0.85, "... beyond which share it is still the same physics")
     same: float = number(0.8, "cosine of what two take, from which they take the same errors ...")
     same_fall: float = number(0.85, "... if one takes this share of what the other takes")
     nothing: float = number(0.01, "chance of such sizes if there were no effect")

@@ -119,8 +119,10 @@ class VerdictInputs:
 
     @property
     def _rest_outweighs(self) -> bool:
-        """No effect is beyond doubt, and much is left that is no noise."""
+        """No effect is beyond doubt, none takes nearly all, and much is left that is no noise."""
         if not all(f.certainty == "doubtful" for f in self.effects):
+            return False
+        if any(f.share >= SETTINGS.nearly_all and not f.wrong_form for f in self.effects):
             return False
         if self._continuous and self.rest.share > SETTINGS.much:
             return True
