@@ -166,18 +166,19 @@ def test_a_model_that_misses_as_before_is_not_said_to_miss_anew(known, words):
 
 
 @pytest.mark.parametrize(
-    ("certainty", "left", "verdict"),
+    ("takes", "certainty", "left", "verdict"),
     [
-        ("doubtful", 0.4, "outside_catalogue"),
-        ("doubtful", 0.2, "outside_catalogue"),
-        ("doubtful", 0.05, "effect_missing"),
-        ("sure", 0.4, "effect_missing"),
+        (0.3, "doubtful", 0.4, "outside_catalogue"),
+        (0.3, "doubtful", 0.2, "outside_catalogue"),
+        (0.3, "doubtful", 0.05, "effect_missing"),
+        (0.3, "sure", 0.4, "effect_missing"),
+        (0.9, "doubtful", 0.2, "effect_missing"),
     ],
 )
 def test_much_that_is_left_and_depends_on_something_outweighs_a_doubtful_effect(
-    certainty, left, verdict
+    takes, certainty, left, verdict
 ):
-    found = [Finding("heading_bias", None, [], 0.3, certainty, "it changes with heading")]
+    found = [Finding("heading_bias", None, [], takes, certainty, "it changes with heading")]
     rest = Rest(left, True, ["heading"])
     weighed = VerdictInputs(4.2, 4.2, 3.6, 2.8, found, rest, [], [], [], 1.0)
     assert weighed.verdict == verdict
