@@ -47,14 +47,13 @@ for name; do :; done
 case $1 in
     --quiet) [ -e "$units/$name.${2#is-}" ] ;;
     enable) : >"$units/$name.enabled" ;;
-    start) : >"$units/$name.active" ;;
     disable) rm -f "$units/$name.enabled" "$units/$name.active" ;;
-    restart)
-        [ ! -e "$ROBOT/pid" ] || kill "$(cat "$ROBOT/pid")" 2>/dev/null || true
+    start)
+        [ "$name" = twinmill-robot.service ] || { : >"$units/$name.active" && exit 0; }
         [ -e "$ROBOT/dies" ] && exit 0
         turbopi --config "$ROBOT/system/etc/turbopi/turbopi.conf" >"$ROBOT/journal" 2>&1 &
         echo $! >"$ROBOT/pid" ;;
-    stop) kill "$(cat "$ROBOT/pid")" ;;
+    stop) kill "$(cat "$ROBOT/pid")" 2>/dev/null ;;
     is-active) kill -0 "$(cat "$ROBOT/pid" 2>/dev/null || echo none)" 2>/dev/null ;;
 esac""",
     "v4l2-ctl": 'cat "$ROBOT/camera.yuyv"',

@@ -45,7 +45,6 @@ class Robot:
     Attributes:
         telemetry, run: its newest messages.
         first_s, heard_s: when it said anything first and last, by time.monotonic().
-        run_heard_s: when it said who it is.
         recent: (time.monotonic(), time.time(), telemetry_t) of the last WINDOW_S.
         senders: of its telemetry.
         acks, signed_acks: by number of the command; the latter with the robot's signature.
@@ -57,7 +56,6 @@ class Robot:
     run: Any = None
     first_s: float = field(default_factory=time.monotonic)
     heard_s: float = 0.0
-    run_heard_s: float = 0.0
     recent: deque = field(default_factory=deque)
     senders: Senders = field(default_factory=Senders)
     acks: dict = field(default_factory=dict)
@@ -238,7 +236,7 @@ class Fleet:
         elif kind == "ACK":
             robot.acks[message.seq] = message
         elif kind == "RUN":
-            robot.run, robot.run_heard_s = message, now_s
+            robot.run = message
         else:
             robot.telemetry = message
             robot.recent.append((now_s, time.time(), message))

@@ -266,12 +266,14 @@ key()
     as_root mv "$secret.new" "$secret"
 }
 
-# restart: and is it still there after a while?
+# restart: and is it still there after a while? What the program before said is older than stopped_us.
 restart()
 {
     may_be_root
     as_root systemctl enable "$unit" >/dev/null 2>&1 || true
-    as_root systemctl restart "$unit" ||
+    as_root systemctl stop "$unit" || true
+    echo "stopped_us=$(date +%s%6N)"
+    as_root systemctl start "$unit" ||
         fail "service dies" "systemctl cannot start $unit: $(last_words)"
     sleep 2
     systemctl is-active --quiet "$unit" ||

@@ -152,11 +152,10 @@ def _update(
         _bring_key(remote, of_robot(request.key, target.robot_id))
         remote.run("configure", *(f"{key}={value}" for key, value in settings.items()))
     progress("restarting")
-    restarted_s = time.monotonic()
-    remote.run("restart")
+    stopped_us = int(remote.run("restart")["stopped_us"])
     progress("waiting for telemetry")
     version = package.version if package else found["previous"]
-    _hear(target, version, restarted_s, request.wait_s, fleet=fleet, outcome=outcome)
+    _hear(target, version, stopped_us, request.wait_s, fleet=fleet, outcome=outcome)
 
 
 def _choose(
@@ -233,7 +232,7 @@ def _plan(
 def _hear(
     target: Target,
     version: str,
-    since_s: float,
+    since_us: int,
     wait_s: float,
     *,
     fleet: Fleet,
@@ -241,7 +240,8 @@ def _hear(
 ) -> None:
     def heard() -> bool:
         robot = fleet.robots.get(target.robot_id)
-        return bool(robot and robot.telemetry and robot.run_heard_s > since_s)
+        said = [robot.telemetry, robot.run] if robot else [None]
+        return all(message and message.utime_us > since_us for message in said)
 
     if not _wait(heard, wait_s):
         raise RemoteError(
