@@ -223,6 +223,33 @@ def test_too_few_poses_are_told(robot):
     _one([_robot(pose_hz=4)], "poses come slowly", fatal=False)
 
 
+def test_wheels_of_the_model_are_named_beside_columns_that_seem_wrong(robot):
+    """Three wheels at 120 degrees (Campion et al. 1996), told of a model with four mecanum ones."""
+    forward, left, turn = np.linalg.lstsq(MECANUM.T, robot.command.T, rcond=None)[0] * 0.5
+    at_rad = np.radians([60, 180, 300])
+    rims = -np.sin(at_rad) * forward[:, None] + np.cos(at_rad) * left[:, None] + turn[:, None]
+    found = _findings([replace(robot, command=np.column_stack([rims, 0 * forward]))])
+    assert any(f.fatal for f in found)
+    assert all("base.wheels" in f.remedy for f in found if f.fatal), found
+
+
+def test_commands_that_are_all_zero_are_told(robot):
+    _one([replace(robot, command=0 * robot.command)], "all commands are zero")
+
+
+def test_wheels_on_which_alike_commands_are_a_turn_are_not_called_astray(robot):
+    """Marker 5 cm before the middle of a robot that spins on the spot, all wheels alike."""
+    t_s = robot.pose_t_s
+    theta = 0.5 + 1.5 * t_s
+    x, y = 0.05 * np.cos(theta), 0.05 * np.sin(theta)
+    alike = np.full(robot.command.shape, 0.5)
+    spins = replace(_with_pose(robot, x=x, y=y, theta=theta), command=alike)
+    assert make_track(spins).astray_rad == 0
+    across = _with_pose(robot, x=0.2 * t_s, y=0 * t_s, theta=0 * t_s + np.pi / 2)
+    track = make_track(replace(across, command=alike))
+    assert track.astray_rad == pytest.approx(-np.pi / 2, abs=0.01)
+
+
 def test_commands_of_another_run_are_told(robot):
     _one([replace(robot, command=_robot(seed=7).command)], "do not explain the motion")
 

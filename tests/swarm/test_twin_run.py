@@ -43,6 +43,32 @@ def test_nan_is_refused_by_the_name_of_its_option(tmp_path, option):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("wheels", ["mecanum", "differential", "omni3", "ackermann", "none"])
+def test_wheels_that_the_firmware_mixes_duties_for_go_straight_and_others_are_refused(
+    tmp_path, wheels
+):
+    """Speed alone is straight ahead: whatever the layout, or it is refused by its name."""
+    model, log = tmp_path / "m.toml", tmp_path / "a.lcmlog"
+    duties = "duty_pct = [0, 100]\nwheel_speed_mps = [0, 0.36]\n"
+    model.write_text(f'[robot]\n[base]\ndrive = "duty"\nwheels = "{wheels}"\n{duties}')
+    script = tmp_path / "s.csv"
+    script.write_text("t_s,speed_input,turn_input\n0,50,0\n2,0,0\n")
+    result = run("--n", 1, "--script", script, "--log", log, model=model)
+    assert bool(result.returncode) == (wheels in ("omni3", "ackermann"))
+    if result.returncode:
+        assert f"'{wheels}'" in result.stderr or f'"{wheels}"' in result.stderr
+        assert result.stderr.count("\n") == 1
+        assert not log.exists()
+        return
+    poses = read(log)[0]["TWIN_TRUTH_R00"]
+    first, last = poses[0], poses[-1]
+    ahead = np.array([np.cos(first.theta_rad), np.sin(first.theta_rad)])
+    moved = np.array([last.x_m - first.x_m, last.y_m - first.y_m])
+    assert moved @ ahead == pytest.approx(0.36, abs=0.05)  # 2 s at half of 0.36 m/s
+    assert moved @ [-ahead[1], ahead[0]] == pytest.approx(0, abs=1e-6)
+    assert last.theta_rad == pytest.approx(first.theta_rad, abs=1e-6)
+
+
 def test_log_holds_what_real_robots_would_say(tmp_path):
     log = tmp_path / "a.lcmlog"
     result = run("--n", 3, "--behavior", "milling", "--duration-s", 11, "--log", log)

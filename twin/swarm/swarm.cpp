@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "plant/kinematics.h"
 #include "sensor/cone_sensor.h"
 
 namespace twin
@@ -29,16 +30,33 @@ fw_config ConfigFor(const DetectionModel &detection, const fw_table &table)
     return config;
 }
 
+// Whether the duties that the firmware mixes of speed and turn drive these wheels: all alike go
+// straight ahead, and left against right turns on the spot. Of any other layout it does not hold.
+bool IsDrivenByMixing(const Model &model)
+{
+    const Kinematics kinematics(model.robot, model.base.wheels);
+    const auto moved = [&](double left, double right) {
+        return kinematics.Forward({{left, right, left, right}, 0});
+    };
+    const Twist ahead = moved(1, 1), turn = moved(-1, 1);
+    const double lever_m = model.robot.half_wheelbase_m + model.robot.half_track_m;
+    constexpr double kNone = 1e-6;  // of a rim speed of 1
+    return ahead.vx_mps > 0.5 && std::abs(ahead.vy_mps) < kNone &&
+           lever_m * std::abs(ahead.omega_radps) < kNone && turn.omega_radps > 0 &&
+           std::hypot(turn.vx_mps, turn.vy_mps) < kNone;
+}
+
 void CheckModel(const Model &model, const fw_config &config)
 {
     if (model.base.drive == Drive::kWheelSpeed)
         throw std::invalid_argument(
             "the model's base.drive is 'wheel_speed', which the firmware cannot command: a swarm "
             "needs 'duty', 'twist' or 'steering'");
-    if (model.base.drive == Drive::kDuty && model.base.wheels == WheelKind::kOmni3)
+    if (model.base.drive == Drive::kDuty && !IsDrivenByMixing(model))
         throw std::invalid_argument(
-            "the model's base.wheels is 'omni3', and the firmware mixes duties for left and right "
-            "wheels alone: a swarm of such robots needs base.drive = 'twist'");
+            std::string("the model's base.wheels is '") + WheelKindName(model.base.wheels) +
+            "', and the firmware mixes duties for left and right wheels alone: a swarm of such "
+            "robots needs base.drive = 'twist'");
     const double timeout_s = static_cast<double>(config.frame_timeout_us) * 1e-6;
     if (model.sensor.delay_s > timeout_s)
         throw std::invalid_argument("sensor.delay_s = " + std::to_string(model.sensor.delay_s) +

@@ -15,6 +15,7 @@ FROZEN_S = 0.5  # a pose that keeps its very bits for longer while driven is no 
 REST_S = 1.5  # coasting ends within 0.5 s; the rest is for lag and clocks
 SMOOTH_S = 0.026  # half width of the heading's smoothing: three poses of 120 Hz to each side
 ASTRAY_RAD = 0.35  # more than any heading bias: the marker body's axes are turned
+SPIN_RAD = 0.2  # in a quarter of a second: on these wheels alike commands are no way straight ahead
 
 
 @dataclass(frozen=True)
@@ -292,6 +293,9 @@ def _astray_rad(robot: RobotLog, pose: np.ndarray, segment: np.ndarray) -> float
         ]
     )
     steady = (forward != 0).all(axis=1) & (np.ptp(np.sign(forward), axis=1) == 0)
+    bend = np.median(_bend_rad(pose, first, middle, last)[steady]) if steady.any() else 0.0
+    if bend > SPIN_RAD:
+        return 0.0
     if np.count_nonzero(steady) < half:
         return 0.0
     step = (pose[last, :2] - pose[first, :2])[steady] * np.sign(forward[steady, :1])
@@ -299,6 +303,16 @@ def _astray_rad(robot: RobotLog, pose: np.ndarray, segment: np.ndarray) -> float
     weight = np.hypot(step[:, 0], step[:, 1])
     astray_rad = float(np.angle(np.sum(weight * np.exp(1j * angle))))
     return astray_rad if abs(astray_rad) > ASTRAY_RAD else 0.0
+
+
+def _bend_rad(pose: np.ndarray, first: np.ndarray, middle: np.ndarray, last: np.ndarray):
+    """(K,) by which the path turns from the one half of a step to the other."""
+    x, y = pose[:, 0], pose[:, 1]
+    one, other = (
+        (x[end] - x[begin]) + 1j * (y[end] - y[begin])
+        for begin, end in ((first, middle), (middle, last))
+    )
+    return np.abs(np.angle(other * np.conj(one)))
 
 
 def _straight(command: np.ndarray, kind: CommandKind) -> np.ndarray:

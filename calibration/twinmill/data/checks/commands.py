@@ -30,6 +30,7 @@ FAR_S = np.arange(-6.0, 6.0 + 1e-9, 0.06)
 UNRELATED = 0.85  # share left at which commands and poses have nothing to do with each other
 LEAST_MPS = 0.01  # RMS speed below which nothing is said of a robot that hardly moves
 FEWEST_BLOCKS = 8
+OTHER_WHEELS = ", or, if the columns are right, check base.wheels and the sizes of the model"
 DRIVEN_BY = {"duty": "duties", "wheel_speed": "wheel speeds", "twist": "velocities of the body"}
 UNITS = (  # measured over commanded speed, and what it says
     ((300.0, 3000.0), "the positions are in millimetres", "name the columns x_mm and y_mm"),
@@ -144,13 +145,15 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
     alike.sort(key=lambda e: (e.alternative.steps, e.left))
     simplest = [e for e in alike if e.alternative.steps < alike[0].alternative.steps + 0.6][:3]
     words = [described(e.alternative, track.command_kind, e.turned_rad) for e in simplest]
+    of_columns = not all(e.alternative.of_poses for e in simplest)
     return [
         checked.finding(
             ", or ".join(dict.fromkeys(what for what, _ in words)),
             f"the commands explain {1 - own.left:.0%} of the motion as it is, and "
             f"{1 - simplest[0].left:.0%} without that mistake",
             "correct it where the log is made, or import anew with "
-            + ", or ".join(dict.fromkeys(options for _, options in words)),
+            + ", or ".join(dict.fromkeys(options for _, options in words))
+            + (OTHER_WHEELS if of_columns and track.command_kind != "twist" else ""),
         ),
         *_units(checked, simplest[0]),
     ]
@@ -203,9 +206,16 @@ def _is_bias(e: Explained) -> bool:
 
 
 def _unrelated(checked: CheckedTrack, left: float) -> InputFinding:
+    if not checked.track.command.any():
+        return checked.finding(
+            "the robot moves, and all commands are zero",
+            f"{len(checked.track.command)} of them",
+            "record what drove it, or name the right columns and import anew",
+        )
     return checked.finding(
         "the commands do not explain the motion",
-        f"under no order and sign of the columns and no turn of the axes more than {1 - left:.0%}",
+        f"under no order and sign of the columns and no turn of the axes more than "
+        f"{max(0.0, 1 - left):.0%}",
         "check that commands and poses are of the same robot and run, and shifted by less than "
         "six seconds against each other (--pose-shift-s)",
     )
