@@ -39,6 +39,7 @@ from twinmill.data.multi_log import read_multi_log
 from twinmill.data.steady_table import is_steady_table, read_steady_tables
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill.diagnosis import diagnose as _diagnose
+from twinmill.diagnosis.finding import Finding as _Found
 from twinmill.diagnosis.finding import Ranked
 from twinmill.files import check_new_folder, plain, replacing
 from twinmill.fitting import add as _add
@@ -738,7 +739,9 @@ class Finding(_Shown):
 
     Attributes:
         effect: its name.
-        parameters: estimates by name.
+        parameters: estimates by name, with all else that was found.
+        share: of the squared error above the noise that it takes away, on data not fitted to.
+        certainty: sure, group or doubtful.
         score_heldout: of the model with it, on data that was not fitted to.
 
     Examples:
@@ -746,28 +749,45 @@ class Finding(_Shown):
         True
     """
 
-    def __init__(self, ranked: Ranked, log: Log):
-        self._result, self._log = ranked, log
-        self.effect, self.score_heldout = ranked.effect, ranked.score_heldout
-        self.parameters = {e.name.split(".", 1)[-1]: e.value for e in ranked.parameters}
+    def __init__(self, finding: _Found, ranked: Ranked, log: Log):
+        self._result, self._ranked, self._log = finding, ranked, log
+        self.effect, self.score_heldout = finding.effect, ranked.score_heldout
+        self.share, self.certainty = finding.share, finding.certainty
+        self.parameters = {e.name.split(".", 1)[-1]: e.value for e in finding.parameters}
 
-    def add_to(self, model: Model) -> Model:
+    def to_json(self) -> dict:
+        """An entry of findings[] of `twinmill diagnose --json`, and what ranking[] has beside.
+
+        Examples:
+            >>> d.best.to_json()["certainty"]
+            'sure'
+        """
+        return plain({**self._ranked.to_json(), **self._result.to_json()})
+
+    def add_to(self, model: Model | str | Path) -> Model:
         """Adds the effect to a model, all fitted to the log of the diagnosis.
 
         Args:
-            model: that lacks it.
+            model: that lacks it, or the name of one.
 
         Returns:
             The new model.
 
         Raises:
-            ValueError: the effect is made for another drive, or, of the camera, it is there.
+            ValueError: the model has the effect already, and that of the diagnosis had not; or the
+                effect is made for another drive.
 
         Examples:
             >>> d.best.add_to(tm.Model.load("fitted.toml")).effects
             ['coasting']
         """
-        return model.add(self.effect.split("#")[0], self._log).model
+        model, effect = _model(model), self.effect.split("#")[0]
+        if effect in model.effects and not self._result.again:
+            raise ValueError(
+                f"{model.name}: has {effect} already, and the model of the diagnosis had not; fit "
+                "this one to the log."
+            )
+        return model.add(effect, self._log).model
 
     def table(self) -> pd.DataFrame:
         """Its parameters.
@@ -806,22 +826,39 @@ class Diagnosis(_Shown):
         self._result = result
         self.verdict, self.sentence = result.verdict, result.sentence
         ranked = {r.effect: r for r in result.ranking}
-        self.found = [Finding(ranked[name], log) for name in result.found if name in ranked]
+        self.found = [
+            Finding(result.finding(name), ranked[name], log)
+            for name in result.found
+            if name in ranked
+        ]
         self.best = self.found[0] if self.found else None
 
     def table(self) -> pd.DataFrame:
-        """All effects that were tried, best first.
+        """The effects that explain most, best first.
 
         Returns:
             effect, found, score_heldout, share_explained, p_value, group (effects of one number
-            look alike in this log).
+            look alike in this log), takes_away and certainty (of what was found, as `share` and
+            `certainty` of `Finding`), estimates (with standard errors; of what was not found, when
+            it was tried alone).
 
         Examples:
             >>> d.table().loc[0, "effect"]
             'coasting'
         """
         keys = ("effect", "score_heldout", "share_explained", "p_value", "group")
-        table = pd.DataFrame([{k: getattr(r, k) for k in keys} for r in self._result.ranking])
+        rows = []
+        for r in self._result.ranking:
+            f = self._result.finding(r.effect)
+            rows.append(
+                {
+                    **{k: getattr(r, k) for k in keys},
+                    "takes_away": f.share if f else np.nan,
+                    "certainty": f.certainty if f else "",
+                    "estimates": diagnosis_report.estimates((f or r).parameters),
+                }
+            )
+        table = pd.DataFrame(rows)
         if len(table):
             table.insert(1, "found", table["effect"].isin(self._result.found))
         return table

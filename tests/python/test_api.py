@@ -219,6 +219,19 @@ def test_a_fit_is_shown_with_its_own_clock_and_name_and_says_that_nothing_is_wri
     assert "Not written yet" in text and "Written:" not in text
 
 
+def test_what_was_found_has_one_set_of_numbers(here):
+    d = tm.diagnose("run.lcmlog", "fitted.toml")
+    (told,) = d.to_json()["findings"]
+    assert d.best.share == told["share"]
+    assert [p["value"] for p in told["parameters"]] == list(d.best.parameters.values())
+    row = d.table().set_index("effect").loc["coasting"]
+    assert (row["takes_away"], row["certainty"]) == (told["share"], told["certainty"])
+    shown = re.findall(r"^ coasting .*(deceleration_mps2 \S+ ± \S+)", str(d), re.MULTILINE)
+    assert len(shown) == 2 and all(text in row["estimates"] for text in shown)  # in both tables
+    with pytest.raises(ValueError, match="has coasting already"):
+        d.best.add_to("hidden.toml")
+
+
 def test_importing_needs_no_numbers():
     code = "import sys, twinmill; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -83,6 +83,11 @@ class Diagnosis:
         """All effects that were found."""
         return [*self.motion, *(f.effect for f in self.camera)]
 
+    def finding(self, effect: str) -> Finding | None:
+        """What was found of an effect; None if it was not."""
+        own = [f for f in (*self.findings, *self.camera) if f.effect == effect]
+        return own[0] if own else None
+
     @property
     def model(self) -> native.Model:
         """The common model with the findings of the motion."""

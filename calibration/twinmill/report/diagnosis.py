@@ -50,7 +50,7 @@ def findings(diagnosis: Diagnosis) -> Table:
                 Cell(f"{f.effect}{names}", "good"),
                 Cell(f.takes, "", f.share),
                 Cell(f.certainty, certainty),
-                Cell(", ".join(_estimate(e) for e in f.parameters)),
+                Cell(estimates(f.parameters)),
             ]
         )
     if rows:
@@ -78,7 +78,7 @@ def ranking(diagnosis: Diagnosis) -> Table:
     """Table of all effects that were tried, best first, with scores and estimates."""
     rows = []
     for r in diagnosis.ranking:
-        found = r.effect in diagnosis.found
+        found = diagnosis.finding(r.effect)
         rows.append(
             [
                 Cell(r.effect, "good" if found else "dim"),
@@ -86,7 +86,7 @@ def ranking(diagnosis: Diagnosis) -> Table:
                 Cell(f"{100 * r.share_explained:.0f} %"),
                 Cell(f"{r.p_value:.3f}"),
                 Cell("" if r.group is None else str(r.group)),
-                Cell(", ".join(_estimate(e) for e in r.parameters)),
+                Cell(estimates((found or r).parameters)),
             ]
         )
     return Table(
@@ -95,8 +95,8 @@ def ranking(diagnosis: Diagnosis) -> Table:
         rows,
         "Found effects are coloured. The score is of drives that were not fitted to; explains: "
         "share of what anything could explain; p: chance of such a fit if nothing were missing, "
-        "for all effects together; effects of one group look alike in this log. Estimates are "
-        "those of the step that tried an effect, before what came later was fitted beside it.",
+        "for all effects together; effects of one group look alike in this log. Estimates of "
+        "effects that were not found are those of the step that tried them.",
         words=(0, 5),
     )
 
@@ -156,7 +156,7 @@ def robots_off(diagnosis: Diagnosis) -> Table:
             Cell(number(off.score_before), tone(off.score_before)),
             Cell(number(off.score_after), tone(off.score_after)),
             Cell(f"{off.p_value:.1g}"),
-            Cell(", ".join(_estimate(e) for e in off.parameters)),
+            Cell(estimates(off.parameters)),
         ]
         for off in diagnosis.robots_off
     ]
@@ -353,6 +353,11 @@ def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
     return [
         (names.get(s["effect"], f"+ {s['effect']}"), s["score_heldout"]) for s in steps(diagnosis)
     ]
+
+
+def estimates(parameters: Sequence[ParameterEstimate]) -> str:
+    """Names, values and standard errors, in a line."""
+    return ", ".join(map(_estimate, parameters))
 
 
 def _estimate(estimate: ParameterEstimate) -> str:
