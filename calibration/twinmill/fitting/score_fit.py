@@ -474,9 +474,14 @@ class ScoreFit:
 
     @cached_property
     def _intervals(self) -> np.ndarray:
-        """(P, P) the same, its scatter widened by Student's t for so few blocks."""
+        """(P, P) the same, its scatter widened by Student's t for so few blocks.
+
+        And by how far the prior pulled what came out far from it: G^-1 D (x - usual), to first
+        order, by the curvature G and the prior's precision D.
+        """
         widening = student.ppf(0.975, max(self.blocks - 1, 1)) / NORMAL_95
-        return self.covariance + (widening**2 - 1) * self._scatter_covariance
+        pull = np.linalg.pinv(self._curvature) @ ((self.x - self.usual) / self.std**2)
+        return self.covariance + (widening**2 - 1) * self._scatter_covariance + np.outer(pull, pull)
 
     @property
     def stds(self) -> np.ndarray:

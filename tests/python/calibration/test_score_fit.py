@@ -253,6 +253,16 @@ def test_a_narrow_prior_holds_and_a_wide_one_does_not(straight, model_file, trut
     assert let_go.value == pytest.approx(truth[LAG], abs=0.01) and let_go.seen
 
 
+def test_an_interval_reaches_back_over_what_the_prior_pulled(straight, model_file):
+    """The free estimate lies where a fit without the prior puts it, far from the prior's middle."""
+    (free,) = (e for e in score_fit([straight], model_file()).shared_estimates() if e.name == LAG)
+    far = free.value + 0.05
+    pulled = score_fit([straight], model_file(), base__motor_lag_s={"usual": far, "std": 0.01})
+    (held,) = (e for e in pulled.shared_estimates() if e.name == LAG)
+    assert abs(held.value - free.value) < 1.96 * held.std
+    assert held.std > 0.7 * abs(held.value - free.value)
+
+
 def test_an_estimate_at_its_bound_is_marked(straight, model_file):
     for bound, value in (({"max": 0.07}, 0.07), ({"min": 0.12, "value": 0.13}, 0.12)):
         found = score_fit([straight], model_file(), base__motor_lag_s=bound).shared_estimates()
