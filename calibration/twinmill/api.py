@@ -58,6 +58,7 @@ TERMINAL_COLUMNS = 100
 A_PATH = "the path of a file"
 NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
 Result = TypeVar("Result")
+Shown = TypeVar("Shown", bound="_Shown")
 
 # The threads of a BLAS wait in loops: on matrices as narrow as ours, two take many times the
 # processor time of one where other programs run, and are no sooner done.
@@ -65,9 +66,14 @@ _one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
 
 
 class _Shown:
-    """What all results share: one line, a table for notebooks, text for terminals, JSON."""
+    """What all results share: one line, a table for notebooks, text for terminals, JSON.
+
+    Attributes:
+        left_out: sentences on robots and logs that could not be judged, and on what else is odd.
+    """
 
     _result: Any
+    left_out: tuple[str, ...] = ()
 
     def to_json(self) -> dict:
         """The same object as `--json` of the command, without how the command was called."""
@@ -82,7 +88,10 @@ class _Shown:
 
     def __str__(self) -> str:
         out = StringIO()
-        Console(file=out, width=TERMINAL_COLUMNS, color_system=None).print(self._text())
+        lines = [f"! {said}" for said in self.left_out]
+        Console(file=out, width=TERMINAL_COLUMNS, color_system=None).print(
+            *lines, self._text(), sep="\n", markup=False, highlight=False
+        )
         return out.getvalue().rstrip()
 
     def __reduce__(self) -> str:
@@ -478,7 +487,7 @@ class Model(_Shown):
                 robot_id=robot,
             ),
         )
-        return Addition(result, Model(file))
+        return _told(Addition(result, Model(file)), measurements)
 
     def diagnose(self, log: "Log | str | Path", **options: Any) -> "Diagnosis":
         """Names the physical effect that the model lacks.
@@ -944,7 +953,8 @@ def compare(log: Log | str | Path, model: Model | str | Path | None = None) -> C
         ['log', 'robot_id', 'channel', 'unit', 'horizon_s', 'rms', 'floor', 'ratio']
     """
     model = _model(model)
-    return Comparison(_compare.compare(_log(log).measurements(model), model.file))
+    measurements = _log(log).measurements(model)
+    return _told(Comparison(_compare.compare(measurements, model.file)), measurements)
 
 
 @_one_thread
@@ -975,7 +985,7 @@ def fit(log: Log | str | Path, model: Model | str | Path | None = None) -> Fit:
         f"{start.file.path.stem}_fitted.toml",
         lambda out: _fit.fit(measurements, start.file, out, "twinmill.fit"),
     )
-    return Fit(result, Model(file))
+    return _told(Fit(result, Model(file)), measurements)
 
 
 @_one_thread
@@ -1012,10 +1022,9 @@ def diagnose(
     log, model = _log(log), _model(model)
     checked("progress", progress, (Callable, NoneType), "a function that takes a text")
     excluded = known("without", without, catalogue())
-    result = _diagnose.diagnose(
-        log.measurements(model), model.file, progress or (lambda _: None), excluded
-    )
-    return Diagnosis(result, log)
+    measurements = log.measurements(model)
+    result = _diagnose.diagnose(measurements, model.file, progress or (lambda _: None), excluded)
+    return _told(Diagnosis(result, log), measurements)
 
 
 def simulate(
@@ -1081,6 +1090,13 @@ def _model(model: Model | str | Path | None) -> Model:
     wanted = "a model, or the name of one"
     model = checked("model", model, (Model, str, Path, NoneType), wanted)
     return model if isinstance(model, Model) else Model.load(model or DEFAULT_MODEL)
+
+
+def _told(shown: Shown, measurements: Measurements) -> Shown:
+    """The result, with what was found wrong with its logs."""
+    mild = [str(f) for f in measurements.findings if not f.fatal]
+    shown.left_out = (*measurements.excluded, *mild)
+    return shown
 
 
 @contextmanager

@@ -21,12 +21,9 @@ def checked(name: str, value: Any, kinds: Any, wanted: str) -> Any:
     """
     if isinstance(value, kinds):
         return value
-    kind, hint = type(value).__name__, ""
-    if isinstance(value, str | int | float):
-        kind = f"{value!r}"
-    elif hasattr(value, "model"):
-        hint = "; its attribute `model` is a model"
-    raise TypeError(f"{name}: must be {wanted}, not {kind}{hint}.")
+    came = repr(value) if isinstance(value, str | int | float) else f"a {type(value).__name__}"
+    hint = " (its attribute `model` is a model)" if hasattr(value, "model") else ""
+    raise TypeError(f"{name}: is {came}{hint}, and must be {wanted}.")
 
 
 def known(what: str, names: Iterable[str], all_names: Collection[str]) -> tuple[str, ...]:

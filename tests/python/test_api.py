@@ -10,7 +10,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import lcm
 import pytest
+import turbopi
 from matplotlib import pyplot
 
 import twinmill as tm
@@ -74,7 +76,9 @@ def test_the_examples_of_the_documentation_run(here):
 def test_everything_public_has_an_example():
     for found in doctest.DocTestFinder(exclude_empty=False).find(api, "tm"):
         private = any(part.startswith("_") for part in found.name.split("."))
-        assert private or found.name in ("tm", "tm.Result") or found.examples, found.name
+        assert private or found.name in ("tm", "tm.Result", "tm.Shown") or found.examples, (
+            found.name
+        )
 
 
 def test_a_comparison_is_that_of_the_command(here, capsys):
@@ -148,22 +152,37 @@ def test_what_is_wrong_is_said_in_a_sentence(here):
 
 
 WRONG_TYPES = {  # what is called, and what the sentence says
-    "no log": (lambda log, model: tm.compare(None), "log: must be a log"),
-    "swapped": (lambda log, model: tm.compare(model, log), "model: .* not Log"),
-    "table": (lambda log, model: tm.fit(log.table()), "log: .* not DataFrame"),
-    "list": (lambda log, model: tm.load(["run.lcmlog"]), "log: .* not list"),
+    "no log": (lambda log, model: tm.compare(None), "log: is a NoneType, and must be a log"),
+    "swapped": (lambda log, model: tm.compare(model, log), "model: is a Log, and must be"),
+    "table": (lambda log, model: tm.fit(log.table()), "log: is a DataFrame, and must be"),
+    "list": (lambda log, model: tm.load(["run.lcmlog"]), "log: is a list, and must be"),
     "class": (lambda log, model: tm.Log("run.lcmlog"), "paths: .*`load`"),
-    "script": (lambda log, model: tm.simulate(script=log.table()), "script: .* not DataFrame"),
-    "no model": (lambda log, model: tm.Model.load(None), "model: must be the name"),
-    "number": (lambda log, model: tm.compare(log, 5), "model: .* not 5"),
+    "script": (
+        lambda log, model: tm.simulate(script=log.table()),
+        "script: is a DataFrame, and must be",
+    ),
+    "no model": (
+        lambda log, model: tm.Model.load(None),
+        "model: is a NoneType, and must be the name",
+    ),
+    "number": (lambda log, model: tm.compare(log, 5), "model: is 5, and must be"),
     "not the model of it": (lambda log, model: tm.compare(log, _Holder(model)), "`model` is"),
     "file": (lambda log, model: tm.Model("turbopi.toml"), "file: .*`Model.load`"),
-    "quantity": (lambda log, model: model[0], "quantity: .* not 0"),
-    "width": (lambda log, model: model.add("dead_zone", log, width=0.1), "width: .* not 0.1"),
-    "robot": (lambda log, model: model.add("dead_zone", log, robot="1"), "robot: .* not '1'"),
-    "effects": (lambda log, model: model.add(["dead_zone"], log), "effect: .* not list"),
+    "quantity": (lambda log, model: model[0], "quantity: is 0, and must be"),
+    "width": (
+        lambda log, model: model.add("dead_zone", log, width=0.1),
+        "width: is 0\\.1, and must be",
+    ),
+    "robot": (
+        lambda log, model: model.add("dead_zone", log, robot="1"),
+        "robot: is '1', and must be",
+    ),
+    "effects": (lambda log, model: model.add(["dead_zone"], log), "effect: is a list, and must be"),
     "letters": (lambda log, model: tm.diagnose(log, without="dead_zone"), "without: .*list"),
-    "progress": (lambda log, model: tm.diagnose(log, progress=True), "progress: .* not True"),
+    "progress": (
+        lambda log, model: tm.diagnose(log, progress=True),
+        "progress: is True, and must be",
+    ),
 }
 
 
@@ -207,6 +226,25 @@ def test_of_several_logs_all_views_show_the_same_robot(here, tmp_path):
     mine = rows[rows["log"] == data["log"]]
     assert mine["rms"].tolist() == [row["rms"] for row in data["errors"]]
     assert "run.lcmlog" in repr(found) and "other.lcmlog" in repr(found)
+
+
+def test_a_robot_that_is_left_out_is_told(here, tmp_path):
+    """Its poses are those of the middle of the room, in a log that is else the same."""
+    dead = tmp_path / "dead.lcmlog"
+    log = lcm.EventLog(str(dead), "w", overwrite=True)
+    for event in lcm.EventLog("run.lcmlog", "r"):
+        data = event.data
+        if event.channel.endswith("_POSE"):
+            pose = turbopi.pose_t.decode(data)
+            pose.position_m, pose.orientation_wxyz = [0, 0, 0], [1, 0, 0, 0]
+            data = pose.encode()
+        log.write_event(event.timestamp, event.channel, data)
+    log.close()
+    with pytest.raises(tm.LogError, match="poses do not move"):
+        tm.compare(dead)
+    found = tm.compare(tm.load("run.lcmlog", dead), "fitted.toml")
+    (said,) = found.left_out
+    assert said.startswith("Left out: dead.lcmlog R00") and "Left out" in str(found)
 
 
 def test_a_fit_is_shown_with_its_own_clock_and_name_and_says_that_nothing_is_written(here):

@@ -404,7 +404,9 @@ Model Model::Load(const std::string &name)
 std::string FindModelFile(const std::string &name)
 {
     namespace fs = std::filesystem;
-    const std::string file = fs::path(name).has_extension() ? name : name + ".toml";
+    const bool is_whole = fs::path(name).has_extension();
+    const std::string file = is_whole ? name : name + ".toml";
+    const fs::path kind = is_whole ? fs::path(name).extension() : ".toml";
     std::error_code unreadable;
     for (const std::string &here : {name, file})
         if (fs::is_regular_file(here, unreadable))
@@ -421,7 +423,7 @@ std::string FindModelFile(const std::string &name)
             continue;
         if (entry.path().filename() == file)
             return entry.path().string();
-        if (entry.path().extension() == fs::path(file).extension())
+        if (entry.path().extension() == kind)
             others.insert(entry.path().filename().string());
     }
     std::string list;
