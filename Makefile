@@ -70,7 +70,7 @@ docs: build
 	@cmp -s docs/requirements.txt .deps/docs/requirements.txt || { rm -rf .deps/docs && \
 	    $(PYTHON) -m pip install --quiet --no-deps --target .deps/docs \
 	    --requirement docs/requirements.txt && cp docs/requirements.txt .deps/docs; }
-	@PYTHONPATH=.deps/docs $(PYTHON) -m mkdocs --quiet build
+	@PYTHONPATH=.deps/docs NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs --quiet build
 
 # One file to install with pip where there is no compiler: dist/twinmill-*.whl.
 wheel: build

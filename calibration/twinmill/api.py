@@ -108,7 +108,7 @@ class Log(_Shown):
     """One recorded run, or several: what robots were told, and where they were.
 
     Attributes:
-        paths: of the files.
+        paths: the files of the runs.
 
     Examples:
         >>> log = tm.load("run.lcmlog")
@@ -144,7 +144,7 @@ class Log(_Shown):
             A list of runs; its `findings` say what is wrong with the others.
 
         Raises:
-            BadInputError: by what is wrong with the logs, nothing is left to judge.
+            BadInputError: all logs are unusable; the message says why.
             LogError: a run is shorter than 10 s.
 
         Examples:

@@ -37,21 +37,32 @@ def register(app: typer.Typer) -> None:
 def _ask(
     question: Annotated[Question, typer.Argument(show_default=False)],
     *,
-    behavior: Annotated[str, typer.Option("--behavior")] = "milling",
-    model: Annotated[str, typer.Option("--model", "-m", metavar="M")] = "paper.toml",
+    behavior: Annotated[
+        str, typer.Option("--behavior", help="Behaviour of the swarm.")
+    ] = "milling",
+    model: Annotated[
+        str, typer.Option("--model", "-m", metavar="M", help="Model of the robots.")
+    ] = "paper.toml",
     n: Annotated[
         int | None, typer.Option("--n", help="Robots, where they are not asked for.")
     ] = None,
     seeds: Annotated[int, typer.Option("--seeds", min=10, help="Runs of each value.")] = 100,
-    duration_s: Annotated[float, typer.Option("--duration-s", min=1)] = 120,
+    duration_s: Annotated[
+        float, typer.Option("--duration-s", min=1, help="Length of a run.")
+    ] = 120,
     goal: Annotated[
         str | None, typer.Option("--goal", help="Class that is wanted; default: the behaviour's.")
     ] = None,
     at_least: Annotated[
         float, typer.Option("--at-least", min=0.01, max=1, help="Share of runs that is enough.")
     ] = 0.9,
-    target_radius_m: Annotated[float | None, typer.Option("--target-radius-m")] = None,
-    start: Annotated[str, typer.Option("--start")] = "square",
+    target_radius_m: Annotated[
+        float | None,
+        typer.Option(
+            "--target-radius-m", help="Radius of what a camera sees; 0: the other robot's centre."
+        ),
+    ] = None,
+    start: Annotated[str, typer.Option("--start", help="Where the robots start.")] = "square",
     as_json: AsJson = False,
     out: Out = None,
 ) -> list[Curve]:

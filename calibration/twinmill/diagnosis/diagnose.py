@@ -75,7 +75,8 @@ LACKS = {
     "wheel_angle": "a steady table gives means over many turns of the wheels",
 }
 TWO_CLOCKS = (
-    "the clocks are two, and their offset hides a delay; say that they are one (twinmill import "
+    "commands and poses use different clocks, so a delay cannot be told from the offset; if both "
+    "use one clock, say so (twinmill import "
     "--same-clock), or fit a calibration log on the same clocks first"
 )
 NO_HEADING = "the heading was not recorded, and what the robot holds is found"

@@ -71,9 +71,9 @@ def irregularity_notes(
         ratio = irregularity(own, noise, model) if noise and own.data else 0.0
         if ratio > SETTINGS.irregular:
             notes.append(
-                f"{own.measurement.label}: what no smooth response to the commands follows is "
-                f"{ratio:.1f} times what the noise in the model file makes (more random "
-                "disturbance, slipping wheels, play in the gears or a rough floor may be)."
+                f"{own.measurement.label}: the unexplained scatter is {ratio:.1f} times "
+                "the noise in the model file (more random disturbance, slipping wheels, "
+                "play in the gears or a rough floor may be)."
             )
     return notes
 

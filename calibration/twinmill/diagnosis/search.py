@@ -184,7 +184,7 @@ class Search:
             if s.size < 1e-6:
                 hidden.append((s.name, "the data have no drive on which it acts"))
             elif self.settings.traced**2 * s.size < self.settings.faint:
-                hidden.append((s.name, "three times its usual strength would not show"))
+                hidden.append((s.name, "even three times its usual size would not be visible"))
         return hidden
 
     @property

@@ -196,6 +196,8 @@ class VerdictInputs:
             return events
         on = self._continuous
         depends = f", and depends on {' and '.join(on)}" if on else ""
+        if not (on or self.rest.firm):
+            return f" {100 * self.rest.share:.0f} % is left, which may be noise.{events}"
         return (
             f" Something else is left: {100 * self.rest.share:.0f} % of the squared error above "
             f"the noise{depends}; no effect of the catalogue takes it.{events}"

@@ -14,6 +14,7 @@ from twinmill.experiment.screen import screen
 from twinmill.model.parameters import Parameter, all_effect_parameters, catalogue
 from twinmill.predict.modelled_log import ModelledLog
 
+MOST_NAMED = 5  # effects in a sentence
 WEAKEST = 4  # effects that show least, where nothing else is in question
 
 
@@ -74,14 +75,14 @@ def question(
     """
     names = [s.name for s in known]
     if asked.alike:
-        return asked.alike, f"These logs cannot tell {' from '.join(asked.alike)}."
+        return asked.alike, f"These logs cannot tell {_from(asked.alike)}."
     doubtful = []
     for effect in (n for n in asked.named if n in names):
         rivals = np.flatnonzero(margins[names.index(effect), 1:] < least_chi2)
         doubtful += [effect, *(names[j] for j in rivals)] if len(rivals) else []
     if doubtful:
         doubtful = list(dict.fromkeys(doubtful))
-        return doubtful, f"These logs hardly tell {' from '.join(doubtful)}."
+        return doubtful, f"These logs hardly tell {_from(doubtful)}."
     if asked.hidden:
         return asked.hidden, f"These logs cannot show {', '.join(asked.hidden)}."
     if len(asked.closest) > 1:
@@ -141,3 +142,9 @@ def _without(diagnosis: Diagnosis, names: list[str], base: list[Parameter]) -> S
 def _values(ranked: list[Ranked]) -> dict[str, dict[str, float]]:
     """Fitted parameters by effect and short name."""
     return {r.effect: {e.name.split(".", 1)[1]: e.value for e in r.parameters} for r in ranked}
+
+
+def _from(names: list[str]) -> str:
+    """`a from b from c`; of many the first, and how many more."""
+    more = len(names) - MOST_NAMED
+    return " from ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

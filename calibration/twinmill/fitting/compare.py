@@ -142,10 +142,7 @@ class Comparison:
         if not np.isfinite(self.score):
             return "No score: no log tells its noise from the motion."
         if self.score < SUSPECT:
-            return (
-                "Better than any smooth response to the commands that was tried: as good as this "
-                "log can tell."
-            )
+            return "Predicts better than the noise estimate: this log shows nothing to improve."
         if self.score <= GOOD:
             return "As good as this log can tell: nothing is missing that it would show."
         if self.score <= MISSING:

@@ -69,7 +69,8 @@ def findings(diagnosis: Diagnosis) -> Table:
         ["effect", "takes away", "certainty", "estimates"],
         rows,
         "Takes away: share of the squared error at 0.5 s above the log's noise, on parts of the "
-        "data that were not fitted to.",
+        "data that were not fitted to. Estimates: ± is one standard error; a 95 % interval is "
+        "about twice that to each side.",
         words=(0, 2, 3),
     )
 
@@ -233,7 +234,7 @@ def _said(diagnosis: Diagnosis) -> list[RenderableType]:
         Text(f"{diagnosis.sentence}", show.STYLES[TONES[diagnosis.verdict]]),
         Text(
             f"score {number(diagnosis.before.score)} as given, "
-            f"{number(diagnosis.score_refit)} after a refit of the base"
+            f"{number(diagnosis.score_refit)} after a refit of the base (on held-out data)"
         ),
         Text(),
     ]

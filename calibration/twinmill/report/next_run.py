@@ -123,7 +123,14 @@ def _chances(plan: Plan) -> Table:
     ]
     return Table(
         "What it tells apart",
-        ["effect", "best\nimitation", "margin\nso far", "with\nthis run", "named\nso far", "then"],
+        [
+            "effect",
+            "best\nimitation",
+            "margin (chi2)\nso far",
+            "margin (chi2)\nwith this run",
+            "named\nso far",
+            "then",
+        ],
         rows,
         "Margin: chi2 of the effect's trace that no rival and no change of the base could leave, "
         "at its fitted strength or else its usual one. Named: chance that it is, if it is the one: "

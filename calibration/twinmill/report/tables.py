@@ -27,8 +27,8 @@ SHOWN = {
 }  # unit: factor, as a person reads it
 WORST = 3  # regimes of a group
 TOGETHER = (
-    "Told together: the log tells how such quantities go together (the covariance in the model "
-    "file), as that one side is weaker, and none of them by itself."
+    "Known only in combination: the log determines how such quantities go together (the "
+    "covariance in the model file), as that one side is weaker, but none of them by itself."
 )
 
 
@@ -110,20 +110,21 @@ def _held_heading(robot: RobotComparison) -> list[tuple[str, str]]:
 
 
 def _noise(noise: Noise, has_heading: bool) -> str:
-    """In words: what the sensor adds to a pose, and how the robot itself wavers."""
+    """In words: what the sensor adds to a pose, and how the robot itself varies."""
     at = noise.position
     if not has_heading:
         return (
             f"each measured place is off by {number(1000 * at.sensor, 2)} mm; the robot's speed "
-            f"wavers by {number(1000 * at.drive, 2)} mm/s for {number(at.memory_s, 2)} s at a time"
+            f"varies by {number(1000 * at.drive, 2)} mm/s "
+            f"(correlation time {number(at.memory_s, 2)} s)"
         )
     heading = noise.heading
     mm, degrees = number(1000 * at.sensor, 2), number(np.degrees(heading.sensor), 2)
     mm_s, degrees_s = number(1000 * at.drive, 2), number(np.degrees(heading.drive), 2)
     return (
         f"each measured pose is off by {mm} mm and {degrees}°; "
-        f"the robot's speed wavers by {mm_s} mm/s for {number(at.memory_s, 2)} s at a time, "
-        f"its turning by {degrees_s}°/s for {number(heading.memory_s, 2)} s"
+        f"the robot's speed varies by {mm_s} mm/s (correlation time {number(at.memory_s, 2)} s), "
+        f"its turning by {degrees_s}°/s ({number(heading.memory_s, 2)} s)"
     )
 
 
@@ -203,9 +204,9 @@ def parameters(estimates: list[ParameterEstimate]) -> Table:
     rows = []
     for e in estimates:
         told = e.seen or e.together
-        remark = "not told by this log"
+        remark = "not determined by this log"
         if told:
-            remark = "at its bound" if e.at_bound else "" if e.seen else "told together"
+            remark = "at its bound" if e.at_bound else "" if e.seen else "known only in combination"
         value, std = (
             (rounded(e.value, e.std), f"± {number(e.std)}") if told else (number(e.value), "-")
         )
