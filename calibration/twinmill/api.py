@@ -171,7 +171,7 @@ class Log(_Shown):
 
     @property
     def duration_s(self) -> float:
-        """Of the longest log.
+        """Length of the longest log.
 
         Examples:
             >>> tm.load("run.lcmlog").duration_s > 59

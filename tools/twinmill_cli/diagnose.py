@@ -49,8 +49,9 @@ def _diagnose(
 ) -> Diagnosis:
     """Name the physical effect that a model lacks, or say that none is or that the log cannot tell.
 
-    Best on a model whose base was fitted to another log of the same robot and clocks: then a lag
-    that is new and a delay can be told from what was there before.
+    Best on a model whose base was fitted to another log of the same robot and clocks.
+
+    Then a new lag or delay can be told from what was there before.
 
     Example: twinmill diagnose run.lcmlog --model fitted.toml
     """
