@@ -14,7 +14,7 @@ from twinmill.data.track import command_at
 from twinmill.diagnosis.library import TIME
 from twinmill.diagnosis.search import Trial
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.model.parameters import Parameter, effect_names
+from twinmill.model.parameters import Parameter, effect_names, needing
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
@@ -47,8 +47,21 @@ class Change:
         )
 
 
-def changes_of(trial: Trial) -> dict[str, Change]:
-    """The strongest change of each effect's instance that is not one number; logs alone tell."""
+@dataclass(frozen=True)
+class OneHeading:
+    """An error of the heading that was told along one heading alone."""
+
+    why: str = (
+        "the robot drove along one heading, where an error that changes with the heading looks "
+        "the same"
+    )
+
+
+def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
+    """The strongest change of each effect's instance that is not one number; logs alone tell.
+
+    An error of the heading may change with it unseen where the robot kept to one.
+    """
     fit = trial.fit
     logs = [i for i, d in enumerate(fit.datasets) if isinstance(d, Trajectory)]
     instances = set(effect_names(trial.state.model))
@@ -62,14 +75,21 @@ def changes_of(trial: Trial) -> dict[str, Change]:
     left, columns, blocks = fit.whitened(logs)
     basis = np.linalg.qr(np.vstack([columns, np.diag(1 / fit.std)]))[0]
     doing = [_doing(fit.datasets[i]) for i in logs]
-    found: dict[str, Change] = {}
+    found: dict[str, Change | OneHeading] = {}
+    rows = [fit.datasets[i].measured[0].size for i in logs]
+
+    def done(key: tuple[str, str]) -> np.ndarray:
+        """(R,) what the robot was doing, for each row."""
+        return np.concatenate([np.repeat(d[key], n) for d, n in zip(doing, rows, strict=True)])
+
+    heading = done(("heading", "cos")) + 1j * done(("heading", "sin"))
+    for c in sizes:
+        instance, own = fit.unknowns[c].parameter.name.split(".")[0], columns[:, c] ** 2
+        of_heading = instance.split("#")[0] in needing("heading")
+        if of_heading and abs(own @ heading) > SETTINGS.one_heading * own.sum():
+            found[instance] = OneHeading()
     for on, way in [key for key in doing[0] if all(key in d for d in doing)]:
-        values = np.concatenate(
-            [
-                np.repeat(d[on, way], fit.datasets[i].measured[0].size)
-                for d, i in zip(doing, logs, strict=True)
-            ]
-        )
+        values = done((on, way))
         for c in sizes:
             change = _change(
                 trial=trial,

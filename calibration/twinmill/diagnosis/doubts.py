@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from twinmill.diagnosis.constancy import Change
+from twinmill.diagnosis.constancy import Change, OneHeading
 from twinmill.diagnosis.finding import Finding, doubted
 from twinmill.diagnosis.library import CHANGE, TIME
 from twinmill.diagnosis.rest import Rest
@@ -44,7 +44,12 @@ BY = {
 }
 
 
-def of_one(done: Search, name: str, own: Sequence[ParameterEstimate], change: Change | None) -> str:
+def of_one(
+    done: Search,
+    name: str,
+    own: Sequence[ParameterEstimate],
+    change: Change | OneHeading | None,
+) -> str:
     """A doubt about one effect by itself; empty if there is none.
 
     Args:
@@ -282,11 +287,14 @@ FORM_RULES = (_swings, _comes_and_goes, _is_some_moments, _leaves_its_own, _is_s
 def _much_left_by(rest: Rest, group: str) -> bool:
     """Whether a group takes much of what is left; of one without formulas that is not known."""
     taken = (rest.left_over or {}).get(group, 1.0)
-    return rest.share > SETTINGS.nothing_left and taken > SETTINGS.form_takes
+    much = taken > SETTINGS.form_takes or rest.share > SETTINGS.lag_leaves
+    return rest.share > SETTINGS.nothing_left and much
 
 
 def _alike_losses(found: Sequence[Finding]) -> list[Finding]:
     """Findings of a moment, and those of a place that are as large as one of a moment.
+
+    Or that are doubtful, and take so much that they stand for something.
 
     None of a moment that ends where another begins: together they are one of another form.
     """
@@ -296,6 +304,8 @@ def _alike_losses(found: Sequence[Finding]) -> list[Finding]:
     def as_large(finding: Finding) -> bool:
         own, *_ = finding.parameters
         losses = [f.parameters[0] for f in events]
+        if events and finding.certainty == "doubtful" and finding.share > SETTINGS.much_left:
+            return True
         known = own.value > SETTINGS.within * own.std
         return known and any(
             abs(own.value - e.value) < SETTINGS.within * np.hypot(own.std, e.std) for e in losses

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import twinmill_native as native
 
-from twinmill.diagnosis.constancy import Change, changes_of
+from twinmill.diagnosis.constancy import Change, OneHeading, changes_of
 from twinmill.diagnosis.doubts import beside_larger, of_one, seen_once, stand_in
 from twinmill.diagnosis.finding import Finding, Late, Ranked, doubted
 from twinmill.diagnosis.library import TIME
@@ -218,7 +218,7 @@ def _finding(
     *,
     less: Trial | None,
     share: float,
-    changes: Mapping[str, Change],
+    changes: Mapping[str, Change | OneHeading],
 ) -> Finding:
     estimates = done.last.fit.shared_estimates()
     if name == REFIT:

@@ -60,7 +60,7 @@ class Settings(Numbers):
     weighty: float = number(0.1, "share of the loudest visit that another must bring to count")
     slight: float = number(0.3, "share of what is left that a second finding must take")
     much_left: float = number(0.3, "share left, beyond which no name is sure")
-    lag_leaves: float = number(0.25, "share left, beyond which no lag is sure")
+    lag_leaves: float = number(0.25, "the same of a lag, and of what the rest depends on")
     form_takes: float = number(0.15, "share of what is left, by which a finding has another form")
     nearly_all: float = number(0.85, "... beyond which share it is still the same physics")
     same: float = number(0.8, "cosine of what two take, from which they take the same errors ...")
@@ -69,6 +69,7 @@ class Settings(Numbers):
     companion_evidence: float = number(9.0, "fall of the cost if a size changed with the drive")
     companion_t: float = number(3.0, "the same over blocks: standard errors from zero")
     companion_change: float = number(0.15, "least change of the size per standard deviation")
+    one_heading: float = number(0.9, "mean direction of headings, beyond which they are one")
 
     # What is left.
     nothing_left: float = number(0.02, "share of the first excess: where less is left, nothing is")

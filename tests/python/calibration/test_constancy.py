@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a log could tell that an effect is one number."""
+
+import numpy as np
+import pytest
+
+from twinmill.diagnosis.constancy import OneHeading, changes_of
+from twinmill.diagnosis.diagnose import first_state
+from twinmill.diagnosis.search import fitted, with_effects
+from twinmill.fitting.opening import judged, open_measurements
+
+BIAS_RAD = 0.06
+
+
+@pytest.mark.parametrize("turn", [False, True])
+def test_a_heading_bias_along_one_heading_may_be_one_that_changes_with_it(
+    turn, tanh_robot, measure, model_file
+):
+    """Legs to and fro along one line of the room, or with a turn on the spot between them."""
+    legs = [[(d,) * 4] * 48 for d in (100, 0, -100, 0, 50, 0, -50, 0)]
+    spin = [[(-60, 60, -60, 60)] * 30] if turn else []
+    run = measure(tanh_robot(), 6, script_pct=np.concatenate([*legs, *spin] * 4))
+    run = run.with_pose(run.track.pose + [0, 0, BIAS_RAD])
+    guess = model_file()
+    state = first_state(judged(open_measurements([run], guess)), guess, ())
+    told = changes_of(fitted(with_effects(state, ["heading_bias"])))
+    assert isinstance(told.get("heading_bias"), OneHeading) != turn
