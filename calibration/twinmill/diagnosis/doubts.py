@@ -287,8 +287,7 @@ FORM_RULES = (_swings, _comes_and_goes, _is_some_moments, _leaves_its_own, _is_s
 def _much_left_by(rest: Rest, group: str) -> bool:
     """Whether a group takes much of what is left; of one without formulas that is not known."""
     taken = (rest.left_over or {}).get(group, 1.0)
-    much = taken > SETTINGS.form_takes or rest.share > SETTINGS.lag_leaves
-    return rest.share > SETTINGS.nothing_left and much
+    return rest.share > SETTINGS.nothing_left and taken > SETTINGS.form_takes
 
 
 def _alike_losses(found: Sequence[Finding]) -> list[Finding]:

@@ -60,7 +60,7 @@ class Settings(Numbers):
     weighty: float = number(0.1, "share of the loudest visit that another must bring to count")
     slight: float = number(0.3, "share of what is left that a second finding must take")
     much_left: float = number(0.3, "share left, beyond which no name is sure")
-    lag_leaves: float = number(0.25, "the same of a lag, and of what the rest depends on")
+    lag_leaves: float = number(0.25, "share left, beyond which no lag is sure")
     form_takes: float = number(0.15, "share of what is left, by which a finding has another form")
     nearly_all: float = number(0.85, "... beyond which share it is still the same physics")
     same: float = number(0.8, "cosine of what two take, from which they take the same errors ...")

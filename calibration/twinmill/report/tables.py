@@ -256,7 +256,7 @@ def held_out(added: AddResult) -> list[Table]:
                 ),
             ]
         rows.append(row)
-    note = "Fitted on one half of the log, judged on the other, both ways."
+    note = "Each of six parts of the log is judged by a fit to the other five."
     return [Table("Errors on data that was not fitted", columns, rows, note)]
 
 

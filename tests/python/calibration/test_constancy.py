@@ -20,7 +20,7 @@ def test_a_heading_bias_along_one_heading_may_be_one_that_changes_with_it(
     legs = [[(d,) * 4] * 48 for d in (100, 0, -100, 0, 50, 0, -50, 0)]
     spin = [[(-60, 60, -60, 60)] * 30] if turn else []
     run = measure(tanh_robot(), 6, script_pct=np.concatenate([*legs, *spin] * 4))
-    run = run.with_pose(run.track.pose + [0, 0, BIAS_RAD])
+    run = run.with_pose(run.track.pose + np.array([0, 0, BIAS_RAD]))
     guess = model_file()
     state = first_state(judged(open_measurements([run], guess)), guess, ())
     told = changes_of(fitted(with_effects(state, ["heading_bias"])))
