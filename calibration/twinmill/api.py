@@ -367,7 +367,9 @@ class Model(_Shown):
         """All quantities of base, camera and effects.
 
         Returns:
-            name, unit, value, min and max (both in the unit), held (no fit moves it), doc.
+            name, unit, value, neutral (nothing happens), default, min, max and usual_size (all in
+            the unit), held (no fit moves it), stage (where it acts), role, place_like, above and
+            below (what a value on either side of neutral does), doc.
 
         Examples:
             >>> table = tm.Model.load("turbopi.toml").table().set_index("name")
@@ -609,7 +611,8 @@ class Fit(_Shown):
 
         Returns:
             name, value, std (half a 95 % interval over 1.96), unit, at_bound, seen (false where
-            the log does not tell the quantity, and the prior holds it).
+            the log does not tell the quantity, and the prior holds it), together (it tells the
+            quantity with others, and not alone).
 
         Examples:
             >>> fitted.table().set_index("name").loc["base.motor_lag_s", "unit"]
@@ -694,7 +697,8 @@ class Addition(_Shown):
 
         Returns:
             name, value, std (half a 95 % interval over 1.96), unit, at_bound, seen (false where
-            the log does not tell the quantity, and the prior holds it).
+            the log does not tell the quantity, and the prior holds it), together (it tells the
+            quantity with others, and not alone).
 
         Examples:
             >>> list(added.table().columns)[:4]
