@@ -324,6 +324,40 @@ def test_a_frame_of_tf_is_placed_in_the_root_of_its_tree(tmp_path):
         _import(bag, ("/tf", "/cmd_vel"), robot_id=1)
 
 
+def test_a_frame_that_is_fixed_to_one_that_moves_is_placed_with_it(tmp_path):
+    """A marker sits 0.1 m ahead and 0.2 m left of the robot's middle, turned a quarter to the left.
+
+    So the middle is at (-0.2, 0.1) of the marker, turned a quarter to the right.
+    """
+    marker = [
+        (START_S + t, _transforms(START_S + t, ("world", "marker", 0.1 * t, 0.5, 0.2)))
+        for t in TIMES_S
+    ]
+    fixed = _transforms(
+        START_S,
+        ("marker", "base_link", -0.2, 0.1, -math.pi / 2),
+        ("base_link", "base_camera", 0.05, 0, 0),
+        ("world", "corner", 1, 1, 0),
+    )
+    bag = _written(
+        tmp_path / "tf.mcap",
+        ("/tf", "tf2_msgs/msg/TFMessage", TF_TYPE, marker),
+        ("/tf_static", "tf2_msgs/msg/TFMessage", TF_TYPE, [(START_S - 1, fixed)]),
+        _twists(),
+    )
+    names = {t.name for t in list_topics(bag)}
+    assert {"/tf:marker", "/tf:base_link", "/tf:base_camera"} < names
+    assert "/tf:corner" not in names
+    robot = _printed(bag)[1]
+    cos, sin = math.cos(0.2), math.sin(0.2)
+    x_m = np.array([0.1 * t for t in TIMES_S]) - 0.2 * cos - 0.1 * sin
+    np.testing.assert_allclose(robot.pose[:, 0], x_m, atol=1e-9)
+    np.testing.assert_allclose(robot.pose[:, 1], 0.5 - 0.2 * sin + 0.1 * cos, atol=1e-9)
+    np.testing.assert_allclose(robot.pose[:, 2], 0.2 - math.pi / 2, atol=1e-9)
+    with pytest.raises(LogError, match=r"does not move; .* name it as /tf:base_link"):
+        _import(bag, ("/tf_static:base_link", "/cmd_vel"), robot_id=1)
+
+
 def test_steering_angles_need_the_wheelbase(tmp_path):
     payload = struct.pack("<5f", 0.25, 0, 0.5, 0, 0)
     rows = [(START_S + t, payload) for t in TIMES_S]

@@ -255,7 +255,8 @@ def _concluded(
     after = [fitted.get(id(o.measurement), o) for o in opened]
     modelled = [r.modelled.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
     noise = irregularity_notes(opened, [s.noise for s in modelled], model_file.model)
-    faint = done.faint
+    named = {name for f in findings for name in (f.effect, *(f.group or ()))}
+    faint = [(name, why) for name, why in done.faint if name not in named]
     hidden = [*faint, *unseen.items()]
     refit = _refit(done)
     usual = model_file.usual_score(hashes)

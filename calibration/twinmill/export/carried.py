@@ -110,6 +110,15 @@ class RobotModel:
             found.append((instance, card, values))
         return found
 
+    def base_left(self, why: str) -> list[Left]:
+        """Duty table, lag and noise of the base, as far as the model has them."""
+        has = {
+            "duty table": self.model.drive == "duty",
+            "motor lag": self.get("base.motor_lag_s") > 0,
+            "noise": True,
+        }
+        return [Left(name, why) for name, there in has.items() if there]
+
     def left_effects(self, carried: Sequence[str], target: str) -> list[Left]:
         """Effects that are not among those carried."""
         left = []

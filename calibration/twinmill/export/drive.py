@@ -57,9 +57,7 @@ def wheel_gains(robot: RobotModel) -> np.ndarray:
 
 def left_by_drive(robot: RobotModel, target: str) -> list[Left]:
     """What such controllers do not know of the base."""
-    left = [
-        Left(name, f"{target} has no place for it") for name in ("duty table", "motor lag", "noise")
-    ]
+    left = robot.base_left(f"{target} has no place for it")
     forward, sideways = robot.get("base.forward_gain"), robot.get("base.sideways_gain")
     if sideways != forward and robot.model.wheel_kind in ("mecanum", "none"):
         why = f"{target} knows one wheel radius; sideways the robot goes "

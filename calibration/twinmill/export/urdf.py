@@ -50,9 +50,11 @@ def urdf(robot: RobotModel) -> tuple[str, list[Left]]:
 
 
 def _left(robot: RobotModel) -> list[Left]:
+    why = "URDF holds geometry, masses and limits alone"
     left = [
-        Left(name, "URDF holds geometry, masses and limits alone")
-        for name in ("gains of speed and turning", "duty table", "motor lag", "noise", "sensor")
+        Left("gains of speed and turning", why),
+        *robot.base_left(why),
+        Left("sensor", why),
     ]
     return [*left, *robot.left_effects(("view_pan",), "URDF")]
 

@@ -36,6 +36,7 @@ from twinmill.data.importers.ros_messages import (
     role_of,
     tag_rows,
     transform_row,
+    transforms_of,
 )
 from twinmill.data.importers.series import CommandSeries, PoseSeries
 from twinmill.data.log import LogError
@@ -47,6 +48,7 @@ LOOKED_AT = 5000  # messages of tf, to see which frames there are
 STEP_BACK_S = 1.0  # messages are never exchanged by that much: a clock was set
 CLOCK_FROM_ZERO_S = 60.0  # the least stamp of a clock that began at 0, which is no missing stamp
 FULL_DUTIES = (1.0, 100.0, 255.0)
+OF_BASE = re.compile(r"base(_link|_footprint)?$")
 OF_CAMERA = re.compile(r"camera|optical|(^|_)cam(_|$)")  # frames whose z is ahead, not up
 
 
@@ -54,13 +56,18 @@ OF_CAMERA = re.compile(r"camera|optical|(^|_)cam(_|$)")  # frames whose z is ahe
 class Topic:
     """One topic of a bag, a frame of tf as `/tf:frame`, or a tag as `/tag_detections:3`.
 
-    `role` is `pose`, `command` or empty.
+    Attributes:
+        name, kind: its name and the type of its messages.
+        count: how many there are; of a fixed frame those of the frame that carries it.
+        role: `pose`, `command` or empty.
+        fixed: whether it is a frame that never moves in its parent.
     """
 
     name: str
     kind: str
     count: int
     role: str
+    fixed: bool = False
 
     @property
     def robot(self) -> str:
@@ -97,23 +104,50 @@ def list_topics(path: Path) -> list[Topic]:
     with _open(path) as reader:
         kinds = {c.topic: c.msgtype for c in reader.connections}
         counts = {name: topic.msgcount for name, topic in reader.topics.items()}
-        many = [c for c in reader.connections if c.msgtype in MANY and "static" not in c.topic]
+        many = [c for c in reader.connections if c.msgtype in MANY]
         parts: Counter[tuple[str, str]] = Counter()
+        parents: dict[str, str] = {}
         for connection, _, raw in islice(reader.messages(many), LOOKED_AT if many else 0):
-            kind = connection.msgtype
-            for part in _parts(kind, reader.deserialize(raw, kind)):
+            kind, message = connection.msgtype, reader.deserialize(raw, connection.msgtype)
+            if _is_static(connection.topic):
+                parents |= {child: parent for child, parent, _ in transforms_of(message)}
+                continue
+            for part in _parts(kind, message):
                 parts[f"{connection.topic}:{part}", kind] += 1
     if not sum(counts.values()):
         raise LogError(f"{path}: has no messages; check that the recorder was subscribed.")
     topics = [Topic(name, kind, counts[name], role_of(kind)) for name, kind in kinds.items()]
-    topics += [Topic(name, kind, count, "pose") for (name, kind), count in parts.items()]
-    return sorted(topics, key=lambda t: t.name)
+    moving = [Topic(name, kind, count, "pose") for (name, kind), count in parts.items()]
+    return sorted([*topics, *moving, *_carried(parents, moving)], key=lambda t: t.name)
+
+
+def _is_static(topic: str) -> bool:
+    """Whether it is the topic of frames that never move in their parents."""
+    return topic.rpartition("/")[2] == "tf_static"
+
+
+def _carried(parents: dict[str, str], moving: list[Topic]) -> Iterator[Topic]:
+    """Frames fixed to others that move, as frames of the topic of these.
+
+    Args:
+        parents: of the fixed frames.
+        moving: frames that move in their parents.
+    """
+    frames = {t.name.partition(":")[2]: t for t in moving if t.kind == TF}
+    for frame in parents.keys() - frames.keys():
+        above, seen = frame, set()
+        while above in parents and above not in frames and above not in seen:
+            seen.add(above)
+            above = parents[above]
+        if carrier := frames.get(above):
+            name = f"{carrier.name.partition(':')[0]}:{frame}"
+            yield replace(carrier, name=name, fixed=True)
 
 
 def _parts(kind: str, message: object) -> Iterator[str]:
     """Frames or tags in a message."""
     if kind == TF:
-        yield from (t.child_frame_id.lstrip("/") for t in message.transforms)
+        yield from (child for child, _, _ in transforms_of(message))
     else:
         yield from (number for number, _ in tag_rows(message))
 
@@ -143,9 +177,13 @@ def _is_tag_of(topic: Topic, command: str) -> bool:
     return of_tag and _told(topic.name.rpartition(":")[2], "", {}) == _told("", command, {})
 
 
-def _likely(topic: Topic) -> tuple[bool, bool, int]:
-    """Topics of their own before frames, frames of a base before wheels, then the most messages."""
-    return topic.kind not in MANY, "base" in topic.name, topic.count
+def _likely(topic: Topic) -> tuple[bool, bool, bool, int]:
+    """Topics of their own before frames, frames of a base before wheels, then the most messages.
+
+    Of fixed frames only the base itself counts: sensors are often called after what carries them.
+    """
+    base = OF_BASE.search(topic.name) if topic.fixed else "base" in topic.name
+    return topic.kind not in MANY, bool(base), not topic.fixed, topic.count
 
 
 def numbering(pairs: list[tuple[str, str]]) -> list[str]:
@@ -470,8 +508,14 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
         for name in set(names) & set(found):
             found[name].lost = reader.topics[name].msgcount - len(found[name])
     for topic, messages in found.items():
-        if not messages:
-            raise LogError(f"{path.name}: {topic} holds nothing; choose another.")
+        if messages:
+            continue
+        if _is_static(topic.partition(":")[0]):
+            raise LogError(
+                f"{path.name}: {topic} does not move; where the frame that it is fixed to moves on "
+                f"/tf, name it as /tf:{topic.partition(':')[2]}."
+            )
+        raise LogError(f"{path.name}: {topic} holds nothing; choose another.")
     return found
 
 
@@ -484,21 +528,23 @@ def _shown(path: Path, count: int, messages: Iterator) -> Iterator:
 def _put(
     frames: Frames, message: object, *, name: str, received_ns: int, found: dict[str, _Messages]
 ) -> None:
-    """Adds a message of tf to the tree, and the places of the frames that are wanted."""
-    for transform in message.transforms:
-        frame, parent = (
-            text.lstrip("/") for text in (transform.child_frame_id, transform.header.frame_id)
-        )
-        frames.put(frame, parent, transform_row(transform.transform))
-        messages = found.get(f"{name}:{frame}")
-        if messages is None:
-            continue
-        root, row = frames.place(frame)
-        if root != messages.root:  # what came before the tree was whole is of another frame
-            messages.root = root
-            for rows in (messages.header_ns, messages.received_ns, messages.values):
-                del rows[:]
-        messages.add(transform.header.stamp, received_ns, row)
+    """Adds a message of tf to the tree, and the places of the frames that are wanted.
+
+    A wanted frame that is fixed moves whenever the one that carries it does.
+    """
+    wanted = [(*topic.partition(":")[::2], messages) for topic, messages in found.items()]
+    for frame, parent, transform in transforms_of(message):
+        row = transform_row(transform.transform)
+        frames.put(frame, parent, row, fixed=_is_static(name))
+        for topic, child, messages in wanted:
+            if topic != name or frames.carrier(child) != frame:
+                continue
+            root, row = frames.place(child)
+            if root != messages.root:  # what came before the tree was whole is of another frame
+                messages.root = root
+                for rows in (messages.header_ns, messages.received_ns, messages.values):
+                    del rows[:]
+            messages.add(transform.header.stamp, received_ns, row)
 
 
 def _stamps(

@@ -21,10 +21,27 @@ class Frames:
 
     def __init__(self) -> None:
         self._parent: dict[str, tuple[str, np.ndarray, np.ndarray]] = {}
+        self._fixed: set[str] = set()
 
-    def put(self, frame: str, parent: str, row: Row) -> None:
-        """Places a frame in its parent; the row is that of `ros_messages.transform_row`."""
+    def put(self, frame: str, parent: str, row: Row, *, fixed: bool) -> None:
+        """Places a frame in its parent.
+
+        Args:
+            frame: its name.
+            parent: name of the frame that it is placed in.
+            row: that of `ros_messages.transform_row`.
+            fixed: the frame never moves in its parent.
+        """
         self._parent[frame] = parent, np.array(row[:3]), np.array(row[3:])
+        (self._fixed.add if fixed else self._fixed.discard)(frame)
+
+    def carrier(self, frame: str) -> str:
+        """The frame itself if it moves in its parent, else the next one above that does."""
+        for _ in range(DEEPEST):
+            if frame not in self._fixed:
+                break
+            frame = self._parent[frame][0]
+        return frame
 
     def place(self, frame: str) -> tuple[str, Row]:
         """The root of the tree, and the frame's pose in it."""

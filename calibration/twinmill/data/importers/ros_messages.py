@@ -33,6 +33,12 @@ def _pose(pose: Any) -> Row:
     return p.x, p.y, p.z, q.w, q.x, q.y, q.z
 
 
+def transforms_of(message: Any) -> Iterator[tuple[str, str, Any]]:
+    """Frame, its parent and the stamped transform of each in a message of tf."""
+    for transform in message.transforms:
+        yield transform.child_frame_id.lstrip("/"), transform.header.frame_id.lstrip("/"), transform
+
+
 def transform_row(transform: Any) -> Row:
     """x, y, z in m, then the quaternion, w first."""
     p, q = transform.translation, transform.rotation
