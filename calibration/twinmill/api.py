@@ -14,14 +14,16 @@ Objects cannot be pickled: give paths to other processes, and let them return wh
 """
 
 import html
+import shutil
 import subprocess
+import weakref
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib.metadata import version
 from io import StringIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, mkdtemp
 from types import NoneType
 from typing import Any, TypeVar
 
@@ -121,12 +123,13 @@ class Log(_Shown):
     def __init__(
         self,
         paths: Iterable[str | Path],
-        folder: TemporaryDirectory | None = None,
+        folder: Path | None = None,
         said: Iterable[str] = (),
     ):
         several = checked("paths", paths, (list, tuple), "a list of paths; `load` takes names")
         self.paths = [Path(checked("log", path, (str, Path), A_PATH)) for path in several]
-        self._folder = folder  # removed with the last reference to a simulated run
+        if folder:  # of a simulated run; removed with the last reference to it
+            weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         self._said = list(said)  # by the twin
         self._measurements: dict[str, Measurements] = {}  # by the model's hash
         for path in filter(is_steady_table, self.paths):
@@ -422,6 +425,9 @@ class Model(_Shown):
         Returns:
             As `compare`, which says more.
 
+        Raises:
+            LogError: the log cannot be used; one sentence.
+
         Examples:
             >>> tm.Model.load("turbopi.toml").compare("run.lcmlog").score > 1.3
             True
@@ -436,6 +442,9 @@ class Model(_Shown):
 
         Returns:
             As `fit`, which says more.
+
+        Raises:
+            LogError: the log cannot be used; one sentence.
 
         Examples:
             >>> tm.Model.load("turbopi.toml").fit("run.lcmlog").model.name
@@ -500,6 +509,10 @@ class Model(_Shown):
 
         Returns:
             As `diagnose`.
+
+        Raises:
+            LogError: the log cannot be used; one sentence.
+            ValueError: there is no such effect as is named in `without`.
 
         Examples:
             >>> d = tm.Model.load("fitted.toml").diagnose("run.lcmlog", without=["coasting"])
@@ -571,6 +584,9 @@ class Comparison(_Shown):
         Returns:
             Path of the page, folder/index.html.
 
+        Raises:
+            ValueError: the folder cannot be written.
+
         Examples:
             >>> from tempfile import mkdtemp
             >>> found.report(mkdtemp()).name
@@ -641,6 +657,9 @@ class Fit(_Shown):
         Returns:
             As `compare`.
 
+        Raises:
+            LogError: the log cannot be used; one sentence.
+
         Examples:
             >>> fitted.compare("run.lcmlog").score < fitted.before.score
             True
@@ -655,6 +674,9 @@ class Fit(_Shown):
 
         Returns:
             Path of the page, folder/index.html.
+
+        Raises:
+            ValueError: the folder cannot be written.
 
         Examples:
             >>> from tempfile import mkdtemp
@@ -729,6 +751,9 @@ class Addition(_Shown):
 
         Returns:
             Path of the page, folder/index.html.
+
+        Raises:
+            ValueError: the folder cannot be written.
 
         Examples:
             >>> from tempfile import mkdtemp
@@ -896,6 +921,9 @@ class Diagnosis(_Shown):
 
         Returns:
             Path of the page, folder/index.html.
+
+        Raises:
+            ValueError: the folder cannot be written.
 
         Examples:
             >>> from tempfile import mkdtemp
@@ -1067,13 +1095,25 @@ def simulate(
         True
     """
     checked("script", script, (str, Path, NoneType), "the path of a CSV file")
-    folder = TemporaryDirectory(prefix="twinmill.")
-    place, file = Path(folder.name), _model(model).file
-    (place / "model.toml").write_text(file.text)
-    command = [
-        find_program("twin_run"), "--plant", plant, "--model", "model.toml", "--n", n,
-        "--seed", seed, "--duration-s", duration_s, "--log", "simulated.lcmlog",
+    file = _model(model).file
+    place = Path(mkdtemp(prefix="twinmill."))
+    options = [
+        "--plant", plant, "--n", n, "--seed", seed, "--duration-s", duration_s,
         *(["--script", Path(script).resolve()] if script else ["--behavior", behavior]),
+    ]  # fmt: skip
+    try:
+        (place / "model.toml").write_text(file.text)
+        said = _run_twin(place, options)
+        return Log([place / "simulated.lcmlog"], place, said)
+    except BaseException:
+        shutil.rmtree(place, ignore_errors=True)
+        raise
+
+
+def _run_twin(place: Path, options: list) -> list[str]:
+    """Writes simulated.lcmlog in a folder, by the model.toml in it; what the twin warned of."""
+    command = [
+        find_program("twin_run"), "--model", "model.toml", "--log", "simulated.lcmlog", *options,
     ]  # fmt: skip
     done = subprocess.run(
         [str(word) for word in command], cwd=place, capture_output=True, text=True, check=False
@@ -1081,8 +1121,7 @@ def simulate(
     if done.returncode:
         said = done.stderr.strip().removeprefix("twin_run: ") or "twin_run failed."
         raise ValueError(in_python(said))
-    said = [line.removeprefix("twin_run: ") for line in done.stderr.splitlines()]
-    return Log([place / "simulated.lcmlog"], folder, said)
+    return [line.removeprefix("twin_run: ") for line in done.stderr.splitlines()]
 
 
 def _log(log: Log | str | Path) -> Log:

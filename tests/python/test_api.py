@@ -8,6 +8,7 @@ import pickle
 import re
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import lcm
@@ -120,8 +121,11 @@ def test_a_simulated_log_goes_with_its_object_unless_it_is_saved(here, tmp_path)
     place = log.paths[0]
     log.save(tmp_path / "kept.lcmlog")
     assert (tmp_path / "kept.lcmlog").read_bytes() == place.read_bytes()
-    del log
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        del log
     assert not place.exists()
+    assert not said
 
 
 def test_what_is_wrong_is_said_in_a_sentence(here):
@@ -143,6 +147,8 @@ def test_what_is_wrong_is_said_in_a_sentence(here):
         tm.simulate(behavior="nobody", duration_s=1)
     with pytest.raises(ValueError, match=r"^n: ((?!--).)*$"):
         tm.simulate(n=0)
+    with pytest.raises(ValueError, match=r"^seed: Value -1 not in range 0 to "):
+        tm.simulate(n=1, seed=-1)
     with pytest.raises(ValueError, match=r"^duration_s: nan ((?!--).)*$"):
         tm.simulate(n=1, duration_s=float("nan"))
     with pytest.raises(ValueError, match="nearest is 'dead_zone'"):

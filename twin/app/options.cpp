@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <sstream>
 
@@ -64,7 +65,9 @@ void AddWorld(CLI::App &app, Options &o)
         ->check(CLI::ExistingFile);
     app.add_option("--script", o.script, "CSV of inputs or duties that all play instead")
         ->check(CLI::ExistingFile);
-    app.add_option("--seed", o.seed, "same seed, same run")->capture_default_str();
+    app.add_option("--seed", o.seed, "same seed, same run")
+        ->check(CLI::Range(int64_t{0}, std::numeric_limits<int64_t>::max()))
+        ->capture_default_str();
     AddChoice(app, "--start", o.start, kStarts,
               "where they start; default with --spread-m: square");
     app.add_option("--spread-m", o.spread_m, "side of the square, diameter of the disc")

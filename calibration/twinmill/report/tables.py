@@ -16,11 +16,9 @@ from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
 
 Tone = Literal["", "good", "warn", "bad", "dim"]
 
-FLOOR_KINDS = {
-    "repeat": "runs that the log repeats",
-    "bootstrap": "the model's own noisy replica",
-    "sensor": "sensor noise alone (too low)",
-}
+OF_RESPONSE = (
+    "what a smooth response to the commands misses on parts of the log that it was not fitted to"
+)
 SHOWN = {
     "m": (1000.0, "mm"),
     "rad": (float(np.degrees(1)), "°"),
@@ -90,7 +88,7 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
         ),
         ("model", comparison.model_name),
         ("noise", _noise(noise, track.has_heading)),
-        ("floor", f"from {FLOOR_KINDS.get(robot.floor.kind, robot.floor.kind)}"),
+        ("floor", robot.floor.reason or OF_RESPONSE),
         (
             "clock",
             f"motion capture {number(1000 * abs(robot.time_offset_s))} ms "
