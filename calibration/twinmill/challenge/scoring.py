@@ -235,10 +235,10 @@ def _estimates(hidden: Hidden, findings: list[Said]) -> list[dict]:
     return [
         {
             "name": f"{hidden.name}.{name}",
-            "truth": value,
+            "truth": float(value),
             "value": values[name]["value"],
             "std": values[name]["std"],
-            "within": abs(values[name]["value"] - value) <= WITHIN * values[name]["std"],
+            "within": bool(abs(values[name]["value"] - value) <= WITHIN * values[name]["std"]),
             "leads": name == leading,
         }
         for name, value in truth.items()
