@@ -280,6 +280,20 @@ def test_a_lag_hidden_in_a_robot_of_forces_comes_to_its_own_once(plant, name):
     assert np.mean(usual[end] - late[end]) / slope == pytest.approx(late_s, rel=0.15)
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("plant", ["mujoco", "rollers"])
+def test_a_robot_of_forces_has_no_dry_friction(plant, axis):
+    """It would take the same speed away at all speeds: v = g u - loss, of two speeds u."""
+    robot = next(r for r in ROBOTS if r.plant == plant)
+    asked_mps = np.array([0.1, 0.3])
+    rims = [robot.to_wheels @ (u * np.eye(3)[axis]) for u in asked_mps]
+    slow_mps, fast_mps = (
+        drive_by_forces(robot, np.tile(rim, (2500, 1)))[1000:].mean(axis=0)[axis] for rim in rims
+    )
+    loss_mps = (asked_mps[0] * fast_mps - asked_mps[1] * slow_mps) / np.ptp(asked_mps)
+    assert abs(loss_mps) < 2e-3
+
+
 @pytest.mark.parametrize("plant", ["mujoco", "rollers"])
 def test_a_robot_of_forces_drifts_outward_in_arcs_as_its_mass_asks(plant):
     """So a lateral slip that is named there is no mistake."""

@@ -18,6 +18,10 @@ SIDE, AHEAD, LEFT = (-1, 1, 1, -1), (1, 1, -1, -1), (1, -1, 1, -1)
 ROTOR_KGM2 = 1.5e-4
 GRIP = 0.8
 ROLLERS = 10
+# Friction along the axles, and of the rollers' bearings. It takes a constant speed away, as
+# coulomb_friction does: here below 2 mm/s, so that where nothing is hidden nothing is there.
+SLIDE = 0.001
+BEARING_Nm = 2e-5
 
 # By itself MuJoCo also writes warnings to MUJOCO_LOG.TXT in the working directory.
 mujoco.set_mju_user_warning(lambda text: print(f"mujoco: {text}", file=sys.stderr))
@@ -55,7 +59,7 @@ def mjcf(robot: Robot) -> str:
     bodies = "".join(wheel(robot, k) for k in range(4))
     pairs = "".join(
         f"<pair geom1='floor' geom2='g{k}' condim='3' solref='0.005 1' "
-        f"friction='{0.02 * GRIP} {GRIP} 0.005 0.0001 0.0001'/>"
+        f"friction='{SLIDE} {GRIP} 0.005 0.0001 0.0001'/>"
         for k in range(4)
     )
     motors = "".join(
@@ -98,7 +102,7 @@ def _roller_wheel(robot: Robot, k: int) -> str:
         f"axis='0 1 0' armature='{ROTOR_KGM2}'/><replicate count='{ROLLERS}' "
         f"euler='0 {2 * np.pi / ROLLERS} 0'><body pos='0 0 {-hub_m}'><inertial pos='0 0 0' "
         f"mass='0.0015' diaginertia='5e-8 5e-8 5e-8'/><joint axis='{axle}' armature='2e-7' "
-        f"damping='2e-6' frictionloss='3e-4'/><geom type='ellipsoid' zaxis='{axle}' mass='0' "
-        f"size='{roller_m} {roller_m} {half_m}' friction='{GRIP}' contype='0' conaffinity='1' "
+        f"damping='2e-6' frictionloss='{BEARING_Nm}'/><geom type='ellipsoid' zaxis='{axle}' "
+        f"mass='0' size='{roller_m} {roller_m} {half_m}' friction='{GRIP}' contype='0' conaffinity='1' "
         "solref='0.005 1'/></body></replicate></body>"
     )
