@@ -103,6 +103,6 @@ def _roller_wheel(robot: Robot, k: int) -> str:
         f"euler='0 {2 * np.pi / ROLLERS} 0'><body pos='0 0 {-hub_m}'><inertial pos='0 0 0' "
         f"mass='0.0015' diaginertia='5e-8 5e-8 5e-8'/><joint axis='{axle}' armature='2e-7' "
         f"damping='2e-6' frictionloss='{BEARING_Nm}'/><geom type='ellipsoid' zaxis='{axle}' "
-        f"mass='0' size='{roller_m} {roller_m} {half_m}' friction='{GRIP}' contype='0' conaffinity='1' "
-        "solref='0.005 1'/></body></replicate></body>"
+        f"mass='0' size='{roller_m} {roller_m} {half_m}' friction='{GRIP}' contype='0' "
+        "conaffinity='1' solref='0.005 1'/></body></replicate></body>"
     )
