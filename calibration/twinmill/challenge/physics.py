@@ -429,6 +429,8 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
         form("wheel_gain", "plain", "rolls", _wheel_gain, **dict(zip(wheels, gains, strict=True)))
         form("wheel_gain", "cousin", "rolls", _one_wheel, loss=0.05)
         bent = random.uniform(-0.03, 0.03, (len(wheels), 2))
+        if robot.wheels == "differential":
+            bent[2:] = bent[:2]
         parts = {
             f"{w}_{p}": b
             for w, row in zip(wheels, bent, strict=True)
