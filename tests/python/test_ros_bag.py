@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.importers.ros_bag import _rows, guess_pairs, list_topics, numbering
-from twinmill.data.importers.ros_messages import COMMANDS
+from twinmill.data.importers.ros_messages import COMMANDS, joints_beside_wheels
 from twinmill.data.log import LogError, read_log
 from twinmill_cli.main import app
 
@@ -393,17 +393,18 @@ def test_what_full_duty_is_in_a_bag(tmp_path, values, full, expected):
 
 
 def test_wheels_are_taken_by_the_names_of_their_joints(tmp_path):
-    names = ["rear_right_wheel", "rear_left_wheel", "front_right_wheel", "front_left_wheel"]
-    data = _aligned(_header(START_S), 4) + struct.pack("<I", 4)
+    names = ["arm", "rear_right_wheel", "rear_left_wheel", "front_right_wheel", "front_left_wheel"]
+    data = _aligned(_header(START_S), 4) + struct.pack("<I", 5)
     for name in names:
         data = _text(data, name)
     data = _aligned(data, 4) + struct.pack("<I", 0)
-    data = _floats(data, [4.0, 3.0, 2.0, 1.0])
+    data = _floats(data, [9.0, 4.0, 3.0, 2.0, 1.0])
     rows = [(START_S + t, data + struct.pack("<I", 0)) for t in TIMES_S]
     joints = ("/r1/wheels", "sensor_msgs/msg/JointState", JOINTS_TYPE, rows)
     bag = _written(tmp_path / "j.mcap", _poses("/r1/pose"), joints)
-    robots, _ = _import(bag, ("/r1/pose", "/r1/wheels"), receive_stamps=True)
+    robots, warnings = _import(bag, ("/r1/pose", "/r1/wheels"), receive_stamps=True)
     np.testing.assert_allclose(robots[1].command[-1], [1, 2, 3, 4])
+    assert "/r1/wheels: joints that are called wheels are taken, not arm." in warnings
 
 
 @pytest.mark.parametrize(
@@ -555,5 +556,7 @@ def test_joints_beside_the_wheels_are_none():
         name=["arm", "right_wheel_joint", "left_wheel_joint"], velocity=[0.5, 2.0, 1.0]
     )
     assert row_of(arm) == (1.0, 2.0)
+    assert joints_beside_wheels(arm) == ["arm"]
     unnamed = SimpleNamespace(name=["a", "b"], velocity=[3.0, 4.0])
     assert row_of(unnamed) == (3.0, 4.0)
+    assert joints_beside_wheels(unnamed) == []

@@ -27,12 +27,14 @@ from twinmill.data.importers.ros_messages import (
     COMMANDS,
     CORNERS,
     DEFINITIONS,
+    JOINTS,
     MANY,
     POSES,
     STEERED,
     TAGS,
     TF,
     Row,
+    joints_beside_wheels,
     role_of,
     tag_rows,
     transform_row,
@@ -371,6 +373,7 @@ class _Messages:
     widths: set[int] = field(default_factory=set)
     root: str = ""  # of the tree, for a frame of tf
     lost: int = 0  # the bag says that it has more
+    left_out: list[str] = field(default_factory=list)  # joints that are no wheels
 
     def add(self, stamp: object, received_ns: int, value: Row) -> None:
         self.header_ns.append(stamp.sec * 10**9 + stamp.nanosec if stamp else 0)
@@ -411,6 +414,11 @@ class _Rows:
             notes.append(
                 f"{topic}: {messages.lost} of {len(messages) + messages.lost} messages "
                 "cannot be read: the bag is damaged."
+            )
+        if messages.left_out:
+            notes.append(
+                f"{topic}: joints that are called wheels are taken, not "
+                f"{', '.join(messages.left_out)}."
             )
         if messages.root:
             notes.append(f"{topic}: its place in the frame {messages.root} is taken.")
@@ -502,6 +510,8 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
                     if f"{name}:{number}" in found:
                         found[f"{name}:{number}"].add(message.header.stamp, received_ns, row)
                 continue
+            if kind == JOINTS and not found[name]:
+                found[name].left_out = joints_beside_wheels(message)
             value_of = POSES.get(kind) or COMMANDS[kind][1]
             stamp = getattr(getattr(message, "header", None), "stamp", None)
             found[name].add(stamp, received_ns, value_of(message))

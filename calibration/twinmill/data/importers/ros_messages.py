@@ -19,6 +19,7 @@ TAGS = tuple(  # poses of tags in the camera's frame, by several packages
     )
 )
 CORNERS = "apriltag_msgs/msg/AprilTagDetectionArray"  # without poses: these are on /tf
+JOINTS = "sensor_msgs/msg/JointState"
 MANY = (TF, *TAGS)  # of one topic
 STEERED = ("ackermann_msgs/msg/AckermannDrive", "ackermann_msgs/msg/AckermannDriveStamped")
 DEFINITIONS = {  # of types that the library does not bring; older bags hold none
@@ -76,7 +77,7 @@ def _wheel_speeds(message: Any) -> Row:
     names = list(message.name)
     if len(names) != len(speeds):
         return speeds
-    wheels = [k for k, name in enumerate(names) if "wheel" in name.lower()] or range(len(names))
+    wheels = _called_wheels(names) or range(len(names))
     speeds = tuple(speeds[k] for k in wheels)
     places = [_wheel(names[k]) for k in wheels]
     if len(places) == 2:
@@ -85,6 +86,20 @@ def _wheel_speeds(message: Any) -> Row:
         return speeds
     order = sorted(range(len(places)), key=lambda k: places[k])
     return tuple(speeds[k] for k in order)
+
+
+def _called_wheels(names: list[str]) -> list[int]:
+    """Places of the joints that are called wheels."""
+    return [k for k, name in enumerate(names) if "wheel" in name.lower()]
+
+
+def joints_beside_wheels(message: Any) -> list[str]:
+    """Names of the joints in a JointState that are taken for no wheels."""
+    names = list(message.name)
+    wheels = _called_wheels(names)
+    if not wheels or len(names) != len(message.velocity):
+        return []
+    return [name for k, name in enumerate(names) if k not in wheels]
 
 
 def _wheel(name: str) -> tuple[int, int] | None:
@@ -110,7 +125,7 @@ COMMANDS: dict[str, tuple[CommandKind, Callable[[Any], Row]]] = {
     "geometry_msgs/msg/TwistStamped": ("twist", lambda m: _twist(m.twist)),
     STEERED[0]: ("twist", _steered),
     STEERED[1]: ("twist", lambda m: _steered(m.drive)),
-    "sensor_msgs/msg/JointState": ("wheel_speed", _wheel_speeds),
+    JOINTS: ("wheel_speed", _wheel_speeds),
     **{
         f"std_msgs/msg/{number}MultiArray": ("duty", _duties)
         for number in ("Float64", "Float32", "Int16", "Int32")
