@@ -14,16 +14,15 @@ Objects cannot be pickled: give paths to other processes, and let them return wh
 """
 
 import html
-import shutil
 import subprocess
 import weakref
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from importlib.metadata import version
 from io import StringIO
 from pathlib import Path
-from tempfile import TemporaryDirectory, mkdtemp
+from tempfile import TemporaryDirectory
 from types import NoneType
 from typing import Any, TypeVar
 
@@ -123,13 +122,12 @@ class Log(_Shown):
     def __init__(
         self,
         paths: Iterable[str | Path],
-        folder: Path | None = None,
         said: Iterable[str] = (),
+        forget: Callable[[], None] = lambda: None,
     ):
         several = checked("paths", paths, (list, tuple), "a list of paths; `load` takes names")
         self.paths = [Path(checked("log", path, (str, Path), A_PATH)) for path in several]
-        if folder:  # of a simulated run; removed with the last reference to it
-            weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        weakref.finalize(self, forget)  # removes the file of a simulated run
         self._said = list(said)  # by the twin
         self._measurements: dict[str, Measurements] = {}  # by the model's hash
         for path in filter(is_steady_table, self.paths):
@@ -1096,18 +1094,16 @@ def simulate(
     """
     checked("script", script, (str, Path, NoneType), "the path of a CSV file")
     file = _model(model).file
-    place = Path(mkdtemp(prefix="twinmill."))
     options = [
         "--plant", plant, "--n", n, "--seed", seed, "--duration-s", duration_s,
         *(["--script", Path(script).resolve()] if script else ["--behavior", behavior]),
     ]  # fmt: skip
-    try:
+    with ExitStack() as stack:
+        folder = TemporaryDirectory(prefix="twinmill.", ignore_cleanup_errors=True)
+        place = Path(stack.enter_context(folder))
         (place / "model.toml").write_text(file.text)
         said = _run_twin(place, options)
-        return Log([place / "simulated.lcmlog"], place, said)
-    except BaseException:
-        shutil.rmtree(place, ignore_errors=True)
-        raise
+        return Log([place / "simulated.lcmlog"], said, stack.pop_all().close)
 
 
 def _run_twin(place: Path, options: list) -> list[str]:

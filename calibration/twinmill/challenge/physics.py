@@ -422,15 +422,11 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
         form("input_delay", "cousin", "command", _delay_that_varies, delay_s=0.03)
     if robot.drive != "twist":
         form("backlash", "plain", "rolls", _backlash, gap_rad=0.15)
-        gains = random.normal(0, 0.03, len(wheels))
-        if robot.wheels == "differential":
-            gains[2:] = gains[:2]
+        gains = _by_wheel(robot, random.normal(0, 0.03, len(wheels)))
         gains -= gains.mean()
         form("wheel_gain", "plain", "rolls", _wheel_gain, **dict(zip(wheels, gains, strict=True)))
         form("wheel_gain", "cousin", "rolls", _one_wheel, loss=0.05)
-        bent = random.uniform(-0.03, 0.03, (len(wheels), 2))
-        if robot.wheels == "differential":
-            bent[2:] = bent[:2]
+        bent = _by_wheel(robot, random.uniform(-0.03, 0.03, (len(wheels), 2)))
         parts = {
             f"{w}_{p}": b
             for w, row in zip(wheels, bent, strict=True)
@@ -443,6 +439,11 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
     if robot.sideways:
         form("heading_bias", "plain", "observe", _bias, bias_rad=0.02 * sign())
     return found
+
+
+def _by_wheel(robot: Robot, drawn: np.ndarray) -> np.ndarray:
+    """(K, ...) as drawn; of robots on two wheels front and rear of a side are one."""
+    return drawn[[0, 1, 0, 1]] if robot.wheels == "differential" else drawn
 
 
 def _of_the_ground(robot: Robot, random: np.random.Generator) -> list[Hidden]:

@@ -108,11 +108,13 @@ def list_topics(path: Path) -> list[Topic]:
         counts = {name: topic.msgcount for name, topic in reader.topics.items()}
         many = [c for c in reader.connections if c.msgtype in MANY]
         parts: Counter[tuple[str, str]] = Counter()
-        parents: dict[str, str] = {}
-        for connection, _, raw in islice(reader.messages(many), LOOKED_AT if many else 0):
-            kind, message = connection.msgtype, reader.deserialize(raw, connection.msgtype)
-            if _is_static(connection.topic):
-                parents |= {child: parent for child, parent, _ in transforms_of(message)}
+        frames = Frames()
+        for connection, at_ns, raw in islice(reader.messages(many), LOOKED_AT if many else 0):
+            kind, static = connection.msgtype, _is_static(connection.topic)
+            message = reader.deserialize(raw, kind)
+            if kind == TF:
+                _put(frames, message, fixed=static, received_ns=at_ns, wanted={})
+            if static:
                 continue
             for part in _parts(kind, message):
                 parts[f"{connection.topic}:{part}", kind] += 1
@@ -120,7 +122,7 @@ def list_topics(path: Path) -> list[Topic]:
         raise LogError(f"{path}: has no messages; check that the recorder was subscribed.")
     topics = [Topic(name, kind, counts[name], role_of(kind)) for name, kind in kinds.items()]
     moving = [Topic(name, kind, count, "pose") for (name, kind), count in parts.items()]
-    return sorted([*topics, *moving, *_carried(parents, moving)], key=lambda t: t.name)
+    return sorted([*topics, *moving, *_carried(frames, moving)], key=lambda t: t.name)
 
 
 def _is_static(topic: str) -> bool:
@@ -128,20 +130,11 @@ def _is_static(topic: str) -> bool:
     return topic.rpartition("/")[2] == "tf_static"
 
 
-def _carried(parents: dict[str, str], moving: list[Topic]) -> Iterator[Topic]:
-    """Frames fixed to others that move, as frames of the topic of these.
-
-    Args:
-        parents: of the fixed frames.
-        moving: frames that move in their parents.
-    """
-    frames = {t.name.partition(":")[2]: t for t in moving if t.kind == TF}
-    for frame in parents.keys() - frames.keys():
-        above, seen = frame, set()
-        while above in parents and above not in frames and above not in seen:
-            seen.add(above)
-            above = parents[above]
-        if carrier := frames.get(above):
+def _carried(frames: Frames, moving: list[Topic]) -> Iterator[Topic]:
+    """Frames fixed to others that move, as frames of the topic of these."""
+    by_frame = {t.name.partition(":")[2]: t for t in moving if t.kind == TF}
+    for frame in frames.fixed - by_frame.keys():
+        if carrier := by_frame.get(frames.carrier(frame)):
             name = f"{carrier.name.partition(':')[0]}:{frame}"
             yield replace(carrier, name=name, fixed=True)
 
@@ -471,6 +464,7 @@ def _of_bag(path: Path) -> list[str]:
 def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
     """Messages of each topic that is wanted, and of each frame of tf."""
     found: dict[str, _Messages] = {}
+    wanted: dict[str, dict[str, _Messages]] = {}  # frames, by the topic of tf
     frames, with_frames = Frames(), any(":" in topic for topic in topics)
     with _open(path) as reader:
         kinds = {c.topic: c.msgtype for c in reader.connections}
@@ -495,6 +489,8 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
             if not role_of(kind) and kind not in MANY:
                 raise LogError(f"{path.name}: {topic} holds {kind}, which is not read here.")
             found[topic] = _Messages(kind)
+            if kind == TF:
+                wanted.setdefault(name, {})[topic.partition(":")[2]] = found[topic]
         chosen = [
             c for c in reader.connections if c.topic in names or (with_frames and c.msgtype == TF)
         ]
@@ -502,7 +498,8 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
         for connection, received_ns, raw in _shown(path, count, reader.messages(chosen)):
             message, name = reader.deserialize(raw, connection.msgtype), connection.topic
             if connection.msgtype == TF:
-                _put(frames, message, name=name, received_ns=received_ns, found=found)
+                fixed, of_topic = _is_static(name), wanted.get(name, {})
+                _put(frames, message, fixed=fixed, received_ns=received_ns, wanted=of_topic)
                 continue
             kind = connection.msgtype
             if kind in TAGS:
@@ -536,18 +533,22 @@ def _shown(path: Path, count: int, messages: Iterator) -> Iterator:
 
 
 def _put(
-    frames: Frames, message: object, *, name: str, received_ns: int, found: dict[str, _Messages]
+    frames: Frames,
+    message: object,
+    *,
+    fixed: bool,
+    received_ns: int,
+    wanted: dict[str, _Messages],
 ) -> None:
-    """Adds a message of tf to the tree, and the places of the frames that are wanted.
+    """Adds a message of tf to the tree, and the places of the frames that are wanted of its topic.
 
     A wanted frame that is fixed moves whenever the one that carries it does.
     """
-    wanted = [(*topic.partition(":")[::2], messages) for topic, messages in found.items()]
     for frame, parent, transform in transforms_of(message):
         row = transform_row(transform.transform)
-        frames.put(frame, parent, row, fixed=_is_static(name))
-        for topic, child, messages in wanted:
-            if topic != name or frames.carrier(child) != frame:
+        frames.put(frame, parent, row, fixed=fixed)
+        for child, messages in wanted.items():
+            if frames.carrier(child) != frame:
                 continue
             root, row = frames.place(child)
             if root != messages.root:  # what came before the tree was whole is of another frame

@@ -21,7 +21,7 @@ class Frames:
 
     def __init__(self) -> None:
         self._parent: dict[str, tuple[str, np.ndarray, np.ndarray]] = {}
-        self._fixed: set[str] = set()
+        self.fixed: set[str] = set()  # frames that never move in their parents
 
     def put(self, frame: str, parent: str, row: Row, *, fixed: bool) -> None:
         """Places a frame in its parent.
@@ -33,12 +33,12 @@ class Frames:
             fixed: the frame never moves in its parent.
         """
         self._parent[frame] = parent, np.array(row[:3]), np.array(row[3:])
-        (self._fixed.add if fixed else self._fixed.discard)(frame)
+        (self.fixed.add if fixed else self.fixed.discard)(frame)
 
     def carrier(self, frame: str) -> str:
         """The frame itself if it moves in its parent, else the next one above that does."""
         for _ in range(DEEPEST):
-            if frame not in self._fixed:
+            if frame not in self.fixed:
                 break
             frame = self._parent[frame][0]
         return frame
