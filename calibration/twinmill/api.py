@@ -302,9 +302,6 @@ class Log(_Shown):
 class Model(_Shown):
     """A robot's model: base, camera and effects, as a model file holds them. It never changes.
 
-    Attributes:
-        file: text, hash and the twin's own object.
-
     Examples:
         >>> model = tm.Model.load("turbopi.toml")
         >>> model
@@ -314,7 +311,7 @@ class Model(_Shown):
     """
 
     def __init__(self, file: ModelFile):
-        self.file = checked("file", file, ModelFile, "a model file; `Model.load` takes its name")
+        self._file = checked("file", file, ModelFile, "a model file; `Model.load` takes its name")
 
     @classmethod
     def load(cls, name: str | Path = DEFAULT_MODEL) -> "Model":
@@ -334,6 +331,16 @@ class Model(_Shown):
             []
         """
         return cls(ModelFile.load(str(checked("model", name, (str, Path), "the name of a model"))))
+
+    @property
+    def file(self) -> ModelFile:
+        """Its text, its hash and the twin's own object.
+
+        Examples:
+            >>> tm.Model.load("turbopi.toml").file.path.name
+            'turbopi.toml'
+        """
+        return self._file
 
     @property
     def name(self) -> str:

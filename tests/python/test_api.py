@@ -297,3 +297,20 @@ def test_an_effect_of_the_camera_is_added_from_detections(here, tmp_path):
     assert added.plot().axes
     with pytest.raises(ValueError, match="has it already"):
         added.model.add("missed_detection", log)
+
+
+def test_a_recording_that_is_named_twice_counts_once(here, tmp_path):
+    again = tmp_path / "again.lcmlog"
+    again.write_bytes(Path("run.lcmlog").read_bytes())
+    once = tm.compare("run.lcmlog", "fitted.toml")
+    twice = tm.compare(tm.load("run.lcmlog", again), "fitted.toml")
+    (said,) = twice.left_out
+    assert said.startswith("Left out: again.lcmlog: the same recording as run.lcmlog")
+    assert twice.score == once.score
+
+
+def test_the_file_of_a_model_stays(here):
+    model = tm.Model.load("fitted.toml")
+    with pytest.raises(AttributeError):
+        model.file = None
+    assert repr(model) == "Model(fitted.toml: duty, no effects)"

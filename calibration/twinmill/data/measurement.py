@@ -176,12 +176,14 @@ def clean_measurements(
     judged: list[Measurement | SteadyTable] = []
     excluded: list[LogError] = []
     findings: list[InputFinding] = []
+    named: dict[str, str] = {}  # first name of each content
     for path in paths:
         try:
             if isinstance(path, Path) and is_steady_table(path):
                 judged += read_steady_tables(path)
                 continue
             log = path if isinstance(path, Log) else read_log(path)
+            _check_new(log, named)
         except LogError as error:
             excluded.append(error)
             continue
@@ -199,6 +201,17 @@ def clean_measurements(
         raise excluded[0]
     read = Measurements(judged, [f"Left out: {error}" for error in excluded], [])
     return read.excluding_wrong([*findings, *check_recorded(read.tracks, model)])
+
+
+def _check_new(log: Log, named: dict[str, str]) -> None:
+    """A run that counts twice makes intervals too narrow, and its held-out blocks were fitted."""
+    first = named.get(log.sha256)
+    if first is not None:
+        raise LogError(
+            f"{log.path.name}: the same recording as {first}, which is used; a run counts once, so "
+            "name each once."
+        )
+    named[log.sha256] = log.path.name
 
 
 def _measured(log: Log, robot: RobotLog, runs: int) -> Measurement:

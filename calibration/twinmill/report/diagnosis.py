@@ -11,6 +11,7 @@ from rich.text import Text
 from twinmill.diagnosis.explain import Explanation, steps
 from twinmill.diagnosis.outliers import FEWEST, Outlier, in_words
 from twinmill.diagnosis.result import Diagnosis
+from twinmill.diagnosis.search import REFIT
 from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.model.parameters import ParameterEstimate, catalogue
 from twinmill.report import Figure, Section, comparisons, detections, show, tables
@@ -47,7 +48,7 @@ def findings(diagnosis: Diagnosis) -> Table:
         certainty: Tone = "good" if f.certainty == "sure" else "warn"
         rows.append(
             [
-                Cell(f"{f.effect}{names}", "good"),
+                Cell(f"{_named(f.effect)}{names}", "good"),
                 Cell(f.takes, "", f.share),
                 Cell(f.certainty, certainty),
                 Cell(estimates(f.parameters)),
@@ -82,7 +83,7 @@ def ranking(diagnosis: Diagnosis) -> Table:
         found = diagnosis.finding(r.effect)
         rows.append(
             [
-                Cell(r.effect, "good" if found else "dim"),
+                Cell(_named(r.effect), "good" if found else "dim"),
                 Cell(number(r.score_heldout), tone(r.score_heldout)),
                 Cell(f"{100 * r.share_explained:.0f} %"),
                 Cell(f"{r.p_value:.3f}"),
@@ -350,10 +351,14 @@ def _detection_figures(diagnosis: Diagnosis) -> list[Figure]:
 
 def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
     """Steps of the waterfall."""
-    names = {None: "as given", "refit": "base refitted"}
+    names = {None: "as given", REFIT: "base refitted"}
     return [
         (names.get(s["effect"], f"+ {s['effect']}"), s["score_heldout"]) for s in steps(diagnosis)
     ]
+
+
+def _named(effect: str) -> str:
+    return "stale numbers of the base" if effect == REFIT else effect
 
 
 def estimates(parameters: Sequence[ParameterEstimate]) -> str:
