@@ -158,7 +158,10 @@ def test_a_doubtful_name_is_right_but_not_beyond_doubt():
     answer = found(case.hidden[0].name)
     answer["findings"][0]["certainty"] = "doubtful"
     outcome = scored(case, answer)["outcome"]
-    assert outcome["first"] and not outcome["verdict_right"] and not outcome["clean"]
+    assert outcome["first"] and outcome["named"]
+    assert not outcome["verdict_right"] and not outcome["clean"]
+    silent = scored(case, answer | {"verdict": "outside_catalogue"})["outcome"]
+    assert silent["first"] and not silent["named"]
     nothing = scored(case_of("none"), answer)["outcome"]
     assert nothing["alarm"] and not nothing["wrong_and_sure"]
 

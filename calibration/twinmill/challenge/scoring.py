@@ -36,7 +36,8 @@ class Bar:
 
 BARS = (
     Bar("right_first", "one effect hidden: right first, or in its group", 0.95, True),
-    Bar("verdict_right", "beyond doubt, and the verdict right as well", 0.95, True),
+    Bar("named", "and the verdict right as well", 0.95, True),
+    Bar("verdict_right", "and beyond doubt", 0.95, True),
     Bar("clean", "and no other name", 0.95, True),
     Bar("rollers_first", "rollers: right first", 0.90, True),
     Bar("false_alarm", "nothing hidden: false alarms", 0.03, False),
@@ -113,8 +114,10 @@ def scored(case: Case, found: dict) -> dict:
     told = _rest(found)
     names = frozenset().union(*right)
     beyond_doubt = bool(firm and firm[0].names & names) and verdict in NAMED
+    first = bool(findings and findings[0].names & names)
     outcome = {
-        "first": bool(findings and findings[0].names & names),
+        "first": first,
+        "named": first and verdict in NAMED,
         "verdict_right": beyond_doubt,
         "clean": beyond_doubt and not others,
         "all": bool(right) and all(any(f.names & r for f in findings) for r in right),
@@ -151,6 +154,7 @@ def summary(results: list[dict]) -> dict:
     rollers = of("one", "cousin", plant="rollers")
     return {
         "right_first": share("first", single),
+        "named": share("named", single),
         "verdict_right": share("verdict_right", single),
         "clean": share("clean", single),
         "rollers_first": share("first", rollers),
