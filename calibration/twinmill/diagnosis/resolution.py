@@ -4,6 +4,7 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
+from twinmill.diagnosis.search import State
 from twinmill.fitting.opening import Opened, wide_gains
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import GAINS
@@ -49,7 +50,8 @@ def _of_robot(logs: Sequence[Opened]) -> Resolution:
             model.set(name, 1.0)
     free = wide_gains(models[0])
     data = [replace(o.data, own=_clock(o)) for o in logs]
-    estimates = {e.name: e for e in ScoreFit(data, models, free).fit().estimates}
+    by_channel = State(data, models, free).by_channel
+    estimates = {e.name: e for e in ScoreFit(data, models, free, by_channel).fit().estimates}
     speed, turn = (SURE * estimates[n].std if estimates[n].seen else None for n in GAINS)
     return Resolution(logs[0].measurement.track.robot_id, speed, turn)
 
