@@ -98,7 +98,7 @@ def with_stale_numbers(
     Args:
         found: in the order of worth.
         model: the final one.
-        lag_std_s: how well the model's lag was known.
+        lag_std_s: how well other logs told the model's lag; 0 where none did.
         stds: how well other logs told the numbers of the model's effects, by name.
     """
     gone: list[Finding] = []
@@ -124,10 +124,12 @@ def _stale_numbers(
     finding: Finding, model: native.Model, lag_std_s: float, stds: Mapping[str, float]
 ) -> list[ParameterEstimate]:
     """What a finding changes, if the model may well have all of it by its own error; else none."""
-    if finding.effect == LAG_EFFECT and not finding.group and lag_std_s > 0:
+    lag_s = model.get(LAG)
+    known_s = lag_std_s or SETTINGS.stated_lag * lag_s
+    if finding.effect == LAG_EFFECT and not finding.group and known_s > 0:
         extra = finding.parameters[0]
-        if abs(extra.value) <= SETTINGS.within * np.hypot(extra.std, lag_std_s):
-            return [replace(extra, name=LAG, value=model.get(LAG) + extra.value)]
+        if abs(extra.value) <= SETTINGS.within * np.hypot(extra.std, known_s):
+            return [replace(extra, name=LAG, value=lag_s + extra.value)]
     known = finding.again and all(_is_error(e, model, stds) for e in finding.parameters)
     return finding.parameters if known else []
 

@@ -55,6 +55,7 @@ class Settings(Numbers):
 
     # Doubts.
     within: float = number(2.0, "standard deviations: what differs by less is an error")
+    stated_lag: float = number(0.05, "standard deviation of a motor lag that no log told, a share")
     beyond: float = number(3.0, "usual sizes, or standard deviations at a bound: too far ...")
     near: float = number(0.5, "... if another leaves less than this more of the squared score")
     weighty: float = number(0.1, "share of the loudest visit that another must bring to count")

@@ -136,9 +136,16 @@ def test_each_wheel_with_a_command_of_its_own_has_its_formulas():
         model.copy().add_effect("equation", {"adds_to": "rim_mps", "formula": f"p0*{term.formula}"})
 
 
-@pytest.mark.parametrize(("known_s", "effect"), [(0.0133, REFIT), (0.001, "motor_lag")])
-def test_a_lag_within_the_models_own_error_is_a_stale_number(known_s, effect):
+@pytest.mark.parametrize(
+    ("lag_s", "known_s", "effect"),
+    [
+        *((0.1, 0.0133, REFIT), (0.1, 0.001, "motor_lag")),
+        *((0.2, 0.0, REFIT), (0.05, 0.0, "motor_lag"), (0.0, 0.0, "motor_lag")),  # known to 5 %
+    ],
+)
+def test_a_lag_within_the_models_own_error_is_a_stale_number(lag_s, known_s, effect):
     model = native.Model.load("turbopi.toml")
+    model.set("base.motor_lag_s", lag_s)
     extra = ParameterEstimate("motor_lag.extra_s", -0.0108, 0.0028, "s", False, True)
     lag = Finding("motor_lag", None, [extra], 0.6, "sure")
     found = with_stale_numbers([lag], model, known_s, {})

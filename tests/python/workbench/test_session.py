@@ -5,6 +5,7 @@ import os
 import shlex
 import shutil
 
+import lcm
 import numpy as np
 import pytest
 
@@ -151,7 +152,11 @@ def test_the_model_as_given_is_not_saved_again(session):
 
 def test_a_robot_that_the_checks_find_wrong_is_left_out_of_the_scores(session, compared):
     """They come after the first predictions: places and scores are then those of the others."""
-    shutil.copy("run.lcmlog", "wrong.lcmlog")
+    *events, _ = lcm.EventLog("run.lcmlog", "r")
+    wrong = lcm.EventLog("wrong.lcmlog", "w", overwrite=True)
+    for event in events:
+        wrong.write_event(event.timestamp, event.channel, event.data)
+    wrong.close()
     two = Session([type(session.paths[0])(n) for n in ("wrong.lcmlog", "run.lcmlog")], "model.toml")
     two.read()
     two.measure()
