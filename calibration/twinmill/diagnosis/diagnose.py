@@ -248,7 +248,7 @@ def _concluded(
     )
     rest = rest_of(formulas, last.fit, start.fit, model_file.left_over(hashes))
     findings = beside_more(of_another_form(findings, rest), rest)
-    findings.sort(key=lambda f: -f.share)
+    findings.sort(key=lambda f: -f.share)  # for people: the chain's order is by what each loses
     told = [f.depends_on for f in findings if f.depends_on]
     rest = replace(rest, depends_on=[*dict.fromkeys([*told, *rest.depends_on])])
     models = zip(known, last.state.models, strict=True)

@@ -41,10 +41,10 @@ HORIZON = HORIZONS_S.index(0.5)
 def findings_of(
     done: Search, first: State, less: Mapping[str, Trial | None]
 ) -> tuple[list[Finding], list[tuple[str, float]]]:
-    """Findings in the order of worth, and the held-out score after each of them.
+    """Findings in the order of a chain, and the held-out score after each of them.
 
-    Worth is what the final model loses without the effect. Shares are those of a chain that adds
-    the effects in this order. Effects that stand in for each other lose little alone, and what each
+    The chain adds the effects by what the final model loses without each. Shares are those of the
+    chain. Effects that stand in for each other lose little alone, and what each
     takes depends on what was taken before: the first is the one that takes most on the average over
     one order of adding and its reverse.
 
@@ -96,7 +96,7 @@ def with_stale_numbers(
     """Findings in which what the model may well have by its own error is a stale number.
 
     Args:
-        found: in the order of worth.
+        found: in the order of the chain.
         model: the final one.
         lag_std_s: how well other logs told the model's lag; 0 where none did.
         stds: how well other logs told the numbers of the model's effects, by name.

@@ -17,7 +17,6 @@ from scipy.stats import chi2
 from twinmill.diagnosis.search import REFIT, Search, State, Trial, cross_validate, fitted, screen
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened, wide_gains
-from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     GAINS,
     LAG_EFFECT,
@@ -243,7 +242,7 @@ def _with_gains(as_all: Trial) -> Trial:
     """Gains of its own, however large."""
     free = wide_gains(as_all.state.model)
     state = replace(as_all.state, free=free)
-    fit = ScoreFit(state.datasets, state.models, free, state.by_channel).fit()
+    fit = state.fit_of(free).fit()
     evidence = as_all.fit.held_cost - fit.held_cost
     return Trial(("gains",), fit, replace(state, models=fit.models), evidence, evidence, 0.0)
 

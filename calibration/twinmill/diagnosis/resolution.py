@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, replace
 
 from twinmill.diagnosis.search import State
 from twinmill.fitting.opening import Opened, wide_gains
-from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import GAINS
 
 SURE = 4.0  # standard deviations: as much evidence as the search asks for
@@ -50,8 +49,8 @@ def _of_robot(logs: Sequence[Opened]) -> Resolution:
             model.set(name, 1.0)
     free = wide_gains(models[0])
     data = [replace(o.data, own=_clock(o)) for o in logs]
-    by_channel = State(data, models, free).by_channel
-    estimates = {e.name: e for e in ScoreFit(data, models, free, by_channel).fit().estimates}
+    fit = State(data, models, free).fit_of(free).fit()
+    estimates = {e.name: e for e in fit.estimates}
     speed, turn = (SURE * estimates[n].std if estimates[n].seen else None for n in GAINS)
     return Resolution(logs[0].measurement.track.robot_id, speed, turn)
 

@@ -39,6 +39,7 @@ from twinmill.predict.datasets import Dataset, Trajectory, total_score
 from twinmill.predict.detections import Detections
 
 REFIT = "refit"  # the base's numbers were stale: a candidate like any effect
+REFIT_IN_WORDS = "stale numbers of the base"
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from twinmill.diagnosis import moments
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.rest import MOMENTS, Rest
-from twinmill.diagnosis.search import REFIT, of_levels
+from twinmill.diagnosis.search import REFIT, REFIT_IN_WORDS, of_levels
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.compare import GOOD, MISSING
 
@@ -269,7 +269,7 @@ def _named(finding: Finding) -> str:
         )
         instead = f", or {' or '.join(finding.group[1:])} instead" if finding.group else ""
         share = f"; {takes}" if finding.share >= 0.005 else ""  # else robots' own gains took it
-        return f"stale numbers of the base ({values}{share}){instead}"
+        return f"{REFIT_IN_WORDS} ({values}{share}){instead}"
     name = f"{finding.effect} beside the model's own" if finding.again else finding.effect
     if finding.group:
         name = f"one of {' or '.join(finding.group)}, which these logs cannot tell apart"

@@ -11,7 +11,7 @@ from rich.text import Text
 from twinmill.diagnosis.explain import Explanation, steps
 from twinmill.diagnosis.outliers import FEWEST, Outlier, in_words
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.search import REFIT
+from twinmill.diagnosis.search import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.model.parameters import ParameterEstimate, catalogue
 from twinmill.report import Figure, Section, comparisons, detections, show, tables
@@ -358,7 +358,8 @@ def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
 
 
 def _named(effect: str) -> str:
-    return "stale numbers of the base" if effect == REFIT else effect
+    """As the sentence of the verdict names it."""
+    return REFIT_IN_WORDS if effect == REFIT else effect
 
 
 def estimates(parameters: Sequence[ParameterEstimate]) -> str:

@@ -150,14 +150,11 @@ def test_the_model_as_given_is_not_saved_again(session):
         session.save(type(session.paths[0])("copy.toml"))
 
 
-def test_a_robot_that_the_checks_find_wrong_is_left_out_of_the_scores(session, compared):
+def test_a_robot_that_the_checks_find_wrong_is_left_out_of_the_scores(session, compared, write_log):
     """They come after the first predictions: places and scores are then those of the others."""
     *events, _ = lcm.EventLog("run.lcmlog", "r")
-    wrong = lcm.EventLog("wrong.lcmlog", "w", overwrite=True)
-    for event in events:
-        wrong.write_event(event.timestamp, event.channel, event.data)
-    wrong.close()
-    two = Session([type(session.paths[0])(n) for n in ("wrong.lcmlog", "run.lcmlog")], "model.toml")
+    wrong = write_log(*((e.channel, e.data) for e in events), name="wrong.lcmlog")
+    two = Session([wrong, *session.paths], "model.toml")
     two.read()
     two.measure()
     two.judge(1)
