@@ -44,5 +44,17 @@ TEST(ReverseAsymmetry, ActsOnOneSideOfATurn)
     EXPECT_NEAR(right.state.pose.theta_rad, -kFull_mps / kLever_m, 1e-12);
 }
 
+// Three wheels that all lose a tenth in reverse turn a tenth slower that way.
+TEST(ReverseAsymmetry, SlowsThreeWheelsAlikeWhereBothSidesAreAlike)
+{
+    Model model;
+    model.base.wheels = WheelKind::kOmni3;
+    model.base.drive = Drive::kWheelSpeed;
+    Player player(With("reverse_asymmetry", {-0.1, -0.1}, model), 0.02);
+    player.Play({-10, -10, -10, 0}, 0.02);
+    EXPECT_NEAR(player.state.omega_radps,
+                -9 * model.robot.wheel_radius_m / model.robot.half_track_m, 1e-12);
+}
+
 }  // namespace
 }  // namespace twin::test

@@ -20,6 +20,12 @@ std::vector<const char *> NamesIn(unsigned mask, std::span<const char *const> na
 
 }  // namespace
 
+std::vector<const char *> DriveNames(unsigned drives)
+{
+    constexpr const char *kNames[] = {"duties", "wheel speeds", "velocities", "steering angles"};
+    return NamesIn(drives, kNames);
+}
+
 const char *FamilyName(Family family)
 {
     switch (family)

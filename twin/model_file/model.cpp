@@ -40,6 +40,15 @@ Parameter TableSpeed(const Model &model, size_t i)
     return p;
 }
 
+// "a, b or c".
+std::string Listed(const std::vector<const char *> &words)
+{
+    std::string text;
+    for (size_t i = 0; i < words.size(); ++i)
+        text += std::string(i == 0 ? "" : i + 1 < words.size() ? ", " : " or ") + words[i];
+    return text;
+}
+
 // Calls visit(parameter, value) for the numbers of the model whose full name is `name`, or for all
 // if it is empty; `parameter` has its full name.
 template <class Visit>
@@ -118,14 +127,12 @@ void Model::Set(const std::string &name, double value)
 
 std::string Model::WhyNot(const EffectSpec &spec) const
 {
-    if (!(spec.card.drives & static_cast<unsigned>(base.drive)))
-        return spec.card.drives == kDutyOnly
-                   ? "acts on wheel duties, and this model's robot is not driven by duties"
-                   : "acts on commanded velocities, and this model's robot is driven by others";
+    const auto drive = static_cast<unsigned>(base.drive);
+    if (!(spec.card.drives & drive))
+        return "acts on robots that are told " + Listed(DriveNames(spec.card.drives)) +
+               ", and this model's is told " + DriveNames(drive).front();
     if (base.wheels == WheelKind::kNone && std::ranges::any_of(spec.parameters, IsPerWheel))
         return "acts on single wheels, and base.wheels of this model is \"none\"";
-    if (spec.needs_sides && base.wheels == WheelKind::kOmni3)
-        return "acts on left and right wheels, and an omni3 robot has none";
     return "";
 }
 

@@ -95,6 +95,7 @@ nb::dict CardEntry(const EffectSpec &spec, const std::vector<Wheel> &wheels)
     entry["needs"] = NeedsName(card.needs);
     entry["suspect_when"] = Words(PhaseNames(card.suspect_when));
     entry["reference"] = card.reference;
+    entry["drives"] = Words(DriveNames(card.drives));
     entry["duty_only"] = card.drives == kDutyOnly;
     bool place_like = false;
     nb::list parameters;

@@ -17,7 +17,14 @@ CASES = ("none", "one", "cousin", "two", "outside", "one", "cousin", "none", "on
 AHEAD_S = 2.0
 SIZES = (1.3, 6.0)  # floors that a hidden effect adds to the error at AHEAD_S
 LEAST = 1.1
-TIMING = ("motor_lag", "input_delay", "slew_limit", "lag_by_duty", "coasting")
+TIMING = (
+    "motor_lag",
+    "input_delay",
+    "slew_limit",
+    "acceleration_limit",
+    "lag_by_duty",
+    "coasting",
+)
 # Two effects of one of these families are not hidden together: a log seldom parts them.
 FAMILIES = (
     TIMING,
@@ -26,7 +33,7 @@ FAMILIES = (
     ("battery_sag", "heat_gain", "abrupt_loss", "transient_loss"),
     ("floor_tilt", "carpet_grain", "floor_patch", "gain_slope"),
     ("yaw_lever", "turn_asymmetry", "lateral_slip", "strafe_loss"),
-    ("marker_offset", "heading_bias"),
+    ("marker_offset", "heading_bias", "compass_deviation"),
 )
 
 

@@ -105,9 +105,18 @@ def _speed_power(duty, v, _):
 
 
 def _slew(duty, v, _):
-    most, out = STEP_S / v["ramp_s"], np.zeros_like(duty)
-    for k in range(1, len(duty)):
-        out[k] = out[k - 1] + np.clip(duty[k] - out[k - 1], -most, most)
+    return _ramp(duty, v["ramp_s"])
+
+
+def _accelerates(twist, v, _):
+    return _ramp(twist, np.array([v["pace_s2_per_m"]] * 2 + [v["turn_pace_s2_per_rad"]]))
+
+
+def _ramp(signal, pace_s):
+    """(N, k) signals that change by one in no less than (k,) pace_s."""
+    most, out = STEP_S / pace_s, np.zeros_like(signal)
+    for k in range(1, len(signal)):
+        out[k] = out[k - 1] + np.clip(signal[k] - out[k - 1], -most, most)
     return out
 
 
@@ -289,10 +298,23 @@ def _bias(pose, v, _):
     return pose + np.array([0, 0, v["bias_rad"]])
 
 
-def _compass(pose, v, _):
-    return pose + np.column_stack(
-        [np.zeros((len(pose), 2)), v["size_rad"] * np.sin(pose[:, 2] + 1)]
-    )
+def _turned(pose, by_rad):
+    """The heading seen is off by (N,); places are right."""
+    return pose + np.column_stack([np.zeros((len(pose), 2)), by_rad])
+
+
+def _hard_iron(pose, v, _):
+    heading = pose[:, 2]
+    return _turned(pose, v["cos_rad"] * np.cos(heading) + v["sin_rad"] * np.sin(heading))
+
+
+def _iron_of_both_kinds(pose, v, _):
+    heading = pose[:, 2]
+    return _turned(pose, v["size_rad"] * (np.sin(heading + 1) + 0.3 * np.sin(2 * heading)))
+
+
+def _soft_iron(pose, v, _):
+    return _turned(pose, v["size_rad"] * np.sin(2 * pose[:, 2] + 1))
 
 
 def _turn_by_heading(twist, v, s):
@@ -420,7 +442,10 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
         form("yaw_lag", "plain", "lag", _turning_lags, extra_s=0.04)
         form("input_delay", "plain", "command", _delay, delay_s=0.025)
         form("input_delay", "cousin", "command", _delay_that_varies, delay_s=0.03)
-    if robot.drive != "twist":
+    if robot.drive == "twist":
+        form("acceleration_limit", "plain", "duty", _accelerates, pace_s2_per_m=0.6,
+             turn_pace_s2_per_rad=0.15)  # fmt: skip
+    else:
         form("backlash", "plain", "rolls", _backlash, gap_rad=0.15)
         gains = _by_wheel(robot, random.normal(0, 0.03, len(wheels)))
         gains -= gains.mean()
@@ -438,6 +463,9 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
     form("marker_offset", "plain", "observe", _marker, x_m=0.007 * sign(), y_m=0.006 * sign())
     if robot.sideways:
         form("heading_bias", "plain", "observe", _bias, bias_rad=0.02 * sign())
+    off = {"cos_rad": 0.03 * sign(), "sin_rad": 0.03 * sign()}
+    form("compass_deviation", "plain", "observe", _hard_iron, **off)
+    form("compass_deviation", "cousin", "observe", _iron_of_both_kinds, size_rad=0.04)
     return found
 
 
@@ -502,10 +530,10 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
     compass = {"size_rad": 0.05}
     found = [
         Hidden(
-            name="compass",
+            name="soft iron",
             kind="outside",
             stage="observe",
-            act=_compass,
+            act=_soft_iron,
             values=compass,
             grows=("size_rad",),
             most=5,

@@ -10,7 +10,7 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.cameras import with_detections
-from twinmill.diagnosis.doubts import beside_more, of_another_form
+from twinmill.diagnosis.doubts import beside_more, of_another_form, within_the_table
 from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_numbers
 from twinmill.diagnosis.notes import (
     few_commands_notes,
@@ -246,6 +246,8 @@ def _concluded(
     findings = with_stale_numbers(
         findings, last.state.model, model_file.lag_std_s(hashes), model_file.effect_stds
     )
+    if model_file.model.drive == "duty" and model_file.known_from_other_logs(hashes):
+        findings = within_the_table(findings, less, last)
     rest = rest_of(formulas, last.fit, start.fit, model_file.left_over(hashes))
     findings = beside_more(of_another_form(findings, rest), rest)
     findings.sort(key=lambda f: -f.share)  # for people: the chain's order is by what each loses

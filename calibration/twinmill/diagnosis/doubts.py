@@ -5,7 +5,7 @@ An effect that is named surely and is not there sends its user the wrong way, so
 with the finding.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -87,6 +87,42 @@ def seen_once(done: Search, name: str, less: Trial | None) -> list[str] | None:
     if less is None or _visits(done.last, less, instance) != 1:
         return None
     return [n for n in _same(done, name) if with_role(n, "moment")]
+
+
+def within_the_table(
+    found: Sequence[Finding], less: Mapping[str, Trial], last: Trial
+) -> list[Finding]:
+    """Findings, doubtful where speeds that other logs told may be as wrong as what they change.
+
+    Args:
+        found: of a robot of duties, whose base other logs told.
+        less: the final state refitted without each effect.
+        last: the final state.
+    """
+
+    def judged(finding: Finding) -> Finding:
+        bends = finding.effect in less and _bends(finding.effect)
+        if not bends or _share_of_way(less[finding.effect], last) > SETTINGS.told_speeds:
+            return finding
+        why = (
+            f"it changes the way by less than {100 * SETTINGS.told_speeds:.1f} %, and speeds that "
+            "another log told are seldom known better"
+        )
+        return doubted(finding, why)
+
+    return [judged(f) for f in found]
+
+
+def _share_of_way(less: Trial, whole: Trial) -> float:
+    """Of two states, how far apart their predictions are at the longest horizon, over the way."""
+    apart, way = 0.0, 0.0
+    rows = zip(whole.fit.datasets, less.fit.state[0], whole.fit.state[0], strict=True)
+    for data, before, after in rows:
+        if isinstance(data, Trajectory):
+            moved = data.as_errors(before) - data.as_errors(after)
+            apart += float(np.nansum(moved[:, -1, :2] ** 2))
+            way += float(np.nansum(data.measured[:, -1, :2] ** 2))
+    return float(np.sqrt(apart / max(way, 1e-12)))
 
 
 def _sizes(

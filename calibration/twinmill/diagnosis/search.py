@@ -14,6 +14,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.settings import SETTINGS, Settings
+from twinmill.diagnosis.starts import MARGIN, Left, Starts, starts_of
 from twinmill.fitting.detection_fit import DetectionFit
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
@@ -40,6 +41,8 @@ from twinmill.predict.detections import Detections
 
 REFIT = "refit"  # the base's numbers were stale: a candidate like any effect
 REFIT_IN_WORDS = "stale numbers of the base"
+SECONDS = 3.0  # of a log, in which what happened in a moment is seen
+PAUSE_S = 2.0  # between the end of what lasts for a while and its next begin
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,8 @@ class Trial:
         fit: of all free parameters.
         state: with the fitted models.
         evidence: fall of the held-out cost against the state it started from.
-        without_best: the same without the block with the most evidence for it.
+        without_best: the same without the block with the most evidence for it; of what lasts for a
+            while without the 3 s with the most, if enough is left.
         blocks_t: t of the relative fall over blocks.
     """
 
@@ -216,11 +220,11 @@ def search(
         settings = settings.stricter(settings.usual * known)
     rounds: list[Round] = []
     dropped: list[str] = []
-    ways: Ways = {}
+    starts: dict[str, Starts] = {}
     first_excess = max(before.held_score**2 - 1, 0.0)
     for number in range(settings.most):
         progress(f"round {number + 1}: screening the catalogue")
-        screened = screen(before, ways)
+        screened = screen(before, starts)
         this = Round(before, screened, [])
         rounds.append(this)
         for candidate in _promising(screened, settings)[: settings.fitted]:
@@ -288,7 +292,30 @@ def cross_validate(
     fit = state.fit_of(state.free)
     fit.begin_at_best(state.free[len(before.state.free) :])
     fit.fit()
-    return Trial(names, fit, replace(state, models=fit.models), *fit.against(before.fit))
+    after = replace(state, models=fit.models)
+    evidence, without_best, blocks_t = fit.against(before.fit)
+    within = _without_best_seconds(names, after, fit, before)
+    if within > SETTINGS.lasts * evidence:
+        without_best = max(without_best, within)
+    return Trial(names, fit, after, evidence, without_best, blocks_t)
+
+
+def _without_best_seconds(
+    names: Sequence[str], state: State, fit: ScoreFit | DetectionFit, before: Trial
+) -> float:
+    """Evidence for what lasts for a while, without the SECONDS with the most; 0 for all else.
+
+    A while may lie within one block. What happened in a moment is seen for two seconds.
+    """
+    if len(names) > 1 or not with_role(names[0], "moment")[1:]:
+        return 0.0
+    logs = [d for d in state.datasets if isinstance(d, Trajectory)]
+    least = []
+    for shift in (0.0, 0.5):
+        numbers = [((d.start_s - d.start_s[0]) / SECONDS + shift).astype(int) for d in logs]
+        blocks = [np.repeat(p, d.measured[0].size) for p, d in zip(numbers, logs, strict=True)]
+        least.append(fit.least_against(before.fit, blocks))
+    return min(least)
 
 
 def _best(
@@ -322,7 +349,9 @@ def _began_before(trial: Trial, name: str) -> bool:
     """An effect of a moment that is hardly within the logs: it is there all the time, or never."""
     if not with_role(name, "moment"):
         return False
-    low_s, high_s = np.quantile(_times_s(trial.state), (MARGIN, 1 - MARGIN))
+    logs = [d for d in trial.state.datasets if isinstance(d, Trajectory)]
+    times_s = np.concatenate([d.start_s for d in logs])
+    low_s, high_s = np.quantile(times_s, (MARGIN, 1 - MARGIN))
     return not all(low_s < t_s < high_s for t_s in _when_s(trial, name))
 
 
@@ -471,32 +500,27 @@ def candidates(state: State) -> list[str]:
         names.append(REFIT)
     for name, entry in catalogue_of(model).items():
         usable = entry["stage"] in state.datasets[0].stages and not entry["texts"]
-        fits = not entry["duty_only"] or model.drive == "duty"
-        if usable and fits and name not in moved and name not in state.excluded:
+        if usable and name not in moved and name not in state.excluded:
             names.append(name)
     return names
 
 
-# Of an effect: starts, and (S, R) how each data set's rows change by it from each of them.
-Ways = dict[str, tuple[list[dict[str, float]], list[np.ndarray]]]
-
-
 def screen(
-    before: Trial, ways: Ways | None = None, names: Sequence[str] | None = None
+    before: Trial, starts: dict[str, Starts] | None = None, names: Sequence[str] | None = None
 ) -> list[Screened]:
     """Every candidate's expected worth, by its signature over what is free.
 
     Args:
         before: what is free in it is projected out.
-        ways: of effects whose start is searched, found in earlier rounds; new ones are added. What
-            was accepted since changes little of how a patch of the floor changes the rows, but
+        starts: of effects whose start is searched, found in earlier rounds; new ones are added.
+            What was accepted since changes little of how a patch of the floor changes the rows, but
             much of which limit is the right one.
         names: of the candidates, where not all that the state can have are meant.
     """
     fit, state = before.fit, before.state
     if state.of_cameras:
         return [_screened_bits(name, before) for name in candidates(state)]
-    ways = {} if ways is None else ways
+    starts = {} if starts is None else starts
     rows, _ = fit.state
     weights = [np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)]
     left, columns, _ = fit.whitened(range(len(rows)))
@@ -504,12 +528,15 @@ def screen(
     padded = np.concatenate([left, (fit.usual - fit.x) / fit.std * -1]) if len(fit.x) else left
     basis = np.linalg.qr(free)[0] if len(fit.x) else free
     rest = padded - basis @ (basis.T @ padded)
+    ends = np.cumsum([len(r) for r in rows])[:-1]
+    parts = (np.split(whole[: len(left)], ends) for whole in (rest, basis))
+    what_is_left = Left(weights, *parts)
     found = []
     for name in candidates(state) if names is None else names:
-        searched = any(with_role(name, role) for role in STARTS)
-        if searched and (name not in ways or with_role(name, "limit")):
-            ways[name] = _ways(name, state, rows)
-        start = _best_start(*ways[name], weights, rest) if searched else {}
+        if name not in starts or with_role(name, "limit"):
+            of = starts_of(name, state.models, state.datasets, rows)
+            starts |= {name: of} if of else {}
+        start = starts[name].best(what_is_left) if name in starts else {}
         found.append(
             _screened(name, state, rows=rows, weights=weights, basis=basis, rest=rest, start=start)
         )
@@ -536,52 +563,6 @@ def _widths(name: str, parameters: Sequence[Parameter], start: dict[str, float])
     reach = np.abs(_reach(name, parameters, start))
     std = np.array([p.std for p in parameters])
     return np.maximum(std / np.maximum(reach, 1e-12), 1.0)
-
-
-def _ways(
-    name: str, state: State, rows: list[np.ndarray]
-) -> tuple[list[dict[str, float]], list[np.ndarray]]:
-    """Starts of an effect that has several, and the change of the rows from each, see Ways."""
-    starts = next(of(name, state) for role, of in STARTS.items() if with_role(name, role))
-    if len(starts) < 2:
-        return starts, []
-    changes = []
-    for dataset, model, row in zip(state.datasets, state.models, rows, strict=True):
-        points = [_points(name, state, model, s) for s in starts]
-        names = points[0][1]
-        values = np.array([p[2].values[-1] for p in points])
-        changes.append(row - dataset.rows(points[0][2].model, names, values))
-    if len(with_role(name, "moment")) == 2:
-        return _between(name, state, starts, changes)
-    return starts, changes
-
-
-def _between(
-    name: str, state: State, begins: list[dict[str, float]], changes: list[np.ndarray]
-) -> tuple[list[dict[str, float]], list[np.ndarray]]:
-    """Ways of an effect that begins and ends, from what it changes if it never ends.
-
-    A small effect of a while is one that begins with it, less one that begins where it ends.
-    """
-    begin, end = (f"{_next_instance(name, state)}.{key}" for key in with_role(name, "moment"))
-    pairs = list(combinations(range(len(begins)), 2))
-    starts = [{begin: begins[a][begin], end: begins[b][begin]} for a, b in pairs]
-    first, second = np.array(pairs).T
-    return starts, [c[first] - c[second] for c in changes]
-
-
-def _best_start(
-    starts: list[dict[str, float]],
-    changes: list[np.ndarray],
-    weights: list[np.ndarray],
-    rest: np.ndarray,
-) -> dict[str, float]:
-    """Of several starts the one that explains most at the usual strength."""
-    if not changes:
-        return {}
-    columns = np.concatenate([w * c for w, c in zip(weights, changes, strict=True)], axis=1)
-    gains = (columns @ rest[: columns.shape[1]]) ** 2 / ((columns**2).sum(axis=1) + 1e-12)
-    return starts[int(np.argmax(gains))]
 
 
 def _screened(
@@ -674,67 +655,6 @@ def _points(
         [p.name for p in parameters],
         _Points(model, np.clip(values, low, high), SMALL),
     )
-
-
-PLACES = 5  # along each side of the floor that was driven
-
-
-def _places(name: str, state: State) -> list[dict[str, float]]:
-    """Starts of an effect with a place, over the floor that was driven."""
-    instance = _next_instance(name, state)
-    logs = [d.measurement.track for d in state.datasets if isinstance(d, Trajectory)]
-    if not logs:
-        return [{}]
-    xy = np.concatenate([t.pose[t.segment >= 0, :2] for t in logs])
-    low, high = np.nanquantile(xy, 0.03, axis=0), np.nanquantile(xy, 0.97, axis=0)
-    radius_m = max(0.15, 0.2 * float(np.max(high - low)))
-    starts = []
-    for x in np.linspace(low[0], high[0], PLACES):
-        for y in np.linspace(low[1], high[1], PLACES):
-            if np.min(np.hypot(*(xy[::20] - (x, y)).T)) < radius_m:
-                at = {"x_m": float(x), "y_m": float(y), "radius_m": radius_m}
-                starts.append({f"{instance}.{key}": value for key, value in at.items()})
-    return starts or [{}]
-
-
-def _next_instance(name: str, state: State) -> str:
-    """What the effect is called once it is added."""
-    count = state.model.effects.count(name)
-    return f"{name}#{count + 1}" if count else name
-
-
-MOMENTS = 16  # over the time of the log
-NEVER_S = 1e5  # later than any log ends
-PAUSE_S = 2.0  # between the end of what lasts for a while and its next begin
-MARGIN = 0.05  # share of it at each end, within which a moment is none
-
-
-def _moments(name: str, state: State) -> list[dict[str, float]]:
-    """Starts of an effect that begins at a moment, and never ends."""
-    instance = _next_instance(name, state)
-    begin, *end = (f"{instance}.{key}" for key in with_role(name, "moment"))
-    at_s = np.quantile(_times_s(state), (np.arange(MOMENTS) + 0.5) / MOMENTS)
-    return [{begin: float(t_s), **dict.fromkeys(end, NEVER_S)} for t_s in at_s]
-
-
-def _times_s(state: State) -> np.ndarray:
-    """Times at which the windows of all logs start, s."""
-    return np.concatenate([d.start_s for d in state.datasets if isinstance(d, Trajectory)])
-
-
-LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual one
-
-
-def _limits(name: str, state: State) -> list[dict[str, float]]:
-    """Starts of an effect with a limit."""
-    instance = _next_instance(name, state)
-    usual = {p["name"]: p["default"] for p in catalogue()[name]["parameters"]}
-    limits = with_role(name, "limit")
-    return [{f"{instance}.{key}": k * usual[key] for key in limits} for k in LIMITS]
-
-
-# Where a search starts, by the role of the parameter that it is for.
-STARTS = {"place": _places, "moment": _moments, "limit": _limits}
 
 
 def _promising(screened: list[Screened], settings: Settings) -> list[Screened]:

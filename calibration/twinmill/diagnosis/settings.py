@@ -17,6 +17,7 @@ class Settings(Numbers):
     # The search: which effect is accepted.
     evidence: float = number(16.0, "least fall of the held-out cost (-2 log likelihood)")
     without_best: float = number(8.0, "the same without the block with the most evidence")
+    lasts: float = number(0.4, "share of it without the best 3 s, if an effect is of a while")
     without_visit: float = number(4.0, "the same of an effect of a place, seen at visits alone")
     drowned: float = number(1.15, "score from which on what else is missing drowns evidence ...")
     less_evidence: float = number(9.0, "... so that this much is enough ...")
@@ -56,6 +57,7 @@ class Settings(Numbers):
     # Doubts.
     within: float = number(2.0, "standard deviations: what differs by less is an error")
     stated_lag: float = number(0.05, "standard deviation of a motor lag that no log told, a share")
+    told_speeds: float = number(0.015, "share of the way by which speeds of another log may be off")
     beyond: float = number(3.0, "usual sizes, or standard deviations at a bound: too far ...")
     near: float = number(0.5, "... if another leaves less than this more of the squared score")
     weighty: float = number(0.1, "share of the loudest visit that another must bring to count")
@@ -81,7 +83,7 @@ class Settings(Numbers):
     firm_t: float = number(3.0, "t over blocks: the smooth response predicts better")
     far: float = number(10.0, "times the median squared error: a single moment ...")
     several: int = number(3, "... of which so many are no accident")
-    place_chance: float = number(0.01, "that errors repeat so at a place, of the model ...")
+    place_chance: float = number(0.004, "that errors repeat so at a place, of the model ...")
     place_chance_of_floor: float = number(0.05, "... and of the smooth response, too ...")
     place_share: float = number(0.1, "... if this share of their square repeats")
 

@@ -100,8 +100,12 @@ class VerdictInputs:
 
     @property
     def _unexplained(self) -> bool:
-        """More is left than is usual, and neither an effect nor a formula takes it."""
-        return self.last > MISSING * self.known
+        """More is left than is usual, and neither an effect nor a formula takes it.
+
+        Less is enough where the smooth response predicts much of it.
+        """
+        firm = self.rest.firm and self.rest.share > SETTINGS.much_left
+        return self.last > (GOOD if firm else MISSING) * self.known
 
     @property
     def _noise_outweighs(self) -> bool:
@@ -126,7 +130,7 @@ class VerdictInputs:
             return False
         if self._continuous and self.rest.share > SETTINGS.much:
             return True
-        return self.rest.firm and self.rest.share > self._taken
+        return self.rest.firm and self.rest.share > min(self._taken, SETTINGS.much_left)
 
     @property
     def _taken(self) -> float:
@@ -213,7 +217,7 @@ class VerdictInputs:
         events = moments.sentence(self.rest.moments) if self.rest.moments else ""
         if events and not self._outside:
             return f"Nothing is missing that acts all the time. {events}"
-        if self.noises and not self.rest.depends_on:
+        if self.noises and not (self.rest.depends_on or self.rest.firm):
             return "Something random disturbs the motion that no effect of the catalogue describes."
         on = " and ".join(self._continuous)
         depends = f"it depends on {on}" if on else "no formula that was tried describes it"

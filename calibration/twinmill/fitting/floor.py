@@ -27,6 +27,8 @@ from twinmill.model.parameters import (
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S, rms
 
+HORIZON = HORIZONS_S.index(0.5)
+PAUSE_S = 1.0  # between the starts of windows of two bumps
 ARM_M = 0.1  # a turn counts as the way of a point so far from the middle
 REACH_S = 1.0  # delays and offsets that are looked for
 
@@ -37,7 +39,7 @@ class NoiseFloor:
 
     Attributes:
         rms: (H, 3) errors that count as one; NaN where a channel does not move.
-        keep: (W,) bool: windows that are judged; the others hold a bump.
+        keep: (W,) bool: windows that are judged; the others hold a bump that was over soon.
         kind: "response"; None if the log cannot give a floor.
         reason: why it cannot; empty otherwise.
         offset_s: capture's clock less the robot's, with which it was found.
@@ -73,20 +75,20 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     offset_s = base.get(CLOCK)
     response = Response(data, velocity, base.get(LAG), offset_s)
     response.boost(list(place_gains(response.motion)))
-    keep = _without_bumps(data, response)
-    if not keep.all():
-        response = response.of_windows(keep)
+    calm = _without_bumps(data, response)
+    if not calm.all():
+        response = response.of_windows(calm)
     points = response.points
     known = known_physics(base, velocity[points], lambda m: body_velocity_at(data, m, points))
     response.boost([*dependences(response.motion), *known])
     within, across = (
-        np.where(keep[:, None, None], e, np.nan) for e in (response.within, response.across)
+        np.where(calm[:, None, None], e, np.nan) for e in (response.within, response.across)
     )
     floor = np.sqrt((rms(within) ** 2 + rms(across) ** 2) / 2)
     moves = rms(data.measured) > 1e-9
     return NoiseFloor(
         rms=np.where(moves, np.maximum(floor, 1e-9), np.nan),
-        keep=keep,
+        keep=calm | _lasting(data, base, ~calm),
         kind="response",
         reason="",
         offset_s=offset_s,
@@ -197,6 +199,25 @@ def _without_bumps(data: Trajectory, response: Response) -> np.ndarray:
     parts &= apart_s < HORIZONS_S[-1]
     rare = (bumps | parts).mean() < FLOOR_SETTINGS.rare_bumps
     return ~bumps & ~parts if rare else ~bumps
+
+
+def _lasting(data: Trajectory, base: native.Model, bumps: np.ndarray) -> np.ndarray:
+    """(W,) windows with bumps that are none: for a while all of the motion is less, or more.
+
+    They tell nothing of the noise, and are judged.
+    """
+    found = np.zeros(len(bumps), bool)
+    measured, errors = (e[:, HORIZON] * (1, 1, ARM_M) for e in (data.measured, data.errors(base)))
+    index = np.flatnonzero(bumps & np.isfinite(measured).all(axis=1))
+    for part in np.split(index, 1 + np.flatnonzero(np.diff(data.start_s[index]) > PAUSE_S)):
+        if len(part) and np.ptp(data.start_s[part]) >= FLOOR_SETTINGS.lasts_s:
+            own, missed = measured[part], errors[part]
+            predicted = own - missed
+            share = np.sum(own * predicted) / max(np.sum(predicted**2), 1e-12)
+            left = np.sum((own - share * predicted) ** 2) / max(np.sum(missed**2), 1e-12)
+            low, high = FLOOR_SETTINGS.least_way, 2 - FLOOR_SETTINGS.least_way
+            found[part] = low < share < high and left < FLOOR_SETTINGS.uneven
+    return found
 
 
 def is_far(errors: np.ndarray, floor: np.ndarray, times: float) -> np.ndarray:

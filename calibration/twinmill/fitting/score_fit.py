@@ -356,13 +356,18 @@ class ScoreFit:
             parts.append(np.bincount(d.block, like.weight(i, like.held_out[i]) * held**2))
         return np.concatenate(parts)
 
-    def without_blocks(self) -> np.ndarray:
-        """(B,) held-out cost of the data without each block, the prior left aside."""
+    def without_blocks(self, blocks: Sequence[np.ndarray] | None = None) -> np.ndarray:
+        """(B,) held-out cost of the data without each block, the prior left aside.
+
+        Args:
+            blocks: (R,) of each data set, from 0; its own if left out.
+        """
         costs = []
+        blocks = [d.block for d in self.datasets] if blocks is None else blocks
         whole = [self._misfit(i, r) for i, r in enumerate(self.held_out)]
-        for i, (d, held) in enumerate(zip(self.datasets, self.held_out, strict=True)):
+        parts = zip(self.datasets, self.held_out, self.scales, blocks, strict=True)
+        for i, (d, held, scale, block) in enumerate(parts):
             rest = sum(whole) - whole[i]
-            scale, block = self.scales[i], d.block
             shape = (block.max() + 1, scale.max() + 1)
             place = np.ravel_multi_index((block, scale), shape)
             squares, judged = (
@@ -406,8 +411,12 @@ class ScoreFit:
         a, b = less.block_costs(less), self.block_costs(less)
         falls = (a - b) / np.maximum(a + b, 1e-300)
         spread = np.std(falls, ddof=1) / np.sqrt(len(falls)) if len(falls) > 1 else np.inf
-        least = float(np.min(less.without_blocks() - self.without_blocks()))
+        least = self.least_against(less)
         return less.held_cost - self.held_cost, least, float(falls.mean() / max(spread, 1e-12))
+
+    def least_against(self, less: "ScoreFit", blocks: Sequence[np.ndarray] | None = None) -> float:
+        """Evidence against a poorer model's fit without the block with the most; see above."""
+        return float(np.min(less.without_blocks(blocks) - self.without_blocks(blocks)))
 
     # -- uncertainty ----------------------------------------------------------------------------
 

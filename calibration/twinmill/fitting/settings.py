@@ -34,6 +34,9 @@ class FloorSettings(Numbers):
     bump_part: float = number(4.0, "... and so many times, of windows that overlap such a one ...")
     rare_bumps: float = number(0.1, "... if all these are less than this share of the windows")
     most_bumps: float = number(0.25, "share of bumped windows, beyond which none is left out")
+    lasts_s: float = number(4.0, "what lasts so long is no bump, and is judged, if ...")
+    least_way: float = number(0.3, "... so much of the way is gone all the time ...")
+    uneven: float = number(0.3, "... and one share of the way leaves less than this of the miss")
 
     # The smooth response.
     ridge_worth: float = number(0.998, "a ridge is taken if it lowers the error to this share")

@@ -33,7 +33,7 @@ constexpr ParameterSpec kParameters[] = {
      Role::kPlace},
     {"y_m", "m", 0, 0.2, -100, 100, "centre in W; means nothing at strength 0", "", "", 1,
      Role::kPlace},
-    {"radius_m", "m", 0.5, 0.3, 0.02, 3, "of the patch; means nothing at strength 0", "", "", 0,
+    {"radius_m", "m", 0.5, 0.3, 0.02, 10, "of the patch; means nothing at strength 0", "", "", 0,
      Role::kPlace},
 };
 

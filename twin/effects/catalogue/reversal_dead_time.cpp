@@ -10,7 +10,7 @@ namespace
 
 constexpr Card kCard = {
     .name = "reversal_dead_time",
-    .drives = kDutyOnly,
+    .drives = kDutyOnly | static_cast<unsigned>(Drive::kWheelSpeed),
     .summary = "A wheel told to turn the other way stands still for a while first.",
     .equation = "u' = 0 until dead_time after u left its old sign, then u' = u",
     .leaves_out = "play that has to be taken up also after a pause: time at zero duty counts here",

@@ -11,7 +11,7 @@ constexpr Card kCard = {
     .drives = kAnyDrive,
     .summary =
         "Wheels that turn backwards are slower or faster than forwards, each side by its own factor.",
-    .equation = "v' = v (1 + side) where v < 0",
+    .equation = "v' = v (1 + side) where v < 0; a wheel in the middle has the mean of both sides",
     .leaves_out = "differences between front and rear wheels",
     .measure = "straight drives forward and back at the same duties",
     .reference =
@@ -30,11 +30,17 @@ constexpr ParameterSpec kParameters[] = {
      "right wheels strong in reverse", "right wheels weak in reverse"},
 };
 
+// A wheel in the middle has the mean of both sides.
+double Side(double left, const Numbers &v)
+{
+    return ((1 + left) * v[0] + (1 - left) * v[1]) / 2;
+}
+
 void Step(WheelSignals &s, const Numbers &v, double *)
 {
     for (int k = 0; k < s.robot.wheels; ++k)
         if (s.target_mps[k] < 0)
-            s.target_mps[k] *= 1 + v[s.robot.left[k] > 0 ? 0 : 1];
+            s.target_mps[k] *= 1 + Side(s.robot.left[k], v);
 }
 
 }  // namespace
@@ -43,7 +49,6 @@ EFFECT(reverse_asymmetry) = {
     .card = kCard,
     .parameters = kParameters,
     .act = OnWheels{Step},
-    .needs_sides = true,
 };
 
 }  // namespace twin

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <cmath>
-
 #include "effects/effect.h"
+#include "effects/ramp.h"
 
 namespace twin
 {
@@ -34,34 +32,13 @@ constexpr ParameterSpec kParameters[] = {
 
 int StateSize(const Numbers &v)
 {
-    return v[0] > 0 ? 1 + 2 * kMaxWheels : 0;
+    return v[0] > 0 ? kRampState : 0;
 }
 
-// Over a step of a ramp that begins at `out`; `full_ramp_s` is the time from rest to full duty.
-double Mean(double out, double told, double full_ramp_s, double dt_s)
-{
-    const double ramp_s = std::abs(told - out) * full_ramp_s;
-    if (ramp_s <= dt_s)
-        return told - (told - out) * ramp_s / (2 * dt_s);
-    return out + std::copysign(dt_s / (2 * full_ramp_s), told - out);
-}
-
-// What the driver put out at time state[0], and what it was told then. A later effect may cut the
-// step: how far the ramp got is known only when the next one begins.
 void Step(DutySignals &s, const Numbers &v, double *state)
 {
-    const double ramp_s = v[0];
-    if (ramp_s <= 0)
-        return;
-    const double change = std::max(0.0, s.t_s - state[0]) / ramp_s;
-    state[0] = s.t_s;
-    double *out = state + 1, *told = out + kMaxWheels;
-    for (int k = 0; k < s.robot.wheels; ++k)
-    {
-        out[k] += std::clamp(told[k] - out[k], -change, change);
-        told[k] = s.duty[k];
-        s.duty[k] = Mean(out[k], told[k], ramp_s, s.dt_s);
-    }
+    if (v[0] > 0)
+        Ramp(s, {v[0], v[0], v[0], v[0]}, state);
 }
 
 }  // namespace

@@ -97,6 +97,8 @@ struct Card
     unsigned suspect_when = 0;  // mask of Phase: where it is the first to think of
 };
 
+// What a robot is told, in words, of a mask of Drive: "duties", "wheel speeds", ...
+std::vector<const char *> DriveNames(unsigned drives);
 const char *FamilyName(Family family);
 const char *NeedsName(Needs needs);
 std::vector<const char *> ManeuverNames(unsigned maneuvers);

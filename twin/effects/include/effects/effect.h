@@ -107,7 +107,6 @@ struct EffectSpec
     Act act;
     int (*state_size)(const Numbers &) = nullptr;  // doubles that it remembers; nullptr: none
     Turn turn = Turn::kUsual;  // within its stage, wherever the model file has it
-    bool needs_sides = false;  // of robots with left and right wheels alone
     std::span<const TextParameter> texts = {};
     // Of `values` and `texts` in their order. Throws std::invalid_argument in one sentence if a
     // text makes no sense.

@@ -1,0 +1,313 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the fit of an effect begins that has a place, a moment or a limit.
+
+The errors change with such a quantity in no smooth way, so that a fit finds what is near its begin
+alone. Of a grid of values the one is taken that explains most of what is left, if all else were
+linear.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.model.parameters import (
+    Parameter,
+    catalogue,
+    effect_names,
+    effect_parameters,
+    with_role,
+)
+from twinmill.predict.datasets import Dataset, Trajectory
+from twinmill.predict.windows import CHANNELS, HORIZONS_S
+
+PLACES = 9  # along each side of the floor that was driven
+RADII = (0.12, 0.2, 0.35)  # of a patch, as a share of the longer side ...
+LEAST_RADIUS_M = 0.15  # ... and at least
+LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual one
+EVERY_S = 2.0  # between moments ...
+MOST_MOMENTS = 100  # ... of which there are no more
+SHORTEST_S = 4.0  # of what lasts for a while; what is shorter is a single moment
+NEVER_S = 1e5  # later than any log ends
+MARGIN = 0.05  # share of a log at each end, within which a moment is none
+
+
+@dataclass(frozen=True)
+class Subject:
+    """An effect that might be added, and the data sets and models that it might be added to."""
+
+    name: str
+    datasets: Sequence[Dataset]
+    models: Sequence[native.Model]
+
+    @property
+    def instance(self) -> str:
+        """What the effect is called once it is added."""
+        count = self.models[0].effects.count(self.name)
+        return f"{self.name}#{count + 1}" if count else self.name
+
+    @property
+    def logs(self) -> list[Trajectory]:
+        """Those data sets that are logs."""
+        return [d for d in self.datasets if isinstance(d, Trajectory)]
+
+    def named(self, role: str) -> list[str]:
+        """Full names of the effect's parameters of a role."""
+        return [f"{self.instance}.{key}" for key in with_role(self.name, role)]
+
+    def changes(
+        self, rows: Sequence[np.ndarray], values: Callable[[list[Parameter]], np.ndarray]
+    ) -> list[np.ndarray]:
+        """(B, R) by which each data set's rows change with the effect.
+
+        Args:
+            rows: (R,) of each data set, without it.
+            values: (B, P) values of its P parameters.
+        """
+        found = []
+        for dataset, model, row in zip(self.datasets, self.models, rows, strict=True):
+            model = model.copy()
+            model.add_effect(self.name)
+            parameters = effect_parameters(model, effect_names(model)[-1], fresh=True)
+            names = [p.name for p in parameters]
+            found.append(row - dataset.rows(model, names, values(parameters)))
+        return found
+
+
+@dataclass(frozen=True)
+class Left:
+    """What is left of all data sets, weighted; what is free is projected out of it.
+
+    Attributes:
+        weights: (R,) of each data set's rows.
+        rests: (R,) of each data set.
+        bases: (R, P) of each data set; all of them together, and their prior, are orthonormal.
+    """
+
+    weights: Sequence[np.ndarray]
+    rests: Sequence[np.ndarray]
+    bases: Sequence[np.ndarray]
+
+    def products(self, columns: Iterable[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """(S, k) products of S times k changes with what is left, and (S, k, k) with each other.
+
+        Args:
+            columns: (S, k, R) of each data set.
+        """
+        moment, gram, free = 0.0, 0.0, 0.0
+        for w, rest, basis, c in zip(self.weights, self.rests, self.bases, columns, strict=True):
+            whitened = w * c
+            moment = moment + whitened @ rest
+            gram = gram + whitened @ whitened.swapaxes(1, 2)
+            free = free + whitened @ basis
+        return moment, gram - free @ np.swapaxes(free, 1, 2)
+
+
+class Starts(Protocol):
+    """Starts of one effect, and how the rows change from each."""
+
+    def best(self, left: Left) -> dict[str, float]:
+        """Of the starts the one that explains most; values by name."""
+        ...
+
+
+def starts_of(
+    name: str,
+    models: Sequence[native.Model],
+    datasets: Sequence[Dataset],
+    rows: Sequence[np.ndarray],
+) -> Starts | None:
+    """Starts of an effect; None if it has no place, moment or limit.
+
+    Args:
+        name: of the effect.
+        models: without it, one for each data set.
+        datasets: that the rows are of.
+        rows: (R,) of each data set.
+    """
+    subject = Subject(name, datasets, models)
+    if with_role(name, "moment"):
+        return Whiles.of(subject, rows) if subject.named("moment")[1:] else _moments(subject, rows)
+    if with_role(name, "place"):
+        return _places(subject, rows) if subject.logs else None
+    return Grid.of(subject, rows) if with_role(name, "limit") else None
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Limits, and (S, 1, R) by which each data set's rows change at usual strength from each."""
+
+    starts: list[dict[str, float]]
+    columns: list[np.ndarray]
+
+    @classmethod
+    def of(cls, subject: Subject, rows: Sequence[np.ndarray]) -> "Grid":
+        """Of an effect with a limit: about the usual one."""
+        usual = {p["name"]: p["default"] for p in catalogue()[subject.name]["parameters"]}
+        keys = with_role(subject.name, "limit")
+        starts = [{f"{subject.instance}.{key}": k * usual[key] for key in keys} for k in LIMITS]
+
+        def values(parameters: list[Parameter]) -> np.ndarray:
+            low, high = (np.array([getattr(p, k) for p in parameters]) for k in ("min", "max"))
+            whole = [[start.get(p.name, p.value) for p in parameters] for start in starts]
+            return np.clip(np.array(whole), low, high)
+
+        return cls(starts, [c[:, None] for c in subject.changes(rows, values)])
+
+    def best(self, left: Left) -> dict[str, float]:
+        """See Starts."""
+        return self.starts[int(np.argmax(_gains(*left.products(self.columns))))]
+
+
+@dataclass(frozen=True)
+class Switched:
+    """Starts of an effect that is on in some places, or from some moment on.
+
+    While it is on it is always the same. So a prediction changes by the share of its time in which
+    it is on, and one pass over the logs for each size, with the effect on all the time, tells of
+    all starts.
+
+    Attributes:
+        starts: S of them.
+        changes: (k, R) by which each data set's rows change by each of k sizes at usual strength.
+        shares: (S, W, H) of each data set: of each prediction's time that it is on.
+    """
+
+    starts: list[dict[str, float]]
+    changes: list[np.ndarray]
+    shares: list[np.ndarray]
+
+    def best(self, left: Left) -> dict[str, float]:
+        """See Starts."""
+        columns = (c * _of_rows(s)[:, None] for c, s in zip(self.changes, self.shares, strict=True))
+        return self.starts[int(np.argmax(_gains(*left.products(columns))))]
+
+
+@dataclass(frozen=True)
+class Whiles:
+    """Starts of an effect that begins at one moment and ends at another; see Switched.
+
+    Of a while that is what begins with it, less what begins where it ends.
+
+    Attributes:
+        keys: full names of begin and end.
+        at_s: (T,) moments, s since the first command.
+        changes, shares: see Switched; of what never ends.
+    """
+
+    keys: list[str]
+    at_s: np.ndarray
+    changes: list[np.ndarray]
+    shares: list[np.ndarray]
+
+    @classmethod
+    def of(cls, subject: Subject, rows: Sequence[np.ndarray]) -> "Whiles":
+        """Of an effect that begins and ends."""
+        begin, end = subject.named("moment")
+        at_s = _grid_s(subject)
+        changes = _always_on(subject, rows, {begin: 0.0, end: NEVER_S})
+        return cls([begin, end], at_s, changes, [_since(d, at_s) for d in subject.datasets])
+
+    def best(self, left: Left) -> dict[str, float]:
+        """See Starts."""
+        count = len(self.at_s)
+        columns = (
+            (c * _of_rows(s)[:, None]).reshape(1, -1, c.shape[1])
+            for c, s in zip(self.changes, self.shares, strict=True)
+        )
+        moment, gram = left.products(columns)
+        moment = moment.reshape(count, -1)
+        gram = gram.reshape(count, moment.shape[1], count, -1).swapaxes(1, 2)
+        a, b = np.triu_indices(count, 1)
+        long = self.at_s[b] - self.at_s[a] >= min(SHORTEST_S, self.at_s[-1] - self.at_s[0])
+        a, b = a[long], b[long]
+        between = gram[a, a] + gram[b, b] - gram[a, b] - gram[b, a]
+        k = int(np.argmax(_gains(moment[a] - moment[b], between)))
+        return dict(zip(self.keys, (float(self.at_s[a[k]]), float(self.at_s[b[k]])), strict=True))
+
+
+def _always_on(
+    subject: Subject, rows: Sequence[np.ndarray], on: dict[str, float]
+) -> list[np.ndarray]:
+    """(k, R) by which each data set's rows change by each size alone, where `on` holds."""
+    sizes = subject.named("size")
+
+    def values(parameters: list[Parameter]) -> np.ndarray:
+        off = {p.name: on.get(p.name, p.usual) for p in parameters}
+        own = {p.name: p.value for p in parameters}
+        return np.array([[(off | {s: own[s]})[p.name] for p in parameters] for s in sizes])
+
+    return subject.changes(rows, values)
+
+
+def _moments(subject: Subject, rows: Sequence[np.ndarray]) -> Switched:
+    """Of an effect that begins at a moment, and never ends."""
+    (begin,) = subject.named("moment")
+    at_s = _grid_s(subject)
+    changes = _always_on(subject, rows, {begin: 0.0})
+    shares = [_since(d, at_s) for d in subject.datasets]
+    return Switched([{begin: float(t_s)} for t_s in at_s], changes, shares)
+
+
+def _grid_s(subject: Subject) -> np.ndarray:
+    """(T,) moments over the time of all logs, s since the first command."""
+    times_s = np.concatenate([d.start_s for d in subject.logs])
+    low_s, high_s = np.quantile(times_s, (MARGIN, 1 - MARGIN))
+    return np.linspace(low_s, high_s, int(np.clip((high_s - low_s) / EVERY_S, 2, MOST_MOMENTS)))
+
+
+def _since(dataset: Dataset, at_s: np.ndarray) -> np.ndarray:
+    """(T, W, H) share of each prediction's time that is after each moment."""
+    assert isinstance(dataset, Trajectory)
+    ahead_s = np.array(HORIZONS_S)
+    end_s = dataset.start_s[:, None] + ahead_s
+    return np.clip((end_s - at_s[:, None, None]) / ahead_s, 0, 1).astype(np.float32)
+
+
+def _places(subject: Subject, rows: Sequence[np.ndarray]) -> Switched:
+    """Of an effect with a round place: over the floor that was driven."""
+    keys = [f"{subject.instance}.{key}" for key in ("x_m", "y_m", "radius_m")]
+    tracks = [d.measurement.track for d in subject.logs]
+    xy = np.concatenate([t.pose[t.segment >= 0, :2] for t in tracks])
+    low, high = np.nanquantile(xy, 0.03, axis=0), np.nanquantile(xy, 0.97, axis=0)
+    side_m = float(np.max(high - low))
+    circles = [
+        (x, y, radius_m)
+        for radius_m in sorted({max(LEAST_RADIUS_M, share * side_m) for share in RADII})
+        for x in np.linspace(low[0], high[0], PLACES)
+        for y in np.linspace(low[1], high[1], PLACES)
+        if np.nanmin(np.hypot(*(xy[::20] - (x, y)).T)) < radius_m
+    ]
+    entry = {p["name"]: p for p in catalogue()[subject.name]["parameters"]}
+    middle = (low + high) / 2
+    everywhere = dict(zip(keys, (*middle.tolist(), entry["radius_m"]["max"]), strict=True))
+    return Switched(
+        [dict(zip(keys, map(float, circle), strict=True)) for circle in circles],
+        _always_on(subject, rows, everywhere),
+        [_inside(d, np.array(circles)) for d in subject.datasets],
+    )
+
+
+def _inside(dataset: Dataset, circles: np.ndarray) -> np.ndarray:
+    """(S, W, H) share of each prediction's poses that are inside each of (S, 3) circles."""
+    assert isinstance(dataset, Trajectory)
+    pose, windows = dataset.measurement.track.pose, dataset.windows
+    x_m, y_m, radius_m = circles.T[:, :, None]
+    inside = np.hypot(pose[:, 0] - x_m, pose[:, 1] - y_m) < radius_m
+    count = np.cumsum(inside, axis=1, dtype=np.int32)
+    first, last = windows.starts[:, None], np.maximum(windows.ends, windows.starts[:, None])
+    share = (count[:, last] - count[:, first]) / np.maximum(last - first, 1)
+    return share.astype(np.float32)
+
+
+def _of_rows(shares: np.ndarray) -> np.ndarray:
+    """(S, W, H) shares to (S, R): the same for all channels of a prediction."""
+    return np.repeat(shares.reshape(len(shares), -1), len(CHANNELS), axis=1)
+
+
+def _gains(moment: np.ndarray, gram: np.ndarray) -> np.ndarray:
+    """(S,) fall of the squares by k columns with these (S, k) products and (S, k, k) squares."""
+    whole = gram + 1e-9 * np.eye(gram.shape[-1])
+    return np.sum(moment * np.linalg.solve(whole, moment[..., None])[..., 0], axis=1)
