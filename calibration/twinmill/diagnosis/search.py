@@ -456,14 +456,15 @@ def _with_best_lateness(
 def _proven(trial: Trial, score: float, settings: Settings) -> bool:
     """Enough evidence, and blocks that agree; near the noise agreement alone is not enough."""
     count = len(trial.names)
-    loud = trial.evidence >= settings.evidence * count
+    enough, less = settings.evidence * count, settings.less_evidence * count
+    if count == 1 and len(with_role(trial.names[0], "moment")) > 1:
+        enough = less = settings.passing
+    loud = trial.evidence >= enough
     somewhere = count == 1 and bool(with_role(trial.names[0], "place"))
     least = settings.without_visit if somewhere else settings.without_best
     spread = trial.without_best >= least * count
     agreed = (
-        score >= settings.drowned
-        and trial.evidence >= settings.less_evidence * count
-        and trial.blocks_t >= settings.blocks_t
+        score >= settings.drowned and trial.evidence >= less and trial.blocks_t >= settings.blocks_t
     )
     return (loud and spread) or agreed
 

@@ -16,8 +16,9 @@ class Settings(Numbers):
 
     # The search: which effect is accepted.
     evidence: float = number(16.0, "least fall of the held-out cost (-2 log likelihood)")
+    passing: float = number(30.0, "the same of an effect of a while, which is fitted to all of it")
     without_best: float = number(8.0, "the same without the block with the most evidence")
-    lasts: float = number(0.4, "share of it without the best 3 s, if an effect is of a while")
+    lasts: float = number(0.3, "share of it without the best 3 s, if an effect is of a while")
     without_visit: float = number(4.0, "the same of an effect of a place, seen at visits alone")
     drowned: float = number(1.15, "score from which on what else is missing drowns evidence ...")
     less_evidence: float = number(9.0, "... so that this much is enough ...")
@@ -106,7 +107,7 @@ class Settings(Numbers):
     def stricter(self, times: float) -> "Settings":
         """The same with so many times the evidence."""
         times = min(max(times, 1.0), self.strictest)
-        raised = ("evidence", "without_best", "without_visit", "less_evidence")
+        raised = ("evidence", "passing", "without_best", "without_visit", "less_evidence")
         return replace(self, **{k: times * getattr(self, k) for k in raised})
 
 

@@ -28,7 +28,7 @@ from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S, rms
 
 HORIZON = HORIZONS_S.index(0.5)
-PAUSE_S = 1.0  # between the starts of windows of two bumps
+PAUSE_S = 2.5  # between the starts of windows of two bumps; a robot may rest meanwhile
 ARM_M = 0.1  # a turn counts as the way of a point so far from the middle
 REACH_S = 1.0  # delays and offsets that are looked for
 
@@ -75,7 +75,8 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     offset_s = base.get(CLOCK)
     response = Response(data, velocity, base.get(LAG), offset_s)
     response.boost(list(place_gains(response.motion)))
-    calm = _without_bumps(data, response)
+    far = is_far(response.across, response.errors, FLOOR_SETTINGS.bump_part)
+    calm = _without_bumps(data, response, far)
     if not calm.all():
         response = response.of_windows(calm)
     points = response.points
@@ -88,7 +89,7 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     moves = rms(data.measured) > 1e-9
     return NoiseFloor(
         rms=np.where(moves, np.maximum(floor, 1e-9), np.nan),
-        keep=calm | _lasting(data, base, ~calm),
+        keep=calm | _lasting(data, base, ~calm | far),
         kind="response",
         reason="",
         offset_s=offset_s,
@@ -186,8 +187,8 @@ def _acts(data: Trajectory, name: str) -> bool:
     return bool(track.command[:, BASE_GAINS.index(name)].any())
 
 
-def _without_bumps(data: Trajectory, response: Response) -> np.ndarray:
-    """(W,) windows without bumps, nor a part of one.
+def _without_bumps(data: Trajectory, response: Response, far: np.ndarray) -> np.ndarray:
+    """(W,) windows without bumps, nor a part of one, which is `far` (W,) off.
 
     What bumps often does so by itself: its parts are left in.
     """
@@ -195,20 +196,19 @@ def _without_bumps(data: Trajectory, response: Response) -> np.ndarray:
     if not bumps.any() or bumps.mean() > FLOOR_SETTINGS.most_bumps:
         return np.ones(len(bumps), bool)
     apart_s = np.abs(data.start_s[:, None] - data.start_s[bumps]).min(axis=1)
-    parts = is_far(response.across, response.errors, FLOOR_SETTINGS.bump_part)
-    parts &= apart_s < HORIZONS_S[-1]
+    parts = far & (apart_s < HORIZONS_S[-1])
     rare = (bumps | parts).mean() < FLOOR_SETTINGS.rare_bumps
     return ~bumps & ~parts if rare else ~bumps
 
 
-def _lasting(data: Trajectory, base: native.Model, bumps: np.ndarray) -> np.ndarray:
-    """(W,) windows with bumps that are none: for a while all of the motion is less, or more.
+def _lasting(data: Trajectory, base: native.Model, far: np.ndarray) -> np.ndarray:
+    """(W,) windows that are off by no bump: for a while all of the motion is less, or more.
 
-    They tell nothing of the noise, and are judged.
+    Those with bumps tell nothing of the noise, and are judged. `far` (W,) are off at all.
     """
-    found = np.zeros(len(bumps), bool)
+    found = np.zeros(len(far), bool)
     measured, errors = (e[:, HORIZON] * (1, 1, ARM_M) for e in (data.measured, data.errors(base)))
-    index = np.flatnonzero(bumps & np.isfinite(measured).all(axis=1))
+    index = np.flatnonzero(far & np.isfinite(measured).all(axis=1))
     for part in np.split(index, 1 + np.flatnonzero(np.diff(data.start_s[index]) > PAUSE_S)):
         if len(part) and np.ptp(data.start_s[part]) >= FLOOR_SETTINGS.lasts_s:
             own, missed = measured[part], errors[part]

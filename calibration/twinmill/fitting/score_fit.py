@@ -8,6 +8,7 @@ set has a scale of its own: what the model lacks in one must not drown what the 
 Levenberg and Marquardt, bounded; weights n_i / S_i^2 are renewed in each step.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,6 +38,7 @@ STARTS = (1.0, 0.3, 0.1, -0.1, -0.3, -1.0, 3.0)
 SEEN = 0.5  # times the prior's width: a wider estimate is the prior's
 AT_BOUND = 0.005  # share of the range
 NORMAL_95 = 1.96
+PASSING_S = 3.0  # of blocks, where all of an effect may lie within a usual one
 
 
 @dataclass(frozen=True)
@@ -282,9 +284,14 @@ class ScoreFit:
         self.store()
         return self
 
-    def _stepped(self, gram: np.ndarray, pull: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Newton's step; what would leave its bounds stops there, and the rest adapts."""
-        free, moved = np.ones(len(x), bool), x.copy()
+    def _stepped(
+        self, gram: np.ndarray, pull: np.ndarray, x: np.ndarray, held: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Newton's step; what would leave its bounds stops there, and the rest adapts.
+
+        What is `held` (P,) stays.
+        """
+        free, moved = np.ones(len(x), bool) if held is None else ~held, x.copy()
         while free.any():
             held = moved - x
             held[free] = 0.0
@@ -316,10 +323,20 @@ class ScoreFit:
     # -- held out -------------------------------------------------------------------------------
 
     @cached_property
+    def _passing(self) -> np.ndarray:
+        """(P,) of effects that last for a while: what has two moments."""
+        instances = [u.parameter.name.split(".")[0] for u in self.unknowns]
+        moments = Counter(
+            i for i, u in zip(instances, self.unknowns, strict=True) if u.parameter.role == "moment"
+        )
+        return np.array([moments[i] > 1 for i in instances], bool)
+
+    @cached_property
     def held_out(self) -> list[np.ndarray]:
         """(R,) rows of each data set, each part predicted by a fit to the other five parts.
 
-        One Newton step from the joint fit, with its slopes.
+        One Newton step from the joint fit, with its slopes. An effect that lasts for a while keeps
+        its numbers: one part may hold all of it.
         """
         rows, slopes = self.state
         if not len(self.x):
@@ -333,7 +350,7 @@ class ScoreFit:
                 weighted, own = j[out] * self.weight(i, r)[out, None], self.columns[i]
                 g[np.ix_(own, own)] -= weighted.T @ j[out]
                 p[own] -= weighted.T @ r[out]
-            points.append(self._stepped(g, p, self.x))
+            points.append(self._stepped(g, p, self.x, self._passing))
         if sum(len(r) for r in rows) < FEW_ROWS:
             points = [self._without_part(k, x) for k, x in enumerate(points)]
         held = []
@@ -446,19 +463,33 @@ class ScoreFit:
 
     @cached_property
     def _scatter_covariance(self) -> np.ndarray:
-        """(P, P) covariance of what the data scatter: the jackknife over blocks.
+        """(P, P) covariance due to what the data scatter.
+
+        Of an effect that lasts for a while by shorter blocks: one whole block may hold all of it.
+        """
+        spread, passing = self._jackknife(None), self._passing
+        if passing.any():
+            own = np.ix_(passing, passing)
+            short = self._jackknife(PASSING_S)[own]
+            spread[passing] = spread[:, passing] = 0.0
+            spread[own] = short
+        return spread
+
+    def _jackknife(self, block_s: float | None) -> np.ndarray:
+        """(P, P) covariance by leaving out blocks of this length; None: as the data sets have them.
 
         Of a log the mean over two divisions into blocks, half a block apart, which scatters less
         itself (Künsch 1989, section 2).
         """
-        spread = np.zeros_like(self._curvature)
+        spread, count = np.zeros_like(self._curvature), 0
         for i, data in enumerate(self.datasets):
-            divisions = _divisions(data)
+            divisions = _divisions(data, block_s)
+            count += len(np.unique(divisions[0]))
             for block in divisions:
                 for b in np.unique(block):
                     moved = self._moved_without(i, block == b)
                     spread += np.outer(moved, moved) / len(divisions)
-        return spread * (self.blocks - 1) / max(self.blocks, 1)
+        return spread * (count - 1) / max(count, 1)
 
     def _moved_without(self, i: int, out: np.ndarray) -> np.ndarray:
         """(P,) Newton's step without the rows `out` (R,) of data set i."""
@@ -563,12 +594,12 @@ class ScoreFit:
         return {self.estimates[c].name: self.estimates[c] for c in self.columns[i] if c >= count}
 
 
-def _divisions(data: ErrorDataset) -> list[np.ndarray]:
+def _divisions(data: ErrorDataset, block_s: float | None) -> list[np.ndarray]:
     """(R,) blocks of a data set; of a log also those that begin half a block later."""
     if not isinstance(data, Trajectory):
         return [data.block]
-    later = np.floor((data.start_s - data.start_s[0]) / data.block_s + 0.5).astype(int)
-    return [data.block, np.repeat(later, data.measured[0].size)]
+    at = (data.start_s - data.start_s[0]) / (block_s or data.block_s)
+    return [np.repeat(np.floor(at + k).astype(int), data.measured[0].size) for k in (0.0, 0.5)]
 
 
 def _no_less(wide: np.ndarray, least: np.ndarray) -> np.ndarray:

@@ -190,3 +190,18 @@ def model_file(tmp_path_factory, model_text) -> Callable[..., ModelFile]:
         return ModelFile.load(str(path))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def true_model(tanh_robot, model_file):
+    """The robot as the twin writes it; its curve by twenty straight lines."""
+    robot = tanh_robot()
+    duty_pct = list(range(0, 101, 5))
+    speeds = [round(float(v), 5) for v in robot.speed_mps(np.array(duty_pct) / 100)]
+    gains = f"sideways_gain = {robot.sideways}\nyaw_gain = {robot.yaw}\n"
+    return model_file(
+        ("[0, 25, 50, 75, 100]", str(duty_pct)),
+        ("[0, 0.1, 0.2, 0.3, 0.4]", str(speeds)),
+        ("motor_lag_s = 0.05", f"motor_lag_s = {robot.lag_s}\n{gains}"),
+        name="true.toml",
+    )

@@ -32,21 +32,6 @@ def opened(drive, model_file):
     return open_measurements([drive], model_file())[0]
 
 
-@pytest.fixture(scope="module")
-def true_model(tanh_robot, model_file):
-    """The robot as the twin writes it; its curve by twenty straight lines."""
-    robot = tanh_robot()
-    duty_pct = list(range(0, 101, 5))
-    speeds = [round(float(v), 5) for v in robot.speed_mps(np.array(duty_pct) / 100)]
-    gains = f"sideways_gain = {robot.sideways}\nyaw_gain = {robot.yaw}\n"
-    return model_file(
-        ("[0, 25, 50, 75, 100]", str(duty_pct)),
-        ("[0, 0.1, 0.2, 0.3, 0.4]", str(speeds)),
-        ("motor_lag_s = 0.05", f"motor_lag_s = {robot.lag_s}\n{gains}"),
-        name="true.toml",
-    )
-
-
 def test_two_models_have_the_same_floor_on_one_log(opened, drive, model_file):
     """A model too slow by a half, with other nodes, an effect and a lag of a third of a second."""
     bad = model_file(
@@ -128,6 +113,23 @@ def test_physics_that_no_model_has_is_no_noise(hidden, tanh_robot, measure, mode
     hurt = np.argmax(without / noise)
     assert without[hurt] > 5 * noise[hurt]
     assert floor[hurt] < 2 * noise[hurt]
+
+
+@pytest.mark.parametrize(("until_s", "share", "judged"), [(40.5, 0.0, False), (48.0, 0.6, True)])
+def test_what_lasts_is_judged(until_s, share, judged, tanh_robot, measure, model_file):
+    """From 40 s on the wheels bring nothing for half a second, or three fifths for eight."""
+
+    class Tired(tanh_robot):
+        def wheels_mps(self, duty):
+            at_s = np.arange(len(duty)) * EULER_S
+            tired = (at_s > 40) & (at_s < until_s)
+            return super().wheels_mps(duty) * np.where(tired, share, 1.0)[:, None]
+
+    (opened,) = open_measurements([measure(Tired(), 2, 100.0)], model_file())
+    inside = (opened.data.start_s > 39.5) & (opened.data.start_s < until_s)
+    moved = np.nan_to_num(np.abs(opened.data.measured[:, 2, :2])).max(axis=1) > 0.05
+    kept = opened.floor.keep[inside & moved]
+    assert kept.all() if judged else not kept.all()
 
 
 def test_the_right_model_scores_one_and_a_wrong_one_more(drive, true_model, model_file):

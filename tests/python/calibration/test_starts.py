@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is on at some times or in some places alone is found, wherever these are.
+
+Truth: a robot that shares no code with the twin, with something done to it where and when is known.
+"""
+
+import numpy as np
+import pytest
+
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.starts import Left, starts_of
+from twinmill.fitting.opening import open_measurements
+
+EULER_S = 1 / 480  # step of the robots here
+
+
+def weaker(robot, low_s, high_s, share):
+    """The robot with wheels that bring less by a share between two times."""
+
+    class Weaker(robot):
+        def wheels_mps(self, duty):
+            at_s = np.arange(len(duty)) * EULER_S
+            weak = (at_s > low_s) & (at_s < high_s)
+            return super().wheels_mps(duty) * (1 - share * weak)[:, None]
+
+    return Weaker()
+
+
+@pytest.mark.parametrize(("low_s", "high_s"), [(17.0, 24.0), (61.0, 67.0)])
+def test_a_loss_of_some_seconds_is_named(low_s, high_s, tanh_robot, measure, true_model):
+    run = measure(weaker(tanh_robot, low_s, high_s, 0.2), 4, 90.0)
+    found = diagnose([run], true_model)
+    assert found.verdict == "effect_missing" and found.found == ["transient_loss"]
+    told = {e.name.split(".")[1]: e for e in found.findings[0].parameters}
+    assert told["loss"].value == pytest.approx(0.2, abs=2 * told["loss"].std)
+    assert told["from_s"].value == pytest.approx(low_s, abs=1.0)
+    assert told["until_s"].value == pytest.approx(high_s, abs=1.0)
+
+
+def test_a_heading_that_errs_once_a_turn_is_named(tanh_robot, measure, true_model):
+    """0.07 rad times the sine of the heading and a radian: coefficients by the sum of angles."""
+
+    def deviate(pose, valid):
+        heading = pose[:, 2]
+        return np.column_stack([pose[:, :2], heading + 0.07 * np.sin(heading + 1)]), valid
+
+    found = diagnose([measure(tanh_robot(), 4, 90.0, spoil=deviate)], true_model)
+    assert found.verdict == "effect_missing" and found.found == ["compass_deviation"]
+    told = {e.name.split(".")[1]: e for e in found.findings[0].parameters}
+    for key, truth in (("cos_rad", 0.07 * np.sin(1)), ("sin_rad", 0.07 * np.cos(1))):
+        assert told[key].value == pytest.approx(truth, abs=2 * told[key].std)
+        assert told[key].std < 0.02
+
+
+@pytest.fixture(scope="module")
+def opened(tanh_robot, measure, true_model):
+    """A run of the robot as it is."""
+    return open_measurements([measure(tanh_robot(), 5, 60.0)], true_model)[0]
+
+
+def left_by(opened, errors):
+    """What is left, if errors (R,) were all of it, and nothing else is free."""
+    return Left([np.ones(len(errors))], [errors], [np.zeros((len(errors), 0))])
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("abrupt_loss", {"loss": 0.08, "from_s": 31.0}),
+        ("transient_loss", {"loss": 0.15, "from_s": 21.0, "until_s": 27.0}),
+        ("floor_patch", {"strength": 0.2, "radius_m": 0.25}),
+    ],
+)
+def test_one_pass_with_it_always_on_finds_where_it_is_on(name, values, opened):
+    """Truth: what the plant itself changes with the effect at that time or place."""
+    data, model = opened.data, opened.model.copy()
+    rows = data.rows(model, ["clock.offset_s"], np.array([[model.get("clock.offset_s")]]))[0]
+    starts = starts_of(name, [opened.model], [data], [rows])
+    if name == "floor_patch":
+        pose = data.measurement.track.pose
+        centre = np.nanmedian(pose[:, :2], axis=0)
+        values = values | {"x_m": centre[0], "y_m": centre[1]}
+    model.add_effect(name)
+    for key, value in values.items():
+        model.set(f"{name}.{key}", value)
+    errors = rows - data.rows(model, ["clock.offset_s"], np.array([[0.0]]))[0]
+    best = starts.best(left_by(opened, errors))
+    for key, value in best.items():
+        near = 0.15 if key.endswith("_m") else 2.0
+        assert value == pytest.approx(values[key.split(".")[1]], abs=near), best
