@@ -84,7 +84,7 @@ class Settings(Numbers):
     firm_t: float = number(3.0, "t over blocks: the smooth response predicts better")
     far: float = number(10.0, "times the median squared error: a single moment ...")
     several: int = number(3, "... of which so many are no accident")
-    place_chance: float = number(0.004, "that errors repeat so at a place, of the model ...")
+    place_chance: float = number(0.01, "that errors repeat so at a place, of the model ...")
     place_chance_of_floor: float = number(0.05, "... and of the smooth response, too ...")
     place_share: float = number(0.1, "... if this share of their square repeats")
 

@@ -105,18 +105,11 @@ def _added_to_camera(result: AddResult, not_written: str) -> RenderableType:
 
 def effect(entry: dict) -> RenderableType:
     """One card of the catalogue."""
-    lines = _facts(
-        [
-            (label, entry[key])
-            for label, key in (
-                ("equation", "equation"),
-                ("stage", "stage"),
-                ("leaves out", "leaves_out"),
-                ("measure by", "measure"),
-                ("reference", "reference"),
-            )
-        ]
-    )
+    labels = ("equation", "stage", "leaves out", "measure by", "reference")
+    keys = ("equation", "stage", "leaves_out", "measure", "reference")
+    facts = [(label, entry[key]) for label, key in zip(labels, keys, strict=True)]
+    told = f"that are told {' or '.join(entry['drives'])}"
+    lines = _facts([*facts[:2], ("robots", told), *facts[2:]])
     return Group(
         Text.assemble((entry["name"], "bold"), f": {entry['summary']}"),
         Text(),
