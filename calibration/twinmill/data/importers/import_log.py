@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import tomlkit
 
-from twinmill.data.checks import check_poses, check_tracks
+from twinmill.data.checks import check_driven, check_poses, check_recorded
 from twinmill.data.importers.columns import Guess, check_renames, explain, read_mapping
 from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
@@ -389,14 +389,16 @@ def _summary(log: Log, out: Path, warnings: list[str]) -> dict:
 
 
 def _judged(robot: RobotLog) -> list[str]:
-    """What was cut; or the mistake of the poses, from which cuts and a turned heading follow.
+    """What was cut, and what is wrong with poses or velocities; a mistake stands alone.
 
-    A heading that seems turned may be in degrees: `diagnose` checks that, and so does this.
+    Cuts and a heading that seems turned may follow from a mistake. Duties and wheel speeds need a
+    model to be judged by.
     """
-    found = check_poses(robot, "")
+    found, notes = check_poses(robot, ""), []
     if not found:
         track = make_track(robot)
-        found = [f for f in check_tracks([("", track)]) if f.fatal] if track.astray_rad else []
-    if not found:
-        return [f"robot {robot.robot_id}: {note}" for note in track.notes]
-    return [f"robot {f.robot_id}: {f.what}: {f.evidence}; {f.remedy}." for f in found]
+        tracks = [("", track)]
+        found = [f for f in check_recorded(tracks, None) if f.fatal] or check_driven(tracks, None)
+        notes = [] if any(f.fatal for f in found) else track.notes
+    said = [f"{f.what}: {f.evidence}; {f.remedy}." for f in found]
+    return [f"robot {robot.robot_id}: {words}" for words in (*notes, *said)]
