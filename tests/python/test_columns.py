@@ -340,3 +340,30 @@ def test_german_names_are_asked_about_and_kept(tmp_path):
     robot = read_log(tmp_path / "o.lcmlog").robots[4]
     np.testing.assert_allclose(robot.command[0], [0.5, -1, 0.25, 1])
     np.testing.assert_allclose(robot.pose[-1, 2], np.radians(118))
+
+
+@pytest.mark.parametrize(
+    "names",
+    ["r1_x_m,r1_y_m,r2_x_m,r2_y_m", "robot1.x_m,robot1.y_m,robot2.x_m,robot2.y_m", "x1,y1,x2,y2"],
+)
+def test_robots_side_by_side_are_read_one_by_one(tmp_path, names):
+    """One drives along x, the other along y; the second is hidden once."""
+    rows = ["0,0,1,5,0", "1,0.1,1,,", "2,0.2,1,5,0.4"]
+    (tmp_path / "p.csv").write_text("\n".join([f"t_s,{names}", *rows]) + "\n")
+    told = "t_s,r1_vx_mps,r1_omega_radps,r2_vx_mps,r2_omega_radps\n0,1,2,3,4\n"
+    (tmp_path / "c.csv").write_text(told)
+    given = {"x": "x_m", "y": "y_m"} if names == "x1,y1,x2,y2" else {}
+    options = ImportOptions(rename=given)
+    import_log(tmp_path / "p.csv", tmp_path / "c.csv", tmp_path / "o.lcmlog", options=options)
+    robots = read_log(tmp_path / "o.lcmlog").robots
+    np.testing.assert_allclose(robots[1].pose[:, :2], [[0, 1], [0.1, 1], [0.2, 1]])
+    np.testing.assert_allclose(robots[2].pose[robots[2].valid, :2], [[5, 0], [5, 0.4]])
+    np.testing.assert_allclose(robots[2].command[0], [3, 0, 4, 0])
+
+
+def test_columns_with_numbers_that_are_no_robots_stay(imported):
+    wheels = "t_s,robot_id,w1_radps,w2_radps,w3_radps,w4_radps\n0,4,1,2,3,4\n"
+    for table in (wheels, wheels.replace("robot_id,", "").replace(",4,", ",", 1)):
+        robot, warnings = imported(commands=table)
+        np.testing.assert_allclose(robot.command[0], [1, 2, 3, 4])
+        assert not any("side by side" in w for w in warnings)

@@ -16,7 +16,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from twinmill.data.log import LogError
-from twinmill.data.measurement_table import Table, is_number, read_header, read_table
+from twinmill.data.measurement_table import Table, is_number
 from twinmill.data.units import UNITS, plain_name, split_unit
 
 
@@ -294,7 +294,7 @@ def _guess(table: Table, column: str, known: frozenset[str], new: str | None) ->
         if split_unit(name)[1] == "pwm" and centred:
             return centred
         if math.isnan(factor):
-            return Guess(column, targets, factor, f"by its name; {_lacks(targets[0])}", False)
+            return Guess(column, targets, factor, f"by its name; {lacks(targets[0])}", False)
         other = _in_other_unit(column, targets, _numbers(table, column))
         if other and split_unit(name)[1] in ("pwm", "pct") and not new:
             return other
@@ -325,6 +325,12 @@ def _usual(name: str) -> tuple[tuple[str, ...], Callable] | None:
     return USUAL.get(plain) or USUAL.get(OF_MESSAGE.sub("", plain))
 
 
+def is_usual(name: str, known: frozenset[str]) -> bool:
+    """Whether a name is one of ours in any unit, or a usual one for what we know."""
+    usual = _usual(name)
+    return bool(by_name(name, known)) or bool(usual and known.issuperset(usual[0]))
+
+
 LACKS = {  # numbers that no table has, by what ours hold
     "radps": "the factor is 1 / the wheel's radius in m",
     "m": "the factor is the metres on the floor that a pixel is wide",
@@ -332,7 +338,8 @@ LACKS = {  # numbers that no table has, by what ours hold
 }
 
 
-def _lacks(target: str) -> str:
+def lacks(target: str) -> str:
+    """What a factor that must be written by hand is, of one of our columns."""
     return LACKS.get(target) or LACKS[split_unit(target)[1]]
 
 
@@ -353,23 +360,6 @@ def _renamed(table: str, column: str, new: str, factor: float) -> tuple[float, s
     if new_unit == new_ours:
         return old_factor, f"{table}: {column} is in {old_unit} by its name: converted to {new}."
     return factor, f"{table}: {column} is read in {new_unit}, whatever its name says."
-
-
-def check_renames(rename: dict[str, str], tables: list[Path], known: frozenset[str]) -> None:
-    """Raises LogError where an old name is in no table, or a new one has no meaning."""
-    headers = {path.name: read_header(path) for path in tables} if rename else {}
-    for old, new in rename.items():
-        if not any(old in header for header in headers.values()):
-            names = "; ".join(f"{name} has {', '.join(h)}" for name, h in headers.items())
-            raise LogError(
-                f"--rename {old}={new}: no table has a column '{old}'"
-                f"{f' ({names})' if names else ''}; correct the name."
-            )
-        if not by_name(new, known) and not _usual(new):
-            raise LogError(
-                f"--rename {old}={new}: {new} is not one of our columns; they are "
-                f"{', '.join(sorted(known))}."
-            )
 
 
 def _numbers(table: Table, column: str) -> np.ndarray:
@@ -427,7 +417,7 @@ def read_mapping(path: Path, kind: str, known: frozenset[str]) -> Mapping:
         numbers = [entry[k] for k in keys & {"factor", "value", "zero"}]
         if any(isinstance(n, float) and math.isnan(n) for n in numbers):
             raise LogError(
-                f"{path}: [{kind}] {target}: has no factor yet; {_lacks(target)}: write it there."
+                f"{path}: [{kind}] {target}: has no factor yet; {lacks(target)}: write it there."
             )
         good = keys == {"value"} or {"column"} <= keys <= {"column", "factor", "zero"}
         if target not in known or not good or not all(_is_real(n) for n in numbers):
@@ -447,81 +437,3 @@ def read_mapping(path: Path, kind: str, known: frozenset[str]) -> Mapping:
 
 def _is_real(number: object) -> bool:
     return isinstance(number, int | float) and math.isfinite(number)
-
-
-def read_mapped(
-    path: Path,
-    known: frozenset[str],
-    *,
-    mapping: Mapping | None,
-    rename: dict[str, str],
-    flips: frozenset[str],
-) -> Table:
-    """A table under our names and in our units.
-
-    Args:
-        path: CSV, `.gz` too.
-        known: our columns that this kind of table has.
-        mapping: what a person decided; None: names that say all, and `rename`.
-        rename: column in the file to ours, which may have another unit (`yaw=theta_deg`).
-        flips: our columns that are to change their sign.
-
-    Raises:
-        LogError: as read_table; a column of the mapping is not there, one looks like ours and
-            has no unit, or two hold one quantity.
-    """
-    table = read_table(path, known)
-    if mapping is None:
-        guesses = explain(table, known, rename)
-        for guess in guesses:
-            if guess.rival:
-                raise _rivals(table.name, guess)
-            if not guess.sure and guess.column:
-                raise _unsure(table.name, guess)
-        notes = [guess.note for guess in guesses if guess.note]
-        table, mapping = replace(table, notes=table.notes + notes), mapping_of(guesses)
-    gone = [s.column for s in mapping.values() if s.column and s.column not in table.header]
-    if gone:
-        raise LogError(
-            f"{table.name}: the mapping names column '{gone[0]}', but the file has "
-            f"{', '.join(table.header)}; correct the mapping."
-        )
-    return table.under(mapping, flips)
-
-
-def _rivals(table: str, guess: Guess) -> LogError:
-    if guess.rival == guess.column:
-        return LogError(
-            f"{table}: two columns are called '{guess.column}'; take one of them out of the file."
-        )
-    return LogError(
-        f"{table}: columns '{guess.rival}' and '{guess.column}' hold one quantity; take one out of "
-        "the file, or choose with a --mapping file (--explain-columns writes one)."
-    )
-
-
-def _unsure(table: str, guess: Guess) -> LogError:
-    target = guess.targets[0]
-    if math.isnan(guess.factor):
-        return LogError(
-            f"{table}: column '{guess.column}' can be {target} by a factor that no table has: let "
-            f"--explain-columns FILE write down all columns, write it there ({_lacks(target)}), "
-            "and give that to --mapping."
-        )
-    if guess.zero:
-        return LogError(
-            f"{table}: column '{guess.column}' {guess.why}; let --explain-columns FILE write down "
-            "all columns, check factor and zero there, and give that to --mapping."
-        )
-    stem, ours = split_unit(target)
-    if len(guess.targets) > 1:  # both wheels of a side
-        stem = "left" if guess.targets == LEFT else "right"
-    unit = next((u for u, known in UNITS.items() if known == (ours, guess.factor)), ours)
-    new = f"{stem}_{unit}" if unit else target
-    doubt = "has no unit" if ours else f"may be {target}"
-    more = " (or _mm, _deg, _ms, _pwm ...)" if ours else ""
-    return LogError(
-        f"{table}: column '{guess.column}' {doubt} ({guess.why}); say what it is with "
-        f"--rename {guess.column}={new}{more}, or let --explain-columns FILE write down all "
-        "columns and give that to --mapping."
-    )

@@ -9,9 +9,10 @@ import numpy as np
 import tomlkit
 
 from twinmill.data.checks import check_driven, check_poses, check_recorded
-from twinmill.data.importers.columns import Guess, check_renames, explain, read_mapping
+from twinmill.data.importers.columns import Guess, explain, read_mapping
 from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
+from twinmill.data.importers.mapped import check_renames, read_columns
 from twinmill.data.importers.motive import read_motive
 from twinmill.data.importers.path_heading import with_path_heading
 from twinmill.data.importers.plain import (
@@ -34,7 +35,7 @@ from twinmill.data.importers.series import (
 )
 from twinmill.data.importers.vicon import read_vicon
 from twinmill.data.log import Log, LogError, RobotLog, read_log
-from twinmill.data.measurement_table import Table, read_table
+from twinmill.data.measurement_table import Table
 from twinmill.data.track import make_track
 from twinmill.files import replacing
 
@@ -240,7 +241,7 @@ def explain_columns(
 ) -> dict[str, tuple[Table, list[Guess]]]:
     """Both tables and what their columns look like, by `poses` and `commands`."""
     given = (("poses", poses, OF_POSES), ("commands", commands, OF_COMMANDS))
-    tables = {kind: (read_table(path, known), known) for kind, path, known in given if path}
+    tables = {kind: (read_columns(path, known), known) for kind, path, known in given if path}
     return {kind: (table, explain(table, known)) for kind, (table, known) in tables.items()}
 
 
