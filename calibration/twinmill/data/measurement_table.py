@@ -210,8 +210,11 @@ class Table:
                 f"called {self.header[0]} to {self.header[-1]}; write a line of names above, or "
                 f"say what each is, as with --rename {self.header[0]}={column}."
             )
-        alike = [name for name in self.strange if _may_be(name, column)]
-        near = difflib.get_close_matches(column, alike, n=1, cutoff=NEAR)
+        own = _quantity(column)
+        same = [name for name in self.strange if own and _quantity(name) == own]
+        open_names = [name for name in self.strange if not _quantity(name)]
+        near = difflib.get_close_matches(column, same, n=1, cutoff=0.0)
+        near = near or difflib.get_close_matches(column, open_names, n=1, cutoff=NEAR)
         if not near:
             which = f", or say which of {', '.join(self.strange)} holds it: --rename NAME={column}"
             return LogError(
@@ -223,10 +226,10 @@ class Table:
         )
 
 
-def _may_be(name: str, column: str) -> bool:
-    """Whether both hold the same quantity, where the name tells by its unit which it holds."""
-    (_, unit), (_, own) = split_unit(name), split_unit(column)
-    return not unit or not own or UNITS[unit][0] == UNITS[own][0]
+def _quantity(name: str) -> str:
+    """What a column holds by the unit in its name, as one of our units; empty if it has none."""
+    unit = split_unit(name)[1]
+    return UNITS[unit][0] if unit else ""
 
 
 def _in_unit_of(name: str, column: str) -> str:

@@ -281,7 +281,7 @@ def _together(table: Table, known: frozenset[str], guesses: list[Guess]) -> list
     has_time = any("t_s" in guess.targets for guess in guesses)
     counter = next((named[name] for name in COUNTERS if name in named), None)
     if counter and not has_time and "t_s" in known:
-        changed[counter] = Guess(counter, ("t_s",), math.nan, f"counts; {LACKS['t_s']}", False)
+        changed[counter] = Guess(counter, ("t_s",), math.nan, ", ".join(lacks("t_s")), False)
     return [changed.get(guess.column, guess) for guess in guesses]
 
 
@@ -294,7 +294,7 @@ def _guess(table: Table, column: str, known: frozenset[str], new: str | None) ->
         if split_unit(name)[1] == "pwm" and centred:
             return centred
         if math.isnan(factor):
-            return Guess(column, targets, factor, f"by its name; {lacks(targets[0])}", False)
+            return Guess(column, targets, factor, ", ".join(lacks(targets[0])), False)
         other = _in_other_unit(column, targets, _numbers(table, column))
         if other and split_unit(name)[1] in ("pwm", "pct") and not new:
             return other
@@ -331,16 +331,17 @@ def is_usual(name: str, known: frozenset[str]) -> bool:
     return bool(by_name(name, known)) or bool(usual and known.issuperset(usual[0]))
 
 
-LACKS = {  # numbers that no table has, by what ours hold
-    "radps": "the factor is 1 / the wheel's radius in m",
-    "m": "the factor is the metres on the floor that a pixel is wide",
-    "t_s": "the factor is 1 / the frames of a second",
+LACKS = {  # what a column is whose factor no table has, and that factor, by what ours hold
+    "radps": ("a speed of the wheel's rim", "1 / the wheel's radius in m"),
+    "m": ("in pixels", "the metres on the floor that a pixel is wide"),
+    "s": ("a count of frames", "1 / the frames of a second"),
 }
 
 
-def lacks(target: str) -> str:
-    """What a factor that must be written by hand is, of one of our columns."""
-    return LACKS.get(target) or LACKS[split_unit(target)[1]]
+def lacks(target: str) -> tuple[str, str]:
+    """What a column is that becomes one of ours by a number from outside; that number."""
+    what, factor = LACKS[split_unit(target)[1]]
+    return what, f"the factor is {factor}"
 
 
 def _renamed(table: str, column: str, new: str, factor: float) -> tuple[float, str]:
@@ -417,7 +418,7 @@ def read_mapping(path: Path, kind: str, known: frozenset[str]) -> Mapping:
         numbers = [entry[k] for k in keys & {"factor", "value", "zero"}]
         if any(isinstance(n, float) and math.isnan(n) for n in numbers):
             raise LogError(
-                f"{path}: [{kind}] {target}: has no factor yet; {lacks(target)}: write it there."
+                f"{path}: [{kind}] {target}: has no factor yet; {lacks(target)[1]}: write it there."
             )
         good = keys == {"value"} or {"column"} <= keys <= {"column", "factor", "zero"}
         if target not in known or not good or not all(_is_real(n) for n in numbers):

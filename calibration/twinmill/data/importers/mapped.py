@@ -100,9 +100,10 @@ def _rivals(table: str, guess: Guess) -> LogError:
 def _unsure(table: str, guess: Guess) -> LogError:
     target = guess.targets[0]
     if math.isnan(guess.factor):
+        what, factor = lacks(target)
         return LogError(
-            f"{table}: column '{guess.column}' can be {target} by a factor that no table has: let "
-            f"--explain-columns FILE write down all columns, write it there ({lacks(target)}), "
+            f"{table}: column '{guess.column}' is {what}, and ours is {target}; let "
+            f"--explain-columns FILE write down all columns, write the factor there ({factor}), "
             "and give that to --mapping."
         )
     if guess.zero:
