@@ -177,6 +177,13 @@ def test_no_column_is_proposed_for_another_quantity(imported):
         imported("t_s,robot_id,vx_mps,u,y_m,q\n0,4,0,0,0,0\n")
 
 
+def test_directions_beside_duties_are_not_dropped(imported):
+    """An Arduino's way: how much, and which way."""
+    rows = "t_s,left_pwm,left_dir,right_pwm,right_dir\n0,100,1,100,0\n"
+    with pytest.raises(LogError, match="'left_dir' is a direction, and our duties have signs"):
+        imported(commands=rows)
+
+
 def test_forward_duties_that_stop_at_zero_are_no_middle(imported):
     rows = "0,255,255\n1,128,128\n2,0,0\n3,64,64\n4,0,0\n"
     robot, _ = imported(commands="t_s,left_pwm,right_pwm\n" + rows)

@@ -231,6 +231,7 @@ USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]
 QUATERNIONS = (("qw", "qx", "qy", "qz"), ("qx", "qy", "qz", "qw"))  # orders of q0 to q3
 NUMBERED = ("q0", "q1", "q2", "q3")
 LEVEL = 0.2  # x and y of the quaternion of a robot on a floor are smaller
+DIRECTION = re.compile(r"(^|_)dir(ection)?(_|$)")  # of a wheel, beside a duty without a sign
 COUNTERS = ("frame", "frame_id", "frame_number", "sample", "index")
 
 
@@ -269,20 +270,33 @@ def _together(table: Table, known: frozenset[str], guesses: list[Guess]) -> list
         larger, other = sorted(plane, key=lambda g: g.factor)
         why = f"in the unit of '{larger.column}', which {larger.why}"
         changed[other.column] = replace(other, factor=larger.factor, why=why)
-    if set(NUMBERED) <= set(named) and known.issuperset(QUATERNIONS[0]):
-        parts = [_numbers(table, named[q]) for q in NUMBERED]
-        size = [np.abs(part).max(initial=0.0) for part in parts]
-        middle_is_small = max(size[1:3]) < LEVEL
-        if middle_is_small != (max(size[:2]) < LEVEL):
-            order = QUATERNIONS[0 if middle_is_small else 1]
-            why = "so it looks, since x and y are small where a robot is level"
-            for q, target in zip(NUMBERED, order, strict=True):
-                changed[named[q]] = Guess(named[q], (target,), 1.0, why, False)
+    changed |= _quaternion(table, known, named)
+    told = {target for guess in guesses for target in guess.targets}
+    for name, column in named.items():
+        if DIRECTION.search(name) and told & {*LEFT, *RIGHT}:
+            why = "is a direction, and our duties have signs: give them its sign, and take it out"
+            changed[column] = Guess(column, (), 1.0, why, False)
     has_time = any("t_s" in guess.targets for guess in guesses)
     counter = next((named[name] for name in COUNTERS if name in named), None)
     if counter and not has_time and "t_s" in known:
         changed[counter] = Guess(counter, ("t_s",), math.nan, ", ".join(lacks("t_s")), False)
     return [changed.get(guess.column, guess) for guess in guesses]
+
+
+def _quaternion(table: Table, known: frozenset[str], named: dict[str, str]) -> dict[str, Guess]:
+    """What q0 to q3 look like, by the order in which x and y of a level robot are small."""
+    if not (set(NUMBERED) <= set(named) and known.issuperset(QUATERNIONS[0])):
+        return {}
+    parts = [np.abs(_numbers(table, named[q])).max(initial=0.0) for q in NUMBERED]
+    w_first, w_last = max(parts[1:3]) < LEVEL, max(parts[:2]) < LEVEL
+    if w_first == w_last:
+        return {}
+    order = QUATERNIONS[0 if w_first else 1]
+    why = "so it looks, since x and y are small where a robot is level"
+    return {
+        named[q]: Guess(named[q], (target,), 1.0, why, False)
+        for q, target in zip(NUMBERED, order, strict=True)
+    }
 
 
 def _guess(table: Table, column: str, known: frozenset[str], new: str | None) -> Guess:

@@ -98,6 +98,8 @@ def _rivals(table: str, guess: Guess) -> LogError:
 
 
 def _unsure(table: str, guess: Guess) -> LogError:
+    if not guess.targets:
+        return LogError(f"{table}: column '{guess.column}' {guess.why} of the file.")
     target = guess.targets[0]
     if math.isnan(guess.factor):
         what, factor = lacks(target)
