@@ -160,7 +160,7 @@ def test_units_are_told_from_speeds(robot):
 
 def test_a_height_in_the_place_of_y_is_named(robot):
     flat = 0.05 + 1e-4 * np.random.default_rng(1).normal(size=len(robot.pose))
-    _one([replace(_with_pose(robot, y=flat), z_m=robot.pose[:, 1])], "y is up", "--up y")
+    _one([replace(_with_pose(robot, y=flat), z_m=robot.pose[:, 1])], "y is up", "the other --up")
 
 
 def test_headings_that_are_none_are_named(robot):

@@ -100,6 +100,90 @@ def test_duties_about_a_middle_are_asked_about_and_kept(
     assert not told[[1, 3]].any()
 
 
+@pytest.mark.parametrize(
+    ("ahead", "back", "looks"),
+    [("0.5", "-1", "a share of full duty"), ("1750", "1000", "pulses about 1500 us")],
+)
+def test_duties_that_do_not_fit_the_unit_in_their_name_are_asked_about(
+    imported, tmp_path, monkeypatch, ahead, back, looks
+):
+    """Half ahead, then all back, of what is called PWM."""
+    monkeypatch.chdir(tmp_path)
+    commands = f"t_s,left_pwm,right_pwm\n0,{ahead},{back}\n1,{back},{ahead}\n"
+    with pytest.raises(LogError, match=f"'left_pwm' .*looks like {looks}"):
+        imported(commands=commands)
+    options = ["--poses", "p.csv", "--commands", "c.csv", "--explain-columns", "m.toml"]
+    assert CliRunner().invoke(app, ["import", *options]).exit_code == 0
+    robot, _ = imported(commands=commands, mapping=tmp_path / "m.toml")
+    np.testing.assert_allclose(robot.command[0], [0.5, -1, 0.5, -1])
+
+
+def _mapped(imported, tmp_path, monkeypatch, poses, **factors):
+    """The robot of a table as `--explain-columns` maps it, with the factors that it asks for."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "p.csv").write_text(poses)
+    files = ["import", "--poses", "p.csv", "--explain-columns", "m.toml", "--force"]
+    assert CliRunner().invoke(app, files).exit_code == 0
+    mapping = tmp_path / "m.toml"
+    given = [f'{name} = {{column = "{name}"}}\n' for name in COMMANDS.split("\n")[0].split(",")]
+    text = mapping.read_text()
+    for column, factor in factors.items():
+        text = text.replace(f'"{column}", factor = nan', f'"{column}", factor = {factor}')
+    mapping.write_text(text + "[commands]\n" + "".join(given))
+    return imported(poses, mapping=mapping, robot_id=4)
+
+
+def test_x_and_y_have_one_unit(imported, tmp_path, monkeypatch):
+    """A corridor in millimetres: 900 mm along, 8 mm across."""
+    rows = "".join(f"{k},{100 * k},{k % 2 * 8},0\n" for k in range(10))
+    robot, _ = _mapped(imported, tmp_path, monkeypatch, "t,x,y,yaw\n" + rows)
+    np.testing.assert_allclose(np.ptp(robot.pose[:, :2], axis=0), [0.9, 0.008])
+
+
+@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
+def test_the_order_of_numbered_quaternions_is_told_by_a_level_robot(
+    imported, tmp_path, monkeypatch, order
+):
+    heading = np.linspace(0, 3, 10)
+    part = dict(zip("wxyz", (np.cos(heading / 2), 0.01, -0.01, np.sin(heading / 2)), strict=True))
+    rows = np.column_stack(
+        [np.arange(10), 0.1 * np.arange(10), np.arange(10), *(part[c] + 0 * heading for c in order)]
+    )
+    table = "t,x,y,q0,q1,q2,q3\n" + "".join(",".join(map(str, row)) + "\n" for row in rows)
+    robot, _ = _mapped(imported, tmp_path, monkeypatch, table)
+    np.testing.assert_allclose(robot.pose[:, 2], heading, atol=1e-3)
+
+
+def test_pixels_and_frames_ask_for_the_number_that_no_table_has(imported, tmp_path, monkeypatch):
+    """350 px a metre, 25 frames a second."""
+    rows = "".join(f"{k},{35 * k},{7 * k},0\n" for k in range(10))
+    table = "frame,x_px,y_px,yaw_rad\n" + rows
+    with pytest.raises(LogError, match=r"x_m: has no factor yet; .* metres .* a pixel"):
+        _mapped(imported, tmp_path, monkeypatch, table, frame=0.04)
+    scale = {"frame": 0.04, "x_px": 1 / 350, "y_px": 1 / 350}
+    robot, _ = _mapped(imported, tmp_path, monkeypatch, table, **scale)
+    np.testing.assert_allclose(robot.pose_t_s, 0.04 * np.arange(10), atol=1e-6)
+    np.testing.assert_allclose(robot.pose[9, :2], [0.9, 0.18])
+
+
+@pytest.mark.parametrize("lost", ["null", "None", "NaN", "N/A", ""])
+def test_words_for_a_lost_measurement_are_none(imported, lost):
+    robot, _ = imported(POSES.replace("1,4,0.5,0.25,0.5", f"1,4,{lost},{lost},{lost}"))
+    assert robot.valid.tolist() == [True, False, True]
+
+
+def test_no_column_is_proposed_for_another_quantity(imported):
+    with pytest.raises(LogError, match=r"x_m is missing; add it, or say which of vx_mps, u, "):
+        imported("t_s,robot_id,vx_mps,u,y_m,q\n0,4,0,0,0,0\n")
+
+
+def test_directions_beside_duties_are_not_dropped(imported):
+    """An Arduino's way: how much, and which way."""
+    rows = "t_s,left_pwm,left_dir,right_pwm,right_dir\n0,100,1,100,0\n"
+    with pytest.raises(LogError, match="'left_dir' is a direction, and our duties have signs"):
+        imported(commands=rows)
+
+
 def test_forward_duties_that_stop_at_zero_are_no_middle(imported):
     rows = "0,255,255\n1,128,128\n2,0,0\n3,64,64\n4,0,0\n"
     robot, _ = imported(commands="t_s,left_pwm,right_pwm\n" + rows)
@@ -263,3 +347,30 @@ def test_german_names_are_asked_about_and_kept(tmp_path):
     robot = read_log(tmp_path / "o.lcmlog").robots[4]
     np.testing.assert_allclose(robot.command[0], [0.5, -1, 0.25, 1])
     np.testing.assert_allclose(robot.pose[-1, 2], np.radians(118))
+
+
+@pytest.mark.parametrize(
+    "names",
+    ["r1_x_m,r1_y_m,r2_x_m,r2_y_m", "robot1.x_m,robot1.y_m,robot2.x_m,robot2.y_m", "x1,y1,x2,y2"],
+)
+def test_robots_side_by_side_are_read_one_by_one(tmp_path, names):
+    """One drives along x, the other along y; the second is hidden once."""
+    rows = ["0,0,1,5,0", "1,0.1,1,,", "2,0.2,1,5,0.4"]
+    (tmp_path / "p.csv").write_text("\n".join([f"t_s,{names}", *rows]) + "\n")
+    told = "t_s,r1_vx_mps,r1_omega_radps,r2_vx_mps,r2_omega_radps\n0,1,2,3,4\n"
+    (tmp_path / "c.csv").write_text(told)
+    given = {"x": "x_m", "y": "y_m"} if names == "x1,y1,x2,y2" else {}
+    options = ImportOptions(rename=given)
+    import_log(tmp_path / "p.csv", tmp_path / "c.csv", tmp_path / "o.lcmlog", options=options)
+    robots = read_log(tmp_path / "o.lcmlog").robots
+    np.testing.assert_allclose(robots[1].pose[:, :2], [[0, 1], [0.1, 1], [0.2, 1]])
+    np.testing.assert_allclose(robots[2].pose[robots[2].valid, :2], [[5, 0], [5, 0.4]])
+    np.testing.assert_allclose(robots[2].command[0], [3, 0, 4, 0])
+
+
+def test_columns_with_numbers_that_are_no_robots_stay(imported):
+    wheels = "t_s,robot_id,w1_radps,w2_radps,w3_radps,w4_radps\n0,4,1,2,3,4\n"
+    for table in (wheels, wheels.replace("robot_id,", "").replace(",4,", ",", 1)):
+        robot, warnings = imported(commands=table)
+        np.testing.assert_allclose(robot.command[0], [1, 2, 3, 4])
+        assert not any("side by side" in w for w in warnings)

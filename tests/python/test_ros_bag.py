@@ -19,7 +19,7 @@ from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
-from twinmill.data.importers.ros_bag import _rows, guess_pairs, list_topics, numbering
+from twinmill.data.importers.ros_bag import Topic, _rows, guess_pairs, list_topics, numbering
 from twinmill.data.importers.ros_messages import COMMANDS, joints_beside_wheels
 from twinmill.data.log import LogError, read_log
 from twinmill_cli.main import app
@@ -92,6 +92,39 @@ def test_a_bag_is_listed_and_pairs_are_guessed_by_namespace(tmp_path):
     assert result.exit_code == 0, result.output
     command = json.loads(result.output)["command"]
     assert "--pose /r11/pose --command /r11/cmd_vel" in command
+
+
+def test_odometry_is_said_and_what_others_measured_is_guessed_before_it(tmp_path):
+    """A robot counts its wheels 100 times a second; a camera sees it 20 times."""
+    bag = _bag(tmp_path / "bag", StoragePlugin.SQLITE3)
+    topics = [*list_topics(bag), Topic("/r03/odom", "nav_msgs/msg/Odometry", 1000, "pose")]
+    assert guess_pairs(topics) == [("/r03/pose", "/r03/cmd_vel")]
+    with Writer(tmp_path / "odom", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        kinds = {"/odom": "nav_msgs/msg/Odometry", "/cmd_vel": "geometry_msgs/msg/Twist"}
+        of = {t: writer.add_connection(t, kind, typestore=STORE) for t, kind in kinds.items()}
+        for k in range(5):
+            stamp = T["builtin_interfaces/msg/Time"](sec=START_S + k, nanosec=0)
+            zero = T["geometry_msgs/msg/Vector3"](x=0, y=0, z=0)
+            twist = T["geometry_msgs/msg/Twist"](linear=zero, angular=zero)
+            message = T["nav_msgs/msg/Odometry"](
+                header=T["std_msgs/msg/Header"](stamp=stamp, frame_id="odom"),
+                child_frame_id="base_link",
+                pose=T["geometry_msgs/msg/PoseWithCovariance"](
+                    pose=T["geometry_msgs/msg/Pose"](
+                        position=T["geometry_msgs/msg/Point"](x=0.1 * k, y=0, z=0),
+                        orientation=T["geometry_msgs/msg/Quaternion"](x=0, y=0, z=0, w=1),
+                    ),
+                    covariance=np.zeros(36),
+                ),
+                twist=T["geometry_msgs/msg/TwistWithCovariance"](
+                    twist=twist, covariance=np.zeros(36)
+                ),
+            )
+            at_ns = (START_S + k) * 10**9
+            writer.write(of["/odom"], at_ns, STORE.serialize_cdr(message, kinds["/odom"]))
+            writer.write(of["/cmd_vel"], at_ns, STORE.serialize_cdr(twist, kinds["/cmd_vel"]))
+    _, warnings = _import(tmp_path / "odom", ("/odom", "/cmd_vel"), robot_id=1)
+    assert "/odom: is odometry" in warnings
 
 
 def test_what_is_no_bag_or_a_broken_one_is_one_sentence(tmp_path):

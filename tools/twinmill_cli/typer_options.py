@@ -5,10 +5,11 @@ import math
 from typing import Any
 
 import typer
-from typer.core import TyperOption
+from typer.core import TyperCommand, TyperOption
 
 _display_type = TyperOption.display_type_rich
 _process_value = TyperOption.process_value
+_parse_args = TyperCommand.parse_args
 
 
 def _type_shown(option: TyperOption, ctx: typer.Context) -> str | None:
@@ -26,5 +27,16 @@ def _finite(option: TyperOption, ctx: typer.Context, value: Any) -> Any:
     return found
 
 
+def _each_once(command: TyperCommand, ctx: typer.Context, args: list[str]) -> list[str]:
+    """Typer's, but an option for one value is refused the second time: it takes the last."""
+    _, _, given = command.make_parser(ctx).parse_args(args=[*args])
+    for option in given:
+        single = isinstance(option, TyperOption) and not (option.multiple or option.is_flag)
+        if single and given.count(option) > 1:
+            raise typer.BadParameter("is given twice, and takes one value.", ctx=ctx, param=option)
+    return _parse_args(command, ctx, args)
+
+
+TyperCommand.parse_args = _each_once
 TyperOption.display_type_rich = _type_shown
 TyperOption.process_value = _finite

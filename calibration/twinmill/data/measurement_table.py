@@ -26,9 +26,11 @@ DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d")
 TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d")
 DAY_S = 86_400
 UNITLESS = ("-", "1", "#", "id")  # as they stand in a row of units
+LOST = ("", "null", "none", "na", "n/a", "#n/a", "-")  # as programs write a lost measurement
 FLAGS = {"true": 1.0, "yes": 1.0, "false": 0.0, "no": 0.0}
 UNNAMED = "column_{}"  # what columns are called in a file that does not name them
 BEGINNING_BYTES = 65536  # tell the encoding
+NEAR = 0.5  # likeness of names from which one is proposed for the other
 FEWEST_ROWS = 10  # from which on a last cell that is shorter than all above it was cut
 
 
@@ -131,14 +133,14 @@ class Table:
 
         Args:
             column: its name.
-            empty_is_nan: take empty cells for lost measurements.
+            empty_is_nan: take empty cells, and LOST words, for lost measurements.
 
         Raises:
             LogError: the column is missing, or a cell is no number (its row is named).
         """
         cells = self.cells(column)
         if empty_is_nan:
-            cells = [cell or "nan" for cell in cells]
+            cells = ["nan" if cell.lower() in LOST else cell for cell in cells]
         try:
             values = np.array([float(cell) for cell in cells])
             return (values - self.zero.get(column, 0.0)) * self.factor.get(column, 1.0)
@@ -208,13 +210,26 @@ class Table:
                 f"called {self.header[0]} to {self.header[-1]}; write a line of names above, or "
                 f"say what each is, as with --rename {self.header[0]}={column}."
             )
-        near = difflib.get_close_matches(column, self.strange, n=1, cutoff=0.0)
+        own = _quantity(column)
+        same = [name for name in self.strange if own and _quantity(name) == own]
+        open_names = [name for name in self.strange if not _quantity(name)]
+        near = difflib.get_close_matches(column, same, n=1, cutoff=0.0)
+        near = near or difflib.get_close_matches(column, open_names, n=1, cutoff=NEAR)
         if not near:
-            return LogError(f"{self.name}: column {column} is missing; add it.")
+            which = f", or say which of {', '.join(self.strange)} holds it: --rename NAME={column}"
+            return LogError(
+                f"{self.name}: column {column} is missing; add it{which if self.strange else ''}."
+            )
         return LogError(
             f"{self.name}: column {column} is missing (nearest is '{near[0]}'); rename "
             f"it in the file or with --rename '{near[0]}={_in_unit_of(near[0], column)}'."
         )
+
+
+def _quantity(name: str) -> str:
+    """What a column holds by the unit in its name, as one of our units; empty if it has none."""
+    unit = split_unit(name)[1]
+    return UNITS[unit][0] if unit else ""
 
 
 def _in_unit_of(name: str, column: str) -> str:

@@ -134,7 +134,7 @@ class Robots:
                     "packets",
                     False,
                     f"{self.stream.broken} packets cannot be read: another program sends to this "
-                    f"port, or NatNet {server.protocol} is newer than is known here",
+                    f"port, or NatNet {server.protocol} is not one of 3.0 to 4.2",
                 )
             )
         return found + (self._bodies() if self.frames else [])

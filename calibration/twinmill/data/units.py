@@ -9,6 +9,7 @@ UNITS = {  # unit in a name: that of ours, and the factor
     **{unit: (unit, 1.0) for unit in OURS},
     "mm": ("m", 1e-3),
     "cm": ("m", 1e-2),
+    "px": ("m", math.nan),  # no table says how wide a pixel is
     "deg": ("rad", math.pi / 180),
     "mmps": ("mps", 1e-3),
     "cmps": ("mps", 1e-2),

@@ -94,9 +94,10 @@ def _motion(path: RobotPath, start_s: float) -> np.ndarray:
 
 
 def _orders(series: CommandSeries, start_s: float) -> np.ndarray:
-    """How much is asked of it, on the grid."""
+    """How much is asked of it, on the grid; in m/s where velocities are told."""
     t_s = series.utime_us / 1e6 - start_s
     grid_s = np.arange(0, max(t_s[-1], STEP_S), STEP_S)
     row = np.searchsorted(t_s, grid_s, side="right") - 1
-    size = np.linalg.norm(series.value, axis=1)
+    turn = LEVER_M if series.kind == "twist" else 1.0
+    size = np.linalg.norm(series.value * [1.0, 1.0, turn, 1.0], axis=1)
     return np.where(row >= 0, size[np.maximum(row, 0)], 0.0)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill track --commands`: when a film began, from drives whose beginning is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,16 @@ def test_beginning_is_found_wherever_it_is(begin_s, duration_s):
     assert shift_s == pytest.approx(EPOCH_S + begin_s, abs=0.05)
     (moved,) = on_clock([path], shift_s)
     assert moved.t_s[0] == shift_s and np.array_equal(moved.pose, path.pose, equal_nan=True)
+
+
+def test_turns_and_speeds_weigh_alike_where_velocities_are_told():
+    """Fast straights between slow turns on the spot, of a robot that is told m/s and rad/s."""
+    series = commands(7)
+    left, right = 0.003 * series.value[:, 0], 0.003 * series.value[:, 1]
+    nothing = np.zeros(len(left))
+    value = np.column_stack([(left + right) / 2, nothing, (right - left) / 0.25, nothing])
+    told = replace(series, kind="twist", value=value)
+    assert align([driven(series, 6.0, 20.0)], [told]) == pytest.approx(EPOCH_S + 6.0, abs=0.05)
 
 
 def test_robots_tell_together():

@@ -40,6 +40,21 @@ UNITS = (  # measured over commanded speed, and what it says
         "the commanded speeds are in millimetres per second",
         "name the columns vx_mmps and vy_mmps",
     ),
+    (
+        (1 / 300, 1 / 30),
+        "the commanded speeds are in centimetres per second",
+        "name the columns vx_cmps and vy_cmps",
+    ),
+    (
+        (7.0, 14.0),
+        "lengths are off by ten, as if of mm and cm one was taken for the other",
+        "correct the units or the factors of positions and speeds",
+    ),
+    (
+        (1 / 14, 1 / 7),
+        "lengths are off by ten, as if of mm and cm one was taken for the other",
+        "correct the units or the factors of positions and speeds",
+    ),
 )
 TURN_UNITS = (
     ((25.0, 130.0), "the headings are in degrees", "name the column theta_deg"),
@@ -134,9 +149,8 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
     found = search.best(wheel_alternatives(columns_in_use(checked.body)) + poses)
     found = [e for e in found if not _is_bias(e)]
     best = min(found, key=lambda e: e.left)
-    shifted = _shifted(checked, search, own, best)
-    if shifted:
-        return [shifted]
+    if mistaken := _in_room(checked, search, own, best) or _shifted(checked, search, own, best):
+        return [mistaken]
     if not far_better(best, own):
         if min(own.left, best.left) > UNRELATED:
             return [_unrelated(checked, min(own.left, best.left))]
@@ -157,6 +171,23 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
         ),
         *_units(checked, simplest[0]),
     ]
+
+
+def _in_room(
+    checked: CheckedTrack, search: Search, own: Explained, best: Explained
+) -> InputFinding | None:
+    """Velocities along the room's axes that were taken for the body's."""
+    if checked.track.command_kind != "twist" or not checked.track.has_heading:
+        return None
+    room = Search(search.motion.told_in_room(), search.wheels).own()
+    if room.left > ALIKE * best.left + ALIKE_LEFT or not far_better(room, own):
+        return None
+    return checked.finding(
+        "the velocities are along the room's axes, not the body's",
+        f"the commands explain {1 - own.left:.0%} of the motion as the body's, and "
+        f"{1 - room.left:.0%} as the room's",
+        "name the columns vx_world_mps and vy_world_mps and import anew",
+    )
 
 
 def _shifted(
@@ -247,7 +278,7 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
     speed = float(e.gain[:2].max())
     turn = float(e.gain[2]) if checked.track.has_heading else 0.0
     kind = checked.track.command_kind
-    tried = [(speed, unit) for unit in UNITS[: 3 if kind == "twist" else 2]]
+    tried = [(speed, unit) for unit in UNITS[: len(UNITS) if kind == "twist" else 2]]
     tried += [(turn, unit) for unit in TURN_UNITS[: 2 if kind == "twist" else 1]]
     if kind == "wheel_speed":
         tried += [(speed, unit) for unit in WHEEL_UNITS]

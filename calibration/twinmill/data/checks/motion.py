@@ -5,7 +5,7 @@ Both are averaged over the same window, so that neither noise nor slow cameras m
 a least-squares line over [-h, h] is the mean velocity under the weight 3 (h^2 - s^2) / (4 h^3).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -92,6 +92,14 @@ class Motion:
         world = np.conj(self.world_mps) if mirrored else self.world_mps
         return world * np.exp(-1j * heading_sign * self.heading_rad)
 
+    def told_in_room(self) -> "Motion":
+        """The same, if the first two columns were velocities along the room's axes."""
+        heading_rad = np.interp(self.grid_s, self.t_s, np.unwrap(self.heading_rad))
+        linear = self.shapes[:, 1].copy()
+        along = (linear[:, 0] + 1j * linear[:, 1]) * np.exp(-1j * heading_rad)
+        linear[:, 0], linear[:, 1] = along.real, along.imag
+        return replace(self, shapes=_powers(linear))
+
     def felt(self, lag_s: float) -> Felt:
         """Commands through a first-order lag, averaged over the window."""
         keep = np.exp(-GRID_S / lag_s)
@@ -113,10 +121,7 @@ class Motion:
 
 def _shapes(track: Track, grid_s: np.ndarray) -> np.ndarray:
     """(G, SHAPES, 4) the command in force in each grid step, averaged over the step."""
-    top = np.abs(track.command).max(axis=0)
-    unit = track.command / np.where(top > 0, top.max(), 1)
-    size, sign = np.abs(unit), np.sign(unit)
-    shapes = np.stack([sign * np.sqrt(size), unit, sign * size**2], axis=1) * top.max()
+    shapes = _powers(track.command)
     knots_s = np.append(track.command_t_s, max(grid_s[-1], track.command_t_s[-1]) + 1)
     area = np.concatenate(
         [np.zeros((1, SHAPES, 4)), np.cumsum(shapes * np.diff(knots_s)[:, None, None], axis=0)]
@@ -127,3 +132,11 @@ def _shapes(track: Track, grid_s: np.ndarray) -> np.ndarray:
     at_grid = area[place] + shapes[place] * within[:, None, None]
     at_grid[before] = 0
     return np.diff(at_grid, axis=0, prepend=0.0) / GRID_S
+
+
+def _powers(command: np.ndarray) -> np.ndarray:
+    """(M, SHAPES, 4) of (M, 4): its root, itself, its square, as large as the largest command."""
+    top = np.abs(command).max()
+    unit = command / (top or 1)
+    size, sign = np.abs(unit), np.sign(unit)
+    return np.stack([sign * np.sqrt(size), unit, sign * size**2], axis=1) * top

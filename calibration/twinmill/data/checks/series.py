@@ -48,7 +48,8 @@ def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
             finding(
                 f"{axis} is up in these poses, not z",
                 f"z goes over {height_m:.2f} m and {axis} over {min(x_m, y_m) * 1000:.0f} mm",
-                f"import with --up {axis}",
+                "import with the other --up (y or z), or take a table's columns in another order, "
+                f"as in --rename z_m={axis}_m --rename {axis}_m=z_m",
             )
         ]
     if fast_mps > FASTEST_MPS:
@@ -57,7 +58,8 @@ def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
             finding(
                 f"the positions are in {unit}, not in m",
                 f"the robot drives at {fast_mps:.0f} m/s by them, over {max(x_m, y_m):.0f} m",
-                "name the columns x_mm and y_mm (x_cm and y_cm) and import anew",
+                "name the columns x_mm and y_mm (x_cm and y_cm), or choose metres in the export, "
+                "and import anew",
             )
         ]
     if robot.has_heading and _heading_is_constant(robot, pose):

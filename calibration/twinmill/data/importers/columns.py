@@ -16,7 +16,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from twinmill.data.log import LogError
-from twinmill.data.measurement_table import Table, is_number, read_header, read_table
+from twinmill.data.measurement_table import Table, is_number
 from twinmill.data.units import UNITS, plain_name, split_unit
 
 
@@ -61,7 +61,7 @@ class Guess:
 def by_name(column: str, known: frozenset[str]) -> tuple[tuple[str, ...], float] | None:
     """Our columns and the factor, where a name with a unit says it all.
 
-    The factor is NaN where a number is needed that no table has: the radius of the wheels.
+    The factor is NaN where a number is needed that no table has, as LACKS says.
     """
     if column in known:
         return (column,), 1.0
@@ -94,6 +94,8 @@ def _length(values: np.ndarray) -> tuple[float, str]:
     span = float(np.ptp(values))
     if span > 100:
         return 1e-3, f"goes over {span:.0f}, so it looks like mm"
+    if span > 20:
+        return 1e-2, f"goes over {span:.0f}, so it looks like cm"
     return 1.0, f"goes over {span:.2f}, so it looks like m"
 
 
@@ -115,8 +117,10 @@ def _duty(values: np.ndarray) -> tuple[float, str]:
 
 def _speed(values: np.ndarray) -> tuple[float, str]:
     top = float(np.abs(values).max())
-    if top > 20:
+    if top > 60:
         return 1e-3, f"goes to {top:.0f}, so it looks like mm/s"
+    if top > 4:
+        return 1e-2, f"goes to {top:.0f}, so it looks like cm/s"
     return 1.0, f"goes to {top:.2f}, so it looks like m/s"
 
 
@@ -134,6 +138,20 @@ def _plain(values: np.ndarray) -> tuple[float, str]:
 # Standstill, and what goes to full duty from there: bytes, servos by angle and by pulse.
 CENTRED = ((127.5, 127.5), (90.0, 90.0), (1500.0, 500.0))
 AT_REST = 0.02  # of the latter
+LOW_PULSE_US = 500.0  # no servo takes shorter ones
+
+
+def _in_other_unit(column: str, targets: tuple[str, ...], values: np.ndarray) -> Guess | None:
+    """What duties look like whose values do not fit the unit in their name: nobody drives so."""
+    top = float(np.abs(values).max(initial=0.0))
+    if 0 < top <= 1 and np.any(values % 1):
+        factor, why = _duty(values)
+        return Guess(column, targets, factor, why, False)
+    if top > 255 and values.min() > LOW_PULSE_US:
+        middle, span = CENTRED[-1]
+        why = f"goes from {values.min():g} to {top:g}, so it looks like pulses about {middle:g} us"
+        return Guess(column, targets, 100 / span, why, False, zero=middle)
+    return None
 
 
 def _centred(column: str, targets: tuple[str, ...], values: np.ndarray) -> Guess | None:
@@ -160,14 +178,14 @@ WHEELS = {"left": (1, 3), "right": (2, 4), "fl": (1,), "fr": (2,), "rl": (3,), "
 OF_MESSAGE = re.compile(r"^%?(field_)?((pose|transform|twist)_)*(?=[a-z])")
 # Usual names without a unit: what they mean, and how their values tell the unit.
 USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]]]] = {
-    **dict.fromkeys(("t", "time", "timestamp", "stamp", "secs"), (("t_s",), _time)),
+    **dict.fromkeys(("t", "time", "timestamp", "stamp", "secs", "frame_time"), (("t_s",), _time)),
     **dict.fromkeys((*ROBOT, "id"), (("robot_id",), _plain)),
     **dict.fromkeys(("x", "pos_x", "position_x", "px", "translation_x"), (("x_m",), _length)),
     **dict.fromkeys(("y", "pos_y", "position_y", "py", "translation_y"), (("y_m",), _length)),
     **dict.fromkeys(
         ("z", "pos_z", "position_z", "pz", "height", "translation_z"), (("z_m",), _length)
     ),
-    **dict.fromkeys(("theta", "yaw", "heading", "psi", "phi"), (("theta_rad",), _angle)),
+    **dict.fromkeys(("theta", "yaw", "heading", "psi", "phi", "angle"), (("theta_rad",), _angle)),
     **dict.fromkeys(("v", "vx", "linear_x", "speed"), (("vx_mps",), _speed)),
     **dict.fromkeys(("vy", "linear_y"), (("vy_mps",), _speed)),
     **dict.fromkeys(("w", "omega", "angular_z", "wz", "yaw_rate"), (("omega_radps",), _turn)),
@@ -204,7 +222,17 @@ USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]
         name: ((f"{wheel}_pct",), _duty)
         for name, wheel in (("vl", "fl"), ("vr", "fr"), ("hl", "rl"), ("hr", "rr"))
     },
+    # French and Spanish
+    **dict.fromkeys(("temps", "tiempo", "horodatage"), (("t_s",), _time)),
+    **dict.fromkeys(("cap", "orientation", "angulo", "\u00e1ngulo"), (("theta_rad",), _angle)),
+    **dict.fromkeys(("vitesse", "velocidad"), (("vx_mps",), _speed)),
+    **dict.fromkeys(("vitesse_angulaire", "velocidad_angular"), (("omega_radps",), _turn)),
 }
+QUATERNIONS = (("qw", "qx", "qy", "qz"), ("qx", "qy", "qz", "qw"))  # orders of q0 to q3
+NUMBERED = ("q0", "q1", "q2", "q3")
+LEVEL = 0.2  # x and y of the quaternion of a robot on a floor are smaller
+DIRECTION = re.compile(r"(^|_)dir(ection)?(_|$)")  # of a wheel, beside a duty without a sign
+COUNTERS = ("frame", "frame_id", "frame_number", "sample", "index")
 
 
 def explain(
@@ -217,10 +245,11 @@ def explain(
         known: our columns that this kind of table has.
         rename: column in the file to ours, as a person decided.
     """
+    looks = [_guess(table, column, known, (rename or {}).get(column)) for column in table.header]
     guesses: list[Guess] = []
     holder: dict[str, str] = {}  # column that is each of ours
-    for column in table.header:
-        guess = _guess(table, column, known, (rename or {}).get(column))
+    for guess in _together(table, known, looks):
+        column = guess.column
         taken = [target for target in guess.targets if target in holder]
         if taken:
             why = f"left out: {taken[0]} is column '{holder[taken[0]]}' already"
@@ -232,6 +261,44 @@ def explain(
     return guesses
 
 
+def _together(table: Table, known: frozenset[str], guesses: list[Guess]) -> list[Guess]:
+    """What columns look like beside each other: x and y have one unit, q0 to q3 an order."""
+    named = {plain_name(guess.column): guess.column for guess in guesses}
+    changed: dict[str, Guess] = {}
+    plane = [g for g in guesses if g.targets in (("x_m",), ("y_m",)) and not g.sure]
+    if len(plane) == 2 and plane[0].factor != plane[1].factor:
+        larger, other = sorted(plane, key=lambda g: g.factor)
+        why = f"in the unit of '{larger.column}', which {larger.why}"
+        changed[other.column] = replace(other, factor=larger.factor, why=why)
+    changed |= _quaternion(table, known, named)
+    told = {target for guess in guesses for target in guess.targets}
+    for name, column in named.items():
+        if DIRECTION.search(name) and told & {*LEFT, *RIGHT}:
+            why = "is a direction, and our duties have signs: give them its sign, and take it out"
+            changed[column] = Guess(column, (), 1.0, why, False)
+    has_time = any("t_s" in guess.targets for guess in guesses)
+    counter = next((named[name] for name in COUNTERS if name in named), None)
+    if counter and not has_time and "t_s" in known:
+        changed[counter] = Guess(counter, ("t_s",), math.nan, ", ".join(lacks("t_s")), False)
+    return [changed.get(guess.column, guess) for guess in guesses]
+
+
+def _quaternion(table: Table, known: frozenset[str], named: dict[str, str]) -> dict[str, Guess]:
+    """What q0 to q3 look like, by the order in which x and y of a level robot are small."""
+    if not (set(NUMBERED) <= set(named) and known.issuperset(QUATERNIONS[0])):
+        return {}
+    parts = [np.abs(_numbers(table, named[q])).max(initial=0.0) for q in NUMBERED]
+    w_first, w_last = max(parts[1:3]) < LEVEL, max(parts[:2]) < LEVEL
+    if w_first == w_last:
+        return {}
+    order = QUATERNIONS[0 if w_first else 1]
+    why = "so it looks, since x and y are small where a robot is level"
+    return {
+        named[q]: Guess(named[q], (target,), 1.0, why, False)
+        for q, target in zip(NUMBERED, order, strict=True)
+    }
+
+
 def _guess(table: Table, column: str, known: frozenset[str], new: str | None) -> Guess:
     """What one column looks like, under the new name that a person gave it."""
     name = new or column
@@ -241,7 +308,10 @@ def _guess(table: Table, column: str, known: frozenset[str], new: str | None) ->
         if split_unit(name)[1] == "pwm" and centred:
             return centred
         if math.isnan(factor):
-            return Guess(column, targets, factor, f"of the rim; {RADIUS}", False)
+            return Guess(column, targets, factor, ", ".join(lacks(targets[0])), False)
+        other = _in_other_unit(column, targets, _numbers(table, column))
+        if other and split_unit(name)[1] in ("pwm", "pct") and not new:
+            return other
         note = ""
         if new:
             factor, note = _renamed(table.name, column, new, factor)
@@ -269,7 +339,23 @@ def _usual(name: str) -> tuple[tuple[str, ...], Callable] | None:
     return USUAL.get(plain) or USUAL.get(OF_MESSAGE.sub("", plain))
 
 
-RADIUS = "the factor is 1 / the wheel's radius in m"
+def is_usual(name: str, known: frozenset[str]) -> bool:
+    """Whether a name is one of ours in any unit, or a usual one for what we know."""
+    usual = _usual(name)
+    return bool(by_name(name, known)) or bool(usual and known.issuperset(usual[0]))
+
+
+LACKS = {  # what a column is whose factor no table has, and that factor, by what ours hold
+    "radps": ("a speed of the wheel's rim", "1 / the wheel's radius in m"),
+    "m": ("in pixels", "the metres on the floor that a pixel is wide"),
+    "s": ("a count of frames", "1 / the frames of a second"),
+}
+
+
+def lacks(target: str) -> tuple[str, str]:
+    """What a column is that becomes one of ours by a number from outside; that number."""
+    what, factor = LACKS[split_unit(target)[1]]
+    return what, f"the factor is {factor}"
 
 
 def _renamed(table: str, column: str, new: str, factor: float) -> tuple[float, str]:
@@ -289,23 +375,6 @@ def _renamed(table: str, column: str, new: str, factor: float) -> tuple[float, s
     if new_unit == new_ours:
         return old_factor, f"{table}: {column} is in {old_unit} by its name: converted to {new}."
     return factor, f"{table}: {column} is read in {new_unit}, whatever its name says."
-
-
-def check_renames(rename: dict[str, str], tables: list[Path], known: frozenset[str]) -> None:
-    """Raises LogError where an old name is in no table, or a new one has no meaning."""
-    headers = {path.name: read_header(path) for path in tables} if rename else {}
-    for old, new in rename.items():
-        if not any(old in header for header in headers.values()):
-            names = "; ".join(f"{name} has {', '.join(h)}" for name, h in headers.items())
-            raise LogError(
-                f"--rename {old}={new}: no table has a column '{old}'"
-                f"{f' ({names})' if names else ''}; correct the name."
-            )
-        if not by_name(new, known) and not _usual(new):
-            raise LogError(
-                f"--rename {old}={new}: {new} is not one of our columns; they are "
-                f"{', '.join(sorted(known))}."
-            )
 
 
 def _numbers(table: Table, column: str) -> np.ndarray:
@@ -363,7 +432,7 @@ def read_mapping(path: Path, kind: str, known: frozenset[str]) -> Mapping:
         numbers = [entry[k] for k in keys & {"factor", "value", "zero"}]
         if any(isinstance(n, float) and math.isnan(n) for n in numbers):
             raise LogError(
-                f"{path}: [{kind}] {target}: has no factor yet; {RADIUS}: write it there."
+                f"{path}: [{kind}] {target}: has no factor yet; {lacks(target)[1]}: write it there."
             )
         good = keys == {"value"} or {"column"} <= keys <= {"column", "factor", "zero"}
         if target not in known or not good or not all(_is_real(n) for n in numbers):
@@ -383,81 +452,3 @@ def read_mapping(path: Path, kind: str, known: frozenset[str]) -> Mapping:
 
 def _is_real(number: object) -> bool:
     return isinstance(number, int | float) and math.isfinite(number)
-
-
-def read_mapped(
-    path: Path,
-    known: frozenset[str],
-    *,
-    mapping: Mapping | None,
-    rename: dict[str, str],
-    flips: frozenset[str],
-) -> Table:
-    """A table under our names and in our units.
-
-    Args:
-        path: CSV, `.gz` too.
-        known: our columns that this kind of table has.
-        mapping: what a person decided; None: names that say all, and `rename`.
-        rename: column in the file to ours, which may have another unit (`yaw=theta_deg`).
-        flips: our columns that are to change their sign.
-
-    Raises:
-        LogError: as read_table; a column of the mapping is not there, one looks like ours and
-            has no unit, or two hold one quantity.
-    """
-    table = read_table(path, known)
-    if mapping is None:
-        guesses = explain(table, known, rename)
-        for guess in guesses:
-            if guess.rival:
-                raise _rivals(table.name, guess)
-            if not guess.sure and guess.column:
-                raise _unsure(table.name, guess)
-        notes = [guess.note for guess in guesses if guess.note]
-        table, mapping = replace(table, notes=table.notes + notes), mapping_of(guesses)
-    gone = [s.column for s in mapping.values() if s.column and s.column not in table.header]
-    if gone:
-        raise LogError(
-            f"{table.name}: the mapping names column '{gone[0]}', but the file has "
-            f"{', '.join(table.header)}; correct the mapping."
-        )
-    return table.under(mapping, flips)
-
-
-def _rivals(table: str, guess: Guess) -> LogError:
-    if guess.rival == guess.column:
-        return LogError(
-            f"{table}: two columns are called '{guess.column}'; take one of them out of the file."
-        )
-    return LogError(
-        f"{table}: columns '{guess.rival}' and '{guess.column}' hold one quantity; take one out of "
-        "the file, or choose with a --mapping file (--explain-columns writes one)."
-    )
-
-
-def _unsure(table: str, guess: Guess) -> LogError:
-    target = guess.targets[0]
-    if math.isnan(guess.factor):
-        return LogError(
-            f"{table}: column '{guess.column}' is a speed of the wheel's rim, and we take rad/s; "
-            f"let --explain-columns FILE write down all columns, write the factor there "
-            f"({RADIUS}), and give that to --mapping."
-        )
-    if guess.zero:
-        return LogError(
-            f"{table}: column '{guess.column}' {guess.why}; let --explain-columns FILE write down "
-            "all columns, check factor and zero there, and give that to --mapping."
-        )
-    stem, ours = split_unit(target)
-    if len(guess.targets) > 1:  # both wheels of a side
-        stem = "left" if guess.targets == LEFT else "right"
-    unit = next((u for u, known in UNITS.items() if known == (ours, guess.factor)), ours)
-    new = f"{stem}_{unit}" if unit else target
-    doubt = "has no unit" if ours else f"may be {target}"
-    more = " (or _mm, _deg, _ms, _pwm ...)" if ours else ""
-    return LogError(
-        f"{table}: column '{guess.column}' {doubt} ({guess.why}); say what it is with "
-        f"--rename {guess.column}={new}{more}, or let --explain-columns FILE write down all "
-        "columns and give that to --mapping."
-    )

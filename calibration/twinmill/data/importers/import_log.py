@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import tomlkit
 
-from twinmill.data.checks import check_poses, check_tracks
-from twinmill.data.importers.columns import Guess, check_renames, explain, read_mapping
+from twinmill.data.checks import check_driven, check_poses, check_recorded
+from twinmill.data.importers.columns import Guess, explain, read_mapping
 from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
+from twinmill.data.importers.mapped import check_renames, read_columns
 from twinmill.data.importers.motive import read_motive
 from twinmill.data.importers.path_heading import with_path_heading
 from twinmill.data.importers.plain import (
@@ -34,7 +35,7 @@ from twinmill.data.importers.series import (
 )
 from twinmill.data.importers.vicon import read_vicon
 from twinmill.data.log import Log, LogError, RobotLog, read_log
-from twinmill.data.measurement_table import Table, read_table
+from twinmill.data.measurement_table import Table
 from twinmill.data.track import make_track
 from twinmill.files import replacing
 
@@ -240,7 +241,7 @@ def explain_columns(
 ) -> dict[str, tuple[Table, list[Guess]]]:
     """Both tables and what their columns look like, by `poses` and `commands`."""
     given = (("poses", poses, OF_POSES), ("commands", commands, OF_COMMANDS))
-    tables = {kind: (read_table(path, known), known) for kind, path, known in given if path}
+    tables = {kind: (read_columns(path, known), known) for kind, path, known in given if path}
     return {kind: (table, explain(table, known)) for kind, (table, known) in tables.items()}
 
 
@@ -389,14 +390,16 @@ def _summary(log: Log, out: Path, warnings: list[str]) -> dict:
 
 
 def _judged(robot: RobotLog) -> list[str]:
-    """What was cut; or the mistake of the poses, from which cuts and a turned heading follow.
+    """What was cut, and what is wrong with poses or velocities; a mistake stands alone.
 
-    A heading that seems turned may be in degrees: `diagnose` checks that, and so does this.
+    Cuts and a heading that seems turned may follow from a mistake. Duties and wheel speeds need a
+    model to be judged by.
     """
-    found = check_poses(robot, "")
+    found, notes = check_poses(robot, ""), []
     if not found:
         track = make_track(robot)
-        found = [f for f in check_tracks([("", track)]) if f.fatal] if track.astray_rad else []
-    if not found:
-        return [f"robot {robot.robot_id}: {note}" for note in track.notes]
-    return [f"robot {f.robot_id}: {f.what}: {f.evidence}; {f.remedy}." for f in found]
+        tracks = [("", track)]
+        found = [f for f in check_recorded(tracks, None) if f.fatal] or check_driven(tracks, None)
+        notes = [] if any(f.fatal for f in found) else track.notes
+    said = [f"{f.what}: {f.evidence}; {f.remedy}." for f in found]
+    return [f"robot {robot.robot_id}: {words}" for words in (*notes, *said)]

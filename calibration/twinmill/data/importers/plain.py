@@ -10,7 +10,8 @@ import numpy as np
 import turbopi
 
 from twinmill.data.importers.beat import at_even_beat
-from twinmill.data.importers.columns import Mapping, read_mapped
+from twinmill.data.importers.columns import Mapping
+from twinmill.data.importers.mapped import read_mapped
 from twinmill.data.importers.series import (
     CommandSeries,
     DetectionSeries,
@@ -41,7 +42,7 @@ KNOWN = OF_POSES | OF_COMMANDS
 
 @dataclass(frozen=True)
 class Columns:
-    """How to read a table: as `columns.read_mapped`, and whose rows they are.
+    """How to read a table: as `mapped.read_mapped`, and whose rows they are.
 
     Attributes:
         rename, mapping, flips: as there.

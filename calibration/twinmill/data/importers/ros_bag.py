@@ -27,8 +27,10 @@ from twinmill.data.importers.ros_messages import (
     COMMANDS,
     CORNERS,
     DEFINITIONS,
+    ESTIMATES,
     JOINTS,
     MANY,
+    ODOMETRY,
     POSES,
     STEERED,
     TAGS,
@@ -172,13 +174,16 @@ def _is_tag_of(topic: Topic, command: str) -> bool:
     return of_tag and _told(topic.name.rpartition(":")[2], "", {}) == _told("", command, {})
 
 
-def _likely(topic: Topic) -> tuple[bool, bool, bool, int]:
-    """Topics of their own before frames, frames of a base before wheels, then the most messages.
+def _likely(topic: Topic) -> tuple[bool, bool, bool, bool, int]:
+    """Topics of their own before frames, what others measured before what the robot estimates.
+
+    Then frames of a base before wheels, then the most messages.
 
     Of fixed frames only the base itself counts: sensors are often called after what carries them.
     """
     base = OF_BASE.search(topic.name) if topic.fixed else "base" in topic.name
-    return topic.kind not in MANY, bool(base), not topic.fixed, topic.count
+    measured = topic.kind not in ESTIMATES
+    return topic.kind not in MANY, measured, bool(base), not topic.fixed, topic.count
 
 
 def numbering(pairs: list[tuple[str, str]]) -> list[str]:
@@ -415,6 +420,11 @@ class _Rows:
             )
         if messages.root:
             notes.append(f"{topic}: its place in the frame {messages.root} is taken.")
+        if messages.kind == ODOMETRY or _words(messages.root)[-1:] == ["odom"]:
+            notes.append(
+                f"{topic}: is odometry; if it counts the robot's own wheels, slip and wrong wheels "
+                "do not show in it: then take poses of a camera or of motion capture."
+            )
         value = np.empty((len(messages), 0))
         if len(messages.widths) == 1:
             value = np.frombuffer(messages.values).reshape(len(messages), -1)

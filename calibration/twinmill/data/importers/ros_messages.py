@@ -20,6 +20,8 @@ TAGS = tuple(  # poses of tags in the camera's frame, by several packages
 )
 CORNERS = "apriltag_msgs/msg/AprilTagDetectionArray"  # without poses: these are on /tf
 JOINTS = "sensor_msgs/msg/JointState"
+ODOMETRY = "nav_msgs/msg/Odometry"
+ESTIMATES = (ODOMETRY, "geometry_msgs/msg/PoseWithCovarianceStamped")  # often of the robot itself
 MANY = (TF, *TAGS)  # of one topic
 STEERED = ("ackermann_msgs/msg/AckermannDrive", "ackermann_msgs/msg/AckermannDriveStamped")
 DEFINITIONS = {  # of types that the library does not bring; older bags hold none
@@ -117,7 +119,7 @@ def _wheel(name: str) -> tuple[int, int] | None:
 POSES: dict[str, Callable[[Any], Row]] = {
     "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
     "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
-    "nav_msgs/msg/Odometry": lambda m: _pose(m.pose.pose),
+    ODOMETRY: lambda m: _pose(m.pose.pose),
     "geometry_msgs/msg/TransformStamped": lambda m: transform_row(m.transform),
 }
 COMMANDS: dict[str, tuple[CommandKind, Callable[[Any], Row]]] = {

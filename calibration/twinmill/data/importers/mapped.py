@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Other people's tables under our names and in our units, or what must be asked first."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+from twinmill.data.importers.columns import (
+    LEFT,
+    Guess,
+    Mapping,
+    explain,
+    is_usual,
+    lacks,
+    mapping_of,
+)
+from twinmill.data.importers.side_by_side import in_rows
+from twinmill.data.log import LogError
+from twinmill.data.measurement_table import Table, read_header, read_table
+from twinmill.data.units import UNITS, split_unit
+
+
+def read_columns(path: Path, known: frozenset[str]) -> Table:
+    """As `read_table`, robots that stand side by side in rows of their own."""
+    return in_rows(read_table(path, known))
+
+
+def _header(path: Path, known: frozenset[str]) -> list[str]:
+    return in_rows(Table(path.name, read_header(path), [], [], known)).header
+
+
+def check_renames(rename: dict[str, str], tables: list[Path], known: frozenset[str]) -> None:
+    """Raises LogError where an old name is in no table, or a new one has no meaning."""
+    headers = {p.name: _header(p, known) for p in tables} if rename else {}
+    for old, new in rename.items():
+        if not any(old in header for header in headers.values()):
+            names = "; ".join(f"{name} has {', '.join(h)}" for name, h in headers.items())
+            raise LogError(
+                f"--rename {old}={new}: no table has a column '{old}'"
+                f"{f' ({names})' if names else ''}; correct the name."
+            )
+        if not is_usual(new, known):
+            raise LogError(
+                f"--rename {old}={new}: {new} is not one of our columns; they are "
+                f"{', '.join(sorted(known))}."
+            )
+
+
+def read_mapped(
+    path: Path,
+    known: frozenset[str],
+    *,
+    mapping: Mapping | None,
+    rename: dict[str, str],
+    flips: frozenset[str],
+) -> Table:
+    """A table under our names and in our units.
+
+    Args:
+        path: CSV, `.gz` too.
+        known: our columns that this kind of table has.
+        mapping: what a person decided; None: names that say all, and `rename`.
+        rename: column in the file to ours, which may have another unit (`yaw=theta_deg`).
+        flips: our columns that are to change their sign.
+
+    Raises:
+        LogError: as read_table; a column of the mapping is not there, one looks like ours and
+            has no unit, or two hold one quantity.
+    """
+    table = read_columns(path, known)
+    if mapping is None:
+        guesses = explain(table, known, rename)
+        for guess in guesses:
+            if guess.rival:
+                raise _rivals(table.name, guess)
+            if not guess.sure and guess.column:
+                raise _unsure(table.name, guess)
+        notes = [guess.note for guess in guesses if guess.note]
+        table, mapping = replace(table, notes=table.notes + notes), mapping_of(guesses)
+    gone = [s.column for s in mapping.values() if s.column and s.column not in table.header]
+    if gone:
+        raise LogError(
+            f"{table.name}: the mapping names column '{gone[0]}', but the file has "
+            f"{', '.join(table.header)}; correct the mapping."
+        )
+    return table.under(mapping, flips)
+
+
+def _rivals(table: str, guess: Guess) -> LogError:
+    if guess.rival == guess.column:
+        return LogError(
+            f"{table}: two columns are called '{guess.column}'; take one of them out of the file."
+        )
+    return LogError(
+        f"{table}: columns '{guess.rival}' and '{guess.column}' hold one quantity; take one out of "
+        "the file, or choose with a --mapping file (--explain-columns writes one)."
+    )
+
+
+def _unsure(table: str, guess: Guess) -> LogError:
+    if not guess.targets:
+        return LogError(f"{table}: column '{guess.column}' {guess.why} of the file.")
+    target = guess.targets[0]
+    if math.isnan(guess.factor):
+        what, factor = lacks(target)
+        return LogError(
+            f"{table}: column '{guess.column}' is {what}, and ours is {target}; let "
+            f"--explain-columns FILE write down all columns, write the factor there ({factor}), "
+            "and give that to --mapping."
+        )
+    if guess.zero:
+        return LogError(
+            f"{table}: column '{guess.column}' {guess.why}; let --explain-columns FILE write down "
+            "all columns, check factor and zero there, and give that to --mapping."
+        )
+    stem, ours = split_unit(target)
+    if len(guess.targets) > 1:  # both wheels of a side
+        stem = "left" if guess.targets == LEFT else "right"
+    unit = next((u for u, known in UNITS.items() if known == (ours, guess.factor)), ours)
+    new = f"{stem}_{unit}" if unit else target
+    doubt = "has no unit" if ours else f"may be {target}"
+    more = " (or _mm, _deg, _ms, _pwm ...)" if ours else ""
+    return LogError(
+        f"{table}: column '{guess.column}' {doubt} ({guess.why}); say what it is with "
+        f"--rename {guess.column}={new}{more}, or let --explain-columns FILE write down all "
+        "columns and give that to --mapping."
+    )

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`import` says what is wrong with velocity commands and poses, before any model is asked.
+
+The drive is algebra: a unicycle that obeys at once, whose path is summed here.
+"""
+
+import numpy as np
+import pytest
+
+from twinmill.data.importers.import_log import ImportOptions, import_log
+
+STEP_S, HELD_S, DURATION_S = 0.02, 1.2, 60.0
+TURNED = 0.4  # the heading at the beginning
+
+
+def _drive(seed=3):
+    """(N,) s; (N, 2) m/s ahead and rad/s to the left; (N, 3) m, m, rad."""
+    random = np.random.default_rng(seed)
+    t_s = np.arange(0, DURATION_S, STEP_S)
+    choices = np.array(
+        [[0.25, 0], [-0.2, 0], [0, 1.0], [0, -0.8], [0.2, 0.7], [0.15, -0.9], [0, 0]]
+    )
+    order = random.integers(0, len(choices), int(DURATION_S / HELD_S) + 1)
+    told = choices[order[(t_s / HELD_S).astype(int)]]
+    heading = TURNED + np.concatenate([[0], np.cumsum(told[:-1, 1])]) * STEP_S
+    middle = heading + told[:, 1] * STEP_S / 2
+    steps = told[:, :1] * np.column_stack([np.cos(middle), np.sin(middle)]) * STEP_S
+    place = np.concatenate([np.zeros((1, 2)), np.cumsum(steps[:-1], axis=0)])
+    place += random.normal(0, 3e-4, place.shape)
+    return t_s, told, np.column_stack([place, heading])
+
+
+def _said(folder, pose_names, poses, command_names, commands):
+    """Warnings of the import of two tables of one robot."""
+    files = {"p.csv": (pose_names, poses), "c.csv": (command_names, commands)}
+    for name, (header, rows) in files.items():
+        np.savetxt(folder / name, rows, "%.7f", ",", header=f"t_s,{header}", comments="")
+    options = ImportOptions(robot_id=1, same_clock=True)
+    done = import_log(folder / "p.csv", folder / "c.csv", folder / "o.lcmlog", options=options)
+    return " ".join(done["warnings"])
+
+
+POSES, BODY = "x_m,y_m,theta_rad", "vx_mps,vy_mps,omega_radps"
+
+
+def test_a_right_drive_is_imported_without_a_word(tmp_path):
+    t_s, told, pose = _drive()
+    commands = np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]])
+    assert not _said(tmp_path, POSES, np.column_stack([t_s, pose]), BODY, commands)
+
+
+@pytest.mark.parametrize(
+    ("speed", "place", "words"),
+    [
+        (1e3, 1, "commanded speeds are in millimetres per second"),
+        (1e2, 1, "commanded speeds are in centimetres per second"),
+        (10, 1, "off by ten"),
+        (0.1, 1, "off by ten"),
+        (1, 10, "off by ten"),
+        (1, 0.1, "off by ten"),
+    ],
+)
+def test_units_of_speeds_are_told_at_import(tmp_path, speed, place, words):
+    t_s, told, pose = _drive()
+    commands = np.column_stack([t_s, speed * told[:, 0], 0 * t_s, told[:, 1]])
+    poses = np.column_stack([t_s, place * pose[:, :2], pose[:, 2]])
+    assert words in _said(tmp_path, POSES, poses, BODY, commands)
+
+
+def test_turns_in_degrees_are_told_at_import(tmp_path):
+    t_s, told, pose = _drive()
+    commands = np.column_stack([t_s, told[:, 0], 0 * t_s, np.degrees(told[:, 1])])
+    poses = np.column_stack([t_s, pose])
+    assert "turns are in degrees per second" in _said(tmp_path, POSES, poses, BODY, commands)
+
+
+def test_a_compass_is_told_at_import(tmp_path):
+    """It counts from the y axis, to the right: 90 degrees less the heading."""
+    t_s, told, pose = _drive()
+    compass = np.column_stack([t_s, pose[:, :2], np.pi / 2 - pose[:, 2]])
+    commands = np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]])
+    said = _said(tmp_path, POSES, compass, BODY, commands)
+    assert "counted clockwise" in said and "--flip theta_rad --heading-offset-deg=90" in said
+
+
+def test_velocities_of_the_room_under_the_names_of_the_bodys_are_told(tmp_path):
+    t_s, told, pose = _drive()
+    x, y = told[:, 0] * np.cos(pose[:, 2]), told[:, 0] * np.sin(pose[:, 2])
+    poses, commands = np.column_stack([t_s, pose]), np.column_stack([t_s, x, y, told[:, 1]])
+    assert "along the room's axes" in _said(tmp_path, POSES, poses, BODY, commands)
+    (tmp_path / "o.lcmlog").unlink()
+    room = "vx_world_mps,vy_world_mps,omega_radps"
+    assert not _said(tmp_path, POSES, poses, room, commands)
+
+
+def test_clocks_that_run_apart_by_a_thousandth_are_told_at_import(tmp_path):
+    t_s, told, pose = _drive()
+    poses = np.column_stack([1.0015 * t_s, pose])
+    commands = np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]])
+    for name, header, rows in (("p.csv", POSES, poses), ("c.csv", BODY, commands)):
+        np.savetxt(tmp_path / name, rows, "%.7f", ",", header=f"t_s,{header}", comments="")
+    done = import_log(
+        tmp_path / "p.csv",
+        tmp_path / "c.csv",
+        tmp_path / "o.lcmlog",
+        options=ImportOptions(robot_id=1),
+    )
+    assert any(
+        "the two clocks run apart" in w and "--pose-clock-ppm" in w for w in done["warnings"]
+    )
