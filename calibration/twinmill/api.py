@@ -37,7 +37,7 @@ from threadpoolctl import threadpool_limits
 from twinmill import report
 from twinmill.arguments import checked, in_python, known
 from twinmill.data.log import Log as RecordedLog
-from twinmill.data.log import LogError, read_log
+from twinmill.data.log import LogError, RobotLog, read_log
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.multi_log import read_multi_log
 from twinmill.data.steady_table import INPUTS, SteadyTable, is_steady_table, read_steady_tables
@@ -107,6 +107,37 @@ class _Shown:
 
     def _repr_html_(self) -> str:
         return f"<p><b>{html.escape(repr(self))}</b></p>{self.table()._repr_html_()}"
+
+
+class _Reported(_Shown):
+    """A result with a page of its own."""
+
+    def _page(self) -> tuple[report.Section, str]:
+        """What is on the page, and the call that made it."""
+        raise NotImplementedError
+
+    def report(self, folder: str | Path) -> Path:
+        """Writes a page with all tables and figures, as `--out` does.
+
+        Args:
+            folder: made if it is not there; an older page in it is replaced.
+
+        Returns:
+            Path of the page, folder/index.html.
+
+        Raises:
+            ValueError: the folder cannot be written.
+
+        Examples:
+            >>> from tempfile import mkdtemp
+            >>> found.report(mkdtemp()).name
+            'index.html'
+        """
+        place = _path("folder", folder, "the path of a folder")
+        check_new_folder(place)
+        section, call = self._page()
+        source = report.Provenance(call, f"twinmill {version('twinmill')}", "")
+        return report.write_report(place, section.title, source, [section])
 
 
 class Log(_Shown):
@@ -212,8 +243,9 @@ class Log(_Shown):
             >>> set(tm.load("run.lcmlog").table()["log"])
             {'run.lcmlog'}
         """
-        parts = map(_poses, self._logs) if self._logs else map(_steady_rows, self._sheets)
-        return pd.concat(parts, ignore_index=True)
+        if not self._logs:
+            return pd.concat(map(_steady_rows, self._sheets), ignore_index=True)
+        return _rows(self._logs, _poses)
 
     def commands(self) -> pd.DataFrame:
         """All commands, as they were recorded.
@@ -230,7 +262,7 @@ class Log(_Shown):
             >>> set(tm.load("run.lcmlog").commands()["kind"])
             {'duty'}
         """
-        return pd.concat(map(_commands, self._recorded("commands")), ignore_index=True)
+        return _rows(self._recorded("commands"), _commands)
 
     def metrics(self, model: "Model | str | Path | None" = None) -> pd.DataFrame:
         """What the swarm does over time.
@@ -557,7 +589,7 @@ class Model(_Shown):
         return f"Model({self.name}: {self.file.model.drive}, {effects})"
 
 
-class Comparison(_Shown):
+class Comparison(_Reported):
     """How well a model predicts a log, against the log's own noise.
 
     Attributes:
@@ -606,25 +638,8 @@ class Comparison(_Shown):
         """
         return _errors_drawn([("this model", self._result)])
 
-    def report(self, folder: str | Path) -> Path:
-        """Writes a page with all tables and figures, as `--out` does.
-
-        Args:
-            folder: made if it is not there; an older page in it is replaced.
-
-        Returns:
-            Path of the page, folder/index.html.
-
-        Raises:
-            ValueError: the folder cannot be written.
-
-        Examples:
-            >>> from tempfile import mkdtemp
-            >>> found.report(mkdtemp()).name
-            'index.html'
-        """
-        section = report.comparison_section(self._result)
-        return _report(folder, section, "twinmill.compare")
+    def _page(self) -> tuple[report.Section, str]:
+        return report.comparison_section(self._result), "twinmill.compare"
 
     def _text(self) -> RenderableType:
         return show.comparison(self._result)
@@ -634,7 +649,7 @@ class Comparison(_Shown):
         return f"Comparison({self._result.model_name}, {logs}: score {self.score:.3g})"
 
 
-class Fit(_Shown):
+class Fit(_Reported):
     """A model fitted to a log.
 
     Attributes:
@@ -697,24 +712,8 @@ class Fit(_Shown):
         """
         return self.model.compare(log)
 
-    def report(self, folder: str | Path) -> Path:
-        """Writes a page with all tables and figures, as `--out` does.
-
-        Args:
-            folder: made if it is not there; an older page in it is replaced.
-
-        Returns:
-            Path of the page, folder/index.html.
-
-        Raises:
-            ValueError: the folder cannot be written.
-
-        Examples:
-            >>> from tempfile import mkdtemp
-            >>> fitted.report(mkdtemp()).name
-            'index.html'
-        """
-        return _report(folder, report.fit_section(self._result), "twinmill.fit")
+    def _page(self) -> tuple[report.Section, str]:
+        return report.fit_section(self._result), "twinmill.fit"
 
     def _text(self) -> RenderableType:
         return show.fit(self._result, NOT_WRITTEN)
@@ -724,7 +723,7 @@ class Fit(_Shown):
         return f"Fit({name}: score {before:.3g} -> {self.score:.3g})"
 
 
-class Addition(_Shown):
+class Addition(_Reported):
     """An effect added to a model.
 
     Attributes:
@@ -774,24 +773,8 @@ class Addition(_Shown):
             return detections.field_of_view(self._result.after).svg.picture
         return _errors_drawn([("before", self._result.before), ("after", self._result.after)])
 
-    def report(self, folder: str | Path) -> Path:
-        """Writes a page with all tables and figures, as `--out` does.
-
-        Args:
-            folder: made if it is not there; an older page in it is replaced.
-
-        Returns:
-            Path of the page, folder/index.html.
-
-        Raises:
-            ValueError: the folder cannot be written.
-
-        Examples:
-            >>> from tempfile import mkdtemp
-            >>> added.report(mkdtemp()).name
-            'index.html'
-        """
-        return _report(folder, report.added_section(self._result), "twinmill.add")
+    def _page(self) -> tuple[report.Section, str]:
+        return report.added_section(self._result), "twinmill.add"
 
     def _text(self) -> RenderableType:
         return show.added(self._result, NOT_WRITTEN)
@@ -875,7 +858,7 @@ class Finding(_Shown):
         return f"Finding({self.effect}: {values})"
 
 
-class Diagnosis(_Shown):
+class Diagnosis(_Reported):
     """What a model lacks.
 
     Attributes:
@@ -944,24 +927,8 @@ class Diagnosis(_Shown):
         """
         return diagnosis_report.section(self._result).figures[0].svg.picture
 
-    def report(self, folder: str | Path) -> Path:
-        """Writes a page with all tables and figures, as `--out` does.
-
-        Args:
-            folder: made if it is not there; an older page in it is replaced.
-
-        Returns:
-            Path of the page, folder/index.html.
-
-        Raises:
-            ValueError: the folder cannot be written.
-
-        Examples:
-            >>> from tempfile import mkdtemp
-            >>> d.report(mkdtemp()).name
-            'index.html'
-        """
-        return _report(folder, diagnosis_report.section(self._result), "twinmill.diagnose")
+    def _page(self) -> tuple[report.Section, str]:
+        return diagnosis_report.section(self._result), "twinmill.diagnose"
 
     def _text(self) -> RenderableType:
         return diagnosis_report.terminal(self._result)
@@ -1204,17 +1171,22 @@ def _made(name: str, make: Callable[[Path], Result]) -> tuple[Result, ModelFile]
     return replace(result, path=Path(name)), replace(file, path=Path(name))
 
 
-def _poses(log: RecordedLog) -> pd.DataFrame:
+def _poses(robot: RobotLog) -> dict:
+    names = ("x_m", "y_m", "theta_rad")
+    columns = zip(names, robot.pose.T, strict=True)
+    return {"t_s": robot.pose_t_s, **dict(columns), "valid": robot.valid}
+
+
+def _commands(robot: RobotLog) -> dict:
+    columns = {f"c{i}": column for i, column in enumerate(np.atleast_2d(robot.command.T))}
+    return {"t_s": robot.command_t_s, "kind": robot.command_kind, **columns}
+
+
+def _rows(logs: list[RecordedLog], columns: Callable[[RobotLog], dict]) -> pd.DataFrame:
+    """One table of all robots in all logs."""
     parts = [
-        pd.DataFrame(
-            {
-                "log": log.path.name,
-                "robot_id": number,
-                "t_s": robot.pose_t_s,
-                **dict(zip(("x_m", "y_m", "theta_rad"), robot.pose.T, strict=True)),
-                "valid": robot.valid,
-            }
-        )
+        pd.DataFrame({"log": log.path.name, "robot_id": number, **columns(robot)})
+        for log in logs
         for number, robot in log.robots.items()
     ]
     return pd.concat(parts, ignore_index=True)
@@ -1227,22 +1199,6 @@ def _steady_rows(sheet: SteadyTable) -> pd.DataFrame:
     return table.assign(runs=sheet.runs, speed_mps=sheet.value[:, 0], turn_radps=sheet.value[:, 1])
 
 
-def _commands(log: RecordedLog) -> pd.DataFrame:
-    parts = [
-        pd.DataFrame(
-            {
-                "log": log.path.name,
-                "robot_id": number,
-                "t_s": robot.command_t_s,
-                "kind": robot.command_kind,
-                **{f"c{i}": column for i, column in enumerate(np.atleast_2d(robot.command.T))},
-            }
-        )
-        for number, robot in log.robots.items()
-    ]
-    return pd.concat(parts, ignore_index=True)
-
-
 def _errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
     last = results[-1][1]
     if last.worst in (tables := comparisons.steady_comparisons(last)):
@@ -1250,10 +1206,3 @@ def _errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
     robot = last.robots.index(last.worst)
     same = [(label, result.robots[robot]) for label, result in results]
     return error_figures.error_growth(same).svg.picture
-
-
-def _report(folder: str | Path, section: report.Section, call: str) -> Path:
-    place = _path("folder", folder, "the path of a folder")
-    check_new_folder(place)
-    source = report.Provenance(call, f"twinmill {version('twinmill')}", "")
-    return report.write_report(place, section.title, source, [section])
