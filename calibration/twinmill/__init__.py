@@ -8,7 +8,7 @@ model = tm.Model.load("turbopi.toml")
 fit = model.fit(log)
 fit.compare(log).plot()
 d = tm.diagnose(log, fit.model)
-better = d.best.add_to(fit.model)
+better = d.best.add_to(fit.model) if d.best else fit.model
 tm.simulate(better, n=8)
 """
 
@@ -37,10 +37,12 @@ use_own_libraries()
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return import_module("importlib.metadata").version("twinmill")
     if name not in _HOME:
         raise AttributeError(f"module 'twinmill' has no attribute '{name}'")
     return getattr(import_module(_HOME[name]), name)
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *_HOME]
+    return [*__all__, "__version__"]

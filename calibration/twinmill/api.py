@@ -14,6 +14,7 @@ Objects cannot be pickled: give paths to other processes, and let them return wh
 """
 
 import html
+import shutil
 import subprocess
 import weakref
 from collections.abc import Callable, Iterable, Iterator
@@ -21,6 +22,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from importlib.metadata import version
 from io import StringIO
+from numbers import Integral, Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import NoneType
@@ -34,10 +36,11 @@ from threadpoolctl import threadpool_limits
 
 from twinmill import report
 from twinmill.arguments import checked, in_python, known
-from twinmill.data.log import LogError, read_log
+from twinmill.data.log import Log as RecordedLog
+from twinmill.data.log import LogError, RobotLog, read_log
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.multi_log import read_multi_log
-from twinmill.data.steady_table import is_steady_table, read_steady_tables
+from twinmill.data.steady_table import INPUTS, SteadyTable, is_steady_table, read_steady_tables
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill.diagnosis import diagnose as _diagnose
 from twinmill.diagnosis.finding import Finding as _Found
@@ -55,7 +58,7 @@ from twinmill.report.canvas import draw
 from twinmill.report.log_figures import Drawing
 from twinmill.swarm.metrics import swarm_metrics
 
-TERMINAL_COLUMNS = 100
+WIDEST_COLUMNS = 100  # of a printed result; text in longer lines is hard to read
 A_PATH = "the path of a file"
 NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
 Result = TypeVar("Result")
@@ -90,7 +93,8 @@ class _Shown:
     def __str__(self) -> str:
         out = StringIO()
         lines = [f"! {said}" for said in self.left_out]
-        Console(file=out, width=TERMINAL_COLUMNS, color_system=None).print(
+        width = min(shutil.get_terminal_size().columns, WIDEST_COLUMNS)
+        Console(file=out, width=width, color_system=None).print(
             *lines, self._text(), sep="\n", markup=False, highlight=False
         )
         return out.getvalue().rstrip()
@@ -105,8 +109,41 @@ class _Shown:
         return f"<p><b>{html.escape(repr(self))}</b></p>{self.table()._repr_html_()}"
 
 
+class _Reported(_Shown):
+    """A result with a page of its own."""
+
+    def _page(self) -> tuple[report.Section, str]:
+        """What is on the page, and the call that made it."""
+        raise NotImplementedError
+
+    def report(self, folder: str | Path) -> Path:
+        """Writes a page with all tables and figures, as `--out` does.
+
+        Args:
+            folder: made if it is not there; an older page in it is replaced.
+
+        Returns:
+            Path of the page, folder/index.html.
+
+        Raises:
+            ValueError: the folder cannot be written.
+
+        Examples:
+            >>> from tempfile import mkdtemp
+            >>> found.report(mkdtemp()).name
+            'index.html'
+        """
+        place = _path("folder", folder, "the path of a folder")
+        check_new_folder(place)
+        section, call = self._page()
+        source = report.Provenance(call, f"twinmill {version('twinmill')}", "")
+        return report.write_report(place, section.title, source, [section])
+
+
 class Log(_Shown):
     """One recorded run, or several: what robots were told, and where they were.
+
+    Of a steady-state table `table` gives the rows; it has no commands, paths or swarm.
 
     Attributes:
         paths: the files of the runs.
@@ -126,12 +163,12 @@ class Log(_Shown):
         forget: Callable[[], None] = lambda: None,
     ):
         several = checked("paths", paths, (list, tuple), "a list of paths; `load` takes names")
-        self.paths = [Path(checked("log", path, (str, Path), A_PATH)) for path in several]
+        self.paths = [_path("log", path, A_PATH) for path in several]
         weakref.finalize(self, forget)  # removes the file of a simulated run
         self._said = list(said)  # by the twin
         self._measurements: dict[str, Measurements] = {}  # by the model's hash
-        for path in filter(is_steady_table, self.paths):
-            read_steady_tables(path)  # refuses other tables
+        tables = filter(is_steady_table, self.paths)
+        self._sheets = [sheet for path in tables for sheet in read_steady_tables(path)]
         self._logs = [read_log(path) for path in self.paths if not is_steady_table(path)]
 
     def measurements(self, model: "Model | str | Path | None" = None) -> Measurements:
@@ -168,7 +205,8 @@ class Log(_Shown):
             >>> tm.load("run.lcmlog").robots
             [0]
         """
-        return sorted({number for log in self._logs for number in log.robots})
+        recorded = {number for log in self._logs for number in log.robots}
+        return sorted(recorded | {sheet.robot_id for sheet in self._sheets})
 
     @property
     def duration_s(self) -> float:
@@ -198,13 +236,16 @@ class Log(_Shown):
 
         Returns:
             log, robot_id, t_s (motion capture's clock), x_m, y_m, theta_rad (unwrapped), valid; NaN
-            where a pose is not valid.
+            where a pose is not valid. If all are steady-state tables: log, robot_id, speed_input,
+            direction_deg, turn_input, runs, and medians over runs of speed_mps and turn_radps.
 
         Examples:
             >>> set(tm.load("run.lcmlog").table()["log"])
             {'run.lcmlog'}
         """
-        return pd.concat([_poses(log) for log in self._logs], ignore_index=True)
+        if not self._logs:
+            return pd.concat(map(_steady_rows, self._sheets), ignore_index=True)
+        return _rows(self._logs, _poses)
 
     def commands(self) -> pd.DataFrame:
         """All commands, as they were recorded.
@@ -214,11 +255,14 @@ class Log(_Shown):
             of the wheels front-left, front-right, rear-left, rear-right; or vx_mps, vy_mps,
             omega_radps, 0.
 
+        Raises:
+            LogError: all are steady-state tables.
+
         Examples:
             >>> set(tm.load("run.lcmlog").commands()["kind"])
             {'duty'}
         """
-        return pd.concat([_commands(log) for log in self._logs], ignore_index=True)
+        return _rows(self._recorded("commands"), _commands)
 
     def metrics(self, model: "Model | str | Path | None" = None) -> pd.DataFrame:
         """What the swarm does over time.
@@ -227,22 +271,26 @@ class Log(_Shown):
             model: whose range of sight and radius of the body scale the metrics.
 
         Returns:
-            t_s, the metrics, and class: what the last 10 s look like.
+            log, t_s, the metrics, and class: what the last 10 s look like.
 
         Raises:
-            LogError: the log has not two robots with poses at the same time.
+            LogError: a log has not two robots with poses at the same time.
 
         Examples:
-            >>> list(tm.simulate(n=3, duration_s=20).metrics().columns)[:2]
-            ['t_s', 'circliness']
+            >>> list(tm.simulate(n=3, duration_s=20).metrics().columns)[:3]
+            ['log', 't_s', 'circliness']
         """
         native_model = _model(model).file.model
         scale = native_model.get("sensor.range_m"), native_model.get("robot.body_radius_m")
-        series = swarm_metrics(self._logs[0], *scale)
-        table = pd.DataFrame(series.values, columns=list(series.to_json()["metrics"]))
-        table.insert(0, "t_s", series.t_s)
-        table["class"] = series.classes
-        return table
+        parts = []
+        for log in self._recorded("swarm"):
+            series = swarm_metrics(log, *scale)
+            part = pd.DataFrame(series.values, columns=list(series.to_json()["metrics"]))
+            part.insert(0, "log", log.path.name)
+            part.insert(1, "t_s", series.t_s)
+            part["class"] = series.classes
+            parts.append(part)
+        return pd.concat(parts, ignore_index=True)
 
     def plot(self) -> Figure:
         """Paths of all robots, seen from above.
@@ -250,11 +298,15 @@ class Log(_Shown):
         Returns:
             A figure of matplotlib, axes in m of the world frame.
 
+        Raises:
+            LogError: all are steady-state tables.
+
         Examples:
             >>> tm.load("run.lcmlog").plot().axes[0].get_xlabel()
             'x (m)'
         """
-        robots = [recorded for log in self._logs for recorded in read_multi_log(log.path).robots]
+        paths = [log.path for log in self._recorded("paths")]
+        robots = [robot for path in paths for robot in read_multi_log(path).robots]
         return draw(4.6, Drawing(robots).paths).picture
 
     def save(self, path: str | Path, force: bool = False) -> None:
@@ -290,13 +342,19 @@ class Log(_Shown):
             "warnings": self.warnings,
         }
 
+    def _recorded(self, wanted: str) -> list[RecordedLog]:
+        """The logs that are no tables, if there is one."""
+        if not self._logs:
+            name = self.paths[0].name
+            raise LogError(f"{name}: is a steady-state table, which has no {wanted}; give a log.")
+        return self._logs
+
     def __repr__(self) -> str:
         names = ", ".join(path.name for path in self.paths)
-        if not self._logs:
-            return f"Log({names}: steady-state table)"
         plural = "s" if len(self.robots) > 1 else ""
         numbers = ", ".join(map(str, self.robots))
-        return f"Log({names}: robot{plural} {numbers}, {self.duration_s:.0f} s)"
+        length = f"{self.duration_s:.0f} s" if self._logs else "steady-state table"
+        return f"Log({names}: robot{plural} {numbers}, {length})"
 
 
 class Model(_Shown):
@@ -483,7 +541,7 @@ class Model(_Shown):
             >>> added.heldout_after < added.heldout_before
             True
         """
-        checked("robot", robot, (int, NoneType), "the number of a robot")
+        checked("robot", robot, (Integral, NoneType), "the number of a robot")
         own = () if robot is None else (_add.OWN_GAINS,)
         known("effect", (effect,), {*catalogue(), *own})
         for key, text in texts.items():
@@ -500,7 +558,7 @@ class Model(_Shown):
                 out=out,
                 command=command,
                 texts=texts,
-                robot_id=robot,
+                robot_id=None if robot is None else int(robot),
             ),
         )
         return _told(Addition(result, Model(file)), measurements)
@@ -531,7 +589,7 @@ class Model(_Shown):
         return f"Model({self.name}: {self.file.model.drive}, {effects})"
 
 
-class Comparison(_Shown):
+class Comparison(_Reported):
     """How well a model predicts a log, against the log's own noise.
 
     Attributes:
@@ -580,25 +638,8 @@ class Comparison(_Shown):
         """
         return _errors_drawn([("this model", self._result)])
 
-    def report(self, folder: str | Path) -> Path:
-        """Writes a page with all tables and figures, as `--out` does.
-
-        Args:
-            folder: made if it is not there; an older page in it is replaced.
-
-        Returns:
-            Path of the page, folder/index.html.
-
-        Raises:
-            ValueError: the folder cannot be written.
-
-        Examples:
-            >>> from tempfile import mkdtemp
-            >>> found.report(mkdtemp()).name
-            'index.html'
-        """
-        section = report.comparison_section(self._result)
-        return _report(folder, section, "twinmill.compare")
+    def _page(self) -> tuple[report.Section, str]:
+        return report.comparison_section(self._result), "twinmill.compare"
 
     def _text(self) -> RenderableType:
         return show.comparison(self._result)
@@ -608,7 +649,7 @@ class Comparison(_Shown):
         return f"Comparison({self._result.model_name}, {logs}: score {self.score:.3g})"
 
 
-class Fit(_Shown):
+class Fit(_Reported):
     """A model fitted to a log.
 
     Attributes:
@@ -671,24 +712,8 @@ class Fit(_Shown):
         """
         return self.model.compare(log)
 
-    def report(self, folder: str | Path) -> Path:
-        """Writes a page with all tables and figures, as `--out` does.
-
-        Args:
-            folder: made if it is not there; an older page in it is replaced.
-
-        Returns:
-            Path of the page, folder/index.html.
-
-        Raises:
-            ValueError: the folder cannot be written.
-
-        Examples:
-            >>> from tempfile import mkdtemp
-            >>> fitted.report(mkdtemp()).name
-            'index.html'
-        """
-        return _report(folder, report.fit_section(self._result), "twinmill.fit")
+    def _page(self) -> tuple[report.Section, str]:
+        return report.fit_section(self._result), "twinmill.fit"
 
     def _text(self) -> RenderableType:
         return show.fit(self._result, NOT_WRITTEN)
@@ -698,7 +723,7 @@ class Fit(_Shown):
         return f"Fit({name}: score {before:.3g} -> {self.score:.3g})"
 
 
-class Addition(_Shown):
+class Addition(_Reported):
     """An effect added to a model.
 
     Attributes:
@@ -748,24 +773,8 @@ class Addition(_Shown):
             return detections.field_of_view(self._result.after).svg.picture
         return _errors_drawn([("before", self._result.before), ("after", self._result.after)])
 
-    def report(self, folder: str | Path) -> Path:
-        """Writes a page with all tables and figures, as `--out` does.
-
-        Args:
-            folder: made if it is not there; an older page in it is replaced.
-
-        Returns:
-            Path of the page, folder/index.html.
-
-        Raises:
-            ValueError: the folder cannot be written.
-
-        Examples:
-            >>> from tempfile import mkdtemp
-            >>> added.report(mkdtemp()).name
-            'index.html'
-        """
-        return _report(folder, report.added_section(self._result), "twinmill.add")
+    def _page(self) -> tuple[report.Section, str]:
+        return report.added_section(self._result), "twinmill.add"
 
     def _text(self) -> RenderableType:
         return show.added(self._result, NOT_WRITTEN)
@@ -836,7 +845,7 @@ class Finding(_Shown):
         """Its parameters.
 
         Returns:
-            name, value, std, unit, at_bound, seen, as of `Fit.table`.
+            name, value, std, unit, at_bound, seen, together, as of `Fit.table`.
 
         Examples:
             >>> d.best.table()["name"].tolist()
@@ -849,7 +858,7 @@ class Finding(_Shown):
         return f"Finding({self.effect}: {values})"
 
 
-class Diagnosis(_Shown):
+class Diagnosis(_Reported):
     """What a model lacks.
 
     Attributes:
@@ -918,24 +927,8 @@ class Diagnosis(_Shown):
         """
         return diagnosis_report.section(self._result).figures[0].svg.picture
 
-    def report(self, folder: str | Path) -> Path:
-        """Writes a page with all tables and figures, as `--out` does.
-
-        Args:
-            folder: made if it is not there; an older page in it is replaced.
-
-        Returns:
-            Path of the page, folder/index.html.
-
-        Raises:
-            ValueError: the folder cannot be written.
-
-        Examples:
-            >>> from tempfile import mkdtemp
-            >>> d.report(mkdtemp()).name
-            'index.html'
-        """
-        return _report(folder, diagnosis_report.section(self._result), "twinmill.diagnose")
+    def _page(self) -> tuple[report.Section, str]:
+        return diagnosis_report.section(self._result), "twinmill.diagnose"
 
     def _text(self) -> RenderableType:
         return diagnosis_report.terminal(self._result)
@@ -962,7 +955,8 @@ def load(*paths: str | Path) -> Log:
     """
     if not paths:
         raise LogError("load: name one log at least.")
-    return Log(paths)
+    several = f"{A_PATH}; several are named one by one: load(*paths)"
+    return Log([_path("log", path, several) for path in paths])
 
 
 @_one_thread
@@ -1090,7 +1084,7 @@ def simulate(
 
     Raises:
         ModelError: the model cannot be read.
-        ValueError: the twin refuses; its own sentence.
+        ValueError: the twin refuses a value; its own sentence.
 
     Examples:
         >>> swarm = tm.simulate(n=3, duration_s=20)
@@ -1099,12 +1093,16 @@ def simulate(
         >>> swarm.metrics().shape[0] > 0
         True
     """
-    checked("script", script, (str, Path, NoneType), "the path of a CSV file")
+    checked("n", n, Integral, "a whole number")
+    checked("behavior", behavior, str, "the name of a behaviour, or a mix of them")
+    checked("duration_s", duration_s, Real, "a number of seconds")
+    checked("plant", plant, str, "`planar` or `mujoco`")
+    checked("seed", seed, Integral, "a whole number")
+    if script is not None:
+        script = _path("script", script, "the path of a CSV file")
     file = _model(model).file
-    options = [
-        "--plant", plant, "--n", n, "--seed", seed, "--duration-s", duration_s,
-        *(["--script", Path(script).resolve()] if script else ["--behavior", behavior]),
-    ]  # fmt: skip
+    played = ["--behavior", behavior] if script is None else ["--script", script.resolve()]
+    options = ["--plant", plant, "--n", n, "--seed", seed, "--duration-s", duration_s, *played]
     with ExitStack() as stack:
         folder = TemporaryDirectory(prefix="twinmill.", ignore_cleanup_errors=True)
         place = Path(stack.enter_context(folder))
@@ -1135,7 +1133,16 @@ def _log(log: Log | str | Path) -> Log:
 def _model(model: Model | str | Path | None) -> Model:
     wanted = "a model, or the name of one"
     model = checked("model", model, (Model, str, Path, NoneType), wanted)
-    return model if isinstance(model, Model) else Model.load(model or DEFAULT_MODEL)
+    if isinstance(model, Model):
+        return model
+    return Model.load(DEFAULT_MODEL if model is None else model)
+
+
+def _path(name: str, path: Any, wanted: str) -> Path:
+    """A path that is none by accident: an empty text would be the working directory."""
+    if not str(checked(name, path, (str, Path), wanted)):
+        raise ValueError(f"{name}: is empty, and must be {wanted}.")
+    return Path(path)
 
 
 def _told(shown: Shown, measurements: Measurements) -> Shown:
@@ -1149,7 +1156,7 @@ def _told(shown: Shown, measurements: Measurements) -> Shown:
 def _replacing(path: str | Path, force: bool) -> Iterator[Path]:
     """As `replacing`, in the words of the library."""
     try:
-        with replacing(Path(checked("path", path, (str, Path), A_PATH)), force) as temporary:
+        with replacing(_path("path", path, A_PATH), force) as temporary:
             yield temporary
     except ValueError as error:
         raise ValueError(in_python(str(error))) from error
@@ -1164,36 +1171,32 @@ def _made(name: str, make: Callable[[Path], Result]) -> tuple[Result, ModelFile]
     return replace(result, path=Path(name)), replace(file, path=Path(name))
 
 
-def _poses(log: Any) -> pd.DataFrame:
+def _poses(robot: RobotLog) -> dict:
+    names = ("x_m", "y_m", "theta_rad")
+    columns = zip(names, robot.pose.T, strict=True)
+    return {"t_s": robot.pose_t_s, **dict(columns), "valid": robot.valid}
+
+
+def _commands(robot: RobotLog) -> dict:
+    columns = {f"c{i}": column for i, column in enumerate(np.atleast_2d(robot.command.T))}
+    return {"t_s": robot.command_t_s, "kind": robot.command_kind, **columns}
+
+
+def _rows(logs: list[RecordedLog], columns: Callable[[RobotLog], dict]) -> pd.DataFrame:
+    """One table of all robots in all logs."""
     parts = [
-        pd.DataFrame(
-            {
-                "log": log.path.name,
-                "robot_id": number,
-                "t_s": robot.pose_t_s,
-                **dict(zip(("x_m", "y_m", "theta_rad"), robot.pose.T, strict=True)),
-                "valid": robot.valid,
-            }
-        )
+        pd.DataFrame({"log": log.path.name, "robot_id": number, **columns(robot)})
+        for log in logs
         for number, robot in log.robots.items()
     ]
     return pd.concat(parts, ignore_index=True)
 
 
-def _commands(log: Any) -> pd.DataFrame:
-    parts = [
-        pd.DataFrame(
-            {
-                "log": log.path.name,
-                "robot_id": number,
-                "t_s": robot.command_t_s,
-                "kind": robot.command_kind,
-                **{f"c{i}": column for i, column in enumerate(np.atleast_2d(robot.command.T))},
-            }
-        )
-        for number, robot in log.robots.items()
-    ]
-    return pd.concat(parts, ignore_index=True)
+def _steady_rows(sheet: SteadyTable) -> pd.DataFrame:
+    table = pd.DataFrame(sheet.inputs, columns=list(INPUTS))
+    table.insert(0, "log", sheet.log_name)
+    table.insert(1, "robot_id", sheet.robot_id)
+    return table.assign(runs=sheet.runs, speed_mps=sheet.value[:, 0], turn_radps=sheet.value[:, 1])
 
 
 def _errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
@@ -1203,9 +1206,3 @@ def _errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
     robot = last.robots.index(last.worst)
     same = [(label, result.robots[robot]) for label, result in results]
     return error_figures.error_growth(same).svg.picture
-
-
-def _report(folder: str | Path, section: report.Section, call: str) -> Path:
-    check_new_folder(Path(checked("folder", folder, (str, Path), "the path of a folder")))
-    source = report.Provenance(call, f"twinmill {version('twinmill')}", "")
-    return report.write_report(Path(folder), section.title, source, [section])

@@ -37,7 +37,7 @@ def known(what: str, names: Iterable[str], all_names: Collection[str]) -> tuple[
         raise TypeError(f"{what}: must be a list of names, such as [{names!r}].")
     names = tuple(names)
     for name in names:
-        checked(what, name, str, "names")
+        checked(what, name, str, "a name")
         if name not in all_names:
             (near,) = difflib.get_close_matches(name, sorted(all_names), n=1, cutoff=0)
             raise ValueError(f"{what}: there is no '{name}'; the nearest is '{near}'.")

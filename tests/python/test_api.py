@@ -147,21 +147,32 @@ def test_what_is_wrong_is_said_in_a_sentence(here):
         tm.simulate(behavior="nobody", duration_s=1)
     with pytest.raises(ValueError, match=r"^n: ((?!--).)*$"):
         tm.simulate(n=0)
-    with pytest.raises(ValueError, match=r"^seed: Value -1 not in range 0 to "):
-        tm.simulate(n=1, seed=-1)
+    for seed in (-1, 2**63, 2**80):
+        with pytest.raises(ValueError, match=rf"^seed: Value {seed} not in range 0 to "):
+            tm.simulate(n=1, seed=seed)
     with pytest.raises(ValueError, match=r"^duration_s: nan ((?!--).)*$"):
         tm.simulate(n=1, duration_s=float("nan"))
     with pytest.raises(ValueError, match="nearest is 'dead_zone'"):
         tm.diagnose("run.lcmlog", without=["dead_zon"])
     with pytest.raises(ValueError, match="cannot be written"):
         tm.compare("run.lcmlog").report("run.lcmlog")
+    with pytest.raises(ValueError, match="folder: is empty"):
+        tm.compare("run.lcmlog").report("")
+    with pytest.raises(ValueError, match="script: is empty"):
+        tm.simulate(script="")
+    with pytest.raises(tm.ModelError):
+        tm.compare("run.lcmlog", "")
 
 
 WRONG_TYPES = {  # what is called, and what the sentence says
     "no log": (lambda log, model: tm.compare(None), "log: is a NoneType, and must be a log"),
     "swapped": (lambda log, model: tm.compare(model, log), "model: is a Log, and must be"),
     "table": (lambda log, model: tm.fit(log.table()), "log: is a DataFrame, and must be"),
-    "list": (lambda log, model: tm.load(["run.lcmlog"]), "log: is a list, and must be"),
+    "list": (lambda log, model: tm.load(["run.lcmlog"]), r"log: is a list, .*load\(\*paths\)"),
+    "count": (lambda log, model: tm.simulate(n="8"), "n: is '8', and must be"),
+    "half a robot": (lambda log, model: tm.simulate(n=1.5), "n: is 1\\.5, and must be"),
+    "duration": (lambda log, model: tm.simulate(duration_s="60"), "duration_s: is '60', and must"),
+    "behaviour": (lambda log, model: tm.simulate(behavior=None), "behavior: is a NoneType, and"),
     "class": (lambda log, model: tm.Log("run.lcmlog"), "paths: .*`load`"),
     "script": (
         lambda log, model: tm.simulate(script=log.table()),
@@ -280,7 +291,7 @@ def test_importing_needs_no_numbers():
     code = "import sys, twinmill; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(done.stdout.split()) & {"numpy", "pandas", "matplotlib", "twinmill_native"}
-    assert set(tm.__all__) <= set(dir(tm))
+    assert set(tm.__all__) <= set(dir(tm)) and tm.__version__
 
 
 def test_an_effect_of_the_camera_is_added_from_detections(here, tmp_path):
@@ -307,6 +318,38 @@ def test_a_recording_that_is_named_twice_counts_once(here, tmp_path):
     (said,) = twice.left_out
     assert said.startswith("Left out: again.lcmlog: the same recording as run.lcmlog")
     assert twice.score == once.score
+
+
+def test_a_steady_state_table_is_shown_and_says_what_it_has_not(tmp_path):
+    sheet = tmp_path / "sheet.csv"
+    rows = ["4,50,90,0,1,0.14,0,", "4,50,90,0,2,0.16,0.02,", "7,100,90,0,1,0.3,nan,"]
+    heading = "robot_id,speed_input,direction_deg,turn_input,run,speed_mps,turn_radps,note"
+    sheet.write_text("\n".join([heading, *rows]))
+    log = tm.load(sheet)
+    assert repr(log) == "Log(sheet.csv: robots 4, 7, steady-state table)"
+    shown = log.table().set_index("robot_id")
+    assert shown.loc[4, "speed_mps"] == pytest.approx(0.15) and shown.loc[4, "runs"] == 2
+    assert "sheet.csv" in log._repr_html_()
+    for ask in (log.commands, log.metrics, log.plot):
+        with pytest.raises(tm.LogError, match="is a steady-state table, which has no"):
+            ask()
+
+
+def test_of_several_logs_the_metrics_of_each_are_told(here, tmp_path):
+    runs = [tm.simulate(n=n, duration_s=12) for n in (2, 3)]
+    for made, name in zip(runs, ("two.lcmlog", "three.lcmlog"), strict=True):
+        made.save(tmp_path / name)
+    both = tm.load(tmp_path / "two.lcmlog", tmp_path / "three.lcmlog").metrics()
+    for made, name in zip(runs, ("two.lcmlog", "three.lcmlog"), strict=True):
+        alone, own = made.metrics(), both[both["log"] == name].reset_index(drop=True)
+        assert own.drop(columns="log").equals(alone.drop(columns="log"))
+
+
+def test_a_result_is_as_wide_as_the_terminal_and_no_wider_than_can_be_read(here, monkeypatch):
+    found = tm.compare("run.lcmlog", "fitted.toml")
+    for columns, widest in ((80, 80), (60, 60), (300, 100)):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        assert 0.8 * widest < max(map(len, str(found).splitlines())) <= widest
 
 
 def test_the_file_of_a_model_stays(here):

@@ -201,6 +201,20 @@ def test_clocks_far_apart_are_told_with_the_shift(robot, late_s):
     assert abs(late_s + shift_s) < 0.2
 
 
+@pytest.mark.parametrize("by_s", [-0.493, 0.3, 2.0])
+def test_a_clock_that_was_set_within_the_log_is_told_with_time_and_step(robot, by_s):
+    """What was seen at one time is stamped in order; a step back leaves two streams mixed."""
+    stamps_s = robot.pose_t_s + np.where(robot.pose_t_s < 30, 0, by_s)
+    order = np.argsort(stamps_s, kind="stable")
+    (f,) = _findings([replace(robot, pose_t_s=stamps_s[order], pose=robot.pose[order])])
+    assert f.fatal and f.what == "a clock was set within the log"
+    at_s = float(f.evidence.split("about ")[1].split(" s")[0])
+    step_s = float(f.evidence.split("come ")[1].split(" s")[0])
+    assert abs(at_s - 30) <= 3  # the stretches that are judged are as long
+    assert abs(step_s - abs(by_s)) < 0.1
+    assert ("later" if by_s > 0 else "sooner") in f.evidence
+
+
 @pytest.mark.parametrize("noise_m", [0.0, 0.0004, 0.003])
 def test_poses_that_do_not_move_although_commands_do_are_named(robot, noise_m):
     still = np.full(robot.pose.shape, 0.3)

@@ -52,6 +52,16 @@ def test_jump_and_jump_back_leaves_one_segment(driven, length):
     assert track.segment.max() == 0
 
 
+def test_a_pose_that_is_left_out_leaves_no_trace(driven):
+    """A camera's glitch far off the floor, and the same frame lost."""
+    far, lost = driven(), driven()
+    far.pose[600] += [1e8, -1e8, 2.5]
+    lost.pose[600], lost.valid[600] = np.nan, False
+    one, other = make_track(far), make_track(lost)
+    for name in ("pose", "segment", "heading_smooth"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
 def test_gap_cuts_and_short_loss_does_not(driven):
     robot = driven()
     robot.valid[300:303] = False

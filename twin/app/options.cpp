@@ -66,7 +66,7 @@ void AddWorld(CLI::App &app, Options &o)
     app.add_option("--script", o.script, "CSV of inputs or duties that all play instead")
         ->check(CLI::ExistingFile);
     app.add_option("--seed", o.seed, "same seed, same run")
-        ->check(CLI::Range(int64_t{0}, std::numeric_limits<int64_t>::max()))
+        ->check(CLI::Range(uint64_t{0}, uint64_t{std::numeric_limits<int64_t>::max()}))
         ->capture_default_str();
     AddChoice(app, "--start", o.start, kStarts,
               "where they start; default with --spread-m: square");

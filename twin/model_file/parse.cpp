@@ -246,7 +246,7 @@ private:
         }
     }
 
-    // `wheel_gain.front_left = 0.9` of one robot; the effect stands among the model's own.
+    // `wheel_gain.fl = 0.9` of one robot; the effect stands among the model's own.
     void ReadRobotEffect(int id, const std::string &robot, const std::string &effect,
                          const toml::table &table)
     {

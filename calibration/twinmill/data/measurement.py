@@ -52,6 +52,9 @@ class Measurement:
         """Short name of log and robot."""
         return f"{self.log_name} R{self.track.robot_id:02d}"
 
+    def __repr__(self) -> str:
+        return f"Measurement({self.label})"
+
     @property
     def same_clock(self) -> bool:
         """The log says that one clock stamped commands and poses."""

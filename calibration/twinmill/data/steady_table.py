@@ -74,6 +74,9 @@ class SteadyTable:
         """Short name of table and robot."""
         return f"{self.log_name} R{self.robot_id:02d}"
 
+    def __repr__(self) -> str:
+        return f"SteadyTable({self.label})"
+
 
 def is_steady_table(path: Path) -> bool:
     """Whether a file is such a table, by its name."""

@@ -181,8 +181,11 @@ def _silent(robot: RobotLog) -> np.ndarray:
 
 
 def _continuous(pose: np.ndarray, segment: np.ndarray) -> np.ndarray:
-    """Poses with the heading unwrapped anew in each segment: outliers may have hidden a turn."""
-    pose = pose.copy()
+    """Poses with the heading unwrapped anew in each segment: outliers may have hidden a turn.
+
+    NaN where unusable: what is left out must not count as way driven or as a place.
+    """
+    pose = np.where(segment[:, None] < 0, np.nan, pose)
     for number in range(segment.max() + 1):
         part = segment == number
         pose[part, 2] = np.unwrap(pose[part, 2])

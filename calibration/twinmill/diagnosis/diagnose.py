@@ -260,6 +260,7 @@ def _concluded(
     noise = irregularity_notes(opened, [s.noise for s in modelled], model_file.model)
     named = {name for f in findings for name in (f.effect, *(f.group or ()))}
     faint = [(name, why) for name, why in done.faint if name not in named]
+    faint_names = [name for name, _ in faint]
     hidden = [*faint, *unseen.items()]
     refit = _refit(done)
     usual = model_file.usual_score(hashes)
@@ -270,12 +271,12 @@ def _concluded(
         last.held_score,
         findings,
         rest,
-        [name for name, _ in faint],
+        faint_names,
         _instead_of_drift(before.score, done, first, usual),
         noise,
         usual,
     )
-    drives = _drives(faint, _shown(done, faint), first.model.wheel_kind)
+    drives = drives_for(faint_names, _shown(done, faint), first.model.wheel_kind)
     steps = [(None, start.held_score), *chain]
     late = lateness(done, findings, all(o.same_clock for o in known if o.floor))
     return Diagnosis(
@@ -354,15 +355,21 @@ DRIVES = {
 }
 
 
-def _drives(hidden: list[tuple[str, str]], seen: Sequence[str], wheel_kind: str) -> str:
-    """Drives that the hidden effects ask for, the wheels allow, and no effect shown asks for."""
+def drives_for(
+    hidden: Sequence[str], seen: Sequence[str], wheel_kind: str
+) -> tuple[str, list[str]]:
+    """Drives that the wheels allow and no effect shown asks for, and the hidden effects that do."""
     cards = catalogue()
-    asked = {t for name, _ in hidden for t in cards[name]["identify"]}
     had = {t for name in seen for t in cards[name]["identify"]} | CANNOT.get(wheel_kind, set())
-    return ", ".join(words for t, words in DRIVES.items() if t in asked - had)
+    asked = {name: set(cards[name]["identify"]) - had for name in hidden}
+    every = set().union(*asked.values())
+    words = ", ".join(words for t, words in DRIVES.items() if t in every)
+    return words, [name for name, drives in asked.items() if drives]
 
 
-def _next(findings, drives: str, hidden: list[tuple[str, str]], verdict: str) -> dict | None:
+def _next(
+    findings, drives: tuple[str, list[str]], hidden: list[tuple[str, str]], verdict: str
+) -> dict | None:
     """What to drive next, in words; the script itself is designed by `twinmill next`."""
     tied = next((f.group for f in findings if f.group), None)
     if verdict == "ambiguous" and tied:
@@ -373,11 +380,13 @@ def _next(findings, drives: str, hidden: list[tuple[str, str]], verdict: str) ->
             "more duties, from rest and through zero, on clocks tied by a calibration log",
         }
     if hidden:
-        names = ", ".join(name for name, _ in hidden)
-        ask = f"drive {drives}" if drives else "`twinmill effects NAME` says what shows one"
+        words, shown = drives
+        names = shown or [name for name, _ in hidden]
+        ask = f"drive {words}" if words else "`twinmill effects NAME` says what shows one"
+        leave = "leaves" if len(names) == 1 else "leave"
         return {
             "script": None,
-            "separates": [name for name, _ in hidden],
-            "why": f"{names} leave{'s' if len(hidden) == 1 else ''} no trace in this log: {ask}",
+            "separates": names,
+            "why": f"{', '.join(names)} {leave} no trace in this log: {ask}",
         }
     return None

@@ -12,7 +12,7 @@ from twinmill.report.charted import charts
 from twinmill.report.error_figures import error_growth, regimes, waterfall
 from twinmill.report.html import Figure, Section
 from twinmill.report.motion_figures import floor_map
-from twinmill.report.tables import number, tone
+from twinmill.report.tables import Table, number, tone
 
 
 def comparison_section(result: Comparison) -> Section:
@@ -37,8 +37,33 @@ def comparison_section(result: Comparison) -> Section:
 
 def fit_section(result: FitResult) -> Section:
     """Of one fit: the same pictures of the fitted model, beside the old one's errors."""
+    log_name = _same_robot(result)[1].measurement.log_name
+    return _of_both(
+        result,
+        f"{result.before.model_name} fitted to {log_name}",
+        more=comparisons.robot_tables(result.after),
+    )
+
+
+def added_section(result: AddResult) -> Section:
+    """The page of an added effect: scores on data fitted to and held out, and estimates."""
+    if result.of_camera:
+        return _camera_section(result)
+    section = _of_both(
+        result,
+        f"{result.label} added to {result.before.model_name}",
+        more=tables.held_out(result),
+    )
+    held_out = [
+        _score("held out, without", result.heldout_refit.score),
+        _score("held out, with it", result.heldout_after.score),
+    ]
+    return replace(section, score=[*section.score, *held_out])
+
+
+def _of_both(result: FitResult | AddResult, title: str, more: list[Table]) -> Section:
+    """What pages of fitted models share; `more` tables stand at the end."""
     before, after = _same_robot(result)
-    title = f"{result.before.model_name} fitted to {after.measurement.log_name}"
     return Section(
         title,
         [_score("before", result.before.score), _score("after", result.after.score)],
@@ -48,36 +73,7 @@ def fit_section(result: FitResult) -> Section:
         [
             tables.parameters(result.parameters),
             *tables.robots(result.after, result.before),
-            *comparisons.robot_tables(result.after),
-        ],
-        charts=_before_and_after(result),
-        next_step=comparisons.advice(result.after, fitted=True),
-        warnings=result.after.warnings,
-    )
-
-
-def added_section(result: AddResult) -> Section:
-    """The page of an added effect: scores on data fitted to and held out, and estimates."""
-    if result.of_camera:
-        return _camera_section(result)
-    before, after = _same_robot(result)
-    scores = [
-        _score("before", result.before.score),
-        _score("after", result.after.score),
-        _score("held out, without", result.heldout_refit.score),
-        _score("held out, with it", result.heldout_after.score),
-    ]
-    title = f"{result.label} added to {result.before.model_name}"
-    return Section(
-        title,
-        scores,
-        result.after.verdict,
-        comparisons.facts(result.after),
-        _pictures(result.after, [("before", before), ("after", after)]),
-        [
-            tables.parameters(result.parameters),
-            *tables.robots(result.after, result.before),
-            *tables.held_out(result),
+            *more,
         ],
         charts=_before_and_after(result),
         next_step=comparisons.advice(result.after, fitted=True),

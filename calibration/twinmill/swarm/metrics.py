@@ -71,7 +71,8 @@ def swarm_metrics(
     """
     robots = {i: robot for i, robot in log.robots.items() if robot.valid.sum() > SMOOTH}
     if len(robots) < 2:
-        raise LogError(f"{log.path.name}: has poses of {len(robots)} robots; a swarm needs two.")
+        had = "one robot" if robots else "no robot"
+        raise LogError(f"{log.path.name}: has poses of {had}; a swarm needs two.")
     odd = _odd(robots) if odd is None else odd
     strange = set(odd) - set(robots)
     if strange or len(odd) == len(robots):

@@ -6,7 +6,7 @@ left to one factor per channel. Each mistake gives another direction. All are fi
 stretch of the log and judged on the others.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import permutations, product
 
@@ -111,6 +111,22 @@ class Explained:
     late_s: float
 
 
+@dataclass(frozen=True)
+class Jump:
+    """The columns as they are, at one shift up to a time and at another one from there on.
+
+    Attributes:
+        t_s: of the jump, within a stretch.
+        before_s, after_s: the shifts.
+        explained: how well that explains the motion.
+    """
+
+    t_s: float
+    before_s: float
+    after_s: float
+    explained: Explained
+
+
 class Search:
     """Sums from which each alternative is judged, at every lag and shift in time."""
 
@@ -178,15 +194,9 @@ class Search:
 
     def own(self) -> Explained:
         """The columns as they are, at the lag and the shift where they explain most of all."""
-        speeds = self._speeds(self.motion.body_mps(), 1)
-        total = self._sums(np.sum(speeds**2, axis=1))
         found: list[Explained] = []
-        for lag_s, (begin_s, shapes) in self.felt.items():
-            told = begin_s, shapes @ self._weighted(self.wheels).T
-            rows = [self.motion.at(told, late_s) for late_s in self.lates_s]
-            power = np.stack([self._sums(r**2) for r in rows])
-            along = np.stack([self._sums(r * speeds[:, None]) for r in rows])
-            left, gain = self._judged(power, along, total)
+        for lag_s in self.felt:
+            left, gain = self._judged(*self._by_shift(lag_s))
             k = int(left.sum(axis=1).argmin())
             late_s = float(self.lates_s[k])
             found.append(
@@ -203,6 +213,47 @@ class Search:
         own = min(found, key=lambda e: e.left)
         self._own_key = [(own.lag_s, own.late_s)]
         return own
+
+    def _by_shift(self, lag_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Sums for `_judged` of the columns as they are, at each shift."""
+        speeds = self._speeds(self.motion.body_mps(), 1)
+        begin_s, shapes = self.felt[lag_s]
+        told = begin_s, shapes @ self._weighted(self.wheels).T
+        rows = [self.motion.at(told, late_s) for late_s in self.lates_s]
+        power = np.stack([self._sums(r**2) for r in rows])
+        along = np.stack([self._sums(r * speeds[:, None]) for r in rows])
+        return power, along, self._sums(np.sum(speeds**2, axis=1))
+
+    def jump(self, own: Explained, fewest: int) -> Jump:
+        """The two shifts that explain most, with a jump between two stretches.
+
+        Args:
+            own: the columns as they are, at one shift.
+            fewest: stretches before the jump, and after it.
+        """
+        found: list[Jump] = []
+        for lag_s in self.felt:
+            sums = self._by_shift(lag_s)
+            found += [
+                self._jump(replace(own, lag_s=lag_s), sums, split)
+                for split in range(fewest, len(self.starts) - fewest + 1)
+            ]
+        return min(found, key=lambda jump: jump.explained.left)
+
+    def _jump(
+        self, own: Explained, sums: tuple[np.ndarray, np.ndarray, np.ndarray], split: int
+    ) -> Jump:
+        """The best shift before a stretch, and the best from it on."""
+        power, along, total = sums
+        lefts, shifts_s = [], []
+        for part in (slice(split), slice(split, None)):
+            left, _ = self._judged(power[:, part], along[:, part], total[part], part)
+            k = int(left.sum(axis=1).argmin())
+            lefts.append(left[k] * total[part].sum() / total.sum())
+            shifts_s.append(float(self.lates_s[k]))
+        by_block = np.concatenate(lefts)
+        explained = replace(own, left=float(by_block.sum()), by_block=by_block)
+        return Jump(float(self.motion.t_s[self.starts[split]]), *shifts_s, explained)
 
     def best(self, alternatives: list[Alternative]) -> list[Explained]:
         """Each at the lag and the shift where it explains most, of those that are likely."""
@@ -297,15 +348,16 @@ class Search:
         return self._judged(power, along, total)
 
     def _judged(
-        self, power: np.ndarray, along: np.ndarray, total: np.ndarray
+        self, power: np.ndarray, along: np.ndarray, total: np.ndarray, part: slice = slice(None)
     ) -> tuple[np.ndarray, np.ndarray]:
         """(A, B) share left by stretch, judged by fits to the other half; (A, 3) gains.
 
         Args: power, along (A, B, SHAPES, 3): told times itself and times measured. total (B,).
+        part: of all stretches, which these are.
         """
         left = np.zeros(power.shape[:2])
         for half in (0, 1):
-            fit, judge = self.fold != half, self.fold == half
+            fit, judge = self.fold[part] != half, self.fold[part] == half
             p, m = power[:, fit].sum(axis=1), along[:, fit].sum(axis=1)
             gain = np.maximum(m, 0) / np.maximum(p, 1e-12)  # (A, SHAPES, C)
             shape = np.argmax(gain * m, axis=1)[:, None]  # that which explains most

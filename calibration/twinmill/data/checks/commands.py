@@ -27,6 +27,7 @@ TURNED_RAD = 0.35  # more than any heading bias
 ALIKE, ALIKE_LEFT = 1.3, 0.003  # times and beside what the best leaves: as good as the best
 POOR = 0.25  # share left from which clocks far apart are looked for
 FAR_S = np.arange(-6.0, 6.0 + 1e-9, 0.06)
+LEAST_JUMP_S = 0.15  # less may be two drives that are felt with different delays
 UNRELATED = 0.85  # share left at which commands and poses have nothing to do with each other
 LEAST_MPS = 0.01  # RMS speed below which nothing is said of a robot that hardly moves
 FEWEST_BLOCKS = 8
@@ -149,8 +150,9 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
     found = search.best(wheel_alternatives(columns_in_use(checked.body)) + poses)
     found = [e for e in found if not _is_bias(e)]
     best = min(found, key=lambda e: e.left)
-    if mistaken := _in_room(checked, search, own, best) or _shifted(checked, search, own, best):
-        return [mistaken]
+    for mistake in (_in_room, _shifted, _jumped):
+        if mistaken := mistake(checked, search, own, best):
+            return [mistaken]
     if not far_better(best, own):
         if min(own.left, best.left) > UNRELATED:
             return [_unrelated(checked, min(own.left, best.left))]
@@ -214,6 +216,30 @@ def _shifted(
         f"{1 - far.left:.0%} with that shift",
         "stamp both with one clock, or import anew with "
         f"--pose-shift-s={0.1 - far.late_s:.1f}; what is then left of the shift is searched",
+    )
+
+
+def _jumped(
+    checked: CheckedTrack, search: Search, own: Explained, best: Explained
+) -> InputFinding | None:
+    """One clock that was set within the log, where that explains more than any other mistake.
+
+    Rows of encoder logs are often counted, not timed: of them `time_base.py` judges.
+    """
+    if checked.track.command_kind == "wheel_speed":
+        return None
+    far = Search(search.motion, search.wheels, search.felt, FAR_S)
+    jump = far.jump(own, FEWEST_BLOCKS // 2)
+    by_s = jump.after_s - jump.before_s
+    better = far_better(jump.explained, own) and jump.explained.left < best.left
+    if abs(by_s) < LEAST_JUMP_S or not better:
+        return None
+    return checked.finding(
+        "a clock was set within the log",
+        f"the commands explain {1 - own.left:.0%} of the motion as it is stamped, and "
+        f"{1 - jump.explained.left:.0%} if poses from about {jump.t_s:.0f} s on come "
+        f"{abs(by_s):.1f} s {'later' if by_s > 0 else 'sooner'} than those before",
+        "import what lies before and after that time as logs of their own",
     )
 
 

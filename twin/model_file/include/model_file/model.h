@@ -151,7 +151,7 @@ public:
     Frame frame;
     double theta_a1 = 1, theta_a2 = 1;  // this robot's factors on speed and turn rate
     std::vector<EffectInstance> effects;
-    // By robot: "range_m" and the like for fields, "wheel_gain.front_left" for effects.
+    // By robot: "range_m" and the like for fields, "wheel_gain.fl" for effects.
     std::map<int, std::map<std::string, double>> robot_overrides;
     std::set<std::string, std::less<>>
         stated;  // names of table numbers that did not come by default
