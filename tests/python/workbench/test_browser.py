@@ -97,6 +97,9 @@ def test_why_a_log_cannot_be_opened_is_said_in_the_page(import_turbopi, page):
         expect(page.locator("#failed")).to_contain_text(
             re.compile(r"--heading-offset-deg=-1(79|80)\b")
         )
+        page.wait_for_function("document.getElementById('popup').ariaHidden === 'false'")
+        # "Nothing is lost" would be wrong: nothing was opened.
+        expect(page.get_by_text("The workbench does not answer.")).not_to_be_visible()
 
 
 def test_the_whole_conversation(import_turbopi, page):
