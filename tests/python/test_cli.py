@@ -2,11 +2,13 @@
 import hashlib
 import json
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import version
 
 import pytest
+import typer
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -233,6 +235,18 @@ def test_version_and_help(twinmill):
     for verb in ("compare", "fit", "add", "effects", "import"):
         code, out, _ = twinmill(verb, "--help")
         assert code == 0 and "Example: twinmill" in out
+
+
+@pytest.mark.parametrize(("name", "module", "summary"), cli.COMMANDS)
+def test_help_says_what_one_value_is_and_keeps_its_lines(name, module, summary):
+    """In 80 columns: lines of a paragraph are kept as they are, so that longer ones would break."""
+    command = LazyCommand(name, f"twinmill_cli.{module}", summary).command()
+    context = typer.Context(command)
+    for parameter in command.params:
+        assert not re.search(r"list|range|bool", parameter.display_type_rich(ctx=context) or "")
+    (_, *paragraphs) = (command.help or "").split("\n\n")
+    told = [line for p in paragraphs if not p.startswith("Example") for line in p.splitlines()]
+    assert all(len(line) <= 78 for line in told)
 
 
 def test_json_holds_no_nan_and_no_numpy():

@@ -81,7 +81,10 @@ SshConfig = Annotated[
     typer.Option("--ssh-config", metavar="FILE", help="Instead of ~/.ssh/config: ssh -F."),
 ]
 DurationS = Annotated[
-    float, typer.Option("--duration-s", min=0.1, help="Of the bus; else until Ctrl-C.")
+    float,
+    typer.Option(
+        "--duration-s", min=0.1, show_default=False, help="Of the bus; else until Ctrl-C."
+    ),
 ]
 
 

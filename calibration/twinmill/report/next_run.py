@@ -126,8 +126,8 @@ def _chances(plan: Plan) -> Table:
         [
             "effect",
             "best\nimitation",
-            "margin (chi2)\nso far",
-            "margin (chi2)\nwith this run",
+            "margin\nso far",
+            "with\nthis run",
             "named\nso far",
             "then",
         ],
