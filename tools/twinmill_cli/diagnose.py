@@ -157,7 +157,7 @@ def _explain(
             measurements, model_file, out=output, command=source.command, progress=progress
         )
     then = _settling(result.diagnosis, logs, str(output))
-    section = partial(present.section, result.diagnosis, then)
+    section = partial(present.explanation_section, result, then)
     data = {**result.to_json(), **told(measurements)}
     if then:
         data["next_experiment"]["command"] = then[-1][1]

@@ -2,6 +2,7 @@
 """A diagnosis as tables, for the terminal and as a section of a report."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import twinmill_native as native
@@ -292,6 +293,16 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
         notes=lines(diagnosis),
         warnings=before.warnings,
         folded=[deciding(diagnosis)],
+    )
+
+
+def explanation_section(result: Explanation, commands: Commands = ()) -> Section:
+    """The page of the whole loop: that of its diagnosis, and what was fitted and written then."""
+    page = section(result.diagnosis, commands)
+    return replace(
+        page,
+        tables=[*page.tables, tables.parameters(result.parameters)],
+        notes=[*page.notes, f"Written: `{result.path}`"],
     )
 
 
