@@ -296,9 +296,15 @@ def test_no_help_imports_what_only_work_needs():
 
 
 @pytest.mark.parametrize(
-    ("typed", "completed"), [("twinmill diag", "diagnose"), ("twinmill diagnose --mod", "--model")]
+    ("typed", "completed"),
+    [
+        ("twinmill diag", "diagnose"),
+        ("twinmill diagnose --mod", "--model"),
+        ("twinmill add coas", "coasting"),
+        ("twinmill effects coas", "coasting"),
+    ],
 )
-def test_the_tabulator_completes_commands_and_options(typed, completed):
+def test_the_tabulator_completes_commands_options_and_effects(typed, completed):
     """As the shell asks for it: its line, and which of its words."""
     words = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}
     asked = {**os.environ, "_TWINMILL_COMPLETE": "complete_bash", **words}

@@ -23,6 +23,15 @@ ScriptAs = Annotated[
         help="For robots on ROS: a bag with /cmd_vel, or a Python program that publishes it.",
     ),
 ]
+
+
+def effects_beginning(incomplete: str) -> list[str]:
+    """Names in the catalogue, for the shell's completion."""
+    from twinmill.model.parameters import catalogue  # not for --help
+
+    return [name for name in catalogue() if name.startswith(incomplete)]
+
+
 Logs = Annotated[
     list[Path],
     typer.Argument(
