@@ -343,7 +343,9 @@ def give_the_robot_its_own(page) -> None:
     page.get_by_test_id("save-as").fill("mine.toml")
     page.get_by_test_id("save").click()
     page.get_by_text("Written: mine.toml").wait_for()
-    (command,) = page.get_by_test_id("commands").text_content().strip().splitlines()
+    told = page.get_by_test_id("commands").text_content().strip().splitlines()
+    assert len(told) == 1, told
+    (command,) = told
     mine = Path("mine.toml").read_bytes()
     os.remove("mine.toml")
     result = cli.run(shlex.split(command)[1:])
