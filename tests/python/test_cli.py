@@ -2,11 +2,13 @@
 import hashlib
 import json
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import version
 
 import pytest
+import typer
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -243,6 +245,18 @@ def test_version_and_help(twinmill):
         assert code == 0 and "Example: twinmill" in out
 
 
+@pytest.mark.parametrize(("name", "module", "summary"), cli.COMMANDS)
+def test_help_says_what_one_value_is_and_keeps_its_lines(name, module, summary):
+    """In 80 columns: lines of a paragraph are kept as they are, so that longer ones would break."""
+    command = LazyCommand(name, f"twinmill_cli.{module}", summary).command()
+    context = typer.Context(command)
+    for parameter in command.params:
+        assert not re.search(r"list|range|bool", parameter.display_type_rich(ctx=context) or "")
+    (_, *paragraphs) = (command.help or "").split("\n\n")
+    told = [line for p in paragraphs if not p.startswith("Example") for line in p.splitlines()]
+    assert all(len(line) <= 78 for line in told)
+
+
 def test_json_holds_no_nan_and_no_numpy():
     import numpy as np
 
@@ -290,9 +304,15 @@ def test_no_help_imports_what_only_work_needs():
 
 
 @pytest.mark.parametrize(
-    ("typed", "completed"), [("twinmill diag", "diagnose"), ("twinmill diagnose --mod", "--model")]
+    ("typed", "completed"),
+    [
+        ("twinmill diag", "diagnose"),
+        ("twinmill diagnose --mod", "--model"),
+        ("twinmill add coas", "coasting"),
+        ("twinmill effects coas", "coasting"),
+    ],
 )
-def test_the_tabulator_completes_commands_and_options(typed, completed):
+def test_the_tabulator_completes_commands_options_and_effects(typed, completed):
     """As the shell asks for it: its line, and which of its words."""
     words = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}
     asked = {**os.environ, "_TWINMILL_COMPLETE": "complete_bash", **words}

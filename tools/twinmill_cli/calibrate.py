@@ -11,7 +11,7 @@ import typer
 
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import Force, Hold, Logs, Model, NewModel, Out
+from twinmill_cli.options import Force, Hold, Logs, Model, NewModel, Out, effects_beginning
 from twinmill_cli.output import AsJson, busy
 
 if working():  # not for --help
@@ -102,6 +102,7 @@ def _add(
             metavar="EFFECT",
             show_default=False,
             help="Its name; `twinmill effects` lists them. Of one robot also gains.",
+            autocompletion=effects_beginning,
         ),
     ],
     logs: Logs,

@@ -25,7 +25,8 @@ if working():  # not for --help
     from importlib.metadata import version
 
     import numpy as np
-    from rich.console import Console
+    from rich.console import Console, Group
+    from rich.text import Text
 
     import twinmill as tm
     from twinmill.challenge.cases import Case, calibration, draw, draw_robots, make_log, seal
@@ -75,10 +76,11 @@ def _challenge(
 ) -> dict:
     """Draw robots and what is hidden in them, seal the answers, diagnose their logs, unseal, score.
 
-    The robots move by formulas of their own, by forces in MuJoCo, and on wheels with free rollers;
-    what is hidden is an effect of the catalogue, its cousin, two effects, something that no
-    catalogue names, or nothing. Results go to the folder as results.json (the same bytes for the
-    same seed), times.json and index.html. Stopped half way, the same command goes on where it was.
+    The robots move by formulas of their own, by forces in MuJoCo, and on wheels
+    with free rollers; what is hidden is an effect of the catalogue, its cousin,
+    two effects, something that no catalogue names, or nothing. Results go to the
+    folder as results.json (the same bytes for the same seed), times.json and
+    index.html. Stopped half way, the same command goes on where it was.
 
     Example: twinmill challenge --n 20 --out challenge
     """
@@ -113,9 +115,10 @@ def _challenge(
     write_whole(out / "answers.json", answers)
     write_whole(out / "results.json", json.dumps(found, indent=1))
     write_whole(out / "times.json", json.dumps([times_s[case.number] for case in cases]))
-    page.write(out, found, list(times_s.values()))
+    report = page.write(out, found, list(times_s.values()))
     shutil.rmtree(out / DONE)
-    deliver(found, page.shown(found, list(times_s.values())), as_json)
+    shown = page.shown(found, list(times_s.values()))
+    deliver(found, Group(shown, Text(f"Report: {report}")), as_json)
     return found
 
 

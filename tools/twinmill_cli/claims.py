@@ -86,8 +86,9 @@ def _claims(
 ) -> int:
     """Check what was published of these swarms, with a figure of each claim.
 
-    Exit code 1 if a number differs and it is not known why. DIR also gets claims.json and every
-    figure as SVG. Stopped in MuJoCo, the same command goes on where it was.
+    Exit code 1 if a number differs and it is not known why. DIR also gets
+    claims.json and every figure as SVG. Stopped in MuJoCo, the same command goes
+    on where it was.
 
     Example: twinmill claims --out claims
     """

@@ -49,9 +49,8 @@ def _diagnose(
 ) -> Diagnosis:
     """Name the physical effect that a model lacks, or say that none is or that the log cannot tell.
 
-    Best on a model whose base was fitted to another log of the same robot and clocks.
-
-    Then a new lag or delay can be told from what was there before.
+    Best on a model whose base was fitted to another log of the same robot and
+    clocks: a new lag or delay can be told from what was there before.
 
     Example: twinmill diagnose run.lcmlog --model fitted.toml
     """
@@ -76,7 +75,7 @@ def _diagnose(
 def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str, str]]:
     """What takes what was found into the model: why, and the command."""
     stem, told = Path(model).stem, []
-    if result.found:
+    if result.found or result.robots_off:
         to = Path(f"{stem}_explained.toml")
         told.append(("To add what was found", command_line("explain", logs, model, to)))
     elif result.verdict == "refit_enough":
@@ -116,7 +115,10 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
         ), None
     log, model = read_log(path), result.model
     if not all((robot.mode == TABLE).any() for robot in log.robots.values()):
-        return "Each robot was judged by itself: not all play a table, as a swarm does.", None
+        return (
+            "Each robot was judged by itself, not the swarm as a whole: for that all must play a "
+            "table of behaviour, and these do not."
+        ), None
     # Slow to import, and `make demo` does without what it needs.
     from twinmill_cli.compare_swarm import LOOK, compare_swarm
 
@@ -155,7 +157,7 @@ def _explain(
             measurements, model_file, out=output, command=source.command, progress=progress
         )
     then = _settling(result.diagnosis, logs, str(output))
-    section = partial(present.section, result.diagnosis, then)
+    section = partial(present.explanation_section, result, then)
     data = {**result.to_json(), **told(measurements)}
     if then:
         data["next_experiment"]["command"] = then[-1][1]

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from twinmill_cli.lazy import working
+from twinmill_cli.options import effects_beginning
 from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
@@ -36,7 +37,10 @@ def register(app: typer.Typer) -> None:
 
 
 def _effects(
-    name: Annotated[str | None, typer.Argument(help="One effect; all if left out.")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(help="One effect; all if left out.", autocompletion=effects_beginning),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """List the physical effects that a model can have, or show one with its equation.

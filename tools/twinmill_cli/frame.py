@@ -15,6 +15,7 @@ from twinmill.data.measurement import BadInputError, Measurements, load_measurem
 from twinmill.files import check_new_file, check_new_folder
 from twinmill.model.model_file import ModelFile
 from twinmill.report import Provenance, Section, write_report
+from twinmill.report.html import SCORE_NOTE
 from twinmill_cli.output import deliver
 
 
@@ -89,12 +90,13 @@ def finish(
     section: Callable[[], Section],
     as_json: bool,
     out: Path | None,
+    note: str = SCORE_NOTE,
 ) -> None:
     """Report, then JSON or text; the section's pictures are drawn for a report alone."""
     report = None
     if out:
         drawn = section()
-        report = write_report(out, drawn.title, source, [drawn])
+        report = write_report(out, drawn.title, source, [drawn], note=note)
     deliver({**data, **source.to_json(), "report": str(report) if report else None}, text, as_json)
     if report and not as_json:
         typer.echo(f"Report: {report}")

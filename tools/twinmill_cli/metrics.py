@@ -39,6 +39,7 @@ PANELS = {
     "rotation": "rotation",
     "diffusion": "diffusion",
     "groups": "groups",
+    "contacts": "contacts",
 }
 
 
@@ -162,7 +163,13 @@ def _over_time(series: SwarmSeries) -> Figure:
 
     present = [name for name in COLORS if name in series.classes]
     return Figure(
-        draw(7.2, paint, nrows=6, sharex=True, height_ratios=[0.25, 1, 1, 1, 1, 1]),
+        draw(
+            1.4 * len(PANELS),
+            paint,
+            nrows=len(PANELS) + 1,
+            sharex=True,
+            height_ratios=[0.25, *[1] * len(PANELS)],
+        ),
         "Over time",
         "The strip on top is the class of the 10 s before: "
         + ", ".join(f"{name} ({_color_word(name)})" for name in present)

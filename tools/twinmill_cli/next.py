@@ -126,7 +126,8 @@ def _next(
         twists = TwistScript.of(model_file.model, plan.rows)
         write_script(twists, script_as, Path(data["script_as"]), force, command=source.command)
     section = partial(present.section, plan, how)
-    finish(data, present.terminal(plan, how), source, section=section, as_json=as_json, out=out)
+    text = present.terminal(plan, how)
+    finish(data, text, source, section=section, as_json=as_json, out=out, note="")
     return plan
 
 

@@ -23,6 +23,15 @@ ScriptAs = Annotated[
         help="For robots on ROS: a bag with /cmd_vel, or a Python program that publishes it.",
     ),
 ]
+
+
+def effects_beginning(incomplete: str) -> list[str]:
+    """Names in the catalogue, for the shell's completion."""
+    from twinmill.model.parameters import catalogue  # not for --help
+
+    return [name for name in catalogue() if name.startswith(incomplete)]
+
+
 Logs = Annotated[
     list[Path],
     typer.Argument(
@@ -81,7 +90,10 @@ SshConfig = Annotated[
     typer.Option("--ssh-config", metavar="FILE", help="Instead of ~/.ssh/config: ssh -F."),
 ]
 DurationS = Annotated[
-    float, typer.Option("--duration-s", min=0.1, help="Of the bus; else until Ctrl-C.")
+    float,
+    typer.Option(
+        "--duration-s", min=0.1, show_default=False, help="Of the bus; else until Ctrl-C."
+    ),
 ]
 
 

@@ -2,19 +2,30 @@
 """What Typer's options do otherwise in all programs here, once this module is imported."""
 
 import math
+import re
 from typing import Any
 
 import typer
-from typer.core import TyperCommand, TyperOption
+from typer.core import TyperArgument, TyperCommand, TyperOption
 
 _display_type = TyperOption.display_type_rich
+_argument_type = TyperArgument.display_type_rich
 _process_value = TyperOption.process_value
 _parse_args = TyperCommand.parse_args
 
 
 def _type_shown(option: TyperOption, ctx: typer.Context) -> str | None:
     """Typer's, but nothing of a flag: it writes `<bool>`, and nobody is to type one."""
-    return None if option.is_flag else _display_type(option, ctx=ctx)
+    return None if option.is_flag else _plain(_display_type(option, ctx=ctx))
+
+
+def _of_argument(argument: TyperArgument, ctx: typer.Context) -> str | None:
+    return _plain(_argument_type(argument, ctx=ctx))
+
+
+def _plain(shown: str | None) -> str | None:
+    """What one value is: Typer's `<list[Path]>` and `<int range>` as `<path>` and `<int>`."""
+    return shown and re.sub(r"<list\[(.*)\]>|<(\w+) range>", r"<\1\2>", shown).lower()
 
 
 def _finite(option: TyperOption, ctx: typer.Context, value: Any) -> Any:
@@ -39,4 +50,5 @@ def _each_once(command: TyperCommand, ctx: typer.Context, args: list[str]) -> li
 
 TyperCommand.parse_args = _each_once
 TyperOption.display_type_rich = _type_shown
+TyperArgument.display_type_rich = _of_argument
 TyperOption.process_value = _finite

@@ -25,7 +25,6 @@ from twinmill.diagnosis.outliers import (
     odd_of_two,
     one_by_one,
     outliers,
-    sentence,
     spread_of_lags_s,
 )
 from twinmill.diagnosis.resolution import resolutions
@@ -41,7 +40,7 @@ from twinmill.diagnosis.search import (
     search,
 )
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
-from twinmill.fitting.compare import GOOD, comparison
+from twinmill.fitting.compare import GOOD, Comparison, comparison, of_others
 from twinmill.fitting.fit import base_names
 from twinmill.fitting.opening import (
     Opened,
@@ -146,8 +145,23 @@ def diagnose(
         off=off,
         lags_s=lags_s,
     )
-    whole = with_detections(found, model_file, progress, excluded)
-    return replace(whole, sentence=" ".join([whole.sentence, *map(sentence, whole.robots_off)]))
+    return _robots_first(with_detections(found, model_file, progress, excluded))
+
+
+def _robots_first(diagnosis: Diagnosis) -> Diagnosis:
+    """With the robots that differ at the head of the sentence; the rest of it is on the others."""
+    if not diagnosis.robots_off:
+        return diagnosis
+    off = {r.robot_id: r.sentence for r in diagnosis.robots_off}
+    others = of_others(len(diagnosis.robots) - len(off), diagnosis.sentence)
+    return replace(diagnosis, sentence=" ".join([*off.values(), others]))
+
+
+def _as_given(before: Comparison, opened: Sequence[Opened], known: Sequence[Opened]) -> float:
+    """Score of the model as given, of the measurements that the search saw."""
+    seen = {id(o.measurement) for o in known}
+    pairs = zip(before.robots, opened, strict=True)
+    return replace(before, robots=[r for r, o in pairs if id(o.measurement) in seen]).score
 
 
 def _without(opened: Sequence[Opened], off: Sequence[Outlier]) -> list[Opened]:
@@ -233,7 +247,7 @@ def _concluded(
     first: State,
     done: Search,
     model_file: ModelFile,
-    before,
+    before: Comparison,
     unseen: dict[str, str],
     off: Sequence[Outlier],
     lags_s: float,
@@ -264,15 +278,16 @@ def _concluded(
     hidden = [*faint, *unseen.items()]
     refit = _refit(done)
     usual = model_file.usual_score(hashes)
+    given = _as_given(before, opened, known)
     weighed = VerdictInputs(
-        before.score,
+        given,
         start.held_score,
         refit,
         last.held_score,
         findings,
         rest,
         faint_names,
-        _instead_of_drift(before.score, done, first, usual),
+        _instead_of_drift(given, done, first, usual),
         noise,
         usual,
     )

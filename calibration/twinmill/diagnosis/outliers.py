@@ -92,11 +92,6 @@ class Outlier:
         }
 
 
-def sentence(off: Outlier) -> str:
-    """One line on a robot."""
-    return off.sentence
-
-
 @dataclass(frozen=True)
 class Alone:
     """One robot alone: the common model held, its clock free.

@@ -17,7 +17,7 @@ class VerdictInputs:
     """Scores, findings and rest that decide the verdict.
 
     Attributes:
-        score: of the model as given, as `compare` has it.
+        score: of the model as given, as `compare` has it, without robots that differ.
         first, refit, last: held-out scores: where the search started, with the base refitted, with
             what was found.
         hidden: effects that data of this kind could show, and these data do not.
@@ -230,7 +230,11 @@ class VerdictInputs:
     @property
     def notes(self) -> list[str]:
         """Sentences on doubts, and on what was left before."""
-        doubts = [f"Doubtful: {f.why}." for f in self.findings if f.why]
+        whys = dict.fromkeys(f.why for f in self.findings if f.why)
+        doubts = [
+            f"Doubtful ({', '.join(_plain(f) for f in self.findings if f.why == why)}): {why}."
+            for why in whys
+        ]
         if self.rest.again:
             doubts.append(
                 f"At least {100 * self.rest.again:.0f} % of the squared error of way in half a "
@@ -262,6 +266,11 @@ def _in_turn(names: list[str]) -> str:
     if len(names) < 3:
         return " and ".join(names)
     return "; ".join([*names[:-1], f"and {names[-1]}"])
+
+
+def _plain(finding: Finding) -> str:
+    """A finding's name for people."""
+    return REFIT_IN_WORDS if finding.effect == REFIT else finding.effect
 
 
 def _named(finding: Finding) -> str:

@@ -11,7 +11,12 @@ from twinmill.diagnosis.search import without_effect
 from twinmill.experiment.candidates import Candidate, candidates
 from twinmill.experiment.information import CandidateEffect
 from twinmill.experiment.screen import screen
-from twinmill.model.parameters import Parameter, all_effect_parameters, catalogue
+from twinmill.model.parameters import (
+    Parameter,
+    all_effect_parameters,
+    beginning_at_a_moment,
+    catalogue,
+)
 from twinmill.predict.modelled_log import ModelledLog
 
 MOST_NAMED = 5  # effects in a sentence
@@ -55,7 +60,8 @@ def hypotheses_of(diagnosis: Diagnosis, base: list[Parameter]) -> Hypotheses:
     top = next((r.group for r in ranking if r.group is not None), None)
     alike = [r.effect for r in ranking if r.group == top and top is not None]
     named = [] if alike else diagnosis.motion
-    hidden = [effect for effect, _ in diagnosis.not_identifiable]
+    once = beginning_at_a_moment()  # in one run: another run cannot show them
+    hidden = [effect for effect, _ in diagnosis.not_identifiable if effect not in once]
     closest = [r.effect for r in ranking[:2]]
     state = _without(diagnosis, [*alike, *named], base)
     told = [r for r in ranking if r.effect in (*alike, *named)]
@@ -84,7 +90,8 @@ def question(
         doubtful = list(dict.fromkeys(doubtful))
         return doubtful, f"These logs hardly tell {_from(doubtful)}."
     if asked.hidden:
-        return asked.hidden, f"These logs cannot show {', '.join(asked.hidden)}."
+        shown = [n for n in asked.hidden if n in names] or asked.hidden
+        return shown, f"These logs cannot show {', '.join(shown)}."
     if len(asked.closest) > 1:
         first, second = asked.closest
         return (

@@ -24,6 +24,7 @@ from twinmill.predict.windows import CHANNELS, HORIZONS_S, Windows, rms
 
 # Scores: stop; something is missing; the smooth response is not good enough, or data leaked.
 GOOD, MISSING, SUSPECT = 1.15, 1.3, 0.9
+NAMED = 3  # robots that are missed; of more the number is told
 
 
 @dataclass(frozen=True)
@@ -137,20 +138,24 @@ class Comparison:
         return max(logs, key=lambda r: (np.nan_to_num(r.score, nan=-1.0), r.size))
 
     @property
+    def missed(self) -> list[RobotComparison | SteadyComparison]:
+        """Robots that the model misses while it predicts others, worst first."""
+        over = sorted((r for r in self.robots if r.score > MISSING), key=lambda r: -r.score)
+        return over if any(r.score <= MISSING for r in self.robots) else []
+
+    @property
     def verdict(self) -> str:
-        """What the score means, in a sentence."""
-        if not np.isfinite(self.score):
-            return "No score: no log tells its noise from the motion."
-        if self.score < SUSPECT:
-            return "Predicts better than the noise estimate: this log shows nothing to improve."
-        if self.score <= GOOD:
-            return "As good as this log can tell: nothing is missing that it would show."
-        if self.score <= MISSING:
-            return (
-                "Close to what this log can tell; a small effect may be missing, or parameters "
-                "are stale."
-            )
-        return "Something is missing in the model, or its parameters are stale."
+        """What the score means; where some robots are missed and others not, of both."""
+        missed = self.missed
+        if not missed:
+            return _meaning(self.score)
+        others = [r.score for r in self.robots if r.score <= MISSING]
+        named = [f"{r.measurement.label} (score {r.score:.3g})" for r in missed[:NAMED]]
+        more = len(missed) - len(named)
+        named += [f"{more} more"] if more else []
+        return (
+            f"Missed: {', '.join(named)}. {of_others(len(others), _meaning(total_score(others)))}"
+        )
 
     def to_json(self) -> dict:
         """The interface's object."""
@@ -163,6 +168,27 @@ class Comparison:
             "bits": self.bits.to_json() if self.bits else None,
             "warnings": self.warnings,
         }
+
+
+def of_others(count: int, sentence: str) -> str:
+    """A sentence on all robots but those that were named before."""
+    return f"{'The other' if count == 1 else 'All others'}: {sentence[0].lower()}{sentence[1:]}"
+
+
+def _meaning(score: float) -> str:
+    """What a score means, in a sentence."""
+    if not np.isfinite(score):
+        return "No score: no log tells its noise from the motion."
+    if score < SUSPECT:
+        return "Predicts better than the noise estimate: this log shows nothing to improve."
+    if score <= GOOD:
+        return "As good as this log can tell: nothing is missing that it would show."
+    if score <= MISSING:
+        return (
+            "Close to what this log can tell; a small effect may be missing, or parameters are "
+            "stale."
+        )
+    return "Something is missing in the model, or its parameters are stale."
 
 
 def compare_robot(own: Opened) -> RobotComparison | SteadyComparison:

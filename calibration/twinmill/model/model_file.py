@@ -206,6 +206,7 @@ def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> 
     document = tomlkit.parse(parent.text)
     document["parent"] = parent.hash
     document["created_by"] = command
+    _write_moved(document, parent.model, fitted.model)
     _write_base(document, fitted)
     _write_effects(document, fitted)
     _write_robots(document, fitted)
@@ -255,6 +256,20 @@ def write_whole(path: Path, text: str) -> None:
 
 def _short(value: float) -> float:
     return float(f"{value:.6g}")
+
+
+def _write_moved(document: tomlkit.TOMLDocument, before: native.Model, after: native.Model) -> None:
+    """Values of the base that are not as before, those that a log hardly tells as well.
+
+    The predictions that were scored had them.
+    """
+    base = document.setdefault("base", tomlkit.table())
+    for entry in after.values():
+        section, *key = entry["name"].split(".")
+        if section != "base" or entry["value"] == before.get(entry["name"]):
+            continue
+        values, place = (base[key[0]], int(key[1])) if len(key) == 2 else (base, key[0])
+        values[place] = _short(entry["value"])
 
 
 def _write_base(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:

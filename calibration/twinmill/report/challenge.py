@@ -46,8 +46,8 @@ def intervals(found: dict) -> RenderableType:
     return show.table(Table(title, head, rows, note, words=(0,)))
 
 
-def write(folder: Path, found: dict, times_s: list[float]) -> None:
-    """index.html with the same tables and the power against strength."""
+def write(folder: Path, found: dict, times_s: list[float]) -> Path:
+    """Writes index.html with the same tables and the power against strength, and says where."""
     section = Section(
         "Blind test of diagnosis",
         [],
@@ -58,7 +58,7 @@ def write(folder: Path, found: dict, times_s: list[float]) -> None:
         tables=[_rates(found, times_s), *_lost(found), _confusion(found)],
     )
     source = Provenance(found["command"], f"twinmill {version('twinmill')}", "")
-    write_report(folder, "Blind test of diagnosis", source, [section])
+    return write_report(folder, "Blind test of diagnosis", source, [section], note="")
 
 
 def _rates(found: dict, times_s: list[float]) -> Table:

@@ -72,7 +72,9 @@ def advice(comparison: Comparison, fitted: bool = False) -> str:
         if worst.regime in card["suspect_when"] and name not in model.effects
     ]
     try_next = "look at where it fails"
-    if fitted:
+    if comparison.missed:
+        try_next = "`twinmill diagnose` tells how it differs from the others"
+    elif fitted:
         try_next = "`twinmill diagnose` names what is missing"
     elif fresh:
         try_next = f"fit if you have not, then add {' or '.join(fresh)}"

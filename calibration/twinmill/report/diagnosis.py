@@ -2,6 +2,7 @@
 """A diagnosis as tables, for the terminal and as a section of a report."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import twinmill_native as native
@@ -115,7 +116,8 @@ def each_robot(diagnosis: Diagnosis) -> Table:
     count = len(diagnosis.robots)
     too_few = 1 < count < FEWEST and not off
     of_few = _alone(diagnosis) if count == 1 else "not compared" if too_few else "as the model"
-    usual = of_few if count < FEWEST else "as all"
+    adequate = diagnosis.verdict == "model_adequate"
+    usual = of_few if count < FEWEST else "as the model" if adequate else "as all"
     rows = [
         [
             Cell(f"R{r.robot_id:02d}", "bad" if r.robot_id in off else ""),
@@ -232,15 +234,26 @@ def terminal(diagnosis: Diagnosis, commands: Commands = ()) -> RenderableType:
 
 def _said(diagnosis: Diagnosis) -> list[RenderableType]:
     parts: list[RenderableType] = [
-        Text(f"{diagnosis.sentence}", show.STYLES[TONES[diagnosis.verdict]]),
+        Text(diagnosis.sentence, show.STYLES[_tone_of(diagnosis)]),
         Text(
             f"score {number(diagnosis.before.score)} as given, "
-            f"{number(diagnosis.score_refit)} after a refit of the base (on held-out data)"
+            f"{number(diagnosis.score_refit)} after a refit of the base "
+            f"(on held-out data{_without(diagnosis)})"
         ),
         Text(),
     ]
     parts += [show.table(t) for t in (*_tables(diagnosis), *_detection_steps(diagnosis))]
     return parts + [Text(line) for line in lines(diagnosis)]
+
+
+def _tone_of(diagnosis: Diagnosis) -> Tone:
+    return "bad" if diagnosis.robots_off else TONES[diagnosis.verdict]
+
+
+def _without(diagnosis: Diagnosis) -> str:
+    """The robots that the search did not see: those that move otherwise than the rest."""
+    gone = [off.label for off in diagnosis.robots_off if off.models]
+    return f", without {', '.join(gone)}" if gone else ""
 
 
 def _next(diagnosis: Diagnosis, commands: Commands) -> list[Text]:
@@ -264,7 +277,7 @@ def terminal_explanation(result: Explanation, commands: Commands = ()) -> Render
 def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
     """The page of a diagnosis: verdict, figures, tables and the commands that follow."""
     before = diagnosis.before
-    scores = [("as given", before.score), ("base refitted", diagnosis.score_refit)]
+    scores = [("as given", before.score), ("base refitted, held out", diagnosis.score_refit)]
     if len(diagnosis.bit_steps) > 1:
         scores += [("bits", diagnosis.bit_steps[0][1]), ("bits, found", diagnosis.bit_steps[-1][1])]
     return Section(
@@ -272,7 +285,7 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
         [(label, number(value), tone(value)) for label, value in scores],
         diagnosis.sentence,
         comparisons.facts(before),
-        [*_detection_figures(diagnosis), waterfall(_labelled(diagnosis)), *robot_pictures(before)],
+        [*_detection_figures(diagnosis), *_gains(diagnosis), *robot_pictures(before)],
         [*_tables(diagnosis), *_detection_steps(diagnosis), *_detection_tables(diagnosis)],
         charts=charts(before, found_models(diagnosis)),
         next_step=next_run(diagnosis),
@@ -280,6 +293,16 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
         notes=lines(diagnosis),
         warnings=before.warnings,
         folded=[deciding(diagnosis)],
+    )
+
+
+def explanation_section(result: Explanation, commands: Commands = ()) -> Section:
+    """The page of the whole loop: that of its diagnosis, and what was fitted and written then."""
+    page = section(result.diagnosis, commands)
+    return replace(
+        page,
+        tables=[*page.tables, tables.parameters(result.parameters)],
+        notes=[*page.notes, f"Written: `{result.path}`"],
     )
 
 
@@ -349,9 +372,15 @@ def _detection_figures(diagnosis: Diagnosis) -> list[Figure]:
     return [detections.field_of_view(diagnosis.bits), *found]
 
 
+def _gains(diagnosis: Diagnosis) -> list[Figure]:
+    """What each step took away; nothing where none did."""
+    labelled = _labelled(diagnosis)
+    return [waterfall(labelled)] if len(labelled) > 1 else []
+
+
 def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
     """Steps of the waterfall."""
-    names = {None: "as given", REFIT: "base refitted"}
+    names = {None: "as given, held out", REFIT: "base refitted"}
     return [
         (names.get(s["effect"], f"+ {s['effect']}"), s["score_heldout"]) for s in steps(diagnosis)
     ]

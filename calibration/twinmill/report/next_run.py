@@ -58,7 +58,7 @@ def section(plan: Plan, how: How) -> Section:
     power = plan.predicted_power
     return Section(
         "The next run",
-        [("predicted power", percent(power), _tone(power))],
+        [("chance of the right name", percent(power), _tone(power))],
         f"{plan.why} {_outlook(plan)}",
         [("run", _length(plan))],
         [figures.commands(plan), figures.floor(plan), figures.margins(plan)],
@@ -80,8 +80,8 @@ def _length(plan: Plan) -> str:
 def _outlook(plan: Plan) -> str:
     told, asked = len(plan.separates), len(plan.chances)
     return (
-        f"The run tells {told} of these {asked}; the right name comes with a chance of "
-        f"{percent(plan.predicted_power)}, if it is one of these that is missing."
+        f"The run tells {told} of these {asked}: if one of them is missing, the right name comes "
+        f"with a chance of {percent(plan.predicted_power)}."
     )
 
 
@@ -126,8 +126,8 @@ def _chances(plan: Plan) -> Table:
         [
             "effect",
             "best\nimitation",
-            "margin (chi2)\nso far",
-            "margin (chi2)\nwith this run",
+            "margin\nso far",
+            "with\nthis run",
             "named\nso far",
             "then",
         ],

@@ -259,6 +259,7 @@ class Bench:
         """Ends the worker; keeps the state."""
         self._write()
         self.worker.cancel()
+        self.state.close()
 
     # -- arrays for the browser -----------------------------------------------------------------
 

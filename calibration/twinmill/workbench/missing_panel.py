@@ -5,7 +5,7 @@ import html
 
 from nicegui import ui
 
-from twinmill.diagnosis.search import REFIT
+from twinmill.diagnosis.search import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.add import OWN_GAINS
 from twinmill.model.parameters import catalogue
 from twinmill.workbench.bench import moves
@@ -95,7 +95,7 @@ class MissingPanel:
         sure = finding["certainty"] == "sure"
         with ui.element("div").classes("note").props(f'data-testid="finding-{effect}"'):
             with ui.element("div").classes("head"):
-                name = "the base's numbers are stale" if effect == REFIT else effect
+                name = REFIT_IN_WORDS if effect == REFIT else effect
                 ui.html(f"<b>{html.escape(name)}</b>", sanitize=False).style("flex: 1")
                 ui.label(finding["certainty"]).classes(f"chip {'good' if sure else 'warn'}")
                 self._buttons(effect)
@@ -150,7 +150,10 @@ class MissingPanel:
         for off in found["robots_off"]:
             self._robot(off)
         self._would_show(found.get("robots", []))
+        doubts = [f["why"] for f in found["findings"] if f["why"]]  # which the findings say
         for note in found["notes"]:
+            if any(why in note for why in doubts):
+                continue
             ui.label(note).classes("soft").style("margin-top: 6px")
 
     def _robot(self, off: dict) -> None:

@@ -15,6 +15,7 @@ from fastapi import Request
 from nicegui import app, ui
 from pydantic import BaseModel, FiniteFloat, PositiveFloat, ValidationError
 from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import ClientDisconnect
 from starlette.responses import PlainTextResponse, Response
 
 from twinmill.charts.stage import STATIC as CHARTS
@@ -202,6 +203,6 @@ def _refused() -> Response:
 
 
 def _is_worth_reporting(record: logging.LogRecord) -> bool:
-    """False of what Starlette reports when a page is left before it is whole."""
+    """False of what Starlette reports when a page is left before it is whole, or told all."""
     error = record.exc_info[1] if record.exc_info else None
-    return str(error) != "No response returned."
+    return not isinstance(error, ClientDisconnect) and str(error) != "No response returned."

@@ -175,6 +175,8 @@ class Session:
         self.measurements = before.excluding_wrong(
             [f for f in findings if f not in before.findings]
         )
+        if len(self.measurements) == len(before):
+            return  # what is shown, or comes soon, stays
         places = {id(m): k for k, m in enumerate(self.measurements)}
         kept = {k: places[id(m)] for k, m in enumerate(before) if id(m) in places}
         self.robots = {kept[k]: view for k, view in self.robots.items() if k in kept}

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The file that a session survives in: a reload, a stopped server, a machine switched off."""
 
+import fcntl
 import json
 import os
 import secrets
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from twinmill.files import replacing
 
@@ -17,24 +18,27 @@ def state_path(name: str, key: str) -> Path:
 
 
 class StateFile:
-    """One JSON file, whole or not at all, for its owner alone.
+    """One JSON file, whole or not at all, for its owner alone and for one workbench at a time.
 
     Args:
         path: of the file; its folder is made.
 
     Raises:
-        ValueError: it holds something else, or cannot be written.
+        ValueError: it holds something else, cannot be written, or is in use.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
             path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            self._data = json.loads(path.read_text()) if path.exists() else {}
+            self._lock = _locked(path)
+            text = path.read_text() if path.exists() else "{}"
         except OSError as error:
             raise ValueError(
                 f"{path}: cannot be used ({error.strerror}); name another file with --state."
             ) from error
+        try:
+            self._data = json.loads(text)
         except ValueError as error:
             raise ValueError(
                 f"{path}: holds no session of the workbench; name another file with --state, or "
@@ -44,6 +48,10 @@ class StateFile:
             raise ValueError(f"{path}: holds no session of the workbench; remove it.")
         self._data.setdefault("token", secrets.token_urlsafe(16))
         self.write(json.dumps(self._data))
+
+    def close(self) -> None:
+        """Another workbench may take it."""
+        self._lock.close()
 
     @property
     def token(self) -> str:
@@ -62,3 +70,17 @@ class StateFile:
         """
         with replacing(self.path, force=True, mode=0o600) as temporary:
             temporary.write_text(json.dumps({"token": self.token, **json.loads(text)}))
+
+
+def _locked(path: Path) -> TextIO:
+    """A file beside it that holds the lock until it is closed, at the latest with the program."""
+    lock = path.with_name(f".{path.name}.lock").open("w")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        lock.close()
+        raise ValueError(
+            f"{path}: another workbench has this session open; go on in its page, end it with "
+            "Ctrl-C, or name another file with --state."
+        ) from error
+    return lock

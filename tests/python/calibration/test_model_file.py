@@ -60,6 +60,16 @@ def test_child_holds_every_value_of_the_fit(child, parent, fitted):
     assert written.effects == ["dead_zone", "floor_tilt"]
 
 
+def test_child_holds_what_the_log_hardly_tells_without_an_error(parent, fitted, tmp_path):
+    """The score was told of a model that had it."""
+    seen = [e for e in fitted.estimates if not e.name.startswith("base.")]
+    write_child(parent, replace(fitted, estimates=seen), tmp_path / "child.toml", "")
+    written = ModelFile.load(str(tmp_path / "child.toml"))
+    assert written.model.get("base.wheel_speed_mps.4") == 0.41
+    assert written.model.get("base.motor_lag_s") == 0.08
+    assert not written.known_from_other_logs(["another"])
+
+
 def test_child_says_where_it_comes_from(child, parent):
     data = tomllib.loads(child.read_text())
     assert data["parent"] == hashlib.sha256(parent.path.read_bytes()).hexdigest()

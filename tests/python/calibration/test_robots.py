@@ -78,6 +78,20 @@ def test_of_two_robots_the_one_that_the_model_misses_is_odd(logged):
     assert words[0] == "as the model" and "weak" in words[1]
 
 
+def test_a_weak_robot_does_not_make_the_numbers_of_the_others_stale(logged):
+    """The model is the truth of R00 and R02."""
+    measurements, plain = logged(WEAK_R01, usual="")
+    found = diagnose(measurements, plain)
+    assert [r.robot_id for r in found.robots_off] == [1]
+    assert found.verdict == "model_adequate"
+    assert found.sentence.startswith("R01: ") and "All others: nothing" in found.sentence
+    words = [row[1].text for row in each_robot(found).rows]
+    assert words[::2] == ["as the model"] * 2 and "weak" in words[1]
+    compared = compare(measurements, plain)
+    assert compared.verdict.startswith(f"Missed: {measurements[1].label} ")
+    assert "All others: as good as" in compared.verdict
+
+
 def test_of_two_robots_that_the_model_misses_none_is_said_to_be_as_the_other(logged):
     """Which of two is the odd one nothing tells, so a weak one must not stand there as like it."""
     both = "[[effect]]\nname = 'motor_lag'\nextra_s = 0.15\n"

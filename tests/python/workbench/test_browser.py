@@ -97,6 +97,9 @@ def test_why_a_log_cannot_be_opened_is_said_in_the_page(import_turbopi, page):
         expect(page.locator("#failed")).to_contain_text(
             re.compile(r"--heading-offset-deg=-1(79|80)\b")
         )
+        page.wait_for_function("document.getElementById('popup').ariaHidden === 'false'")
+        # "Nothing is lost" would be wrong: nothing was opened.
+        expect(page.get_by_text("The workbench does not answer.")).not_to_be_visible()
 
 
 def test_the_whole_conversation(import_turbopi, page):
@@ -340,7 +343,9 @@ def give_the_robot_its_own(page) -> None:
     page.get_by_test_id("save-as").fill("mine.toml")
     page.get_by_test_id("save").click()
     page.get_by_text("Written: mine.toml").wait_for()
-    (command,) = page.get_by_test_id("commands").text_content().strip().splitlines()
+    told = page.get_by_test_id("commands").text_content().strip().splitlines()
+    assert len(told) == 1, told
+    (command,) = told
     mine = Path("mine.toml").read_bytes()
     os.remove("mine.toml")
     result = cli.run(shlex.split(command)[1:])

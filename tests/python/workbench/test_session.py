@@ -56,6 +56,14 @@ def test_the_score_is_that_of_compare(session, compared):
     assert session.shown(0).score == pytest.approx(compared.score, rel=1e-9)
 
 
+def test_checks_that_find_nothing_wrong_leave_what_is_shown(session):
+    """They may come while a first answer is on the screen."""
+    session.show(session.preview("coasting", 0))
+    foreseen = session.shown(0)
+    session.exclude_wrong([])
+    assert session.shown(0) is foreseen and session.beside.label == "before"
+
+
 def test_regimes_are_those_of_compare_and_their_moments_lie_in_the_log(session, compared):
     mine, theirs = session.regimes(0), compared.main.where
     assert [(r.group, r.regime, r.windows) for r in mine] == [

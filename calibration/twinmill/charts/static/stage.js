@@ -178,7 +178,8 @@ export class Stage {
   mark(times, worst, why) {
     this.marks = times;
     const words = document.querySelector("#marks");
-    words.textContent = times.length ? `${why}: ${times.length} moments ✕` : "";
+    words.textContent = times.length ? `✕ ${why}, ${times.length} moments` : "";
+    words.title = `Forget these marks: ${why}`;  // on a narrow screen the words are cut
     if (times.length) {
       this.seek(Math.max(worst, 0));
       this.play(true);
