@@ -24,6 +24,7 @@ if working():  # not for --help
     from twinmill.diagnosis.result import Diagnosis
     from twinmill.report import diagnosis as present
     from twinmill.swarm.metrics import swarm_metrics
+    from twinmill_cli.calibrate import option as _option
     from twinmill_cli.frame import (
         check_output,
         command_line,
@@ -82,11 +83,14 @@ def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str,
     elif result.verdict == "refit_enough":
         to = Path(f"{stem}_fitted.toml")
         told.append(("To refit the base", command_line("fit", logs, model, to)))
-    if (equation := result.rest.equation) and result.rest.takes >= present.LEAST_TAKES:
-        verb = ["add", "equation", "--adds-to", equation["adds_to"], "--formula"]
-        verb = shlex.join([*verb, equation["formula"]])
+    if proven := result.rest.proven:
+        options = [w for name, text in proven.equation.items() for w in (_option(name), text)]
+        verb = shlex.join(["add", "equation", *options])
+        then = bool(result.found) and not proven.instead_of
+        grown = f"{stem}_explained.toml" if then else model
         to = Path(f"{stem}_equation.toml")
-        told.append(("To add the formula", command_line(verb, logs, model, to)))
+        why = "Then, to add the formula" if then else "To add the formula"
+        told.append((why, command_line(verb, logs, grown, to)))
     return told
 
 

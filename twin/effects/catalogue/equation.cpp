@@ -9,6 +9,7 @@
 
 #include "effects/effect.h"
 #include "effects/nearest.h"
+#include "effects/remember.h"
 
 namespace twin
 {
@@ -35,7 +36,6 @@ private:
                 std::span<const double> parameters);
     void Parse(mu::Parser &parser, std::span<const char *const> names, const std::string &key,
                const std::string &text);
-    double RateAt(double state);
 
     std::vector<double> values_;
     std::vector<size_t> used_;
@@ -345,27 +345,12 @@ void Formula::Parse(mu::Parser &parser, std::span<const char *const> names, cons
     }
 }
 
-double Formula::RateAt(double state)
-{
-    state_ = state;
-    return rate_.Eval();
-}
-
-// Exact where the rate is linear in the state and the rest is held over the step (the exponential
-// Euler method with the rate's own slope; Hochbruck and Ostermann 2010), however stiff.
 void Formula::Remember(double &state, double dt_s)
 {
-    constexpr double kApart = 1e-3;
-    const double rate = RateAt(state), slope = (RateAt(state + kApart) - rate) / kApart;
-    state_ = state;
-    if (!std::isfinite(rate) || !std::isfinite(slope))
-        return;
-    const double z = slope * dt_s;
-    const bool small = std::abs(z) < 1e-5;
-    const double grown = small ? 1 + z / 2 : std::expm1(z) / z;
-    const double mean = small ? 0.5 + z / 6 : (grown - 1) / z;
-    state_ = state + rate * dt_s * mean;
-    state += rate * dt_s * grown;
+    state_ = twin::Remember(state, dt_s, [this](double at) {
+        state_ = at;
+        return rate_.Eval();
+    });
 }
 
 EFFECT(equation) = {
