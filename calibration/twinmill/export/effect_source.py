@@ -225,11 +225,12 @@ def _kind(used: set[str], remembers: bool, stage: str) -> dict[str, str]:
 def _function(text: str, names: dict[str, str], state: dict[str, str]) -> Function:
     used = words(text)
     own = [n for n in (*names, *state) if n in used]
+    numbers = [p for p in PARAMETERS if p in used]
     return Function(
         _in_cpp(text),
-        ", ".join(["const Numbers &v", *(f"double {n}" for n in own)]),
-        ", ".join(["v", *own]),
-        [p for p in PARAMETERS if p in used],
+        ", ".join(["const Numbers &v"] * bool(numbers) + [f"double {n}" for n in own]),
+        ", ".join(["v"] * bool(numbers) + own),
+        numbers,
     )
 
 
