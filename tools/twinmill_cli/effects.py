@@ -89,7 +89,8 @@ def _write(
     said = "\n".join(
         [
             *(f"Written: {path}" for path in told),
-            "Its card is a draft: say in your words what it is and what shows it. Then: make build",
+            "Its card is a draft: say in your words what it is and what shows it.",
+            "Then: make format check",
         ]
     )
     deliver({"effect": name, "files": told}, said, as_json)

@@ -68,8 +68,9 @@ def _curve(rows: Evidence, forms: Sequence[Form], numbers: Sequence[Number]) -> 
     ridge = 1e-3 * np.trace(gram) / len(gram) * np.eye(len(gram))
     inverse = np.linalg.inv(gram + ridge)
     drawn = _drawn(rows, forms, [n.value for n in numbers if n.name], bins)
+    apart = np.eye(len(gram)) - 1 / len(gram)  # what all bins share is a gain of the base
     left = inverse @ (x.T @ rows.left) * USUAL[forms[0].adds_to]
-    spread = np.sqrt(np.diag(inverse)) * USUAL[forms[0].adds_to]
+    spread = np.sqrt(np.diag(apart @ inverse @ apart)) * USUAL[forms[0].adds_to]
     return Curve(name, carrier, middles, left + np.mean(drawn - left), spread, drawn)
 
 

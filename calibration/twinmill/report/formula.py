@@ -31,7 +31,7 @@ def sentences(rest: Rest) -> list[str]:
 
 def _said(found: Formula) -> str:
     what = f"In place of {' and '.join(found.instead_of)}" if found.instead_of else "What is left"
-    like = f" It is {found.like}." if found.like else ""
+    like = f" In words: {found.like}." if found.like else ""
     return (
         f"{what}: {found.forms[0].adds_to} += {found.text}. On stretches that neither chose nor "
         f"fitted it, it takes {100 * found.takes:.0f} % of the squared error (p "
