@@ -525,7 +525,7 @@ class Model(_Shown):
             effect: name from the catalogue; of one robot also `gains`.
             log: what it is fitted to.
             robot: number of the robot that alone has it; by default all have.
-            texts: of the effect `equation`: adds_to and formula.
+            texts: of the effect `equation`: adds_to, formula and state_rate.
 
         Returns:
             Scores without and with the effect, and the new model.

@@ -271,7 +271,8 @@ TEST_P(EveryEffect, ByDefaultChangesSomeSignalIfItActsOnThem)
         EXPECT_GT(changed, 10);
 }
 
-// Short predictions share their way over the floor where nothing on it depends on the place.
+// Short predictions share their way over the floor where nothing on it depends on the place; what
+// remembers does so for each of them.
 TEST_P(EveryEffect, DependsOnPlaceAndHeadingOnlyIfItNeedsTheRoom)
 {
     const Card &card = GetParam()->card;
@@ -279,7 +280,8 @@ TEST_P(EveryEffect, DependsOnPlaceAndHeadingOnlyIfItNeedsTheRoom)
         !std::holds_alternative<OnGround>(GetParam()->act))
         return;
     const auto effect = DefaultsOf(*GetParam());
-    EXPECT_EQ(effect.StateSize(), 0);
+    std::vector<double> here_state(static_cast<size_t>(effect.StateSize()));
+    std::vector<double> there_state = here_state;
     std::mt19937_64 engine(9);
     for (int step = 0; step < 100; ++step)
     {
@@ -287,8 +289,8 @@ TEST_P(EveryEffect, DependsOnPlaceAndHeadingOnlyIfItNeedsTheRoom)
         there.x_m += 3;
         there.y_m -= 2;
         there.theta_rad += 1;
-        effect.Step(here, nullptr);
-        effect.Step(there, nullptr);
+        effect.Step(here, here_state.data());
+        effect.Step(there, there_state.data());
         EXPECT_EQ(here.vx_mps, there.vx_mps);
         EXPECT_EQ(here.vy_mps, there.vy_mps);
         EXPECT_EQ(here.omega_radps, there.omega_radps);

@@ -12,17 +12,18 @@ namespace
 
 const std::vector<double> kNeutral{0, 0, 0, 0};
 
-Alone Formula(const std::string &adds_to, const std::string &formula)
+Alone Formula(const std::string &adds_to, const std::string &formula, const std::string &rate = "")
 {
-    return Alone(
-        BoundEffect(*FindEffect("equation"), kNeutral, std::vector<std::string>{adds_to, formula}));
+    const std::vector<std::string> texts{adds_to, formula, rate};
+    return Alone(BoundEffect(*FindEffect("equation"), kNeutral, texts));
 }
 
-std::string Complaint(const std::string &adds_to, const std::string &formula)
+std::string Complaint(const std::string &adds_to, const std::string &formula,
+                      const std::string &rate = "")
 {
     try
     {
-        Formula(adds_to, formula);
+        Formula(adds_to, formula, rate);
     }
     catch (const std::invalid_argument &error)
     {
@@ -32,9 +33,9 @@ std::string Complaint(const std::string &adds_to, const std::string &formula)
 }
 
 Model WithFormula(const std::string &adds_to, const std::string &formula,
-                  const std::vector<double> &values, Model model = {})
+                  const std::vector<double> &values, const std::string &rate = "", Model model = {})
 {
-    model.AddEffect("equation", {{"adds_to", adds_to}, {"formula", formula}});
+    model.AddEffect("equation", {{"adds_to", adds_to}, {"formula", formula}, {"state_rate", rate}});
     for (size_t i = 0; i < values.size(); ++i)
         model.effects.back().parameters[i].value = values[i];
     return model;
@@ -65,6 +66,75 @@ TEST(Equation, CanSayWhatOtherEffectsSay)
         EXPECT_NEAR(formula.state.pose.x_m, effect.state.pose.x_m, 1e-12) << c.formula;
         EXPECT_NEAR(formula.state.pose.y_m, effect.state.pose.y_m, 1e-12) << c.formula;
         EXPECT_NEAR(formula.state.pose.theta_rad, effect.state.pose.theta_rad, 1e-12) << c.formula;
+    }
+}
+
+// heat_gain's own equation: h(t) = u^2 (1 - exp(-t / 60 s)) on the speed that the wheel tends to.
+TEST(Equation, RemembersAsTheEffectOfWarmMotorsDoes)
+{
+    Player formula(WithFormula("rim_mps", "p0*s*target", {-0.2}, "(u*u - s)/60"), 0.02);
+    Player effect(With("heat_gain", {0.2}), 0.02);
+    for (Player *player : {&formula, &effect})
+    {
+        player->Play(kForward, 40);
+        PlayMedley(*player);
+        player->Play({1, 0.2, 1, 0.2}, 20);
+    }
+    EXPECT_NEAR(formula.state.pose.x_m, effect.state.pose.x_m, 1e-9);
+    EXPECT_NEAR(formula.state.pose.y_m, effect.state.pose.y_m, 1e-9);
+    EXPECT_NEAR(formula.state.pose.theta_rad, effect.state.pose.theta_rad, 1e-9);
+}
+
+// Stored way s goes to d sign(v) with the way driven: s = d (1 - exp(-way / d)), and of what is
+// driven v - |v| s / d is lost, which adds up to s; at any step, be it long against d / v.
+TEST(Equation, IntegratesAStiffStateExactly)
+{
+    constexpr double kReach_m = 0.003;
+    for (const double step_s : {0.002, 0.02, 0.1})
+    {
+        Player player(
+            WithFormula("vx_mps", "p0*(vx - abs(vx)*s/0.003)", {-1}, "vx - abs(vx)*s/0.003"),
+            step_s);
+        player.Play(kForward, 0.2);
+        const double way_m = 0.2 * kFull_mps;
+        const double stored_m = kReach_m * (1 - std::exp(-way_m / kReach_m));
+        EXPECT_NEAR(player.state.pose.x_m, way_m - stored_m, 1e-9) << step_s;
+        // Turned round, the way back gives the stored way twice, as far as e^-24 is nothing.
+        player.Play(kBack, 0.2);
+        EXPECT_NEAR(player.state.pose.x_m, -stored_m + 2 * kReach_m, 1e-9) << step_s;
+    }
+}
+
+TEST(Equation, KeepsAStateWhoseRateHasNoValue)
+{
+    Player player(WithFormula("vx_mps", "p0*(1 + s)", {0.1}, "1/vy"), 0.02);
+    player.Play(kForward, 1);
+    EXPECT_NEAR(player.state.pose.x_m, kFull_mps + 0.1, 1e-12);
+}
+
+TEST(Equation, ChangesWayAndMotionByAShare)
+{
+    Player usual(Model{}, 0.02), travel(WithFormula("travel", "p0", {-0.25}), 0.02),
+        motion(WithFormula("motion", "p0", {-0.25}), 0.02);
+    for (Player *player : {&usual, &travel, &motion})
+        player->Play({0.3, 0.9, 0.3, 0.9}, 1);
+    EXPECT_NEAR(travel.state.vx_mps, 0.75 * usual.state.vx_mps, 1e-12);
+    EXPECT_NEAR(travel.state.omega_radps, usual.state.omega_radps, 1e-12);
+    EXPECT_NEAR(motion.state.vx_mps, 0.75 * usual.state.vx_mps, 1e-12);
+    EXPECT_NEAR(motion.state.omega_radps, 0.75 * usual.state.omega_radps, 1e-12);
+}
+
+TEST(Equation, MovesTheCapturedHeadingAndBack)
+{
+    const DriveChain chain(WithFormula("theta_rad", "p0*sin(theta + 1)", {0.2}));
+    for (const double theta_rad : {-3.0, 0.0, 0.7, 2.5, 9.0})
+    {
+        Pose2 pose{1, 2, theta_rad};
+        double t_s = 0;
+        chain.Observe(pose, t_s);
+        EXPECT_NEAR(pose.theta_rad, theta_rad + 0.2 * std::sin(theta_rad + 1), 1e-12);
+        chain.Invert(pose, t_s);
+        EXPECT_NEAR(pose.theta_rad, theta_rad, 1e-9);
     }
 }
 
@@ -140,6 +210,15 @@ TEST(Equation, SaysWhatIsWrongAndWhere)
         for (const std::string &word : c.says)
             EXPECT_NE(complaint.find(word), std::string::npos) << word << " in: " << complaint;
     }
+}
+
+TEST(Equation, SaysWhatIsWrongWithAState)
+{
+    for (const char *word : {"equation.state_rate", "'omga'", "'omega'", "letter 1"})
+        EXPECT_NE(Complaint("vx_mps", "p0*s", "omga").find(word), std::string::npos) << word;
+    EXPECT_NE(Complaint("duty", "p0*s", "u - s").find("rim_mps"), std::string::npos);
+    EXPECT_NE(Complaint("theta_rad", "p0*s", "x - s").find("no state"), std::string::npos);
+    EXPECT_NE(Complaint("vx_mps", "p0*s").find("'s'"), std::string::npos);
 }
 
 TEST(Equation, ComparesWithoutAssigning)

@@ -151,6 +151,21 @@ TEST(Windows, AreWhatThePlantDoesWhereTheRoomMatters)
                1e-3);
 }
 
+// What a formula remembers of the ground was there before a window began. Without a lag the speed
+// is constant from command to command, and the state is exact.
+TEST(Windows, BeginWithWhatTheGroundRemembers)
+{
+    const RandomDrive run;
+    Model model = Base(0);
+    model.AddEffect(
+        "equation",
+        {{"adds_to", "omega_radps"}, {"formula", "p0*s"}, {"state_rate", "(omega - s)/3"}});
+    model.effects.back().parameters[0].value = 0.5;
+    ASSERT_TRUE(DriveChain(model).RemembersOnGround());
+    ExpectNear(PredictWindows(model, run.track(), run.starts, run.ends), OneByOne(model, run),
+               1e-4);
+}
+
 // Parameters of wheels, of the ground, of what is seen and of the clock.
 const std::vector<std::string> kNames{"wheel_gain.fr", "base.yaw_gain", "marker_offset.x_m",
                                       "clock.offset_s", "base.motor_lag_s"};

@@ -38,6 +38,11 @@ if working():  # not for --help
     )
 
 
+def option(name: str) -> str:
+    """Of the command line, for a text of an effect."""
+    return f"--{name.replace('_', '-')}"
+
+
 def register(app: typer.Typer) -> None:
     """Adds the commands to the application."""
     app.command("compare")(_compare)
@@ -116,6 +121,10 @@ def _add(
     formula: Annotated[
         str | None, typer.Option("--formula", help="Of an equation: what is added, of p0 to p3.")
     ] = None,
+    state_rate: Annotated[
+        str | None,
+        typer.Option("--state-rate", help="Of an equation: ds/dt of the state s that it names."),
+    ] = None,
     hold: Hold = None,
     robot: Annotated[
         int | None,
@@ -132,13 +141,14 @@ def _add(
     """
     gains = robot is not None and effect == OWN_GAINS
     known = [] if gains else [text["name"] for text in find_effect(effect)["texts"]]
-    texts = {"adds_to": adds_to, "formula": formula}
+    texts = {"adds_to": adds_to, "formula": formula, "state_rate": state_rate}
     texts = {name: text for name, text in texts.items() if text is not None}
     if extra := [name for name in texts if name not in known]:
-        option = f"--{extra[0].replace('_', '-')}"
-        raise ValueError(f"{option}: {effect} has none; it is for `twinmill add equation`.")
+        raise ValueError(
+            f"{option(extra[0])}: {effect} has none; it is for `twinmill add equation`."
+        )
     held = hold or []
-    given = [w for name, text in texts.items() for w in (f"--{name.replace('_', '-')}", text)]
+    given = [w for name, text in texts.items() for w in (option(name), text)]
     verb = shlex.join(["add", effect, *of_robot(robot), *given, *holding(held)])
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)

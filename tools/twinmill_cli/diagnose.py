@@ -24,6 +24,7 @@ if working():  # not for --help
     from twinmill.diagnosis.result import Diagnosis
     from twinmill.report import diagnosis as present
     from twinmill.swarm.metrics import swarm_metrics
+    from twinmill_cli.calibrate import option
     from twinmill_cli.frame import (
         check_output,
         command_line,
@@ -67,6 +68,8 @@ def _diagnose(
     then = [*_mending(result, logs, model), *_settling(result, logs, model)]
     if data["next_experiment"]:
         data["next_experiment"]["command"] = then[-1][1]
+    if data["rest"]["proven"]:
+        data["rest"]["proven"]["command"] = next(c for why, c in then if "the formula" in why)
     section = partial(present.section, result, then)
     finish(data, present.terminal(result, then), source, section=section, as_json=as_json, out=out)
     return result
@@ -81,12 +84,30 @@ def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str,
     elif result.verdict == "refit_enough":
         to = Path(f"{stem}_fitted.toml")
         told.append(("To refit the base", command_line("fit", logs, model, to)))
-    if (equation := result.rest.equation) and result.rest.takes >= present.LEAST_TAKES:
-        verb = ["add", "equation", "--adds-to", equation["adds_to"], "--formula"]
-        verb = shlex.join([*verb, equation["formula"]])
-        to = Path(f"{stem}_equation.toml")
-        told.append(("To add the formula", command_line(verb, logs, model, to)))
-    return told
+    grown = f"{stem}_explained.toml" if result.found else model
+    return [*told, *_adding(result, logs, given=model, grown=grown)]
+
+
+def _adding(
+    result: Diagnosis, logs: list[Path], *, given: str, grown: str
+) -> list[tuple[str, str]]:
+    """What adds the formula that was proven; nothing if none was.
+
+    Args:
+        result: the diagnosis.
+        logs: of it.
+        given: the model that was diagnosed: to it, if the formula stands for what was found.
+        grown: the model with what was found.
+    """
+    proven = result.rest.proven
+    if not proven:
+        return []
+    options = [w for name, text in proven.equation.items() for w in (option(name), text)]
+    verb = shlex.join(["add", "equation", *options])
+    model = given if proven.instead_of else grown
+    why = "To add the formula" if model == given else "Then, to add the formula"
+    to = Path(f"{Path(given).stem}_equation.toml")
+    return [(why, command_line(verb, logs, model, to))]
 
 
 def _settling(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str, str]]:
@@ -156,11 +177,12 @@ def _explain(
         result = explain(
             measurements, model_file, out=output, command=source.command, progress=progress
         )
-    then = _settling(result.diagnosis, logs, str(output))
+    settling = _settling(result.diagnosis, logs, str(output))
+    then = [*_adding(result.diagnosis, logs, given=model, grown=str(output)), *settling]
     section = partial(present.explanation_section, result, then)
     data = {**result.to_json(), **told(measurements)}
-    if then:
-        data["next_experiment"]["command"] = then[-1][1]
+    if settling:
+        data["next_experiment"]["command"] = settling[-1][1]
     finish(
         data,
         present.terminal_explanation(result, then),

@@ -158,7 +158,10 @@ void DriveChain::Bind(const EffectInstance &instance)
         },
         effect.act());
     if (std::holds_alternative<OnGround>(effect.act()))
+    {
         homogeneous_ = homogeneous_ && IsSameEverywhere(effect);
+        remembers_on_ground_ = remembers_on_ground_ || effect.StateSize() > 0;
+    }
 }
 
 RobotState DriveChain::Start(const Pose2 &pose) const

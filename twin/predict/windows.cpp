@@ -107,6 +107,28 @@ Pose2 Moved(const Pose2 &start, const Pose2 &from, const Pose2 &to)
     return {start.x_m + c * x_m - s * y_m, start.y_m + s * x_m + c * y_m, to.theta_rad + turn_rad};
 }
 
+// By event: what effects on the ground remember there, moved from measured pose to measured pose;
+// empty where none remembers.
+std::vector<std::vector<double>> Remembered(const DriveChain &chain,
+                                            const std::vector<Event> &events,
+                                            const Recording &recording)
+{
+    std::vector<std::vector<double>> remembered;
+    if (!chain.RemembersOnGround())
+        return remembered;
+    RobotState state = chain.Start({});
+    size_t done = 0;
+    for (size_t e = 0; e < events.size(); ++e)
+    {
+        if (e > 0)
+            state.pose = events[e - 1].measured.pose;
+        Move(chain, recording, done, recording.reached[e], state);
+        done = recording.reached[e];
+        remembered.push_back(state.effect_state);
+    }
+    return remembered;
+}
+
 // All windows of one model, written to `out` (W, H, 3).
 void Predict(const DriveChain &chain, const Windows &windows, const std::vector<Event> &events,
              const Recording &recording, double *out)
@@ -128,11 +150,14 @@ void Predict(const DriveChain &chain, const Windows &windows, const std::vector<
             done = reached;
         }
     }
+    const auto remembered = Remembered(chain, events, recording);
     const size_t horizons = windows.Horizons();
     for (size_t w = 0; w < windows.starts.size(); ++w)
     {
         const size_t from = event_of(windows.starts[w]);
         state.pose = events[from].measured.pose;
+        if (!remembered.empty())
+            state.effect_state = remembered[from];
         size_t done = recording.reached[from];
         for (size_t h = w * horizons; h < (w + 1) * horizons && windows.ends[h] >= 0; ++h)
         {

@@ -11,6 +11,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.cameras import with_detections
 from twinmill.diagnosis.doubts import beside_more, of_another_form, within_the_table
+from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_numbers
 from twinmill.diagnosis.notes import (
     few_commands_notes,
@@ -28,13 +29,14 @@ from twinmill.diagnosis.outliers import (
     spread_of_lags_s,
 )
 from twinmill.diagnosis.resolution import resolutions
-from twinmill.diagnosis.rest import rest_of
+from twinmill.diagnosis.rest import Doubted, formulas_of, rest_of
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.rivals import less_each
 from twinmill.diagnosis.search import (
     REFIT,
     Search,
     State,
+    Trial,
     cross_validate,
     instead_of_drift,
     search,
@@ -262,7 +264,8 @@ def _concluded(
     )
     if model_file.model.drive == "duty" and model_file.known_from_other_logs(hashes):
         findings = within_the_table(findings, less, last)
-    rest = rest_of(formulas, last.fit, start.fit, model_file.left_over(hashes))
+    doubted = _doubted(findings, less, known, start)
+    rest = rest_of(formulas, last.fit, start.fit, model_file.left_over(hashes), without=doubted)
     findings = beside_more(of_another_form(findings, rest), rest)
     findings.sort(key=lambda f: -f.share)  # for people: the chain's order is by what each loses
     told = [f.depends_on for f in findings if f.depends_on]
@@ -322,6 +325,18 @@ def _concluded(
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
         base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),
     )
+
+
+def _doubted(
+    findings: Sequence[Finding], less: dict[str, Trial], known: Sequence[Opened], start: Trial
+) -> Doubted | None:
+    """The effects that were found, where all are in doubt, and the fit without them."""
+    names = tuple(f.effect for f in findings if f.effect != REFIT)
+    if not names or any(f.certainty != "doubtful" for f in findings):
+        return None
+    fit = less[names[0]].fit if len(names) == 1 else start.fit
+    formulas = formulas_of(known, fit)
+    return Doubted(names, formulas, fit) if formulas else None
 
 
 def _with_found(own: Opened, fitted: dict[int, Opened], model: native.Model) -> Opened:

@@ -29,6 +29,7 @@ SWELL = 0.05  # share of all speeds: a usual loss
 CHANGE = "change of the command"
 TIME = "time"
 WAY = "way driven"
+LEFT_OVER = 0.02  # share of a term's norm that must survive beside what is free
 REVERSAL_S = 0.15  # how long a reversal is felt
 START_S = 0.4  # the same of a start from rest, and of a rise of the speed
 # Of one wheel's command, with its half `h`; in proportion to u is a wheel's gain.
@@ -65,8 +66,8 @@ class Term:
 
 def library(
     opened: Sequence[Opened], models: Sequence[native.Model]
-) -> tuple[list[Term], list[np.ndarray]]:
-    """Terms, and (R, T) change of the rows of each log by each at its strength.
+) -> tuple[list[Term], list[np.ndarray], list[np.ndarray]]:
+    """Terms, (R, T) change of the rows of each log by each at its strength, (N, 3) velocities.
 
     Args:
         opened: logs over their floors.
@@ -92,7 +93,8 @@ def library(
         ]
         of_wheel = _wheel_columns(own, model, of_wheels)
         columns.append(np.hstack([body, body @ parts, *swells, of_wheel]))
-    return [*terms, *of_all, *waves[0].terms, *waves[1].terms, *of_wheels], columns
+    every = [*terms, *of_all, *waves[0].terms, *waves[1].terms, *of_wheels]
+    return every, columns, velocities
 
 
 def _terms_of_all_speeds(terms: Sequence[Term]) -> tuple[list[Term], np.ndarray]:
@@ -155,7 +157,7 @@ class Waves:
         angle = along[:, None] * self.rates
         gains = SWELL * np.stack([np.cos(angle), np.sin(angle)], axis=-1).reshape(len(angle), -1)
         response = own.floor.response
-        parts = [_displaced(response, velocity, velocity[:, [k]] * gains, k) for k in range(3)]
+        parts = [displaced(response, velocity, velocity[:, [k]] * gains, k) for k in range(3)]
         weight = np.nan_to_num(own.data.weight)[..., None]
         columns = [part * weight for part in (sum(parts), *parts)]
         return np.concatenate(columns, axis=-1).reshape(weight.size, len(self.terms))
@@ -216,7 +218,7 @@ def _body_columns(own: Opened, velocity: np.ndarray, terms: dict, sizes: dict) -
     response = own.floor.response
     values = np.stack([terms[key] / sizes[key] for key in sizes], axis=-1)
     parts = [
-        _displaced(response, velocity, TYPICAL[channel] * values, axis)
+        displaced(response, velocity, TYPICAL[channel] * values, axis)
         for axis, channel in enumerate(CHANNELS)
     ]  # each (W, H, 3, T)
     columns = np.stack(parts, axis=-1) * np.nan_to_num(own.data.weight)[..., None, None]
@@ -266,7 +268,7 @@ def _wheel_columns(own: Opened, model: native.Model, terms: Sequence[Term]) -> n
     return columns
 
 
-def _displaced(
+def displaced(
     response: Response, velocity: np.ndarray, values: np.ndarray, axis: int
 ) -> np.ndarray:
     """(W, H, 3, T) change of windows' displacements by (N, T) velocities in a body axis, linear."""

@@ -14,10 +14,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from twinmill.diagnosis.library import Term, library
+from twinmill.diagnosis.formula import Formula
+from twinmill.diagnosis.formula_search import formula_of
+from twinmill.diagnosis.library import LEFT_OVER, Term, library
 from twinmill.diagnosis.moments import Moment, moments_of
 from twinmill.diagnosis.place import comes_again
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.fitting.compare import GOOD
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
 
@@ -25,7 +28,6 @@ FOLDS = 5
 FLIPS = 499  # random signs of blocks that make the null distribution
 MOMENTS = "single moments"
 PLACE = "place"
-LEFT_OVER = 0.02  # share of a term's norm that must survive the projection
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,7 @@ class Rest:
         moments: events that neither commands nor findings explain.
         again: least share of the squared error of way that comes again at the same places. The
             floor counts it as noise, since it follows from no command.
+        proven: a formula for it that blocks which neither chose nor fitted it bear out.
     """
 
     share: float
@@ -64,6 +67,7 @@ class Rest:
     old: tuple[str, ...] = ()
     moments: tuple[Moment, ...] = ()
     again: float = 0.0
+    proven: Formula | None = None
 
     @property
     def formula(self) -> str | None:
@@ -86,11 +90,13 @@ class Formulas:
         logs: place among the fit's data sets, and the log.
         terms: T formulas.
         changes: (R, T) of each log.
+        velocities: (N, 3) of the body in each, m/s and rad/s, at the points of its response.
     """
 
     logs: list[tuple[int, Opened]]
     terms: list[Term]
     changes: list[np.ndarray]
+    velocities: list[np.ndarray]
 
     def products(self, fit: ScoreFit, beside: Sequence[np.ndarray] = ()) -> "Products":
         """Products with what a fit leaves, what is free in it projected out.
@@ -119,13 +125,35 @@ class Formulas:
         return Products(np.where(seen, columns, 0.0), left, blocks, seen)
 
 
+@dataclass(frozen=True)
+class Doubted:
+    """Findings of which none is sure, and what is there without them.
+
+    Attributes:
+        names: of the findings.
+        formulas: over the logs, as the model moves without them.
+        fit: without them.
+    """
+
+    names: tuple[str, ...]
+    formulas: Formulas
+    fit: ScoreFit
+
+    def formula(self, whole: ScoreFit) -> Formula | None:
+        """The formula that does better than they do in the fit that has them, if one is proven."""
+        before, after = self.fit.state[0], whole.state[0]
+        rival = [before[i] - after[i] for i, _ in self.formulas.logs]
+        found = formula_of(self.fit, **vars(self.formulas), rival=rival)
+        return replace(found, instead_of=self.names) if found else None
+
+
 def formulas_of(opened: Sequence[Opened], fit: ScoreFit) -> Formulas | None:
     """Formulas over the logs of a fit; None if it has none whose floor told a smooth response."""
     logs = [(i, o) for i, o in enumerate(opened) if o.floor and o.floor.response]
     if not logs:
         return None
-    terms, changes = library([own for _, own in logs], [fit.models[i] for i, _ in logs])
-    return Formulas(logs, terms, changes)
+    found = library([own for _, own in logs], [fit.models[i] for i, _ in logs])
+    return Formulas(logs, *found)
 
 
 def rest_of(
@@ -133,6 +161,8 @@ def rest_of(
     fit: ScoreFit,
     first: ScoreFit,
     known: Mapping[str, float],
+    *,
+    without: Doubted | None = None,
 ) -> Rest:
     """Tests whether the residuals of a fit are noise, and on what they depend.
 
@@ -141,6 +171,7 @@ def rest_of(
         fit: of the final model.
         first: of the model as given.
         known: what the model left in other logs already, as `left_over`.
+        without: the findings, where all are in doubt, and the fit and formulas without them.
     """
     left = max(fit.held_square - 1, 0.0)
     share = left / max(first.held_square - 1, left, 1e-9)
@@ -155,8 +186,19 @@ def rest_of(
     again = comes_again(own_logs, models)
     if again and PLACE not in depends_on:
         depends_on.append(PLACE)
+    proven = None
+    if without:
+        proven = without.formula(fit)
+    if not proven and (depends_on or firm or fit.held_square > GOOD**2):
+        proven = formula_of(fit, **vars(formulas))
     return replace(
-        found, share=share, firm=firm, depends_on=depends_on, moments=tuple(moments), again=again
+        found,
+        share=share,
+        firm=firm,
+        depends_on=list(dict.fromkeys([*(proven.depends_on if proven else ()), *depends_on])),
+        moments=tuple(moments),
+        again=again,
+        proven=proven,
     )
 
 

@@ -110,6 +110,7 @@ class Diagnosis:
                 "depends_on": rest.depends_on,
                 "formula": rest.formula,
                 "moments": [m.to_json() for m in rest.moments],
+                "proven": rest.proven.to_json() if rest.proven else None,
             },
             "late": self.late.to_json() if self.late else None,
             "input": [],

@@ -309,7 +309,7 @@ def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
         table = tomlkit.table() if i >= len(old) else old[i]
         name = instance.split("#")[0]
         table["name"] = name
-        table.update(texts)
+        table.update({key: text for key, text in texts.items() if text})
         keys = [p["name"] for p in entries[name]["parameters"]]
         for key in keys:
             table[key] = _short(fitted.model.get(f"{instance}.{key}"))

@@ -15,14 +15,13 @@ from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.search import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.model.parameters import ParameterEstimate, catalogue
-from twinmill.report import Figure, Section, comparisons, detections, show, tables
+from twinmill.report import Figure, Section, comparisons, detections, formula, show, tables
 from twinmill.report.charted import charts
 from twinmill.report.error_figures import waterfall
 from twinmill.report.sections import robot_pictures
 from twinmill.report.tables import Cell, Table, Tone, number, rounded, tone
 from twinmill.terminal import whole
 
-LEAST_TAKES = 0.05  # share of what is left that a formula must take to be worth a word
 TOO_FEW = (
     f"Of fewer than {FEWEST} robots none can be called the odd one, and what one has is looked for "
     "in all: where their scores differ (twinmill compare), give each a log of its own."
@@ -196,13 +195,7 @@ def moments(diagnosis: Diagnosis) -> Table:
 
 def lines(diagnosis: Diagnosis) -> list[str]:
     """What the tables do not say."""
-    told = list(diagnosis.notes)
-    rest = diagnosis.rest
-    if rest.term and rest.takes >= LEAST_TAKES:
-        told.append(
-            f"The best formula for what is left takes {100 * rest.takes:.0f} % of it: "
-            f"{rest.term.adds_to} += {rest.coefficient:.3g} * {rest.term.formula}."
-        )
+    told = [*diagnosis.notes, *formula.sentences(diagnosis.rest)]
     if diagnosis.late and (late := _late(diagnosis)):
         told.append(late)
     return told
@@ -285,7 +278,12 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
         [(label, number(value), tone(value)) for label, value in scores],
         diagnosis.sentence,
         comparisons.facts(before),
-        [*_detection_figures(diagnosis), *_gains(diagnosis), *robot_pictures(before)],
+        [
+            *_detection_figures(diagnosis),
+            *_gains(diagnosis),
+            *formula.figures(diagnosis.rest),
+            *robot_pictures(before),
+        ],
         [*_tables(diagnosis), *_detection_steps(diagnosis), *_detection_tables(diagnosis)],
         charts=charts(before, found_models(diagnosis)),
         next_step=next_run(diagnosis),

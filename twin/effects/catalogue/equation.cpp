@@ -9,29 +9,39 @@
 
 #include "effects/effect.h"
 #include "effects/nearest.h"
+#include "effects/remember.h"
 
 namespace twin
 {
 
-// A parsed formula and the places where its parser looks for the values of its names. Evaluating
-// writes them: one thread at a time, as for the state.
+// A parsed formula, the rate of its state if it has one, and the places where both look for the
+// values of their names. Evaluating writes them: one thread at a time, as for the state.
 class Formula
 {
 public:
+    // `rate`: of the state `s`; empty: there is none.
     Formula(std::span<const char *const> names, std::span<const double> parameters,
-            const std::string &text);
+            const std::string &text, const std::string &rate);
 
-    // Places in the list of names that the text uses.
+    // Places in the list of names that the texts use.
     std::span<const size_t> used() const { return used_; }
     double &operator[](size_t name) { return values_[name]; }
-    double Evaluate() const { return parser_.Eval(); }
+    bool remembers() const { return remembers_; }
+    // Takes the state through a step; the formula then has its mean over the step.
+    void Remember(double &state, double dt_s);
+    double Evaluate() const { return formula_.Eval(); }
 
 private:
-    void Parse(std::span<const char *const> names, const std::string &text);
+    void Define(mu::Parser &parser, std::span<const char *const> names,
+                std::span<const double> parameters);
+    void Parse(mu::Parser &parser, std::span<const char *const> names, const std::string &key,
+               const std::string &text);
 
     std::vector<double> values_;
     std::vector<size_t> used_;
-    mu::Parser parser_;
+    double state_ = 0;
+    bool remembers_;
+    mu::Parser formula_, rate_;
 };
 
 namespace
@@ -42,12 +52,16 @@ constexpr Card kCard = {
     .drives = kAnyDrive,
     .summary = "A formula of one's own is added to a quantity of the drive.",
     .equation =
-        "adds_to' = adds_to + formula(p0, p1, p2, p3, ...). Per wheel, duty: u (duty or command), "
+        "adds_to' = adds_to + formula(p0, p1, p2, p3, ..., s), ds/dt = state_rate, s = 0 at the "
+        "start. Per wheel, duty: u (duty or command), "
         "V (battery), left and front (1 or -1), t (s); rim_mps, speed the wheel tends to: these, "
         "target and rim (m/s, now), angle (rad). Body: vx, vy (m/s), omega (rad/s), x, y (m), "
-        "theta (rad), moves (0 or 1), t (s). Functions: abs sign min max sqrt exp ln sin cos tan "
-        "asin acos atan atan2 sinh cosh tanh and more of muParser; a ? b : c; _pi",
-    .leaves_out = "memory; where the formula has no finite value, nothing is added",
+        "theta (rad), moves (0 or 1), t (s); travel and motion: the share of way that is more. "
+        "Heading as captured, theta_rad: x, y, theta. Functions: abs sign min max sqrt exp ln sin "
+        "cos tan asin acos atan atan2 sinh cosh tanh and more of muParser; a ? b : c; _pi",
+    .leaves_out =
+        "more than one state; where the formula has no finite value, nothing is added, and where "
+        "the rate has none, s stays",
     .measure = "whatever drive varies the quantities in the formula; what it resembles is its own",
     .reference = "muParser (the parser); the formula is the user's",
     .family = Family::kFormula,
@@ -63,9 +77,13 @@ constexpr ParameterSpec kParameters[] = {
 };
 
 constexpr TextParameter kTexts[] = {
-    {"adds_to", "vx_mps", "one of duty, rim_mps (per wheel), vx_mps, vy_mps, omega_radps (body)"},
+    {"adds_to", "vx_mps",
+     "one of duty, rim_mps (per wheel), vx_mps, vy_mps, omega_radps (body), travel (share of vx "
+     "and vy), motion (share of vx, vy, omega), theta_rad (captured heading)"},
     {"formula", "p0*vx + p1*vy + p2*omega + p3*vx*abs(vx)",
      "what is added, in the unit of adds_to; should be 0 where p0 to p3 are"},
+    {"state_rate", "",
+     "ds/dt, of the same names and s; then the formula may name s, at rim_mps of each wheel"},
 };
 
 // A name in formulas, and its value for wheel k.
@@ -104,33 +122,87 @@ constexpr Name<GroundSignals> kBodyNames[] = {
     {"moves", [](const GroundSignals &s, int) { return s.moves ? 1.0 : 0.0; }},
 };
 
-// Adds the formula's value to one quantity; where it has no finite value, nothing.
+constexpr Name<ObservedPose> kPoseNames[] = {
+    {"x", [](const ObservedPose &p, int) { return p.x_m; }},
+    {"y", [](const ObservedPose &p, int) { return p.y_m; }},
+    {"theta", [](const ObservedPose &p, int) { return p.theta_rad; }},
+};
+
+// The formula's value; where it is not finite, nothing.
+double Finite(const Formula &formula)
+{
+    const double value = formula.Evaluate();
+    return std::isfinite(value) ? value : 0;
+}
+
+// The formula's value for wheel k at the end of its state's step.
 template <class S>
-void Add(std::span<const Name<S>> names, S &s, int k, Formula &formula, double &quantity)
+double Value(std::span<const Name<S>> names, const S &s, int k, Formula &formula, double *state)
 {
     for (const size_t i : formula.used())
         formula[i] = names[i].value(s, k);
-    const double added = formula.Evaluate();
-    if (std::isfinite(added))
-        quantity += added;
+    if (formula.remembers())
+        formula.Remember(state[k], s.dt_s);
+    return Finite(formula);
 }
 
-void AddToDuty(DutySignals &s, const Numbers &v, double *)
+void AddToDuty(DutySignals &s, const Numbers &v, double *state)
 {
     for (int k = 0; k < kMaxWheels; ++k)  // a velocity command has three parts on any robot
-        Add<DutySignals>(kDutyNames, s, k, *v.formula, s.duty[k]);
+        s.duty[k] += Value<DutySignals>(kDutyNames, s, k, *v.formula, state);
 }
 
-void AddToTarget(WheelSignals &s, const Numbers &v, double *)
+void AddToTarget(WheelSignals &s, const Numbers &v, double *state)
 {
     for (int k = 0; k < s.robot.wheels; ++k)
-        Add<WheelSignals>(kWheelNames, s, k, *v.formula, s.target_mps[k]);
+        s.target_mps[k] += Value<WheelSignals>(kWheelNames, s, k, *v.formula, state);
 }
 
 template <double GroundSignals::*velocity>
-void AddToBody(GroundSignals &s, const Numbers &v, double *)
+void AddToBody(GroundSignals &s, const Numbers &v, double *state)
 {
-    Add<GroundSignals>(kBodyNames, s, 0, *v.formula, s.*velocity);
+    s.*velocity += Value<GroundSignals>(kBodyNames, s, 0, *v.formula, state);
+}
+
+template <bool turning>
+void AddShare(GroundSignals &s, const Numbers &v, double *state)
+{
+    const double share = 1 + Value<GroundSignals>(kBodyNames, s, 0, *v.formula, state);
+    s.vx_mps *= share;
+    s.vy_mps *= share;
+    s.omega_radps *= turning ? share : 1;
+}
+
+double HeadingError(const ObservedPose &p, Formula &formula)
+{
+    for (const size_t i : formula.used())
+        formula[i] = kPoseNames[i].value(p, 0);
+    return Finite(formula);
+}
+
+void AddToHeading(ObservedPose &p, const Numbers &v)
+{
+    p.theta_rad += HeadingError(p, *v.formula);
+}
+
+// By repeated substitution: an error grows by less than the heading itself.
+void TakeFromHeading(ObservedPose &p, const Numbers &v)
+{
+    constexpr int kRounds = 50;
+    constexpr double kClose_rad = 1e-12;
+    const double seen_rad = p.theta_rad;
+    for (int round = 0; round < kRounds; ++round)
+    {
+        const double before_rad = p.theta_rad;
+        p.theta_rad = seen_rad - HeadingError(p, *v.formula);
+        if (std::abs(p.theta_rad - before_rad) < kClose_rad)
+            return;
+    }
+}
+
+int StateSize(const Numbers &v)
+{
+    return v.formula && v.formula->remembers() ? kMaxWheels : 0;
 }
 
 template <class S, size_t n>
@@ -158,6 +230,9 @@ const Quantity &FindQuantity(const std::string &name)
         {"vx_mps", OnGround{AddToBody<&GroundSignals::vx_mps>}, NamesOf(kBodyNames)},
         {"vy_mps", OnGround{AddToBody<&GroundSignals::vy_mps>}, NamesOf(kBodyNames)},
         {"omega_radps", OnGround{AddToBody<&GroundSignals::omega_radps>}, NamesOf(kBodyNames)},
+        {"travel", OnGround{AddShare<false>}, NamesOf(kBodyNames)},
+        {"motion", OnGround{AddShare<true>}, NamesOf(kBodyNames)},
+        {"theta_rad", OnObservation{AddToHeading, TakeFromHeading}, NamesOf(kPoseNames)},
     };
     std::set<std::string> known;
     for (const Quantity &quantity : kQuantities)
@@ -172,24 +247,25 @@ const Quantity &FindQuantity(const std::string &name)
 }
 
 // The parser's complaint as one sentence, positions counted from 1.
-[[noreturn]] void Fail(const std::string &formula, int position, const std::string &what)
+[[noreturn]] void Fail(const std::string &key, const std::string &text, int position,
+                       const std::string &what)
 {
-    const int end = static_cast<int>(formula.size());
+    const int end = static_cast<int>(text.size());
     const std::string where =
         position < 0 ? "" : " at letter " + std::to_string(std::min(position, end) + 1);
-    throw std::invalid_argument("equation.formula = '" + formula + "': " + what + where);
+    throw std::invalid_argument("equation." + key + " = '" + text + "': " + what + where);
 }
 
 // The same for one that the parser found.
 [[noreturn]] void Fail(const mu::Parser &parser, const mu::ParserError &error,
-                       const std::string &formula)
+                       const std::string &key, const std::string &text)
 {
     const std::string &token = error.GetToken();
     if (error.GetCode() != mu::ecUNASSIGNABLE_TOKEN || !(std::isalpha(token[0]) || token[0] == '_'))
     {
         std::string what = error.GetMsg().substr(0, error.GetMsg().find(" at position"));
         what = what.substr(0, what.find_last_not_of(".!") + 1);
-        Fail(formula, error.GetPos(), what);
+        Fail(key, text, error.GetPos(), what);
     }
     std::set<std::string> known;
     for (const auto &[name, address] : parser.GetVar())
@@ -198,30 +274,50 @@ const Quantity &FindQuantity(const std::string &name)
         known.insert(name);
     for (const auto &[name, function] : parser.GetFunDef())
         known.insert(name);
-    Fail(formula, error.GetPos(),
+    Fail(key, text, error.GetPos(),
          "unknown name '" + token + "', the nearest known is '" + Nearest(token, known) + "',");
 }
 
 EffectSpec::Compiled Compile(std::span<const double> values, std::span<const std::string> texts)
 {
     const Quantity &quantity = FindQuantity(texts[0]);
-    return {quantity.act, std::make_shared<Formula>(quantity.names, values, texts[1])};
+    const std::string &rate = texts[2];
+    const bool duty = std::holds_alternative<OnDuty>(quantity.act);
+    if (!rate.empty() && (duty || std::holds_alternative<OnObservation>(quantity.act)))
+        Fail("state_rate", rate, -1,
+             "what is added to " + texts[0] + " has no state; leave it empty, or add to " +
+                 (duty ? "rim_mps" : "omega_radps"));
+    return {quantity.act, std::make_shared<Formula>(quantity.names, values, texts[1], rate)};
 }
 
 }  // namespace
 
 Formula::Formula(std::span<const char *const> names, std::span<const double> parameters,
-                 const std::string &text)
-    : values_(names.size())
+                 const std::string &text, const std::string &rate)
+    : values_(names.size()), remembers_(!rate.empty())
 {
-    for (size_t i = 0; i < parameters.size(); ++i)
-        parser_.DefineConst(kParameters[i].name, parameters[i]);
-    for (size_t i = 0; i < names.size(); ++i)
-        parser_.DefineVar(names[i], &values_[i]);
-    Parse(names, text);
+    Define(formula_, names, parameters);
+    Parse(formula_, names, "formula", text);
+    if (remembers_)
+    {
+        Define(rate_, names, parameters);
+        Parse(rate_, names, "state_rate", rate);
+    }
 }
 
-void Formula::Parse(std::span<const char *const> names, const std::string &text)
+void Formula::Define(mu::Parser &parser, std::span<const char *const> names,
+                     std::span<const double> parameters)
+{
+    for (size_t i = 0; i < parameters.size(); ++i)
+        parser.DefineConst(kParameters[i].name, parameters[i]);
+    for (size_t i = 0; i < names.size(); ++i)
+        parser.DefineVar(names[i], &values_[i]);
+    if (remembers_)
+        parser.DefineVar("s", &state_);
+}
+
+void Formula::Parse(mu::Parser &parser, std::span<const char *const> names, const std::string &key,
+                    const std::string &text)
 {
     // The parser would take these for assignments and texts.
     for (size_t i = 0; i < text.size(); ++i)
@@ -229,30 +325,39 @@ void Formula::Parse(std::span<const char *const> names, const std::string &text)
         const bool compares = (i > 0 && std::string("=<>!").find(text[i - 1]) < 4) ||
                               (i + 1 < text.size() && text[i + 1] == '=');
         if (text[i] == '"' || text[i] == '\n' || (text[i] == '=' && !compares))
-            Fail(text, static_cast<int>(i), "only numbers are computed here, not this sign");
+            Fail(key, text, static_cast<int>(i), "only numbers are computed here, not this sign");
     }
     try
     {
-        parser_.SetExpr(text);
+        parser.SetExpr(text);
         int results = 0;
-        parser_.Eval(results);
+        parser.Eval(results);
         if (results != 1)
-            Fail(text, -1, "it must be one value, not a list of them");
-        const mu::varmap_type in_text = parser_.GetUsedVar();
+            Fail(key, text, -1, "it must be one value, not a list of them");
+        const mu::varmap_type in_text = parser.GetUsedVar();
         for (size_t i = 0; i < names.size(); ++i)
-            if (in_text.contains(names[i]))
+            if (in_text.contains(names[i]) && std::ranges::find(used_, i) == used_.end())
                 used_.push_back(i);
     }
     catch (const mu::ParserError &error)
     {
-        Fail(parser_, error, text);
+        Fail(parser, error, key, text);
     }
+}
+
+void Formula::Remember(double &state, double dt_s)
+{
+    state_ = twin::Remember(state, dt_s, [this](double at) {
+        state_ = at;
+        return rate_.Eval();
+    });
 }
 
 EFFECT(equation) = {
     .card = kCard,
     .parameters = kParameters,
     .act = OnGround{AddToBody<&GroundSignals::vx_mps>},
+    .state_size = StateSize,
     .texts = kTexts,
     .compile = Compile,
 };

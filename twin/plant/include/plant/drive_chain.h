@@ -40,6 +40,8 @@ public:
     // No effect of the ground reads where the robot is or heads, nor remembers anything: its
     // velocity in the body frame depends on its commands alone.
     bool IsHomogeneous() const { return homogeneous_; }
+    // Some effect on the ground has a state.
+    bool RemembersOnGround() const { return remembers_on_ground_; }
 
 private:
     template <class On>
@@ -74,6 +76,7 @@ private:
     std::vector<Bound<OnObservation>> observe_;
     int state_size_ = 0;
     bool homogeneous_ = true;
+    bool remembers_on_ground_ = false;
 };
 
 }  // namespace twin

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rows of the logs beside columns of forms: how well each predicts stretches that are left out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from twinmill.diagnosis.forms import Form, Motion, sized
+from twinmill.diagnosis.library import LEFT_OVER
+from twinmill.diagnosis.settings import SETTINGS
+from twinmill.fitting.opening import Opened
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.predict.windows import HORIZONS_S
+
+STRETCH_S = 8.0  # of one half, before one of the other
+SIGN_S = 4.0  # errors so far apart have signs of their own
+HORIZONS = (0, 2, 4)  # of HORIZONS_S: those between would choose the same
+
+
+class Evidence:
+    """Rows of the logs, whitened, and the columns of forms beside what is free in the fit.
+
+    Rows whose window reaches from one stretch into the next are left out.
+
+    Args:
+        logs: place among the fit's data sets, and the log.
+        motions: one for each log.
+        fit: of the final model.
+        changes: (R, T) of the library's terms, for each log.
+    """
+
+    def __init__(
+        self,
+        logs: Sequence[tuple[int, Opened]],
+        motions: Sequence[Motion],
+        fit: ScoreFit,
+        changes: Sequence[np.ndarray],
+    ) -> None:
+        self.logs, self.motions = logs, motions
+        self._divide()
+        rows, _ = fit.state
+        weight = np.concatenate([np.sqrt(fit.weight(i, rows[i])) for i, _ in logs])
+        left, free, _ = fit.whitened([i for i, _ in logs])
+        # As many independent errors as if all horizons were there.
+        self.more = np.sqrt(len(HORIZONS_S) / len(HORIZONS))
+        self.weight = self.more * weight[self.kept]
+        self._left, self._free = self.more * left[self.kept], self.more * free[self.kept]
+        self._changes = np.concatenate(list(changes))[self.kept]
+        self.weighed(np.ones(len(self._left)))
+
+    def _divide(self) -> None:
+        """Of rows that are kept: stretches, blocks that have one sign, and channels."""
+        kept, stretch, block = [], [], []
+        first_stretch = first_block = 0
+        for _, own in self.logs:
+            data = own.data
+            shape = data.measured.shape
+            t_s = data.measurement.track.pose_t_s
+            start_s = data.start_s - data.start_s[0]
+            end_s = t_s[np.maximum(data.windows.ends, 0)] - data.start_s[0]
+            at, fine = (np.floor(start_s / s).astype(int) for s in (STRETCH_S, SIGN_S))
+            inside = np.floor(end_s / STRETCH_S).astype(int) == at[:, None]
+            counted = np.zeros(shape[1], bool)
+            counted[list(HORIZONS)] = True
+            kept.append(np.broadcast_to((inside & counted)[..., None], shape).ravel())
+            stretch.append(np.broadcast_to((first_stretch + at)[:, None, None], shape).ravel())
+            block.append(np.broadcast_to((first_block + fine)[:, None, None], shape).ravel())
+            first_stretch, first_block = stretch[-1].max() + 1, block[-1].max() + 1
+        self.kept = np.concatenate(kept)
+        _, self.stretch = np.unique(np.concatenate(stretch)[self.kept], return_inverse=True)
+        self.block = np.concatenate(block)[self.kept]
+        channels = [3 * k + own.data.channel for k, (_, own) in enumerate(self.logs)]
+        self.channel = np.concatenate(channels)[self.kept]
+        edges = np.flatnonzero(np.diff(self.stretch, prepend=-1))
+        self.parts = [slice(a, b) for a, b in pairwise([*edges, len(self.stretch)])]
+
+    def weighed(self, scale: np.ndarray) -> None:
+        """Weighs each row (R,) anew."""
+        self.scale = scale
+        free = scale[:, None] * self._free
+        self.basis = np.linalg.qr(free)[0] if free.shape[1] else np.zeros((len(free), 0))
+        self.left = self.beside(self._left)
+
+    def beside(self, columns: np.ndarray) -> np.ndarray:
+        """(R,) or (R, K) as weighed, without what is free."""
+        weighed = (self.scale * columns.T).T
+        return weighed - self.basis @ (self.basis.T @ weighed)
+
+    def raw(self, forms: Sequence[Form]) -> np.ndarray:
+        """(R, K) columns of forms, whitened as the fit is."""
+        made = [f for f in forms if f.column < 0]
+        own = np.array([f.column < 0 for f in forms for _ in f.shapes], bool)
+        columns = np.empty((len(self._left), len(own)))
+        columns[:, ~own] = self._changes[:, [f.column for f in forms if f.column >= 0]]
+        if made:
+            parts = [np.zeros((0, own.sum()))]
+            for motion in self.motions:
+                some = motion.columns(made)
+                every = np.zeros((*motion.own.data.measured.shape, some.shape[-1]))
+                every[:, list(HORIZONS)] = some
+                parts.append(every.reshape(-1, some.shape[-1]))
+            columns[:, own] = np.concatenate(parts)[self.kept]
+        columns *= self.weight[:, None]
+        return columns
+
+    def of_all(self, changes: Sequence[np.ndarray]) -> np.ndarray:
+        """(R, 1) raw column of (R,) changes of each log's rows."""
+        return (self.weight * np.concatenate(list(changes))[self.kept])[:, None]
+
+    def seen(self, raw: np.ndarray) -> np.ndarray:
+        """The same of (R, K) raw columns."""
+        before = np.linalg.norm(self.scale[:, None] * raw, axis=0)
+        columns = self.beside(raw)
+        seen = np.linalg.norm(columns, axis=0) > LEFT_OVER * np.maximum(before, 1e-9)
+        return columns if seen.all() else np.where(seen, columns, 0.0)
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Of T forms, each with the columns beside: grams (S, T, k, k) and moments (S, T, k)."""
+
+    grams: np.ndarray
+    moments: np.ndarray
+
+    @classmethod
+    def of(
+        cls, rows: Evidence, columns: np.ndarray, forms: Sequence[Form], beside: np.ndarray
+    ) -> "Sums":
+        """By stretch, after those of (R, q) chosen columns; a second column may be zero."""
+        widths = np.array([len(f.shapes) for f in forms])
+        first = np.cumsum([0, *widths[:-1]])
+        second = np.minimum(first + 1, columns.shape[1] - 1)
+        there = widths == 2
+        q = beside.shape[1]
+        grams = np.zeros((len(rows.parts), len(widths), q + 2, q + 2))
+        moments = np.zeros((len(rows.parts), len(widths), q + 2))
+        known = np.column_stack([rows.left, beside])
+        for k, part in enumerate(rows.parts):
+            own, some = columns[part], known[part]
+            square = np.einsum("rt,rt->t", own, own)
+            cross = np.einsum("rt,rt->t", own[:, :-1], own[:, 1:])
+            across, within = some.T @ own, some.T @ some
+            gram, moment = grams[k], moments[k]
+            moment[:, :q] = within[0, 1:]
+            gram[:, :q, :q] = within[1:, 1:]
+            moment[:, q], moment[there, q + 1] = across[0, first], across[0, second[there]]
+            gram[:, q, q], gram[there, q + 1, q + 1] = square[first], square[second[there]]
+            gram[there, q, q + 1] = gram[there, q + 1, q] = cross[first[there]]
+            gram[:, :q, q] = gram[:, q, :q] = across[1:, first].T
+            gram[there, :q, q + 1] = gram[there, q + 1, :q] = across[1:, second[there]].T
+        return cls(grams, moments)
+
+    def fitted(self, weight: np.ndarray) -> np.ndarray:
+        """(T, k) numbers, in usual strengths, of (S,) weighted stretches."""
+        gram = np.tensordot(weight, self.grams, 1) + np.eye(self.grams.shape[-1])
+        return np.linalg.solve(gram, np.tensordot(weight, self.moments, 1)[..., None])[..., 0]
+
+    def held_out(self, half: np.ndarray) -> np.ndarray:
+        """(T,) fall of the cost on each stretch of a half, fitted to its others."""
+        total = np.zeros(self.grams.shape[1])
+        for k in np.flatnonzero(half):
+            others = half.astype(float)
+            others[k] = 0.0
+            numbers = self.fitted(others)
+            total += 2 * np.einsum("tk,tk->t", numbers, self.moments[k])
+            total -= np.einsum("ti,tij,tj->t", numbers, self.grams[k], numbers)
+        return total
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Forms to choose from, and their raw (R, K) columns."""
+
+    forms: Sequence[Form]
+    raw: np.ndarray
+
+    def some(self, wanted: Sequence[int]) -> "Pool":
+        """Those of these numbers."""
+        place = np.cumsum([0, *(len(f.shapes) for f in self.forms)])
+        own = np.concatenate([np.arange(place[k], place[k + 1]) for k in wanted])
+        return Pool([self.forms[k] for k in wanted], self.raw[:, own])
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Terms chosen on one half, their raw columns, and what they gain there on left-out parts."""
+
+    forms: tuple[Form, ...]
+    raw: np.ndarray
+    gain: float
+
+    @property
+    def numbers(self) -> int:
+        """Of all terms."""
+        return sum(f.numbers for f in self.forms)
+
+    @property
+    def net(self) -> float:
+        """Gain, less what numbers cost."""
+        return self.gain - SETTINGS.each * self.numbers
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What was chosen, the chance of its fall on the other half, and the share that it takes.
+
+    Attributes:
+        scale: (R,) weights of the rows with which it was chosen.
+    """
+
+    chosen: Chosen
+    chance: float
+    takes: float
+    scale: np.ndarray
+
+
+def fitted(rows: Evidence, chosen: Chosen, half: np.ndarray) -> np.ndarray:
+    """(K,) numbers in usual strengths, of a half."""
+    own = half[rows.stretch]
+    x, left = rows.seen(chosen.raw)[own], rows.left[own]
+    return np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ left)
+
+
+def made(rows: Evidence, forms: Sequence[Form], half: np.ndarray, found: Chosen) -> Chosen:
+    """The best of forms whose columns are not there yet."""
+    known = sized(forms, rows.motions)
+    return best_of(rows, Pool(known, rows.raw(known)), half, found) if known else found
+
+
+def best_of(rows: Evidence, pool: Pool, half: np.ndarray, found: Chosen) -> Chosen:
+    """The form of a pool that gains most on left-out stretches of a half beside what was found."""
+    gains = Sums.of(rows, rows.seen(pool.raw), pool.forms, rows.seen(found.raw)).held_out(half)
+    k = int(np.argmax(gains))
+    one = pool.some([k])
+    return Chosen((*found.forms, *one.forms), np.hstack([found.raw, one.raw]), float(gains[k]))

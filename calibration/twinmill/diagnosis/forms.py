@@ -1,0 +1,383 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Forms that a formula for what is left may have: where it acts, on what it depends, what it keeps.
+
+A form is linear in its numbers. It may have one constant besides (a time, a length, a wave number),
+and one state, which relaxes: ds/dt = rate (goal - s). How the rows of a fit change by it follows
+from the predicted motion, without a pass of the plant.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from twinmill.diagnosis.library import (
+    CHANNELS,
+    STILL,
+    SWELL,
+    TIME,
+    TYPICAL,
+    Term,
+    displaced,
+)
+from twinmill.fitting.opening import Opened
+from twinmill.fitting.response import Response
+
+PAST = "past motion"
+HEADING = "heading"
+ALL_AXES = {"travel": (0, 1), "motion": (0, 1, 2)}  # shares of these axes of the body
+HEADING_RAD = 0.02  # usual error of a captured heading
+USUAL = {**TYPICAL, "travel": SWELL, "motion": SWELL, "theta_rad": HEADING_RAD}
+LEVER_M = 0.1  # turning counts as driving at this radius
+SHORTEST_M = 0.3  # wave along the room
+MOST_WAVES = 40
+SHORTEST_S = 6.0  # what comes and goes with time
+MOMENTS = 12  # at which something may begin or end
+LONG_S = (5.0, 15.0, 45.0, 135.0)  # what warms up or recovers
+LAGS_S = (0.15, 0.4, 1.0, 2.5)
+STORED = {"vx": (0.003, 0.01, 0.03), "vy": (0.003, 0.01, 0.03), "omega": (0.02, 0.06, 0.2)}
+C, L = "{c}", "{l}"  # the constant and the lever in texts
+FUNCTIONS = {"abs": np.abs, "sign": np.sign, "sqrt": np.sqrt, "cos": np.cos, "sin": np.sin}
+FUNCTIONS["max"] = np.maximum
+
+
+@dataclass(frozen=True)
+class State:
+    """What a form remembers: s goes to `goal` at `rate` per second, texts as the shapes are."""
+
+    goal: str
+    rate: str
+
+    @property
+    def text(self) -> str:
+        """The rate of change, as the effect `equation` takes it."""
+        return f"({self.goal} - s)*{self.rate}"
+
+
+@dataclass(frozen=True)
+class Form:
+    """One term.
+
+    Attributes:
+        adds_to: where it acts, as the effect `equation` names it.
+        shapes: each is multiplied by a number of its own.
+        group: on what it depends.
+        state: what it remembers; None if nothing.
+        constant: written {c} in shapes and state; 0 where there is none.
+        spread: share of the constant within which a better one may lie.
+        unit: of the constant.
+        column: number of the library's term whose column it has; -1: it is made here.
+        sizes: of the shapes' values; empty until `sized`.
+    """
+
+    adds_to: str
+    shapes: tuple[str, ...]
+    group: str
+    state: State | None = None
+    constant: float = 0.0
+    spread: float = 0.0
+    unit: str = ""
+    column: int = -1
+    sizes: tuple[float, ...] = ()
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The shapes with their constant."""
+        return tuple(self._with_constant(s) for s in self.shapes)
+
+    @property
+    def of_body(self) -> bool:
+        """All that it names is of the body's motion, and not of single wheels."""
+        return self.adds_to != "rim_mps"
+
+    @property
+    def state_rate(self) -> str:
+        """Of the state with its constant; empty if there is none."""
+        return self._with_constant(self.state.text) if self.state else ""
+
+    @property
+    def numbers(self) -> int:
+        """Fitted ones, the constant among them."""
+        return len(self.shapes) + bool(self.constant)
+
+    @property
+    def strengths(self) -> np.ndarray:
+        """Numbers at which each shape adds what is typical."""
+        return USUAL[self.adds_to] / np.array(self.sizes)
+
+    def at(self, constant: float) -> "Form":
+        """The same with another constant."""
+        return replace(self, constant=float(f"{constant:.4g}"), sizes=())
+
+    def _with_constant(self, text: str) -> str:
+        return text.replace(C, f"{self.constant:.4g}").replace(L, f"{LEVER_M:g}")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One log as the model moves in it, at the points of its floor's response.
+
+    Attributes:
+        own: the log.
+        velocity: (N, 3) of the body, m/s and rad/s.
+        names: (N,) each, as the effect `equation` names them.
+        horizons: numbers of those that count here: the rest would choose the same.
+    """
+
+    own: Opened
+    velocity: np.ndarray
+    names: Mapping[str, np.ndarray]
+    horizons: Sequence[int]
+    _known: dict[tuple, np.ndarray] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, own: Opened, velocity: np.ndarray, horizons: Sequence[int]) -> "Motion":
+        """Of a log and (N, 3) the velocity in it."""
+        response = own.floor.response
+        vx, vy, omega = np.where(np.abs(velocity) < STILL, 0.0, velocity).T
+        x, y = response.pose[:, 0], response.pose[:, 1]
+        moves = (np.abs(velocity) > STILL).any(axis=1) * 1.0
+        names = dict(
+            moves=moves,
+            vx=vx,
+            vy=vy,
+            omega=omega,
+            x=x,
+            y=y,
+            theta=response.heading_rad,
+            t=response.middle_s,
+        )
+        return cls(own, velocity, names, horizons)
+
+    def values(self, form: Form) -> np.ndarray:
+        """(N, k) of a form's shapes."""
+        key = (form.adds_to == "theta_rad", form.texts, form.state_rate)
+        if key not in self._known:
+            self._known[key] = self._computed(form)
+        return self._known[key]
+
+    def _computed(self, form: Form) -> np.ndarray:
+        names = dict(self.names)
+        if form.adds_to == "theta_rad":
+            track = self.own.measurement.track
+            names["theta"] = np.nan_to_num(track.heading_smooth[self.own.floor.response.points])
+        if form.state:
+            names["s"] = self._remembered(form)
+        found = [_value(text, names) for text in form.texts]
+        return np.stack([np.broadcast_to(v, names["t"].shape) for v in found], axis=-1)
+
+    def _remembered(self, form: Form) -> np.ndarray:
+        """(N,) the state's mean over each step."""
+        step_s = self.own.floor.response.step_s
+        goal, rate = (
+            np.broadcast_to(_value(form._with_constant(t), self.names), step_s.shape)
+            for t in (form.state.goal, form.state.rate)
+        )
+        keep = np.exp(-rate * step_s)
+        push = (goal * (1 - keep)).tolist()
+        found, s = [], 0.0
+        for k, p in zip(keep.tolist(), push, strict=True):
+            before = s
+            s = k * s + p
+            found.append((before + s) / 2)
+        return np.array(found)
+
+    def columns(self, forms: Sequence[Form]) -> np.ndarray:
+        """(W, H, 3, K) change of the log's errors by each number of some forms, in floors."""
+        parts = {to: [f for f in forms if f.adds_to == to] for to in {f.adds_to for f in forms}}
+        weight = np.nan_to_num(self.own.data.weight[:, self.horizons])[..., None]
+        found = np.empty((*weight.shape[:3], sum(len(f.shapes) for f in forms)))
+        place = dict(zip(forms, np.cumsum([0, *(len(f.shapes) for f in forms)]), strict=False))
+        for adds_to, own in parts.items():
+            values = np.hstack([self.values(f) * f.strengths for f in own])
+            where = np.concatenate([place[f] + np.arange(len(f.shapes)) for f in own])
+            found[..., where] = weight * self._displaced(adds_to, values)
+        return found
+
+    def _displaced(self, adds_to: str, values: np.ndarray) -> np.ndarray:
+        """(W, H, 3, K) change of displacements where (N, K) values are added."""
+        response = copy(self.own.floor.response)
+        response.ends = response.ends[:, self.horizons]
+        if adds_to == "theta_rad":
+            return self._turned(response, values)
+        if adds_to in CHANNELS:
+            return displaced(response, self.velocity, values, CHANNELS.index(adds_to))
+        axes = ALL_AXES[adds_to]
+        parts = (
+            displaced(response, self.velocity, self.velocity[:, [a]] * values, a) for a in axes
+        )
+        return sum(parts)
+
+    def _turned(self, response: Response, error_rad: np.ndarray) -> np.ndarray:
+        """The same by (N, K) errors of the captured heading."""
+        start = error_rad[response.starts][:, None]
+        end = error_rad[np.maximum(response.ends, 0)]
+        moved = np.nan_to_num(self.own.data.measured[:, self.horizons])
+        ahead, left = moved[..., 0, None], moved[..., 1, None]
+        return np.stack([start * left, -start * ahead, end - start], axis=2)
+
+
+def _value(text: str, names: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Of a formula of this file or of the library, which Python and the plant read alike."""
+    return eval(text, {"__builtins__": {}, **FUNCTIONS}, dict(names)) * 1.0
+
+
+def sized(forms: Sequence[Form], motions: Sequence[Motion]) -> list[Form]:
+    """Forms with the sizes of their values over all logs; without those that are always zero."""
+    found = []
+    for form in forms:
+        values = np.abs(np.concatenate([m.values(form) for m in motions]))
+        sizes = np.maximum(np.percentile(values, 95, axis=0), np.sqrt(np.mean(values**2, axis=0)))
+        if np.isfinite(sizes).all() and (sizes > 1e-9).all():
+            found.append(replace(form, sizes=tuple(float(s) for s in sizes)))
+    return found
+
+
+def from_library(terms: Sequence[Term]) -> list[Form]:
+    """The library's terms that the effect `equation` can have.
+
+    Not what changes all speeds at once with time: the form `motion` says that without the wheels.
+    """
+    return [
+        Form(t.adds_to, (t.formula,), t.group, column=k, sizes=(t.size,))
+        for k, t in enumerate(terms)
+        if t.addable and not t.family and not t.formula.endswith("*rim")
+    ]
+
+
+def own_forms(motions: Sequence[Motion], sideways: bool) -> list[Form]:
+    """Forms beside the library's.
+
+    Args:
+        motions: of all logs.
+        sideways: the robot can move to its left.
+    """
+    every = {n: np.concatenate([m.names[n] for m in motions]) for n in motions[0].names}
+    return [
+        *_of_room(every),
+        *_of_time(every),
+        *_of_load(),
+        *_of_speed(),
+        *(f for axis in ("vx", "vy", "omega") if sideways or axis != "vy" for f in _late(axis)),
+    ]
+
+
+def _of_room(every: Mapping[str, np.ndarray]) -> list[Form]:
+    """What depends on place and heading."""
+    found = []
+    for name in ("x", "y"):
+        span = np.ptp(every[name])
+        if span < SHORTEST_M:
+            continue
+        count = int(min(2 * span / SHORTEST_M, MOST_WAVES))
+        for k in range(2, count + 1):
+            found.append(_wave(name, k, span))
+        found.append(Form("travel", (name,), "place"))
+    if np.ptp(every["theta"]) > 0.5:
+        for n in (1, 2, 3, 4):
+            pair = f"cos({n}*theta)", f"sin({n}*theta)"
+            found += [Form(to, pair, HEADING) for to in ("travel", "theta_rad")]
+            found.append(Form("omega_radps", tuple(f"{p}*omega" for p in pair), HEADING))
+    return found
+
+
+def _of_time(every: Mapping[str, np.ndarray]) -> list[Form]:
+    """What comes and goes, begins, or is there for a while."""
+    first, span = every["t"].min(), np.ptp(every["t"])
+    count = int(min(2 * span / SHORTEST_S, MOST_WAVES))
+    found = [_wave("t", k, span) for k in range(1, count + 1)]
+    at = [float(f"{first + span * k / MOMENTS:.4g}") for k in range(1, MOMENTS)]
+    found += [Form("motion", (f"(t > {a:g})",), TIME) for a in at]
+    found += [Form("motion", (f"(t > {a:g})*(t < {b:g})",), TIME) for a in at for b in at if a < b]
+    return found
+
+
+def _wave(name: str, k: int, span: float) -> Form:
+    """That has k half waves in what the logs span of a name of the motion."""
+    pair = f"cos({C}*{name})", f"sin({C}*{name})"
+    adds_to, group, unit = ("motion", TIME, "1/s") if name == "t" else ("travel", "place", "1/m")
+    rate = float(f"{np.pi * k / span:.4g}")
+    return Form(adds_to, pair, group, constant=rate, spread=0.5 / k, unit=unit)
+
+
+def _of_load() -> list[Form]:
+    """What warms up, empties or recovers: a state that follows how hard the robot drives."""
+    turning = f"{L}*{L}*omega*omega"
+    load, rate = f"(vx*vx + vy*vy + {turning})", f"(1/{C})"
+    way = f"sqrt(vx*vx + vy*vy + {turning})"
+    return [
+        Form("motion", ("s",), PAST, State(of, rate), constant=long_s, spread=0.4, unit="s")
+        for of in (load, way)
+        for long_s in LONG_S
+    ]
+
+
+def _of_speed() -> list[Form]:
+    """Losses of way that speeds or turning cause."""
+    shapes = (
+        ("speed", "sqrt(vx*vx + vy*vy)"),
+        ("speed", "(vx*vx + vy*vy)"),
+        ("turning rate", "abs(omega)"),
+        ("turning rate", "omega*omega"),
+    )
+    return [Form("travel", (shape,), group) for group, shape in shapes]
+
+
+def _late(axis: str) -> list[Form]:
+    """What a speed does after its past: a second lag, and way that each reversal stores first."""
+    to = {"vx": "vx_mps", "vy": "vy_mps", "omega": "omega_radps"}[axis]
+    lag, stored = State(axis, f"(1/{C})"), State(f"{C}*sign({axis})", f"(abs({axis})/{C})")
+    found = [Form(to, (f"({axis} - s)",), PAST, lag, lag_s, 0.4, "s") for lag_s in LAGS_S]
+    unit = "rad" if axis == "omega" else "m"
+    for reach in STORED[axis]:
+        for shape in (f"({axis} - abs({axis})*s/{C})", "s"):
+            found.append(Form(to, (shape,), PAST, stored, reach, 0.4, unit))
+    return found
+
+
+def on_and_off(wave: Form, numbers: np.ndarray, levels: Sequence[float]) -> list[Form]:
+    """A wave of time sharpened: there while the wave, or its opposite, is above a level.
+
+    Args:
+        wave: with its constant.
+        numbers: (2,) of its cosine and sine.
+        levels: -1 to 1.
+    """
+    phase = float(np.arctan2(numbers[0], numbers[1]))
+    found = []
+    for turned in (phase, phase - np.copysign(np.pi, phase)):
+        inside = f"sin({wave.constant:.4g}*t + {turned:.3f})"
+        found += [Form(wave.adds_to, (f"({inside} > {a:g})",), wave.group) for a in levels]
+    return found
+
+
+def joined(forms: Sequence[Form]) -> dict[str, str]:
+    """Texts of the effect `equation` that has these terms, all of one place, one with a state."""
+    shapes = [text for form in forms for text in form.texts]
+    formula = " + ".join(f"p{k}*{text}" for k, text in enumerate(shapes))
+    rate = next((f.state_rate for f in forms if f.state), "")
+    texts = {"adds_to": forms[0].adds_to, "formula": formula}
+    return texts | ({"state_rate": rate} if rate else {})
+
+
+def names_in(texts: Sequence[str]) -> list[str]:
+    """Names of the motion that formulas have, in the order of the motion's."""
+    words = set(re.findall(r"[A-Za-z_]\w*", " ".join(texts)))
+    return [n for n in ("vx", "vy", "omega", "x", "y", "theta", "t") if n in words]
+
+
+def variable_of(forms: Sequence[Form]) -> tuple[str, str]:
+    """The name on which a formula is drawn, and the one that all its terms are multiplied by.
+
+    Of a state, time.
+    """
+    shapes = [text for form in forms for text in form.texts]
+    last = {shape.rpartition("*")[2] for shape in shapes}
+    carrier = last.pop() if len(last) == 1 else ""
+    factors = [shape.removesuffix(f"*{carrier}") for shape in shapes]
+    named = names_in(factors[:1])
+    if carrier not in ("vx", "vy", "omega") or not named:
+        carrier, named = "", names_in(shapes[:1])
+    return (named[0] if named and not forms[0].state else "t"), carrier

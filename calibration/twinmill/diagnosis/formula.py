@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A formula for what is left that was proven, for reports and JSON."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinmill.diagnosis.forms import Form, joined
+from twinmill.diagnosis.known_physics import resembles
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number of a formula: its value and 95 % interval.
+
+    Attributes:
+        name: p0 to p3; empty of a constant that the text has in figures.
+        unit: of the number.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return vars(self)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """What is left over one variable, and the formula's curve over it.
+
+    Attributes:
+        name: the variable, as formulas name it.
+        at: (B,) means of bins of it.
+        left: (B,) what is left there, in the unit of what the formula adds to, per `carrier`.
+        spread: (B,) its standard error.
+        drawn: (B,) the formula.
+        carrier: name of the motion that all terms are multiplied by; empty if there is none.
+    """
+
+    name: str
+    carrier: str
+    at: np.ndarray
+    left: np.ndarray
+    spread: np.ndarray
+    drawn: np.ndarray
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A formula that was proven on blocks which neither chose nor fitted it.
+
+    Attributes:
+        forms: its terms, all of one place.
+        numbers: p0 and so on, in their order, then the constant of each term that has one.
+        takes: share of what is left that it took on the half that judged it.
+        chance: of such a fall if it were noise, for both halves together.
+        tried: forms that it was chosen of.
+        again: share of resamplings of the stretches in which the same place and dependence win.
+        holds: names of the motion in it, with the least and largest value seen.
+        curve: what the report draws; None of single wheels.
+        instead_of: findings in doubt, without which it was found.
+    """
+
+    forms: tuple[Form, ...]
+    numbers: tuple[Number, ...]
+    takes: float
+    chance: float
+    tried: int
+    again: float
+    holds: dict[str, tuple[float, float]]
+    curve: Curve | None
+    instead_of: tuple[str, ...] = ()
+
+    @property
+    def equation(self) -> dict[str, str]:
+        """Texts of the effect `equation` that adds it to a model."""
+        return joined(self.forms)
+
+    @property
+    def depends_on(self) -> list[str]:
+        """Groups of its terms, each once."""
+        return list(dict.fromkeys(f.group for f in self.forms))
+
+    @property
+    def text(self) -> str:
+        """With its numbers in place of their names."""
+        texts = [text for form in self.forms for text in form.texts]
+        terms = [f"{n.value:.3g}*{t}" for n, t in zip(self.numbers, texts, strict=False)]
+        rate = self.equation.get("state_rate", "")
+        return " + ".join(terms).replace("+ -", "- ") + (f" with ds/dt = {rate}" if rate else "")
+
+    @property
+    def like(self) -> str:
+        """Known physics that it looks like; empty if none."""
+        return resembles(self.forms, [n.value for n in self.numbers])
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return {
+            "equation": self.equation,
+            "text": f"{self.forms[0].adds_to} += {self.text}",
+            "depends_on": self.depends_on,
+            "numbers": [n.to_json() for n in self.numbers],
+            "takes": self.takes,
+            "chance": self.chance,
+            "tried": self.tried,
+            "again": self.again,
+            "like": self.like,
+            "instead_of": list(self.instead_of),
+            "holds": {name: list(span) for name, span in self.holds.items()},
+        }

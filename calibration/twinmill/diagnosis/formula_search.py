@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The simplest formula for what is left, chosen on one half of the blocks and proven on the other.
+
+Stretches of the logs alternate between two halves. On each half in turn a formula is chosen: of all
+forms, the one of fewest numbers among those that predict left-out stretches of that half equally
+well; then terms beside it, as long as they help. What was chosen is judged on the other half, which
+neither chose nor fitted it: by an F test, and by the chance of so large a fall under random signs
+of blocks (both exact for what they assume; the larger chance counts). So one formula is tested a
+half, however many were tried, and both halves together count twice (Bonferroni).
+"""
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+from scipy.stats import f as fisher
+
+from twinmill.diagnosis.evidence import (
+    HORIZONS,
+    Chosen,
+    Evidence,
+    Pool,
+    Proof,
+    Sums,
+    best_of,
+    fitted,
+    made,
+)
+from twinmill.diagnosis.forms import Form, Motion, from_library, on_and_off, own_forms, sized
+from twinmill.diagnosis.formula import Formula
+from twinmill.diagnosis.formula_telling import TRIED, stability, told
+from twinmill.diagnosis.library import TIME, Term
+from twinmill.diagnosis.settings import SETTINGS
+from twinmill.fitting.opening import Opened
+from twinmill.fitting.score_fit import ScoreFit
+
+FEWEST = 4  # stretches
+SHORTLIST = 60  # forms that are weighed again once it is known what noise remains
+MOST_SCALED = 100.0  # of the square of a channel
+MOST_NUMBERS = 4  # the effect `equation` has p0 to p3
+MOST_TERMS = 3
+ALL_SIGNS = 12  # up to so many blocks all signs are tried ...
+DRAWN = 4095  # ... of more so many
+LEVELS = (-0.7, -0.35, 0.0, 0.35, 0.7)  # of a wave that is sharpened
+
+
+def formula_of(
+    fit: ScoreFit,
+    *,
+    logs: Sequence[tuple[int, Opened]],
+    velocities: Sequence[np.ndarray],
+    terms: Sequence[Term],
+    changes: Sequence[np.ndarray],
+    rival: Sequence[np.ndarray] = (),
+) -> Formula | None:
+    """The formula for what a fit leaves; None if none is proven.
+
+    Args:
+        fit: of the model that lacks it.
+        logs: place among the fit's data sets, and the log.
+        velocities: (N, 3) of the body in each, as the final model moves.
+        terms: of the library.
+        changes: (R, T) of each log's rows by each.
+        rival: (R,) of each log's rows by what the formula must outdo; empty if nothing.
+    """
+    pairs = zip(logs, velocities, strict=True)
+    motions = [Motion.of(own, v, HORIZONS) for (_, own), v in pairs]
+    sideways = fit.models[logs[0][0]].wheel_kind not in ("differential", "ackermann")
+    rows = Evidence(logs, motions, fit, changes)
+    if len(rows.parts) < FEWEST:
+        return None
+    forms = [*from_library(terms), *sized(own_forms(motions, sideways), motions)]
+    pool = Pool(forms, rows.raw(forms))
+    other = rows.of_all(rival) if len(rival) else None
+    half = np.arange(len(rows.parts)) % 2 == 0
+    proofs = [proof for own in (half, ~half) if (proof := _proven(rows, pool, own, other))]
+    for proof in sorted(proofs, key=lambda p: (p.chance, -p.takes)):
+        rows.weighed(proof.scale)
+        again = stability(rows, pool, proof.chosen.forms[0])
+        if again >= SETTINGS.formula_again:
+            return told(rows, proof, len(forms), again)
+    return None
+
+
+def _proven(rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | None) -> Proof | None:
+    """Chooses on a half and judges on the other; None where that does not bear it out.
+
+    Args:
+        rows: are weighed anew.
+        pool: to choose from.
+        half: (S,) of the stretches.
+        rival: (R, 1) raw column of what it must outdo.
+    """
+    rows.weighed(np.ones(len(rows.stretch)))
+    nothing = Chosen((), np.zeros((len(rows.stretch), 0)), 0.0)
+    sums = Sums.of(rows, rows.seen(pool.raw), pool.forms, rows.seen(nothing.raw))
+    net = sums.held_out(half) - SETTINGS.each * np.array([f.numbers for f in pool.forms])
+    best = np.argsort(-net)[:SHORTLIST]
+    if net[best[0]] <= 0:
+        return None
+    first = pool.some(best[:1])
+    rows.weighed(_scales(rows, first.raw, half))
+    chosen = _chosen(rows, pool, pool.some(best), half)
+    if not chosen or (rival is not None and _outdone(rows, chosen, rival, half)):
+        return None
+    proof = _proof(rows, chosen, half)
+    if proof.chance > SETTINGS.formula_chance or proof.takes < SETTINGS.formula_takes:
+        return None
+    return proof
+
+
+def _outdone(rows: Evidence, chosen: Chosen, rival: np.ndarray, half: np.ndarray) -> bool:
+    """Whether a rival predicts left-out stretches as well."""
+    one = Pool([Form("motion", ("1",), "", sizes=(1.0,))], rival)
+    sums = Sums.of(rows, rows.seen(rival), one.forms, rows.seen(rival[:, :0]))
+    return bool(sums.held_out(half)[0] >= chosen.gain - _alike(chosen.gain))
+
+
+def _scales(rows: Evidence, raw: np.ndarray, half: np.ndarray) -> np.ndarray:
+    """(R,) weights with which what these columns leave of each channel counts as noise."""
+    x, own = rows.seen(raw), half[rows.stretch]
+    numbers = np.linalg.solve(x[own].T @ x[own] + np.eye(x.shape[1]), x[own].T @ rows.left[own])
+    after = rows.left[own] - x[own] @ numbers
+    channel = rows.channel[own]
+    size = rows.channel.max() + 1
+    before, after = (np.bincount(channel, v**2, size) for v in (rows.left[own], after))
+    ratio = np.where(after > 0, before / np.maximum(after, 1e-12), 1.0)
+    return np.sqrt(np.clip(ratio, 1.0, MOST_SCALED))[rows.channel]
+
+
+# -- choosing --------------------------------------------------------------------------------------
+
+
+def _chosen(rows: Evidence, pool: Pool, short: Pool, half: np.ndarray) -> Chosen | None:
+    """The simplest terms that predict left-out stretches of a half as well as any.
+
+    Args:
+        rows: as they are weighed.
+        pool: of which the terms after the first are.
+        short: of which the first is.
+        half: (S,) of the stretches.
+    """
+    found = Chosen((), np.zeros((len(rows.stretch), 0)), 0.0)
+    while len(found.forms) < MOST_TERMS:
+        best = _best(rows, short, half, found)
+        if best is None or not _worth(best, found, len(short.forms)):
+            break
+        found = best
+        fitting = [k for k, f in enumerate(pool.forms) if _fits_beside(f, found)]
+        if not fitting:
+            break
+        short = pool.some(fitting)
+    return found if found.forms else None
+
+
+def _worth(more: Chosen, less: Chosen, tried: int) -> bool:
+    """Whether what is chosen beside the rest gains more than the best of so many would."""
+    rise = more.net - less.net
+    if not less.forms:
+        return rise > 0
+    return rise > max(2 * np.log(tried), SETTINGS.formula_beside * less.gain)
+
+
+def _fits_beside(form: Form, found: Chosen) -> bool:
+    states = bool(form.state) + sum(bool(f.state) for f in found.forms)
+    shapes = len(form.shapes) + sum(len(f.shapes) for f in found.forms)
+    same = form.adds_to == found.forms[0].adds_to
+    return same and states < 2 and shapes <= MOST_NUMBERS and form not in found.forms
+
+
+def _best(rows: Evidence, pool: Pool, half: np.ndarray, found: Chosen) -> Chosen | None:
+    """The simplest that gains as much as any beside what was found, its constant polished."""
+    sums = Sums.of(rows, rows.seen(pool.raw), pool.forms, rows.seen(found.raw))
+    gains = sums.held_out(half)
+    net = gains - SETTINGS.each * np.array([f.numbers for f in pool.forms])
+    if net.max() <= 0:
+        return None
+    near = np.flatnonzero(net >= net.max() - _alike(net.max()))
+    simplest = min(near, key=lambda k: (_complexity(pool.forms[k]), -net[k]))
+    tops = dict.fromkeys([int(simplest), int(np.argmax(net))])
+    polished = [_polished(rows, pool.some([k]), half, found) for k in tops]
+    most = max(c.net for c in polished)
+    close = [c for c in polished if c.net >= most - _alike(most)]
+    return min(close, key=lambda c: (_complexity(c.forms[-1]), -c.gain))
+
+
+def _alike(gain: float) -> float:
+    """By how much less a simpler formula may gain."""
+    return max(SETTINGS.tie, SETTINGS.formula_alike * gain)
+
+
+def _complexity(form: Form) -> int:
+    """Numbers, and a state counts as one more."""
+    return form.numbers + bool(form.state)
+
+
+def _polished(rows: Evidence, one: Pool, half: np.ndarray, found: Chosen) -> Chosen:
+    """With the best constant near the form's, and sharpened where that is simpler or better."""
+    best = best_of(rows, one, half, found)
+    if not best.forms[-1].constant:
+        return best
+    for part in (1.0, 0.25):
+        form = best.forms[-1]
+        tried = [form.at(form.constant * (1 + part * form.spread * f)) for f in TRIED]
+        best = max(best, made(rows, tried, half, found), key=lambda c: c.gain)
+    form = best.forms[-1]
+    if form.group != TIME:
+        return best
+    numbers = fitted(rows, best, half)[-2:] * form.strengths
+    near = [form.at(form.constant * (1 + form.spread * f / 4)) for f in TRIED[::2]]
+    sharp = [s for w in near for s in on_and_off(w, numbers, LEVELS)]
+    other = made(rows, sharp, half, found)
+    return other if other.net > best.net - _alike(best.net) else best
+
+
+# -- proof -----------------------------------------------------------------------------------------
+
+
+def _proof(rows: Evidence, chosen: Chosen, half: np.ndarray) -> Proof:
+    """Judges on the half that did not choose."""
+    numbers = fitted(rows, chosen, half)
+    judging = ~half[rows.stretch]
+    x, left = rows.seen(chosen.raw)[judging], rows.left[judging]
+    gain = 2 * numbers @ (x.T @ left) - np.sum((x @ numbers) ** 2)
+    total = float(left @ left)
+    _, block = np.unique(rows.block[judging], return_inverse=True)
+    chance = 1.0
+    if gain > 0:
+        errors = np.sum((left / rows.scale[judging]) ** 2)
+        chance = max(_by_signs(np.bincount(block, (x @ numbers) * left)), _by_f(x, left, errors))
+    return Proof(chosen, min(1.0, 2 * chance), float(gain / max(total, 1e-9)), rows.scale)
+
+
+def _by_signs(pushes: np.ndarray) -> float:
+    """Chance of so large a sum of the blocks' parts if each had a random sign."""
+    if len(pushes) <= ALL_SIGNS:
+        signs = np.array(list(product((1.0, -1.0), repeat=len(pushes))))
+        return float(np.mean(signs @ pushes >= pushes.sum() * (1 - 1e-12)))
+    signs = np.random.default_rng(1).choice([-1.0, 1.0], (DRAWN, len(pushes)))
+    return float((1 + np.sum(signs @ pushes >= pushes.sum())) / (1 + DRAWN))
+
+
+def _by_f(x: np.ndarray, left: np.ndarray, errors: float) -> float:
+    """F test of (R, K) columns where (R,) rows tell so many independent errors."""
+    total, k = float(left @ left), x.shape[1]
+    push = x.T @ left
+    fall = float(np.linalg.lstsq(x.T @ x, push, rcond=None)[0] @ push)
+    if errors - k < 1:
+        return 1.0
+    rest = max(total - fall, 1e-9) / (errors - k)
+    return float(fisher.sf(fall / k / rest, k, errors - k))

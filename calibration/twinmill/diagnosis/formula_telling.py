@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is told of a formula that was proven: numbers with intervals, stability, a curve."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.stats import t as student
+
+from twinmill.diagnosis.evidence import Chosen, Evidence, Pool, Proof, Sums, best_of, made
+from twinmill.diagnosis.forms import USUAL, Form, names_in, variable_of
+from twinmill.diagnosis.formula import Curve, Formula, Number
+from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.units import units_of
+
+TRIED = np.linspace(-1, 1, 9)  # constants within a form's spread, and again within a fourth
+DRAWS = 40  # resamplings of the stretches
+SLOPE = 0.01  # of a constant's logarithm
+LARGEST_LOG = 5.0
+BINS = 14  # of the curve that a report draws
+
+
+# -- telling ---------------------------------------------------------------------------------------
+
+
+def told(rows: Evidence, proof: Proof, tried: int, again: float) -> Formula:
+    """With numbers from all blocks, their intervals, and where the formula holds."""
+    every = np.ones(len(rows.parts), bool)
+    found = Chosen((), np.zeros((len(rows.stretch), 0)), 0.0)
+    for form in proof.chosen.forms:
+        best = best_of(rows, Pool([form], rows.raw([form])), every, found)
+        if form.constant:
+            near = [form.at(form.constant * (1 + form.spread / 4 * f)) for f in TRIED]
+            best = max(best, made(rows, near, every, found), key=lambda c: c.gain)
+        found = best
+    names = names_in([t for f in found.forms for t in (*f.texts, f.state_rate)])
+    seen = {n: np.concatenate([m.names[n] for m in rows.motions]) for n in names}
+    numbers = _numbers(rows, found)
+    return Formula(
+        forms=found.forms,
+        numbers=numbers,
+        takes=proof.takes,
+        chance=proof.chance,
+        tried=tried,
+        again=again,
+        holds={n: (float(v.min()), float(v.max())) for n, v in seen.items()},
+        curve=_curve(rows, found.forms, numbers) if found.forms[0].of_body else None,
+    )
+
+
+def _curve(rows: Evidence, forms: Sequence[Form], numbers: Sequence[Number]) -> Curve:
+    """What is left in bins of the first variable of the first term, and the formula there."""
+    name, carrier = variable_of(forms)
+    at = np.concatenate([m.names[name] for m in rows.motions])
+    if name == "theta":
+        middles = np.linspace(-np.pi, np.pi, BINS, endpoint=False)
+        inside = [f"(cos(theta - {a:.4f}) > {np.cos(np.pi / BINS):.6f})" for a in middles]
+    else:
+        edges = np.unique(np.quantile(at, np.linspace(0, 1, BINS + 1)))
+        edges[-1] += 1e-9 + 1e-6 * abs(edges[-1])
+        inside = [f"({name} >= {a!r})*({name} < {b!r})" for a, b in pairwise(edges.tolist())]
+        middles = (edges[1:] + edges[:-1]) / 2
+    by = f"*{carrier}" if carrier else ""
+    bins = [Form(forms[0].adds_to, (f"{text}{by}",), "", sizes=(1.0,)) for text in inside]
+    x = rows.seen(rows.raw(bins))
+    gram = x.T @ x
+    ridge = 1e-3 * np.trace(gram) / len(gram) * np.eye(len(gram))
+    inverse = np.linalg.inv(gram + ridge)
+    drawn = _drawn(rows, forms, [n.value for n in numbers if n.name], bins)
+    apart = np.eye(len(gram)) - 1 / len(gram)  # what all bins share is a gain of the base
+    left = inverse @ (x.T @ rows.left) * USUAL[forms[0].adds_to]
+    spread = np.sqrt(np.diag(apart @ inverse @ apart)) * USUAL[forms[0].adds_to]
+    return Curve(name, carrier, middles, left + np.mean(drawn - left), spread, drawn)
+
+
+def _drawn(
+    rows: Evidence, forms: Sequence[Form], values: Sequence[float], bins: Sequence[Form]
+) -> np.ndarray:
+    """(B,) the formula in bins, as what is left there is fitted: by least squares on carriers."""
+    parts = [np.hstack([m.values(f) for f in forms]) @ np.array(values) for m in rows.motions]
+    whole = np.concatenate(parts)
+    weights = [np.concatenate([m.values(b)[:, 0] for m in rows.motions]) for b in bins]
+    return np.array([w @ whole / max(w @ w, 1e-12) for w in weights])
+
+
+def _numbers(rows: Evidence, found: Chosen) -> tuple[Number, ...]:
+    """Values and intervals: the jackknife over stretches, the constants' slopes beside."""
+    constants = [k for k, f in enumerate(found.forms) if f.constant]
+    plain = rows.seen(found.raw)
+    x = np.column_stack([plain, *(_slope(rows, found, k) for k in constants)])
+    grams = np.array([x[p].T @ x[p] for p in rows.parts])
+    moments = np.array([x[p].T @ rows.left[p] for p in rows.parts])
+    gram, moment = grams.sum(0), moments.sum(0)
+    ridge = 1e-9 * np.diag(np.maximum(np.diag(gram), 1e-12))
+    values = np.linalg.solve(gram + ridge, moment)
+    apart = [
+        np.linalg.solve(gram - g + ridge, moment - m) - values
+        for g, m in zip(grams, moments, strict=True)
+    ]
+    count = len(rows.parts)
+    half = student.ppf(0.975, count - 1) * np.sqrt(
+        (count - 1) / count * np.sum(np.square(apart), axis=0)
+    )
+    strengths = np.concatenate([f.strengths for f in found.forms])
+    units = [unit for f in found.forms for unit in units_of(f)]
+    own = _of_all(rows, found) * strengths
+    told = [
+        Number(f"p{k}", float(v), float(v - h), float(v + h), unit)
+        for k, (v, h, unit) in enumerate(zip(own, half[: len(own)] * strengths, units, strict=True))
+    ]
+    for k, h in zip(constants, half[len(own) :], strict=True):
+        at, by = found.forms[k].constant, float(np.exp(min(h, LARGEST_LOG)))
+        told.append(Number("", at, at / by, at * by, found.forms[k].unit))
+    return tuple(told)
+
+
+def _of_all(rows: Evidence, found: Chosen) -> np.ndarray:
+    x = rows.seen(found.raw)
+    return np.linalg.lstsq(x, rows.left, rcond=None)[0]
+
+
+def _slope(rows: Evidence, found: Chosen, k: int) -> np.ndarray:
+    """(R,) change of the rows by the logarithm of the k-th term's constant."""
+    form = found.forms[k]
+    first = sum(len(f.shapes) for f in found.forms[:k])
+    own = _of_all(rows, found)[first : first + len(form.shapes)] * form.strengths
+    up, down = (replace(form, constant=form.constant * b) for b in (1 + SLOPE, 1 - SLOPE))
+    above, below = (rows.seen(rows.raw([f])) @ (own / f.strengths) for f in (up, down))
+    return (above - below) / (2 * SLOPE)
+
+
+def stability(rows: Evidence, pool: Pool, first: Form) -> float:
+    """Share of resamplings of the stretches in which a form of the same kind gains most."""
+    beside = np.zeros((len(rows.stretch), 0))
+    sums = Sums.of(rows, rows.seen(pool.raw), pool.forms, beside)
+    cost = SETTINGS.each * np.array([f.numbers for f in pool.forms])
+    random, count, same = np.random.default_rng(1), len(rows.parts), 0
+    for _ in range(DRAWS):
+        weight = np.bincount(random.integers(count, size=count), minlength=count).astype(float)
+        push = np.tensordot(weight, sums.moments, 1)
+        gain = np.einsum("tk,tk->t", sums.fitted(weight), push) - cost
+        best = pool.forms[int(np.argmax(gain))]
+        same += (best.adds_to, best.group) == (first.adds_to, first.group)
+    return same / DRAWS

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What known physics a formula looks like, by its shape and its sign; empty where neither says."""
+
+import re
+from collections.abc import Callable, Sequence
+
+from twinmill.diagnosis.forms import PAST, Form
+
+AXES = {"vx": "driving", "vy": "driving sideways", "omega": "turning"}
+CHANNEL_OF = {"vx_mps": "vx", "vy_mps": "vy", "omega_radps": "omega"}
+
+
+def resembles(forms: Sequence[Form], numbers: Sequence[float]) -> str:
+    """In words, of the first term that says something; empty if none does.
+
+    Args:
+        forms: terms of a formula.
+        numbers: theirs, in order.
+    """
+    first = 0
+    for form in forms:
+        own = numbers[first : first + len(form.shapes)]
+        first += len(form.shapes)
+        for looks in LOOKS:
+            if words := looks(form, own):
+                return words
+    return ""
+
+
+def _of_speed(form: Form, own: Sequence[float]) -> str:
+    axis = CHANNEL_OF.get(form.adds_to)
+    opposing = own[0] < 0
+    if axis and form.shapes == (f"{axis}*abs({axis})",):
+        return (
+            f"quadratic in the speed of {AXES[axis]}, opposing motion: like air drag or oil in the "
+            "gear"
+            if opposing
+            else f"quadratic in the speed of {AXES[axis]}, with the motion: like motors that gain "
+            "more than in proportion"
+        )
+    if axis and form.shapes == (f"sign({axis})",) and opposing:
+        return f"constant against {AXES[axis]}: like dry friction"
+    if axis and form.shapes == (f"abs({axis})",):
+        return f"another size of {AXES[axis]} one way than the other: like unequal motors or a gear"
+    if axis and form.shapes[0].startswith(f"sign({axis})*max(0") and opposing:
+        return f"a loss of {AXES[axis]} from some speed on: like slip or a voltage that gives out"
+    if form.adds_to == "travel" and form.shapes == ("(vx*vx + vy*vy)",) and opposing:
+        return "a loss of way with the square of the speed: like air drag"
+    if form.adds_to == "travel" and form.shapes == ("sqrt(vx*vx + vy*vy)",) and opposing:
+        return "a loss of way in proportion to the speed: like slip of the wheels"
+    if form.adds_to == "travel" and "omega" in form.shapes[0] and opposing:
+        return "a loss of way where it turns: like tyres that scrub in curves"
+    return ""
+
+
+def _of_two_speeds(form: Form, own: Sequence[float]) -> str:
+    axis = CHANNEL_OF.get(form.adds_to)
+    named = set(re.findall(r"vx|vy|omega", form.shapes[0]))
+    if form.adds_to in ("vx_mps", "vy_mps") and "omega" in named and named - {"omega", axis}:
+        return "grows with the pull of curves: like wheels that slip sideways"
+    if form.adds_to == "omega_radps" and named and axis not in named:
+        return "turning that comes of driving: like a smaller wheel or a load off the middle"
+    return ""
+
+
+def _of_past(form: Form, own: Sequence[float]) -> str:
+    if form.group != PAST or not form.state:
+        return ""
+    if form.adds_to == "motion":
+        falls = "falls" if own[0] < 0 else "rises"
+        of = "heat of the motors" if form.state.goal.startswith("(") else "load of the battery"
+        return f"speed {falls} with a memory of {form.constant:.3g} s of how hard it drove: {of}"
+    axis = CHANNEL_OF[form.adds_to]
+    reach = f"{form.constant:.3g} {form.unit}"
+    if "abs" not in form.state.rate:
+        return f"{AXES[axis]} follows later, within {reach}: like a second lag, or a soft mount"
+    if form.shapes == ("s",):
+        return f"friction that builds up over {reach} after a reversal: like bristles (Dahl 1968)"
+    return f"way of {AXES[axis]} is stored over {reach} after a reversal: like play or soft tyres"
+
+
+def _of_place_or_time(form: Form, own: Sequence[float]) -> str:
+    wave = form.constant and form.shapes[0].startswith("cos(")
+    if form.group == "place" and wave:
+        length_m = 2 * 3.14159265 / form.constant
+        name = form.shapes[0].split("*")[-1].rstrip(")")
+        return f"comes again every {length_m:.2f} m along {name}: like tiles, planks or seams"
+    if form.adds_to == "theta_rad":
+        return "the captured heading is off by the heading: like a compass or a tag seen aslant"
+    if form.adds_to == "omega_radps" and form.group == "heading":
+        return "turns more toward one heading: like a slope, or a compass that is pulled"
+    if form.group == "time" and (wave or "sin(" in form.shapes[0]):
+        rate = form.constant or float(re.search(r"sin\(([\d.]+)\*t", form.shapes[0])[1])
+        return f"comes and goes every {6.2831853 / rate:.3g} s: like a load that is switched"
+    if form.group == "time" and "<" in form.shapes[0]:
+        return "there for a while: like something that was held, hung on or carried"
+    if form.group == "time" and ">" in form.shapes[0]:
+        return "from a moment on: like something that came loose or broke"
+    return ""
+
+
+LOOKS: tuple[Callable[[Form, Sequence[float]], str], ...] = (
+    _of_speed,
+    _of_two_speeds,
+    _of_past,
+    _of_place_or_time,
+)

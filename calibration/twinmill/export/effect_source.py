@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Source, card and test of an effect for the catalogue, from the equation of a model."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import wrap
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from twinmill.model.model_file import ModelError, ModelFile, write_whole
+from twinmill.model.parameters import catalogue, effect_names, words
+
+CATALOGUE, TESTS = Path("twin/effects/catalogue"), Path("tests/effects")
+LISTED = "add_executable(test_effects\n"  # in the tests' CMakeLists.txt; the new one follows
+NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+TOKEN = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[A-Za-z_]\w*|\s+|.")
+PARAMETERS = ("p0", "p1", "p2", "p3")
+LONGEST = 78  # of a text in the card
+
+WHEEL = {
+    "u": "in.duty[k]",
+    "V": "in.battery_V",
+    "left": "in.robot.left[k]",
+    "front": "in.robot.front[k]",
+    "t": "in.t_s",
+}
+RIM = {
+    **WHEEL,
+    "rim": "in.rim_mps[k]",
+    "target": "in.target_mps[k]",
+    "angle": "in.wheel_rad[k]",
+}
+BODY = {
+    "vx": "in.vx_mps",
+    "vy": "in.vy_mps",
+    "omega": "in.omega_radps",
+    "x": "in.x_m",
+    "y": "in.y_m",
+    "theta": "in.theta_rad",
+    "moves": "(in.moves ? 1.0 : 0.0)",
+    "t": "in.t_s",
+}
+POSE = {"x": "in.x_m", "y": "in.y_m", "theta": "in.theta_rad"}
+FUNCTIONS = {
+    **{n: f"std::{n}" for n in ("abs", "sqrt", "exp", "sin", "cos", "tan", "min", "max")},
+    **{n: f"std::{n}" for n in ("asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh")},
+    "ln": "std::log",
+    "sign": "Sign",
+}
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an equation acts: type of the signals, names in them, what is done with its value."""
+
+    stage: str
+    signals: str
+    act: str
+    names: dict[str, str]
+    acts: tuple[str, ...] = ()
+    wheels: str = ""
+
+
+def _on_body(*acts: str) -> Place:
+    return Place("ground", "GroundSignals", "OnGround{Step}", BODY, acts)
+
+
+PLACES = {
+    "duty": Place(
+        "duty", "DutySignals", "OnDuty{Step}", WHEEL, ("in.duty[k] += {};",), "kMaxWheels"
+    ),
+    "rim_mps": Place(
+        "wheel",
+        "WheelSignals",
+        "OnWheels{Step}",
+        RIM,
+        ("in.target_mps[k] += {};",),
+        "in.robot.wheels",
+    ),
+    "vx_mps": _on_body("in.vx_mps += {};"),
+    "vy_mps": _on_body("in.vy_mps += {};"),
+    "omega_radps": _on_body("in.omega_radps += {};"),
+    "travel": _on_body(
+        "const double share = 1 + {};", "in.vx_mps *= share;", "in.vy_mps *= share;"
+    ),
+    "motion": _on_body(
+        "const double share = 1 + {};",
+        "in.vx_mps *= share;",
+        "in.vy_mps *= share;",
+        "in.omega_radps *= share;",
+    ),
+    "theta_rad": Place("observe", "ObservedPose", "OnObservation{Observe, Invert}", POSE),
+}
+
+
+@dataclass(frozen=True)
+class Function:
+    """A C++ function of one text: its arguments, what is passed, the numbers that it names."""
+
+    text: str
+    arguments: str
+    values: str
+    parameters: Sequence[str]
+
+
+def write_effect(name: str, model_file: ModelFile, instance: str, root: Path) -> list[Path]:
+    """Writes the source and the test of an effect, and lists the test for the build.
+
+    Args:
+        name: of the new effect.
+        model_file: that has the equation.
+        instance: of the equation in it: `equation`, `equation#2`.
+        root: of the project's source.
+
+    Returns:
+        The files written.
+
+    Raises:
+        ValueError: the name is no name or is taken, or the formula cannot be said in C++.
+        ModelError: the model has no such equation, or `root` is not the project's source.
+    """
+    source, test = root / CATALOGUE / f"{name}.cpp", root / TESTS / f"test_{name}.cpp"
+    lists = root / TESTS / "CMakeLists.txt"
+    _check(name, root, (source, test))
+    listed = lists.read_text()
+    if LISTED not in listed:
+        raise ModelError(f"{lists}: has no line '{LISTED.strip()}'; list the test there by hand.")
+    model = model_file.model
+    if instance not in effect_names(model) or not instance.startswith("equation"):
+        has = [n for n in effect_names(model) if n.split("#")[0] == "equation"]
+        raise ModelError(
+            f"{model_file.path.name}: has no '{instance}'; "
+            + (f"its equations are {', '.join(has)}." if has else "it has no equation at all.")
+        )
+    texts = model.texts[effect_names(model).index(instance)]
+    values = {p: model.get(f"{instance}.{p}") for p in PARAMETERS}
+    made = _source(name, texts, values, model_file.path.name)
+    tested = _test(name, texts, values)
+    write_whole(source, made)
+    write_whole(test, tested)
+    write_whole(lists, listed.replace(LISTED, f"{LISTED}    test_{name}.cpp\n", 1))
+    return [source, test, lists]
+
+
+def _check(name: str, root: Path, files: Sequence[Path]) -> None:
+    if not NAME.fullmatch(name):
+        raise ValueError(
+            f"effect '{name}': is no name; use small letters, figures and single underscores."
+        )
+    if name in catalogue():
+        raise ValueError(f"effect '{name}': the catalogue has it already; take another name.")
+    if not (root / CATALOGUE).is_dir() or not (root / TESTS / "CMakeLists.txt").is_file():
+        raise ModelError(
+            f"{root}: holds no {CATALOGUE}; run this in the project's source, or name it with "
+            "--into."
+        )
+    if there := next((f for f in files if f.exists()), None):
+        raise ValueError(f"{there}: exists already; take another name, or remove it.")
+
+
+def _source(name: str, texts: dict[str, str], values: dict[str, float], model: str) -> str:
+    place, rate = PLACES[texts["adds_to"]], texts.get("state_rate", "")
+    used = words(" ".join([texts["formula"], rate]))
+    state = {"s": "s"} if rate else {}
+    formula = _function(texts["formula"], place.names, state)
+    what = "adds" if texts["adds_to"] not in ("travel", "motion") else "changes by a share"
+    equation = f"{what} to {texts['adds_to']}: {texts['formula']}"
+    equation += f"; ds/dt = {rate}, s = 0 at the start" if rate else ""
+    return (
+        _environment()
+        .get_template("effect.cpp.j2")
+        .render(
+            name=name,
+            summary="Taken from an equation that was found for what a model lacked.",
+            equation="\n".join(f'        "{line}"' for line in _wrapped(equation)),
+            measure="drives that vary the quantities in the equation; what it resembles is its own",
+            reference=f"found in data by twinmill diagnose; {model}",
+            phrase="a formula that was found in data",
+            **_kind(used, bool(rate), place.stage),
+            parameters=[
+                {"name": p, "value": _plain(values[p] or 0.01), "min": -10, "max": 10}
+                for p in _numbers(texts)
+            ],
+            neutral=" && ".join(f"v[{k}] == 0" for k in range(len(_numbers(texts)))),
+            signs="sign" in used,
+            formula=formula,
+            rate=_function(rate, place.names, state) if rate else None,
+            wheels=place.wheels,
+            pad="    " if place.wheels else "",
+            stage=place.stage,
+            signals=place.signals,
+            names=[(n, source) for n, source in place.names.items() if n in used],
+            acts=[act.format(f"Formula({formula.values})") for act in place.acts],
+            act=place.act,
+        )
+    )
+
+
+def _numbers(texts: dict[str, str]) -> list[str]:
+    """p0 and so on, as far as the texts name them."""
+    used = words(" ".join(texts.values()))
+    last = max((k for k, p in enumerate(PARAMETERS) if p in used), default=0)
+    return list(PARAMETERS[: last + 1])
+
+
+def _kind(used: set[str], remembers: bool, stage: str) -> dict[str, str]:
+    """Family, needs and drives of the card, by what the texts name."""
+    if used & {"x", "y", "theta"}:
+        family = "kFrame" if stage == "observe" else "kPlace"
+        return {"family": family, "needs": "kRoom", "identify": "kPlaces | kHeadings"}
+    if remembers:
+        return {"family": "kTransient", "needs": "kHistory", "identify": "kReversals | kLong"}
+    if "V" in used:
+        return {"family": "kPower", "needs": "kBattery", "identify": "kStraight | kLong"}
+    if "angle" in used:
+        return {"family": "kGeometry", "needs": "kWheelAngle", "identify": "kStraight"}
+    if "t" in used:
+        return {"family": "kGain", "needs": "kHistory", "identify": "kStraight | kLong"}
+    turns = "kSpin | kArcs" if "omega" in used else "kStraight"
+    return {"family": "kFriction", "needs": "kSteadySpeed", "identify": f"{turns} | kLevels"}
+
+
+def _function(text: str, names: dict[str, str], state: dict[str, str]) -> Function:
+    used = words(text)
+    own = [n for n in (*names, *state) if n in used]
+    numbers = [p for p in PARAMETERS if p in used]
+    return Function(
+        _in_cpp(text),
+        ", ".join(["const Numbers &v"] * bool(numbers) + [f"double {n}" for n in own]),
+        ", ".join(["v"] * bool(numbers) + own),
+        numbers,
+    )
+
+
+def _in_cpp(text: str) -> str:
+    """A formula as C++ reads it: figures with a point, functions of the standard library."""
+    parts = []
+    for token in TOKEN.findall(text):
+        if token == "^":
+            raise ValueError(f"'{text}': C++ has no power by ^; write x*x or exp(2*ln(x)).")
+        if re.match(r"[\d.]", token):
+            token = token if re.search(r"[.eE]", token) else f"{token}.0"
+        elif token == "_pi":
+            token = "M_PI"
+        elif re.match(r"[A-Za-z_]", token) and token in FUNCTIONS:
+            token = FUNCTIONS[token]
+        parts.append(token)
+    spaced = re.sub(r"(?<=[\w)]) *([*/]) *", r" \1 ", "".join(parts))
+    return re.sub(r"\s+", " ", spaced)
+
+
+def _test(name: str, texts: dict[str, str], values: dict[str, float]) -> str:
+    own = [_plain(values[p] or 0.01) for p in _numbers(texts)]
+    pairs = ", ".join(f'{{"{key}", "{text}"}}' for key, text in texts.items() if text)
+    title = "".join(part.capitalize() for part in name.split("_"))
+    template = _environment().get_template("test_effect.cpp.j2")
+    return template.render(name=name, title=title, values=", ".join(own), texts=f"{{{pairs}}}")
+
+
+def _plain(value: float) -> str:
+    return f"{value:.6g}"
+
+
+def _wrapped(text: str) -> list[str]:
+    return wrap(text, LONGEST, drop_whitespace=False, break_long_words=True)
+
+
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("twinmill.export", "."),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        undefined=StrictUndefined,
+    )

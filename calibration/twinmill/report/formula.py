@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A formula for what is left, in words and drawn over the data."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinmill.diagnosis.formula import Formula
+from twinmill.diagnosis.rest import MOMENTS, Rest
+from twinmill.diagnosis.units import ADDS_TO, NAMES
+from twinmill.report.canvas import MEASURED, PREDICTED, draw, legend_above
+from twinmill.report.html import Figure
+
+PARTS = {"motion": "share of all speeds", "travel": "share of the way", "theta_rad": "heading, rad"}
+SIDES = 1.96  # standard errors: 95 %
+
+
+def sentences(rest: Rest) -> list[str]:
+    """What is said of a formula for what is left; that none holds, where something depends."""
+    found = rest.proven
+    if found:
+        return [_said(found), _bounds(found)]
+    on = [name for name in rest.depends_on if name != MOMENTS]
+    if not on:
+        return []
+    return [
+        f"Something is left; it depends on {' and '.join(on)}. No formula for it held on drives "
+        "that it was not fitted to: more of this drive would tell."
+    ]
+
+
+def _said(found: Formula) -> str:
+    what = f"In place of {' and '.join(found.instead_of)}" if found.instead_of else "What is left"
+    like = f" In words: {found.like}." if found.like else ""
+    return (
+        f"{what}: {found.forms[0].adds_to} += {found.text}. On stretches that neither chose nor "
+        f"fitted it, it takes {100 * found.takes:.0f} % of the squared error (p "
+        f"{found.chance:.2g}, the best of {found.tried} forms).{like}"
+    )
+
+
+def _bounds(found: Formula) -> str:
+    numbers = [
+        f"{n.name or 'constant'} {n.value:.3g} ({n.low:.3g} to {n.high:.3g})"
+        + ("" if n.unit in ("", "1") else f" {n.unit}")
+        for n in found.numbers
+    ]
+    seen = [
+        f"{name} {low:.2g} to {high:.2g} {_unit(name)}".rstrip()
+        for name, (low, high) in found.holds.items()
+    ]
+    where = f" Seen at {', '.join(seen)}; beyond that it is a guess." if seen else ""
+    return (
+        f"Its numbers with 95 % intervals: {', '.join(numbers)}.{where} "
+        f"{100 * found.again:.0f} % of resamplings choose the same dependence."
+    )
+
+
+def _unit(name: str) -> str:
+    if name == "theta":
+        return "rad"
+    return "rad/s" if name == "omega" else str(NAMES[name])
+
+
+def figures(rest: Rest) -> Sequence[Figure]:
+    """The formula over what is left, in bins of its variable; none without a formula."""
+    if not rest.proven or not rest.proven.curve:
+        return []
+    found, curve = rest.proven, rest.proven.curve
+    to = found.forms[0].adds_to
+
+    def paint(axes) -> None:
+        axes.errorbar(
+            curve.at,
+            curve.left,
+            yerr=SIDES * curve.spread,
+            fmt="o",
+            ms=4,
+            lw=1,
+            color=MEASURED,
+            label="what is left",
+        )
+        order = np.argsort(curve.at)
+        axes.plot(curve.at[order], curve.drawn[order], color=PREDICTED, label="formula")
+        axes.axhline(0, color="#888888", lw=0.8)
+        by = f" per {curve.carrier}" if curve.carrier else ""
+        unit = "" if to in PARTS else f", {ADDS_TO[to]}" if not by else ""
+        axes.set(
+            xlabel=f"{curve.name}, {_unit(curve.name)}".rstrip(", "),
+            ylabel=f"{PARTS.get(to, to.rpartition('_')[0])}{by}{unit}",
+        )
+        legend_above(axes, 2)
+
+    caption = (
+        "What the model with the findings leaves, in bins of the variable, with 95 % intervals, "
+        "and what the formula adds there. A base refit may shift all points alike."
+    )
+    return [Figure(draw(2.4, paint), "The formula for what is left", caption)]

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Formulas for what is left: proven where a robot that is not the twin has them, else not offered.
+
+The robots hide what no effect of the catalogue says, written here in NumPy over whole motions.
+"""
+
+import io
+import json
+import shlex
+from contextlib import redirect_stdout
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import linregress
+
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.forms import PAST, Form, Motion, State, joined, own_forms, sized
+from twinmill.diagnosis.formula_search import _by_f, _by_signs
+from twinmill.diagnosis.known_physics import resembles
+from twinmill.diagnosis.units import units_of
+from twinmill.fitting.fit import fit
+from twinmill.fitting.floor import body_velocity_at
+from twinmill.fitting.opening import open_measurements
+from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import effect_names
+from twinmill_cli.main import run
+
+STEP_S = 1 / 480  # of the robot
+REACH_RAD = 0.08
+
+
+@pytest.fixture(scope="module")
+def base(tanh_robot, measure, model_file, tmp_path_factory) -> ModelFile:
+    """The base fitted to a log of the robot as it is; one clock stamps all."""
+    path = tmp_path_factory.mktemp("formula") / "base.toml"
+    fit([measure(tanh_robot(), 1, 60.0)], model_file(extra="[clock]\nsame = true\n"), path, "")
+    return ModelFile.load(str(path))
+
+
+def stored(turn_radps: np.ndarray) -> np.ndarray:
+    """(K,) turning of which each reversal first stores 0.08 rad, as Dahl's friction (1968) does."""
+    kept, s = np.empty(len(turn_radps)), 0.0
+    for k, w in enumerate(turn_radps):
+        change = w - abs(w) * s / REACH_RAD
+        s += STEP_S * change
+        kept[k] = w - change
+    return kept
+
+
+@pytest.fixture(scope="module")
+def playing(tanh_robot, run_log) -> Path:
+    """A log of a robot that turns so."""
+
+    class Playing(tanh_robot):
+        def hindered(self, motion):
+            return np.column_stack([motion[:, :2], stored(motion[:, 2])])
+
+    return run_log(Playing(), 101, 80.0)
+
+
+@pytest.fixture(scope="module")
+def found(playing, base, tmp_path_factory) -> dict:
+    """What `diagnose --json` says of that log, and the page of its report."""
+    out = tmp_path_factory.mktemp("report")
+    return diagnosed([str(playing), "--model", str(base.path), "--out", str(out)]) | {"page": out}
+
+
+def diagnosed(words: list[str]) -> dict:
+    """The JSON of a diagnosis by the command."""
+    said = io.StringIO()
+    with redirect_stdout(said):
+        run(["diagnose", *words, "--json"])
+    return json.loads(said.getvalue())
+
+
+def test_way_that_reversals_store_is_found_with_its_reach(found):
+    proven = found["rest"]["proven"]
+    assert found["verdict"] == "outside_catalogue" and found["rest"]["depends_on"][0] == PAST
+    assert proven["equation"]["adds_to"] == "omega_radps"
+    assert "state_rate" in proven["equation"] and proven["chance"] < 0.02
+    (reach,) = [n for n in proven["numbers"] if n["unit"] == "rad"]
+    assert reach["low"] / 1.1 < REACH_RAD < 1.1 * reach["high"]  # the lag rounds the corners
+    assert "play" in proven["like"]
+    assert proven["holds"]["omega"][0] < -1 < 1 < proven["holds"]["omega"][1]
+
+
+def test_the_printed_command_adds_it_as_it_stands(found, playing, base, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    said = io.StringIO()
+    with redirect_stdout(said):
+        run(["diagnose", str(playing), "--model", str(base.path)])
+    (line,) = [x for x in said.getvalue().splitlines() if x.strip().startswith("twinmill add")]
+    run(shlex.split(line)[1:])
+    (written,) = tmp_path.glob("*.toml")
+    assert effect_names(ModelFile.load(str(written)).model) == ["equation"]
+    then = diagnosed([str(playing), "--model", str(written)])
+    assert then["rest"]["proven"] is None and then["score"] < 1.3 < found["score"]
+
+
+def test_the_report_draws_it_over_the_data(found):
+    page = (found["page"] / "index.html").read_text()
+    assert "The formula for what is left" in page and "neither chose nor fitted it" in page
+
+
+@pytest.mark.parametrize("seed", [301, 302])
+def test_no_formula_is_offered_where_only_noise_is_left(tanh_robot, measure, base, seed):
+    rest = diagnose([measure(tanh_robot(), seed, 60.0)], base).rest
+    assert rest.proven is None
+
+
+@pytest.fixture(scope="module")
+def motion(tanh_robot, measure, base) -> tuple:
+    """A log as the base moves in it, at all horizons."""
+    (own,) = open_measurements([measure(tanh_robot(), 2, 40.0)], base)
+    velocity = body_velocity_at(own.data, own.model, own.floor.response.points)
+    return own, Motion.of(own, velocity, range(5))
+
+
+LAG = State("omega", "(1/{c})")
+HEAT = State("(vx*vx + vy*vy)", "(1/{c})")
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        Form("travel", ("cos({c}*x)", "sin({c}*x)"), "place", constant=4.0, unit="1/m"),
+        Form("motion", ("(t > 17)",), "time"),
+        Form("motion", ("s",), PAST, HEAT, 15.0, unit="s"),
+        Form("omega_radps", ("cos(theta)*omega", "sin(theta)*omega"), "heading"),
+        Form("omega_radps", ("(omega - s)",), PAST, LAG, 0.6, unit="s"),
+        Form("theta_rad", ("cos(theta)", "sin(theta)"), "heading"),
+    ],
+    ids=lambda f: f"{f.adds_to} {f.shapes[0]}",
+)
+def test_a_form_changes_the_errors_as_the_plant_does_that_has_it(motion, form):
+    """The plant with the effect `equation`: another program, which integrates."""
+    own, moves = motion
+    (form,) = sized([form], [moves])
+    columns = moves.columns([form]).reshape(-1, len(form.shapes))
+    model = own.model.copy()
+    model.add_effect("equation", joined([form]))
+    names = ["equation.p0", "equation.p1"]
+    rows = own.data.rows(model, names, np.array([[0.0, 0.0]]))[0]
+    for k, strength in enumerate(form.strengths):
+        values = np.array([[0.0, 0.0]])
+        values[0, k] = 0.2 * strength
+        change = (rows - own.data.rows(model, names, values)[0]) / 0.2
+        # Linear in the number, features at every third pose, speeds as they were: a few percent.
+        assert np.linalg.norm(change - columns[:, k]) < 0.15 * np.linalg.norm(change)
+
+
+def test_units_agree_in_every_form_and_are_told_of_its_numbers(motion):
+    """By dimensions: a number in front of v |v| that gives a speed is in s/m."""
+    for form in own_forms([motion[1]], True):
+        assert units_of(form)
+    assert units_of(Form("vx_mps", ("vx*abs(vx)",), "speed")) == ["s/m"]
+    assert units_of(Form("travel", ("(vx*vx + vy*vy)",), "speed")) == ["s^2/m^2"]
+    with pytest.raises(ValueError, match="is added"):
+        units_of(Form("vx_mps", ("(vx + x)",), "speed"))
+
+
+def test_signs_that_all_agree_are_as_rare_as_they_are():
+    assert _by_signs(np.array([1.0, 2.0, 0.5, 3.0, 1.0])) == pytest.approx(2**-5)
+    assert _by_signs(np.array([1.0, -1.0])) == pytest.approx(3 / 4)  # ++ +- -+ reach zero
+
+
+def test_the_f_test_of_one_column_is_the_t_test_of_a_slope():
+    random = np.random.default_rng(3)
+    x, y = random.normal(size=(2, 50))
+    x, y = x - x.mean(), y - y.mean()
+    y = y * np.sqrt(49 / (y @ y))  # as many independent errors as squares; the mean is one more
+    assert _by_f(x[:, None], y, 49.0) == pytest.approx(linregress(x, y).pvalue)
+
+
+def test_known_physics_is_named_by_shape_and_sign():
+    drag = Form("vx_mps", ("vx*abs(vx)",), "speed")
+    assert "opposing motion: like air drag or oil" in resembles([drag], [-0.1])
+    assert "drag" not in resembles([drag], [0.1])
+    friction = Form("vx_mps", ("sign(vx)",), "speed")
+    assert "dry friction" in resembles([friction], [-0.01])
+    assert resembles([friction], [0.01]) == ""
+    heat = Form("motion", ("s",), PAST, HEAT, 15.0)
+    assert "falls" in resembles([heat], [-1.0]) and "heat of the motors" in resembles([heat], [-1])
