@@ -12,7 +12,8 @@ Player Ramped(double acceleration_mps2, double turn_radps2, double dt_s)
 {
     Model model;
     model.base.drive = Drive::kTwist;
-    return Player(With("acceleration_limit", {1 / acceleration_mps2, 1 / turn_radps2}, model), dt_s);
+    return Player(With("acceleration_limit", {1 / acceleration_mps2, 1 / turn_radps2}, model),
+                  dt_s);
 }
 
 // From rest to speed v the way lost is v^2 / (2 a), in any step, and it is gained while stopping.

@@ -131,7 +131,8 @@ std::string Model::WhyNot(const EffectSpec &spec) const
     if (!(spec.card.drives & drive))
         return "acts on robots that are told " + Listed(DriveNames(spec.card.drives)) +
                ", and this model's is told " + DriveNames(drive).front();
-    if (base.wheels == WheelKind::kNone && std::ranges::any_of(spec.parameters, IsPerWheel))
+    const bool of_wheels = spec.needs_wheels || std::ranges::any_of(spec.parameters, IsPerWheel);
+    if (base.wheels == WheelKind::kNone && of_wheels)
         return "acts on single wheels, and base.wheels of this model is \"none\"";
     return "";
 }

@@ -30,8 +30,8 @@ constexpr ParameterSpec kParameters[] = {
      "time for a change by 1 m/s, 1 / acceleration; 0: no limit", "speeds are ramped",
      "speeds are not ramped"},
     {"turn_pace_s2_per_rad", "s2/rad", 0, 0.1, 0, 5,
-     "time for a change by 1 rad/s, 1 / angular acceleration; 0: no limit",
-     "turn rates are ramped", "turn rates are not ramped"},
+     "time for a change by 1 rad/s, 1 / angular acceleration; 0: no limit", "turn rates are ramped",
+     "turn rates are not ramped"},
 };
 
 int StateSize(const Numbers &v)

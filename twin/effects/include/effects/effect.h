@@ -106,7 +106,8 @@ struct EffectSpec
     std::span<const ParameterSpec> parameters;
     Act act;
     int (*state_size)(const Numbers &) = nullptr;  // doubles that it remembers; nullptr: none
-    Turn turn = Turn::kUsual;  // within its stage, wherever the model file has it
+    Turn turn = Turn::kUsual;   // within its stage, wherever the model file has it
+    bool needs_wheels = false;  // of robots whose wheels are known
     std::span<const TextParameter> texts = {};
     // Of `values` and `texts` in their order. Throws std::invalid_argument in one sentence if a
     // text makes no sense.
