@@ -717,6 +717,7 @@ def _tied(this: Round, settings: Settings) -> list[Trial]:
         if _began_before(trial, trial.names[0]):
             continue
         apart, _, blocks_t = accepted.fit.against(trial.fit)
+        apart += settings.each * (len(trial.fit.x) - len(accepted.fit.x))
         same = canonical_correlation(columns[accepted.names[0]], columns[trial.names[0]])
         below = max(accepted.held_score, trial.held_score) < 1.0  # differences there are no news
         close = apart < settings.tie and (blocks_t < 2.0 or below)

@@ -141,13 +141,13 @@ def test_what_can_do_all_that_another_does_stands_in_one_group_with_it(behind, t
     squares = np.array([1.0, 1.1, 0.9, 1.05])
 
     class FitOf(SimpleNamespace):
-        against = ScoreFit.against
+        against, least_against = ScoreFit.against, ScoreFit.least_against
 
     def fit_of(cost, factor):
         return FitOf(
             held_cost=cost,
             block_costs=lambda _: squares * factor,
-            without_blocks=lambda: cost - squares,
+            without_blocks=lambda _=None: cost - squares,
         )
 
     trials = [

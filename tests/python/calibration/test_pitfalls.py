@@ -470,6 +470,20 @@ def test_a_compass_that_errs_with_heading_is_no_turned_marker(tanh_robot, measur
         return np.column_stack([x_m, y_m, heading_rad + 0.1 * np.sin(heading_rad + 0.5)]), valid
 
     found = diagnose([measure(tanh_robot(), 23, 40.0, spoil=iron)], fitted)
+    assert found.verdict == "effect_missing" and found.motion == ["compass_deviation"]
+    cos, sin = found.findings[0].parameters
+    assert cos.value == pytest.approx(0.1 * np.sin(0.5), abs=2 * cos.std)
+    assert sin.value == pytest.approx(0.1 * np.cos(0.5), abs=2 * sin.std)
+
+
+def test_a_compass_that_errs_twice_a_turn_is_outside_the_catalogue(tanh_robot, measure, fitted):
+    """Soft iron: no turned marker, and no error once a turn."""
+
+    def iron(pose, valid):
+        x_m, y_m, heading_rad = pose.T
+        return np.column_stack([x_m, y_m, heading_rad + 0.1 * np.sin(2 * heading_rad)]), valid
+
+    found = diagnose([measure(tanh_robot(), 23, 40.0, spoil=iron)], fitted)
     assert found.verdict == "outside_catalogue"
     assert not [f for f in found.findings if f.certainty == "sure" and f.effect != "refit"]
     assert "heading" in found.rest.depends_on
