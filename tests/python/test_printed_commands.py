@@ -22,6 +22,7 @@ from twinmill.programs import find_program
 from twinmill.workbench.next_run import then_commands
 from twinmill_cli import main as cli
 from twinmill_cli import next as next_command
+from twinmill_cli.options import ScriptForm
 
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = (
@@ -293,6 +294,19 @@ def test_what_next_says_to_do_with_a_script_of_velocities_can_be_done(tmp_path, 
     check(then)
     said(write.removeprefix("twinmill "))
     compile(Path(shlex.split(play)[1]).read_text(), "script.py", "exec")
+
+
+@pytest.mark.parametrize(
+    ("form", "played"),
+    [("bag", "ros2 bag play 'a script_bag'"), ("publisher", "python3 'a script_publisher.py'")],
+)
+def test_what_was_written_for_ros_is_what_next_says_to_play(form, played):
+    rows = Rows(np.array([0.0, 1.0]), np.array([[0.2, 0, 0, 0], [0.0] * 4]), 2.0, "twist")
+    plan, script = SimpleNamespace(robot_id=2, rows=rows), Path("a script.csv")
+    how = next_command._how(plan, [Path("s.lcmlog")], "cart.toml", script, form=ScriptForm(form))
+    (_, play), (_, then) = how.commands
+    assert play == played and shlex.split(play)[-1] in how.first
+    check(then)
 
 
 def said(line: str) -> dict:

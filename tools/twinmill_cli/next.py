@@ -13,7 +13,7 @@ import typer
 
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import Logs, Model, Out, ScriptAs
+from twinmill_cli.options import Logs, Model, Out, ScriptAs, ScriptForm
 from twinmill_cli.output import AsJson, deliver, telling
 
 if working():  # not for --help
@@ -110,8 +110,13 @@ def _next(
             load(logs, model_file, as_json), model_file, limits, swarm, draws=draws
         )
         write_whole(output, csv_text(narrowing.rows))
-        how = _how(narrowing, logs, model, output)
+        how = _how(narrowing, logs, model, output, form=script_as)
         data = {"script": str(output), **narrowing.to_json(), **source.to_json()}
+        if script_as:
+            twists = TwistScript.of(model_file.model, narrowing.rows)
+            path = ros_path(script_as, output)
+            write_script(twists, script_as, path, force, command=source.command)
+            data["script_as"] = str(path)
         deliver(data, present.narrowing_terminal(narrowing, how), as_json)
         return narrowing
     with telling(f"designing a run with {model}") as progress:
@@ -119,12 +124,12 @@ def _next(
         check(measurements, model_file, limits)
         plan = design(diagnose(measurements, model_file, progress), model_file, limits, progress)
     write_whole(output, csv_text(plan.rows))
-    how = _how(plan, logs, model, output)
+    how = _how(plan, logs, model, output, form=script_as)
     data = {"script": str(output), **plan.to_json()}
     if script_as:
-        data["script_as"] = str(ros_path(script_as, output))
         twists = TwistScript.of(model_file.model, plan.rows)
-        write_script(twists, script_as, Path(data["script_as"]), force, command=source.command)
+        write_script(twists, script_as, ros_path(script_as, output), force, command=source.command)
+        data["script_as"] = str(ros_path(script_as, output))
     section = partial(present.section, plan, how)
     text = present.terminal(plan, how)
     finish(data, text, source, section=section, as_json=as_json, out=out, note="")
@@ -166,14 +171,29 @@ def _sides(text: str) -> tuple[float, float]:
     return float(found[1]), float(found[2])
 
 
-def _how(plan: Plan | Narrowing, logs: list[Path], model: str, script: Path) -> present.How:
-    """How to play the script and what to do then."""
+def _how(
+    plan: Plan | Narrowing,
+    logs: list[Path],
+    model: str,
+    script: Path,
+    *,
+    form: ScriptForm | None = None,
+) -> present.How:
+    """How to play the script, or what was written of it for ROS, and what to do then."""
     path, number = shlex.quote(str(script)), plan.robot_id
+    written = f"{script}, and for ROS {ros_path(form, script)}" if form else f"{script}"
     first = (
-        f"Written: {script}. Put the robot in the middle of the floor, its camera along the first "
+        f"Written: {written}. Put the robot in the middle of the floor, its camera along the first "
         "side."
     )
     then = command_line("diagnose", [*logs, Path("next.lcmlog")], model)
+    if form:
+        player = "ros2 bag play" if form is ScriptForm.BAG else "python3"
+        steps = [
+            ("On the robot:", f"{player} {shlex.quote(str(ros_path(form, script)))}"),
+            ("then, what it sent and its poses imported:", then),
+        ]
+        return present.How(first, steps)
     if plan.rows.kind == "twist":
         program = shlex.quote(str(script.with_suffix(".py")))
         robot = f"twinmill characterise --robot {number} --script {path} --script-as publisher"

@@ -46,17 +46,9 @@ UNITS = (  # measured over commanded speed, and what it says
         "the commanded speeds are in centimetres per second",
         "name the columns vx_cmps and vy_cmps",
     ),
-    (
-        (7.0, 14.0),
-        "lengths are off by ten, as if of mm and cm one was taken for the other",
-        "correct the units or the factors of positions and speeds",
-    ),
-    (
-        (1 / 14, 1 / 7),
-        "lengths are off by ten, as if of mm and cm one was taken for the other",
-        "correct the units or the factors of positions and speeds",
-    ),
 )
+# As above; but a gain of ten may be the robot's own, where shares of its speed are told.
+TENFOLD = ((7.0, 14.0), (1 / 14, 1 / 7))
 TURN_UNITS = (
     ((25.0, 130.0), "the headings are in degrees", "name the column theta_deg"),
     ((1 / 130, 1 / 25), "the commanded turns are in degrees per second", "name it omega_degps"),
@@ -308,15 +300,25 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
     tried += [(turn, unit) for unit in TURN_UNITS[: 2 if kind == "twist" else 1]]
     if kind == "wheel_speed":
         tried += [(speed, unit) for unit in WHEEL_UNITS]
-    return [
-        checked.finding(
-            what,
-            f"the robot is {ratio:.3g} times as fast as its commands and its model say",
-            f"{remedy} and import anew",
-        )
+    told = [
+        checked.finding(what, _pace(ratio), f"{remedy} and import anew")
         for ratio, ((low, high), what, remedy) in tried
         if low < ratio < high
     ]
+    if kind == "twist" and any(low < speed < high for low, high in TENFOLD):
+        told.append(
+            checked.finding(
+                "lengths are off by ten, as if of mm and cm one was taken for the other",
+                _pace(speed),
+                "correct the units or the factors of positions and speeds, and import anew",
+                fatal=False,
+            )
+        )
+    return told
+
+
+def _pace(ratio: float) -> str:
+    return f"the robot is {ratio:.3g} times as fast as its commands and its model say"
 
 
 RATES_PPM = (-3000, -2000, -1000, -500, 0, 500, 1000, 2000, 3000)
