@@ -105,7 +105,7 @@ class _Shown:
         Console(file=out, width=width, color_system=None).print(
             *lines, self._text(), sep="\n", markup=False, highlight=False
         )
-        return out.getvalue().rstrip()
+        return "\n".join(map(str.rstrip, out.getvalue().splitlines())).rstrip()
 
     def __reduce__(self) -> str:
         raise TypeError(
