@@ -80,7 +80,15 @@ class _Shown:
     left_out: tuple[str, ...] = ()
 
     def to_json(self) -> dict:
-        """The same object as `--json` of the command, without how the command was called."""
+        """The same object as `--json` of the command, without how the command was called.
+
+        Returns:
+            As the page Files tells; an absent number is None, so that JSON can hold all of it.
+
+        Examples:
+            >>> found.to_json()["score"] == found.score
+            True
+        """
         return plain(self._result.to_json())
 
     def table(self) -> pd.DataFrame:
@@ -97,7 +105,7 @@ class _Shown:
         Console(file=out, width=width, color_system=None).print(
             *lines, self._text(), sep="\n", markup=False, highlight=False
         )
-        return out.getvalue().rstrip()
+        return "\n".join(map(str.rstrip, out.getvalue().splitlines())).rstrip()
 
     def __reduce__(self) -> str:
         raise TypeError(
@@ -329,7 +337,10 @@ class Log(_Shown):
             temporary.write_bytes(self.paths[0].read_bytes())
 
     def to_json(self) -> dict:
-        """paths, robots, duration_s, warnings.
+        """What the log holds, in numbers and names.
+
+        Returns:
+            paths, robots, duration_s, warnings.
 
         Examples:
             >>> tm.load("run.lcmlog").to_json()["robots"]
@@ -445,7 +456,10 @@ class Model(_Shown):
         return pd.DataFrame(self.file.model.values())
 
     def to_json(self) -> dict:
-        """name, sha256, effects, values by full name.
+        """What the model holds.
+
+        Returns:
+            name, sha256 of its text, effects, values by full name (units as of `table`).
 
         Examples:
             >>> tm.Model.load("turbopi.toml").to_json()["values"]["robot.wheel_radius_m"]
@@ -808,7 +822,10 @@ class Finding(_Shown):
         self.parameters = {e.name.split(".", 1)[-1]: e.value for e in finding.parameters}
 
     def to_json(self) -> dict:
-        """An entry of findings[] of `twinmill diagnose --json`, and what ranking[] has beside.
+        """What the diagnosis tells of this effect.
+
+        Returns:
+            An entry of findings[] of `twinmill diagnose --json`, and what ranking[] has beside.
 
         Examples:
             >>> d.best.to_json()["certainty"]

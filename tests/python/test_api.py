@@ -349,7 +349,9 @@ def test_a_result_is_as_wide_as_the_terminal_and_no_wider_than_can_be_read(here,
     found = tm.compare("run.lcmlog", "fitted.toml")
     for columns, widest in ((80, 80), (60, 60), (300, 100)):
         monkeypatch.setenv("COLUMNS", str(columns))
-        assert 0.8 * widest < max(map(len, str(found).splitlines())) <= widest
+        lines = str(found).splitlines()
+        assert 0.8 * widest < max(map(len, lines)) <= widest
+        assert not any(line.endswith(" ") for line in lines)
 
 
 def test_the_file_of_a_model_stays(here):

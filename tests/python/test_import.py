@@ -198,6 +198,11 @@ def test_heading_offset_and_shift_move_the_poses_alone(imported):
             r"do not overlap.*--pose-shift-s 50\.000",
         ),
         (POSES.replace("1.0,4", "1750000000,4"), COMMANDS, r"held for 1\d+ s"),
+        (
+            POSES,
+            COMMANDS.replace("\n0.1,4", "\n1000,4"),
+            r"times of the commands are in ms, so name that column t_ms",
+        ),
         ("t_s,robot_id,x_m,y_m,qw,qx,qy,qz\n0,4,0,0,1,1,0,0\n", COMMANDS, r"row 2: .*must be 1"),
     ],
 )

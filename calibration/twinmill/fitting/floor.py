@@ -148,19 +148,22 @@ def body_velocity_at(
 ) -> np.ndarray:
     """(N, 3) predicted body velocity, m/s and rad/s, in the step that ends at each of some poses.
 
-    Zero where there is none.
+    At a frame that was lost it is that of the step over the loss. Zero where there is none.
     """
-    predicted = native.one_step(model, data.measurement.played)
     track = data.measurement.track
-    step_s = np.diff(track.pose_t_s, prepend=track.pose_t_s[0] - 1.0)
-    before = np.roll(np.column_stack([track.pose[:, :2], track.heading_rad]), 1, axis=0)
+    seen = np.flatnonzero(track.segment >= 0)
+    predicted = native.one_step(model, data.measurement.played)[seen]
+    t_s, pose = track.pose_t_s[seen], np.column_stack([track.pose[:, :2], track.heading_rad])[seen]
+    step_s = np.diff(t_s, prepend=t_s[0] - 1.0)
+    before = np.roll(pose, 1, axis=0)
     step = predicted - before
     middle = before[:, 2] + step[:, 2] / 2
     c, s = np.cos(middle), np.sin(middle)
     body = np.column_stack(
         [c * step[:, 0] + s * step[:, 1], c * step[:, 1] - s * step[:, 0], step[:, 2]]
     )
-    return np.nan_to_num(body / step_s[:, None])[points]
+    rates = np.vstack([np.nan_to_num(body / step_s[:, None]), np.zeros(3)])
+    return rates[np.searchsorted(seen, np.arange(len(track.pose_t_s))[points])]
 
 
 def coarse_offset_s(data: Trajectory, base: native.Model) -> float:

@@ -39,6 +39,8 @@ from twinmill.data.measurement_table import Table
 from twinmill.data.track import make_track
 from twinmill.files import replacing
 
+TIME_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # of which a second has so many
+SAME_LENGTH = 0.1  # share by which poses and commands of one run differ in length
 LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
 
 
@@ -309,6 +311,7 @@ def _check_times(poses: list[PoseSeries], commands: list[CommandSeries], shift: 
     for p, c in pairs:
         first_s, last_s = p.utime_us[[0, -1]] / 1e6
         start_s, end_s = c.utime_us[[0, -1]] / 1e6
+        _check_unit_of_time(p.robot_id, last_s - first_s, end_s - start_s)
         if last_s < start_s or (not (c.repeat and shift) and first_s > end_s):
             remedy = (
                 "shift the poses, for example so that both start together: --pose-shift-s "
@@ -325,6 +328,17 @@ def _check_times(poses: list[PoseSeries], commands: list[CommandSeries], shift: 
             raise LogError(
                 f"robot {p.robot_id}: a command would be held for {hold_s:.0f} s; the "
                 "times of commands and poses are not of one run, or mixed up."
+            )
+
+
+def _check_unit_of_time(robot_id: int, poses_s: float, commands_s: float) -> None:
+    """Raises LogError where one series lasts a thousand times as long as the other, or more."""
+    (short_s, short), (long_s, long) = sorted([(poses_s, "poses"), (commands_s, "commands")])
+    for unit, times in TIME_UNITS.items():
+        if short_s > 0 and abs(long_s / short_s / times - 1) < SAME_LENGTH:
+            raise LogError(
+                f"robot {robot_id}: the {long} last {long_s:.0f} s, the {short} {short_s:.1f} s; "
+                f"the times of the {long} are in {unit}, so name that column t_{unit}."
             )
 
 
