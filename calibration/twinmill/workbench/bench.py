@@ -154,7 +154,9 @@ class Bench:
     def progress(self) -> str:
         """What the worker is doing and for how long, in words."""
         if self._waiting:
-            return "waiting for the logs"
+            before = self.worker.work
+            scores = before is not None and before.kind == "compare"
+            return f"waiting for the score of {before.model}" if scores else "waiting for the logs"
         return f"{self.worker.words} · {self.worker.for_s:.0f} s"
 
     async def start(self, kind: str, effect: str = "", options: dict | None = None) -> None:
