@@ -3,6 +3,7 @@
 
 import re
 from collections.abc import Callable, Sequence
+from math import pi
 
 from twinmill.diagnosis.forms import PAST, Form
 
@@ -82,7 +83,7 @@ def _of_past(form: Form, own: Sequence[float]) -> str:
 def _of_place_or_time(form: Form, own: Sequence[float]) -> str:
     wave = form.constant and form.shapes[0].startswith("cos(")
     if form.group == "place" and wave:
-        length_m = 2 * 3.14159265 / form.constant
+        length_m = 2 * pi / form.constant
         name = form.shapes[0].split("*")[-1].rstrip(")")
         return f"comes again every {length_m:.2f} m along {name}: like tiles, planks or seams"
     if form.adds_to == "theta_rad":
@@ -91,7 +92,7 @@ def _of_place_or_time(form: Form, own: Sequence[float]) -> str:
         return "turns more toward one heading: like a slope, or a compass that is pulled"
     if form.group == "time" and (wave or "sin(" in form.shapes[0]):
         rate = form.constant or float(re.search(r"sin\(([\d.]+)\*t", form.shapes[0])[1])
-        return f"comes and goes every {6.2831853 / rate:.3g} s: like a load that is switched"
+        return f"comes and goes every {2 * pi / rate:.3g} s: like a load that is switched"
     if form.group == "time" and "<" in form.shapes[0]:
         return "there for a while: like something that was held, hung on or carried"
     if form.group == "time" and ">" in form.shapes[0]:
