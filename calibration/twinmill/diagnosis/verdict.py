@@ -94,18 +94,18 @@ class VerdictInputs:
 
     @property
     def _outside(self) -> bool:
-        """Something is left that no effect takes: it depends on something, or it is much."""
-        depends = bool(self.rest.again or self._continuous)
-        return depends or self.last > SETTINGS.worse * self.known
-
-    @property
-    def _unexplained(self) -> bool:
-        """More is left than is usual, and neither an effect nor a formula takes it.
+        """Something is left that no effect takes: it depends on something, or it is much.
 
         Less is enough where the smooth response predicts much of it.
         """
+        depends = bool(self.rest.again or self._continuous)
         firm = self.rest.firm and self.rest.share > SETTINGS.much_left
-        return self.last > (GOOD if firm else MISSING) * self.known
+        return depends or self.last > (GOOD if firm else SETTINGS.worse) * self.known
+
+    @property
+    def _unexplained(self) -> bool:
+        """More is left than is usual, and neither an effect nor a formula takes it."""
+        return self.last > MISSING * self.known
 
     @property
     def _noise_outweighs(self) -> bool:
@@ -221,10 +221,9 @@ class VerdictInputs:
             return "Something random disturbs the motion that no effect of the catalogue describes."
         on = " and ".join(self._continuous)
         depends = f"it depends on {on}" if on else "no formula that was tried describes it"
-        names = " and ".join(f.effect for f in self.findings)
-        also = (
-            f" {names} explain{'s' if len(self.findings) == 1 else ''} part of it." if names else ""
-        )
+        named = [REFIT_IN_WORDS if f.effect == REFIT else f.effect for f in self.findings]
+        verb = "explains" if len(named) == 1 and named[0] != REFIT_IN_WORDS else "explain"
+        also = f" {' and '.join(named)} {verb} part of it." if named else ""
         return f"Something outside the catalogue is there; {depends}.{also} {events}".rstrip()
 
     @property
