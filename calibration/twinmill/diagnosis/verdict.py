@@ -221,7 +221,7 @@ class VerdictInputs:
             return "Something random disturbs the motion that no effect of the catalogue describes."
         on = " and ".join(self._continuous)
         depends = f"it depends on {on}" if on else "no formula that was tried describes it"
-        named = [REFIT_IN_WORDS if f.effect == REFIT else f.effect for f in self.findings]
+        named = [_plain(f) for f in self.findings]
         verb = "explains" if len(named) == 1 and named[0] != REFIT_IN_WORDS else "explain"
         also = f" {' and '.join(named)} {verb} part of it." if named else ""
         return f"Something outside the catalogue is there; {depends}.{also} {events}".rstrip()
