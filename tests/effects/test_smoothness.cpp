@@ -102,7 +102,7 @@ TEST_P(Smooth, FromNeutralTheSlopeIsSeenToo)
     const EffectSpec &spec = *GetParam();
     // At its neutral deceleration coasting gives way to the lag: a jump. No command reaches a limit
     // that is infinite.
-    if (std::set<std::string>{"coasting", "speed_limit"}.contains(spec.card.name))
+    if (std::set<std::string>{"coasting", "speed_limit", "wheel_limit"}.contains(spec.card.name))
         return;
     std::vector<double> values;
     for (const Parameter &p : ParametersOf(spec))

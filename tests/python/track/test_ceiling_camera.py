@@ -77,7 +77,8 @@ def folder(tmp_path_factory):
 
 
 def track(folder, *arguments, video="run.mp4"):
-    words = ["track", str(folder / video), "--height", str(HEIGHT_M), *map(str, arguments)]
+    height = [] if "--height" in arguments else ["--height", str(HEIGHT_M)]
+    words = ["track", str(folder / video), *height, *map(str, arguments)]
     for option, name in (("--lens", "camera.toml"), ("--floor", "floor.toml")):
         words += [] if option in words else [option, str(folder / name)]
     return cli.run(words)
