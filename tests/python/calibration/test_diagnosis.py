@@ -146,6 +146,7 @@ def test_what_can_do_all_that_another_does_stands_in_one_group_with_it(behind, t
     def fit_of(cost, factor):
         return FitOf(
             held_cost=cost,
+            x=np.zeros(3),
             block_costs=lambda _: squares * factor,
             without_blocks=lambda _=None: cost - squares,
         )

@@ -60,4 +60,4 @@ def test_a_swarm_that_cannot_be_compared_is_said_so(tmp_path, true):
     script = tmp_path / "s.csv"
     script.write_text("t_s,speed_input,turn_input\n0,50,0\n2,0,0\n")
     note, swarm = judged(tmp_path, record(tmp_path, true, "--script", str(script)), true)
-    assert swarm is None and "not all play a table" in note
+    assert swarm is None and "all must play a table of behaviour" in note
