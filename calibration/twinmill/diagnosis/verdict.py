@@ -9,7 +9,7 @@ from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.rest import MOMENTS, Rest
 from twinmill.diagnosis.search import REFIT, REFIT_IN_WORDS, of_levels
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.fitting.compare import GOOD, MISSING
+from twinmill.fitting.compare import GOOD, LACKING, MISSING
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ class VerdictInputs:
                 "No effect is missing; the base model's numbers were stale, and a refit is enough."
             )
         if verdict in ("effect_missing", "ambiguous"):
-            return f"Missing: {_in_turn([_named(f) for f in self.findings])}.{self._left}"
+            return f"{LACKING}{_in_turn([_named(f) for f in self.findings])}.{self._left}"
         return self._outside_sentence
 
     @property

@@ -24,6 +24,7 @@ from twinmill.predict.windows import CHANNELS, HORIZONS_S, Windows, rms
 
 # Scores: stop; something is missing; the smooth response is not good enough, or data leaked.
 GOOD, MISSING, SUSPECT = 1.15, 1.3, 0.9
+LACKING = "Missing: "  # how a sentence on what a model lacks begins
 NAMED = 3  # robots that are missed; of more the number is told
 
 
@@ -172,7 +173,10 @@ class Comparison:
 
 def of_others(count: int, sentence: str) -> str:
     """A sentence on all robots but those that were named before."""
-    return f"{'The other' if count == 1 else 'All others'}: {sentence[0].lower()}{sentence[1:]}"
+    one = count == 1
+    if sentence.startswith(LACKING):
+        return f"{'The other lacks' if one else 'All others lack'} {sentence.removeprefix(LACKING)}"
+    return f"{'The other' if one else 'All others'}: {sentence[0].lower()}{sentence[1:]}"
 
 
 def _meaning(score: float) -> str:

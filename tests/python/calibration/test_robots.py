@@ -14,7 +14,7 @@ from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.outliers import in_words
-from twinmill.fitting.compare import MISSING, compare
+from twinmill.fitting.compare import MISSING, compare, of_others
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import ParameterEstimate
@@ -90,6 +90,11 @@ def test_a_weak_robot_does_not_make_the_numbers_of_the_others_stale(logged):
     compared = compare(measurements, plain)
     assert compared.verdict.startswith(f"Missed: {measurements[1].label} ")
     assert "All others: as good as" in compared.verdict
+
+
+def test_what_the_others_lack_is_one_sentence_with_them():
+    assert of_others(3, "Missing: coasting (90 %).") == "All others lack coasting (90 %)."
+    assert of_others(1, "Missing: coasting (90 %).") == "The other lacks coasting (90 %)."
 
 
 def test_of_two_robots_that_the_model_misses_none_is_said_to_be_as_the_other(logged):
