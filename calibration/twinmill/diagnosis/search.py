@@ -31,6 +31,7 @@ from twinmill.model.parameters import (
     catalogue_of,
     effect_names,
     effect_parameters,
+    lasts_for_a_while,
     making_late,
     needing,
     newest_instance,
@@ -307,7 +308,7 @@ def _without_best_seconds(
 
     A while may lie within one block. What happened in a moment is seen for two seconds.
     """
-    if len(names) > 1 or not with_role(names[0], "moment")[1:]:
+    if len(names) > 1 or not lasts_for_a_while(names[0]):
         return 0.0
     logs = [d for d in state.datasets if isinstance(d, Trajectory)]
     least = []
@@ -367,7 +368,7 @@ def comes_again(done: Search, name: str) -> tuple[float, float] | None:
 
     None if it does not, or if the second time touches the first, which is another form of one.
     """
-    if name not in done.found or len(with_role(name, "moment")) < 2:
+    if name not in done.found or not lasts_for_a_while(name):
         return None
     (again,) = screen(done.last, names=[name])
     trial = cross_validate(done.last, (name,), again.start)
@@ -457,7 +458,7 @@ def _proven(trial: Trial, score: float, settings: Settings) -> bool:
     """Enough evidence, and blocks that agree; near the noise agreement alone is not enough."""
     count = len(trial.names)
     enough, less = settings.evidence * count, settings.less_evidence * count
-    if count == 1 and len(with_role(trial.names[0], "moment")) > 1:
+    if count == 1 and lasts_for_a_while(trial.names[0]):
         enough = less = settings.passing
     loud = trial.evidence >= enough
     somewhere = count == 1 and bool(with_role(trial.names[0], "place"))

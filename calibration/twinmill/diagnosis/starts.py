@@ -18,6 +18,7 @@ from twinmill.model.parameters import (
     catalogue,
     effect_names,
     effect_parameters,
+    lasts_for_a_while,
     with_role,
 )
 from twinmill.predict.datasets import Dataset, Trajectory
@@ -129,7 +130,7 @@ def starts_of(
     """
     subject = Subject(name, datasets, models)
     if with_role(name, "moment"):
-        return Whiles.of(subject, rows) if subject.named("moment")[1:] else _moments(subject, rows)
+        return Whiles.of(subject, rows) if lasts_for_a_while(name) else _moments(subject, rows)
     if with_role(name, "place"):
         return _places(subject, rows) if subject.logs else None
     return Grid.of(subject, rows) if with_role(name, "limit") else None

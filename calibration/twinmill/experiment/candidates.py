@@ -79,8 +79,6 @@ def candidates(
     for name, entry in catalogue_of(model).items():
         if name in model.effects or name in excluded or entry["stage"] not in STAGES:
             continue
-        if entry["duty_only"] and model.drive != "duty":
-            continue
         if entry["texts"]:  # a formula is the user's own, and no candidate
             continue
         candidate, columns = _best_columns(logs, entry, without)

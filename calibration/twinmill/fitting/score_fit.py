@@ -8,7 +8,6 @@ set has a scale of its own: what the model lacks in one must not drown what the 
 Levenberg and Marquardt, bounded; weights n_i / S_i^2 are renewed in each step.
 """
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,6 +24,7 @@ from twinmill.model.parameters import (
     WHERE_OR_WHEN,
     Parameter,
     ParameterEstimate,
+    lasts_for_a_while,
     stated_names,
 )
 from twinmill.predict.datasets import PARTS, ErrorDataset, Trajectory
@@ -324,12 +324,9 @@ class ScoreFit:
 
     @cached_property
     def _passing(self) -> np.ndarray:
-        """(P,) of effects that last for a while: what has two moments."""
+        """(P,) bool: of an effect that lasts for a while."""
         instances = [u.parameter.name.split(".")[0] for u in self.unknowns]
-        moments = Counter(
-            i for i, u in zip(instances, self.unknowns, strict=True) if u.parameter.role == "moment"
-        )
-        return np.array([moments[i] > 1 for i in instances], bool)
+        return np.array([lasts_for_a_while(i.split("#")[0]) for i in instances], bool)
 
     @cached_property
     def held_out(self) -> list[np.ndarray]:

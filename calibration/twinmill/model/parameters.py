@@ -113,6 +113,11 @@ def beginning_at_a_moment() -> list[str]:
     return [name for name in catalogue() if with_role(name, "moment")]
 
 
+def lasts_for_a_while(effect: str) -> bool:
+    """Whether an effect begins at one moment of its log and ends at another."""
+    return len(with_role(effect, "moment")) > 1
+
+
 def late_part(effect: str) -> tuple[str, str] | None:
     """What an effect makes late and by which of its parameters; None if it makes nothing late.
 

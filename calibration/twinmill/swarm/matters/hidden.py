@@ -76,8 +76,5 @@ def _lacking(model: native.Model) -> list[str]:
     return [
         name
         for name, card in catalogue_of(model).items()
-        if name not in model.effects
-        and card["stage"] != OF_A_LOG
-        and not card["texts"]
-        and (not card["duty_only"] or model.drive == "duty")
+        if name not in model.effects and card["stage"] != OF_A_LOG and not card["texts"]
     ]
