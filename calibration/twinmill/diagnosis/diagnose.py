@@ -41,6 +41,7 @@ from twinmill.diagnosis.search import (
     instead_of_drift,
     search,
 )
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
 from twinmill.fitting.compare import GOOD, Comparison, comparison, of_others
 from twinmill.fitting.fit import base_names
@@ -48,6 +49,7 @@ from twinmill.fitting.opening import (
     Opened,
     judged,
     open_measurements,
+    thinned,
     with_own_gains,
     with_own_lags,
 )
@@ -114,12 +116,12 @@ def diagnose(
     opened = open_measurements(measurements, model_file)
     before = comparison(model_file, opened)
     unseen = _unseen(opened)
-    known = with_own_gains(judged(opened))
+    known = thinned(with_own_gains(judged(opened)), SETTINGS.starts)
     first = first_state(known, model_file, {*excluded, *unseen})
     usual = model_file.usual_score([o.measurement.log_sha256 for o in known])
     off = odd_of_two(known, first, GOOD * usual, progress)
     if off:
-        known = _without(judged(opened), off)
+        known = thinned(_without(judged(opened), off), SETTINGS.starts)
         first = first_state(known, model_file, {*excluded, *unseen})
     done = search(first, progress, known=usual)
     lags_s = 0.0
@@ -265,12 +267,20 @@ def _concluded(
     if model_file.model.drive == "duty" and model_file.known_from_other_logs(hashes):
         findings = within_the_table(findings, less, last)
     doubted = _doubted(findings, less, known, start)
-    rest = rest_of(formulas, last.fit, start.fit, model_file.left_over(hashes), without=doubted)
+    whole = [_with_all_starts(o, opened) for o in known]
+    rest = rest_of(
+        formulas,
+        last.fit,
+        start.fit,
+        known=model_file.left_over(hashes),
+        whole=whole,
+        without=doubted,
+    )
     findings = beside_more(of_another_form(findings, rest), rest)
     findings.sort(key=lambda f: -f.share)  # for people: the chain's order is by what each loses
     told = [f.depends_on for f in findings if f.depends_on]
     rest = replace(rest, depends_on=[*dict.fromkeys([*told, *rest.depends_on])])
-    models = zip(known, last.state.models, strict=True)
+    models = zip(whole, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]
     modelled = [r.modelled.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
@@ -325,6 +335,14 @@ def _concluded(
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
         base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),
     )
+
+
+def _with_all_starts(own: Opened, opened: Sequence[Opened]) -> Opened:
+    """One of the measurements as it was opened, with what is its own in the search."""
+    whole = next(o for o in opened if o.measurement is own.measurement)
+    if own.floor is None:
+        return own
+    return replace(own, data=replace(whole.data, own=own.data.own), floor=whole.floor)
 
 
 def _doubted(

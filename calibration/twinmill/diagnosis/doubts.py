@@ -35,6 +35,7 @@ from twinmill.model.parameters import (
 from twinmill.predict.datasets import Trajectory
 
 AWAY_S = 2.0  # between two visits of a place
+SEVERAL = 3  # effects of one of KINDS, that are more likely one of another form
 # Groups of a rest, and what the cards of effects that act by them need or are shown by.
 BY = {
     "place": {"places", "place"},
@@ -308,12 +309,18 @@ def _leaves_its_own(finding: Finding, found: Sequence[Finding], rest: Rest) -> F
 
 
 def _is_second(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
-    """A better finding of the same of KINDS does already what this one does."""
+    """A better finding of the same of KINDS does already what this one does.
+
+    Where a kind needs three, not even the best of them is sure.
+    """
     for of_kind, _, does, what in KINDS:
         alike = [f for f in found if of_kind(f.effect)]
         if finding in alike[1:]:
             first = alike[0].effect
             return doubted(finding, f"{first} {does}, too: both may be one other {what}")
+        if finding in alike and len(alike) >= SEVERAL:
+            names = ", ".join(f.effect for f in alike[1:])
+            return doubted(finding, f"{names}: each {does}, too: all may be one other {what}")
     return None
 
 

@@ -24,6 +24,7 @@ from twinmill.fitting.compare import GOOD
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
 
+MOST_BLOCKS = 200
 FOLDS = 5
 FLIPS = 499  # random signs of blocks that make the null distribution
 MOMENTS = "single moments"
@@ -160,8 +161,9 @@ def rest_of(
     formulas: Formulas | None,
     fit: ScoreFit,
     first: ScoreFit,
-    known: Mapping[str, float],
     *,
+    known: Mapping[str, float],
+    whole: Sequence[Opened],
     without: Doubted | None = None,
 ) -> Rest:
     """Tests whether the residuals of a fit are noise, and on what they depend.
@@ -171,6 +173,7 @@ def rest_of(
         fit: of the final model.
         first: of the model as given.
         known: what the model left in other logs already, as `left_over`.
+        whole: the data sets, with all starts of predictions.
         without: the findings, where all are in doubt, and the fit and formulas without them.
     """
     left = max(fit.held_square - 1, 0.0)
@@ -180,7 +183,7 @@ def rest_of(
     logs = formulas.logs
     firm = _firm(logs, fit)
     found = _dependences(formulas, fit, known)
-    own_logs, models = [own for _, own in logs], [fit.models[i] for i, _ in logs]
+    own_logs, models = [whole[i] for i, _ in logs], [fit.models[i] for i, _ in logs]
     moments = moments_of(own_logs, models)
     depends_on = [*found.depends_on, *([MOMENTS] if moments else [])]
     again = comes_again(own_logs, models)
@@ -310,6 +313,9 @@ class Products:
     def __init__(
         self, columns: np.ndarray, left: np.ndarray, blocks: np.ndarray, seen: np.ndarray
     ) -> None:
+        count = blocks.max() + 1
+        if count > MOST_BLOCKS:  # each has a matrix: of many, neighbours are one
+            blocks = blocks * MOST_BLOCKS // count
         order = np.argsort(blocks, kind="stable")
         edges = np.searchsorted(blocks[order], np.arange(blocks.max() + 2))
         parts = [order[a:b] for a, b in pairwise(edges)]

@@ -247,10 +247,11 @@ def search(
             settings,
         )
         dropped += gone
-    progress("comparing lags and delays")
+    progress("exchanging what was found for other effects")
     found = [n for r in rounds if r.accepted for n in r.accepted.names if n not in dropped]
-    before, gone = _with_best_lateness(rounds, before, found, settings)
-    return Search(rounds, before, [*dropped, *gone], settings)
+    before, kept = _exchanged(rounds, before, found=found, starts=starts, settings=settings)
+    accepted = [n for r in rounds if r.accepted for n in r.accepted.names]
+    return Search(rounds, before, [n for n in accepted if n not in kept], settings)
 
 
 # -- trials -------------------------------------------------------------------------------------
@@ -336,7 +337,7 @@ def _best(
         at_nothing = all(_is_neutral(trial, n) or _began_before(trial, n) for n in trial.names)
         if not at_nothing and _proven(trial, before.held_score, settings):
             good.append(trial)
-    best = min(good, key=lambda t: t.fit.held_cost + settings.each * len(t.fit.x), default=None)
+    best = min(good, key=lambda t: _cost(t, settings), default=None)
     # Stale numbers of the base are more likely than an effect that does the same.
     stale = [
         t
@@ -420,38 +421,81 @@ def _least_fall(before: Trial, trial: Trial, first_excess: float, settings: Sett
     return float(np.clip(settings.below * first_excess, least, most))
 
 
-def _with_best_lateness(
-    rounds: list[Round], last: Trial, found: Sequence[str], settings: Settings
+def _exchanged(
+    rounds: list[Round],
+    last: Trial,
+    *,
+    found: Sequence[str],
+    starts: dict[str, Starts],
+    settings: Settings,
 ) -> tuple[Trial, list[str]]:
-    """The last state with each lag or delay in the place of another, if that is better.
+    """The last state with each effect exchanged for another one, if that is better.
 
-    One alone is accepted first that does what two others do together. What is as good is tied.
+    An effect was accepted beside what was known in its round; what came later may do a part of it,
+    and leave a rest that another one takes as well or better (a forward search alone cannot see
+    that; Miller 2002 calls this sequential replacement). What is as good is tied.
 
     Returns:
-        The best, and what is gone from the findings; a swap is one more round.
+        The best, and the findings that are left; an exchange is one more round.
     """
-    gone = []
-    for name in [n for n in found if with_role(n, "lateness")]:
+    kept = list(found)
+    for name in [n for n in found if n != REFIT]:
+        if name not in kept:
+            continue
         base = without_effect(last, name)
-        others = candidates(base.state) if base else []
-        others = [n for n in others if with_role(n, "lateness") and n != name]
-        trials = [cross_validate(base, (n,)) for n in others]
-        trials = [t for t in trials if t.fit.held_cost < last.fit.held_cost + settings.tie]
-        if not trials:
+        if base is None:
             continue
-        best = min(trials, key=lambda t: t.fit.held_cost)
-        if best.fit.held_cost >= last.fit.held_cost:
-            this = next(r for r in rounds if r.accepted and name in r.accepted.names)
+        others = _rivals(base, name, beside=len(kept) > 1, starts=starts, settings=settings)
+        trials = [cross_validate(base, (s.name,), s.start) for s in others]
+        close = [t for t in trials if _cost(t, settings) < _cost(last, settings) + settings.tie]
+        if not close:
+            continue
+        stale = [t for t in close if t.names == (REFIT,)]
+        best = min(stale or close, key=lambda t: _cost(t, settings))
+        if not stale and _cost(best, settings) >= _cost(last, settings):
+            this = next(r for r in reversed(rounds) if r.accepted and name in r.accepted.names)
             known = {n for t in this.tied for n in t.names}
-            this.tied += [t for t in trials if t.names[0] not in known]
+            this.tied += [t for t in close if t.names[0] not in known]
             continue
-        same = [t for t in trials if t.fit.held_cost < best.fit.held_cost + settings.tie]
-        if last.fit.held_cost < best.fit.held_cost + settings.tie:
+        same = [t for t in close if _cost(t, settings) < _cost(best, settings) + settings.tie]
+        if _cost(last, settings) < _cost(best, settings) + settings.tie:
             same.append(replace(last, names=(name,)))
         tied = [t for t in same if t is not best]
         rounds.append(Round(base, rounds[-1].screened, trials, best, tied))
-        last, gone = best, [*gone, name]
-    return last, gone
+        kept = [n for n in kept if n != name]
+        last, gone = _pruned(best, kept, settings)
+        kept = [*(n for n in kept if n not in gone), *best.names]
+    return last, kept
+
+
+def _rivals(
+    base: Trial, name: str, *, beside: bool, starts: dict[str, Starts], settings: Settings
+) -> list[Screened]:
+    """Candidates in the place of an effect, once all else that was found is there.
+
+    Args:
+        base: the last state without the effect.
+        name: of the effect.
+        starts: of effects whose start is searched.
+        settings: numbers that decide.
+        beside: whether something else was found; if not, the first round has compared them.
+    """
+    late = with_role(name, "lateness")
+    if not beside and not late:
+        return []
+    screened = screen(base, starts)
+    own = next((s.gain for s in screened if s.name == name), 0.0)
+    likely = [s for s in _promising(screened, settings) if s.gain > settings.rival * own]
+    likely = [s for s in likely if s.name != name][: settings.exchanged] if beside else []
+    names = {s.name for s in likely} | {name}
+    return likely + [
+        s for s in screened if late and s.name not in names and with_role(s.name, "lateness")
+    ]
+
+
+def _cost(trial: Trial, settings: Settings) -> float:
+    """Held-out cost, and what its numbers cost."""
+    return trial.fit.held_cost + settings.each * len(trial.fit.x)
 
 
 def _proven(trial: Trial, score: float, settings: Settings) -> bool:

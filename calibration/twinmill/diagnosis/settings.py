@@ -15,6 +15,7 @@ class Settings(Numbers):
     """What each number means stands beside it; scores are over the noise floor, 1.0 is right."""
 
     # The search: which effect is accepted.
+    starts: int = number(3000, "predictions, of more every second, third ... start is looked at")
     evidence: float = number(16.0, "least fall of the held-out cost (-2 log likelihood)")
     passing: float = number(30.0, "the same of an effect of a while, which is fitted to all of it")
     without_best: float = number(8.0, "the same without the block with the most evidence")
@@ -33,6 +34,8 @@ class Settings(Numbers):
     fitted: int = number(7, "candidates that are fitted in each round")
     pairs: int = number(3, "pairs that are tried where no single candidate is accepted")
     most: int = number(6, "rounds")
+    rival: float = number(0.7, "share of an effect's promise, with which another may replace it")
+    exchanged: int = number(3, "most of these that are fitted, for each effect")
     usual: float = number(1.5, "times the evidence where the known score is no worse")
     strictest: float = number(3.0, "the evidence is raised at most so many times")
     common: float = number(1.01, "times a score: no worse")

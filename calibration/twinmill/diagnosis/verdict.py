@@ -112,7 +112,8 @@ class VerdictInputs:
         """The motion is far noisier than it was, and what was found takes little beside."""
         if not self.noises:
             return False
-        return self._taken < 0.5
+        with_base = sum(f.share for f in self.findings)
+        return self._taken < 0.5 and with_base < SETTINGS.nearly_all
 
     @property
     def _of_another_form(self) -> bool:
@@ -217,13 +218,14 @@ class VerdictInputs:
         events = moments.sentence(self.rest.moments) if self.rest.moments else ""
         if events and not self._outside:
             return f"Nothing is missing that acts all the time. {events}"
-        if self.noises and not (self.rest.depends_on or self.rest.firm):
-            return "Something random disturbs the motion that no effect of the catalogue describes."
-        on = " and ".join(self._continuous)
-        depends = f"it depends on {on}" if on else "no formula that was tried describes it"
         named = [_plain(f) for f in self.findings]
         verb = "explains" if len(named) == 1 and named[0] != REFIT_IN_WORDS else "explain"
         also = f" {' and '.join(named)} {verb} part of it." if named else ""
+        if self.noises and not (self.rest.depends_on or self.rest.firm):
+            what = "Something random disturbs the motion that no effect of the catalogue describes."
+            return f"{what}{also}"
+        on = " and ".join(self._continuous)
+        depends = f"it depends on {on}" if on else "no formula that was tried describes it"
         return f"Something outside the catalogue is there; {depends}.{also} {events}".rstrip()
 
     @property

@@ -5,7 +5,7 @@ It is a property of the log. Of the model file only the robot's form is used (dr
 geometry), with numbers refitted to this very log. So better predictions never get a worse score.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import twinmill_native as native
@@ -58,6 +58,12 @@ class NoiseFloor:
     lateness_s: float
     across: np.ndarray
     response: Response | None
+
+    def thinned(self, every: int) -> "NoiseFloor":
+        """The same, seen from every Nth start alone."""
+        response = self.response and self.response.thinned(every)
+        keep, across = self.keep[::every], self.across[::every]
+        return replace(self, keep=keep, across=across, response=response)
 
 
 def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> NoiseFloor:

@@ -220,6 +220,18 @@ def of_few_commands(opened: Sequence[Opened]) -> str:
     )
 
 
+def thinned(opened: Sequence[Opened], most: int) -> list[Opened]:
+    """The same with so few starts that there are no more predictions than `most`, about."""
+    total = sum(len(o.data.keep) for o in opened if o.floor)
+    every = -(-total // most)
+    if every < 2:
+        return list(opened)
+    return [
+        replace(o, data=o.data.thinned(every), floor=o.floor.thinned(every)) if o.floor else o
+        for o in opened
+    ]
+
+
 def wide_gains(model: native.Model) -> tuple[Parameter, ...]:
     """A robot's own gains where they are in question."""
     return tuple(replace(p, usual=1.0, std=WIDE_STD) for p in base_parameters(model, GAINS))

@@ -94,6 +94,15 @@ class Response:
         other.unboosted = np.where(keep[:, None, None], self.unboosted, np.nan)
         return other
 
+    def thinned(self, every: int) -> "Response":
+        """The same, as fitted, seen from every Nth start alone."""
+        other = copy(self)
+        other.data = self.data.thinned(every)
+        for name in ("starts", "ends", "within", "across", "unboosted"):
+            setattr(other, name, getattr(self, name)[::every])
+        other._index_windows()
+        return other
+
     # -- where features are taken ---------------------------------------------------------------
 
     def _choose_points(self) -> None:

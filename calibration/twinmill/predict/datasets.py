@@ -16,7 +16,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.model.parameters import MOTION_STAGES, Parameter
-from twinmill.predict.windows import HORIZONS_S, Windows, difference
+from twinmill.predict.windows import EVERY_S, HORIZONS_S, Windows, difference
 
 BLOCK_S = 8.0  # errors of different blocks count as independent
 FEWEST_BLOCKS = 6  # a shorter log has shorter blocks
@@ -75,6 +75,7 @@ class Trajectory:
         own: see ErrorDataset.
         first_part: part that the log begins with. Logs often begin alike, so that of several each
             begins with another one: else a drive of all of them is left out at once.
+        every_s: between two starts.
     """
 
     measurement: Measurement
@@ -84,6 +85,7 @@ class Trajectory:
     keep: np.ndarray
     own: tuple[Parameter, ...] = ()
     first_part: int = 0
+    every_s: float = EVERY_S
     weight: np.ndarray = field(init=False, repr=False)
     block: np.ndarray = field(init=False, repr=False)
     part: np.ndarray = field(init=False, repr=False)
@@ -127,6 +129,16 @@ class Trajectory:
         known = np.where(floor > 1e-9, floor, np.inf)
         return replace(self, floor=known, keep=self.keep if keep is None else keep)
 
+    def thinned(self, every: int) -> "Trajectory":
+        """The same with every Nth start alone: predictions that overlap tell much the same."""
+        return replace(
+            self,
+            windows=self.windows.thinned(every),
+            measured=self.measured[::every],
+            keep=self.keep[::every],
+            every_s=every * self.every_s,
+        )
+
     @property
     def label(self) -> str:
         """Name of the log and number of the robot."""
@@ -151,7 +163,7 @@ class Trajectory:
     @property
     def covered_s(self) -> float:
         """Time in which predictions start."""
-        return float(np.count_nonzero(self.keep)) * 0.25
+        return float(np.count_nonzero(self.keep)) * self.every_s
 
     @property
     def n_eff(self) -> float:

@@ -54,6 +54,10 @@ class Windows:
         ends[np.cumsum(ends < 0, axis=1) > 0] = -1
         return cls(starts.astype(np.int64), ends.astype(np.int64))
 
+    def thinned(self, every: int) -> "Windows":
+        """Every Nth of them."""
+        return Windows(self.starts[::every], self.ends[::every])
+
     def measured(self, measurement: Measurement) -> np.ndarray:
         """(W, H, 3) displacement forward, left (m) and turn (rad), seen from the start."""
         return self.seen(measurement.track, measurement.track.pose[self.ends])

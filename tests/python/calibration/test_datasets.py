@@ -51,6 +51,16 @@ def test_each_error_is_left_out_once_and_with_its_whole_block(data):
     assert sorted(first) == list(range(PARTS))
 
 
+def test_every_third_start_sees_what_these_saw(data, model_file):
+    """Errors of a prediction do not hang on what else is predicted; as many count as one error."""
+    model, thin = model_file().model, data.thinned(3)
+    assert thin.errors(model) == pytest.approx(data.errors(model)[::3], nan_ok=True)
+    unit = np.broadcast_to(data.floor, data.measured.shape).copy()
+    assert squared(thin, unit[::3]) == pytest.approx(1)
+    assert thin.n_eff == pytest.approx(data.n_eff, rel=0.02)
+    assert np.array_equal(thin.block.reshape(-1, 15), data.block.reshape(-1, 15)[::3])
+
+
 def test_rows_are_errors_over_floor_and_come_back(data, model_file):
     model = model_file().model
     rows = data.rows(model, ["base.yaw_gain"], np.array([[model.get("base.yaw_gain")]]))[0]

@@ -705,6 +705,13 @@ def test_one_window_that_misses_is_no_event():
     assert [list(e) for e in events] == [[40, 41], [80, 81, 82]]
 
 
+def test_three_effects_of_one_kind_are_one_of_another_form():
+    """A body that rolls on in a way of its own is late, sooner and late again at each stop."""
+    names = ("lag_by_duty", "slew_limit", "motor_lag", "wheel_gain")
+    judged = of_another_form([Finding(n, None, [], 0.3, "sure") for n in names], NOTHING_LEFT)
+    assert [f.certainty for f in judged] == ["doubtful", "doubtful", "doubtful", "sure"]
+
+
 def test_two_curves_of_the_speed_over_the_command_may_be_one():
     """Any odd curve is some dead zone and some bend; a gain of a wheel is no part of it."""
     found = [Finding(n, None, [], 0.3, "sure") for n in ("dead_zone", "speed_curve", "wheel_gain")]

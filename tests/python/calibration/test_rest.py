@@ -193,6 +193,24 @@ def test_much_that_is_left_and_depends_on_something_outweighs_a_doubtful_effect(
 
 
 @pytest.mark.parametrize(
+    ("of_base", "of_effect", "verdict"),
+    [
+        (0.55, 0.43, "effect_missing"),  # together they take all that was above the noise
+        (0.3, 0.3, "outside_catalogue"),
+        (0.0, 0.3, "outside_catalogue"),
+    ],
+)
+def test_noise_outweighs_a_name_that_leaves_much(of_base, of_effect, verdict):
+    stale = Finding(REFIT, None, [], of_base, "sure")
+    found = [*([stale] if of_base else []), Finding("carpet_grain", None, [], of_effect, "sure")]
+    rest = Rest(1 - of_base - of_effect, False, [])
+    noise = ["the unexplained scatter is 4.2 times the noise in the model file"]
+    weighed = VerdictInputs(2.0, 2.0, 1.4, 0.9, found, rest, [], [], noise, 1.0)
+    assert weighed.verdict == verdict
+    assert "carpet_grain" in weighed.sentence
+
+
+@pytest.mark.parametrize(
     ("score", "certainty", "verdict"),
     [
         (1.05, "doubtful", "model_adequate"),
