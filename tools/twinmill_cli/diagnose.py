@@ -24,6 +24,7 @@ if working():  # not for --help
     from twinmill.diagnosis.result import Diagnosis
     from twinmill.report import diagnosis as present
     from twinmill.swarm.metrics import swarm_metrics
+    from twinmill.terminal import progress_bar
     from twinmill_cli.calibrate import option
     from twinmill_cli.frame import (
         check_output,
@@ -141,12 +142,18 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
             "table of behaviour, and these do not."
         ), None
     # Slow to import, and `make demo` does without what it needs.
-    from twinmill_cli.compare_swarm import LOOK, compare_swarm
+    from twinmill.report.swarm_comparison import LOOK
+    from twinmill.swarm.compare import compare_swarm
 
-    scale = model.get("sensor.range_m"), model.get("robot.body_radius_m")
     try:
-        series = swarm_metrics(log, *scale)
-        found = compare_swarm(log, series, model, scale, seeds=range(1, TWIN_RUNS + 1))
+        series = swarm_metrics(log, model.get("sensor.range_m"), model.get("robot.body_radius_m"))
+        with progress_bar() as progress:
+            task = progress.add_task("twin runs", total=TWIN_RUNS)
+            found = compare_swarm(
+                *(log, series, model),
+                seeds=range(1, TWIN_RUNS + 1),
+                tell=lambda: progress.advance(task),
+            )
     except ValueError as error:
         return f"Each robot was judged by itself; the swarm as a whole cannot be: {error}", None
     done = "with what was found" if result.found else "with this model, its base refitted"
