@@ -14,10 +14,6 @@ from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import Detections
 
-# Scatter of the logarithm of errors among cameras that are alike: over all frames, and over those
-# in which another robot is in view, which are few and come in passages.
-SPREAD, SPREAD_IN_VIEW = 0.1, 0.2
-
 
 def odd_cameras(cameras: list[Detections], model: native.Model) -> set[int]:
     """Numbers of the robots whose bits fit the model much worse than the others'; never half."""
@@ -34,8 +30,8 @@ def camera_outliers(cameras: list[Detections], model: native.Model) -> dict[int,
     if found is None:
         return {}
     robots = np.array([s.robot_id for s in cameras])[found.robot]
-    over_all = _apart(found, robots, np.ones(len(robots), bool), SPREAD)
-    in_view = _apart(found, robots, found.in_view, SPREAD_IN_VIEW)
+    over_all = _apart(found, robots, np.ones(len(robots), bool), SETTINGS.camera_spread)
+    in_view = _apart(found, robots, found.in_view, SETTINGS.camera_spread_in_view)
     return {i: max(over_all[i], in_view[i]) for i in over_all}
 
 

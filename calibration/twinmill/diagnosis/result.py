@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 
 import twinmill_native as native
 
+from twinmill.data.checks.settings import CHECKS
 from twinmill.diagnosis.finding import Finding, Late, Ranked
 from twinmill.diagnosis.outliers import Outlier
 from twinmill.diagnosis.resolution import Resolution
@@ -141,5 +142,6 @@ class Diagnosis:
             "notes": self.notes,
             "settings": asdict(self.search.settings),
             "floor_settings": asdict(FLOOR_SETTINGS),
+            "check_settings": asdict(CHECKS),
             "passes": self.search.passes,
         }
