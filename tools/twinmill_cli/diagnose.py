@@ -85,12 +85,12 @@ def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str,
     elif result.verdict == "refit_enough":
         to = Path(f"{stem}_fitted.toml")
         told.append(("To refit the base", command_line("fit", logs, model, to)))
-    grown = f"{stem}_explained.toml" if result.found else model
-    return [*told, *_adding(result, logs, given=model, grown=grown)]
+    explained = f"{stem}_explained.toml" if result.found else model
+    return [*told, *_adding(result, logs, given=model, explained=explained)]
 
 
 def _adding(
-    result: Diagnosis, logs: list[Path], *, given: str, grown: str
+    result: Diagnosis, logs: list[Path], *, given: str, explained: str
 ) -> list[tuple[str, str]]:
     """What adds the formula that was proven; nothing if none was.
 
@@ -98,14 +98,14 @@ def _adding(
         result: the diagnosis.
         logs: of it.
         given: the model that was diagnosed: to it, if the formula stands for what was found.
-        grown: the model with what was found.
+        explained: the model with what was found.
     """
     proven = result.rest.proven
     if not proven:
         return []
     options = [w for name, text in proven.equation.items() for w in (option(name), text)]
     verb = shlex.join(["add", "equation", *options])
-    model = given if proven.instead_of else grown
+    model = given if proven.instead_of else explained
     why = "To add the formula" if model == given else "Then, to add the formula"
     to = Path(f"{Path(given).stem}_equation.toml")
     return [(why, command_line(verb, logs, model, to))]
@@ -185,7 +185,7 @@ def _explain(
             measurements, model_file, out=output, command=source.command, progress=progress
         )
     settling = _settling(result.diagnosis, logs, str(output))
-    then = [*_adding(result.diagnosis, logs, given=model, grown=str(output)), *settling]
+    then = [*_adding(result.diagnosis, logs, given=model, explained=str(output)), *settling]
     section = partial(present.explanation_section, result, then)
     data = {**result.to_json(), **told(measurements)}
     if settling:

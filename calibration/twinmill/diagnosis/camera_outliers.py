@@ -16,12 +16,12 @@ from twinmill.predict.detections import Detections
 
 
 def odd_cameras(cameras: list[Detections], model: native.Model) -> set[int]:
-    """Numbers of the robots whose bits fit the model much worse than the others'; never half."""
+    """Robots whose detections fit the model much worse than the others'; never half."""
     return odd_ones(camera_outliers(cameras, model))
 
 
 def camera_outliers(cameras: list[Detections], model: native.Model) -> dict[int, float]:
-    """By robot: how many scales its bits' errors are above the median robot's.
+    """By robot: how many scales its detections' errors are above the median robot's.
 
     Over all frames, or over those with a robot in view if they say more: a camera that sees nothing
     is right in all the others.
@@ -93,7 +93,7 @@ def _judge_camera(
     first = done.rounds[0].accepted
     p_value = count * (done.rounds[0].p_value(first) if first else t.sf(away[robot_id], count - 1))
     parameters = [e for e in done.last.fit.estimates if e.name.split(".")[0] in done.found]
-    told = f"the bits of its camera err {before:.2f} times as much as they should with the "
+    told = f"the detections of its camera err {before:.2f} times as much as they should with the "
     told += f"model of all, those of the others {others:.2f} times; "
     told += (
         f"{' and '.join(done.found)} of its own makes it {after:.2f}"

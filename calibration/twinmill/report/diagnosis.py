@@ -282,8 +282,11 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
     """The page of a diagnosis: verdict, figures, tables and the commands that follow."""
     before = diagnosis.before
     scores = [("as given", before.score), ("base refitted, held out", diagnosis.score_refit)]
-    if len(diagnosis.bit_steps) > 1:
-        scores += [("bits", diagnosis.bit_steps[0][1]), ("bits, found", diagnosis.bit_steps[-1][1])]
+    if len(diagnosis.detection_steps) > 1:
+        scores += [
+            ("detections", diagnosis.detection_steps[0][1]),
+            ("detections, found", diagnosis.detection_steps[-1][1]),
+        ]
     return Section(
         f"What {before.model_name} lacks",
         [(label, number(value), tone(value)) for label, value in scores],
@@ -367,24 +370,26 @@ def _tables(diagnosis: Diagnosis) -> list[Table]:
 
 
 def _detection_steps(diagnosis: Diagnosis) -> list[Table]:
-    return [detections.steps(diagnosis.bit_steps)] if len(diagnosis.bit_steps) > 1 else []
+    return (
+        [detections.steps(diagnosis.detection_steps)] if len(diagnosis.detection_steps) > 1 else []
+    )
 
 
 def _detection_tables(diagnosis: Diagnosis) -> list[Table]:
-    """Predicted and measured bits, with the effects that were found if there are any."""
-    bits = diagnosis.bits_after or diagnosis.bits
-    return detections.confusion_tables(bits) if bits else []
+    """Predicted and measured detections, with the effects that were found if there are any."""
+    found = diagnosis.detections_after or diagnosis.detections
+    return detections.confusion_tables(found) if found else []
 
 
 def _detection_figures(diagnosis: Diagnosis) -> list[Figure]:
     """What the camera sees, with the model as given and with what was found."""
-    if not diagnosis.bits:
+    if not diagnosis.detections:
         return []
-    after = diagnosis.bits_after
+    after = diagnosis.detections_after
     found = (
         [detections.field_of_view(after, "What the camera sees, effects added")] if after else []
     )
-    return [detections.field_of_view(diagnosis.bits), *found]
+    return [detections.field_of_view(diagnosis.detections), *found]
 
 
 def _gains(diagnosis: Diagnosis) -> list[Figure]:
