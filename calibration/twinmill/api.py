@@ -17,7 +17,7 @@ import subprocess
 import weakref
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
-from dataclasses import fields, replace
+from dataclasses import replace
 from numbers import Integral, Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -78,6 +78,19 @@ NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
 SWARM_SCALE = ("sensor.range_m", "robot.body_radius_m")  # of a model, for metrics of swarms
 LONGEST_RUN_S = 600.0
 LEAST_TOP_DUTY = 0.2  # below it no robot on a floor moves
+NAMES = ((list, tuple, set, frozenset), "a list of names")
+BY_NAME = (Mapping, "a dictionary by name")
+NUMBER = (Real, "a number")
+SWITCH = (bool, "True or False")
+IMPORT_OPTIONS: dict[str, tuple[Any, str]] = {
+    **dict.fromkeys(("robots", "rename"), BY_NAME),
+    **dict.fromkeys(("pose_shift_s", "pose_clock_ppm", "wheelbase_m", "full_duty"), NUMBER),
+    **dict.fromkeys(("path_heading", "same_clock", "receive_stamps"), SWITCH),
+    **dict.fromkeys(("flips", "pose_topics", "command_topics"), NAMES),
+    "mapping": ((str, Path), A_PATH),
+    "up": (str, "`y` or `z`"),
+}
+Form = TypeVar("Form", LogFormat, ModelFormat)
 Result = TypeVar("Result")
 Told = TypeVar("Told", bound="Shown")
 
@@ -312,13 +325,13 @@ class Log(Shown):
             >>> "pose.csv" in [file.name for file in files]
             True
         """
-        (form,) = known("to", (to,), [*LogFormat])
+        form = _format(to, LogFormat)
         logs, file = self._recorded("messages"), _model(model).file
         if len(logs) > 1:
             raise ValueError(f"{path}: one export cannot hold {len(logs)} logs; export each.")
         with said_in_python():
             done = export_log(
-                *(logs[0].path, LogFormat(form), path_of("path", path, A_PATH)),
+                *(logs[0].path, form, path_of("path", path, A_PATH)),
                 model=file.model,
                 command="twinmill.Log.export",
                 force=force,
@@ -665,12 +678,12 @@ class Model(Shown):
             >>> tm.Model.load("turbopi.toml").export(Path(mkdtemp()) / "turbopi.json", to="json")
             []
         """
-        (form,) = known("to", (to,), [*ModelFormat])
+        form = _format(to, ModelFormat)
         checked("robot", robot, (Integral, NoneType), "the number of a robot")
         out = path_of("path", path, A_PATH)
         with said_in_python():
             done = export_model(
-                *(open_robot(self.file, robot, None), ModelFormat(form), out),
+                *(open_robot(self.file, robot, None), form, out),
                 ranges_stem=out.with_suffix("") if ranges else None,
                 force=force,
             )
@@ -1483,10 +1496,12 @@ def import_log(
         >>> tm.import_log(poses, commands)
         Log(imported.lcmlog: robot 0, 60 s)
     """
-    known("option", options, [f.name for f in fields(ImportOptions) if f.name != "force"])
+    checked("robot_id", robot_id, (Integral, NoneType), "the number of a robot")
     checked("heading_offset_deg", heading_offset_deg, Real, "an angle in degrees")
     offset_rad = float(np.radians(heading_offset_deg))
-    how = ImportOptions(robot_id=robot_id, heading_offset_rad=offset_rad, **options)
+    how = ImportOptions(
+        robot_id=robot_id, heading_offset_rad=offset_rad, **_import_options(options)
+    )
     tables = {"poses": poses, "commands": commands, "detections": detections}
     files = {"motive": motive, "vicon": vicon, "bag": bag}
     several = checked("io_tsv", io_tsv, (list, tuple), "a list of paths")
@@ -1504,6 +1519,26 @@ def import_log(
         own = read_log(out).warnings
         said = [in_python(text) for text in told["warnings"] if text not in own]
         return Log([out], said, stack.pop_all().close)
+
+
+def _import_options(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields of `ImportOptions`, once each is known to be of its kind."""
+    told = {}
+    for name in known("option", options, IMPORT_OPTIONS):
+        kinds, wanted = IMPORT_OPTIONS[name]
+        told[name] = checked(name, options[name], kinds, wanted)
+    if "mapping" in told:
+        told["mapping"] = Path(told["mapping"])
+    if "flips" in told:
+        told["flips"] = frozenset(told["flips"])
+    return told
+
+
+def _format(to: str, forms: type[Form]) -> Form:
+    """One of these formats, by its name."""
+    if checked("to", to, str, "the name of a format") not in [*forms]:
+        raise ValueError(f"to: there is no '{to}'; choose one of {', '.join(forms)}.")
+    return forms(to)
 
 
 def _as_csv(place: Path, name: str, table: str | Path | pd.DataFrame | None) -> Path | None:

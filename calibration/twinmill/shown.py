@@ -9,7 +9,7 @@ from importlib.metadata import version
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Self
 
 import pandas as pd
 from rich.console import Console, RenderableType
@@ -59,6 +59,12 @@ class Shown:
             *lines, self._text(), sep="\n", markup=False, highlight=False
         )
         return "\n".join(map(str.rstrip, out.getvalue().splitlines())).rstrip()
+
+    def __copy__(self) -> Self:
+        return self  # it never changes
+
+    def __deepcopy__(self, _: dict) -> Self:
+        return self
 
     def __reduce__(self) -> str:
         raise TypeError(

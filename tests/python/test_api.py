@@ -2,6 +2,7 @@
 """`import twinmill as tm`: the examples run, results are those of the commands, nothing is left."""
 
 import ast
+import copy
 import doctest
 import json
 import os
@@ -10,6 +11,7 @@ import re
 import subprocess
 import sys
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from pathlib import Path
 
@@ -174,6 +176,12 @@ def test_tables_become_the_log_of_the_command(here, tmp_path):
     assert not place.exists()
 
 
+def test_exports_make_the_folders_that_they_are_to_be_in(here, tmp_path):
+    log = tm.load("run.lcmlog")
+    for to in ("csv", "rosbag2"):
+        assert all(f.exists() for f in log.export(tmp_path / to / "deep" / "out", to=to))
+
+
 def test_tables_hold_what_the_log_holds(here):
     log, raw = tm.load("run.lcmlog"), read_log("run.lcmlog").robots[0]
     poses, commands = log.table(), log.commands()
@@ -230,7 +238,9 @@ def test_what_is_wrong_is_said_in_a_sentence(here):
         tm.import_log()
     with pytest.raises(ValueError, match="option: there is no 'renames'; the nearest is 'rename'"):
         tm.import_log("poses.csv", "commands.csv", renames={})
-    with pytest.raises(ValueError, match="to: there is no 'xlsx'"):
+    with pytest.raises(tm.LogError, match="up q: must be y or z"):
+        tm.import_log("poses.csv", "commands.csv", up="q")
+    with pytest.raises(ValueError, match="to: there is no 'xlsx'; choose one of mcap, csv"):
         tm.load("run.lcmlog").export("out", to="xlsx")
     with pytest.raises(ValueError, match=r"exists; .*force=True"):
         tm.Model.load().export("fitted.toml", to="json")
@@ -290,6 +300,18 @@ WRONG_TYPES = {  # what is called, and what the sentence says
         "base.motor_lag_s: is '0\\.1', and must be a number",
     ),
     "sides": (lambda log, model: tm.next_run(log, floor_m="2x2"), "floor_m: is '2x2', and must be"),
+    "letters of flips": (
+        lambda log, model: tm.import_log("a.csv", "b.csv", flips="y_m"),
+        "flips: is 'y_m', and must be a list of names",
+    ),
+    "list of renames": (
+        lambda log, model: tm.import_log("a.csv", "b.csv", rename=["yaw=theta_rad"]),
+        "rename: is a list, and must be a dictionary",
+    ),
+    "shift": (
+        lambda log, model: tm.import_log("a.csv", "b.csv", pose_shift_s="1"),
+        "pose_shift_s: is '1', and must be a number",
+    ),
     "poses": (lambda log, model: tm.import_log(5, 6), "poses: is 5, and must be a table"),
     "card": (lambda log, model: tm.effect(None), "name: is a NoneType, and must be"),
     "progress": (
@@ -317,6 +339,17 @@ def test_what_cannot_be_pickled_says_what_to_do(here):
     for thing in (tm.load("run.lcmlog"), tm.Model.load("turbopi")):
         with pytest.raises(TypeError, match="give paths"):
             pickle.dumps(thing)
+
+
+def test_a_copy_is_as_good_as_what_never_changes(here):
+    for thing in (tm.load("run.lcmlog"), tm.Model.load("turbopi")):
+        assert copy.copy(thing) is copy.deepcopy(thing) is thing
+
+
+def test_threads_give_what_one_gives(here):
+    with ThreadPoolExecutor(3) as pool:
+        scores = [*pool.map(lambda _: tm.compare("run.lcmlog", "fitted.toml").score, range(3))]
+    assert set(scores) == {tm.compare("run.lcmlog", "fitted.toml").score}
 
 
 def test_a_plot_opens_in_the_window_of_a_script(here):

@@ -103,6 +103,7 @@ def _write_tables(
     check_new_folder(folder)
     if folder.exists() and not force:
         raise ValueError(f"{folder}: exists; choose another name, or replace it with --force.")
+    folder.parent.mkdir(parents=True, exist_ok=True)
     files = [folder / f"{name}.{to}" for name in tables]
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as temporary:
         for table, file in zip(tables.values(), files, strict=True):
