@@ -13,9 +13,36 @@ tm.simulate(better, n=8)
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from twinmill.programs import use_own_libraries, use_own_models
+
+if TYPE_CHECKING:  # for editors and type checkers; the same names as below
+    from twinmill.api import Addition as Addition
+    from twinmill.api import Diagnosis as Diagnosis
+    from twinmill.api import Explanation as Explanation
+    from twinmill.api import Finding as Finding
+    from twinmill.api import Fit as Fit
+    from twinmill.api import Log as Log
+    from twinmill.api import Model as Model
+    from twinmill.api import compare as compare
+    from twinmill.api import diagnose as diagnose
+    from twinmill.api import effect as effect
+    from twinmill.api import effects as effects
+    from twinmill.api import explain as explain
+    from twinmill.api import fit as fit
+    from twinmill.api import import_log as import_log
+    from twinmill.api import load as load
+    from twinmill.api import next_run as next_run
+    from twinmill.api import simulate as simulate
+    from twinmill.data.log import LogError as LogError
+    from twinmill.model.model_file import ModelError as ModelError
+    from twinmill.results import Comparison as Comparison
+    from twinmill.results import Effect as Effect
+    from twinmill.results import NextRun as NextRun
+    from twinmill.results import SwarmComparison as SwarmComparison
+
+    __version__: str
 
 # Where each public name is; imported when it is first used.
 _HOME = {
@@ -23,11 +50,13 @@ _HOME = {
     "ModelError": "twinmill.model.model_file",
     **dict.fromkeys(
         (
-            *("Addition", "Comparison", "Diagnosis", "Finding", "Fit", "Log", "Model"),
-            *("compare", "diagnose", "fit", "load", "simulate"),
+            *("Addition", "Diagnosis", "Explanation", "Finding", "Fit", "Log", "Model"),
+            *("compare", "diagnose", "effect", "effects", "explain", "fit", "import_log"),
+            *("load", "next_run", "simulate"),
         ),
         "twinmill.api",
     ),
+    **dict.fromkeys(("Comparison", "Effect", "NextRun", "SwarmComparison"), "twinmill.results"),
 }
 __all__ = sorted(_HOME)
 
@@ -36,12 +65,14 @@ use_own_models()
 use_own_libraries()
 
 
-def __getattr__(name: str) -> Any:
-    if name == "__version__":
-        return import_module("importlib.metadata").version("twinmill")
-    if name not in _HOME:
-        raise AttributeError(f"module 'twinmill' has no attribute '{name}'")
-    return getattr(import_module(_HOME[name]), name)
+if not TYPE_CHECKING:  # who checks types knows all names from above
+
+    def __getattr__(name: str) -> Any:
+        if name == "__version__":
+            return import_module("importlib.metadata").version("twinmill")
+        if name not in _HOME:
+            raise AttributeError(f"module 'twinmill' has no attribute '{name}'")
+        return getattr(import_module(_HOME[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -13,15 +13,11 @@ Objects cannot be pickled: give paths to other processes, and let them return wh
 `table` gives.
 """
 
-import html
-import shutil
 import subprocess
 import weakref
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack
 from dataclasses import replace
-from importlib.metadata import version
-from io import StringIO
 from numbers import Integral, Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -31,124 +27,86 @@ from typing import Any, TypeVar
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from rich.console import Console, RenderableType
+from rich.console import RenderableType
 from threadpoolctl import threadpool_limits
 
 from twinmill import report
 from twinmill.arguments import checked, in_python, known
+from twinmill.data.importers import import_log as _import
+from twinmill.data.importers.import_log import ImportOptions
 from twinmill.data.log import Log as RecordedLog
 from twinmill.data.log import LogError, RobotLog, read_log
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.multi_log import read_multi_log
 from twinmill.data.steady_table import INPUTS, SteadyTable, is_steady_table, read_steady_tables
-from twinmill.defaults import DEFAULT_MODEL
+from twinmill.defaults import DEFAULT_MODEL, LogFormat, ModelFormat, least_seeds
 from twinmill.diagnosis import diagnose as _diagnose
+from twinmill.diagnosis import explain as _explain
 from twinmill.diagnosis.finding import Finding as _Found
 from twinmill.diagnosis.finding import Ranked
-from twinmill.files import check_new_folder, plain, replacing
+from twinmill.experiment.design import Limits, design, plan_run
+from twinmill.experiment.design import check as check_limits
+from twinmill.export.carried import open_robot
+from twinmill.export.log_files import export_log
+from twinmill.export.model_files import export_model
+from twinmill.files import plain
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import catalogue
+from twinmill.model.parameters import catalogue, find_effect
+from twinmill.model.set_values import with_values
 from twinmill.programs import find_program
-from twinmill.report import comparisons, detections, error_figures, show, steady
+from twinmill.report import detections, show
 from twinmill.report import diagnosis as diagnosis_report
 from twinmill.report.canvas import draw
 from twinmill.report.log_figures import Drawing
+from twinmill.results import Comparison, Effect, NextRun, SwarmComparison, errors_drawn
+from twinmill.shown import (
+    A_PATH,
+    Reported,
+    Shown,
+    own_folder,
+    path_of,
+    replacing_in_python,
+    said_in_python,
+)
+from twinmill.swarm.compare import compare_swarm
 from twinmill.swarm.metrics import swarm_metrics
 
-WIDEST_COLUMNS = 100  # of a printed result; text in longer lines is hard to read
-A_PATH = "the path of a file"
 NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
+SWARM_SCALE = ("sensor.range_m", "robot.body_radius_m")  # of a model, for metrics of swarms
+LONGEST_RUN_S = 600.0
+LEAST_TOP_DUTY = 0.2  # below it no robot on a floor moves
+NAMES = ((list, tuple, set, frozenset), "a list of names")
+BY_NAME = (Mapping, "a dictionary by name")
+NUMBER = (Real, "a number")
+SWITCH = (bool, "True or False")
+IMPORT_OPTIONS: dict[str, tuple[Any, str]] = {
+    **dict.fromkeys(("robots", "rename"), BY_NAME),
+    **dict.fromkeys(("pose_shift_s", "pose_clock_ppm", "wheelbase_m", "full_duty"), NUMBER),
+    **dict.fromkeys(("path_heading", "same_clock", "receive_stamps"), SWITCH),
+    **dict.fromkeys(("flips", "pose_topics", "command_topics"), NAMES),
+    "mapping": ((str, Path), A_PATH),
+    "up": (str, "`y` or `z`"),
+}
+Form = TypeVar("Form", LogFormat, ModelFormat)
 Result = TypeVar("Result")
-Shown = TypeVar("Shown", bound="_Shown")
+Told = TypeVar("Told", bound="Shown")
 
-# The threads of a BLAS wait in loops: on matrices as narrow as ours, two take many times the
-# processor time of one where other programs run, and are no sooner done.
-_one_thread = threadpool_limits.wrap(limits=1, user_api="blas")
+Call = TypeVar("Call", bound=Callable)
 
 
-class _Shown:
-    """What all results share: one line, a table for notebooks, text for terminals, JSON.
+def _one_thread(call: Call) -> Call:
+    """Leaves BLAS one thread meanwhile.
 
-    Attributes:
-        left_out: sentences on robots and logs that could not be judged, and on what else is odd.
+    Its threads wait in loops: on matrices as narrow as ours, two take many times the processor time
+    of one where other programs run, and are no sooner done.
     """
-
-    _result: Any
-    left_out: tuple[str, ...] = ()
-
-    def to_json(self) -> dict:
-        """The same object as `--json` of the command, without how the command was called.
-
-        Returns:
-            As the page Files tells; an absent number is None, so that JSON can hold all of it.
-
-        Examples:
-            >>> found.to_json()["score"] == found.score
-            True
-        """
-        return plain(self._result.to_json())
-
-    def table(self) -> pd.DataFrame:
-        """The numbers; each class says which."""
-        raise NotImplementedError
-
-    def _text(self) -> RenderableType:
-        return repr(self)
-
-    def __str__(self) -> str:
-        out = StringIO()
-        lines = [f"! {said}" for said in self.left_out]
-        width = min(shutil.get_terminal_size().columns, WIDEST_COLUMNS)
-        Console(file=out, width=width, color_system=None).print(
-            *lines, self._text(), sep="\n", markup=False, highlight=False
-        )
-        return "\n".join(map(str.rstrip, out.getvalue().splitlines())).rstrip()
-
-    def __reduce__(self) -> str:
-        raise TypeError(
-            f"{type(self).__name__}: cannot be pickled; give paths to other processes, and return "
-            "what to_json() or table() gives."
-        )
-
-    def _repr_html_(self) -> str:
-        return f"<p><b>{html.escape(repr(self))}</b></p>{self.table()._repr_html_()}"
+    return threadpool_limits.wrap(limits=1, user_api="blas")(call)
 
 
-class _Reported(_Shown):
-    """A result with a page of its own."""
-
-    def _page(self) -> tuple[report.Section, str]:
-        """What is on the page, and the call that made it."""
-        raise NotImplementedError
-
-    def report(self, folder: str | Path) -> Path:
-        """Writes a page with all tables and figures, as `--out` does.
-
-        Args:
-            folder: made if it is not there; an older page in it is replaced.
-
-        Returns:
-            Path of the page, folder/index.html.
-
-        Raises:
-            ValueError: the folder cannot be written.
-
-        Examples:
-            >>> from tempfile import mkdtemp
-            >>> found.report(mkdtemp()).name
-            'index.html'
-        """
-        place = _path("folder", folder, "the path of a folder")
-        check_new_folder(place)
-        section, call = self._page()
-        source = report.Provenance(call, f"twinmill {version('twinmill')}", "")
-        return report.write_report(place, section.title, source, [section])
-
-
-class Log(_Shown):
+class Log(Shown):
     """One recorded run, or several: what robots were told, and where they were.
 
     Of a steady-state table `table` gives the rows; it has no commands, paths or swarm.
@@ -171,7 +129,7 @@ class Log(_Shown):
         forget: Callable[[], None] = lambda: None,
     ):
         several = checked("paths", paths, (list, tuple), "a list of paths; `load` takes names")
-        self.paths = [_path("log", path, A_PATH) for path in several]
+        self.paths = [path_of("log", path, A_PATH) for path in several]
         weakref.finalize(self, forget)  # removes the file of a simulated run
         self._said = list(said)  # by the twin
         self._measurements: dict[str, Measurements] = {}  # by the model's hash
@@ -288,8 +246,8 @@ class Log(_Shown):
             >>> list(tm.simulate(n=3, duration_s=20).metrics().columns)[:3]
             ['log', 't_s', 'circliness']
         """
-        native_model = _model(model).file.model
-        scale = native_model.get("sensor.range_m"), native_model.get("robot.body_radius_m")
+        twin = _model(model).file.model
+        scale = [twin.get(name) for name in SWARM_SCALE]
         parts = []
         for log in self._recorded("swarm"):
             series = swarm_metrics(log, *scale)
@@ -333,8 +291,95 @@ class Log(_Shown):
         """
         if len(self.paths) > 1:
             raise ValueError(f"{path}: one file cannot hold {len(self.paths)} logs; save each.")
-        with _replacing(path, force) as temporary:
+        with replacing_in_python(path, force) as temporary:
             temporary.write_bytes(self.paths[0].read_bytes())
+
+    def export(
+        self,
+        path: str | Path,
+        to: str,
+        *,
+        model: "Model | str | Path | None" = None,
+        force: bool = False,
+    ) -> list[Path]:
+        """Writes the log for other programs, whole or not at all.
+
+        Args:
+            path: new file (mcap), or new folder (the others).
+            to: `mcap` (Foxglove), `rosbag2`, or tables, one file per type of message: `csv`,
+                `parquet`.
+            model: whose size and range of sight are drawn in Foxglove.
+            force: replace what is there.
+
+        Returns:
+            The files that were written.
+
+        Raises:
+            ValueError: there is no such format, `path` is there or cannot be written, or these are
+                several logs.
+            LogError: it is a steady-state table.
+
+        Examples:
+            >>> from tempfile import mkdtemp
+            >>> files = tm.load("run.lcmlog").export(Path(mkdtemp()) / "tables", to="csv")
+            >>> "pose.csv" in [file.name for file in files]
+            True
+        """
+        form = _format(to, LogFormat)
+        logs, file = self._recorded("messages"), _model(model).file
+        if len(logs) > 1:
+            raise ValueError(f"{path}: one export cannot hold {len(logs)} logs; export each.")
+        with said_in_python():
+            done = export_log(
+                *(logs[0].path, form, path_of("path", path, A_PATH)),
+                model=file.model,
+                command="twinmill.Log.export",
+                force=force,
+            )
+        return done.files
+
+    def compare_swarm(
+        self,
+        model: "Model | str | Path | None" = None,
+        *,
+        n_seeds: int = 50,
+        behavior: str | None = None,
+    ) -> "SwarmComparison":
+        """Tells whether the recorded swarm behaves as the twin's swarms do.
+
+        Paths of a swarm are chaotic, so metrics over time are compared: the recorded run is ranked
+        among runs of the twin that start from the same poses.
+
+        Args:
+            model: of all robots; a model, or the name of one; None is TurboPi's.
+            n_seeds: runs of the twin, 39 at least: fewer cannot tell anything.
+            behavior: of all robots; None: what the log says.
+
+        Returns:
+            Verdict, p-values and the bands of the twin's runs.
+
+        Raises:
+            LogError: these are several logs, or there are not two robots at the same time.
+            ValueError: the log is too short, does not say what the robots play, or there are too
+                few runs.
+
+        Examples:
+            >>> swarm = tm.simulate(n=3, duration_s=20)
+            >>> swarm.compare_swarm(n_seeds=39).table()["metric"].unique().tolist()
+            ['circliness', 'radius_m', 'rotation', 'diffusion', 'groups', 'contacts']
+        """
+        checked("n_seeds", n_seeds, Integral, "a whole number")
+        checked("behavior", behavior, (str, NoneType), "the name of a behaviour")
+        if n_seeds < least_seeds():
+            raise ValueError(f"n_seeds: is {n_seeds}, and must be {least_seeds()} at least.")
+        logs, twin = self._recorded("swarm"), _model(model).file.model
+        if len(logs) > 1:
+            raise LogError(f"compare_swarm: is of one log, and these are {len(logs)}.")
+        series = swarm_metrics(logs[0], *(twin.get(name) for name in SWARM_SCALE))
+        seeds = range(1, int(n_seeds) + 1)
+        with said_in_python():
+            result = compare_swarm(logs[0], series, twin, seeds=seeds, behavior=behavior)
+        return SwarmComparison(result)
 
     def to_json(self) -> dict:
         """What the log holds, in numbers and names.
@@ -368,7 +413,7 @@ class Log(_Shown):
         return f"Log({names}: robot{plural} {numbers}, {length})"
 
 
-class Model(_Shown):
+class Model(Shown):
     """A robot's model: base, camera and effects, as a model file holds them. It never changes.
 
     Examples:
@@ -490,7 +535,7 @@ class Model(_Shown):
             Traceback (most recent call last):
             ValueError: fitted.toml: exists; choose another name, or replace it with force=True.
         """
-        with _replacing(path, force) as temporary:
+        with replacing_in_python(path, force) as temporary:
             temporary.write_text(self.file.text)
 
     def compare(self, log: "Log | str | Path") -> "Comparison":
@@ -577,6 +622,115 @@ class Model(_Shown):
         )
         return _told(Addition(result, Model(file)), measurements)
 
+    def set(self, values: Mapping[str, float]) -> "Model":
+        """Sets numbers by hand; what fits told of these is forgotten.
+
+        Args:
+            values: by full name, in the unit of `table`; six digits are kept.
+
+        Returns:
+            The new model; this one stays as it is.
+
+        Raises:
+            ModelError: there is no such quantity, or a value is outside its bounds.
+
+        Examples:
+            >>> slower = tm.Model.load("turbopi.toml").set({"base.motor_lag_s": 0.09})
+            >>> slower["base.motor_lag_s"]
+            0.09
+        """
+        checked("values", values, Mapping, "a dictionary of numbers by name")
+        for name, value in values.items():
+            checked("values", name, str, "the name of a quantity")
+            checked(name, value, Real, "a number")
+        text = with_values(self.file, values, "twinmill.Model.set")
+        return Model(_read_back(f"{self.file.path.stem}_set.toml", text))
+
+    def export(
+        self,
+        path: str | Path,
+        to: str,
+        *,
+        robot: int | None = None,
+        ranges: bool = False,
+        force: bool = False,
+    ) -> list[str]:
+        """Writes the model for another simulator, whole or not at all.
+
+        Args:
+            path: new file.
+            to: `mjcf`, `sdf`, `urdf`, `ros2_control` or `json`, which alone has all.
+            robot: with what the model states of this robot alone; None: of all.
+            ranges: write intervals and 100 samples of the fitted numbers, too: files of the same
+                name that end in `_ranges.yaml`, `_ranges.json` and `_ranges.npz`.
+            force: replace what is there.
+
+        Returns:
+            A sentence for each part of the model that the file cannot carry, then what is odd in
+            the ranges.
+
+        Raises:
+            ValueError: there is no such format, a file is there or cannot be written, or the
+                format cannot carry this robot at all.
+
+        Examples:
+            >>> from tempfile import mkdtemp
+            >>> tm.Model.load("turbopi.toml").export(Path(mkdtemp()) / "turbopi.json", to="json")
+            []
+        """
+        form = _format(to, ModelFormat)
+        checked("robot", robot, (Integral, NoneType), "the number of a robot")
+        out = path_of("path", path, A_PATH)
+        with said_in_python():
+            done = export_model(
+                *(open_robot(self.file, robot, None), form, out),
+                ranges_stem=out.with_suffix("") if ranges else None,
+                force=force,
+            )
+        return [*(left.sentence() for left in done.left), *done.warnings]
+
+    def explain(
+        self, log: "Log | str | Path", *, progress: Callable[[str], None] | None = None
+    ) -> "Explanation":
+        """Diagnoses, and adds what is found.
+
+        Args:
+            log: a log, or the path of one.
+            progress: as of `explain`, which says more.
+
+        Returns:
+            As `explain`.
+
+        Raises:
+            LogError: the log cannot be used; one sentence.
+
+        Examples:
+            >>> tm.Model.load("fitted.toml").explain("run.lcmlog").model.effects
+            ['coasting']
+        """
+        return explain(log, self, progress=progress)
+
+    def next_run(self, log: "Log | str | Path", **options: Any) -> "NextRun":
+        """Designs the run that best tells apart what these logs cannot.
+
+        Args:
+            log: a log, or the path of one.
+            options: as of `next_run`, which says more.
+
+        Returns:
+            As `next_run`.
+
+        Raises:
+            LogError: the log cannot be used; one sentence.
+            ValueError: no script can be within these limits, or none shows what is in question.
+
+        Examples:
+            >>> run = tm.Model.load("fitted.toml").next_run("run.lcmlog", duration_s=20)
+            >>> run.duration_s <= 20
+            True
+        """
+        return next_run(log, self, **options)
+
     def diagnose(self, log: "Log | str | Path", **options: Any) -> "Diagnosis":
         """Names the physical effect that the model lacks.
 
@@ -603,67 +757,7 @@ class Model(_Shown):
         return f"Model({self.name}: {self.file.model.drive}, {effects})"
 
 
-class Comparison(_Reported):
-    """How well a model predicts a log, against the log's own noise.
-
-    Attributes:
-        score: root mean square of prediction errors over what noise alone would cause: 1.0 is as
-            good as the log can tell; above 1.3 something is missing.
-        verdict: what that means, in a sentence.
-
-    Examples:
-        >>> found = tm.compare("run.lcmlog", "turbopi.toml")
-        >>> found.score > 1.3
-        True
-    """
-
-    def __init__(self, result: _compare.Comparison):
-        self._result = result
-        self.score, self.verdict = result.score, result.verdict
-
-    def table(self) -> pd.DataFrame:
-        """Errors of each robot in each log.
-
-        Returns:
-            log, robot_id, channel, unit, horizon_s, rms, floor (both in the unit), ratio.
-
-        Examples:
-            >>> found.table()["horizon_s"].unique().tolist()
-            [0.1, 0.2, 0.5, 1.0, 2.0]
-        """
-        robots = [robot.to_json() for robot in self._result.robots]
-        return pd.DataFrame(
-            {"log": robot["log"], "robot_id": robot["robot_id"], **row}
-            for robot in robots
-            for row in robot["errors"]
-        )
-
-    def plot(self) -> Figure:
-        """Errors over the time predicted ahead, with the noise floor; of a table, its values.
-
-        Of several robots it is the one that the model misses most.
-
-        Returns:
-            A figure of matplotlib: m for forward and left, degrees for heading, over s.
-
-        Examples:
-            >>> len(found.plot().axes)  # forward, left, heading
-            3
-        """
-        return _errors_drawn([("this model", self._result)])
-
-    def _page(self) -> tuple[report.Section, str]:
-        return report.comparison_section(self._result), "twinmill.compare"
-
-    def _text(self) -> RenderableType:
-        return show.comparison(self._result)
-
-    def __repr__(self) -> str:
-        logs = ", ".join(dict.fromkeys(r.measurement.log_name for r in self._result.robots))
-        return f"Comparison({self._result.model_name}, {logs}: score {self.score:.3g})"
-
-
-class Fit(_Reported):
+class Fit(Reported):
     """A model fitted to a log.
 
     Attributes:
@@ -706,7 +800,7 @@ class Fit(_Reported):
             >>> len(fitted.plot().axes)  # forward, left, heading
             3
         """
-        return _errors_drawn([("before", self._result.before), ("after", self._result.after)])
+        return errors_drawn([("before", self._result.before), ("after", self._result.after)])
 
     def compare(self, log: "Log | str | Path") -> Comparison:
         """Compares the fitted model with a log.
@@ -737,7 +831,7 @@ class Fit(_Reported):
         return f"Fit({name}: score {before:.3g} -> {self.score:.3g})"
 
 
-class Addition(_Reported):
+class Addition(Reported):
     """An effect added to a model.
 
     Attributes:
@@ -785,7 +879,7 @@ class Addition(_Reported):
         """
         if self._result.of_camera:
             return detections.field_of_view(self._result.after).svg.picture
-        return _errors_drawn([("before", self._result.before), ("after", self._result.after)])
+        return errors_drawn([("before", self._result.before), ("after", self._result.after)])
 
     def _page(self) -> tuple[report.Section, str]:
         return report.added_section(self._result), "twinmill.add"
@@ -800,7 +894,7 @@ class Addition(_Reported):
         )
 
 
-class Finding(_Shown):
+class Finding(Shown):
     """An effect that a model lacks, as a diagnosis found it.
 
     Attributes:
@@ -875,7 +969,7 @@ class Finding(_Shown):
         return f"Finding({self.effect}: {values})"
 
 
-class Diagnosis(_Reported):
+class Diagnosis(Reported):
     """What a model lacks.
 
     Attributes:
@@ -891,8 +985,8 @@ class Diagnosis(_Reported):
         'effect_missing'
     """
 
-    def __init__(self, result: _diagnose.Diagnosis, log: Log):
-        self._result = result
+    def __init__(self, result: _diagnose.Diagnosis, log: Log, file: ModelFile):
+        self._result, self._file = result, file
         self.verdict, self.sentence = result.verdict, result.sentence
         ranked = {r.effect: r for r in result.ranking}
         self.found = [
@@ -944,6 +1038,36 @@ class Diagnosis(_Reported):
         """
         return diagnosis_report.section(self._result).figures[0].svg.picture
 
+    @_one_thread
+    def next_run(
+        self,
+        *,
+        duration_s: float = 30.0,
+        floor_m: tuple[float, float] = (2.0, 2.0),
+        max_duty: float = 1.0,
+    ) -> "NextRun":
+        """Designs the run that best tells apart what this diagnosis leaves open.
+
+        Args:
+            duration_s: longest run.
+            floor_m: free floor, along and across the robot at its start.
+            max_duty: highest duty of a wheel, 0.2 to 1; of a robot told velocities, share of the
+                highest in its logs.
+
+        Returns:
+            As `next_run`, without a second diagnosis.
+
+        Raises:
+            ValueError: no script can be within these limits, or none shows what is in question.
+
+        Examples:
+            >>> d.next_run(duration_s=20, floor_m=(2.5, 2.0)).duration_s <= 20
+            True
+        """
+        limits = _limits(duration_s, floor_m, max_duty)
+        check_limits([o.measurement for o in self._result.opened], self._file, limits)
+        return NextRun(design(self._result, self._file, limits, lambda _: None))
+
     def _page(self) -> tuple[report.Section, str]:
         return diagnosis_report.section(self._result), "twinmill.diagnose"
 
@@ -952,6 +1076,79 @@ class Diagnosis(_Reported):
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.verdict}: {self.sentence})"
+
+
+class Explanation(Reported):
+    """A model with the effects that were found, and the diagnosis behind it.
+
+    Attributes:
+        model: the new one.
+        diagnosis: of the model as given.
+        after: comparison of the new model with the log.
+        score: of the new model on the log that it was fitted to.
+
+    Examples:
+        >>> explained = tm.explain("run.lcmlog", "fitted.toml")
+        >>> explained.diagnosis.verdict
+        'effect_missing'
+    """
+
+    def __init__(self, result: _explain.Explanation, model: Model, log: Log, file: ModelFile):
+        self._result, self.model = result, model
+        self.diagnosis = Diagnosis(result.diagnosis, log, file)
+        self.after = Comparison(result.after)
+        self.score = self.after.score
+
+    def table(self) -> pd.DataFrame:
+        """Fitted quantities.
+
+        Returns:
+            name, value, std, unit, at_bound, seen, together, as of `Fit.table`.
+
+        Examples:
+            >>> "coasting.deceleration_mps2" in explained.table()["name"].tolist()
+            True
+        """
+        return pd.DataFrame([e.to_json() for e in self._result.parameters])
+
+    def steps(self) -> pd.DataFrame:
+        """The model as given, then with each finding.
+
+        Returns:
+            effect (`as given` first; `refit` is of stale numbers) and score_heldout.
+
+        Examples:
+            >>> explained.steps()["score_heldout"].is_monotonic_decreasing
+            True
+        """
+        steps = self._result.diagnosis.steps
+        return pd.DataFrame(
+            {"effect": effect or "as given", "score_heldout": score} for effect, score in steps
+        )
+
+    def plot(self) -> Figure:
+        """Score after each step: as given, refitted, with each effect found.
+
+        Returns:
+            A figure of matplotlib, as of `Diagnosis.plot`.
+
+        Examples:
+            >>> explained.plot().axes[0].get_xlabel()
+            'score: error over noise floor'
+        """
+        return self.diagnosis.plot()
+
+    def _page(self) -> tuple[report.Section, str]:
+        page = diagnosis_report.explanation_section(self._result, not_written=NOT_WRITTEN)
+        return page, "twinmill.explain"
+
+    def _text(self) -> RenderableType:
+        return diagnosis_report.terminal_explanation(self._result, not_written=NOT_WRITTEN)
+
+    def __repr__(self) -> str:
+        found = ", ".join(self._result.diagnosis.found) or "nothing"
+        before = self._result.diagnosis.before
+        return f"Explanation(found {found}: score {before.score:.3g} -> {self.score:.3g})"
 
 
 def load(*paths: str | Path) -> Log:
@@ -973,7 +1170,7 @@ def load(*paths: str | Path) -> Log:
     if not paths:
         raise LogError("load: name one log at least.")
     several = f"{A_PATH}; several are named one by one: load(*paths)"
-    return Log([_path("log", path, several) for path in paths])
+    return Log([path_of("log", path, several) for path in paths])
 
 
 @_one_thread
@@ -1072,7 +1269,125 @@ def diagnose(
     excluded = known("without", without, catalogue())
     measurements = log.measurements(model)
     result = _diagnose.diagnose(measurements, model.file, progress or (lambda _: None), excluded)
-    return _told(Diagnosis(result, log), measurements)
+    return _told(Diagnosis(result, log, model.file), measurements)
+
+
+@_one_thread
+def explain(
+    log: Log | str | Path,
+    model: Model | str | Path | None = None,
+    *,
+    progress: Callable[[str], None] | None = None,
+) -> Explanation:
+    """Diagnoses, adds what is found, and fits all of it; every step on held-out data.
+
+    Args:
+        log: a log, or the path of one.
+        model: best one that was fitted to another log; None is TurboPi's.
+        progress: is told in words what is being done.
+
+    Returns:
+        The new model, and the diagnosis behind it.
+
+    Raises:
+        LogError: the log cannot be used; one sentence.
+        ModelError: the model cannot be read.
+
+    Examples:
+        >>> explained = tm.explain("run.lcmlog", "fitted.toml")
+        >>> explained.model.effects
+        ['coasting']
+    """
+    log, model = _log(log), _model(model)
+    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
+    measurements = log.measurements(model)
+    result, file = _made(
+        f"{model.file.path.stem}_explained.toml",
+        lambda out: _explain.explain(
+            *(measurements, model.file),
+            out=out,
+            command="twinmill.explain",
+            progress=progress or (lambda _: None),
+        ),
+    )
+    return _told(Explanation(result, Model(file), log, model.file), measurements)
+
+
+@_one_thread
+def next_run(
+    log: Log | str | Path,
+    model: Model | str | Path | None = None,
+    *,
+    duration_s: float = 30.0,
+    floor_m: tuple[float, float] = (2.0, 2.0),
+    max_duty: float = 1.0,
+    progress: Callable[[str], None] | None = None,
+) -> NextRun:
+    """Designs the run that best tells apart what these logs cannot.
+
+    What is in question is what `diagnose` leaves open: effects that look alike, else effects that
+    would not show. Play the script, log it, and diagnose the old and the new logs together.
+
+    Args:
+        log: a log, or the path of one.
+        model: that a diagnosis would be given; None is TurboPi's.
+        duration_s: longest run.
+        floor_m: free floor, along and across the robot at its start.
+        max_duty: highest duty of a wheel, 0.2 to 1; of a robot told velocities, share of the
+            highest in its logs.
+        progress: is told in words what is being done.
+
+    Returns:
+        The script, and what it would tell.
+
+    Raises:
+        LogError: the log cannot be used; one sentence.
+        ModelError: the model cannot be read.
+        ValueError: no script can be within these limits, or none shows what is in question.
+
+    Examples:
+        >>> run = tm.next_run("run.lcmlog", "fitted.toml", duration_s=20, floor_m=(2.5, 2))
+        >>> list(run.table().columns)
+        ['t_s', 'fl_pct', 'fr_pct', 'rl_pct', 'rr_pct']
+    """
+    log, model = _log(log), _model(model)
+    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
+    limits = _limits(duration_s, floor_m, max_duty)
+    measurements = log.measurements(model)
+    plan = plan_run(measurements, model.file, limits, progress or (lambda _: None))
+    return _told(NextRun(plan), measurements)
+
+
+def effects() -> list[Effect]:
+    """The physical effects that a model can have: the catalogue.
+
+    Returns:
+        One card an effect, in the order of the catalogue.
+
+    Examples:
+        >>> "coasting" in [effect.name for effect in tm.effects()]
+        True
+    """
+    return [Effect(entry) for entry in catalogue().values()]
+
+
+def effect(name: str) -> Effect:
+    """The card of one effect.
+
+    Args:
+        name: of an effect of the catalogue.
+
+    Returns:
+        What it is, its equation, its parameters, and where it comes from.
+
+    Raises:
+        ValueError: there is none; the sentence has the nearest.
+
+    Examples:
+        >>> tm.effect("coasting")
+        Effect(coasting: ...)
+    """
+    return Effect(find_effect(checked("name", name, str, "the name of an effect")))
 
 
 def simulate(
@@ -1083,7 +1398,7 @@ def simulate(
     duration_s: float = 60.0,
     plant: str = "planar",
     seed: int = 1,
-    script: str | Path | None = None,
+    script: str | Path | NextRun | None = None,
 ) -> Log:
     """Lets robots drive in the twin.
 
@@ -1094,7 +1409,8 @@ def simulate(
         duration_s: simulated time.
         plant: `planar`, or `mujoco` with contacts and rollers.
         seed: the same seed gives the same log.
-        script: CSV of inputs or duties that all play in place of a behaviour.
+        script: CSV of inputs or duties that all play in place of a behaviour, or a run that
+            `next_run` designed.
 
     Returns:
         A log like a robot's own; its file goes with the object unless it is saved.
@@ -1115,17 +1431,138 @@ def simulate(
     checked("duration_s", duration_s, Real, "a number of seconds")
     checked("plant", plant, str, "`planar` or `mujoco`")
     checked("seed", seed, Integral, "a whole number")
-    if script is not None:
-        script = _path("script", script, "the path of a CSV file")
+    if not isinstance(script, NextRun | None):
+        script = path_of("script", script, "the path of a CSV file, or a designed run").resolve()
     file = _model(model).file
-    played = ["--behavior", behavior] if script is None else ["--script", script.resolve()]
-    options = ["--plant", plant, "--n", n, "--seed", seed, "--duration-s", duration_s, *played]
+    options = ["--plant", plant, "--n", n, "--seed", seed, "--duration-s", duration_s]
     with ExitStack() as stack:
-        folder = TemporaryDirectory(prefix="twinmill.", ignore_cleanup_errors=True)
-        place = Path(stack.enter_context(folder))
+        place = own_folder(stack)
         (place / "model.toml").write_text(file.text)
+        if isinstance(script, NextRun):
+            script.save(place / "script.csv")
+            script = place / "script.csv"
+        options += ["--behavior", behavior] if script is None else ["--script", script]
         said = _run_twin(place, options)
         return Log([place / "simulated.lcmlog"], said, stack.pop_all().close)
+
+
+def import_log(
+    poses: str | Path | pd.DataFrame | None = None,
+    commands: str | Path | pd.DataFrame | None = None,
+    *,
+    motive: str | Path | None = None,
+    vicon: str | Path | None = None,
+    io_tsv: Iterable[str | Path] = (),
+    bag: str | Path | None = None,
+    detections: str | Path | pd.DataFrame | None = None,
+    robot_id: int | None = None,
+    heading_offset_deg: float = 0.0,
+    **options: Any,
+) -> Log:
+    """Makes a log from motion capture and commands: tables, or files of other programs.
+
+    One source of poses (`poses`, `motive`, `vicon`) and one of commands (`commands`, `io_tsv`) are
+    needed, or a bag, which holds both. Tables may be those of pandas; the page Files lists their
+    columns. Arguments are named as the options of `twinmill import`, and so are warnings.
+
+    Args:
+        poses: CSV or table: t_s, robot_id, x_m, y_m, theta_rad; one of ROS or of others with
+            `rename`.
+        commands: CSV or table: t_s, robot_id, and fl_pct, fr_pct, rl_pct, rr_pct, or vx_mps,
+            vy_mps, omega_radps, or others; each row is held until the next.
+        motive: CSV export of OptiTrack Motive.
+        vicon: CSV export of Vicon Tracker or Nexus.
+        io_tsv: io.tsv of robots.
+        bag: ROS bag, with the topics in `pose_topics` and `command_topics`.
+        detections: CSV or table of what cameras saw: t_s, robot_id, seen.
+        robot_id: whose the rows are, for files that do not say.
+        heading_offset_deg: from the tracked body's x axis to the robot's front, left positive.
+        options: fields of `twinmill.data.importers.import_log.ImportOptions`: `robots` and `rename`
+            (dictionaries), `mapping` (a path), `flips` (a set of columns), `up`, `pose_shift_s`,
+            `pose_clock_ppm`, `path_heading`, `same_clock`, `pose_topics`, `command_topics`,
+            `receive_stamps`, `wheelbase_m`, `full_duty`.
+
+    Returns:
+        A log; its file goes with the object unless it is saved.
+
+    Raises:
+        LogError: a file cannot be read, or what it holds makes no run; one sentence.
+        ValueError: there is no such option; the sentence has the nearest.
+
+    Examples:
+        >>> poses = tm.load("run.lcmlog").table().drop(columns="log")
+        >>> commands = pd.DataFrame({"t_s": [0, 5], "robot_id": 0, "vx_mps": 0.2, "vy_mps": 0,
+        ...                          "omega_radps": [0, 0.5]})
+        >>> tm.import_log(poses, commands)
+        Log(imported.lcmlog: robot 0, 60 s)
+    """
+    checked("robot_id", robot_id, (Integral, NoneType), "the number of a robot")
+    checked("heading_offset_deg", heading_offset_deg, Real, "an angle in degrees")
+    offset_rad = float(np.radians(heading_offset_deg))
+    how = ImportOptions(
+        robot_id=robot_id, heading_offset_rad=offset_rad, **_import_options(options)
+    )
+    tables = {"poses": poses, "commands": commands, "detections": detections}
+    files = {"motive": motive, "vicon": vicon, "bag": bag}
+    several = checked("io_tsv", io_tsv, (list, tuple), "a list of paths")
+    with ExitStack() as stack, said_in_python():
+        place = own_folder(stack)
+        read = {key: _as_csv(place, key, table) for key, table in tables.items()}
+        read |= {key: path and path_of(key, path, A_PATH) for key, path in files.items()}
+        out = place / "imported.lcmlog"
+        told = _import.import_log(
+            *(read.pop("poses"), read.pop("commands"), out),
+            io_tsv=tuple(path_of("io_tsv", path, A_PATH) for path in several),
+            options=how,
+            **read,
+        )
+        own = read_log(out).warnings
+        said = [in_python(text) for text in told["warnings"] if text not in own]
+        return Log([out], said, stack.pop_all().close)
+
+
+def _import_options(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields of `ImportOptions`, once each is known to be of its kind."""
+    told = {}
+    for name in known("option", options, IMPORT_OPTIONS):
+        kinds, wanted = IMPORT_OPTIONS[name]
+        told[name] = checked(name, options[name], kinds, wanted)
+    if "mapping" in told:
+        told["mapping"] = Path(told["mapping"])
+    if "flips" in told:
+        told["flips"] = frozenset(told["flips"])
+    return told
+
+
+def _format(to: str, forms: type[Form]) -> Form:
+    """One of these formats, by its name."""
+    if checked("to", to, str, "the name of a format") not in [*forms]:
+        raise ValueError(f"to: there is no '{to}'; choose one of {', '.join(forms)}.")
+    return forms(to)
+
+
+def _as_csv(place: Path, name: str, table: str | Path | pd.DataFrame | None) -> Path | None:
+    """The path of a table, which is written to a folder if it is one of pandas."""
+    wanted = "a table of pandas, or the path of a CSV file"
+    checked(name, table, (str, Path, pd.DataFrame, NoneType), wanted)
+    if not isinstance(table, pd.DataFrame):
+        return table if table is None else path_of(name, table, wanted)
+    table.to_csv(place / f"{name}.csv", index=False)
+    return place / f"{name}.csv"
+
+
+def _limits(duration_s: float, floor_m: tuple[float, float], max_duty: float) -> Limits:
+    """Of a designed run, from what came."""
+    checked("duration_s", duration_s, Real, "a number of seconds")
+    checked("floor_m", floor_m, (list, tuple), "two sides in m, as (2, 1.5)")
+    checked("max_duty", max_duty, Real, "a share of full duty")
+    if len(floor_m) != 2 or not all(isinstance(side, Real) and side > 0 for side in floor_m):
+        raise ValueError(f"floor_m: is {floor_m}, and must be two sides in m, as (2, 1.5).")
+    if not LONGEST_RUN_S >= duration_s > 0:
+        raise ValueError(f"duration_s: is {duration_s}, and must be within 0 to {LONGEST_RUN_S:g}.")
+    if not 1 >= max_duty >= LEAST_TOP_DUTY:
+        raise ValueError(f"max_duty: is {max_duty}, and must be within {LEAST_TOP_DUTY} to 1.")
+    return Limits(float(duration_s), (float(floor_m[0]), float(floor_m[1])), float(max_duty))
 
 
 def _run_twin(place: Path, options: list) -> list[str]:
@@ -1155,28 +1592,19 @@ def _model(model: Model | str | Path | None) -> Model:
     return Model.load(DEFAULT_MODEL if model is None else model)
 
 
-def _path(name: str, path: Any, wanted: str) -> Path:
-    """A path that is none by accident: an empty text would be the working directory."""
-    if not str(checked(name, path, (str, Path), wanted)):
-        raise ValueError(f"{name}: is empty, and must be {wanted}.")
-    return Path(path)
-
-
-def _told(shown: Shown, measurements: Measurements) -> Shown:
+def _told(shown: Told, measurements: Measurements) -> Told:
     """The result, with what was found wrong with its logs."""
     mild = [str(f) for f in measurements.findings if not f.fatal]
     shown.left_out = (*measurements.excluded, *mild)
     return shown
 
 
-@contextmanager
-def _replacing(path: str | Path, force: bool) -> Iterator[Path]:
-    """As `replacing`, in the words of the library."""
-    try:
-        with replacing(_path("path", path, A_PATH), force) as temporary:
-            yield temporary
-    except ValueError as error:
-        raise ValueError(in_python(str(error))) from error
+def _read_back(name: str, text: str) -> ModelFile:
+    """A model of that text, which is in no file."""
+    with TemporaryDirectory(prefix="twinmill.") as folder:
+        path = Path(folder) / name
+        path.write_text(text)
+        return replace(ModelFile.load(str(path)), path=Path(name))
 
 
 def _made(name: str, make: Callable[[Path], Result]) -> tuple[Result, ModelFile]:
@@ -1214,12 +1642,3 @@ def _steady_rows(sheet: SteadyTable) -> pd.DataFrame:
     table.insert(0, "log", sheet.log_name)
     table.insert(1, "robot_id", sheet.robot_id)
     return table.assign(runs=sheet.runs, speed_mps=sheet.value[:, 0], turn_radps=sheet.value[:, 1])
-
-
-def _errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
-    last = results[-1][1]
-    if last.worst in (tables := comparisons.steady_comparisons(last)):
-        return steady.values(tables).svg.picture
-    robot = last.robots.index(last.worst)
-    same = [(label, result.robots[robot]) for label, result in results]
-    return error_figures.error_growth(same).svg.picture

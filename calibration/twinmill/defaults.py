@@ -28,6 +28,25 @@ class Question(StrEnum):
     HOW_ALIKE = "how-alike"
 
 
+class LogFormat(StrEnum):
+    """What a log can be exported to."""
+
+    MCAP = "mcap"
+    CSV = "csv"
+    PARQUET = "parquet"
+    ROSBAG2 = "rosbag2"
+
+
+class ModelFormat(StrEnum):
+    """What a model can be exported to."""
+
+    MJCF = "mjcf"
+    SDF = "sdf"
+    URDF = "urdf"
+    ROS2_CONTROL = "ros2_control"
+    JSON = "json"
+
+
 def least_seeds() -> int:
     """Fewer runs of the twin cannot tell anything at this rate of false alarms."""
     return math.ceil(2 / FALSE_ALARMS) - 1

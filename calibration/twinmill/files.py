@@ -67,6 +67,7 @@ def replacing_folder(out: Path, force: bool) -> Iterator[Path]:
     if out.exists() and not (force and out.is_dir()):
         raise ValueError(f"{out}: exists; choose another name, or replace it with --force.")
     check_new_folder(out)
+    out.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{out.name}.", dir=out.parent) as folder:
         yield Path(folder) / out.name
         if out.exists():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the programs, the models and the libraries of this installation are."""
+"""Where the programs, the models and the libraries of this installation are, and its cores."""
 
 import ctypes
 import os
@@ -28,6 +28,13 @@ def find_program(name: str) -> Path:
         f"{name}: neither in this package, nor built in {_BUILT}, nor on the path; build it with "
         "`make build`, or install twinmill as a wheel."
     )
+
+
+def available_cores() -> int:
+    """Processor cores that this process may use; all where the system does not say."""
+    if hasattr(os, "sched_getaffinity"):  # not on macOS and Windows
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def use_own_models() -> None:

@@ -18,13 +18,13 @@ if working():  # not for --help
     from twinmill.fitting.add import OWN_GAINS, AddResult, add
     from twinmill.fitting.compare import Comparison, compare
     from twinmill.fitting.fit import FitResult, fit
+    from twinmill.model.parameters import find_effect
     from twinmill.report import (
         added_section,
         comparison_section,
         fit_section,
         show,
     )
-    from twinmill_cli.effects import find_effect
     from twinmill_cli.frame import (
         check_output,
         command_line,

@@ -24,6 +24,7 @@ if working():  # not for --help
     from twinmill.diagnosis.result import Diagnosis
     from twinmill.report import diagnosis as present
     from twinmill.swarm.metrics import swarm_metrics
+    from twinmill.terminal import progress_bar
     from twinmill_cli.calibrate import option
     from twinmill_cli.frame import (
         check_output,
@@ -84,12 +85,12 @@ def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str,
     elif result.verdict == "refit_enough":
         to = Path(f"{stem}_fitted.toml")
         told.append(("To refit the base", command_line("fit", logs, model, to)))
-    grown = f"{stem}_explained.toml" if result.found else model
-    return [*told, *_adding(result, logs, given=model, grown=grown)]
+    explained = f"{stem}_explained.toml" if result.found else model
+    return [*told, *_adding(result, logs, given=model, explained=explained)]
 
 
 def _adding(
-    result: Diagnosis, logs: list[Path], *, given: str, grown: str
+    result: Diagnosis, logs: list[Path], *, given: str, explained: str
 ) -> list[tuple[str, str]]:
     """What adds the formula that was proven; nothing if none was.
 
@@ -97,14 +98,14 @@ def _adding(
         result: the diagnosis.
         logs: of it.
         given: the model that was diagnosed: to it, if the formula stands for what was found.
-        grown: the model with what was found.
+        explained: the model with what was found.
     """
     proven = result.rest.proven
     if not proven:
         return []
     options = [w for name, text in proven.equation.items() for w in (option(name), text)]
     verb = shlex.join(["add", "equation", *options])
-    model = given if proven.instead_of else grown
+    model = given if proven.instead_of else explained
     why = "To add the formula" if model == given else "Then, to add the formula"
     to = Path(f"{Path(given).stem}_equation.toml")
     return [(why, command_line(verb, logs, model, to))]
@@ -141,12 +142,18 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
             "table of behaviour, and these do not."
         ), None
     # Slow to import, and `make demo` does without what it needs.
-    from twinmill_cli.compare_swarm import LOOK, compare_swarm
+    from twinmill.report.swarm_comparison import LOOK
+    from twinmill.swarm.compare import compare_swarm
 
-    scale = model.get("sensor.range_m"), model.get("robot.body_radius_m")
     try:
-        series = swarm_metrics(log, *scale)
-        found = compare_swarm(log, series, model, scale, seeds=range(1, TWIN_RUNS + 1))
+        series = swarm_metrics(log, model.get("sensor.range_m"), model.get("robot.body_radius_m"))
+        with progress_bar() as progress:
+            task = progress.add_task("twin runs", total=TWIN_RUNS)
+            found = compare_swarm(
+                *(log, series, model),
+                seeds=range(1, TWIN_RUNS + 1),
+                tell=lambda: progress.advance(task),
+            )
     except ValueError as error:
         return f"Each robot was judged by itself; the swarm as a whole cannot be: {error}", None
     done = "with what was found" if result.found else "with this model, its base refitted"
@@ -178,7 +185,7 @@ def _explain(
             measurements, model_file, out=output, command=source.command, progress=progress
         )
     settling = _settling(result.diagnosis, logs, str(output))
-    then = [*_adding(result.diagnosis, logs, given=model, grown=str(output)), *settling]
+    then = [*_adding(result.diagnosis, logs, given=model, explained=str(output)), *settling]
     section = partial(present.explanation_section, result, then)
     data = {**result.to_json(), **told(measurements)}
     if settling:

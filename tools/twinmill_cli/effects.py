@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated
 
@@ -16,25 +15,11 @@ from twinmill_cli.output import AsJson, deliver
 if working():  # not for --help
     from twinmill.export.effect_source import write_effect
     from twinmill.model.model_file import ModelFile
-    from twinmill.model.parameters import catalogue
+    from twinmill.model.parameters import catalogue, find_effect
     from twinmill.report import show, tables
 
 
 NEW = "new"  # in the place of an effect's name
-
-
-def find_effect(name: str) -> dict:
-    """The catalogue's entry of that name.
-
-    Raises:
-        ValueError: there is none; the message names the nearest.
-    """
-    entries = catalogue()
-    if name in entries:
-        return entries[name]
-    near = get_close_matches(name, entries, n=1, cutoff=0.6)
-    hint = f"did you mean {near[0]}?" if near else "`twinmill effects` lists them all."
-    raise ValueError(f"effect '{name}': not in the catalogue; {hint}")
 
 
 def register(app: typer.Typer) -> None:

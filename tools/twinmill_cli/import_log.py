@@ -175,8 +175,6 @@ def _command(
     Example: twinmill import --poses poses.csv --commands commands.csv -o run.lcmlog
     """
     try:
-        if up not in ("y", "z", None):
-            raise LogError(f"--up {up}: must be y or z.")
         if explain_columns_to:
             asked = {"poses": poses, "commands": commands}
             _explain(

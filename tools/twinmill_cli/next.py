@@ -20,15 +20,12 @@ if working():  # not for --help
     import numpy as np
 
     from twinmill.data.measurement import Measurements
-    from twinmill.diagnosis.diagnose import diagnose
-    from twinmill.experiment.design import Limits, Plan, check, design, log_of
+    from twinmill.experiment.design import Limits, Plan, plan_run
     from twinmill.experiment.played import csv_text
     from twinmill.export.script import TwistScript
     from twinmill.files import check_new_file
-    from twinmill.fitting.opening import open_measurements
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import next_run as present
-    from twinmill.swarm.classes import goal_of
     from twinmill.terminal import progress_bar
     from twinmill_cli.frame import command_line, finish, load, open_model, provenance
     from twinmill_cli.ros_script import check_new_script, ros_path, write_script
@@ -120,9 +117,7 @@ def _next(
         deliver(data, present.narrowing_terminal(narrowing, how), as_json)
         return narrowing
     with telling(f"designing a run with {model}") as progress:
-        measurements = load(logs, model_file, as_json)
-        check(measurements, model_file, limits)
-        plan = design(diagnose(measurements, model_file, progress), model_file, limits, progress)
+        plan = plan_run(load(logs, model_file, as_json), model_file, limits, progress)
     write_whole(output, csv_text(plan.rows))
     how = _how(plan, logs, model, output, form=script_as)
     data = {"script": str(output), **plan.to_json()}
@@ -139,26 +134,16 @@ def _next(
 def _narrowing(
     measurements: Measurements, model_file: ModelFile, limits: Limits, swarm: Request, *, draws: int
 ) -> Narrowing:
-    """Runs the swarms, then designs the drive."""
-    from twinmill.swarm.narrowing import design_for, spread_of
+    """The run that narrows the swarm's prediction, with the share of models that were run."""
+    from twinmill.swarm.narrowing import narrow
 
-    check(measurements, model_file, limits)
-    if model_file.model.drive != "duty":
-        raise ValueError(
-            f"--for: the model is driven by {model_file.model.drive}, and what narrows a swarm's "
-            "prediction is a script of wheel duties; leave --for out."
-        )
     with progress_bar() as progress:
         task = progress.add_task("swarms of models drawn", total=draws)
-        spread = spread_of(
-            swarm, goal_of(swarm), draws=draws, seed=1, tell=lambda: progress.advance(task)
+        return narrow(
+            *(measurements, model_file, limits, swarm),
+            draws=draws,
+            tell=lambda: progress.advance(task),
         )
-    logs = [o for o in open_measurements(measurements, model_file) if o.floor]
-    excess = model_file.usual_score([o.measurement.log_sha256 for o in logs]) ** 2
-    modelled = log_of([o.modelled() for o in logs])
-    return design_for(
-        spread, goal_of(swarm), file=model_file, modelled=modelled, limits=limits, excess=excess
-    )
 
 
 def _sides(text: str) -> tuple[float, float]:

@@ -63,10 +63,12 @@ def seen(frames: Frames | None) -> Arrays:
     return {"seen": np.column_stack([frames.t_s, bit])[kept]}
 
 
-def expected(bits: Detections, model: native.Model) -> Arrays:
+def expected(detections: Detections, model: native.Model) -> Arrays:
     """(K, 2) robot's clock and how likely a model has the bit that `seen` tells; NaN if unknown."""
-    frames = bits.frames
-    chance = np.where(bits.usable, bits.reported(model, raw=not frames.has_vote), np.nan)
+    frames = detections.frames
+    chance = np.where(
+        detections.usable, detections.reported(model, raw=not frames.has_vote), np.nan
+    )
     period_s = float(np.median(np.diff(frames.t_s))) if len(frames.t_s) > 1 else STEP_S
     every = max(1, round(STEP_S / max(period_s, 1e-3)))
     return {"expected": np.column_stack([frames.t_s, chance])[::every]}

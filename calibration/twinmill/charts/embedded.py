@@ -38,7 +38,7 @@ class Shown:
         model: whose predictions are shown.
         regimes: where it fails.
         beside: label and model that is drawn beside, or None.
-        bits: of its camera, or None.
+        detections: of its camera, or None.
     """
 
     view: RobotView
@@ -46,7 +46,7 @@ class Shown:
     model: native.Model
     regimes: Sequence[Regime]
     beside: tuple[str, native.Model] | None = None
-    bits: Detections | None = None
+    detections: Detections | None = None
 
 
 def embedded(robots: Sequence[Shown], first: int, span_s: tuple[float, float]) -> str:
@@ -66,7 +66,7 @@ def embedded(robots: Sequence[Shown], first: int, span_s: tuple[float, float]) -
         own = pack_robot(robot.view, measurement.track, measurement.frames, robot.model)
         blocks[f"robot{k}"] = own
         blocks[f"prediction{k}"] = pack_prediction(
-            robot.view, robot.model, robot.beside, robot.bits
+            robot.view, robot.model, robot.beside, robot.detections
         )
     options = {
         "robots": [_facts(r, logs.index(_log(r))) for r in robots],

@@ -70,16 +70,17 @@ def pack_prediction(
     view: RobotView,
     model: native.Model,
     beside: tuple[str, native.Model] | None,
-    bits: Detections | None,
+    detections: Detections | None,
     *,
     every: int = 1,
     **facts: object,
 ) -> bytes:
     """What a model says of one robot; another model's words beside it, with its label.
 
-    `bits`: of its camera, if it has one and others are near; `every`: see `RobotView.predicted`.
+    `detections`: of its camera, if it has one and others are near; `every`: as of
+    `RobotView.predicted`.
     """
-    arrays = view.predicted(model, every) | (expected(bits, model) if bits else {})
+    arrays = view.predicted(model, every) | (expected(detections, model) if detections else {})
     if beside:
         others = view.predicted(beside[1], every)
         arrays |= {f"{name}_beside": a for name, a in others.items() if name != "starts"}

@@ -7,7 +7,6 @@ forward Euler, in NumPy; or bodies in MuJoCo, with mass, wheels that slip and hu
 """
 
 import hashlib
-import os
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -20,6 +19,7 @@ from matplotlib.axes import Axes
 
 from twinmill.claims.published import Points
 from twinmill.claims.rows import Claim, Row, mean
+from twinmill.programs import available_cores
 from twinmill.report import Figure
 from twinmill.report.canvas import FLOOR, MEASURED, draw
 from twinmill.swarm.axes import Axis
@@ -122,7 +122,7 @@ def laboratories_in_mujoco(
             ended += run_part(one, range(1))["class"]
         return lab, ended
 
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(available_cores()) as pool:
         for done, future in enumerate(as_completed([pool.submit(ends, lab) for lab in todo]), 1):
             lab, ended = future.result()
             store.keep(lab, {"lab": [lab] * len(ended), "class": ended})

@@ -14,18 +14,14 @@ from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import Detections
 
-# Scatter of the logarithm of errors among cameras that are alike: over all frames, and over those
-# in which another robot is in view, which are few and come in passages.
-SPREAD, SPREAD_IN_VIEW = 0.1, 0.2
-
 
 def odd_cameras(cameras: list[Detections], model: native.Model) -> set[int]:
-    """Numbers of the robots whose bits fit the model much worse than the others'; never half."""
+    """Robots whose detections fit the model much worse than the others'; never half."""
     return odd_ones(camera_outliers(cameras, model))
 
 
 def camera_outliers(cameras: list[Detections], model: native.Model) -> dict[int, float]:
-    """By robot: how many scales its bits' errors are above the median robot's.
+    """By robot: how many scales its detections' errors are above the median robot's.
 
     Over all frames, or over those with a robot in view if they say more: a camera that sees nothing
     is right in all the others.
@@ -34,8 +30,8 @@ def camera_outliers(cameras: list[Detections], model: native.Model) -> dict[int,
     if found is None:
         return {}
     robots = np.array([s.robot_id for s in cameras])[found.robot]
-    over_all = _apart(found, robots, np.ones(len(robots), bool), SPREAD)
-    in_view = _apart(found, robots, found.in_view, SPREAD_IN_VIEW)
+    over_all = _apart(found, robots, np.ones(len(robots), bool), SETTINGS.camera_spread)
+    in_view = _apart(found, robots, found.in_view, SETTINGS.camera_spread_in_view)
     return {i: max(over_all[i], in_view[i]) for i in over_all}
 
 
@@ -97,7 +93,7 @@ def _judge_camera(
     first = done.rounds[0].accepted
     p_value = count * (done.rounds[0].p_value(first) if first else t.sf(away[robot_id], count - 1))
     parameters = [e for e in done.last.fit.estimates if e.name.split(".")[0] in done.found]
-    told = f"the bits of its camera err {before:.2f} times as much as they should with the "
+    told = f"the detections of its camera err {before:.2f} times as much as they should with the "
     told += f"model of all, those of the others {others:.2f} times; "
     told += (
         f"{' and '.join(done.found)} of its own makes it {after:.2f}"

@@ -62,9 +62,9 @@ def with_detections(
         ranking=[*ranking, *diagnosis.ranking] if found else [*diagnosis.ranking, *ranking],
         not_identifiable=[*diagnosis.not_identifiable, *not_shown(done, alike, excluded)],
         notes=[*diagnosis.notes, *_notes(before)],
-        bits=before,
-        bits_after=compare_detections(alike, model) if found else None,
-        bit_steps=_steps(done),
+        detections=before,
+        detections_after=compare_detections(alike, model) if found else None,
+        detection_steps=_steps(done),
         detection_estimates=tuple(done.last.fit.estimates),
         robots_off=(*diagnosis.robots_off, *off),
     )
@@ -90,7 +90,7 @@ def not_shown(
     """Effects of the camera that could be there and not be seen, and why."""
     if all(c.frames.has_raw for c in cameras):
         return done.faint
-    why = "the log has no raw bits, only those after the vote"
+    why = "the log has no raw detections, only those after the vote"
     return [*done.faint, *((n, why) for n in needing("raw_frames") if n not in excluded)]
 
 
@@ -131,9 +131,9 @@ def _sentence(diagnosis: Diagnosis, found: Sequence[Finding]) -> str:
 def _of_one(finding: Finding) -> str:
     if finding.group:
         names = " or ".join(finding.group)
-        return f"The camera's bits lack one of {names}; these logs cannot tell which."
+        return f"The camera's detections lack one of {names}; these logs cannot tell which."
     values = ", ".join(_value(e) for e in finding.parameters)
-    return f"The camera's bits lack {finding.effect} ({values})."
+    return f"The camera's detections lack {finding.effect} ({values})."
 
 
 def _value(estimate: ParameterEstimate) -> str:
@@ -142,10 +142,11 @@ def _value(estimate: ParameterEstimate) -> str:
     return f"{estimate.name.split('.')[1]} {estimate.value:.3g}{spread}{unit}"
 
 
-def _notes(bits: DetectionComparison | None) -> list[str]:
-    if bits and not bits.raw:
+def _notes(detections: DetectionComparison | None) -> list[str]:
+    if detections and not detections.raw:
         return [
-            "The logs keep the voted bits alone: misses blur into the vote, and what is named "
-            "sensor_delay may be a longer vote. Raw bits in the telemetry would tell them apart."
+            "The logs keep the voted detections alone: misses blur into the vote, and what is "
+            "named sensor_delay may be a longer vote. Raw detections in the telemetry would tell "
+            "them apart."
         ]
     return []

@@ -65,7 +65,6 @@ from twinmill.model.parameters import (
     needing,
 )
 
-DRIFT_STD = 0.04  # gains of a calibrated robot wander so much with battery and heat
 # What a measurement must have for an effect to show, and what to say where it has not.
 LACKS = {
     "changes": "acts only while the speed changes, and a steady table has no starts and stops",
@@ -191,7 +190,7 @@ def first_state(
     free = []
     if told and model.drive == "duty":
         gains = [n for n in BASE_GAINS if n in names]
-        free = [replace(p, std=DRIFT_STD) for p in base_parameters(opened[0].model, gains)]
+        free = [replace(p, std=SETTINGS.drift_std) for p in base_parameters(opened[0].model, gains)]
         unsure = model_file.unsure_speeds()
         speeds = base_parameters(opened[0].model, unsure)
         free += [replace(p, std=min(p.std, unsure[p.name])) for p in speeds]

@@ -34,8 +34,6 @@ from twinmill.model.parameters import (
 )
 from twinmill.predict.datasets import Trajectory
 
-AWAY_S = 2.0  # between two visits of a place
-SEVERAL = 3  # effects of one of KINDS, that are more likely one of another form
 # Groups of a rest, and what the cards of effects that act by them need or are shown by.
 BY = {
     "place": {"places", "place"},
@@ -182,7 +180,7 @@ def _visits(last: Trial, less: Trial, instance: str) -> int | None:
             x_m, y_m, radius_m = (model.get(f"{instance}.{k}") for k in ("x_m", "y_m", "radius_m"))
             pose = data.measurement.track.pose[data.windows.starts]
             there = np.hypot(pose[:, 0] - x_m, pose[:, 1] - y_m) < radius_m
-            visit = np.cumsum(np.diff(data.start_s[there], prepend=-np.inf) > AWAY_S) - 1
+            visit = np.cumsum(np.diff(data.start_s[there], prepend=-np.inf) > SETTINGS.away_s) - 1
             fall = (before**2 - after**2).reshape(len(there), -1).sum(axis=1)[there]
             falls += list(np.bincount(visit, fall))
     return int(np.sum(np.array(falls) > SETTINGS.weighty * max(falls, default=0.0)))
@@ -318,7 +316,7 @@ def _is_second(finding: Finding, found: Sequence[Finding], rest: Rest) -> Findin
         if finding in alike[1:]:
             first = alike[0].effect
             return doubted(finding, f"{first} {does}, too: both may be one other {what}")
-        if finding in alike and len(alike) >= SEVERAL:
+        if finding in alike and len(alike) >= SETTINGS.of_a_kind:
             names = ", ".join(f.effect for f in alike[1:])
             return doubted(finding, f"{names}: each {does}, too: all may be one other {what}")
     return None

@@ -25,7 +25,6 @@ from twinmill.model.parameters import (
 )
 from twinmill.predict.datasets import total_score
 
-FEWEST = 3  # robots, below which none can be called the odd one
 TRIED = 3
 WHEELS = "wheel_gain"
 SIDES = {
@@ -120,7 +119,7 @@ def one_by_one(
         done: the common search.
         progress: told in words what is being done.
     """
-    if len(_ids(opened)) < FEWEST:
+    if len(_ids(opened)) < SETTINGS.fewest_robots:
         return []
     return _each_alone(opened, done.last.state, progress)
 

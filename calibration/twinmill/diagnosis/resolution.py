@@ -5,10 +5,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
 from twinmill.diagnosis.search import State
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened, wide_gains
 from twinmill.model.parameters import GAINS
-
-SURE = 4.0  # standard deviations: as much evidence as the search asks for
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,9 @@ def _of_robot(logs: Sequence[Opened]) -> Resolution:
     data = [replace(o.data, own=_clock(o)) for o in logs]
     fit = State(data, models, free).fit_of(free).fit()
     estimates = {e.name: e for e in fit.estimates}
-    speed, turn = (SURE * estimates[n].std if estimates[n].seen else None for n in GAINS)
+    speed, turn = (
+        SETTINGS.resolved * estimates[n].std if estimates[n].seen else None for n in GAINS
+    )
     return Resolution(logs[0].measurement.track.robot_id, speed, turn)
 
 

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 
 import twinmill_native as native
 
+from twinmill.data.checks.settings import CHECKS
 from twinmill.diagnosis.finding import Finding, Late, Ranked
 from twinmill.diagnosis.outliers import Outlier
 from twinmill.diagnosis.resolution import Resolution
@@ -39,10 +40,10 @@ class Diagnosis:
         notes: sentences on what to keep in mind.
         next_experiment: which run would settle what this log leaves open, or None.
         robots_off: those that differ from the others.
-        bits: of the robots' cameras with the model as given, or None.
-        bits_after: with the effects of the camera that were found; None if there are none.
-        bit_steps: the camera's effects as found, each with the bits' score on held-out frames; the
-            first is the model without them.
+        detections: of the robots' cameras with the model as given, or None.
+        detections_after: with the effects of the camera that were found; None if there are none.
+        detection_steps: the camera's effects as found, each with the detections' score on held-out
+            frames; the first is the model without them.
         detection_estimates: of all effects of the camera, with what was found.
         camera: effects of the camera that were found.
         robots: how small a difference of each robot would have been seen.
@@ -65,9 +66,9 @@ class Diagnosis:
     notes: list[str]
     next_experiment: dict | None
     robots_off: tuple[Outlier, ...] = ()
-    bits: DetectionComparison | None = None
-    bits_after: DetectionComparison | None = None
-    bit_steps: Sequence[tuple[str | None, float]] = ()
+    detections: DetectionComparison | None = None
+    detections_after: DetectionComparison | None = None
+    detection_steps: Sequence[tuple[str | None, float]] = ()
     detection_estimates: tuple[ParameterEstimate, ...] = ()
     camera: tuple[Finding, ...] = ()
     base_names: tuple[str, ...] = ()
@@ -135,11 +136,12 @@ class Diagnosis:
             "robots": [r.to_json() for r in self.robots],
             "robots_off": [r.to_json() for r in self.robots_off],
             "camera": [f.to_json() for f in self.camera],
-            "bits": self.bits.to_json() if self.bits else None,
-            "bits_after": self.bits_after.to_json() if self.bits_after else None,
-            "bit_steps": [{"effect": e, "score_heldout": s} for e, s in self.bit_steps],
+            "bits": self.detections.to_json() if self.detections else None,
+            "bits_after": self.detections_after.to_json() if self.detections_after else None,
+            "bit_steps": [{"effect": e, "score_heldout": s} for e, s in self.detection_steps],
             "notes": self.notes,
             "settings": asdict(self.search.settings),
             "floor_settings": asdict(FLOOR_SETTINGS),
+            "check_settings": asdict(CHECKS),
             "passes": self.search.passes,
         }

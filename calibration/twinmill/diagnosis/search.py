@@ -391,7 +391,7 @@ def _is_common(before: Trial, refit: Trial, settings: Settings) -> bool:
 
 
 def _matters(before: Trial, trial: Trial, first_excess: float, settings: Settings) -> bool:
-    """Whether the addition is worth its words: by the fall of the squared score, or by the bits."""
+    """Whether the addition is worth its words, by the fall of the squared score or detections."""
     if before.state.of_cameras:
         return _changes_enough_bits(before, trial, settings)
     fall = before.held_score**2 - trial.held_score**2

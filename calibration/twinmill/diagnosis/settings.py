@@ -2,12 +2,13 @@
 """The numbers that decide a diagnosis, in one record: reports and JSON output print it.
 
 A step that needs another number to be quick or exact (a grid, a count of random signs) keeps it to
-itself; here is what moves a verdict. Those of the noise floor: `fitting/settings.py`.
+itself; here is what moves a verdict. Those of the noise floor stand in `fitting/settings.py`, those
+of the checks of the input in `data/checks/settings.py`.
 """
 
 from dataclasses import dataclass, replace
 
-from twinmill.fitting.settings import Numbers, number
+from twinmill.settings import Numbers, number
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,7 @@ class Settings(Numbers):
     bits: float = number(0.005, "share of detections that an effect of the camera changes ...")
     bits_in_view: float = number(0.02, "... or of those with a robot in view, or without")
     late_s: float = number(0.025, "delay of a camera that may be a clock offset, s")
+    drift_std: float = number(0.04, "by which gains wander with battery and heat: share of them")
 
     # What stands in one group.
     alike: float = number(0.95, "canonical correlation of signatures from which two are one")
@@ -65,6 +67,8 @@ class Settings(Numbers):
     beyond: float = number(3.0, "usual sizes, or standard deviations at a bound: too far ...")
     near: float = number(0.5, "... if another leaves less than this more of the squared score")
     weighty: float = number(0.1, "share of the loudest visit that another must bring to count")
+    away_s: float = number(2.0, "s between two visits of a place")
+    of_a_kind: int = number(3, "effects of one kind, which are one of another form")
     slight: float = number(0.3, "share of what is left that a second finding must take")
     much_left: float = number(0.3, "share left, beyond which no name is sure")
     lag_leaves: float = number(0.25, "share left, beyond which no lag is sure")
@@ -97,6 +101,7 @@ class Settings(Numbers):
     place_share: float = number(0.1, "... if this share of their square repeats")
 
     # Robots that differ.
+    fewest_robots: int = number(3, "robots below which none is called different")
     odd: float = number(3.5, "robust standard deviations from the median")
     odd_evidence: float = number(16.0, "least fall of the held-out cost, for one robot")
     odd_chance: float = number(0.005, "that one of robots that are alike is called different")
@@ -104,6 +109,11 @@ class Settings(Numbers):
     spread_of_effects: float = number(
         0.03, "by which they differ at least in an effect, of its usual size"
     )
+    camera_spread: float = number(
+        0.1, "scatter of the logarithm of errors among cameras that are alike, over all frames ..."
+    )
+    camera_spread_in_view: float = number(0.2, "... and over frames with a robot in view")
+    resolved: float = number(4.0, "standard errors, from which a robot's difference would be seen")
     noisy: float = number(4.0, "times the sensor noise of the others, from which it is said")
 
     # The verdict.

@@ -36,7 +36,7 @@ MARGIN = 0.05  # share of a log at each end, within which a moment is none
 
 
 @dataclass(frozen=True)
-class Subject:
+class Candidate:
     """An effect that might be added, and the data sets and models that it might be added to."""
 
     name: str
@@ -128,12 +128,12 @@ def starts_of(
         datasets: that the rows are of.
         rows: (R,) of each data set.
     """
-    subject = Subject(name, datasets, models)
+    candidate = Candidate(name, datasets, models)
     if with_role(name, "moment"):
-        return Whiles.of(subject, rows) if lasts_for_a_while(name) else _moments(subject, rows)
+        return Whiles.of(candidate, rows) if lasts_for_a_while(name) else _moments(candidate, rows)
     if with_role(name, "place"):
-        return _places(subject, rows) if subject.logs else None
-    return Grid.of(subject, rows) if with_role(name, "limit") else None
+        return _places(candidate, rows) if candidate.logs else None
+    return Grid.of(candidate, rows) if with_role(name, "limit") else None
 
 
 @dataclass(frozen=True)
@@ -144,18 +144,18 @@ class Grid:
     columns: list[np.ndarray]
 
     @classmethod
-    def of(cls, subject: Subject, rows: Sequence[np.ndarray]) -> "Grid":
+    def of(cls, candidate: Candidate, rows: Sequence[np.ndarray]) -> "Grid":
         """Of an effect with a limit: about the usual one."""
-        usual = {p["name"]: p["default"] for p in catalogue()[subject.name]["parameters"]}
-        keys = with_role(subject.name, "limit")
-        starts = [{f"{subject.instance}.{key}": k * usual[key] for key in keys} for k in LIMITS]
+        usual = {p["name"]: p["default"] for p in catalogue()[candidate.name]["parameters"]}
+        keys = with_role(candidate.name, "limit")
+        starts = [{f"{candidate.instance}.{key}": k * usual[key] for key in keys} for k in LIMITS]
 
         def values(parameters: list[Parameter]) -> np.ndarray:
             low, high = (np.array([getattr(p, k) for p in parameters]) for k in ("min", "max"))
             whole = [[start.get(p.name, p.value) for p in parameters] for start in starts]
             return np.clip(np.array(whole), low, high)
 
-        return cls(starts, [c[:, None] for c in subject.changes(rows, values)])
+        return cls(starts, [c[:, None] for c in candidate.changes(rows, values)])
 
     def best(self, left: Left) -> dict[str, float]:
         """See Starts."""
@@ -204,12 +204,12 @@ class Whiles:
     shares: list[np.ndarray]
 
     @classmethod
-    def of(cls, subject: Subject, rows: Sequence[np.ndarray]) -> "Whiles":
+    def of(cls, candidate: Candidate, rows: Sequence[np.ndarray]) -> "Whiles":
         """Of an effect that begins and ends."""
-        begin, end = subject.named("moment")
-        at_s = _grid_s(subject)
-        changes = _always_on(subject, rows, {begin: 0.0, end: NEVER_S})
-        return cls([begin, end], at_s, changes, [_since(d, at_s) for d in subject.datasets])
+        begin, end = candidate.named("moment")
+        at_s = _grid_s(candidate)
+        changes = _always_on(candidate, rows, {begin: 0.0, end: NEVER_S})
+        return cls([begin, end], at_s, changes, [_since(d, at_s) for d in candidate.datasets])
 
     def best(self, left: Left) -> dict[str, float]:
         """See Starts."""
@@ -230,31 +230,31 @@ class Whiles:
 
 
 def _always_on(
-    subject: Subject, rows: Sequence[np.ndarray], on: dict[str, float]
+    candidate: Candidate, rows: Sequence[np.ndarray], on: dict[str, float]
 ) -> list[np.ndarray]:
     """(k, R) by which each data set's rows change by each size alone, where `on` holds."""
-    sizes = subject.named("size")
+    sizes = candidate.named("size")
 
     def values(parameters: list[Parameter]) -> np.ndarray:
         off = {p.name: on.get(p.name, p.usual) for p in parameters}
         own = {p.name: p.value for p in parameters}
         return np.array([[(off | {s: own[s]})[p.name] for p in parameters] for s in sizes])
 
-    return subject.changes(rows, values)
+    return candidate.changes(rows, values)
 
 
-def _moments(subject: Subject, rows: Sequence[np.ndarray]) -> Switched:
+def _moments(candidate: Candidate, rows: Sequence[np.ndarray]) -> Switched:
     """Of an effect that begins at a moment, and never ends."""
-    (begin,) = subject.named("moment")
-    at_s = _grid_s(subject)
-    changes = _always_on(subject, rows, {begin: 0.0})
-    shares = [_since(d, at_s) for d in subject.datasets]
+    (begin,) = candidate.named("moment")
+    at_s = _grid_s(candidate)
+    changes = _always_on(candidate, rows, {begin: 0.0})
+    shares = [_since(d, at_s) for d in candidate.datasets]
     return Switched([{begin: float(t_s)} for t_s in at_s], changes, shares)
 
 
-def _grid_s(subject: Subject) -> np.ndarray:
+def _grid_s(candidate: Candidate) -> np.ndarray:
     """(T,) moments over the time of all logs, s since the first command."""
-    times_s = np.concatenate([d.start_s for d in subject.logs])
+    times_s = np.concatenate([d.start_s for d in candidate.logs])
     low_s, high_s = np.quantile(times_s, (MARGIN, 1 - MARGIN))
     return np.linspace(low_s, high_s, int(np.clip((high_s - low_s) / EVERY_S, 2, MOST_MOMENTS)))
 
@@ -267,10 +267,10 @@ def _since(dataset: Dataset, at_s: np.ndarray) -> np.ndarray:
     return np.clip((end_s - at_s[:, None, None]) / ahead_s, 0, 1).astype(np.float32)
 
 
-def _places(subject: Subject, rows: Sequence[np.ndarray]) -> Switched:
+def _places(candidate: Candidate, rows: Sequence[np.ndarray]) -> Switched:
     """Of an effect with a round place: over the floor that was driven."""
-    keys = [f"{subject.instance}.{key}" for key in ("x_m", "y_m", "radius_m")]
-    tracks = [d.measurement.track for d in subject.logs]
+    keys = [f"{candidate.instance}.{key}" for key in ("x_m", "y_m", "radius_m")]
+    tracks = [d.measurement.track for d in candidate.logs]
     xy = np.concatenate([t.pose[t.segment >= 0, :2] for t in tracks])
     low, high = np.nanquantile(xy, 0.03, axis=0), np.nanquantile(xy, 0.97, axis=0)
     side_m = float(np.max(high - low))
@@ -281,13 +281,13 @@ def _places(subject: Subject, rows: Sequence[np.ndarray]) -> Switched:
         for y in np.linspace(low[1], high[1], PLACES)
         if np.nanmin(np.hypot(*(xy[::20] - (x, y)).T)) < radius_m
     ]
-    entry = {p["name"]: p for p in catalogue()[subject.name]["parameters"]}
+    entry = {p["name"]: p for p in catalogue()[candidate.name]["parameters"]}
     middle = (low + high) / 2
     everywhere = dict(zip(keys, (*middle.tolist(), entry["radius_m"]["max"]), strict=True))
     return Switched(
         [dict(zip(keys, map(float, circle), strict=True)) for circle in circles],
-        _always_on(subject, rows, everywhere),
-        [_inside(d, np.array(circles)) for d in subject.datasets],
+        _always_on(candidate, rows, everywhere),
+        [_inside(d, np.array(circles)) for d in candidate.datasets],
     )
 
 

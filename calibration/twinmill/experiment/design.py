@@ -10,6 +10,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import SHORTEST_LOG_S, Measurement
 from twinmill.data.steady_table import SteadyTable
+from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.experiment.hypotheses import Hypotheses, candidate_effects, hypotheses_of, question
 from twinmill.experiment.information import CandidateEffect, FisherInformation
@@ -120,6 +121,27 @@ class Plan:
             "moves": [m.name for m in self.moves],
             "effects": [vars(c) for c in self.chances],
         }
+
+
+def plan_run(
+    measurements: Sequence[Measurement | SteadyTable],
+    model_file: ModelFile,
+    limits: Limits,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Plan:
+    """Diagnoses logs, and designs the run that best names what they leave open.
+
+    Args:
+        measurements: the logs so far.
+        model_file: that they are diagnosed with.
+        limits: time, floor, duty.
+        progress: told in words what is being done.
+
+    Raises:
+        ValueError: no script can be within these limits, or none shows what is in question.
+    """
+    check(measurements, model_file, limits)
+    return design(diagnose(measurements, model_file, progress), model_file, limits, progress)
 
 
 def design(

@@ -146,11 +146,11 @@ def add(
     told = model_file.known_from_other_logs(logs.values())
     base = base_parameters(model_file.model, base_names(model_file.model, judged(opened), told))
     old = without_held([*base, *all_effect_parameters(model_file.model)], held)
-    grown = [o.with_model(richer) for o in opened]
+    enlarged = [o.with_model(richer) for o in opened]
     if robot_id is None:
-        moved, found = fitted(grown, [*old, *fresh], fresh)
+        moved, found = fitted(enlarged, [*old, *fresh], fresh)
     else:
-        moved, found = fitted(with_own(grown, robot_id, fresh), old, fresh)
+        moved, found = fitted(with_own(enlarged, robot_id, fresh), old, fresh)
     held = [HeldOut.of(f) for f in (fitted(opened, [])[1], fitted(opened, old)[1], found)]
     before = comparison(model_file, opened)
     after = comparison(model_file, [o.realigned() for o in moved], Path(out).name)

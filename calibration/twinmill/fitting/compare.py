@@ -109,12 +109,15 @@ class RobotComparison:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All robots of all logs and tables against one model; `bits`: of their cameras, or None."""
+    """All robots of all logs and tables against one model.
+
+    `detections` are those of their cameras, or None.
+    """
 
     model_name: str
     robots: list[RobotComparison | SteadyComparison]
     warnings: list[str]
-    bits: DetectionComparison | None = None
+    detections: DetectionComparison | None = None
 
     @property
     def score(self) -> float:
@@ -166,7 +169,7 @@ class Comparison:
             "score": self.score,
             "verdict": self.verdict,
             "robots": [r.to_json() for r in self.robots],
-            "bits": self.bits.to_json() if self.bits else None,
+            "bits": self.detections.to_json() if self.detections else None,
             "warnings": self.warnings,
         }
 
@@ -223,5 +226,7 @@ def compare(measurements: Sequence[Measurement | SteadyTable], model_file: Model
     """
     opened = open_measurements(measurements, model_file)
     found = comparison(model_file, opened)
-    bits = compare_detections(all_detections([r.modelled for r in found.robots]), model_file.model)
-    return replace(found, bits=bits)
+    detections = compare_detections(
+        all_detections([r.modelled for r in found.robots]), model_file.model
+    )
+    return replace(found, detections=detections)

@@ -28,7 +28,7 @@ from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S, rms
 
 HORIZON = HORIZONS_S.index(0.5)
-PAUSE_S = 2.5  # between the starts of windows of two bumps; a robot may rest meanwhile
+PAUSE_S = 2.5  # between the starts of windows of two disturbances; a robot may rest meanwhile
 ARM_M = 0.1  # a turn counts as the way of a point so far from the middle
 REACH_S = 1.0  # delays and offsets that are looked for
 
@@ -197,23 +197,23 @@ def _acts(data: Trajectory, name: str) -> bool:
 
 
 def _without_bumps(data: Trajectory, response: Response, far: np.ndarray) -> np.ndarray:
-    """(W,) windows without bumps, nor a part of one, which is `far` (W,) off.
+    """(W,) windows without disturbances, nor a part of one, which is `far` (W,) off.
 
-    What bumps often does so by itself: its parts are left in.
+    A robot that is disturbed often is so by itself: the parts are left in.
     """
-    bumps = is_far(response.across, response.errors, FLOOR_SETTINGS.bump)
-    if not bumps.any() or bumps.mean() > FLOOR_SETTINGS.most_bumps:
-        return np.ones(len(bumps), bool)
-    apart_s = np.abs(data.start_s[:, None] - data.start_s[bumps]).min(axis=1)
+    disturbed = is_far(response.across, response.errors, FLOOR_SETTINGS.bump)
+    if not disturbed.any() or disturbed.mean() > FLOOR_SETTINGS.most_bumps:
+        return np.ones(len(disturbed), bool)
+    apart_s = np.abs(data.start_s[:, None] - data.start_s[disturbed]).min(axis=1)
     parts = far & (apart_s < HORIZONS_S[-1])
-    rare = (bumps | parts).mean() < FLOOR_SETTINGS.rare_bumps
-    return ~bumps & ~parts if rare else ~bumps
+    rare = (disturbed | parts).mean() < FLOOR_SETTINGS.rare_bumps
+    return ~disturbed & ~parts if rare else ~disturbed
 
 
 def _lasting(data: Trajectory, base: native.Model, far: np.ndarray) -> np.ndarray:
     """(W,) windows that are off by no bump: for a while all of the motion is less, or more.
 
-    Those with bumps tell nothing of the noise, and are judged. `far` (W,) are off at all.
+    Disturbed ones tell nothing of the noise, and are judged. `far` (W,) are off at all.
     """
     found = np.zeros(len(far), bool)
     measured, errors = (e[:, HORIZON] * (1, 1, ARM_M) for e in (data.measured, data.errors(base)))

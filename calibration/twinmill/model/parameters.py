@@ -4,6 +4,7 @@
 import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from functools import cache
 
 import twinmill_native as native
@@ -90,6 +91,20 @@ class ParameterEstimate:
 def catalogue() -> dict[str, dict]:
     """The twin's effects by name."""
     return {entry["name"]: entry for entry in native.catalogue()}
+
+
+def find_effect(name: str) -> dict:
+    """The catalogue's entry of that name.
+
+    Raises:
+        ValueError: there is none; the message names the nearest.
+    """
+    entries = catalogue()
+    if name in entries:
+        return entries[name]
+    near = get_close_matches(name, entries, n=1, cutoff=0.6)
+    hint = f"did you mean {near[0]}?" if near else "`twinmill effects` lists them all."
+    raise ValueError(f"effect '{name}': not in the catalogue; {hint}")
 
 
 def is_of_camera(effect: str) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Predicted against measured bits: how often they agree, and at which range and bearing not."""
+"""Predicted against measured detections: how often they agree, and where they do not."""
 
 from dataclasses import dataclass
 
@@ -45,7 +45,7 @@ class Confusion:
 
 @dataclass(frozen=True)
 class DetectionComparison:
-    """All robots of all logs that reported bits.
+    """All robots of all logs that reported detections.
 
     Attributes:
         predicted: (K,) probability that the frame shows a target, misses and false ones included.
@@ -55,7 +55,7 @@ class DetectionComparison:
         range_m, bearing_rad: (K,) of the nearest other robot; the bearing from the heading, left
             positive.
         reach_m, half_rad: of the model's camera, for pictures.
-        raw: measured bits are those of single frames; false if only the vote's were logged.
+        raw: measured detections are those of single frames; false if only the vote's were logged.
         vote_agreement: share of frames whose voted bit follows from the raw ones; None without.
     """
 
@@ -73,7 +73,7 @@ class DetectionComparison:
 
     @property
     def confusion(self) -> Confusion:
-        """Of geometry against measured bits."""
+        """Of geometry against measured detections."""
         return Confusion.of(self.in_view, self.measured)
 
     @property
@@ -138,9 +138,9 @@ def brier_ratio(chance: np.ndarray, bit: np.ndarray) -> float:
 def compare_detections(
     cameras: list[Detections], model: native.Model
 ) -> DetectionComparison | None:
-    """Compares a model's bits with those of all robots; None if no robot reported any.
+    """Compares a model's detections with those of all robots; None if no robot reported any.
 
-    Raw bits are compared where every log has them, else voted ones with the vote predicted.
+    Raw detections are compared where every log has them, else voted ones with the vote predicted.
 
     Args:
         cameras: frames with poses.

@@ -37,13 +37,13 @@ def _drawn(
     robots: list[RobotComparison],
     others: list[tuple[str, native.Model] | None],
 ) -> str:
-    bits = {b.label: b for b in all_detections([r.modelled for r in robots])}
+    detections = {b.label: b for b in all_detections([r.modelled for r in robots])}
     shown = []
     for robot, other in zip(robots, others, strict=True):
         modelled = robot.modelled
         view = RobotView(modelled.measurement, robot.floor, modelled.clock_free)
         name = f"{modelled.measurement.label} · {number(robot.score)}"
-        seen = bits.get(modelled.measurement.label)
+        seen = detections.get(modelled.measurement.label)
         shown.append(Shown(view, name, modelled.model, robot.where, other, seen))
     first = robots.index(worst) if worst in robots else 0
     return embedded(shown, first, _stretch(robots[first]))

@@ -47,8 +47,8 @@ def robot_tables(comparison: Comparison) -> list[Table]:
         made += _of_worst(comparison)
     if sheets := steady_comparisons(comparison):
         made += [steady.errors(sheets), steady.cells(sheets)]
-    if comparison.bits:
-        made += detections.confusion_tables(comparison.bits)
+    if comparison.detections:
+        made += detections.confusion_tables(comparison.detections)
     return made
 
 

@@ -23,7 +23,7 @@ def steps(found: Sequence[tuple[str | None, float]]) -> Table:
         for effect, score in found
     ]
     return Table(
-        "The bits, step by step",
+        "The detections, step by step",
         ["step", "held-out\nscore"],
         rows,
         "On frames that were not fitted to: 1.0 is right.",
@@ -31,27 +31,31 @@ def steps(found: Sequence[tuple[str | None, float]]) -> Table:
     )
 
 
-def confusion_tables(bits: DetectionComparison) -> list[Table]:
+def confusion_tables(detections: DetectionComparison) -> list[Table]:
     """By robot, and by range and bearing of the nearest robot."""
-    return [_by_robot(bits), _by_place(bits)]
+    return [_by_robot(detections), _by_place(detections)]
 
 
-def _by_robot(bits: DetectionComparison) -> Table:
+def _by_robot(detections: DetectionComparison) -> Table:
     rows = [
         [Cell(label), *_counts(confusion), Cell(number(score), tone(score))]
-        for label, confusion, score in bits.by_robot()
+        for label, confusion, score in detections.by_robot()
     ]
     if len(rows) > 1:
-        total = [Cell("all"), *_counts(bits.confusion), Cell(number(bits.score), tone(bits.score))]
+        total = [
+            Cell("all"),
+            *_counts(detections.confusion),
+            Cell(number(detections.score), tone(detections.score)),
+        ]
         rows.append(total)
+    agreed = detections.vote_agreement
     vote = (
         ""
-        if bits.vote_agreement is None
-        else f" The voted bit follows from the raw ones in {100 * bits.vote_agreement:.1f} % of "
-        "the frames."
+        if agreed is None
+        else f" The voted bit follows from the raw ones in {100 * agreed:.1f} % of the frames."
     )
     return Table(
-        f"The camera's bit ({'raw' if bits.raw else 'after the vote'})",
+        f"The camera's bit ({'raw' if detections.raw else 'after the vote'})",
         ["robot", *COLUMNS, "score"],
         rows,
         "Frames by what the model's geometry says and what the robot reported; score: how far off "
@@ -59,15 +63,15 @@ def _by_robot(bits: DetectionComparison) -> Table:
     )
 
 
-def _by_place(bits: DetectionComparison) -> Table:
+def _by_place(detections: DetectionComparison) -> Table:
     rows = []
-    edges = np.linspace(0, SHOWN * bits.reach_m, BINS + 1)
-    inside = np.abs(bits.bearing_rad) < bits.half_rad
+    edges = np.linspace(0, SHOWN * detections.reach_m, BINS + 1)
+    inside = np.abs(detections.bearing_rad) < detections.half_rad
     for near, far in pairwise(edges):
         for ahead in (True, False):
-            here = (bits.range_m >= near) & (bits.range_m < far) & (inside == ahead)
+            here = (detections.range_m >= near) & (detections.range_m < far) & (inside == ahead)
             if here.any():
-                confusion = Confusion.of(bits.in_view[here], bits.measured[here])
+                confusion = Confusion.of(detections.in_view[here], detections.measured[here])
                 where = "in the cone" if ahead else "beside it"
                 rows.append([Cell(f"{near:.2f} to {far:.2f} m"), Cell(where), *_counts(confusion)])
     return Table(
@@ -88,9 +92,9 @@ def _counts(c: Confusion) -> list[Cell]:
     ]
 
 
-def field_of_view(bits: DetectionComparison, title: str = "What the camera sees") -> Figure:
+def field_of_view(detections: DetectionComparison, title: str = "What the camera sees") -> Figure:
     """Share of frames that see, over range and bearing of the nearest robot."""
-    cells = bits.cells()
+    cells = detections.cells()
     ranges = sorted({r for c in cells for r in c["range_m"]})
     bearings = np.degrees(sorted({b for c in cells for b in c["bearing_rad"]}))
     kinds = ("measured", "predicted")
@@ -106,9 +110,11 @@ def field_of_view(bits: DetectionComparison, title: str = "What the camera sees"
             mesh = axes.pcolormesh(
                 bearings, ranges, shares[kind], cmap="viridis", vmin=0, vmax=1, rasterized=False
             )
-            half = min(np.degrees(bits.half_rad), 180)
+            half = min(np.degrees(detections.half_rad), 180)
             axes.plot(
-                [-half, -half, half, half], [0, bits.reach_m, bits.reach_m, 0], color="#d55e00"
+                [-half, -half, half, half],
+                [0, detections.reach_m, detections.reach_m, 0],
+                color="#d55e00",
             )
             axes.set(title=kind, xlabel="bearing (°), left positive", xticks=[-90, 0, 90])
             axes.invert_xaxis()

@@ -9,10 +9,12 @@ import twinmill_native as native
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from twinmill.data.checks.settings import CHECKS
 from twinmill.diagnosis.explain import Explanation, steps
-from twinmill.diagnosis.outliers import FEWEST, Outlier, in_words
+from twinmill.diagnosis.outliers import Outlier, in_words
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.search import REFIT, REFIT_IN_WORDS
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.model.parameters import ParameterEstimate, catalogue
 from twinmill.report import Figure, Section, comparisons, detections, formula, show, tables
@@ -23,8 +25,9 @@ from twinmill.report.tables import Cell, Table, Tone, number, rounded, tone
 from twinmill.terminal import whole
 
 TOO_FEW = (
-    f"Of fewer than {FEWEST} robots none can be called the odd one, and what one has is looked for "
-    "in all: where their scores differ (twinmill compare), give each a log of its own."
+    f"Of fewer than {SETTINGS.fewest_robots} robots none can be called the odd one, and what one "
+    "has is looked for in all: where their scores differ (twinmill compare), give each a log of "
+    "its own."
 )
 
 Commands = Sequence[tuple[str, str]]  # what for, and the line to type
@@ -113,10 +116,10 @@ def each_robot(diagnosis: Diagnosis) -> Table:
     """What is said of each robot, and what its logs would have shown of it."""
     off = {o.robot_id: _said_of(o.sentence) for o in diagnosis.robots_off}
     count = len(diagnosis.robots)
-    too_few = 1 < count < FEWEST and not off
+    too_few = 1 < count < SETTINGS.fewest_robots and not off
     of_few = _alone(diagnosis) if count == 1 else "not compared" if too_few else "as the model"
     adequate = diagnosis.verdict == "model_adequate"
-    usual = of_few if count < FEWEST else "as the model" if adequate else "as all"
+    usual = of_few if count < SETTINGS.fewest_robots else "as the model" if adequate else "as all"
     rows = [
         [
             Cell(f"R{r.robot_id:02d}", "bad" if r.robot_id in off else ""),
@@ -255,14 +258,22 @@ def _next(diagnosis: Diagnosis, commands: Commands) -> list[Text]:
     return told + [part for why, command in commands for part in (Text(f"{why}:"), whole(command))]
 
 
-def terminal_explanation(result: Explanation, commands: Commands = ()) -> RenderableType:
-    """What a person reads of the whole loop, and what to type then."""
+def terminal_explanation(
+    result: Explanation, commands: Commands = (), not_written: str = ""
+) -> RenderableType:
+    """What a person reads of the whole loop, and what to type then.
+
+    Args:
+        result: the model and its diagnosis.
+        commands: what to type then, each with why.
+        not_written: said in the place of where the model was written.
+    """
     return Group(
         *_said(result.diagnosis),
         Text(),
         show.table(tables.steps(_labelled(result.diagnosis))),
         show.table(tables.parameters(result.parameters)),
-        Text(f"Written: {result.path}"),
+        Text(not_written or f"Written: {result.path}"),
         *_next(result.diagnosis, commands),
     )
 
@@ -271,8 +282,11 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
     """The page of a diagnosis: verdict, figures, tables and the commands that follow."""
     before = diagnosis.before
     scores = [("as given", before.score), ("base refitted, held out", diagnosis.score_refit)]
-    if len(diagnosis.bit_steps) > 1:
-        scores += [("bits", diagnosis.bit_steps[0][1]), ("bits, found", diagnosis.bit_steps[-1][1])]
+    if len(diagnosis.detection_steps) > 1:
+        scores += [
+            ("detections", diagnosis.detection_steps[0][1]),
+            ("detections, found", diagnosis.detection_steps[-1][1]),
+        ]
     return Section(
         f"What {before.model_name} lacks",
         [(label, number(value), tone(value)) for label, value in scores],
@@ -294,19 +308,25 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
     )
 
 
-def explanation_section(result: Explanation, commands: Commands = ()) -> Section:
+def explanation_section(
+    result: Explanation, commands: Commands = (), not_written: str = ""
+) -> Section:
     """The page of the whole loop: that of its diagnosis, and what was fitted and written then."""
     page = section(result.diagnosis, commands)
     return replace(
         page,
         tables=[*page.tables, tables.parameters(result.parameters)],
-        notes=[*page.notes, f"Written: `{result.path}`"],
+        notes=[*page.notes, not_written or f"Written: `{result.path}`"],
     )
 
 
 def deciding(diagnosis: Diagnosis) -> Table:
-    """The numbers that decided, with what each means: the search's, then the noise floor's."""
-    numbers = [*diagnosis.search.settings.listed(), *FLOOR_SETTINGS.listed()]
+    """The numbers that decided, with what each means: of search, noise floor and input checks."""
+    numbers = [
+        *diagnosis.search.settings.listed(),
+        *FLOOR_SETTINGS.listed(),
+        *CHECKS.listed(),
+    ]
     rows = [[Cell(name), Cell(f"{value:g}"), Cell(what)] for name, value, what in numbers]
     note = "Scores are over the noise floor: 1.0 is right. Costs are -2 log likelihoods."
     return Table("Numbers that decided", ["name", "value", "what"], rows, note, words=(0, 2))
@@ -350,24 +370,26 @@ def _tables(diagnosis: Diagnosis) -> list[Table]:
 
 
 def _detection_steps(diagnosis: Diagnosis) -> list[Table]:
-    return [detections.steps(diagnosis.bit_steps)] if len(diagnosis.bit_steps) > 1 else []
+    return (
+        [detections.steps(diagnosis.detection_steps)] if len(diagnosis.detection_steps) > 1 else []
+    )
 
 
 def _detection_tables(diagnosis: Diagnosis) -> list[Table]:
-    """Predicted and measured bits, with the effects that were found if there are any."""
-    bits = diagnosis.bits_after or diagnosis.bits
-    return detections.confusion_tables(bits) if bits else []
+    """Predicted and measured detections, with the effects that were found if there are any."""
+    found = diagnosis.detections_after or diagnosis.detections
+    return detections.confusion_tables(found) if found else []
 
 
 def _detection_figures(diagnosis: Diagnosis) -> list[Figure]:
     """What the camera sees, with the model as given and with what was found."""
-    if not diagnosis.bits:
+    if not diagnosis.detections:
         return []
-    after = diagnosis.bits_after
+    after = diagnosis.detections_after
     found = (
         [detections.field_of_view(after, "What the camera sees, effects added")] if after else []
     )
-    return [detections.field_of_view(diagnosis.bits), *found]
+    return [detections.field_of_view(diagnosis.detections), *found]
 
 
 def _gains(diagnosis: Diagnosis) -> list[Figure]:

@@ -26,7 +26,7 @@ def comparison_section(result: Comparison) -> Section:
         comparisons.facts(result),
         [
             *_pictures(result, [("this model", robot)]),
-            *([detections.field_of_view(result.bits)] if result.bits else []),
+            *([detections.field_of_view(result.detections)] if result.detections else []),
         ],
         [*tables.robots(result), *comparisons.robot_tables(result)],
         charts=charts(result),
@@ -85,7 +85,10 @@ def _camera_section(result: AddResult) -> Section:
     before, after = number(result.heldout_refit.score), number(result.heldout_after.score)
     return Section(
         f"{result.effect} added to {result.model_name}",
-        [_score("bits before", result.before.score), _score("bits after", result.after.score)],
+        [
+            _score("detections before", result.before.score),
+            _score("detections after", result.after.score),
+        ],
         f"Held out: {before} without, {after} with.",
         figures=[detections.field_of_view(result.after)],
         tables=[tables.parameters(result.parameters), *detections.confusion_tables(result.after)],

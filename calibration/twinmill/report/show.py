@@ -89,7 +89,7 @@ def added(result: AddResult, not_written: str = "") -> RenderableType:
 
 def _added_to_camera(result: AddResult, not_written: str) -> RenderableType:
     return Group(
-        _change("bits", result.before.score, result.after.score),
+        _change("detections", result.before.score, result.after.score),
         _change(
             "held out",
             result.heldout_refit.score,

@@ -6,13 +6,19 @@ of the runs would be as probable as any other, so that its rank among them, by w
 treats all runs alike, gives an exact test (Dwass 1957; Besag and Clifford 1989).
 """
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
 
+from twinmill.data.log import Log
 from twinmill.defaults import FALSE_ALARMS
+from twinmill.programs import available_cores
+from twinmill.swarm.behaviors import find_table
 from twinmill.swarm.metrics import STEP_S, SwarmSeries, body_velocity
+from twinmill.swarm.sweep import parse_table
 
 BLOCK_S = 2.0  # metrics are means over this
 STARTED_MPS = 0.02
@@ -140,3 +146,127 @@ def twin_values(cell: native.Cell, seed: int, ring: int, scale: tuple[float, flo
     weight = ((t_s - known_s[after - 1]) / cell.period_s)[:, None, None]
     pose = np.ascontiguousarray((1 - weight) * trace[after - 1] + weight * trace[after])
     return native.measure(pose, body_velocity(pose), ring, *scale)
+
+
+@dataclass(frozen=True)
+class SwarmComparison:
+    """The floor's run and the twin's.
+
+    Attributes:
+        names: of the K metrics compared.
+        t_s: (B,) middle of each block, since the swarm began to move.
+        floor: (B, K) in the metrics' own units.
+        twins: (S, B, K) the same.
+        test: how they compare.
+        robots: numbers of those that were compared.
+    """
+
+    names: list[str]
+    t_s: np.ndarray
+    floor: np.ndarray
+    twins: np.ndarray
+    test: RankTest
+    robots: tuple[int, ...]
+
+    def to_json(self) -> dict:
+        """Verdict, tests and bands."""
+        j, left = self.test, self.test.left
+        low, middle, high = (plain(part, self.names) for part in (j.low, j.middle, j.high))
+        return {
+            "differs": j.differs,
+            "false_alarm_rate": FALSE_ALARMS,
+            "p_energy": j.p_value,
+            "p_band": j.p_band,
+            "left_band": {"t_s": self.t_s[left[0]], "metric": self.names[left[1]]}
+            if left
+            else None,
+            "seeds": len(self.twins),
+            "t_s": self.t_s,
+            "series": {
+                name: {
+                    "floor": self.floor[:, k],
+                    "low": low[:, k],
+                    "middle": middle[:, k],
+                    "high": high[:, k],
+                }
+                for k, name in enumerate(self.names)
+            },
+        }
+
+    @property
+    def verdict(self) -> str:
+        """One or two sentences."""
+        j = self.test
+        tests = f"(energy distance p = {j.p_value:.3f}, band p = {j.p_band:.3f})"
+        if not j.differs:
+            return f"The floor's run could be one of the twin's {len(self.twins)} {tests}."
+        words = f"The floor's run is not one of the twin's {len(self.twins)} {tests}."
+        if j.left:
+            words += (
+                f" It leaves the twin's band first {self.t_s[j.left[0]]:.0f} s after the start, in "
+                f"{self.names[j.left[1]]}."
+            )
+        return words
+
+
+def compare_swarm(
+    log: Log,
+    series: SwarmSeries,
+    model: native.Model,
+    *,
+    seeds: range,
+    behavior: str | None = None,
+    tell: Callable[[], None] = lambda: None,
+) -> SwarmComparison:
+    """Runs the twin from the log's start and compares.
+
+    Args:
+        log: a swarm's.
+        series: its metrics.
+        model: of all robots; says how far they see, and how large they are.
+        seeds: of the runs of the twin.
+        behavior: of all robots; None: what the log says.
+        tell: is called after each run.
+
+    Raises:
+        ValueError: a behaviour is not known, or the log is too short.
+    """
+    begin = first_motion(series)
+    values = series.values[begin:]
+    count = round((series.t_s[-1] - series.t_s[begin]) / STEP_S) + 1
+    names = compared(bool(series.odd))
+    floor = blocks(values, names)
+    if len(values) < count or len(floor) < 2:
+        why = "has gaps in its poses" if len(values) < count else "is too short"
+        raise ValueError(
+            f"{log.path.name}: {why} after the swarm starts; at least {2 * BLOCK_S:.0f} s with "
+            "poses of all robots, without a gap, are needed."
+        )
+    ring = len(series.robots) - len(series.odd)
+    tables = [_table(behavior or log.robots[i].behavior, i) for i in series.robots]
+    cell = native.Cell(model, tables, ring, poses=series.pose[begin].tolist())
+    scale = model.get("sensor.range_m"), model.get("robot.body_radius_m")
+    twins = []
+    with ThreadPoolExecutor(available_cores()) as pool:
+        for one in pool.map(lambda seed: twin_values(cell, seed, ring, scale, count=count), seeds):
+            twins.append(blocks(one, names))
+            tell()
+    runs = np.array(twins)
+    t_s = (np.arange(len(floor)) + 0.5) * BLOCK_S
+    return SwarmComparison(
+        names,
+        t_s,
+        plain(floor, names),
+        plain(runs, names),
+        rank_test(floor, runs, least_spread(names)),
+        tuple(series.robots),
+    )
+
+
+def _table(name: str, robot: int) -> list[int]:
+    own = find_table(name) if name else ""
+    if own:
+        return parse_table(f"{name}={own}")[1]
+    if not name:
+        raise ValueError(f"the log does not say what robot {robot} plays; give --behavior NAME.")
+    return native.species(name, 1)[0][1]

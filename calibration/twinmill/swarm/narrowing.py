@@ -12,8 +12,7 @@ tells less. What is promised is therefore what the fit itself would say of the r
 seen.
 """
 
-import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -22,7 +21,8 @@ import pyarrow as pa
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
-from twinmill.experiment.design import CENTRE, Floor, Limits, choose
+from twinmill.data.steady_table import SteadyTable
+from twinmill.experiment.design import CENTRE, Floor, Limits, check, choose, log_of
 from twinmill.experiment.moves import Move, duty_axes, family
 from twinmill.experiment.one_step_fit import System
 from twinmill.experiment.played import LEAD_S, Played, Rows, rows_of
@@ -40,7 +40,8 @@ from twinmill.model.parameters import (
 )
 from twinmill.model.ranges import Ranges, ranges
 from twinmill.predict.modelled_log import ModelledLog
-from twinmill.swarm.classes import reached
+from twinmill.programs import available_cores
+from twinmill.swarm.classes import goal_of, reached
 from twinmill.swarm.forecast.draws import drawn_models, file_of
 from twinmill.swarm.request import Request, run_part
 
@@ -121,7 +122,7 @@ def spread_of(
         tell()
         return float(reached(pa.table(columns), goal).mean())
 
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(available_cores()) as pool:
         shares = np.array(list(pool.map(share, asked)))
     found = Spread.of(known, shares)
     if found.std(found.covariance) < LEAST_STD:
@@ -177,6 +178,42 @@ class Narrowing:
             "moves": [m.name for m in self.moves],
             "duration_s": self.rows.end_s,
         }
+
+
+def narrow(
+    measurements: Sequence[Measurement | SteadyTable],
+    file: ModelFile,
+    limits: Limits,
+    swarm: Request,
+    *,
+    draws: int,
+    tell: Callable[[], None] = lambda: None,
+) -> Narrowing:
+    """Runs swarms of models that the fits leave open, and designs the run that narrows them most.
+
+    Args:
+        measurements: logs of one robot.
+        file: of the model.
+        limits: time, floor, duty.
+        swarm: what is run.
+        draws: models that are drawn.
+        tell: is called after each of them.
+
+    Raises:
+        ValueError: no script of duties can be within these limits, or none would narrow it.
+    """
+    check(measurements, file, limits)
+    if file.model.drive != "duty":
+        raise ValueError(
+            f"--for: the model is driven by {file.model.drive}, and what narrows a swarm's "
+            "prediction is a script of wheel duties; leave --for out."
+        )
+    goal = goal_of(swarm)
+    spread = spread_of(swarm, goal, draws=draws, seed=1, tell=tell)
+    logs = [o for o in open_measurements(measurements, file) if o.floor]
+    excess = file.usual_score([o.measurement.log_sha256 for o in logs]) ** 2
+    modelled = log_of([o.modelled() for o in logs])
+    return design_for(spread, goal, file=file, modelled=modelled, limits=limits, excess=excess)
 
 
 def design_for(

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who simulates the parts: this machine's cores, or a Dask cluster."""
 
-import os
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from importlib.metadata import version
 
 import twinmill_native as native
 
+from twinmill.programs import available_cores
 from twinmill.swarm.request import Request, run_part
 
 Done = tuple[int, dict[str, list]]
@@ -16,7 +16,7 @@ CONNECT_S = 15
 
 def run_here(request: Request, parts: dict[int, range], workers: int | None) -> Iterator[Done]:
     """Runs parts in threads, which the kernel leaves free to run; yields them as they end."""
-    count = workers or len(os.sched_getaffinity(0))
+    count = workers or available_cores()
     queue = iter(parts.items())
     with ThreadPoolExecutor(count) as pool:
         running = {}

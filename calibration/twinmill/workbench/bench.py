@@ -284,9 +284,9 @@ class Bench:
         """What the model shown says of one robot; under a hand of fewer moments, at once."""
         shown, beside = self.session.shown(index).model, self.session.beside_of(index)
         revision = self.changes["prediction"]
-        view, bits = self.session.robots[index], self.session.bits(index)
+        view, seen = self.session.robots[index], self.session.detections(index)
         every = RESTARTS if self.session.is_dragged else 1
-        return pack_prediction(view, shown, beside, bits, every=every, revision=revision)
+        return pack_prediction(view, shown, beside, seen, every=every, revision=revision)
 
     def swarm_bytes(self) -> bytes:
         """Poses of the twin's swarms."""

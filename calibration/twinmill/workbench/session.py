@@ -431,7 +431,7 @@ class Session:
             return None
         return self.beside.label, self.beside.opened[index].model
 
-    def bits(self, index: int) -> Detections | None:
+    def detections(self, index: int) -> Detections | None:
         """What its camera told, with the paths of its log's other robots; None without them."""
         if index not in self._bits and not self.unjudged:
             self._bits[index] = self._detections_of(index)

@@ -15,22 +15,12 @@ from twinmill.data.checks.alternatives import (
 )
 from twinmill.data.checks.finding import InputFinding
 from twinmill.data.checks.motion import Motion
+from twinmill.data.checks.settings import CHECKS
 from twinmill.data.checks.words import described
 from twinmill.data.log import KINDS, CommandKind
 from twinmill.data.track import Track
 
-GOOD = 0.03  # share of the motion left unexplained at which no mistake is looked for
-FAR_BETTER = 0.5  # times what is left: physics explains that much more, a mistake more still
-SURE = 4.0  # standard errors over stretches of the log
-CLEAR, CLEAR_SURE = 0.1, 2.0  # times what is left, if that is GOOD: then fewer errors are enough
-TURNED_RAD = 0.35  # more than any heading bias
-ALIKE, ALIKE_LEFT = 1.3, 0.003  # times and beside what the best leaves: as good as the best
-POOR = 0.25  # share left from which clocks far apart are looked for
 FAR_S = np.arange(-6.0, 6.0 + 1e-9, 0.06)
-LEAST_JUMP_S = 0.15  # less may be two drives that are felt with different delays
-UNRELATED = 0.85  # share left at which commands and poses have nothing to do with each other
-LEAST_MPS = 0.01  # RMS speed below which nothing is said of a robot that hardly moves
-FEWEST_BLOCKS = 8
 OTHER_WHEELS = ", or, if the columns are right, check base.wheels and the sizes of the model"
 DRIVEN_BY = {"duty": "duties", "wheel_speed": "wheel speeds", "twist": "velocities of the body"}
 UNITS = (  # measured over commanded speed, and what it says
@@ -117,10 +107,10 @@ def check_commands(
 ) -> tuple[list[InputFinding], Search | None, Explained | None]:
     """Findings of one robot, and how well its commands explain its motion; None if too short."""
     track = checked.track
-    if not track.has_heading and (turns := _turning_share(checked)) > 0.05:
+    if not track.has_heading and (turns := _turning_share(checked)) > CHECKS.turns:
         return [_no_heading(checked, turns)], None, None
     motion = Motion.of(track)
-    if len(motion.t_s) < 20 or motion.block.max() + 1 < FEWEST_BLOCKS:
+    if len(motion.t_s) < CHECKS.fewest_poses or motion.block.max() + 1 < CHECKS.fewest_blocks:
         return [], None, None
     body = checked.body if track.has_heading else checked.body * np.array([[1], [1], [0]])
     search = Search(motion, body)
@@ -129,9 +119,9 @@ def check_commands(
         held = [a for a in pose_alternatives() if a.is_turn]
         own = min([own, *search.best(held)], key=lambda e: e.left)
     speed_mps = float(np.sqrt(np.mean(np.abs(motion.world_mps) ** 2)))
-    if speed_mps < LEAST_MPS and np.abs(motion.turn_radps).max() < 0.2:
+    if speed_mps < CHECKS.least_mps and np.abs(motion.turn_radps).max() < CHECKS.least_radps:
         return [], search, own
-    if own.left < GOOD:
+    if own.left < CHECKS.good:
         return _units(checked, own), search, own
     return _mistakes(checked, search, own), search, own
 
@@ -146,12 +136,13 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
         if mistaken := mistake(checked, search, own, best):
             return [mistaken]
     if not far_better(best, own):
-        if min(own.left, best.left) > UNRELATED:
+        if min(own.left, best.left) > CHECKS.unrelated:
             return [_unrelated(checked, min(own.left, best.left))]
-        return _units(checked, own) if own.left < 0.5 else []
-    alike = [e for e in found if e.left < ALIKE * best.left + ALIKE_LEFT]
+        return _units(checked, own) if own.left < CHECKS.explained else []
+    alike = [e for e in found if e.left < CHECKS.alike * best.left + CHECKS.alike_left]
     alike.sort(key=lambda e: (e.alternative.steps, e.left))
-    simplest = [e for e in alike if e.alternative.steps < alike[0].alternative.steps + 0.6][:3]
+    most = alike[0].alternative.steps + CHECKS.steps
+    simplest = [e for e in alike if e.alternative.steps < most][:3]
     words = [described(e.alternative, track.command_kind, e.turned_rad) for e in simplest]
     of_columns = not all(e.alternative.of_poses for e in simplest)
     return [
@@ -174,7 +165,7 @@ def _in_room(
     if checked.track.command_kind != "twist" or not checked.track.has_heading:
         return None
     room = Search(search.motion.told_in_room(), search.wheels).own()
-    if room.left > ALIKE * best.left + ALIKE_LEFT or not far_better(room, own):
+    if room.left > CHECKS.alike * best.left + CHECKS.alike_left or not far_better(room, own):
         return None
     return checked.finding(
         "the velocities are along the room's axes, not the body's",
@@ -196,10 +187,10 @@ def _shifted(
         best: the best mistake of signs, columns and axes.
     """
     at_end = own.late_s in (search.lates_s[0], search.lates_s[-1])
-    if own.left < POOR and not at_end:
+    if own.left < CHECKS.poor and not at_end:
         return None
     far = Search(search.motion, search.wheels, search.felt, FAR_S).own()
-    if far.left > ALIKE * best.left + ALIKE_LEFT or not far_better(far, own):
+    if far.left > CHECKS.alike * best.left + CHECKS.alike_left or not far_better(far, own):
         return None
     late = "late" if far.late_s > 0 else "early"
     return checked.finding(
@@ -221,10 +212,10 @@ def _jumped(
     if checked.track.command_kind == "wheel_speed":
         return None
     far = Search(search.motion, search.wheels, search.felt, FAR_S)
-    jump = far.jump(own, FEWEST_BLOCKS // 2)
+    jump = far.jump(own, CHECKS.fewest_blocks // 2)
     by_s = jump.after_s - jump.before_s
     better = far_better(jump.explained, own) and jump.explained.left < best.left
-    if abs(by_s) < LEAST_JUMP_S or not better:
+    if abs(by_s) < CHECKS.least_jump_s or not better:
         return None
     return checked.finding(
         "a clock was set within the log",
@@ -241,17 +232,17 @@ def far_better(best: Explained, own: Explained) -> bool:
     Where it leaves next to nothing, its gain by stretch differs only as the motion does: a robot
     that turns in a few stretches gains there alone by a sign of the turn.
     """
-    if best.left > FAR_BETTER * own.left or own.left - best.left < GOOD:
+    if best.left > CHECKS.far_better * own.left or own.left - best.left < CHECKS.good:
         return False
     gained = own.by_block - best.by_block
-    clear = best.left < min(GOOD, CLEAR * own.left)
-    sure = CLEAR_SURE if clear else SURE
+    clear = best.left < min(CHECKS.good, CHECKS.clear * own.left)
+    sure = CHECKS.clear_sure if clear else CHECKS.sure
     return gained.sum() > sure * gained.std() * np.sqrt(len(gained))
 
 
 def _is_bias(e: Explained) -> bool:
     """A heading that is off by no more than an effect of physics makes it."""
-    return e.alternative.is_turn and abs(e.turned_rad) < TURNED_RAD
+    return e.alternative.is_turn and abs(e.turned_rad) < CHECKS.turned_rad
 
 
 def _unrelated(checked: CheckedTrack, left: float) -> InputFinding:
@@ -291,7 +282,7 @@ def _no_heading(checked: CheckedTrack, share: float) -> InputFinding:
 
 def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
     """Speeds that are off by what a unit makes, where the commands explain the motion well."""
-    if e.left > 0.5:
+    if e.left > CHECKS.explained:
         return []
     speed = float(e.gain[:2].max())
     turn = float(e.gain[2]) if checked.track.has_heading else 0.0
@@ -322,8 +313,6 @@ def _pace(ratio: float) -> str:
 
 
 RATES_PPM = (-3000, -2000, -1000, -500, 0, 500, 1000, 2000, 3000)
-LEAST_PPM = 870.0  # less is for fits of the clock, and slow changes of a robot imitate it
-DRIFT_SURE = 7.0
 
 
 def check_drift(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
@@ -334,7 +323,7 @@ def check_drift(checked: CheckedTrack, search: Search, own: Explained) -> list[I
     if checked.track.command_kind == "wheel_speed":
         return []
     span_s = float(np.ptp(search.motion.t_s))
-    if own.left > 0.3 or span_s < 30:
+    if own.left > CHECKS.drift_left or span_s < CHECKS.drift_span_s:
         return []
     by_block = np.array([search.at_rate(own, 1e-6 * rate).by_block for rate in RATES_PPM])
     left = by_block.sum(axis=1)
@@ -343,7 +332,7 @@ def check_drift(checked: CheckedTrack, search: Search, own: Explained) -> list[I
     rate = _vertex(RATES_PPM[near], left[near])
     without = [_vertex(RATES_PPM[near], left[near] - block[near]) for block in by_block.T]
     std = float(np.sqrt((len(without) - 1) * np.var(without)))  # jackknife, Efron and Stein 1981
-    if not (np.isfinite(std) and abs(rate) > max(LEAST_PPM, DRIFT_SURE * std)):
+    if not (np.isfinite(std) and abs(rate) > max(CHECKS.least_ppm, CHECKS.drift_sure * std)):
         return []
     return [
         checked.finding(
@@ -370,7 +359,7 @@ def check_exchange(
     Only shifts in time near those at which a robot's own commands fit best are tried.
     """
     n = len(judged)
-    if n < 2 or all(own.left < 0.03 for _, _, own in judged):
+    if n < 2 or all(own.left < CHECKS.good for _, _, own in judged):
         return [], set()
     lates_s = sorted({round(own.late_s, 3) for _, _, own in judged} | {0.0, 0.06, 0.12})
     table = [[_explained(j, i, lates_s) for j in judged] for i in judged]

@@ -4,20 +4,12 @@
 import numpy as np
 
 from twinmill.data.checks.finding import InputFinding
+from twinmill.data.checks.settings import CHECKS
 from twinmill.data.log import RobotLog
 from twinmill.data.track import Track, command_at
 
-FASTEST_MPS = 25.0  # half a second of it at least: no robot in a laboratory
-MM_MPS = 100.0  # faster still, even centimetres would make it 1 m/s
-FLAT_M = 0.05  # what a height varies by on a floor
-NOISE_RAD, NONSENSE_RAD = np.radians(3), np.radians(20)
-LOST_SHARE = 0.2
-SLOW_S = 0.15
-SHORT_S = 13.0
-STILL_RAD = 1e-6
 # Commands from here on move any robot on a floor, and for how long they must: in all, and of it.
 STRONG = {"duty": (0.3,) * 4, "wheel_speed": (2.0,) * 4, "twist": (0.05, 0.05, 0.3, np.inf)}
-DRIVEN_S, DRIVEN_SHARE = 3.0, 0.05
 # Nothing moves within this much, nor within five times the noise where that is as little as this.
 STANDS, STANDS_NOISY = np.array([0.005, 0.005, 0.035]), np.array([0.05, 0.05, 0.2])
 
@@ -25,7 +17,7 @@ STANDS, STANDS_NOISY = np.array([0.005, 0.005, 0.035]), np.array([0.05, 0.05, 0.
 def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
     """Findings of a robot's poses as they were recorded."""
     t_s, pose, z_m = (a[robot.valid] for a in (robot.pose_t_s, robot.pose, robot.z_m))
-    if len(t_s) < 20:
+    if len(t_s) < CHECKS.fewest_poses:
         return []
 
     def finding(what: str, evidence: str, remedy: str) -> InputFinding:
@@ -42,7 +34,9 @@ def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
     span_m = np.ptp(np.column_stack([pose[:, :2], z_m]), axis=0)
     x_m, y_m, height_m = (float(v) for v in span_m)
     fast_mps = _usual_top_speed(t_s, pose)
-    if min(x_m, y_m) < FLAT_M < 0.2 * max(x_m, y_m) and height_m > max(0.3, 5 * min(x_m, y_m)):
+    flat_m, wide_m = sorted((x_m, y_m))
+    is_flat = flat_m < CHECKS.flat_m < CHECKS.lies_share * wide_m
+    if is_flat and height_m > max(CHECKS.up_m, 5 * flat_m):
         axis = "y" if y_m < x_m else "x"
         return [
             finding(
@@ -52,8 +46,8 @@ def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
                 f"as in --rename z_m={axis}_m --rename {axis}_m=z_m",
             )
         ]
-    if fast_mps > FASTEST_MPS:
-        unit = "mm" if fast_mps > MM_MPS else "mm or cm"
+    if fast_mps > CHECKS.fastest_mps:
+        unit = "mm" if fast_mps > CHECKS.mm_mps else "mm or cm"
         return [
             finding(
                 f"the positions are in {unit}, not in m",
@@ -81,28 +75,28 @@ def check_track(track: Track, label: str) -> list[InputFinding]:
         found.append(InputFinding(what, evidence, remedy, fatal, label, track.robot_id))
 
     timing = track.timing
-    if timing.pose_lost_share > LOST_SHARE:
+    if timing.pose_lost_share > CHECKS.lost:
         add(
             "many poses are lost",
             f"{timing.pose_lost_share:.0%} of the frames while the robot is tracked",
             "look for hidden markers or a full network, since fewer poses show quick changes worse",
         )
     closed_loop = abs(timing.command_period_s / timing.pose_period_s - 1) < 0.2
-    if timing.pose_period_s > SLOW_S and not closed_loop:
+    if timing.pose_period_s > CHECKS.slow_s and not closed_loop:
         add(
             "the poses come slowly",
             f"{1 / timing.pose_period_s:.1f} in a second",
             "record at 10 Hz or more, since lags, delays and starts cannot be judged from so few",
         )
     noise_rad = _heading_noise_rad(track) if track.has_heading else 0.0
-    if noise_rad > NONSENSE_RAD:
+    if noise_rad > CHECKS.nonsense_rad:
         add(
             "the headings make no sense",
             f"they jump by {np.degrees(noise_rad):.0f} degrees from pose to pose",
             "check the column and its unit: degrees belong into theta_deg",
             fatal=True,
         )
-    elif noise_rad > NOISE_RAD:
+    elif noise_rad > CHECKS.noisy_rad:
         add(
             "the headings are noisy",
             f"{np.degrees(noise_rad):.1f} degrees, which makes "
@@ -129,7 +123,7 @@ def check_length(tracks: list[tuple[str, Track]]) -> list[InputFinding]:
             robot_id,
         )
         for robot_id, seconds in total_s.items()
-        if seconds < SHORT_S
+        if seconds < CHECKS.short_s
     ]
 
 
@@ -158,7 +152,7 @@ def _stands(robot: RobotLog, t_s: np.ndarray, pose: np.ndarray) -> str:
     command = command_at(t_s, robot.command_t_s, robot.command)
     share = float((np.abs(command) > STRONG[robot.command_kind]).any(axis=1).mean())
     driven_s = share * float(np.ptp(t_s))
-    if driven_s < DRIVEN_S or share < DRIVEN_SHARE:
+    if driven_s < CHECKS.driven_s or share < CHECKS.driven:
         return ""
     return f"they stay within {1000 * span[:2].max():.1f} mm in {driven_s:.0f} s of strong commands"
 
@@ -171,15 +165,15 @@ def _noise(bends: np.ndarray) -> np.ndarray:
 def _heading_is_constant(robot: RobotLog, pose: np.ndarray) -> bool:
     """The heading never changes, though positions have noise: so it is no measurement."""
     bend = np.median(np.abs(np.diff(pose[:, :2], n=2, axis=0)))
-    return bool(np.ptp(pose[:, 2]) < STILL_RAD and bend > STILL_RAD)
+    return bool(np.ptp(pose[:, 2]) < CHECKS.still_rad and bend > CHECKS.still_rad)
 
 
 def _heading_noise_rad(track: Track) -> float:
     """Standard deviation from second differences; zero where motion alone would make them."""
-    if track.timing.pose_period_s > SLOW_S:
+    if track.timing.pose_period_s > CHECKS.slow_s:
         return 0.0
     index = np.flatnonzero(track.segment >= 0)
-    if len(index) < 20:
+    if len(index) < CHECKS.fewest_poses:
         return 0.0
     bend = np.diff(track.pose[index, 2], n=2)
     same = np.diff(track.segment[index])

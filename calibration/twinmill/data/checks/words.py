@@ -4,6 +4,7 @@
 import numpy as np
 
 from twinmill.data.checks.alternatives import Alternative
+from twinmill.data.checks.settings import CHECKS
 from twinmill.data.log import CommandKind
 
 COLUMNS: dict[CommandKind, tuple[str, ...]] = {
@@ -20,7 +21,6 @@ FLIPS = {
     (-1, 1, -1, 1): "the left wheels have the wrong sign",
     (1, -1, 1, -1): "the right wheels have the wrong sign",
 }
-RIGHT_ANGLE_DEG = 25.0  # an axis that is nearer than this to another is that axis
 
 
 def described(a: Alternative, kind: CommandKind, turned_rad: float) -> tuple[str, str]:
@@ -63,7 +63,7 @@ def _of_poses(a: Alternative, turned_deg: float) -> tuple[str, str]:
         return _mirrored_positions(turned_deg if a.turned else 0.0, turned, turn)
     else:
         return turned, turn
-    if a.turned and abs(turned_deg) > RIGHT_ANGLE_DEG:
+    if a.turned and abs(turned_deg) > CHECKS.right_angle_deg:
         return f"{what}, and {turned}", f"{options} {turn}"
     return what, options
 
@@ -80,6 +80,6 @@ def _mirrored_positions(turned_deg: float, turned: str, turn: str) -> tuple[str,
         ),
     }
     for angle_deg, words in axes.items():
-        if abs((turned_deg - angle_deg + 180) % 360 - 180) < RIGHT_ANGLE_DEG:
+        if abs((turned_deg - angle_deg + 180) % 360 - 180) < CHECKS.right_angle_deg:
             return words
     return f"the positions are mirrored, and {turned}", f"--flip y_m {turn}"

@@ -128,6 +128,8 @@ def import_log(
             "a log needs one source of poses and one of commands: give --poses, --motive or "
             "--vicon, and --commands or --io-tsv."
         )
+    if options.up not in ("y", "z", None):
+        raise LogError(f"--up {options.up}: must be y or z.")
     if options.robot_id is not None and (not 0 <= options.robot_id <= 99 or len(io_tsv) > 1):
         raise LogError(
             f"--robot-id {options.robot_id}: must be in 0..99 and fits one robot; "

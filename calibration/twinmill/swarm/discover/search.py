@@ -22,6 +22,7 @@ from ribs.schedulers import Scheduler
 
 from twinmill.defaults import BATCH, PER_GENERATION
 from twinmill.model.model_file import write_whole
+from twinmill.programs import available_cores
 from twinmill.swarm.discover.genes import GENES, Mix, decode
 from twinmill.swarm.discover.kinds import COLUMNS, MEASURES, measures
 from twinmill.swarm.request import Request
@@ -55,7 +56,7 @@ class Hunt:
 
     def run(self, mixes: list[Mix], seeds: range, plant: str = "planar") -> np.ndarray:
         """(mixes, seeds, COLUMNS) metrics of the last 10 s."""
-        count = len(os.sched_getaffinity(0))
+        count = available_cores()
         chunks = [mixes[k::count] for k in range(min(count, len(mixes)))]
         rows = np.empty((len(mixes), len(seeds), len(COLUMNS)))
         with ThreadPoolExecutor(count) as pool:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Probabilities of the classes in each cell of a sweep, by models drawn from the uncertainty."""
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -13,6 +12,7 @@ import pyarrow as pa
 
 from twinmill.model.model_file import ModelFile
 from twinmill.model.ranges import quantities, ranges
+from twinmill.programs import available_cores
 from twinmill.swarm.classes import COLORS
 from twinmill.swarm.model_text import with_values
 from twinmill.swarm.request import Request
@@ -103,7 +103,7 @@ def forecast(
 
     # A model's runs are one part or a few: models, not parts, go side by side.
     lock, texts = Lock(), drawn_models(request, count, seed)
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(available_cores()) as pool:
         counts = list(pool.map(counts_of, range(count), texts))
     return Forecast(points, swept, _shrunk(np.array(counts)))
 

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers that decide the checks of the input, in one record: reports and JSON output print it.
+
+Grids that are searched, and the units that a ratio may stand for, stay where they are used.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinmill.settings import Numbers, number
+
+
+@dataclass(frozen=True)
+class CheckSettings(Numbers):
+    """Numbers of the checks; `left` is the share of the squared motion that stays unexplained."""
+
+    # Signs, columns, axes and clocks: commands against poses.
+    good: float = number(0.03, "left at which no mistake is looked for")
+    far_better: float = number(0.5, "times what is left: a mistake explains so much more ...")
+    sure: float = number(4.0, "... and surely: standard errors over stretches of the log ...")
+    clear: float = number(0.1, "... or where it leaves so many times less, and little at all, ...")
+    clear_sure: float = number(2.0, "... so many standard errors")
+    alike: float = number(1.3, "times what the best mistake leaves: another is as good ...")
+    alike_left: float = number(0.003, "... and so much beside it")
+    steps: float = number(0.6, "simple mistakes more: an alternative is no less simple")
+    explained: float = number(0.5, "left beyond which nothing is said of units")
+    unrelated: float = number(0.85, "left at which commands and poses belong to other runs")
+    poor: float = number(0.25, "left from which clocks far apart are looked for")
+    turned_rad: float = number(0.35, "heading offset that is no effect of physics")
+    right_angle_deg: float = number(25.0, "an axis that is nearer than this to another is that one")
+    least_mps: float = number(0.01, "RMS speed below which nothing is said ...")
+    least_radps: float = number(0.2, "... if the robot turns no faster than this")
+    turns: float = number(0.05, "share of the time with turns, from which a heading is needed")
+    fewest_poses: int = number(20, "poses below which nothing is said")
+    fewest_blocks: int = number(8, "stretches of 3 s below which nothing is said")
+    least_jump_s: float = number(0.15, "step of a clock: less may be two delays")
+    drift_left: float = number(0.3, "left up to which a drift of clocks is looked for ...")
+    drift_span_s: float = number(30.0, "... in logs of this length at least")
+    least_ppm: float = number(870.0, "drift of clocks: less is for fits, robots imitate it ...")
+    drift_sure: float = number(7.0, "... and so many standard errors")
+
+    # Poses alone: axes, units, headings that are none, how much there is.
+    fastest_mps: float = number(25.0, "usual top speed over half a second: units are wrong ...")
+    mm_mps: float = number(100.0, "... and from here they are mm: cm would make it 1 m/s")
+    flat_m: float = number(0.05, "range of a height over a floor")
+    lies_share: float = number(0.2, "of the longer side: a flat coordinate is smaller")
+    up_m: float = number(0.3, "range of z from which another axis is up")
+    noisy_rad: float = number(float(np.radians(3)), "noise of headings that is worth a sentence")
+    nonsense_rad: float = number(float(np.radians(20)), "noise of headings that are none")
+    lost: float = number(0.2, "share of lost frames that is worth a sentence")
+    slow_s: float = number(0.15, "time between poses that is worth a sentence")
+    short_s: float = number(13.0, "usable poses, below which a log is short")
+    still_rad: float = number(1e-6, "range of a heading that was not measured")
+    driven_s: float = number(3.0, "strong commands that must move the robot, in all ...")
+    driven: float = number(0.05, "... and as a share of the time")
+
+
+CHECKS = CheckSettings()

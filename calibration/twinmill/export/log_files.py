@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A log for other programs: MCAP for Foxglove, a ROS bag, or one table per message type."""
+
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import pyarrow as pa
+import twinmill_native as native
+
+from twinmill.defaults import LogFormat
+from twinmill.export.mcap_file import write_mcap
+from twinmill.export.recording import Recording, read_recording
+from twinmill.export.rosbag2_file import left_out, write_rosbag2
+from twinmill.export.tables import tables_of, write_csv, write_parquet
+from twinmill.files import check_new_folder, replacing, replacing_folder
+from twinmill.model.outlines import Body
+
+
+@dataclass(frozen=True)
+class ExportedLog:
+    """What was written of a log.
+
+    Attributes:
+        out: the file or the folder.
+        files: all that were written.
+        channels: messages by channel.
+        warnings: sentences on what is odd in the log, or was left out.
+        provenance: command, version, log_sha256 and t0_utime_us, as the files carry them.
+    """
+
+    out: Path
+    files: list[Path]
+    channels: dict[str, int]
+    warnings: list[str]
+    provenance: dict
+
+    def to_json(self) -> dict:
+        """The interface's object."""
+        return {
+            "out": str(self.out),
+            "files": [str(file) for file in self.files],
+            "messages": sum(self.channels.values()),
+            "channels": self.channels,
+            "warnings": self.warnings,
+            **self.provenance,
+        }
+
+
+def default_name(log: Path, to: LogFormat) -> Path:
+    """Where a log is written to if nothing is said: its name, in this folder."""
+    return Path(f"{log.stem}.mcap" if to is LogFormat.MCAP else f"{log.stem}_{to}")
+
+
+def export_log(
+    log: Path, to: LogFormat, out: Path, *, model: native.Model, command: str, force: bool
+) -> ExportedLog:
+    """Writes a log for other programs, whole or not at all.
+
+    Args:
+        log: the file; one that breaks off is read up to there.
+        to: what is written.
+        out: a new file (mcap) or folder (the others).
+        model: says how large the robots are and how far they see.
+        command: recorded in the files.
+        force: replace what is there.
+
+    Raises:
+        LogError: the log cannot be read.
+        ValueError: `out` is there, or cannot be written.
+    """
+    recording = read_recording(log)
+    provenance = {
+        "command": command,
+        "version": f"twinmill {version('twinmill')}",
+        "log_sha256": recording.sha256,
+        "t0_utime_us": recording.t0_utime_us,
+    }
+    files, warnings = [out], list(recording.warnings)
+    if to is LogFormat.MCAP:
+        with replacing(out, force) as temporary:
+            write_mcap(recording, temporary, provenance, Body.of(model))
+    elif to is LogFormat.ROSBAG2:
+        with replacing_folder(out, force) as temporary:
+            write_rosbag2(recording, temporary)
+        if strange := left_out(recording):
+            warnings.append(f"ROS has no messages for {', '.join(strange)}: left out.")
+    else:
+        files = _write_tables(recording, provenance, out, to, force=force)
+    counts = {channel.name: len(channel.messages) for channel in recording.channels}
+    return ExportedLog(out, files, counts, warnings, provenance)
+
+
+def _write_tables(
+    recording: Recording, provenance: dict, folder: Path, to: LogFormat, *, force: bool
+) -> list[Path]:
+    """One file per table: all are there in the end, or none is new."""
+    tables = tables_of(recording, provenance)
+    write: Callable[[pa.Table, Path], None] = write_csv if to is LogFormat.CSV else write_parquet
+    check_new_folder(folder)
+    if folder.exists() and not force:
+        raise ValueError(f"{folder}: exists; choose another name, or replace it with --force.")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    files = [folder / f"{name}.{to}" for name in tables]
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as temporary:
+        for table, file in zip(tables.values(), files, strict=True):
+            write(table, Path(temporary) / file.name)
+        folder.mkdir(exist_ok=True)
+        for file in files:
+            os.replace(Path(temporary) / file.name, file)
+    return files

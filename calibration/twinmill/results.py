@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Results that stand for themselves: a comparison, a designed run, a swarm's test, a card."""
+
+from io import StringIO
+from pathlib import Path
+
+import pandas as pd
+from matplotlib.figure import Figure
+from rich.console import RenderableType
+
+from twinmill import report
+from twinmill.arguments import checked
+from twinmill.experiment.design import Plan
+from twinmill.experiment.played import csv_text
+from twinmill.files import plain
+from twinmill.fitting import compare as _compare
+from twinmill.report import (
+    comparisons,
+    error_figures,
+    next_run_figures,
+    show,
+    steady,
+    swarm_comparison,
+)
+from twinmill.report import next_run as next_run_report
+from twinmill.shown import Reported, Shown, replacing_in_python
+from twinmill.swarm import compare as _compare_swarm
+
+NOT_SAVED = next_run_report.How("Not written yet: `run.save(path)` of this result does that.", [])
+
+
+class Comparison(Reported):
+    """How well a model predicts a log, against the log's own noise.
+
+    Attributes:
+        score: root mean square of prediction errors over what noise alone would cause: 1.0 is as
+            good as the log can tell; above 1.3 something is missing.
+        verdict: what that means, in a sentence.
+
+    Examples:
+        >>> found = tm.compare("run.lcmlog", "turbopi.toml")
+        >>> found.score > 1.3
+        True
+    """
+
+    def __init__(self, result: _compare.Comparison):
+        self._result = result
+        self.score, self.verdict = result.score, result.verdict
+
+    def table(self) -> pd.DataFrame:
+        """Errors of each robot in each log.
+
+        Returns:
+            log, robot_id, channel, unit, horizon_s, rms, floor (both in the unit), ratio.
+
+        Examples:
+            >>> found.table()["horizon_s"].unique().tolist()
+            [0.1, 0.2, 0.5, 1.0, 2.0]
+        """
+        robots = [robot.to_json() for robot in self._result.robots]
+        return pd.DataFrame(
+            {"log": robot["log"], "robot_id": robot["robot_id"], **row}
+            for robot in robots
+            for row in robot["errors"]
+        )
+
+    def plot(self) -> Figure:
+        """Errors over the time predicted ahead, with the noise floor; of a table, its values.
+
+        Of several robots it is the one that the model misses most.
+
+        Returns:
+            A figure of matplotlib: m for forward and left, degrees for heading, over s.
+
+        Examples:
+            >>> len(found.plot().axes)  # forward, left, heading
+            3
+        """
+        return errors_drawn([("this model", self._result)])
+
+    def _page(self) -> tuple[report.Section, str]:
+        return report.comparison_section(self._result), "twinmill.compare"
+
+    def _text(self) -> RenderableType:
+        return show.comparison(self._result)
+
+    def __repr__(self) -> str:
+        logs = ", ".join(dict.fromkeys(r.measurement.log_name for r in self._result.robots))
+        return f"Comparison({self._result.model_name}, {logs}: score {self.score:.3g})"
+
+
+class NextRun(Reported):
+    """A script for the robot that tells apart what the logs so far cannot.
+
+    Attributes:
+        why: what the logs leave open.
+        separates: effects that the run would more probably name than not.
+        predicted_power: chance of the right name if each effect in question is as probable.
+        duration_s: of the script.
+
+    Examples:
+        >>> run = tm.next_run("run.lcmlog", "fitted.toml")
+        >>> 0 <= run.predicted_power <= 1
+        True
+    """
+
+    def __init__(self, plan: Plan):
+        self._result = plan
+        self.why, self.separates = plan.why, plan.separates
+        self.predicted_power, self.duration_s = plan.predicted_power, plan.rows.end_s
+
+    def table(self) -> pd.DataFrame:
+        """The script; each row is held until the next, and the last one stops.
+
+        Returns:
+            t_s, and duties in percent (fl_pct, fr_pct, rl_pct, rr_pct) or velocities (vx_mps,
+            vy_mps, omega_radps).
+
+        Examples:
+            >>> float(run.table()["t_s"].iloc[0])
+            0.0
+        """
+        return pd.read_csv(StringIO(csv_text(self._result.rows)))
+
+    def effects(self) -> pd.DataFrame:
+        """What the run would do for each effect in question, surest first.
+
+        Returns:
+            effect, rival (that could imitate it best; None: the base), margin_before and margin
+            (chi2 that no rival can imitate), power_before and power (chance that it is named if it
+            is the one).
+
+        Examples:
+            >>> list(run.effects().columns)[:2]
+            ['effect', 'rival']
+        """
+        return pd.DataFrame(self._result.to_json()["effects"])
+
+    def plot(self) -> Figure:
+        """The predicted path, with and without each effect in question.
+
+        Returns:
+            A figure of matplotlib, axes in m from the middle of the floor.
+
+        Examples:
+            >>> run.plot().axes[0].get_xlabel()
+            'x (m)'
+        """
+        return next_run_figures.floor(self._result).svg.picture
+
+    def save(self, path: str | Path, force: bool = False) -> None:
+        """Writes the script as robots, `simulate` and `twin_run` read it.
+
+        Args:
+            path: new file (.csv).
+            force: replace it if it is there.
+
+        Raises:
+            ValueError: it is there, or cannot be written.
+
+        Examples:
+            >>> from tempfile import mkdtemp
+            >>> run.save(Path(mkdtemp()) / "next.csv")
+        """
+        with replacing_in_python(path, force) as temporary:
+            temporary.write_text(csv_text(self._result.rows))
+
+    def _page(self) -> tuple[report.Section, str]:
+        return next_run_report.section(self._result, NOT_SAVED), "twinmill.next_run"
+
+    def _text(self) -> RenderableType:
+        return next_run_report.terminal(self._result, NOT_SAVED)
+
+    def __repr__(self) -> str:
+        told = ", ".join(self.separates) or "nothing for sure"
+        return f"NextRun({self.duration_s:.0f} s, tells apart {told})"
+
+
+class SwarmComparison(Reported):
+    """A recorded swarm among the twin's swarms.
+
+    Attributes:
+        differs: whether it is not one of them; one true model in twenty is called different.
+        verdict: the same for people.
+        p_energy, p_band: chance of so odd a run as a whole, and at its worst moment.
+
+    Examples:
+        >>> swarm = tm.simulate(n=3, duration_s=20)
+        >>> 0 < swarm.compare_swarm(n_seeds=39).p_energy <= 1
+        True
+    """
+
+    def __init__(self, result: _compare_swarm.SwarmComparison):
+        self._result = result
+        self.differs, self.verdict = result.test.differs, result.verdict
+        self.p_energy, self.p_band = result.test.p_value, result.test.p_band
+
+    def table(self) -> pd.DataFrame:
+        """Metrics over time, in means over 2 s.
+
+        Returns:
+            metric, t_s (since the swarm began to move), recorded, and low, middle, high of the
+            twin's runs.
+
+        Examples:
+            >>> swarm = tm.simulate(n=3, duration_s=20)
+            >>> list(swarm.compare_swarm(n_seeds=39).table().columns)
+            ['metric', 't_s', 'recorded', 'low', 'middle', 'high']
+        """
+        told = self._result.to_json()
+        parts = [
+            pd.DataFrame({"metric": name, "t_s": told["t_s"], **series})
+            for name, series in told["series"].items()
+        ]
+        return pd.concat(parts, ignore_index=True).rename(columns={"floor": "recorded"})
+
+    def plot(self) -> Figure:
+        """Metrics over time: the recorded run, the twin's runs and their band.
+
+        Returns:
+            A figure of matplotlib, one panel a metric, over s.
+
+        Examples:
+            >>> swarm = tm.simulate(n=3, duration_s=20)
+            >>> len(swarm.compare_swarm(n_seeds=39).plot().axes)
+            6
+        """
+        return swarm_comparison.bands(self._result).svg.picture
+
+    def _page(self) -> tuple[report.Section, str]:
+        return swarm_comparison.section(self._result), "twinmill.Log.compare_swarm"
+
+    def _text(self) -> RenderableType:
+        return self.verdict
+
+    def __repr__(self) -> str:
+        return f"SwarmComparison({self.verdict})"
+
+
+class Effect(Shown):
+    """A card of the catalogue: one physical effect that a model can have.
+
+    Attributes:
+        name, summary, equation, stage: what it is, and where it acts.
+
+    Examples:
+        >>> tm.effect("coasting").stage
+        'wheel'
+    """
+
+    def __init__(self, entry: dict):
+        self._entry = checked("entry", entry, dict, "a card; `effect` takes its name")
+        self.name, self.summary = entry["name"], entry["summary"]
+        self.equation, self.stage = entry["equation"], entry["stage"]
+
+    def to_json(self) -> dict:
+        """All of the card, as `twinmill effects NAME --json`.
+
+        Returns:
+            name, summary, equation, stage, reference, parameters and more.
+
+        Examples:
+            >>> tm.effect("coasting").to_json()["parameters"][0]["unit"]
+            'm/s^2'
+        """
+        return plain(self._entry)
+
+    def table(self) -> pd.DataFrame:
+        """Its parameters.
+
+        Returns:
+            name, unit, default, neutral (nothing happens), min, max, doc and more.
+
+        Examples:
+            >>> tm.effect("coasting").table()["name"].tolist()
+            ['deceleration_mps2', 'viscous_per_s']
+        """
+        return pd.DataFrame(self._entry["parameters"])
+
+    def _text(self) -> RenderableType:
+        return show.effect(self._entry)
+
+    def __repr__(self) -> str:
+        return f"Effect({self.name}: {self.summary})"
+
+
+def errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
+    """Errors over the time predicted ahead, or a table's values; of the robot missed most.
+
+    Args:
+        results: by the name that each has in the figure; of the last, the robot is taken.
+    """
+    last = results[-1][1]
+    if last.worst in (tables := comparisons.steady_comparisons(last)):
+        return steady.values(tables).svg.picture
+    robot = last.robots.index(last.worst)
+    same = [(label, result.robots[robot]) for label, result in results]
+    return error_figures.error_growth(same).svg.picture

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What all objects of the library share: how they are shown, and what they are made with."""
+
+import html
+import shutil
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from importlib.metadata import version
+from io import StringIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Self
+
+import pandas as pd
+from rich.console import Console, RenderableType
+
+from twinmill import report
+from twinmill.arguments import checked, in_python
+from twinmill.files import check_new_folder, plain, replacing
+
+WIDEST_COLUMNS = 100  # of a printed result; text in longer lines is hard to read
+A_PATH = "the path of a file"
+
+
+class Shown:
+    """What all results share: one line, a table for notebooks, text for terminals, JSON.
+
+    Attributes:
+        left_out: sentences on robots and logs that could not be judged, and on what else is odd.
+    """
+
+    _result: Any
+    left_out: tuple[str, ...] = ()
+
+    def to_json(self) -> dict:
+        """The same object as `--json` of the command, without how the command was called.
+
+        Returns:
+            As the page Files tells; an absent number is None, so that JSON can hold all of it.
+
+        Examples:
+            >>> found.to_json()["score"] == found.score
+            True
+        """
+        return plain(self._result.to_json())
+
+    def table(self) -> pd.DataFrame:
+        """The numbers; each class says which."""
+        raise NotImplementedError
+
+    def _text(self) -> RenderableType:
+        return repr(self)
+
+    def __str__(self) -> str:
+        out = StringIO()
+        lines = [f"! {said}" for said in self.left_out]
+        width = min(shutil.get_terminal_size().columns, WIDEST_COLUMNS)
+        Console(file=out, width=width, color_system=None).print(
+            *lines, self._text(), sep="\n", markup=False, highlight=False
+        )
+        return "\n".join(map(str.rstrip, out.getvalue().splitlines())).rstrip()
+
+    def __copy__(self) -> Self:
+        return self  # it never changes
+
+    def __deepcopy__(self, _: dict) -> Self:
+        return self
+
+    def __reduce__(self) -> str:
+        raise TypeError(
+            f"{type(self).__name__}: cannot be pickled; give paths to other processes, and return "
+            "what to_json() or table() gives."
+        )
+
+    def _repr_html_(self) -> str:
+        return f"<p><b>{html.escape(repr(self))}</b></p>{self.table()._repr_html_()}"
+
+
+class Reported(Shown):
+    """A result with a page of its own."""
+
+    def _page(self) -> tuple[report.Section, str]:
+        """What is on the page, and the call that made it."""
+        raise NotImplementedError
+
+    def report(self, folder: str | Path) -> Path:
+        """Writes a page with all tables and figures, as `--out` does.
+
+        Args:
+            folder: made if it is not there; an older page in it is replaced.
+
+        Returns:
+            Path of the page, folder/index.html.
+
+        Raises:
+            ValueError: the folder cannot be written.
+
+        Examples:
+            >>> from tempfile import mkdtemp
+            >>> found.report(mkdtemp()).name
+            'index.html'
+        """
+        place = path_of("folder", folder, "the path of a folder")
+        check_new_folder(place)
+        section, call = self._page()
+        source = report.Provenance(call, f"twinmill {version('twinmill')}", "")
+        return report.write_report(place, section.title, source, [section])
+
+
+def path_of(name: str, path: Any, wanted: str) -> Path:
+    """A path that is none by accident: an empty text would be the working directory."""
+    if not str(checked(name, path, (str, Path), wanted)):
+        raise ValueError(f"{name}: is empty, and must be {wanted}.")
+    return Path(path)
+
+
+@contextmanager
+def replacing_in_python(path: str | Path, force: bool) -> Iterator[Path]:
+    """As `replacing`, in the words of the library."""
+    with said_in_python(), replacing(path_of("path", path, A_PATH), force) as temporary:
+        yield temporary
+
+
+@contextmanager
+def said_in_python() -> Iterator[None]:
+    """Errors of the library in the words of Python: options of commands as arguments."""
+    try:
+        yield
+    except ValueError as error:
+        raise type(error)(in_python(str(error))) from error
+
+
+def own_folder(stack: ExitStack) -> Path:
+    """A folder that goes with the object that it is made for."""
+    folder = TemporaryDirectory(prefix="twinmill.", ignore_cleanup_errors=True)
+    return Path(stack.enter_context(folder))
