@@ -48,6 +48,7 @@ class Columns:
         rename, mapping, flips: as there.
         robot_id: of all rows, for files without that column, or with one name in it.
         robots: robot_id by what stands in that column.
+        lacks_robot: what to do about a file without robots, beside adding that column.
     """
 
     rename: dict[str, str] = field(default_factory=dict)
@@ -55,6 +56,7 @@ class Columns:
     flips: frozenset[str] = frozenset()
     robot_id: int | None = None
     robots: dict[str, int] = field(default_factory=dict)
+    lacks_robot: str = "give --robot-id for a file of one robot"
 
     def read(self, path: Path, known: frozenset[str]) -> Table:
         """The table under our names."""
@@ -286,8 +288,7 @@ def _robot_ids(table: Table, columns: Columns) -> tuple[np.ndarray, list[str]]:
     if not table.has("robot_id"):
         if columns.robot_id is None:
             raise LogError(
-                f"{table.name}: column robot_id is missing; add it, or give --robot-id for "
-                "a file of one robot."
+                f"{table.name}: column robot_id is missing; add it, or {columns.lacks_robot}."
             )
         return np.full(len(table.rows), columns.robot_id), []
     cells = table.cells("robot_id")
