@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables of other people: what is not sure is refused or said, what is obvious is read."""
 
+import csv
 import math
 
 import numpy as np
@@ -157,6 +158,27 @@ def test_other_delimiters_and_decimal_commas_are_found_and_said(imported, how, w
     assert [w for w in warnings if words in w] == [
         f"{n}.csv: cells are separated {words}" for n in "pc"
     ]
+
+
+def test_quoted_decimal_commas_between_commas_are_found_and_said(imported):
+    """As spreadsheets on the web write a table where commas are decimal points."""
+    robots, warnings = imported(decimal=",", quoting=csv.QUOTE_NONNUMERIC)
+    _same_poses(robots[4])
+    assert "p.csv: cells are separated by commas, and numbers have decimal commas." in warnings
+
+
+def test_commas_of_thousands_are_no_decimal_points(imported):
+    """1,000 and 1,250 millimetres may be metres and may be kilometres: neither is guessed."""
+    poses = POSES.assign(x_mm=[f"1,{k % 1000:03}" for k in range(len(POSES))]).drop(columns="x_m")
+    with pytest.raises(LogError, match="x_m is '1,000', not a number"):
+        imported(poses)
+
+
+def test_the_line_that_tells_excel_the_delimiter_is_passed_over(imported):
+    table = POSES.to_csv(index=False, sep=";", decimal=",")
+    robots, warnings = imported(f"sep=;\r\n{table}".encode())
+    _same_poses(robots[4])
+    assert "p.csv: cells are separated by semicolons, and numbers have decimal commas." in warnings
 
 
 def test_a_table_of_numpy_is_read(imported, tmp_path):

@@ -22,6 +22,8 @@ from twinmill.terminal import progress_bar
 
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
+THOUSANDS = re.compile(r"\s*[+-]?\d{1,3},\d{3}\s*")
+OF_EXCEL = re.compile(r"\s*sep=.\s*", re.IGNORECASE)  # a first line that tells Excel the delimiter
 DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d")
 TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d")
 DAY_S = 86_400
@@ -296,12 +298,12 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
             f"{path.name}: has no rows of numbers, so there is nothing to import; check "
             "that the export worked."
         )
-    comma = delimiter != "," and _has_decimal_commas(rows)
+    comma = _has_decimal_commas(rows, delimiter)
     if comma:
         rows = [
             [c.replace(",", ".") if DECIMAL_COMMA.fullmatch(c) else c for c in row] for row in rows
         ]
-    if delimiter != ",":
+    if delimiter != "," or comma:
         more = ", and numbers have decimal commas" if comma else ""
         notes.append(f"{path.name}: cells are separated by {DELIMITERS[delimiter]}{more}.")
     return Table(path.name, header, rows, line, known, notes=notes)
@@ -317,6 +319,9 @@ def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str]:
     for line in lines:
         if not line.strip() or line.lstrip().startswith("#"):
             before, comment = before + 1, line.lstrip("\ufeff #")
+            continue
+        if not before and OF_EXCEL.fullmatch(line):
+            before += 1
             continue
         if not (delimiter := _between_values(line)):
             return chain([line], lines), before, _delimiter(line)
@@ -383,10 +388,16 @@ def _remembered(lines: Iterator[str], last: list[str]) -> Iterator[str]:
         yield line
 
 
-def _has_decimal_commas(rows: list[list[str]]) -> bool:
-    """Whether commas in cells are decimal points: some are, and no cell has a point as well."""
-    commas = any(DECIMAL_COMMA.fullmatch(cell) for row in rows for cell in row)
-    return commas and not any(is_number(cell) and "." in cell for row in rows for cell in row)
+def _has_decimal_commas(rows: list[list[str]], delimiter: str) -> bool:
+    """Whether commas in cells are decimal points: some are, and no cell has a point as well.
+
+    Between commas cells with a comma stand in quotes; those that all have three digits behind it
+    may be thousands.
+    """
+    commas = [c for row in rows for c in row if "," in c and DECIMAL_COMMA.fullmatch(c)]
+    if delimiter == "," and all(map(THOUSANDS.fullmatch, commas)):
+        return False
+    return bool(commas) and not any(is_number(cell) and "." in cell for row in rows for cell in row)
 
 
 def _ends_short(rows: list[list[str]]) -> bool:
