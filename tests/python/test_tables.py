@@ -238,14 +238,17 @@ def test_shares_of_full_duty_under_percent_are_refused(imported):
         imported(commands=rows)
 
 
-@pytest.mark.parametrize("form", ["%Y-%m-%dT%H:%M:%S.%fZ", "%Y-%m-%d %H:%M:%S.%f", "%H:%M:%S.%f"])
+@pytest.mark.parametrize(
+    "form",
+    ["%Y-%m-%dT%H:%M:%S.%fZ", "%Y-%m-%d %H:%M:%S.%f", "%H:%M:%S.%f", "%d.%m.%Y %H:%M:%S,%f"],
+)
 def test_dates_and_times_of_day_go_on_over_midnight(imported, form):
     start = pd.Timestamp("2026-03-07 23:59:50")
     times = [
         table.assign(t_s=(start + pd.to_timedelta(table.t_s, unit="s")).dt.strftime(form))
         for table in (POSES, COMMANDS)
     ]
-    robots, _ = imported(*times)
+    robots, _ = imported(*times, **({"sep": ";"} if "," in form else {}))
     _same_poses(robots[4])
     np.testing.assert_allclose(np.diff(robots[4].command_t_s), np.diff(COMMANDS.t_s), atol=2e-6)
 

@@ -25,6 +25,7 @@ DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
 THOUSANDS = re.compile(r"\s*[+-]?\d{1,3},\d{3}\s*")
 OF_EXCEL = re.compile(r"\s*sep=.\s*", re.IGNORECASE)  # a first line that tells Excel the delimiter
 DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d")
+DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[T ]+(\d{1,2}:\d\d:\d\d)(?:[.,](\d+))?")
 TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d")
 DAY_S = 86_400
 UNITLESS = ("-", "1", "#", "id")  # as they stand in a row of units
@@ -169,18 +170,19 @@ class Table:
     def is_dated(self, column: str) -> bool:
         """Whether a column holds dates with times, or times of day."""
         first = self.cells(column)[0]
-        return bool(DATE.match(first) or TIME_OF_DAY.match(first))
+        return any(kind.match(first) for kind in (DATE, DAY_FIRST, TIME_OF_DAY))
 
     def seconds(self, column: str) -> np.ndarray:
         """(rows,) s of a column of numbers, dates or times of day.
 
-        Dates are ISO 8601, UTC if they name no zone; times of day go on over midnight.
+        Dates are ISO 8601, or day, month and year with points between; UTC if they name no zone.
+        Times of day go on over midnight.
         """
         if not self.is_dated(column):
             return self.finite(column)
         import pandas as pd  # slow to import
 
-        cells = self.cells(column)
+        cells = [_day_last(cell) for cell in self.cells(column)]
         if DATE.match(cells[0]):
             stamps = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True, errors="coerce")
             spans = stamps - pd.Timestamp(0, tz="UTC")
@@ -226,6 +228,15 @@ class Table:
             f"{self.name}: column {column} is missing (nearest is '{near[0]}'); rename "
             f"it in the file or with --rename '{near[0]}={_in_unit_of(near[0], column)}'."
         )
+
+
+def _day_last(cell: str) -> str:
+    """A time of the day 1.3.2026 as ISO 8601 has it; others as they are."""
+    found = DAY_FIRST.fullmatch(cell)
+    if not found:
+        return cell
+    day, month, year, clock, part = found.groups()
+    return f"{year}-{int(month):02}-{int(day):02}T{clock.zfill(8)}.{part or 0}"
 
 
 def _quantity(name: str) -> str:
@@ -346,7 +357,7 @@ def _between_values(line: str) -> str:
 
 
 def _is_value(cell: str) -> bool:
-    times = (DECIMAL_COMMA.fullmatch, DATE.match, TIME_OF_DAY.match)
+    times = (DECIMAL_COMMA.fullmatch, DATE.match, DAY_FIRST.match, TIME_OF_DAY.match)
     return is_number(cell) or any(matches(cell) for matches in times)
 
 

@@ -42,6 +42,7 @@ from twinmill.files import replacing
 
 TIME_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # of which a second has so many
 SAME_LENGTH = 0.1  # share by which poses and commands of one run differ in length
+SLOWEST_S, FEWEST_POSES = 2.0, 5  # from pose to pose; which tell it
 LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
 
 
@@ -341,6 +342,7 @@ def _check_times(poses: list[PoseSeries], commands: list[CommandSeries], shift: 
         first_s, last_s = p.utime_us[[0, -1]] / 1e6
         start_s, end_s = c.utime_us[[0, -1]] / 1e6
         _check_unit_of_time(p.robot_id, last_s - first_s, end_s - start_s)
+        _check_rate(p)
         if last_s < start_s or (not (c.repeat and shift) and first_s > end_s):
             remedy = (
                 "shift the poses, for example so that both start together: --pose-shift-s "
@@ -353,7 +355,7 @@ def _check_times(poses: list[PoseSeries], commands: list[CommandSeries], shift: 
                 f"{start_s:.3f} to {end_s:.3f} s do not overlap; {remedy}."
             )
         hold_s = np.diff(np.append(c.utime_us / 1e6, max(last_s, end_s))).max()
-        if c.repeat and hold_s > LONGEST_HOLD_S:
+        if hold_s > LONGEST_HOLD_S:
             raise LogError(
                 f"robot {p.robot_id}: a command would be held for {hold_s:.0f} s; the "
                 "times of commands and poses are not of one run, or mixed up."
@@ -369,6 +371,19 @@ def _check_unit_of_time(robot_id: int, poses_s: float, commands_s: float) -> Non
                 f"robot {robot_id}: the {long} last {long_s:.0f} s, the {short} {short_s:.1f} s; "
                 f"the times of the {long} are in {unit}, so name that column t_{unit}."
             )
+
+
+def _check_rate(poses: PoseSeries) -> None:
+    """Raises LogError where poses are so far apart that they tell nothing of a drive."""
+    if len(poses.utime_us) < FEWEST_POSES:
+        return
+    step_s = float(np.median(np.diff(poses.utime_us))) * 1e-6
+    if step_s > SLOWEST_S:
+        unit = next((u for u, times in TIME_UNITS.items() if step_s / times < SLOWEST_S), "ns")
+        raise LogError(
+            f"robot {poses.robot_id}: its poses are {step_s:g} s apart, too far to tell of a "
+            f"drive; if the times are in {unit}, name that column t_{unit}, in both files."
+        )
 
 
 def _provenance(sources: list[Path], options: ImportOptions) -> str:

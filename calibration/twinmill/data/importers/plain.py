@@ -26,6 +26,8 @@ HEADING_LIKE = re.compile(r"theta|yaw|heading|psi|orient|angle|rot|^q_?[wxyz0-3]
 QUATERNION = ("qw", "qx", "qy", "qz")
 WORLD = ("vx_world_mps", "vy_world_mps")
 INPUTS = ("speed_input", "turn_input")
+LATEST_S = 1e11  # in the year 5138; a later stamp has another unit
+SINCE_1970 = {"ms": 1e14, "us": 1e17}  # stamps of our days are smaller
 WRAP_DEG = 20  # more than a robot turns from row to row
 VALUES: dict[CommandKind, tuple[str, ...]] = {
     "duty": ("fl_pct", "fr_pct", "rl_pct", "rr_pct"),
@@ -328,7 +330,15 @@ def _numbered(table: str, names: list[str], columns: Columns) -> tuple[dict[str,
 
 
 def _utime_us(table: Table) -> np.ndarray:
-    return np.round(table.seconds("t_s") * 1e6).astype(np.int64)
+    t_s = table.seconds("t_s")
+    largest = np.abs(t_s).max()
+    if largest > LATEST_S:
+        unit = next((u for u, top in SINCE_1970.items() if largest < top), "ns")
+        raise LogError(
+            f"{table.name}: t_s goes to {largest:.4g}, which are no seconds; if it counts {unit} "
+            f"since 1970, name the column t_{unit}, in the file or with --rename t_s=t_{unit}."
+        )
+    return np.round(t_s * 1e6).astype(np.int64)
 
 
 def _by_robot(
