@@ -225,9 +225,9 @@ def test_an_option_that_is_no_finite_number_is_refused_by_name(twinmill, argumen
 def test_an_option_for_one_value_is_not_given_twice(twinmill, tmp_path):
     """The first of two files was dropped without a word."""
     files = [tmp_path / "a.csv", tmp_path / "b.csv"]
-    given = [word for path in files for word in ("--poses", path)]
+    given = [word for path in files for word in ("--motive", path)]
     code, out, err = twinmill("import", *given, "--commands", "c.csv", "-o", "o.lcmlog")
-    assert code == 2 and not out and "--poses" in err and "given twice" in err
+    assert code == 2 and not out and "--motive" in err and "given twice" in err
 
 
 def test_truncated_log_is_read_with_a_warning(twinmill, coasting_robot, tmp_path):

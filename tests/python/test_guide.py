@@ -153,3 +153,19 @@ def test_what_is_missing_or_does_not_go_together_is_one_sentence(folder):
     (folder / "plan").mkdir()
     with pytest.raises(ValueError, match="plan: exists"):
         run(["guide", *TWIN])
+
+
+@pytest.mark.parametrize("wheels", ["differential", "ackermann"])
+def test_the_first_drive_stands_only_to_rest(wheels):
+    """Legs that a robot could not drive were stood through: 14 of the first 20 s."""
+    shares = []
+    for kind in (wheels, "none"):
+        run(["guide", *told("other", "csv", "twist", kind, "one"), "-o", kind])
+        rows = np.genfromtxt(f"{kind}/drive.csv", delimiter=",", skip_header=1)
+        stands = ~rows[:-1, 1:].any(axis=1)
+        shares.append(np.diff(rows[:, 0])[stands].sum() / rows[-1, 0])
+        if kind == wheels:
+            assert not rows[:, 2].any()  # sideways
+            turns = rows[rows[:, 3] != 0]
+            assert wheels == "differential" or turns[:, 1].all()  # not on the spot
+    assert shares[0] == pytest.approx(shares[1], abs=1e-3)

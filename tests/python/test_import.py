@@ -25,6 +25,12 @@ POSES = "t_s,robot_id,x_m,y_m,theta_rad\n0,4,0,0,3\n0.5,4,0.1,0.2,-3\n1.0,4,0.3,
 COMMANDS = "t_s,robot_id,fl_pct,fr_pct,rl_pct,rr_pct\n0,4,0,0,0,0\n0.1,4,10,-20,30,-100\n"
 
 
+def _in_unit(table, of_a_second):
+    header, *rows = (line.split(",", 1) for line in table.splitlines())
+    rows = [[str(float(t) * of_a_second), rest] for t, rest in rows]
+    return "".join(f"{t},{rest}\n" for t, rest in (header, *rows))
+
+
 @pytest.fixture
 def put(tmp_path):
     """Writes text to a file of that name, compressed if it ends in .gz."""
@@ -202,6 +208,17 @@ def test_heading_offset_and_shift_move_the_poses_alone(imported):
             POSES,
             COMMANDS.replace("\n0.1,4", "\n1000,4"),
             r"times of the commands are in ms, so name that column t_ms",
+        ),
+        # Both in one unit that is no second: lengths agree, steps and stamps tell it.
+        (
+            _in_unit(POSES + "1.5,4,0,0,0\n2,4,0,0,0\n", 1e3),
+            _in_unit(COMMANDS + "1.9,4,0,0,0,0\n", 1e3),
+            r"poses are 500 s apart.* times are in ms, name that column t_ms, in both files",
+        ),
+        (
+            POSES.replace("\n", "\n1772366400000000", 1),
+            COMMANDS,
+            r"p.csv: t_s goes to 1.772e\+16.*counts us since 1970, name the column t_us",
         ),
         ("t_s,robot_id,x_m,y_m,qw,qx,qy,qz\n0,4,0,0,1,1,0,0\n", COMMANDS, r"row 2: .*must be 1"),
     ],

@@ -108,3 +108,12 @@ def test_clocks_that_run_apart_by_a_thousandth_are_told_at_import(tmp_path):
     assert any(
         "the two clocks run apart" in w and "--pose-clock-ppm" in w for w in done["warnings"]
     )
+
+
+def test_headings_in_degrees_are_told_and_nothing_that_follows_from_them(tmp_path):
+    """Speeds along the axes of a wrong heading are no speeds of the robot."""
+    t_s, told, pose = _drive()
+    poses = np.column_stack([t_s, pose[:, :2], np.degrees(pose[:, 2])])
+    commands = np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]])
+    said = _said(tmp_path, POSES, poses, BODY, commands)
+    assert said.count("robot 1:") == 1 and "the headings are in degrees" in said

@@ -20,7 +20,11 @@ from typer.testing import CliRunner
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.importers.ros_bag import Topic, _rows, guess_pairs, list_topics, numbering
-from twinmill.data.importers.ros_messages import COMMANDS, joints_beside_wheels
+from twinmill.data.importers.ros_messages import (
+    COMMANDS,
+    joints_as_they_stand,
+    joints_beside_wheels,
+)
 from twinmill.data.log import LogError, read_log
 from twinmill_cli.main import app
 
@@ -593,3 +597,28 @@ def test_joints_beside_the_wheels_are_none():
     unnamed = SimpleNamespace(name=["a", "b"], velocity=[3.0, 4.0])
     assert row_of(unnamed) == (3.0, 4.0)
     assert joints_beside_wheels(unnamed) == []
+
+
+@pytest.mark.parametrize(
+    ("names", "speeds", "wheels", "beside", "unordered"),
+    [
+        (["RightWheel", "LeftWheel"], [2.0, 1.0], (1.0, 2.0), [], []),
+        (["r1/wheelRight", "r1/caster", "r1/wheelLeft"], [2, 9, 1], (1, 2), ["r1/caster"], []),
+        (["RRWheel", "FLWheel", "RLWheel", "FRWheel"], [4, 1, 3, 2], (1, 2, 3, 4), [], []),
+        (
+            ["arm_1", "drivewhl_r", "grip", "drivewhl_l"],
+            [8, 2, 9, 1],
+            (1, 2),
+            ["arm_1", "grip"],
+            [],
+        ),
+        (["arm_1", "motor_right", "motor_left"], [9, 2, 1], (1, 2), ["arm_1"], []),
+        (["motor_b", "motor_a"], [2, 1], (2, 1), [], ["motor_b", "motor_a"]),
+    ],
+)
+def test_names_of_joints_as_people_write_them(names, speeds, wheels, beside, unordered):
+    """Camel case was not parted: right and left were exchanged without a word."""
+    message = SimpleNamespace(name=names, velocity=speeds)
+    assert COMMANDS["sensor_msgs/msg/JointState"][1](message) == wheels
+    assert joints_beside_wheels(message) == beside
+    assert joints_as_they_stand(message) == unordered

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables of other people: what is not sure is refused or said, what is obvious is read."""
 
+import csv
 import math
 
 import numpy as np
@@ -159,6 +160,27 @@ def test_other_delimiters_and_decimal_commas_are_found_and_said(imported, how, w
     ]
 
 
+def test_quoted_decimal_commas_between_commas_are_found_and_said(imported):
+    """As spreadsheets on the web write a table where commas are decimal points."""
+    robots, warnings = imported(decimal=",", quoting=csv.QUOTE_NONNUMERIC)
+    _same_poses(robots[4])
+    assert "p.csv: cells are separated by commas, and numbers have decimal commas." in warnings
+
+
+def test_commas_of_thousands_are_no_decimal_points(imported):
+    """1,000 and 1,250 millimetres may be metres and may be kilometres: neither is guessed."""
+    poses = POSES.assign(x_mm=[f"1,{k % 1000:03}" for k in range(len(POSES))]).drop(columns="x_m")
+    with pytest.raises(LogError, match="x_m is '1,000', not a number"):
+        imported(poses)
+
+
+def test_the_line_that_tells_excel_the_delimiter_is_passed_over(imported):
+    table = POSES.to_csv(index=False, sep=";", decimal=",")
+    robots, warnings = imported(f"sep=;\r\n{table}".encode())
+    _same_poses(robots[4])
+    assert "p.csv: cells are separated by semicolons, and numbers have decimal commas." in warnings
+
+
 def test_a_table_of_numpy_is_read(imported, tmp_path):
     np.savetxt(tmp_path / "np.txt", POSES, header=" ".join(POSES.columns))
     robots, _ = imported((tmp_path / "np.txt").read_bytes())
@@ -216,14 +238,17 @@ def test_shares_of_full_duty_under_percent_are_refused(imported):
         imported(commands=rows)
 
 
-@pytest.mark.parametrize("form", ["%Y-%m-%dT%H:%M:%S.%fZ", "%Y-%m-%d %H:%M:%S.%f", "%H:%M:%S.%f"])
+@pytest.mark.parametrize(
+    "form",
+    ["%Y-%m-%dT%H:%M:%S.%fZ", "%Y-%m-%d %H:%M:%S.%f", "%H:%M:%S.%f", "%d.%m.%Y %H:%M:%S,%f"],
+)
 def test_dates_and_times_of_day_go_on_over_midnight(imported, form):
     start = pd.Timestamp("2026-03-07 23:59:50")
     times = [
         table.assign(t_s=(start + pd.to_timedelta(table.t_s, unit="s")).dt.strftime(form))
         for table in (POSES, COMMANDS)
     ]
-    robots, _ = imported(*times)
+    robots, _ = imported(*times, **({"sep": ";"} if "," in form else {}))
     _same_poses(robots[4])
     np.testing.assert_allclose(np.diff(robots[4].command_t_s), np.diff(COMMANDS.t_s), atol=2e-6)
 

@@ -280,12 +280,9 @@ def _play(names: list[str], rows: np.ndarray, path: Path) -> float:
 
 def _first_drive(model: native.Model) -> tuple[list[str], np.ndarray]:
     """Columns and rows, t_s first, of a drive that shows most effects."""
-    sideways = model.wheel_kind in ("mecanum", "omni3", "none")
-    legs = plan("mixed", DRIVE_S, sideways, np.random.default_rng(SEED))
-    axes = np.array([leg[1] for leg in legs])
+    legs = plan("mixed", DRIVE_S, True, np.random.default_rng(SEED))
+    axes = _as_it_can(model.wheel_kind, np.array([leg[1] for leg in legs]))
     t_s = np.cumsum([0.0, *(leg[0] for leg in legs)])
-    if model.wheel_kind == "ackermann":
-        axes[:, 2] *= np.abs(axes[:, 0])  # it does not turn on the spot
     values = axes * [FULL_MPS, FULL_MPS, FULL_RADPS]
     if model.drive != "twist":
         speeds = np.array([model.wheel_speeds(*row) for row in values])
@@ -296,3 +293,15 @@ def _first_drive(model: native.Model) -> tuple[list[str], np.ndarray]:
     still = np.zeros(len(names))
     rows = [np.append(at_s, row) for at_s, row in zip(t_s, [*values, still], strict=True)]
     return names, np.round(rows, 3)
+
+
+def _as_it_can(wheels: str, axes: np.ndarray) -> np.ndarray:
+    """(N, 3) forward, left, turn: what it cannot do alone it does driving ahead, not standing."""
+    if wheels in ("mecanum", "omni3", "none"):
+        return axes
+    ahead, left, turn = axes.T
+    ahead = np.where(ahead == 0, left, ahead)
+    if wheels == "ackermann":  # it does not turn on the spot
+        ahead = np.where(ahead == 0, np.abs(turn), ahead)
+        turn = turn * np.abs(ahead)
+    return np.column_stack([ahead, 0 * left, turn])

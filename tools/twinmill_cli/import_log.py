@@ -18,6 +18,7 @@ if working():  # not for --help
 
     from twinmill.data.importers.columns import Guess, to_toml
     from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
+    from twinmill.data.importers.robot_files import files_of
     from twinmill.data.importers.ros_bag import Topic, guess_pairs, list_topics, numbering
     from twinmill.data.importers.ros_messages import STEERED
     from twinmill.data.log import LogError
@@ -35,16 +36,18 @@ def register(app: typer.Typer) -> None:
 
 
 def _command(
+    beside: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
     *,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="The log to write (.lcmlog).")
     ] = None,
     poses: Annotated[
-        Path | None,
+        list[Path] | None,
         typer.Option(
             help=(
                 "CSV: t_s, robot_id, x_m, y_m, theta_rad or qw, qx, qy, qz; optional z_m, valid. "
-                "Without a heading only the position is judged."
+                "Without a heading only the position is judged. Where each robot has a file of "
+                "its own, repeat it, or quote a pattern: 'poses_R*.csv'."
             )
         ),
     ] = None,
@@ -59,12 +62,12 @@ def _command(
         typer.Option(help="CSV export of Vicon Tracker or Nexus with objects or segments."),
     ] = None,
     commands: Annotated[
-        Path | None,
+        list[Path] | None,
         typer.Option(
             help=(
                 "CSV: t_s, robot_id and fl_pct, fr_pct, rl_pct, rr_pct | speed_input, turn_input | "
                 "w1_radps..w4_radps | vx_mps, vy_mps, omega_radps | vx_world_mps, vy_world_mps; "
-                "held until the next row."
+                "held until the next row. As with poses one file or one for each robot."
             )
         ),
     ] = None,
@@ -110,7 +113,7 @@ def _command(
         typer.Option(
             metavar="NAME=ID",
             help="Number of a robot by its name: a rigid body, a word in the column "
-            "robot_id or in a bag's topics; else digits in it.",
+            "robot_id, in the name of a robot's own file or in a bag's topics; else digits in it.",
         ),
     ] = None,
     robot_id: Annotated[int | None, typer.Option(help="For files of one robot.")] = None,
@@ -175,11 +178,18 @@ def _command(
     Example: twinmill import --poses poses.csv --commands commands.csv -o run.lcmlog
     """
     try:
-        if explain_columns_to:
-            asked = {"poses": poses, "commands": commands}
-            _explain(
-                asked, explain_columns(poses, commands), explain_columns_to, robot_id, force=force
+        if beside:
+            raise LogError(
+                f"{beside[0]}: stands alone; write the option before each file, or quote the "
+                "pattern, as in --poses 'poses_R*.csv'."
             )
+        if explain_columns_to:
+            asked = {
+                "poses": files_of(poses, "--poses"),
+                "commands": files_of(commands, "--commands"),
+            }
+            explained = explain_columns(*(paths[0] if paths else None for paths in asked.values()))
+            _explain(asked, explained, explain_columns_to, robot_id, force=force)
             return
         if bag and not pose and not command:
             _list(bag, list_topics(bag), as_json)
@@ -257,7 +267,7 @@ def _unpaired(topics: list[Topic]) -> str:
 
 
 def _explain(
-    asked: dict[str, Path | None],
+    asked: dict[str, tuple[Path, ...]],
     explained: dict[str, tuple[TableFile, list[Guess]]],
     out: Path,
     robot_id: int | None,
@@ -282,9 +292,11 @@ def _explain(
         )
         Console().print(show.table(table))
     words = ["twinmill", "import"]
-    for kind, path in asked.items():
-        words += [f"--{kind}", str(path) if path else kind.upper()]
-    if not any("robot_id" in g.targets for g in guesses.get("poses", [])):
+    for kind, paths in asked.items():
+        for path in paths or [kind.upper()]:
+            words += [f"--{kind}", str(path)]
+    several = max(map(len, asked.values())) > 1
+    if not several and not any("robot_id" in g.targets for g in guesses.get("poses", [])):
         words += ["--robot-id", str(1 if robot_id is None else robot_id)]
     line = shlex.join([*words, "--mapping", str(out), "-o", "run.lcmlog"])
     told = [word for kind in guesses for word in _lacking(kind, guesses[kind])]

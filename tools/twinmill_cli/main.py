@@ -39,6 +39,11 @@ COMMANDS = (
         "Find a camera's lens from a film of a board that is moved about before it.",
     ),
     (
+        "track-check",
+        "track",
+        "Compare poses of a printed sheet with the ruler along which a hand pushed it.",
+    ),
+    (
         "export-model",
         "export_model",
         "Write a model for other simulators, and name what their file cannot carry.",

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill track` and `track-calibrate`: poses from a film of tagged robots, and its lens."""
+"""`twinmill track`, its lens and its proof: poses from films of tagged robots."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
@@ -23,7 +24,7 @@ if working():  # not for --help
     from rich.text import Text
 
     from twinmill.data.bus import open_bus
-    from twinmill.data.importers.plain import Columns, read_commands
+    from twinmill.data.importers.plain import Columns, read_commands, read_poses
     from twinmill.files import check_new_file
     from twinmill.terminal import Fitting, progress_bar
     from twinmill.track.align import align
@@ -37,6 +38,7 @@ if working():  # not for --help
     from twinmill.track.page import Page
     from twinmill.track.paths import RobotPath, Tags, follow, write_poses
     from twinmill.track.quality import Quality, judge
+    from twinmill.track.ruler import Ruler, against_ruler
     from twinmill.track.together import Pair, clocks, compared, merged, on_clock
 
 WHOLE = 0.98  # of the frames that a container promises; some count them wrongly by a few
@@ -59,6 +61,7 @@ def register(app: typer.Typer) -> None:
     """Adds the commands to the application."""
     app.command("track", no_args_is_help=True)(_track)
     app.command("track-calibrate", no_args_is_help=True)(_calibrate)
+    app.command("track-check", no_args_is_help=True)(_check)
 
 
 def _track(
@@ -493,3 +496,76 @@ def _lens_text(out: Path, found: Calibration) -> str:
         *(f"! {advice}" for advice in found.advice),
     ]
     return "\n".join(lines)
+
+
+def _check(
+    poses: Annotated[Path, typer.Argument(metavar="POSES", show_default=False)],
+    marks_mm: Annotated[
+        str,
+        typer.Option(
+            "--marks-mm", metavar="MM,...", show_default=False, help="Where it stopped, in order."
+        ),
+    ],
+    *,
+    robot: Annotated[
+        int | None, typer.Option("--robot", min=0, max=99, help="The sheet's number.")
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Compare poses of a printed sheet with the ruler along which a hand pushed it.
+
+    Film a sheet on the floor that lies still for two seconds at each of some marks
+    of a ruler, and let `track` find it. Nothing else is needed, no robot either.
+    Exit code 1 says that a stop is off by more than 3 mm or 1 degree.
+
+    Example: twinmill track-check ruler.csv --marks-mm 0,100,200,300
+    """
+    sheets = [s for s in read_poses(poses, Columns()) if robot in (None, s.robot_id)]
+    if len(sheets) != 1:
+        seen = ", ".join(str(s.robot_id) for s in read_poses(poses, Columns()))
+        raise ValueError(f"{poses}: holds poses of {seen}; say whose with --robot.")
+    found = against_ruler(sheets[0], _marks_m(marks_mm))
+    data = {
+        "poses": str(poses),
+        "good": found.good,
+        "miss_m": found.miss_m,
+        "turn_rad": found.turn_rad,
+        "scale": found.scale,
+        "noise_m": found.noise_m,
+        "noise_rad": found.noise_rad,
+        "stops": [{**asdict(stop), "miss_m": stop.miss_m} for stop in found.stops],
+        "sentence": found.sentence,
+    }
+    deliver(data, _ruler_text(found), as_json)
+    return 0 if found.good else 1
+
+
+def _marks_m(text: str) -> list[float]:
+    try:
+        marks_m = [1e-3 * float(word) for word in text.split(",")]
+    except ValueError:
+        marks_m = []
+    if len(marks_m) < 2 or not all(0 < b - a < 100 for a, b in pairwise(marks_m)):
+        raise ValueError(f"--marks-mm {text}: must be two numbers or more that rise, as 0,100,200.")
+    return marks_m
+
+
+def _ruler_text(found: Ruler) -> Group:
+    table = Table(box=frame.SIMPLE_HEAD)
+    for name in ("mark", "lay still", "along", "off", "across", "turned"):
+        table.add_column(name, justify="right")
+    for stop in found.stops:
+        table.add_row(
+            f"{1e3 * stop.mark_m:g} mm",
+            f"{stop.from_s:.1f} to {stop.to_s:.1f} s",
+            f"{1e3 * stop.along_m:.1f} mm",
+            f"{1e3 * (stop.along_m - stop.mark_m):+.1f} mm",
+            f"{1e3 * stop.across_m:+.1f} mm",
+            f"{np.degrees(stop.turn_rad):+.2f}°",
+        )
+    noise = (
+        f"At rest a pose wanders by {1e3 * found.noise_m:.2f} mm and "
+        f"{np.degrees(found.noise_rad):.2f}°, the hand's tremor included; lengths are "
+        f"{100 * found.scale:.2f} % of the ruler's."
+    )
+    return Group(Fitting(table), Text(noise), Text(found.sentence))

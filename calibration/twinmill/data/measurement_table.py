@@ -22,7 +22,10 @@ from twinmill.terminal import progress_bar
 
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
+THOUSANDS = re.compile(r"\s*[+-]?\d{1,3},\d{3}\s*")
+OF_EXCEL = re.compile(r"\s*sep=.\s*", re.IGNORECASE)  # a first line that tells Excel the delimiter
 DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d")
+DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[T ]+(\d{1,2}:\d\d:\d\d)(?:[.,](\d+))?")
 TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d")
 DAY_S = 86_400
 UNITLESS = ("-", "1", "#", "id")  # as they stand in a row of units
@@ -167,18 +170,19 @@ class Table:
     def is_dated(self, column: str) -> bool:
         """Whether a column holds dates with times, or times of day."""
         first = self.cells(column)[0]
-        return bool(DATE.match(first) or TIME_OF_DAY.match(first))
+        return any(kind.match(first) for kind in (DATE, DAY_FIRST, TIME_OF_DAY))
 
     def seconds(self, column: str) -> np.ndarray:
         """(rows,) s of a column of numbers, dates or times of day.
 
-        Dates are ISO 8601, UTC if they name no zone; times of day go on over midnight.
+        Dates are ISO 8601, or day, month and year with points between; UTC if they name no zone.
+        Times of day go on over midnight.
         """
         if not self.is_dated(column):
             return self.finite(column)
         import pandas as pd  # slow to import
 
-        cells = self.cells(column)
+        cells = [_day_last(cell) for cell in self.cells(column)]
         if DATE.match(cells[0]):
             stamps = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True, errors="coerce")
             spans = stamps - pd.Timestamp(0, tz="UTC")
@@ -224,6 +228,15 @@ class Table:
             f"{self.name}: column {column} is missing (nearest is '{near[0]}'); rename "
             f"it in the file or with --rename '{near[0]}={_in_unit_of(near[0], column)}'."
         )
+
+
+def _day_last(cell: str) -> str:
+    """A time of the day 1.3.2026 as ISO 8601 has it; others as they are."""
+    found = DAY_FIRST.fullmatch(cell)
+    if not found:
+        return cell
+    day, month, year, clock, part = found.groups()
+    return f"{year}-{int(month):02}-{int(day):02}T{clock.zfill(8)}.{part or 0}"
 
 
 def _quantity(name: str) -> str:
@@ -296,12 +309,12 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
             f"{path.name}: has no rows of numbers, so there is nothing to import; check "
             "that the export worked."
         )
-    comma = delimiter != "," and _has_decimal_commas(rows)
+    comma = _has_decimal_commas(rows, delimiter)
     if comma:
         rows = [
             [c.replace(",", ".") if DECIMAL_COMMA.fullmatch(c) else c for c in row] for row in rows
         ]
-    if delimiter != ",":
+    if delimiter != "," or comma:
         more = ", and numbers have decimal commas" if comma else ""
         notes.append(f"{path.name}: cells are separated by {DELIMITERS[delimiter]}{more}.")
     return Table(path.name, header, rows, line, known, notes=notes)
@@ -317,6 +330,9 @@ def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str]:
     for line in lines:
         if not line.strip() or line.lstrip().startswith("#"):
             before, comment = before + 1, line.lstrip("\ufeff #")
+            continue
+        if not before and OF_EXCEL.fullmatch(line):
+            before += 1
             continue
         if not (delimiter := _between_values(line)):
             return chain([line], lines), before, _delimiter(line)
@@ -341,7 +357,7 @@ def _between_values(line: str) -> str:
 
 
 def _is_value(cell: str) -> bool:
-    times = (DECIMAL_COMMA.fullmatch, DATE.match, TIME_OF_DAY.match)
+    times = (DECIMAL_COMMA.fullmatch, DATE.match, DAY_FIRST.match, TIME_OF_DAY.match)
     return is_number(cell) or any(matches(cell) for matches in times)
 
 
@@ -383,10 +399,16 @@ def _remembered(lines: Iterator[str], last: list[str]) -> Iterator[str]:
         yield line
 
 
-def _has_decimal_commas(rows: list[list[str]]) -> bool:
-    """Whether commas in cells are decimal points: some are, and no cell has a point as well."""
-    commas = any(DECIMAL_COMMA.fullmatch(cell) for row in rows for cell in row)
-    return commas and not any(is_number(cell) and "." in cell for row in rows for cell in row)
+def _has_decimal_commas(rows: list[list[str]], delimiter: str) -> bool:
+    """Whether commas in cells are decimal points: some are, and no cell has a point as well.
+
+    Between commas cells with a comma stand in quotes; those that all have three digits behind it
+    may be thousands.
+    """
+    commas = [c for row in rows for c in row if "," in c and DECIMAL_COMMA.fullmatch(c)]
+    if delimiter == "," and all(map(THOUSANDS.fullmatch, commas)):
+        return False
+    return bool(commas) and not any(is_number(cell) and "." in cell for row in rows for cell in row)
 
 
 def _ends_short(rows: list[list[str]]) -> bool:

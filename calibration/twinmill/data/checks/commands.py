@@ -291,6 +291,9 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
     tried += [(turn, unit) for unit in TURN_UNITS[: 2 if kind == "twist" else 1]]
     if kind == "wheel_speed":
         tried += [(speed, unit) for unit in WHEEL_UNITS]
+    (low, high), *_ = TURN_UNITS[0]
+    if low < turn < high:  # speeds along axes of a wrong heading tell nothing
+        speed, tried = 0.0, [(turn, TURN_UNITS[0])]
     told = [
         checked.finding(what, _pace(ratio), f"{remedy} and import anew")
         for ratio, ((low, high), what, remedy) in tried

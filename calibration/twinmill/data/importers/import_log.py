@@ -25,6 +25,7 @@ from twinmill.data.importers.plain import (
     read_detections,
     read_poses,
 )
+from twinmill.data.importers.robot_files import Given, files_of, read_each, robot_numbers
 from twinmill.data.importers.ros_bag import BagOptions, read_bag
 from twinmill.data.importers.series import (
     CommandSeries,
@@ -41,6 +42,7 @@ from twinmill.files import replacing
 
 TIME_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # of which a second has so many
 SAME_LENGTH = 0.1  # share by which poses and commands of one run differ in length
+SLOWEST_S, FEWEST_POSES = 2.0, 5  # from pose to pose; which tell it
 LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
 
 
@@ -50,8 +52,8 @@ class ImportOptions:
 
     Attributes:
         robot_id: whose the rows are, for files that do not say.
-        robots: robot_id by name: of a rigid body, in a table's column robot_id, or as a word
-            in a bag's topics.
+        robots: robot_id by name: of a rigid body, in a table's column robot_id, as a word in the
+            name of a robot's own table or in a bag's topics.
         rename: column in a plain CSV file to column as we name it, or with another unit.
         mapping: file that says which column is what, in place of `rename`.
         flips: our columns that are to change their sign.
@@ -88,8 +90,8 @@ class ImportOptions:
 
 
 def import_log(
-    poses: Path | None,
-    commands: Path | None,
+    poses: Given,
+    commands: Given,
     out: Path,
     *,
     motive: Path | None = None,
@@ -102,8 +104,8 @@ def import_log(
     """Makes a log from one source of poses and one of commands.
 
     Args:
-        poses: plain CSV, or None with `motive` or `vicon`.
-        commands: plain CSV, or None with `io_tsv`.
+        poses: plain CSV, several where each robot has its own, or None with `motive` or `vicon`.
+        commands: plain CSV, several where each robot has its own, or None with `io_tsv`.
         out: the log to write; nothing is there until all went well.
         motive: export of OptiTrack Motive.
         vicon: export of Vicon Tracker or Nexus.
@@ -120,24 +122,26 @@ def import_log(
         LogError: one sentence on what is wrong; nothing was written.
     """
     options = options or ImportOptions()
+    poses, commands = files_of(poses, "--poses"), files_of(commands, "--commands")
     captures = [path for path in (poses, motive, vicon) if path]
     if bag and (captures or commands or io_tsv):
         raise LogError("--bag: holds poses and commands; give no other source beside it.")
-    if not bag and (len(captures) != 1 or (commands is None) == (not io_tsv)):
+    if not bag and (len(captures) != 1 or bool(commands) == bool(io_tsv)):
         raise LogError(
             "a log needs one source of poses and one of commands: give --poses, --motive or "
             "--vicon, and --commands or --io-tsv."
         )
     if options.up not in ("y", "z", None):
         raise LogError(f"--up {options.up}: must be y or z.")
-    if options.robot_id is not None and (not 0 <= options.robot_id <= 99 or len(io_tsv) > 1):
+    several = max(len(poses), len(commands), len(io_tsv)) > 1
+    if options.robot_id is not None and (not 0 <= options.robot_id <= 99 or several):
         raise LogError(
             f"--robot-id {options.robot_id}: must be in 0..99 and fits one robot; "
-            "number several by their folders' names."
+            "number several by the names of their files or of their folders."
         )
     if options.mapping and options.rename and not detections:
         raise LogError("--rename: does nothing beside --mapping; write it into that file.")
-    tables = [path for path in (poses, commands) if path and not options.mapping]
+    tables = [] if options.mapping else [*poses, *commands]
     check_renames(
         options.rename, tables + ([detections] if detections else []), KNOWN | OF_DETECTIONS
     )
@@ -152,10 +156,15 @@ def import_log(
         )
         pose_series, command_series = read_bag(bag, *topics, how)
     else:
-        pose_series = _read_poses(poses, motive, vicon, options=options, absolute=bool(io_tsv))
-        numbers = {series.robot_id for series in pose_series}
-        only = numbers.pop() if len(numbers) == 1 else None
-        command_series = _read_commands(commands, io_tsv, options, only)
+        of_files = robot_numbers(poses, commands, options.robots)
+        pose_series = (
+            _read_tables(poses, "poses", options, of_files)
+            if poses
+            else _read_capture(motive, vicon, options, absolute=bool(io_tsv))
+        )
+        command_series = _read_commands(
+            commands, io_tsv, options, of_files=of_files, poses=pose_series
+        )
     _check_names(options, [series.robot_id for series in (*pose_series, *command_series)])
     pose_series = [_moved(series, options) for series in pose_series]
     shift = not bag or options.receive_stamps
@@ -168,7 +177,7 @@ def import_log(
         for series in command_series
     ]
     seen = _detections(detections, options, by_robot) if detections else []
-    paths = (poses, motive, vicon, commands, *io_tsv, detections)
+    paths = (*poses, motive, vicon, *commands, *io_tsv, detections)
     sources = [path for path in paths if path is not None]
     with replacing(out, options.force) as temporary:
         provenance = _provenance(sources, options)
@@ -177,33 +186,54 @@ def import_log(
         return _summary(read_log(temporary), out, warnings)
 
 
-def _read_poses(
-    poses: Path | None,
-    motive: Path | None,
-    vicon: Path | None,
-    *,
-    options: ImportOptions,
-    absolute: bool,
+def _read_capture(
+    motive: Path | None, vicon: Path | None, options: ImportOptions, *, absolute: bool
 ) -> list[PoseSeries]:
     """Series of the one that is given; stamps since the epoch, or since the capture's start."""
     if motive:
         return read_motive(motive, options.robots, options.up or "y", absolute)
-    if vicon:
-        return read_vicon(vicon, options.robots, options.up or "z")
-    return read_poses(poses, _columns(options, "poses"))
+    return read_vicon(vicon, options.robots, options.up or "z")
 
 
 def _read_commands(
-    commands: Path | None, io_tsv: tuple[Path, ...], options: ImportOptions, only: int | None
+    commands: tuple[Path, ...],
+    io_tsv: tuple[Path, ...],
+    options: ImportOptions,
+    *,
+    of_files: dict[Path, int],
+    poses: list[PoseSeries],
 ) -> list[CommandSeries]:
-    """Series of the one that is given; a table without robots is of the only one with poses."""
-    if commands:
-        columns = _columns(options, "commands")
-        return read_commands(
-            commands,
-            replace(columns, robot_id=only if columns.robot_id is None else columns.robot_id),
-        )
-    return [read_io_tsv(path, options.robot_id) for path in io_tsv]
+    """Series of the kind that is given; one table without robots is of the only one with poses."""
+    if not commands:
+        return [read_io_tsv(path, options.robot_id) for path in io_tsv]
+    numbers = {series.robot_id for series in poses}
+    if len(commands) == len(numbers) == 1 and options.robot_id is None:
+        options = replace(options, robot_id=numbers.pop())
+    return _read_tables(commands, "commands", options, of_files)
+
+
+def _read_tables(
+    paths: tuple[Path, ...], kind: str, options: ImportOptions, of_files: dict[Path, int]
+) -> list:
+    """Series of poses or of commands in plain CSV, of all files.
+
+    Args:
+        paths: the files.
+        kind: `poses` or `commands`.
+        options: how to read them.
+        of_files: robot_id by file, where its name tells it.
+    """
+    columns, read = _columns(options, kind), read_poses if kind == "poses" else read_commands
+    lacks = columns.lacks_robot
+    if len(paths) > 1:
+        names = " ".join(f"--robot '{p.name.split('.')[0]}={k}'" for k, p in enumerate(paths, 1))
+        lacks = f"number the files, whose names do not tell their robots: {names}"
+
+    def of(path: Path) -> list:
+        number = of_files.get(path, options.robot_id)
+        return read(path, replace(columns, robot_id=number, lacks_robot=lacks))
+
+    return read_each(paths, of_files, of, kind)
 
 
 def _detections(
@@ -314,6 +344,7 @@ def _check_times(poses: list[PoseSeries], commands: list[CommandSeries], shift: 
         first_s, last_s = p.utime_us[[0, -1]] / 1e6
         start_s, end_s = c.utime_us[[0, -1]] / 1e6
         _check_unit_of_time(p.robot_id, last_s - first_s, end_s - start_s)
+        _check_rate(p)
         if last_s < start_s or (not (c.repeat and shift) and first_s > end_s):
             remedy = (
                 "shift the poses, for example so that both start together: --pose-shift-s "
@@ -326,7 +357,7 @@ def _check_times(poses: list[PoseSeries], commands: list[CommandSeries], shift: 
                 f"{start_s:.3f} to {end_s:.3f} s do not overlap; {remedy}."
             )
         hold_s = np.diff(np.append(c.utime_us / 1e6, max(last_s, end_s))).max()
-        if c.repeat and hold_s > LONGEST_HOLD_S:
+        if hold_s > LONGEST_HOLD_S:
             raise LogError(
                 f"robot {p.robot_id}: a command would be held for {hold_s:.0f} s; the "
                 "times of commands and poses are not of one run, or mixed up."
@@ -342,6 +373,19 @@ def _check_unit_of_time(robot_id: int, poses_s: float, commands_s: float) -> Non
                 f"robot {robot_id}: the {long} last {long_s:.0f} s, the {short} {short_s:.1f} s; "
                 f"the times of the {long} are in {unit}, so name that column t_{unit}."
             )
+
+
+def _check_rate(poses: PoseSeries) -> None:
+    """Raises LogError where poses are so far apart that they tell nothing of a drive."""
+    if len(poses.utime_us) < FEWEST_POSES:
+        return
+    step_s = float(np.median(np.diff(poses.utime_us))) * 1e-6
+    if step_s > SLOWEST_S:
+        unit = next((u for u, times in TIME_UNITS.items() if step_s / times < SLOWEST_S), "ns")
+        raise LogError(
+            f"robot {poses.robot_id}: its poses are {step_s:g} s apart, too far to tell of a "
+            f"drive; if the times are in {unit}, name that column t_{unit}, in both files."
+        )
 
 
 def _provenance(sources: list[Path], options: ImportOptions) -> str:

@@ -26,6 +26,8 @@ HEADING_LIKE = re.compile(r"theta|yaw|heading|psi|orient|angle|rot|^q_?[wxyz0-3]
 QUATERNION = ("qw", "qx", "qy", "qz")
 WORLD = ("vx_world_mps", "vy_world_mps")
 INPUTS = ("speed_input", "turn_input")
+LATEST_S = 1e11  # in the year 5138; a later stamp has another unit
+SINCE_1970 = {"ms": 1e14, "us": 1e17}  # stamps of our days are smaller
 WRAP_DEG = 20  # more than a robot turns from row to row
 VALUES: dict[CommandKind, tuple[str, ...]] = {
     "duty": ("fl_pct", "fr_pct", "rl_pct", "rr_pct"),
@@ -48,6 +50,7 @@ class Columns:
         rename, mapping, flips: as there.
         robot_id: of all rows, for files without that column, or with one name in it.
         robots: robot_id by what stands in that column.
+        lacks_robot: what to do about a file without robots, beside adding that column.
     """
 
     rename: dict[str, str] = field(default_factory=dict)
@@ -55,6 +58,7 @@ class Columns:
     flips: frozenset[str] = frozenset()
     robot_id: int | None = None
     robots: dict[str, int] = field(default_factory=dict)
+    lacks_robot: str = "give --robot-id for a file of one robot"
 
     def read(self, path: Path, known: frozenset[str]) -> Table:
         """The table under our names."""
@@ -286,8 +290,7 @@ def _robot_ids(table: Table, columns: Columns) -> tuple[np.ndarray, list[str]]:
     if not table.has("robot_id"):
         if columns.robot_id is None:
             raise LogError(
-                f"{table.name}: column robot_id is missing; add it, or give --robot-id for "
-                "a file of one robot."
+                f"{table.name}: column robot_id is missing; add it, or {columns.lacks_robot}."
             )
         return np.full(len(table.rows), columns.robot_id), []
     cells = table.cells("robot_id")
@@ -327,7 +330,15 @@ def _numbered(table: str, names: list[str], columns: Columns) -> tuple[dict[str,
 
 
 def _utime_us(table: Table) -> np.ndarray:
-    return np.round(table.seconds("t_s") * 1e6).astype(np.int64)
+    t_s = table.seconds("t_s")
+    largest = np.abs(t_s).max()
+    if largest > LATEST_S:
+        unit = next((u for u, top in SINCE_1970.items() if largest < top), "ns")
+        raise LogError(
+            f"{table.name}: t_s goes to {largest:.4g}, which are no seconds; if it counts {unit} "
+            f"since 1970, name the column t_{unit}, in the file or with --rename t_s=t_{unit}."
+        )
+    return np.round(t_s * 1e6).astype(np.int64)
 
 
 def _by_robot(

@@ -36,6 +36,7 @@ from twinmill.data.importers.ros_messages import (
     TAGS,
     TF,
     Row,
+    joints_as_they_stand,
     joints_beside_wheels,
     role_of,
     tag_rows,
@@ -52,6 +53,7 @@ LOOKED_AT = 5000  # messages of tf, to see which frames there are
 STEP_BACK_S = 1.0  # messages are never exchanged by that much: a clock was set
 CLOCK_FROM_ZERO_S = 60.0  # the least stamp of a clock that began at 0, which is no missing stamp
 FULL_DUTIES = (1.0, 100.0, 255.0)
+SIDES = {2: "left, right", 4: "front left, front right, rear left, rear right"}
 OF_BASE = re.compile(r"base(_link|_footprint)?$")
 OF_CAMERA = re.compile(r"camera|optical|(^|_)cam(_|$)")  # frames whose z is ahead, not up
 
@@ -372,6 +374,7 @@ class _Messages:
     root: str = ""  # of the tree, for a frame of tf
     lost: int = 0  # the bag says that it has more
     left_out: list[str] = field(default_factory=list)  # joints that are no wheels
+    unordered: list[str] = field(default_factory=list)  # wheels whose names tell no order
 
     def add(self, stamp: object, received_ns: int, value: Row) -> None:
         self.header_ns.append(stamp.sec * 10**9 + stamp.nanosec if stamp else 0)
@@ -417,6 +420,11 @@ class _Rows:
             notes.append(
                 f"{topic}: joints that are called wheels are taken, not "
                 f"{', '.join(messages.left_out)}."
+            )
+        if sides := SIDES.get(len(messages.unordered)):
+            notes.append(
+                f"{topic}: {', '.join(messages.unordered)} are taken for {sides}, as they stand: "
+                "their names do not tell; see what `twinmill wheels` or `diagnose` says of signs."
             )
         if messages.root:
             notes.append(f"{topic}: its place in the frame {messages.root} is taken.")
@@ -519,6 +527,7 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
                 continue
             if kind == JOINTS and not found[name]:
                 found[name].left_out = joints_beside_wheels(message)
+                found[name].unordered = joints_as_they_stand(message)
             value_of = POSES.get(kind) or COMMANDS[kind][1]
             stamp = getattr(getattr(message, "header", None), "stamp", None)
             found[name].add(stamp, received_ns, value_of(message))
@@ -632,6 +641,11 @@ def _commands(robot_id: int, given: _Rows, options: BagOptions) -> CommandSeries
     topic, kind = given.topic, given.kind
     if kind not in COMMANDS:
         raise LogError(f"--command: {topic} holds {kind}, which is no command.")
+    if kind == JOINTS and given.widths == [0]:
+        raise LogError(
+            f"--command: {topic} has positions of joints and no velocities; record what the wheels "
+            "are told, or let the driver publish velocities."
+        )
     if len(given.widths) > 1 or given.widths[0] not in (2, 3, WIDTH):
         raise LogError(
             f"--command: {topic} has {' or '.join(map(str, given.widths))} numbers a message, but "

@@ -3,6 +3,7 @@
 
 import re
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any
 
 from twinmill.data.log import CommandKind
@@ -24,6 +25,8 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 ESTIMATES = (ODOMETRY, "geometry_msgs/msg/PoseWithCovarianceStamped")  # often of the robot itself
 MANY = (TF, *TAGS)  # of one topic
 STEERED = ("ackermann_msgs/msg/AckermannDrive", "ackermann_msgs/msg/AckermannDriveStamped")
+WHEEL = re.compile("wheel|whl", re.IGNORECASE)
+WORDS = re.compile("[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+")  # of front_left, FrontLeft, FLWheel
 DEFINITIONS = {  # of types that the library does not bring; older bags hold none
     STEERED[0]: "float32 steering_angle\nfloat32 steering_angle_velocity\nfloat32 speed\n"
     "float32 acceleration\nfloat32 jerk\n",
@@ -73,40 +76,56 @@ def _duties(message: Any) -> Row:
 def _wheel_speeds(message: Any) -> Row:
     """In our order where the joints' names tell the wheel, else as they stand.
 
-    Where some joints are called wheels, the others (an arm, a pan) are none.
+    Where some joints are called wheels, or tell their sides, the others (an arm, a pan) are none.
     """
     speeds = tuple(map(float, message.velocity))
-    names = list(message.name)
-    if len(names) != len(speeds):
-        return speeds
-    wheels = _called_wheels(names) or range(len(names))
-    speeds = tuple(speeds[k] for k in wheels)
-    places = [_wheel(names[k]) for k in wheels]
+    names = tuple(message.name)
+    return tuple(speeds[k] for k in _taken(names)) if len(names) == len(speeds) else speeds
+
+
+@cache
+def _taken(names: tuple[str, ...]) -> tuple[int, ...]:
+    """Places of the joints that are wheels, in our order where their names tell it."""
+    wheels = _wheels_among(names)
+    order = _order([names[k] for k in wheels])
+    return tuple(wheels[k] for k in order) if order else tuple(wheels)
+
+
+def _wheels_among(names: tuple[str, ...]) -> list[int]:
+    """Places of the joints that are called wheels, or else tell their sides; all if none does."""
+    called = [k for k, name in enumerate(names) if WHEEL.search(name)]
+    sided = [k for k, name in enumerate(names) if _wheel(name)]
+    return called or (sided if len(sided) in (2, 4) else list(range(len(names))))
+
+
+def _order(names: list[str]) -> list[int] | None:
+    """In which order they are left, right or ours; None if the names do not tell."""
+    places = [_wheel(name) for name in names]
     if len(places) == 2:
         places = [place and (1, place[1]) for place in places]
     if not all(place and all(place) for place in places) or len(set(places)) < len(places):
-        return speeds
-    order = sorted(range(len(places)), key=lambda k: places[k])
-    return tuple(speeds[k] for k in order)
-
-
-def _called_wheels(names: list[str]) -> list[int]:
-    """Places of the joints that are called wheels."""
-    return [k for k, name in enumerate(names) if "wheel" in name.lower()]
+        return None
+    return sorted(range(len(places)), key=lambda k: places[k])
 
 
 def joints_beside_wheels(message: Any) -> list[str]:
     """Names of the joints in a JointState that are taken for no wheels."""
-    names = list(message.name)
-    wheels = _called_wheels(names)
-    if not wheels or len(names) != len(message.velocity):
+    if len(message.name) != len(message.velocity):
         return []
-    return [name for k, name in enumerate(names) if k not in wheels]
+    return [name for k, name in enumerate(message.name) if k not in _taken(tuple(message.name))]
+
+
+def joints_as_they_stand(message: Any) -> list[str]:
+    """Names of the wheels in a JointState whose order is not told by their names."""
+    if len(message.name) != len(message.velocity):
+        return []
+    names = [message.name[k] for k in _wheels_among(tuple(message.name))]
+    return [] if _order(names) else names
 
 
 def _wheel(name: str) -> tuple[int, int] | None:
     """Front 1 or rear 2, left 1 or right 2; 0 where the name does not say."""
-    words = set(re.findall(r"[a-z]+", name.lower()))
+    words = {word.lower() for word in WORDS.findall(name.rpartition("/")[2])}
     front = bool(words & {"front", "fl", "fr", "lf", "rf"})
     rear = bool(words & {"rear", "back", "rl", "rr", "bl", "br"})
     left = bool(words & {"left", "l", "fl", "rl", "bl", "lf"})
