@@ -18,7 +18,6 @@ from twinmill_cli.options import Model
 from twinmill_cli.output import AsJson, busy, deliver
 
 if working():  # not for --help
-    import tempfile
     from importlib.metadata import version
 
     import pyarrow as pa
@@ -27,7 +26,7 @@ if working():  # not for --help
     from twinmill.export.recording import Recording, read_recording
     from twinmill.export.rosbag2_file import left_out, write_rosbag2
     from twinmill.export.tables import tables_of, write_csv, write_parquet
-    from twinmill.files import check_new_folder, replacing, replacing_folder
+    from twinmill.files import folder_beside, replacing, replacing_folder
     from twinmill.model.outlines import Body
     from twinmill_cli.frame import open_model
 
@@ -121,16 +120,15 @@ def _write_tables(
     force: bool,
 ) -> list[Path]:
     """One file per table: all are there in the end, or none is new."""
-    check_new_folder(folder)
     if folder.exists() and not force:
         raise ValueError(f"{folder}: exists; choose another name, or replace it with --force.")
     files = [folder / f"{name}.{suffix}" for name in tables]
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as temporary:
+    with folder_beside(folder) as temporary:
         for table, file in zip(tables.values(), files, strict=True):
-            write(table, Path(temporary) / file.name)
+            write(table, temporary / file.name)
         folder.mkdir(exist_ok=True)
         for file in files:
-            os.replace(Path(temporary) / file.name, file)
+            os.replace(temporary / file.name, file)
     return files
 
 
