@@ -6,7 +6,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -46,13 +46,10 @@ def replacing(out: Path, force: bool, mode: int = 0o644) -> Iterator[Path]:
     handle, name = tempfile.mkstemp(prefix=f".{out.name}.", dir=out.parent)
     os.close(handle)
     try:
-        yield Path(name)
-        os.chmod(name, mode)
-        os.replace(name, out)
-    except OSError as error:
-        raise ValueError(
-            f"{out}: cannot be written ({error.strerror}); choose another place."
-        ) from error
+        with _said_of(out):
+            yield Path(name)
+            os.chmod(name, mode)
+            os.replace(name, out)
     finally:
         Path(name).unlink(missing_ok=True)
 
@@ -66,17 +63,35 @@ def replacing_folder(out: Path, force: bool) -> Iterator[Path]:
     """
     if out.exists() and not (force and out.is_dir()):
         raise ValueError(f"{out}: exists; choose another name, or replace it with --force.")
-    check_new_folder(out)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{out.name}.", dir=out.parent) as folder:
-        yield Path(folder) / out.name
+    with folder_beside(out) as folder:
+        yield folder / out.name
         if out.exists():
             shutil.rmtree(out)
-        (Path(folder) / out.name).rename(out)
+        (folder / out.name).rename(out)
+
+
+@contextmanager
+def folder_beside(out: Path) -> Iterator[Path]:
+    """A temporary folder beside `out`; what is missing above is made, and stays if `out` does.
+
+    Raises:
+        ValueError: a folder cannot be made or written there.
+    """
+    check_new_folder(out)
+    missing = [above for above in out.parents if not above.exists()]
+    try:
+        with _said_of(out):
+            out.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix=f".{out.name}.", dir=out.parent) as folder:
+                yield Path(folder)
+    finally:
+        for above in missing:
+            with suppress(OSError):  # it holds what was made
+                above.rmdir()
 
 
 def check_new_folder(path: Path) -> None:
-    """Raises ValueError if a folder could not be made or written here."""
+    """Raises ValueError if a folder, and what is missing above it, could not be made here."""
     existing = path
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
@@ -84,11 +99,21 @@ def check_new_folder(path: Path) -> None:
 
 
 def _check_folder(path: Path, folder: Path) -> None:
-    try:
+    if not folder.is_dir():
+        what = f"{folder} is a file" if folder.exists() else f"there is no folder {folder}"
+        raise ValueError(f"{path}: cannot be written: {what}; make the folder, or name another.")
+    with _said_of(path):
         handle, name = tempfile.mkstemp(prefix=".twinmill.", dir=folder)
+        os.close(handle)
+        os.unlink(name)
+
+
+@contextmanager
+def _said_of(path: Path) -> Iterator[None]:
+    """What the system says of a place that cannot be written, in a sentence."""
+    try:
+        yield
     except OSError as error:
         raise ValueError(
             f"{path}: cannot be written ({error.strerror}); choose another place."
         ) from error
-    os.close(handle)
-    os.unlink(name)

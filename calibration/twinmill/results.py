@@ -291,8 +291,8 @@ def errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
         results: by the name that each has in the figure; of the last, the robot is taken.
     """
     last = results[-1][1]
-    if last.worst in (tables := comparisons.steady_comparisons(last)):
+    if last.shown in (tables := comparisons.steady_comparisons(last)):
         return steady.values(tables).svg.picture
-    robot = last.robots.index(last.worst)
+    robot = last.robots.index(last.shown)
     same = [(label, result.robots[robot]) for label, result in results]
     return error_figures.error_growth(same).svg.picture

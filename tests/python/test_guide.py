@@ -153,6 +153,8 @@ def test_what_is_missing_or_does_not_go_together_is_one_sentence(folder):
     (folder / "plan").mkdir()
     with pytest.raises(ValueError, match="plan: exists"):
         run(["guide", *TWIN])
+    run(["guide", *TWIN, "-o", "a/b"])
+    assert (folder / "a" / "b" / "plan.md").is_file()
 
 
 @pytest.mark.parametrize("wheels", ["differential", "ackermann"])

@@ -2,12 +2,13 @@
 import io
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
 from twinmill.data.measurement import load_measurements
-from twinmill.fitting.compare import compare
+from twinmill.fitting.compare import Comparison, compare
 from twinmill.model.model_file import ModelFile
 from twinmill.report import (
     Provenance,
@@ -87,6 +88,15 @@ def test_every_figure_is_well_formed_and_explained(section):
     for figure in section.figures:
         assert ET.fromstring(figure.svg).tag.endswith("svg")
         assert len(figure.caption.split()) > 15
+
+
+def test_the_robot_is_shown_that_something_was_added_to_or_that_is_missed_most():
+    robots = [
+        SimpleNamespace(robot_id=i, score=score, size=9)
+        for i, score in ((1, 1.0), (2, 3.0), (3, 2.0))
+    ]
+    of_all, of_one = (Comparison("m.toml", robots, [], about=about) for about in (None, 3))
+    assert (of_all.shown.robot_id, of_one.shown.robot_id, of_one.worst.robot_id) == (2, 3, 2)
 
 
 def test_names_from_a_log_are_text_and_not_markup(section, tmp_path):

@@ -251,7 +251,10 @@ def main() -> None:
             raise
         code = 1
         _complain(f"the Python package of '{error.name}' is not installed; `make build` does that.")
-    except (ValueError, OSError) as error:
+    except OSError as error:
+        code = 1
+        _complain(f"{error.filename}: {error.strerror}." if error.filename else str(error))
+    except ValueError as error:
         code = 1
         _complain(str(error))
     sys.exit(code)

@@ -2,7 +2,6 @@
 """A log for other programs: MCAP for Foxglove, a ROS bag, or one table per message type."""
 
 import os
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -16,7 +15,7 @@ from twinmill.export.mcap_file import write_mcap
 from twinmill.export.recording import Recording, read_recording
 from twinmill.export.rosbag2_file import left_out, write_rosbag2
 from twinmill.export.tables import tables_of, write_csv, write_parquet
-from twinmill.files import check_new_folder, replacing, replacing_folder
+from twinmill.files import folder_beside, replacing, replacing_folder
 from twinmill.model.outlines import Body
 
 
@@ -100,15 +99,13 @@ def _write_tables(
     """One file per table: all are there in the end, or none is new."""
     tables = tables_of(recording, provenance)
     write: Callable[[pa.Table, Path], None] = write_csv if to is LogFormat.CSV else write_parquet
-    check_new_folder(folder)
     if folder.exists() and not force:
         raise ValueError(f"{folder}: exists; choose another name, or replace it with --force.")
-    folder.parent.mkdir(parents=True, exist_ok=True)
     files = [folder / f"{name}.{to}" for name in tables]
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as temporary:
+    with folder_beside(folder) as temporary:
         for table, file in zip(tables.values(), files, strict=True):
-            write(table, Path(temporary) / file.name)
+            write(table, temporary / file.name)
         folder.mkdir(exist_ok=True)
         for file in files:
-            os.replace(Path(temporary) / file.name, file)
+            os.replace(temporary / file.name, file)
     return files

@@ -154,6 +154,7 @@ def add(
     held = [HeldOut.of(f) for f in (fitted(opened, [])[1], fitted(opened, old)[1], found)]
     before = comparison(model_file, opened)
     after = comparison(model_file, [o.realigned() for o in moved], Path(out).name)
+    after = replace(after, about=robot_id)
     estimates = found.shared_estimates()
     own = _own_estimates(found, fresh) if robot_id is not None else []
     write_child(

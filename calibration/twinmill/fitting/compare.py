@@ -55,6 +55,11 @@ class RobotComparison:
         return self.modelled.measurement
 
     @property
+    def robot_id(self) -> int:
+        """Its number."""
+        return self.measurement.track.robot_id
+
+    @property
     def model(self) -> native.Model:
         """Of the robot, on the clock used."""
         return self.modelled.model
@@ -94,7 +99,7 @@ class RobotComparison:
     def to_json(self) -> dict:
         """One entry of robots[]."""
         return {
-            "robot_id": self.measurement.track.robot_id,
+            "robot_id": self.robot_id,
             "log": self.measurement.log_name,
             "score": self.score,
             "floor_kind": self.floor.kind,
@@ -111,13 +116,16 @@ class RobotComparison:
 class Comparison:
     """All robots of all logs and tables against one model.
 
-    `detections` are those of their cameras, or None.
+    Attributes:
+        detections: of their cameras, or None.
+        about: number of the one robot that something was added to; None where that is of all.
     """
 
     model_name: str
     robots: list[RobotComparison | SteadyComparison]
     warnings: list[str]
     detections: DetectionComparison | None = None
+    about: int | None = None
 
     @property
     def score(self) -> float:
@@ -132,13 +140,23 @@ class Comparison:
 
     @property
     def worst(self) -> RobotComparison | SteadyComparison:
-        """The robot that the model misses most, whose errors are shown.
+        """The robot that the model misses most; tables stand for all their robots."""
+        return self._most_missed(self.robots)
 
-        Tables stand for all their robots.
-        """
-        if isinstance(self.main, SteadyComparison):
-            return self.main
-        logs = [r for r in self.robots if not isinstance(r, SteadyComparison)]
+    @property
+    def shown(self) -> RobotComparison | SteadyComparison:
+        """The robot whose errors are shown: that which something was added to, or the worst."""
+        own = [r for r in self.robots if r.robot_id == self.about]
+        return self._most_missed(own or self.robots)
+
+    @staticmethod
+    def _most_missed(
+        robots: list[RobotComparison | SteadyComparison],
+    ) -> RobotComparison | SteadyComparison:
+        main = max(robots, key=lambda r: r.size)
+        if isinstance(main, SteadyComparison):
+            return main
+        logs = [r for r in robots if not isinstance(r, SteadyComparison)]
         return max(logs, key=lambda r: (np.nan_to_num(r.score, nan=-1.0), r.size))
 
     @property

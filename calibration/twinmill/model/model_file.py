@@ -4,9 +4,7 @@
 import difflib
 import hashlib
 import math
-import os
 from collections.abc import Collection
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +13,7 @@ from typing import Protocol
 import tomlkit
 import twinmill_native as native
 
+from twinmill.files import replacing
 from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import LAG_EFFECT, ParameterEstimate, catalogue_of, effect_names
 
@@ -242,16 +241,11 @@ def write_whole(path: Path, text: str) -> None:
     Raises:
         ModelError: the folder does not exist or cannot be written.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        temporary.write_text(text)
-        os.replace(temporary, path)
-    except OSError as error:
-        with suppress(OSError):
-            temporary.unlink()
-        raise ModelError(
-            f"{path}: cannot be written ({error.strerror}); choose another place."
-        ) from error
+        with replacing(path, force=True) as temporary:
+            temporary.write_text(text)
+    except ValueError as error:
+        raise ModelError(str(error)) from error
 
 
 def _short(value: float) -> float:

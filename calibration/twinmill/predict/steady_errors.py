@@ -45,6 +45,11 @@ class SteadyComparison:
         return self.modelled.measurement
 
     @property
+    def robot_id(self) -> int:
+        """Its number."""
+        return self.measurement.robot_id
+
+    @property
     def model(self) -> native.Model:
         """Of this robot, its own numbers included."""
         return self.modelled.model

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The charts of a report: all robots of a comparison, the worst stretch of the worst one first."""
+"""The charts of a report: all robots of a comparison, first the worst stretch of the one shown."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -29,11 +29,11 @@ def charts(
     places = [k for k, r in enumerate(result.robots) if isinstance(r, RobotComparison)]
     robots = [result.robots[k] for k in places]
     others = [beside[k] if beside else None for k in places]
-    return partial(_drawn, result.worst, robots, others) if robots else None
+    return partial(_drawn, result.shown, robots, others) if robots else None
 
 
 def _drawn(
-    worst: RobotComparison,
+    begin: RobotComparison,
     robots: list[RobotComparison],
     others: list[tuple[str, native.Model] | None],
 ) -> str:
@@ -45,7 +45,7 @@ def _drawn(
         name = f"{modelled.measurement.label} · {number(robot.score)}"
         seen = detections.get(modelled.measurement.label)
         shown.append(Shown(view, name, modelled.model, robot.where, other, seen))
-    first = robots.index(worst) if worst in robots else 0
+    first = robots.index(begin) if begin in robots else 0
     return embedded(shown, first, _stretch(robots[first]))
 
 

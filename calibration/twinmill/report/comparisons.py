@@ -26,14 +26,14 @@ def steady_comparisons(comparison: Comparison) -> list[SteadyComparison]:
 
 def facts(comparison: Comparison) -> list[tuple[str, str]]:
     """What was compared with what: label and text."""
-    if isinstance(comparison.worst, SteadyComparison):
+    if isinstance(comparison.shown, SteadyComparison):
         return steady.facts(steady_comparisons(comparison), comparison.model_name)
     return tables.facts(comparison)
 
 
-def _of_worst(comparison: Comparison) -> list[Table]:
-    """Errors and where they come, of the robot that is missed most; of several it is named."""
-    robot = comparison.worst
+def _of_shown(comparison: Comparison) -> list[Table]:
+    """Errors and where they come, of the robot that is shown; of several it is named."""
+    robot = comparison.shown
     made = [tables.errors(robot), tables.where(robot)]
     if len(comparison.robots) == 1:
         return made
@@ -41,10 +41,10 @@ def _of_worst(comparison: Comparison) -> list[Table]:
 
 
 def robot_tables(comparison: Comparison) -> list[Table]:
-    """Errors and where they come: of the robot that is missed most, then of all tables."""
+    """Errors and where they come: of the robot that is shown, then of all tables."""
     made = []
-    if not isinstance(comparison.worst, SteadyComparison):
-        made += _of_worst(comparison)
+    if not isinstance(comparison.shown, SteadyComparison):
+        made += _of_shown(comparison)
     if sheets := steady_comparisons(comparison):
         made += [steady.errors(sheets), steady.cells(sheets)]
     if comparison.detections:
@@ -58,7 +58,7 @@ def advice(comparison: Comparison, fitted: bool = False) -> str:
         return "compare with a log that the model was not fitted on."
     if comparison.score <= GOOD:
         return "nothing to add for this log; compare with one of another day, floor or battery."
-    robot = comparison.worst
+    robot = comparison.shown
     if isinstance(robot, SteadyComparison):
         return _steady_advice(robot)
     phases = [r for r in robot.where if r.group == "phase"]
@@ -78,8 +78,11 @@ def advice(comparison: Comparison, fitted: bool = False) -> str:
         try_next = "`twinmill diagnose` names what is missing"
     elif fresh:
         try_next = f"fit if you have not, then add {' or '.join(fresh)}"
+    whose, who = "", "the robot"
+    if len(comparison.robots) > 1:
+        whose, who = f" of {robot.measurement.label}", "it"
     return (
-        f"{100 * worst.share:.0f} % of the error comes while the robot is {worst.regime} "
+        f"{100 * worst.share:.0f} % of the error{whose} comes while {who} is {worst.regime} "
         f"({number(worst.ratio)} times the floor): {WRONG[worst.regime]}; {try_next}."
     )
 

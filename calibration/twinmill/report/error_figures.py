@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of errors: how they grow, when they come, and what each step took away."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from twinmill.fitting.compare import GOOD, MISSING, RobotComparison
@@ -13,7 +15,7 @@ from twinmill.report.tables import SHOWN, WORST, number
 TONES = {"good": "#009e73", "warn": "#e69f00", "bad": "#d55e00"}
 
 
-def error_growth(models: list[tuple[str, RobotComparison]]) -> Figure:
+def error_growth(models: Sequence[tuple[str, RobotComparison]]) -> Figure:
     """Error against horizon in each channel that was recorded and moves, over the floor's band."""
     colours = [PREDICTED] if len(models) == 1 else [BEFORE, PREDICTED]
     floors = models[-1][1].floor.rms

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results of calibration to sections of a report."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from twinmill.fitting.add import AddResult
@@ -17,7 +17,7 @@ from twinmill.report.tables import Table, number, tone
 
 def comparison_section(result: Comparison) -> Section:
     """The page of a comparison: score, where the model misses, and what to do next."""
-    robot = result.worst
+    robot = result.shown
     title = f"{result.model_name} against {robot.measurement.log_name}"
     return Section(
         title,
@@ -25,7 +25,7 @@ def comparison_section(result: Comparison) -> Section:
         result.verdict,
         comparisons.facts(result),
         [
-            *_pictures(result, [("this model", robot)]),
+            *robot_pictures(result, [("this model", robot)]),
             *([detections.field_of_view(result.detections)] if result.detections else []),
         ],
         [*tables.robots(result), *comparisons.robot_tables(result)],
@@ -69,7 +69,7 @@ def _of_both(result: FitResult | AddResult, title: str, more: list[Table]) -> Se
         [_score("before", result.before.score), _score("after", result.after.score)],
         result.after.verdict,
         comparisons.facts(result.after),
-        _pictures(result.after, [("before", before), ("after", after)]),
+        robot_pictures(result.after, [("before", before), ("after", after)]),
         [
             tables.parameters(result.parameters),
             *tables.robots(result.after, result.before),
@@ -107,31 +107,24 @@ def _before_and_after(result: FitResult | AddResult) -> Callable[[], str] | None
 
 
 def _same_robot(result: FitResult | AddResult) -> tuple[RobotComparison, RobotComparison]:
-    """The robot that the new model misses most, with the old model and with the new one."""
+    """The robot that is shown of the new model, with the old model and with the new one."""
     pairs = zip(result.before.robots, result.after.robots, strict=True)
-    return next(pair for pair in pairs if pair[1] is result.after.worst)
+    return next(pair for pair in pairs if pair[1] is result.after.shown)
 
 
-def robot_pictures(result: Comparison) -> list[Figure]:
-    """When the model fails the robot that is missed most, and where."""
-    robot, sheets = result.worst, comparisons.steady_comparisons(result)
+def robot_pictures(result: Comparison, models: Sequence[tuple] = ()) -> list[Figure]:
+    """When the model fails the robot that is shown, and where; errors over time with `models`."""
+    robot, sheets = result.shown, comparisons.steady_comparisons(result)
     own = []
     if robot not in sheets:
         own = [*([regimes(robot)] if robot.where else []), floor_map(robot)]
+        own += [error_growth(models)] if models else []
     if len(result.robots) > 1:
         own = [replace(f, title=f"{f.title}: {robot.measurement.label}") for f in own]
     if sheets:
         number = sheets[0].measurement.robot_id
         own += [steady.values(sheets), regimes(sheets[0], f"Steady inputs of robot {number}")]
     return own
-
-
-def _pictures(result: Comparison, models: list[tuple]) -> list[Figure]:
-    """The same, with errors over time if there is a log."""
-    growth = (
-        [] if result.worst in comparisons.steady_comparisons(result) else [error_growth(models)]
-    )
-    return robot_pictures(result) + growth
 
 
 def _score(label: str, value: float) -> tuple[str, str, tables.Tone]:

@@ -69,17 +69,18 @@ def tone(score: float) -> Tone:
 
 def facts(comparison: Comparison) -> list[tuple[str, str]]:
     """What was compared with what: label and text."""
-    robot = comparison.worst
+    robot = comparison.shown
     measurement, noise = robot.measurement, robot.modelled.noise
     track = measurement.track
     recorded = datetime.fromtimestamp(measurement.recorded_utime_us / 1e6, UTC)
     date = f"{recorded:%Y-%m-%d %H:%M} UTC" if recorded.year > 2000 else "date unknown"
     others = len(comparison.robots) - 1
+    why = "which the model misses most" if comparison.about is None else "which it was added to"
     return [
         (
             "log",
             f"{measurement.log_name}, robot {track.robot_id}"
-            + (f", which the model misses most (and {others} more)" if others else ""),
+            + (f", {why} (and {others} more)" if others else ""),
         ),
         (
             "recorded",

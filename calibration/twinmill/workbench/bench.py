@@ -8,6 +8,7 @@ import asyncio
 import json
 from collections import Counter
 from collections.abc import Callable
+from time import monotonic
 from typing import Any
 
 from twinmill.charts.arrays import RESTARTS, measured_path
@@ -22,6 +23,7 @@ from twinmill.workbench.state_file import StateFile
 from twinmill.workbench.swarm import has_poses
 from twinmill.workbench.worker import Done, Work, Worker
 
+RETRY_S = 2.0  # until the session is written again, after it could not be
 AWAITED = ("fit", "add", "diagnose", "next", "swarm")  # work that the user waits for
 
 
@@ -42,18 +44,22 @@ class Bench:
             `work`, `findings`, `plan`, `swarm`, `beside`.
         opening: what is being opened, in words; empty when all is there.
         failure: what went wrong last.
+        unkept: why the session is not kept at present; empty while it is.
         view: what the screen shows: cursor, stretch, robot, tab.
         told: a page has said why nothing can be opened.
+        port: of the server, kept so that a page left open finds the next one; 0 before the first.
     """
 
     def __init__(self, session: Session, state: StateFile) -> None:
         self.session, self.state = session, state
         self.worker = Worker(session.paths)
         self.changes: Counter[str] = Counter(robots=1)
-        self.opening, self.failure = "starting", ""
+        self.opening, self.failure, self.unkept = "starting", "", ""
         self.view: dict[str, Any] = state.read("view", {})
         self._waiting: Work | None = None
+        self.port: int = state.read("port", 0)
         self._written: tuple = ()
+        self._tried_s = 0.0
         self._reading, self._read = False, asyncio.Event()
         self._checks: Done | None = None
         self.told = asyncio.Event()
@@ -247,13 +253,17 @@ class Bench:
 
     def _write(self) -> None:
         now = (sum(self.changes.values()), json.dumps(self.view), sorted(self.session.held))
-        if now != self._written:
-            data = plain({"view": self.view, "session": self.session.to_json()})
-            self._written = now
+        again = self.unkept and monotonic() - self._tried_s > RETRY_S
+        if now != self._written or again:
+            kept = {"view": self.view, "session": self.session.to_json(), "port": self.port}
+            data = plain(kept)
+            self._written, self._tried_s = now, monotonic()
+            before, self.unkept = self.unkept, ""
             try:
                 self.state.write(json.dumps(data, allow_nan=False))
             except ValueError as error:
-                self.failure = f"What you do is not kept: {error}"
+                self.unkept = f"What you do is not kept: {error}"
+            if self.unkept != before:
                 self.changed("work")
                 self._written = (sum(self.changes.values()), *now[1:])
 

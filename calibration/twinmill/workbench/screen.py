@@ -265,14 +265,15 @@ class Screen:
 
     def _draw_status(self) -> None:
         bench = self.bench
-        words = bench.failure or (f"{bench.opening} …" if bench.opening else "")
+        wrong = bench.failure or bench.unkept
+        words = wrong or (f"{bench.opening} …" if bench.opening else "")
         if bench.doing:
             verb = VERBS[bench.doing.kind]
             words = f"{verb} {bench.doing.effect}".strip() + f": {bench.progress}"
         self.status.set_text(
             words or bench.session.tree.file_name(bench.session.tree.current.number)
         )
-        self.status.classes(replace="space bad" if bench.failure else "space")
+        self.status.classes(replace="space bad" if wrong else "space")
         self.cancel.set_visibility(bench.doing is not None)
 
     async def _draw_score(self) -> None:

@@ -48,7 +48,7 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
 
     Args:
         bench: what is shown.
-        port: 0 takes any that is free.
+        port: 0 takes that of the session before, or any that is free.
         show: opens the user's browser.
         say: told the address.
 
@@ -56,7 +56,7 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
         ValueError: the port is taken, or the logs cannot be judged.
     """
     sys.setswitchinterval(SWITCH_S)
-    port = _free_port(port)
+    port = bench.port = _port(port, bench.port)
     url = f"http://{HOST}:{port}/?token={bench.state.token}"
     app.add_middleware(Guard, token=bench.state.token, port=port)
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
@@ -108,6 +108,14 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
         )
     if failed:
         raise failed[0]
+
+
+def _port(asked: int, before: int) -> int:
+    """The port asked for; for 0 that of the session before, so that its pages find this one."""
+    if not asked and before:
+        with suppress(ValueError):  # others have it by now
+            return _free_port(before)
+    return _free_port(asked)
 
 
 def _free_port(port: int) -> int:

@@ -450,7 +450,9 @@ class Session:
 
     def own_scores(self) -> dict[int, float]:
         """Of each robot where the tree stands; NaN without a floor."""
-        number = self.tree.current.number
+        return self._own_scores(self.tree.current.number)
+
+    def _own_scores(self, number: int) -> dict[int, float]:
         return {k: self.settled(number, k).score for k in self.robots}
 
     def regimes(self, index: int) -> list[Regime]:
@@ -466,13 +468,15 @@ class Session:
 
     def score_now(self, exact: bool = False) -> None:
         """Of all robots where the tree stands, unless it is known."""
-        if self.unjudged or not self.checked or self.tree.current.number in self.tree.scores:
+        tried = self.tree.current  # a hand may lead the tree elsewhere meanwhile
+        if self.unjudged or not self.checked or tried.number in self.tree.scores:
             return
-        known = [s for s in self.own_scores().values() if np.isfinite(s)]
+        known = [s for s in self._own_scores(tried.number).values() if np.isfinite(s)]
         total = total_score(known) if known else float("nan")
-        fitted_here = self.model_file.fitted_on([m.log_sha256 for m in self.measurements])
-        heldout = None if fitted_here or self.tree.current.values else total
-        self.tree.scores[self.tree.current.number] = Score(total, heldout, exact)
+        of_file = self._file(tried.number)
+        fitted_here = of_file.fitted_on([m.log_sha256 for m in self.measurements])
+        heldout = None if fitted_here or tried.values else total
+        self.tree.scores[tried.number] = Score(total, heldout, exact)
 
     # -- long work ------------------------------------------------------------------------------
 

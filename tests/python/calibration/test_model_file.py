@@ -128,7 +128,7 @@ def test_unknown_keys_are_refused_with_the_nearest_known_one(model_file):
 def test_a_place_that_cannot_be_written_is_told_in_one_sentence(place, tmp_path):
     (tmp_path / "file").write_text("I was here")
     (tmp_path / "folder").mkdir()
-    with pytest.raises(ModelError, match=rf"{place}: cannot be written .*; choose another place\."):
+    with pytest.raises(ModelError, match=rf"{place}: (cannot be written: |is a folder; ).*\."):
         write_whole(tmp_path / place, "text")
     assert sorted(p.name for p in tmp_path.rglob("*")) == ["file", "folder"]
 

@@ -8,6 +8,15 @@ from playwright.sync_api import expect, sync_playwright
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 PATIENT_MS = 300_000  # for a machine that is busy with other tests: four robots take 16 s of a core
+# All that a page told in passing: on a busy machine a notice is gone before the test looks for it.
+NOTICES = """
+    window.notices = [];
+    new MutationObserver(() => {
+        for (const { textContent } of document.querySelectorAll(".q-notification")) {
+            if (notices.at(-1) !== textContent) notices.push(textContent);
+        }
+    }).observe(document, { childList: true, subtree: true, characterData: true });
+"""
 HERE = ("http://127.0.0.1:", "ws://127.0.0.1:", "data:", "file:", "blob:")
 
 
@@ -28,6 +37,10 @@ def page(browser):
     page.set_default_timeout(PATIENT_MS)
     expect.set_options(timeout=PATIENT_MS)
     page.foreign, page.broken = [], []
+    page.add_init_script(NOTICES)
+    page.noticed = lambda words: page.wait_for_function(
+        "(words) => notices.some((n) => n.includes(words))", arg=words
+    )
     page.on("request", lambda r: None if r.url.startswith(HERE) else page.foreign.append(r.url))
     page.on("pageerror", lambda error: page.broken.append(str(error)))
     yield page

@@ -55,7 +55,7 @@ export class Stage {
 
   async _showLog(log) {
     const found = await this.source.log(log);
-    if (!found) return;
+    if (!found || log !== this._log) return;
     this.end_s = found.end_s;
     this.robots = found.robots.map((r, k) => ({ ...r, path: found.arrays[`path${k}`] }));
     if (!this._spanGiven) this.span = [0, this.end_s];
@@ -72,8 +72,10 @@ export class Stage {
 
   /** One robot's series; its prediction follows. */
   async pick(label, index) {
+    if (!this.robots.some((r) => r.label === label)) return; // another log is shown by now
+    this._picked = label;
     const found = await this.source.robot(index);
-    if (!found) return;
+    if (!found || label !== this._picked) return; // another one was picked meanwhile
     const robot = this.robots.find((r) => r.label === label);
     if (!robot) return;
     Object.assign(robot, { ...found, index });
