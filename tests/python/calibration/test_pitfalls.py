@@ -24,6 +24,7 @@ from twinmill.fitting.opening import open_measurements
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import ParameterEstimate, base_parameters, effect_parameters
+from twinmill.predict.datasets import Trajectory
 from twinmill.report.diagnosis import each_robot
 
 
@@ -114,6 +115,18 @@ def test_sum_of_delay_and_lag_is_told_beside_its_parts(lateness, tanh_robot):
     # What is reported of the lag is what it is beside the delay, not before that was found.
     lag = named["motor_lag.extra_s"]
     assert lag.value == pytest.approx(MORE_LAG_S, abs=2 * lag.std + EULER_S)
+
+
+def test_of_many_predictions_every_third_start_tells_the_same(late, fitted, monkeypatch):
+    """Predictions of 2 s from starts 0.25 s apart overlap."""
+    few = replace(SETTINGS, starts=len(Trajectory.of(late).keep) // 3 + 1)
+    monkeypatch.setattr("twinmill.diagnosis.diagnose.SETTINGS", few)
+    found = diagnose([late], fitted)
+    assert len(found.search.last.fit.datasets[0].keep) < 60 < len(found.opened[0].data.keep)
+    named = {e.name: e for f in found.findings for e in f.parameters}
+    lag, delay_s = named["motor_lag.extra_s"], named["input_delay.delay_s"].value
+    assert lag.value == pytest.approx(MORE_LAG_S, abs=3 * lag.std)
+    assert lag.value + delay_s == pytest.approx(MORE_LAG_S + DELAY_S, abs=0.01)
 
 
 def test_on_a_clock_of_its_own_a_log_tells_no_delay_and_says_why(late, on_own_clock):
