@@ -88,6 +88,13 @@ def seen_once(done: Search, name: str, less: Trial | None) -> list[str] | None:
     return [n for n in _same(done, name) if with_role(n, "moment")]
 
 
+def while_at(done: Search, name: str) -> list[str]:
+    """Effects of a place that do the same as one of a moment: the robot was there at that time."""
+    if not with_role(name, "moment"):
+        return []
+    return [n for n in _same(done, name) if with_role(n, "place")]
+
+
 def within_the_table(
     found: Sequence[Finding], less: Mapping[str, Trial], last: Trial
 ) -> list[Finding]:

@@ -37,6 +37,28 @@ def test_a_loss_of_some_seconds_is_named(low_s, high_s, tanh_robot, measure, tru
     assert told["until_s"].value == pytest.approx(high_s, abs=1.0)
 
 
+def test_a_loss_in_the_one_stretch_that_was_driven_elsewhere_may_be_of_the_floor(
+    tanh_robot, measure, true_model
+):
+    """Twenty seconds of legs about one place, twenty about one 2 m ahead, where it is weaker."""
+
+    def about(seed):
+        random, legs = np.random.default_rng(seed), []
+        for _ in range(10):  # there and back, so that it stays where it is
+            a, b = random.choice((50, 75, 100)), random.choice((-1, 1))
+            leg = [(a, a, a, a), (a, -a, a, -a), (-a, a, a, -a)][random.integers(3)]
+            legs += [b * np.array(leg)] * 48 + [-b * np.array(leg)] * 48
+        return legs
+
+    away = [np.array((75, 75, 75, 75))] * 300
+    script_pct = np.array([*about(1), *away, *about(2), *[-leg for leg in away], *about(3)])
+    low_s = 0.5 + (960 + 300) / 48  # commands come 48 times a second, after half a second
+    run = measure(weaker(tanh_robot, low_s, low_s + 20, 0.15), 4, script_pct=script_pct)
+    found = diagnose([run], true_model)
+    assert found.verdict == "ambiguous"
+    assert set(found.findings[0].group) == {"transient_loss", "floor_patch"}
+
+
 def test_a_heading_that_errs_once_a_turn_is_named(tanh_robot, measure, true_model):
     """0.07 rad times the sine of the heading and a radian: coefficients by the sum of angles."""
 
