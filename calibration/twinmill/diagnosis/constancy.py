@@ -60,7 +60,7 @@ class OneHeading:
 def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
     """The strongest change of each effect's instance that is not one number; logs alone tell.
 
-    An error of the heading may change with it unseen where the robot kept to one.
+    An error of the heading may change with it unseen where the robot drove along one.
     """
     fit = trial.fit
     logs = [i for i, d in enumerate(fit.datasets) if isinstance(d, Trajectory)]
@@ -82,9 +82,12 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
         """(R,) what the robot was doing, for each row."""
         return np.concatenate([np.repeat(d[key], n) for d, n in zip(doing, rows, strict=True)])
 
+    # Of turns alone, a turn that hangs on the heading looks the same.
+    of_way = np.concatenate([fit.datasets[i].channel < 2 for i in logs])
     heading = done(("heading", "cos")) + 1j * done(("heading", "sin"))
     for c in sizes:
-        instance, own = fit.unknowns[c].parameter.name.split(".")[0], columns[:, c] ** 2
+        instance = fit.unknowns[c].parameter.name.split(".")[0]
+        own = columns[:, c] ** 2 * of_way
         of_heading = instance.split("#")[0] in needing("heading")
         if of_heading and abs(own @ heading) > SETTINGS.one_heading * own.sum():
             found[instance] = OneHeading()

@@ -25,3 +25,26 @@ def test_a_heading_bias_along_one_heading_may_be_one_that_changes_with_it(
     state = first_state(judged(open_measurements([run], guess)), guess, ())
     told = changes_of(fitted(with_effects(state, ["heading_bias"])))
     assert isinstance(told.get("heading_bias"), OneHeading) != turn
+
+
+@pytest.mark.parametrize("turn", [False, True])
+def test_an_error_of_the_compass_that_turns_alone_tell_may_be_of_the_turns(
+    turn, tanh_robot, measure, model_file
+):
+    """A turn on the spot between legs, and back again, or on to the next heading.
+
+    Turns whose speed hangs on the heading show the same headings; only the way that is driven
+    along several tells them from a compass that errs.
+    """
+    legs = [[(d,) * 4] * 48 for d in (100, 0, -100, 0)]
+    spin, rest = [[(-60, 60, -60, 60)] * 70], [[(0,) * 4] * 24]
+    back = [] if turn else [[(60, -60, 60, -60)] * 70]
+    run = measure(
+        tanh_robot(), 6, script_pct=np.concatenate([*legs, *spin, *rest, *back, *rest] * 6)
+    )
+    error_rad = 0.1 * np.sin(run.track.pose[:, 2] + 1)
+    run = run.with_pose(run.track.pose + error_rad[:, None] * np.array([0, 0, 1]))
+    guess = model_file()
+    state = first_state(judged(open_measurements([run], guess)), guess, ())
+    told = changes_of(fitted(with_effects(state, ["compass_deviation"])))
+    assert isinstance(told.get("compass_deviation"), OneHeading) != turn
