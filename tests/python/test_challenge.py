@@ -166,6 +166,15 @@ def test_a_doubtful_name_is_right_but_not_beyond_doubt():
     assert nothing["alarm"] and not nothing["wrong_and_sure"]
 
 
+@pytest.mark.parametrize("certainty", ["sure", "doubtful"])
+def test_what_every_robot_of_forces_has_is_no_alarm(certainty):
+    """Mass drifts outward in arcs, whether or not the log is sure of it."""
+    case = next(c for c in DRAWN if c.kind == "none" and c.plan.robot.plant != "planar")
+    answer = found("lateral_slip")
+    answer["findings"][0]["certainty"] = certainty
+    assert not scored(case, answer)["outcome"]["alarm"]
+
+
 def test_all_names_in_one_group_are_wrong():
     case = case_of("one")
     outcome = scored(case, found(case.hidden[0].name, groups=[NAMES], verdict="ambiguous"))[

@@ -123,7 +123,7 @@ def scored(case: Case, found: dict) -> dict:
         "all": bool(right) and all(any(f.names & r for f in findings) for r in right),
         "alarm": any(not f.names & there for f in firm)
         or verdict in ("outside_catalogue", "bad_input")
-        or (verdict in NAMED and all(f.certainty == "doubtful" for f in every)),
+        or (verdict in NAMED and bool(findings) and all(f.certainty == "doubtful" for f in every)),
         "told": verdict == "outside_catalogue" or told["share"] >= TOLD_REST,
         "depends": _depends(case.hidden, told),
         "others": others,
