@@ -25,6 +25,7 @@ from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
 
 MOST_BLOCKS = 200
+MOST_ROWS = 20_000  # at a time, where each has hundreds of columns
 FOLDS = 5
 FLIPS = 499  # random signs of blocks that make the null distribution
 MOMENTS = "single moments"
@@ -120,10 +121,15 @@ class Formulas:
         before = np.linalg.norm(columns, axis=0)
         if free.shape[1]:
             basis = np.linalg.qr(free)[0]
-            columns = columns - basis @ (basis.T @ columns)
+            along, parts = basis.T @ columns, 1 + len(columns) // MOST_ROWS
+            for some, own in zip(
+                np.array_split(columns, parts), np.array_split(basis, parts), strict=True
+            ):
+                some -= own @ along
         seen = np.linalg.norm(columns, axis=0) > LEFT_OVER * np.maximum(before, 1e-12)
         seen &= before > 1e-9
-        return Products(np.where(seen, columns, 0.0), left, blocks, seen)
+        columns[:, ~seen] = 0.0
+        return Products(columns, left, blocks, seen)
 
 
 @dataclass(frozen=True)
