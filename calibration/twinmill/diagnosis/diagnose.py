@@ -261,7 +261,11 @@ def _concluded(
     start, last = done.rounds[0].before, done.last
     findings, chain = findings_of(done, first, less)
     findings = with_stale_numbers(
-        findings, last.state.model, model_file.lag_std_s(hashes), model_file.effect_stds
+        findings,
+        last.state.model,
+        lag_std_s=model_file.lag_std_s(hashes),
+        clock_std_s=model_file.clock_std_s(hashes),
+        stds=model_file.effect_stds,
     )
     if model_file.model.drive == "duty" and model_file.known_from_other_logs(hashes):
         findings = within_the_table(findings, less, last)

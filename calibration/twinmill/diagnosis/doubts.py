@@ -60,6 +60,8 @@ def of_one(
     card = catalogue_of(done.last.state.model)[name]
     if doubt := _at_bound(card, own) or _faster(name, own):
         return doubt
+    if done.last.state.model.drive == "duty" and (doubt := _wanders(card, own)):
+        return doubt
     if not _stands_alone(done, name) and (doubt := _unusual(card, own)):
         return doubt
     if change:
@@ -168,6 +170,15 @@ def _faster(name: str, own: Sequence[ParameterEstimate]) -> str:
         return (
             f"{loss.name} = {loss.value:.3g} makes the robot faster, which few floors or faults do"
         )
+    return ""
+
+
+def _wanders(card: dict, own: Sequence[ParameterEstimate]) -> str:
+    """A doubt where a loss from a moment on is no more than battery and heat do; else empty."""
+    sizes = [(away, e) for e, p, away in _sizes(card, own) if p["role"] == "size"]
+    most, loss = max(sizes, key=lambda pair: pair[0])
+    if with_role(card["name"], "moment") and most < SETTINGS.drift_std:
+        return f"{loss.name} = {loss.value:.3g}: speeds wander by as much with battery and heat"
     return ""
 
 

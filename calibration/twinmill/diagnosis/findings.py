@@ -24,12 +24,14 @@ from twinmill.diagnosis.search import (
 )
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.model.parameters import (
+    CLOCK,
     LAG,
     LAG_EFFECT,
     ParameterEstimate,
     catalogue_of,
     effect_names,
     late_part,
+    making_late,
     newest_instance,
 )
 from twinmill.predict.datasets import Trajectory
@@ -91,7 +93,12 @@ def _takes(names: Sequence[str], chain: Sequence[Trial]) -> dict[str, float]:
 
 
 def with_stale_numbers(
-    found: Sequence[Finding], model: native.Model, lag_std_s: float, stds: Mapping[str, float]
+    found: Sequence[Finding],
+    model: native.Model,
+    *,
+    lag_std_s: float,
+    clock_std_s: float,
+    stds: Mapping[str, float],
 ) -> list[Finding]:
     """Findings in which what the model may well have by its own error is a stale number.
 
@@ -99,12 +106,14 @@ def with_stale_numbers(
         found: in the order of the chain.
         model: the final one.
         lag_std_s: how well other logs told the model's lag; 0 where none did.
+        clock_std_s: the same of the clocks' offset, which a delay cannot be told from.
         stds: how well other logs told the numbers of the model's effects, by name.
     """
     gone: list[Finding] = []
     own: list[ParameterEstimate] = []
     for finding in found:
         numbers = _stale_numbers(finding, model, lag_std_s, stds)
+        numbers = numbers or _stale_clock(finding, model, clock_std_s)
         if numbers:
             gone.append(finding)
             own += numbers
@@ -132,6 +141,21 @@ def _stale_numbers(
             return [replace(extra, name=LAG, value=lag_s + extra.value)]
     known = finding.again and all(_is_error(e, model, stds) for e in finding.parameters)
     return finding.parameters if known else []
+
+
+def _stale_clock(
+    finding: Finding, model: native.Model, clock_std_s: float
+) -> list[ParameterEstimate]:
+    """The offset of the clocks, if a delay may well be all of its error; else none."""
+    names = {finding.effect, *(finding.group or ())}
+    shifts = {*making_late("delay"), *making_late("clock")}
+    if clock_std_s <= 0 or not names & shifts or not all(late_part(n) for n in names):
+        return []
+    _, key = late_part(finding.effect)
+    late = next(e for e in finding.parameters if e.name.split(".", 1)[1] == key)
+    if abs(late.value) > SETTINGS.within * np.hypot(late.std, clock_std_s):
+        return []
+    return [replace(late, name=CLOCK, value=model.get(CLOCK) + late.value)]
 
 
 def _is_error(own: ParameterEstimate, model: native.Model, stds: Mapping[str, float]) -> bool:

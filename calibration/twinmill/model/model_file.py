@@ -60,6 +60,13 @@ class ModelFile:
         """Hashes (sha256) of the logs that told the clock offset."""
         return list(self._document.get("clock", {}).get("fitted_on", []))
 
+    def clock_std_s(self, log_sha256: Collection[str]) -> float:
+        """How well other logs told the clocks' offset; 0 where none did, or clocks are one."""
+        clock = self._document.get("clock", {})
+        if clock.get("same") or not self.clock_logs or set(self.clock_logs) & set(log_sha256):
+            return 0.0
+        return float(clock.get("std", {}).get("offset_s", 0.0))
+
     def known_from_other_logs(self, log_sha256: Collection[str]) -> set[str]:
         """Names of the base quantities that were fitted, and on none of these logs."""
         base = self._document.get("base", {})

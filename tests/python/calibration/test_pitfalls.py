@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from twinmill.diagnosis.diagnose import diagnose, first_state
-from twinmill.diagnosis.doubts import _faster, beside_more, of_another_form
+from twinmill.diagnosis.doubts import _faster, _wanders, beside_more, of_another_form
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.moments import _events
@@ -23,7 +23,12 @@ from twinmill.fitting.fit import base_names, fit
 from twinmill.fitting.opening import open_measurements
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import ParameterEstimate, base_parameters, effect_parameters
+from twinmill.model.parameters import (
+    ParameterEstimate,
+    base_parameters,
+    catalogue,
+    effect_parameters,
+)
 from twinmill.predict.datasets import Trajectory
 from twinmill.report.diagnosis import each_robot
 
@@ -710,6 +715,18 @@ def test_losses_here_and_then_may_be_one_that_comes_and_goes(losses, certainty):
 def test_a_fault_that_makes_a_robot_faster_is_doubtful(effect, size, doubted):
     estimate = ParameterEstimate(f"{effect}.size", size, 0.02, "", False, True)
     assert bool(_faster(effect, [estimate])) == doubted
+
+
+@pytest.mark.parametrize(
+    ("loss", "side", "doubted"), [(0.016, 0.0, True), (0.016, 0.06, False), (0.06, 0.0, False)]
+)
+def test_a_loss_as_small_as_what_batteries_do_is_doubtful(loss, side, doubted):
+    """Gains of a calibrated robot wander by 4 % in a run."""
+    values = {"loss": loss, "side": side, "from_s": 30.0}
+    own = [
+        ParameterEstimate(f"abrupt_loss.{k}", v, 0.005, "", False, True) for k, v in values.items()
+    ]
+    assert bool(_wanders(catalogue()["abrupt_loss"], own)) == doubted
 
 
 def test_one_window_that_misses_is_no_event():

@@ -148,7 +148,7 @@ def test_a_lag_within_the_models_own_error_is_a_stale_number(lag_s, known_s, eff
     model.set("base.motor_lag_s", lag_s)
     extra = ParameterEstimate("motor_lag.extra_s", -0.0108, 0.0028, "s", False, True)
     lag = Finding("motor_lag", None, [extra], 0.6, "sure")
-    found = with_stale_numbers([lag], model, known_s, {})
+    found = with_stale_numbers([lag], model, lag_std_s=known_s, clock_std_s=0.0, stds={})
     assert [f.effect for f in found] == [effect]
     if effect == REFIT:
         (lag,) = found[0].parameters
@@ -161,8 +161,33 @@ def test_an_effect_that_changed_within_the_models_own_error_is_a_stale_number(kn
     model = native.Model.load("turbopi.toml")
     own = ParameterEstimate("heading_bias#2.bias_rad", 0.05, 0.01, "rad", False, True)
     again = Finding("heading_bias", None, [own], 0.6, "sure", again=True)
-    found = with_stale_numbers([again], model, 0.0, {"heading_bias.bias_rad": known})
+    stds = {"heading_bias.bias_rad": known}
+    found = with_stale_numbers([again], model, lag_std_s=0.0, clock_std_s=0.0, stds=stds)
     assert [f.effect for f in found] == [effect]
+
+
+@pytest.mark.parametrize(
+    ("known_s", "group", "effect"),
+    [
+        (0.0075, ("input_delay", "clock_offset", "second_order_lag"), REFIT),  # 1.7 of its errors
+        (0.0075, None, REFIT),
+        (0.004, None, "input_delay"),
+        (0.0, None, "input_delay"),  # clocks are one
+        (0.0075, ("input_delay", "speed_slip"), "input_delay"),
+    ],
+)
+def test_a_delay_within_the_error_of_the_clocks_is_a_stale_number(known_s, group, effect):
+    """Clocks that another log told: 13 ms later is a delay, or their offset is so much larger."""
+    model = native.Model.load("turbopi.toml")
+    model.set("clock.offset_s", -0.127)
+    own = ParameterEstimate("input_delay.delay_s", 0.0134, 0.002, "s", False, True)
+    late = Finding("input_delay", group, [own], 0.8, "group" if group else "sure")
+    (found,) = with_stale_numbers([late], model, lag_std_s=0.0, clock_std_s=known_s, stds={})
+    assert found.effect == effect
+    if effect == REFIT:
+        (offset,) = found.parameters
+        assert offset.name == "clock.offset_s"
+        assert offset.value == pytest.approx(-0.127 + 0.0134)
 
 
 @pytest.mark.parametrize(("known", "words"), [(1.0, "a little more than"), (1.2, "as it did")])
