@@ -134,7 +134,7 @@ class Log(Shown):
         self._said = list(said)  # by the twin
         self._measurements: dict[str, Measurements] = {}  # by the model's hash
         tables = filter(is_steady_table, self.paths)
-        self._sheets = [sheet for path in tables for sheet in read_steady_tables(path)]
+        self._tables = [table for path in tables for table in read_steady_tables(path)]
         self._logs = [read_log(path) for path in self.paths if not is_steady_table(path)]
 
     def measurements(self, model: "Model | str | Path | None" = None) -> Measurements:
@@ -172,7 +172,7 @@ class Log(Shown):
             [0]
         """
         recorded = {number for log in self._logs for number in log.robots}
-        return sorted(recorded | {sheet.robot_id for sheet in self._sheets})
+        return sorted(recorded | {table.robot_id for table in self._tables})
 
     @property
     def duration_s(self) -> float:
@@ -210,7 +210,7 @@ class Log(Shown):
             {'run.lcmlog'}
         """
         if not self._logs:
-            return pd.concat(map(_steady_rows, self._sheets), ignore_index=True)
+            return pd.concat(map(_steady_rows, self._tables), ignore_index=True)
         return _rows(self._logs, _poses)
 
     def commands(self) -> pd.DataFrame:
@@ -1637,8 +1637,8 @@ def _rows(logs: list[RecordedLog], columns: Callable[[RobotLog], dict]) -> pd.Da
     return pd.concat(parts, ignore_index=True)
 
 
-def _steady_rows(sheet: SteadyTable) -> pd.DataFrame:
-    table = pd.DataFrame(sheet.inputs, columns=list(INPUTS))
-    table.insert(0, "log", sheet.log_name)
-    table.insert(1, "robot_id", sheet.robot_id)
-    return table.assign(runs=sheet.runs, speed_mps=sheet.value[:, 0], turn_radps=sheet.value[:, 1])
+def _steady_rows(told: SteadyTable) -> pd.DataFrame:
+    table = pd.DataFrame(told.inputs, columns=list(INPUTS))
+    table.insert(0, "log", told.log_name)
+    table.insert(1, "robot_id", told.robot_id)
+    return table.assign(runs=told.runs, speed_mps=told.value[:, 0], turn_radps=told.value[:, 1])
