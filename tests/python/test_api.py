@@ -300,9 +300,9 @@ WRONG_TYPES = {  # what is called, and what the sentence says
         "base.motor_lag_s: is '0\\.1', and must be a number",
     ),
     "sides": (lambda log, model: tm.next_run(log, floor_m="2x2"), "floor_m: is '2x2', and must be"),
-    "letters of flips": (
-        lambda log, model: tm.import_log("a.csv", "b.csv", flips="y_m"),
-        "flips: is 'y_m', and must be a list of names",
+    "letters of columns": (
+        lambda log, model: tm.import_log("a.csv", "b.csv", flip="y_m"),
+        "flip: is 'y_m', and must be a list of names",
     ),
     "list of renames": (
         lambda log, model: tm.import_log("a.csv", "b.csv", rename=["yaw=theta_rad"]),
