@@ -82,13 +82,23 @@ NAMES = ((list, tuple, set, frozenset), "a list of names")
 BY_NAME = (Mapping, "a dictionary by name")
 NUMBER = (Real, "a number")
 SWITCH = (bool, "True or False")
-IMPORT_OPTIONS: dict[str, tuple[Any, str]] = {
-    **dict.fromkeys(("robots", "rename"), BY_NAME),
-    **dict.fromkeys(("pose_shift_s", "pose_clock_ppm", "wheelbase_m", "full_duty"), NUMBER),
-    **dict.fromkeys(("path_heading", "same_clock", "receive_stamps"), SWITCH),
-    **dict.fromkeys(("flips", "pose_topics", "command_topics"), NAMES),
-    "mapping": ((str, Path), A_PATH),
-    "up": (str, "`y` or `z`"),
+# Options of `import_log`, named as those of `twinmill import` and in its sentences: the field of
+# `ImportOptions`, the kinds that it may be of, and these in words.
+IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
+    "robot": ("robots", *BY_NAME),
+    "rename": ("rename", *BY_NAME),
+    "mapping": ("mapping", (str, Path), A_PATH),
+    "flip": ("flips", *NAMES),
+    "up": ("up", str, "`y` or `z`"),
+    "pose_shift_s": ("pose_shift_s", *NUMBER),
+    "pose_clock_ppm": ("pose_clock_ppm", *NUMBER),
+    "heading_from_path": ("path_heading", *SWITCH),
+    "same_clock": ("same_clock", *SWITCH),
+    "pose": ("pose_topics", *NAMES),
+    "command": ("command_topics", *NAMES),
+    "receive_stamps": ("receive_stamps", *SWITCH),
+    "wheelbase_m": ("wheelbase_m", *NUMBER),
+    "full_duty": ("full_duty", *NUMBER),
 }
 Form = TypeVar("Form", LogFormat, ModelFormat)
 Result = TypeVar("Result")
@@ -134,7 +144,7 @@ class Log(Shown):
         self._said = list(said)  # by the twin
         self._measurements: dict[str, Measurements] = {}  # by the model's hash
         tables = filter(is_steady_table, self.paths)
-        self._sheets = [sheet for path in tables for sheet in read_steady_tables(path)]
+        self._tables = [table for path in tables for table in read_steady_tables(path)]
         self._logs = [read_log(path) for path in self.paths if not is_steady_table(path)]
 
     def measurements(self, model: "Model | str | Path | None" = None) -> Measurements:
@@ -172,7 +182,7 @@ class Log(Shown):
             [0]
         """
         recorded = {number for log in self._logs for number in log.robots}
-        return sorted(recorded | {sheet.robot_id for sheet in self._sheets})
+        return sorted(recorded | {table.robot_id for table in self._tables})
 
     @property
     def duration_s(self) -> float:
@@ -210,7 +220,7 @@ class Log(Shown):
             {'run.lcmlog'}
         """
         if not self._logs:
-            return pd.concat(map(_steady_rows, self._sheets), ignore_index=True)
+            return pd.concat(map(_steady_rows, self._tables), ignore_index=True)
         return _rows(self._logs, _poses)
 
     def commands(self) -> pd.DataFrame:
@@ -1463,7 +1473,7 @@ def import_log(
 
     One source of poses (`poses`, `motive`, `vicon`) and one of commands (`commands`, `io_tsv`) are
     needed, or a bag, which holds both. Tables may be those of pandas; the page Files lists their
-    columns. Arguments are named as the options of `twinmill import`, and so are warnings.
+    columns. Arguments are named as the options of `twinmill import`, whose help says more.
 
     Args:
         poses: CSV or table: t_s, robot_id, x_m, y_m, theta_rad; one of ROS or of others with
@@ -1473,14 +1483,14 @@ def import_log(
         motive: CSV export of OptiTrack Motive.
         vicon: CSV export of Vicon Tracker or Nexus.
         io_tsv: io.tsv of robots.
-        bag: ROS bag, with the topics in `pose_topics` and `command_topics`.
+        bag: ROS bag, with its topics in `pose` and `command`.
         detections: CSV or table of what cameras saw: t_s, robot_id, seen.
         robot_id: whose the rows are, for files that do not say.
         heading_offset_deg: from the tracked body's x axis to the robot's front, left positive.
-        options: fields of `twinmill.data.importers.import_log.ImportOptions`: `robots` and `rename`
-            (dictionaries), `mapping` (a path), `flips` (a set of columns), `up`, `pose_shift_s`,
-            `pose_clock_ppm`, `path_heading`, `same_clock`, `pose_topics`, `command_topics`,
-            `receive_stamps`, `wheelbase_m`, `full_duty`.
+        options: `robot` (numbers by name) and `rename` (our column by the file's), dictionaries;
+            `mapping`, a path; `flip`, a list of our columns; `up`, `pose_shift_s`,
+            `pose_clock_ppm`, `heading_from_path`, `same_clock`; of a bag `pose` and `command`
+            (lists of topics), `receive_stamps`, `wheelbase_m`, `full_duty`.
 
     Returns:
         A log; its file goes with the object unless it is saved.
@@ -1525,8 +1535,8 @@ def _import_options(options: Mapping[str, Any]) -> dict[str, Any]:
     """Fields of `ImportOptions`, once each is known to be of its kind."""
     told = {}
     for name in known("option", options, IMPORT_OPTIONS):
-        kinds, wanted = IMPORT_OPTIONS[name]
-        told[name] = checked(name, options[name], kinds, wanted)
+        field, kinds, wanted = IMPORT_OPTIONS[name]
+        told[field] = checked(name, options[name], kinds, wanted)
     if "mapping" in told:
         told["mapping"] = Path(told["mapping"])
     if "flips" in told:
@@ -1637,8 +1647,8 @@ def _rows(logs: list[RecordedLog], columns: Callable[[RobotLog], dict]) -> pd.Da
     return pd.concat(parts, ignore_index=True)
 
 
-def _steady_rows(sheet: SteadyTable) -> pd.DataFrame:
-    table = pd.DataFrame(sheet.inputs, columns=list(INPUTS))
-    table.insert(0, "log", sheet.log_name)
-    table.insert(1, "robot_id", sheet.robot_id)
-    return table.assign(runs=sheet.runs, speed_mps=sheet.value[:, 0], turn_radps=sheet.value[:, 1])
+def _steady_rows(told: SteadyTable) -> pd.DataFrame:
+    table = pd.DataFrame(told.inputs, columns=list(INPUTS))
+    table.insert(0, "log", told.log_name)
+    table.insert(1, "robot_id", told.robot_id)
+    return table.assign(runs=told.runs, speed_mps=told.value[:, 0], turn_radps=told.value[:, 1])

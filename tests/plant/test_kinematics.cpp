@@ -126,6 +126,23 @@ TEST(Kinematics, Omni3RollsAsItsContactPointsMove)
     }
 }
 
+// A point of a body that turns moves as fast as it is far out, so that wheels at other places than
+// a model's, as an MJCF file may have them, turn the body by their own.
+TEST(Kinematics, WheelsTwiceAsFarOutTurnTheBodyHalfAsFast)
+{
+    for (const WheelKind kind : kAllKinds)
+    {
+        std::vector<Wheel> wheels = DrivenWheels(Robot{}, kind);
+        const WheelMotion motion = Kinematics(wheels).Inverse({0, 0, 1});
+        for (Wheel &wheel : wheels)
+        {
+            wheel.x_m *= 2;
+            wheel.y_m *= 2;
+        }
+        EXPECT_NEAR(Kinematics(wheels).Forward(motion).omega_radps, 0.5, 1e-13);
+    }
+}
+
 // All four wheels of a steered robot turn about one point on the line of the rear axle, at the
 // distance wheelbase / tan(steering) (Rajamani 2012, Vehicle Dynamics and Control, sec. 2.2); the
 // rear wheels' speeds are as their distances from it.

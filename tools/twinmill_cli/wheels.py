@@ -73,7 +73,7 @@ def _wheels(
         return _write(robot_model, output, duty_pct, script_as, force=force, as_json=as_json)
     found = [read_signs(robot, robot_model, log.name) for robot in read_log(log).robots.values()]
     right = all(signs.right for signs in found)
-    data = {"log": str(log), "right": right, "robots": [_json(signs) for signs in found]}
+    data = {"log": str(log), "right": right, "robots": [signs.to_json() for signs in found]}
     deliver(data, Group(*(part for signs in found for part in _shown(signs))), as_json)
     return 0 if right else 1
 
@@ -102,28 +102,9 @@ def _twists(model: native.Model, t_s: np.ndarray, values: np.ndarray, end_s: flo
     return TwistScript.of(model, t_s, values / 100, end_s)
 
 
-def _json(signs: WheelSigns) -> dict:
-    return {
-        "robot_id": signs.robot_id,
-        "right": signs.right,
-        "columns": [
-            {
-                "name": c.name,
-                "does": c.like or None,
-                "sign": c.sign,
-                "stands": c.stood,
-                "right": c.right,
-                **dict(zip(("forward_mps", "left_mps", "turn_radps"), c.body, strict=True)),
-            }
-            for c in signs.columns
-        ],
-        "input": [finding.to_json() for finding in signs.findings],
-    }
-
-
 def _shown(signs: WheelSigns) -> list:
     rows = [
-        [Cell(c.name), *map(Cell, _speeds(c)), Cell(_verdict(c), "good" if c.right else "bad")]
+        [Cell(c.name), *map(Cell, _speeds(c)), Cell(c.verdict, "good" if c.right else "bad")]
         for c in signs.columns
     ]
     titles = ["driven forward", "forward mm/s", "left mm/s", "turn °/s", "so"]
@@ -140,14 +121,3 @@ def _shown(signs: WheelSigns) -> list:
 def _speeds(c: Column) -> list[str]:
     shown = (1e3 * c.body[0], 1e3 * c.body[1], math.degrees(c.body[2]))
     return [f"{value:+.0f}" if c.driven else "-" for value in shown]
-
-
-def _verdict(c: Column) -> str:
-    if not c.driven:
-        return "was not driven alone"
-    if c.stood:
-        return "stands"
-    if not c.like:
-        return "goes as no wheel does"
-    backward = " backward" if c.sign < 0 else ""
-    return "right" if c.right else f"goes as {c.like}{backward}"

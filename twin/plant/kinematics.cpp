@@ -12,11 +12,11 @@ namespace
 
 using InverseMatrix = Eigen::Matrix<double, kMaxWheels, 3>;
 
-InverseMatrix InverseOf(const Robot &robot, WheelKind kind)
+InverseMatrix InverseOf(const std::vector<Wheel> &wheels)
 {
     InverseMatrix inverse = InverseMatrix::Zero();
     int row = 0;
-    for (const Wheel &wheel : DrivenWheels(robot, kind))
+    for (const Wheel &wheel : wheels)
     {
         const double g_x = wheel.grip_x(), g_y = wheel.grip_y();
         inverse.row(row++) << g_x, g_y, wheel.x_m * g_y - wheel.y_m * g_x;
@@ -26,15 +26,18 @@ InverseMatrix InverseOf(const Robot &robot, WheelKind kind)
 
 }  // namespace
 
-Kinematics::Kinematics(const Robot &robot, WheelKind kind)
-    : steers_(kind == WheelKind::kAckermann),
-      wheelbase_m_(2 * robot.half_wheelbase_m),
-      half_track_m_(robot.half_track_m),
-      max_steering_rad_(robot.max_steering_rad),
-      inverse_(InverseOf(robot, kind))
+Kinematics::Kinematics(const Robot &robot, WheelKind kind) : Kinematics(DrivenWheels(robot, kind))
 {
+    steers_ = kind == WheelKind::kAckermann;
+    wheelbase_m_ = 2 * robot.half_wheelbase_m;
+    half_track_m_ = robot.half_track_m;
+    max_steering_rad_ = robot.max_steering_rad;
     if (steers_)
         rear_m_ = robot.half_wheelbase_m;
+}
+
+Kinematics::Kinematics(const std::vector<Wheel> &wheels) : inverse_(InverseOf(wheels))
+{
     // Least squares; the sideways column of a robot that cannot strafe is zero and stays so.
     Eigen::Matrix3d normal = inverse_.transpose() * inverse_;
     for (int i = 0; i < 3; ++i)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads steady-state tables: per robot and input the median of its runs, and how far to trust it.
 
-Errors of typing and timing are common in such sheets, so medians are taken, of runs as well as of
+Errors of typing and timing are common in such tables, so medians are taken, of runs as well as of
 their scatter: a wrong number hardly moves them.
 """
 
@@ -84,7 +84,7 @@ def is_steady_table(path: Path) -> bool:
 
 
 def read_steady_tables(path: Path) -> list[SteadyTable]:
-    """Reads a table: one sheet per robot.
+    """Reads a file: one table per robot.
 
     Raises:
         LogError: no such table, or a wrong cell, with its row.

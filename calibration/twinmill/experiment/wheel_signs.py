@@ -56,6 +56,30 @@ class Column:
         """It was driven alone for long enough to tell."""
         return bool(np.isfinite(self.body).all())
 
+    @property
+    def verdict(self) -> str:
+        """What it does, in words."""
+        if not self.driven:
+            return "was not driven alone"
+        if self.stood:
+            return "stands"
+        if not self.like:
+            return "goes as no wheel does"
+        backward = " backward" if self.sign < 0 else ""
+        return "right" if self.right else f"goes as {self.like}{backward}"
+
+    def to_json(self) -> dict:
+        """The interface's object."""
+        speeds = zip(("forward_mps", "left_mps", "turn_radps"), self.body, strict=True)
+        return {
+            "name": self.name,
+            "does": self.like or None,
+            "sign": self.sign,
+            "stands": self.stood,
+            "right": self.right,
+            **dict(speeds),
+        }
+
 
 @dataclass(frozen=True)
 class WheelSigns:
@@ -69,6 +93,15 @@ class WheelSigns:
     def right(self) -> bool:
         """Every column was driven alone and did what it should."""
         return all(c.right for c in self.columns) and not any(f.fatal for f in self.findings)
+
+    def to_json(self) -> dict:
+        """The interface's object."""
+        return {
+            "robot_id": self.robot_id,
+            "right": self.right,
+            "columns": [column.to_json() for column in self.columns],
+            "input": [finding.to_json() for finding in self.findings],
+        }
 
 
 def columns_that_act(model: native.Model, kind: CommandKind) -> dict[str, tuple[int, ...]]:

@@ -14,7 +14,7 @@ from twinmill.predict.datasets import PARTS
 
 CHANNELS = (("speed", "m/s"), ("turn", "rad/s"), ("standing side", "m/s"))
 
-TYPING_ERROR = 10.0  # times the floor: beyond it, more likely the sheet is wrong than the model
+TYPING_ERROR = 10.0  # times the floor: beyond it, more likely the table is wrong than the model
 
 
 @dataclass
@@ -35,7 +35,7 @@ class SteadyStates:
 
     @classmethod
     def of(cls, sheet: SteadyTable, model: native.Model) -> "SteadyStates":
-        """A sheet with a model of its kind of robot.
+        """A table with a model of its kind of robot.
 
         Raises:
             LogError: the model is driven by measured wheel speeds, which a table does not have.

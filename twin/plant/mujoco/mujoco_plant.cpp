@@ -59,17 +59,17 @@ void CheckInputs(const std::vector<Model> &models, const std::vector<Pose2> &sta
     }
 }
 
-// Radius and places of the wheels as the MJCF file has them.
-Robot Geometry(const mjModel *m, const Model &model)
+// The wheels at their places in the MJCF file.
+std::vector<Wheel> WheelsIn(const mjModel *m, const Model &model)
 {
-    Robot robot;
-    const int wheel = Id(m, mjOBJ_GEOM, 0, model.MakeWheels()[0].name);
-    const mjtNum *hub = m->body_pos + 3 * m->geom_bodyid[wheel];
-    robot.wheel_radius_m = m->geom_size[3 * wheel];
-    robot.half_wheelbase_m = std::abs(hub[0]);
-    robot.half_track_m =
-        model.base.wheels == WheelKind::kOmni3 ? std::hypot(hub[0], hub[1]) : std::abs(hub[1]);
-    return robot;
+    std::vector<Wheel> wheels = model.MakeWheels();
+    for (Wheel &wheel : wheels)
+    {
+        const mjtNum *hub = m->body_pos + 3 * m->geom_bodyid[Id(m, mjOBJ_GEOM, 0, wheel.name)];
+        wheel.x_m = hub[0];
+        wheel.y_m = hub[1];
+    }
+    return wheels;
 }
 
 // Drag across the grip of one wheel that carries its share of the robot.
@@ -94,10 +94,11 @@ MujocoPlant::MujocoPlant(const std::string &mjcf, const std::vector<Model> &mode
     LogToStderrAlone();
     model_.reset(CompileWorld(mjcf, models, starts, options));
     data_.reset(mj_makeData(model_.get()));
-    const Robot geometry = Geometry(model_.get(), models[0]);
-    wheel_radius_m_ = geometry.wheel_radius_m;
-    kinematics_ = Kinematics(geometry, models[0].base.wheels);
-    drag_N_ = RollerDrag(model_.get(), models[0].MakeWheels());
+    const std::vector<Wheel> wheels = WheelsIn(model_.get(), models[0]);
+    const int first = Id(model_.get(), mjOBJ_GEOM, 0, wheels[0].name);
+    wheel_radius_m_ = model_->geom_size[3 * first];
+    kinematics_ = Kinematics(wheels);
+    drag_N_ = RollerDrag(model_.get(), wheels);
     for (size_t i = 0; i < models.size(); ++i)
         robots_.push_back(MakeMember(static_cast<int>(i), models[i], starts[i], options.seed));
     mj_forward(model_.get(), data_.get());

@@ -31,6 +31,8 @@ class Kinematics
 {
 public:
     Kinematics(const Robot &robot, WheelKind kind);
+    // Of wheels at these places, none of them steered.
+    explicit Kinematics(const std::vector<Wheel> &wheels);
     Twist Forward(const WheelMotion &motion) const;
     // The motion nearest to `twist` that the wheels can make. A steered robot cannot turn on the
     // spot; its steering stays within its limit.
@@ -42,8 +44,8 @@ public:
     double SidewaysOfTurning(double omega_radps) const { return rear_m_ * omega_radps; }
 
 private:
-    bool steers_;
-    double rear_m_ = 0, wheelbase_m_, half_track_m_, max_steering_rad_;
+    bool steers_ = false;
+    double rear_m_ = 0, wheelbase_m_ = 0, half_track_m_ = 0, max_steering_rad_ = 0;
     Eigen::Matrix<double, 3, kMaxWheels> forward_;
     Eigen::Matrix<double, kMaxWheels, 3> inverse_;
 };

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a swarm does, as a page: its class, its metrics over time, its paths."""
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.report import Figure, Section
+from twinmill.report.canvas import MEASURED, PREDICTED, draw, plain_ticks
+from twinmill.swarm.classes import COLORS, WORDS
+from twinmill.swarm.metrics import SwarmSeries
+
+LAST_S = 10.0
+NOTE = (
+    "The class comes from the mean of the last 10 s: milling is circliness below 0.2, turning "
+    "together, bodies apart; below 1 is an uneven ring; above, one cluster or separated groups."
+)
+PANELS = {
+    "circliness": "circliness",
+    "radius_m": "radius (m)",
+    "rotation": "rotation",
+    "diffusion": "diffusion",
+    "groups": "groups",
+    "contacts": "contacts",
+}
+
+
+def section(series: SwarmSeries) -> Section:
+    """The page of a swarm's metrics: its class, how they went, where the robots went."""
+    mean = dict(zip(native.METRICS, series.mean.tolist(), strict=True))
+    odd = f", odd robots at {mean['odd_ratio']:.2f} of its radius" if series.odd else ""
+    verdict = (
+        f"{series.final}: {WORDS[series.final]}. Last 10 s: circliness {mean['circliness']:.3f}, "
+        f"radius {mean['radius_m']:.3f} m, rotation {mean['rotation']:+.2f}, diffusion "
+        f"{mean['diffusion']:.2f}, groups {mean['groups']:.1f}, contacts {mean['contacts']:.1f}"
+        f"{odd}."
+    )
+    return Section(
+        title="What the swarm does",
+        score=[("class of the last 10 s", series.final, "")],
+        verdict=verdict,
+        facts=[
+            ("robots", ", ".join(map(str, series.robots))),
+            ("odd", ", ".join(map(str, series.odd)) or "none"),
+            ("time with all poses", f"{series.t_s[-1] - series.t_s[0]:.1f} s"),
+        ],
+        figures=[_over_time(series), _paths(series)],
+    )
+
+
+def _over_time(series: SwarmSeries) -> Figure:
+    colors = [COLORS[name] for name in series.classes]
+
+    def paint(panels) -> None:
+        strip, *rest = panels
+        strip.scatter(series.t_s, np.zeros(len(colors)), c=colors, marker="s", s=40, lw=0)
+        strip.set(ylim=(-1, 1), yticks=[])
+        strip.grid(False)
+        for axes, (name, label) in zip(rest, PANELS.items(), strict=True):
+            axes.plot(
+                series.t_s, series.values[:, native.METRICS.index(name)], color=MEASURED, lw=1
+            )
+            axes.set_ylabel(label)
+        rest[0].set(yscale="log", ylim=(0.02, None))
+        plain_ticks(rest[0].yaxis)
+        for level in (0.2, 1):
+            rest[0].axhline(level, color=PREDICTED, lw=0.8)
+        rest[3].axhline(1, color=PREDICTED, lw=0.8)
+        rest[-1].set_xlabel("time (s)")
+
+    present = [name for name in COLORS if name in series.classes]
+    return Figure(
+        draw(
+            1.4 * len(PANELS),
+            paint,
+            nrows=len(PANELS) + 1,
+            sharex=True,
+            height_ratios=[0.25, *[1] * len(PANELS)],
+        ),
+        "Over time",
+        "The strip on top is the class of the 10 s before: "
+        + ", ".join(f"{name} ({_color_word(name)})" for name in present)
+        + ". Red lines: circliness 0.2 and 1, and diffusion 1, above which nobody can reach "
+        "another's view.",
+    )
+
+
+def _color_word(name: str) -> str:
+    return {
+        "milling": "green",
+        "ellipsoidal": "yellow",
+        "cluster": "red",
+        "separated": "blue",
+        "jammed": "grey",
+        "undefined": "pale",
+    }[name]
+
+
+def _paths(series: SwarmSeries) -> Figure:
+    last = series.t_s > series.t_s[-1] - LAST_S
+
+    def paint(axes) -> None:
+        for k, robot in enumerate(series.robots):
+            path = series.pose[last, k]
+            odd = robot in series.odd
+            axes.plot(path[:, 0], path[:, 1], lw=1.2, color=PREDICTED if odd else MEASURED)
+            end = {"xytext": (5, 5), "textcoords": "offset points"}
+            axes.annotate(str(robot), path[-1, :2], fontsize=8, **end)
+            axes.plot(*path[-1, :2], "o", ms=4, color=PREDICTED if odd else MEASURED)
+        axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
+
+    return Figure(
+        draw(4.5, paint),
+        "Where they went",
+        "Paths of the last 10 s; dots are the ends."
+        + (" Odd robots are red." if series.odd else ""),
+    )
