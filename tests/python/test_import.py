@@ -312,8 +312,13 @@ Frame,Time (Seconds),X,X,Y,Z,W,X,Y,Z,
 """
 
 
-def test_motive_y_up_millimetres_become_z_up_metres(put, tmp_path):
-    import_log(None, put("c.csv", COMMANDS), tmp_path / "o.lcmlog", motive=put("take.csv", MOTIVE))
+# Saved again by a spreadsheet of a country that writes decimal commas.
+SAVED_AGAIN = MOTIVE.replace(",", ";").replace("0.", "0,")
+
+
+@pytest.mark.parametrize("take", [MOTIVE, "\ufeff" + MOTIVE, SAVED_AGAIN])
+def test_motive_y_up_millimetres_become_z_up_metres(put, tmp_path, take):
+    import_log(None, put("c.csv", COMMANDS), tmp_path / "o.lcmlog", motive=put("take.csv", take))
     robot = read_log(tmp_path / "o.lcmlog").robots[4]
     np.testing.assert_allclose(robot.pose[:2, :2], [[0.1, -0.2], [0.1, 0.2]])
     np.testing.assert_allclose(robot.z_m[:2], 0.05)

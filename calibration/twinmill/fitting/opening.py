@@ -196,7 +196,8 @@ def judged(opened: Sequence[Opened]) -> list[Opened]:
 def of_few_commands(opened: Sequence[Opened]) -> str:
     """A sentence where logs have so few commands that a fit holds at these alone; else empty.
 
-    A command counts if it was in force for a hundredth of the time, and moved the robot.
+    A command counts if it was in force for a hundredth of the time, and moved the robot. Where such
+    commands are the lesser part of the drive, as by a stick or by encoders, it has many.
 
     Args:
         opened: measurements; of tables nothing is said.
@@ -209,9 +210,9 @@ def of_few_commands(opened: Sequence[Opened]) -> str:
     shares = shares / max(shares.sum(), 1e-9)
     top = max(np.abs(commands).max(), 1e-9)
     kinds, which = np.unique((commands / top).round(2), axis=0, return_inverse=True)
-    long = np.bincount(which.ravel(), shares) > 0.01
-    count = int(np.sum(long & kinds.any(axis=1)))
-    if count >= FEW_COMMANDS:
+    held, moving = np.bincount(which.ravel(), shares), kinds.any(axis=1)
+    count = int(np.sum(moving & (held > 0.01)))
+    if count >= FEW_COMMANDS or held[moving & (held > 0.01)].sum() < held[moving].sum() / 2:
         return ""
     told = "one command" if count == 1 else f"{count} different commands"
     return (

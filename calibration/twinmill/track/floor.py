@@ -16,6 +16,7 @@ from twinmill.track.detect import ROBOTS, TAGS, Sightings, centres, check_single
 FEWEST = 4  # three leave two places for the camera, and nothing to check by
 FLAT = 0.05  # points are on a line if they stretch less than this share across it
 MIRRORED = 0.5  # of `_turned_alike`; points that are exchanged make less
+EDGE = 0.15  # of the picture, where boards are seldom shown
 WORST_PX, WORST_M = 2.0, 0.005  # beyond both it is no tape measure's error
 
 
@@ -239,9 +240,15 @@ def _which(view: View, place_m: np.ndarray, pixel: np.ndarray, tag: np.ndarray) 
                 rests.append((_pose(view.camera, place_m[rest], pixel[rest]), k, place_m[rest]))
     best = min(rests, key=lambda found: found[0].error_px, default=None)
     if best and not _misses(best[0], best[2]):
+        part = pixel[best[1]] / view.camera.size_px
+        lens = (
+            "; it is near the edge of the picture, where the lens may be wrong: show the board "
+            "there, too, and calibrate it again"
+        )
         return (
             f"{head}; without {names[best[1]]} the rest miss by {best[0].error_px:.1f} px: measure "
-            "anew where it is, or take it out of the floor file."
+            "anew where it is, or take it out of the floor file"
+            f"{lens * bool(np.minimum(part, 1 - part).min() < EDGE)}."
         )
     return (
         f"{head}; check the places of {', '.join(names)}, which is which, and that the lens file "

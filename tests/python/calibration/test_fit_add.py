@@ -179,9 +179,15 @@ def test_commands_that_never_change_give_no_score_and_say_why(
 def test_a_fit_to_few_commands_says_that_it_holds_there_alone(
     tanh_robot, measure, model_file, tmp_path
 ):
-    """As a robot that mills has them: one while it sees nobody, and another while it does."""
+    """As a robot that mills has them: one while it sees nobody, and another while it does.
+
+    One that is driven by a stick has no command for long, and very many.
+    """
     two = np.repeat([[50, 100, 50, 100], [40, 40, 40, 40]], 100, axis=0)
-    for k, (script, told) in enumerate([(np.tile(two, (7, 1)), True), (None, False)]):
+    step = np.arange(1400)[:, None]
+    stick = np.rint(70 * np.sin(step / [23, 31, 37, 29] + [0, 1, 2, 3])).astype(int)
+    cases = [(np.tile(two, (7, 1)), True), (None, False), (stick, False)]
+    for k, (script, told) in enumerate(cases):
         robot = tanh_robot()
         run = measure(robot, 2, 30.0) if script is None else measure(robot, 2, script_pct=script)
         result = fit([run], model_file(), tmp_path / f"{k}.toml", "test")

@@ -13,6 +13,7 @@ import csv
 import re
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +57,9 @@ def read_motive(path: Path, robots: dict[str, int], up: str, absolute: bool) -> 
         LogError: unreadable, no Motive export, or exported in a way that holds no such poses.
     """
     with open_text(path) as text:
-        reader = csv.reader(text)
+        first = text.readline()
+        delimiter = max(",;\t", key=first.count)  # a spreadsheet writes it anew in its own way
+        reader = csv.reader(chain([first], text), delimiter=delimiter)
         header = _header(reader, path.name)
         numbers = [
             _row(row, header, f"{path.name}: row {reader.line_num}") for row in filter(None, reader)
@@ -179,6 +182,7 @@ def _bodies(rows: list[list[str]], turned_about: str, name: str) -> dict[str, li
 def _row(row: list[str], header: _Header, where: str) -> list[float]:
     """Time, then the components of each body; empty cells are NaN."""
     columns = [column for body in header.bodies.values() for column in body]
+    row = [cell.replace(",", ".") for cell in row]  # of numbers alone, where commas are decimal
     try:
         return [
             float(row[header.time_column]),
