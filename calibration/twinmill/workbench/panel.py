@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Protocol
 
 from twinmill.fitting.compare import GOOD, MISSING
-from twinmill.report.tables import rounded
+from twinmill.model.parameters import ParameterEstimate
+from twinmill.report import tables
 from twinmill.workbench.bench import Bench
 
 
@@ -57,8 +58,6 @@ def tone(score: float | None) -> str:
 
 
 def estimate(entry: dict) -> str:
-    """A parameter as --json gives it: `deceleration 0.7 ± 0.02 m/s²`."""
-    name = entry["name"].split(".", 1)[-1]
-    unit = "" if entry["unit"] == "1" else f" {entry['unit'].replace('^2', '²')}"
-    spread = f" ± {entry['std']:.1g}" if entry["std"] is not None else ""
-    return f"{name} {rounded(entry['value'], entry['std'] or 0.0)}{spread}{unit}"
+    """A parameter as --json gives it, in the words of the reports."""
+    std = float("nan") if entry["std"] is None else entry["std"]
+    return tables.estimate(ParameterEstimate(**{**entry, "std": std}))
