@@ -69,6 +69,11 @@ class ModelsPanel:
             ui.html(f'<pre class="command">{text}</pre>', sanitize=False).props(
                 'data-testid="commands"'
             )
+            if self.bench.session.is_outdated:
+                ui.label(
+                    f"{tree.name} was changed since it was opened: now these commands make "
+                    "another model."
+                ).classes("note wrong").props('data-testid="outdated"')
 
     def _save(self) -> None:
         name = (self.path.value or "").strip()

@@ -220,6 +220,14 @@ class Session:
         return self._files[number]
 
     @property
+    def is_outdated(self) -> bool:
+        """Whether the file of the model as given holds another one by now, or is gone."""
+        try:
+            return self.given.path.read_text() != self.given.text
+        except OSError:
+            return True
+
+    @property
     def is_dragged(self) -> bool:
         """Whether a hand holds a knob."""
         return bool(self._dragged)
