@@ -494,5 +494,4 @@ def _effect_words(estimate: ParameterEstimate) -> str:
 
 
 def _number(estimate: ParameterEstimate) -> str:
-    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    return f"{estimate.name} {estimate.value:.3g}{unit}"
+    return f"{estimate.name} {estimate.value:.3g}{estimate.of_unit}"

@@ -215,7 +215,7 @@ def parameters(estimates: list[ParameterEstimate]) -> Table:
                 Cell(e.name, "" if told else "dim"),
                 Cell(value, "" if told else "dim"),
                 Cell(std),
-                Cell("" if e.unit == "1" else e.unit),
+                Cell(e.of_unit.strip()),
                 Cell(remark, "warn" if doubt else "dim"),
             ]
         )

@@ -149,8 +149,8 @@ def _floor(plan: dict) -> dict:
 
     others = plan["paths"][1:]
     lines = [line("floor", corners, "#3c3c3c", 1.5)]
-    lines += [line("as the model is", plan["paths"][0], "#0072b2", 2.5)]
     lines += [line("with an effect", path, "#d55e00", 1) for path in others]
+    lines += [line("as the model is", plan["paths"][0], "#0072b2", 2.5)]  # above the others
     start = {"type": "scatter", "name": "start", "data": [[0, 0]], "symbolSize": 9}
     start["itemStyle"] = {"color": "#3c3c3c"}
     axis = {"type": "value", "splitLine": {"show": False}, "axisLine": {"onZero": False}}
