@@ -8,7 +8,7 @@ from nicegui import ui
 
 from twinmill.experiment.power import percent
 from twinmill.files import replacing
-from twinmill.workbench.panel import PageActions, check_free
+from twinmill.workbench.panel import PageActions, check_free, commands_html
 
 FLOOR_PX = 300  # the longer side of the floor, as drawn
 
@@ -98,8 +98,7 @@ class NextPanel:
             button = ui.button("Save", on_click=lambda: _written(plan, path.value))
             button.props('dense unelevated no-caps padding="4px 16px" data-testid="save-script"')
         ui.label("The same from a terminal, and what to do then:").classes("soft")
-        text = html.escape("\n".join(plan["commands"]))
-        ui.html(f'<pre class="command">{text}</pre>', sanitize=False).props(
+        ui.html(commands_html(plan["commands"]), sanitize=False).props(
             'data-testid="next-commands"'
         )
 

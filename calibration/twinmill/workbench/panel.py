@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What all panels use: what their page does for them; numbers, tones and refusals in words."""
 
+import html
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -43,6 +45,15 @@ def check_free(path: Path) -> None:
     """Raises ValueError if a file is there, in words that do for a page: it has no --force."""
     if path.is_file():
         raise ValueError(f"{path}: exists; choose another name.")
+
+
+def commands_html(commands: Sequence[str]) -> str:
+    """Commands to be copied, a line each; lines break between words alone, not in `--n`."""
+    lines = [
+        " ".join(f"<span>{html.escape(word)}</span>" for word in line.split(" "))
+        for line in commands
+    ]
+    return '<pre class="command">' + "\n".join(lines) + "</pre>"
 
 
 def scored(score: float | None) -> str:
