@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 
 #include "fields.h"
@@ -37,6 +38,9 @@ Parameter TableSpeed(const Model &model, size_t i)
     p.max = 10;
     p.usual_size = kSpeedPrior_mps;
     p.stage = "wheel";
+    std::ostringstream doc;
+    doc << "speed at " << model.base.duty_pct[i] << " % duty";
+    p.doc = doc.str();
     return p;
 }
 

@@ -269,10 +269,11 @@ def _note_frozen(robot: RobotLog, notes: list[str]) -> None:
     t = robot.pose_t_s[index]
     moves = np.flatnonzero((np.diff(np.nan_to_num(robot.pose[index]), axis=0) != 0).any(axis=1))
     borders = np.concatenate([[-1], moves, [len(index) - 1]])
-    for first, last in zip(borders[:-1] + 1, borders[1:], strict=True):
+    starts, ends = borders[:-1] + 1, borders[1:]
+    still = t[ends] - t[starts] > FROZEN_S
+    for first, last in zip(starts[still], ends[still], strict=True):
         within = (robot.command_t_s >= t[first]) & (robot.command_t_s <= t[last])
-        driven = within.any() and (robot.command[within] != 0).any(axis=1).all()
-        if t[last] - t[first] > FROZEN_S and driven:
+        if within.any() and (robot.command[within] != 0).any(axis=1).all():
             notes.append(
                 f"the pose is frozen from {t[first]:.3f} to {t[last]:.3f} s while the "
                 "robot is driven; check the motion capture."

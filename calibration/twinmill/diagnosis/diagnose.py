@@ -12,7 +12,13 @@ from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.cameras import with_detections
 from twinmill.diagnosis.doubts import beside_more, of_another_form, within_the_table
 from twinmill.diagnosis.finding import Finding
-from twinmill.diagnosis.findings import findings_of, lateness, ranking_of, with_stale_numbers
+from twinmill.diagnosis.findings import (
+    findings_of,
+    lateness,
+    ranking_of,
+    steps_of,
+    with_stale_numbers,
+)
 from twinmill.diagnosis.notes import (
     few_commands_notes,
     geometry_notes,
@@ -281,6 +287,7 @@ def _concluded(
     )
     findings = beside_more(of_another_form(findings, rest), rest)
     findings.sort(key=lambda f: -f.share)  # for people: the chain's order is by what each loses
+    steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
     told = [f.depends_on for f in findings if f.depends_on]
     rest = replace(rest, depends_on=[*dict.fromkeys([*told, *rest.depends_on])])
     models = zip(whole, last.state.models, strict=True)
@@ -308,8 +315,8 @@ def _concluded(
         usual,
     )
     drives = drives_for(faint_names, _shown(done, faint), first.model.wheel_kind)
-    steps = [(None, start.held_score), *chain]
-    late = lateness(done, findings, all(o.same_clock for o in known if o.floor))
+    same_clock = all(o.same_clock for o in known if o.floor)
+    late = lateness(done, findings, same_clock)
     return Diagnosis(
         verdict=weighed.verdict,
         sentence=weighed.sentence,
@@ -333,7 +340,7 @@ def _concluded(
             *few_commands_notes(known),
             *weighed.notes,
         ],
-        next_experiment=_next(findings, drives, faint, weighed.verdict),
+        next_experiment=_next(findings, drives, faint, weighed.verdict, same_clock=same_clock),
         robots_off=tuple(off),
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
         base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),
@@ -419,16 +426,22 @@ def drives_for(
 
 
 def _next(
-    findings, drives: tuple[str, list[str]], hidden: list[tuple[str, str]], verdict: str
+    findings,
+    drives: tuple[str, list[str]],
+    hidden: list[tuple[str, str]],
+    verdict: str,
+    *,
+    same_clock: bool,
 ) -> dict | None:
     """What to drive next, in words; the script itself is designed by `twinmill next`."""
     tied = next((f.group for f in findings if f.group), None)
     if verdict == "ambiguous" and tied:
+        clocks = "" if same_clock else ", on clocks tied by a calibration log"
         return {
             "script": None,
             "separates": list(tied),
             "why": f"this log cannot tell {' from '.join(tied)}: drive all its axes at five or "
-            "more duties, from rest and through zero, on clocks tied by a calibration log",
+            f"more duties, from rest and through zero{clocks}",
         }
     if hidden:
         words, shown = drives

@@ -83,6 +83,31 @@ def findings_of(
     return found, [(n, t.held_score) for n, t in zip(names, chain[1:], strict=True)]
 
 
+def steps_of(
+    found: Sequence[Finding], chain: Sequence[tuple[str, float]], first: State, last: Trial
+) -> list[tuple[str, float]]:
+    """Held-out score after each finding, in their order, in which people read them.
+
+    Args:
+        found: findings; stale numbers stand for all of the chain that is named nowhere else.
+        chain: as `findings_of` gives it, of which this is a part where the orders agree.
+        first: where the search started.
+        last: the final trial.
+    """
+    named = {f.effect for f in found} - {REFIT}
+    order = [
+        [n for n, _ in chain if n == f.effect or (f.effect == REFIT and n not in named)]
+        for f in found
+    ]
+    if order == [[n] for n, _ in chain]:
+        return [(f.effect, score) for f, (_, score) in zip(found, chain, strict=True)]
+    state, steps = first, []
+    for finding, names in zip(found, order, strict=True):
+        state = with_effects(state, names)
+        steps.append((finding.effect, _from_final(state, last).held_score))
+    return steps
+
+
 def _takes(names: Sequence[str], chain: Sequence[Trial]) -> dict[str, float]:
     """Share of the squared error at 0.5 s above the floor that each takes in a chain."""
     errors = [_squared(t) for t in chain]
@@ -248,7 +273,9 @@ def _finding(
 ) -> Finding:
     estimates = done.last.fit.shared_estimates()
     if name == REFIT:
+        moved = done.last.fit.moved
         own = [e for e in estimates if e.name in done.last.state.base]
+        own.sort(key=lambda e: -moved[e.name])
         alike = tuple(n for t in _rivals(done, REFIT) for n in t.names)
         group = (REFIT, *alike) if alike else None
         return Finding(REFIT, group, own, share, "group" if alike else "sure")

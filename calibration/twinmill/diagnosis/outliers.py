@@ -387,9 +387,9 @@ def _plain(robot_id: int, parameters: Sequence[ParameterEstimate]) -> str:
 
 def in_words(parameters: Sequence[ParameterEstimate]) -> str:
     """What the parameters of an effect do to a robot; those that say something."""
-    sides = _side_words({e.name.split(".")[1]: e.value for e in parameters if _of_wheel(e)})
-    if sides:
-        return sides
+    of_wheels = {e.name.split(".")[1]: e.value for e in parameters if _of_wheel(e)}
+    if words := _side_words(of_wheels) or _odd_wheel_words(of_wheels):
+        return words
     told = [e for e in parameters if abs(_away(e)) > max(2 * e.std, _least(e))]
     told = told or sorted(parameters, key=lambda e: -abs(_away(e)) / max(e.std, 1e-9))[:1]
     gains = {e.name: e.value - 1 for e in told if e.name in GAINS}
@@ -454,6 +454,23 @@ def _side_words(wheels: dict[str, float]) -> str:
     return f"{weak} wheels {100 * apart:.0f} % weaker than the {other} ones"
 
 
+def _odd_wheel_words(wheels: dict[str, float]) -> str:
+    """One of four wheels, where the others are alike, and not as the model: all drive a bit off."""
+    if len(wheels) < 4:
+        return ""
+    rest = {w: [v for other, v in wheels.items() if other != w] for w in wheels}
+    odd = min(wheels, key=lambda w: np.ptp(rest[w]))
+    others = float(np.mean(rest[odd]))
+    apart = wheels[odd] - others
+    alike = np.ptp(rest[odd]) < min(abs(apart) / 3, 2 * SETTINGS.spread)
+    if not alike or abs(others) < SETTINGS.spread or abs(apart) < 2 * SETTINGS.spread:
+        return ""
+    name = _entry("wheel_gain", odd)["below"].removesuffix(" weak")
+    return (
+        f"{name} {100 * abs(apart):.0f} % {'weaker' if apart < 0 else 'stronger'} than the others"
+    )
+
+
 def _wheel_words(wheels: dict[str, float]) -> str:
     """Wheels in words; two of one side that agree are named together."""
     for pair, side in SIDES.items():
@@ -476,5 +493,4 @@ def _effect_words(estimate: ParameterEstimate) -> str:
 
 
 def _number(estimate: ParameterEstimate) -> str:
-    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    return f"{estimate.name} {estimate.value:.3g}{unit}"
+    return f"{estimate.name} {estimate.value:.3g}{estimate.of_unit}"

@@ -75,6 +75,15 @@ class Diagnosis:
     robots: tuple[Resolution, ...] = ()
 
     @property
+    def lines(self) -> list[str]:
+        """The sentence in parts: one for each robot that differs, then what is said of the rest."""
+        own = [r.sentence for r in self.robots_off]
+        rest = self.sentence
+        for sentence in own:
+            rest = rest.removeprefix(sentence).lstrip()
+        return [line for line in (*own, rest) if line]
+
+    @property
     def motion(self) -> list[str]:
         """Effects of the motion that were found, most important first."""
         return [f.effect for f in self.findings if f.effect != REFIT]

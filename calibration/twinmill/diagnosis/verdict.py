@@ -278,9 +278,7 @@ def _named(finding: Finding) -> str:
     """A finding in the sentence, with what it takes."""
     takes = finding.takes
     if finding.effect == REFIT:
-        values = ", ".join(
-            f"{e.name.split('.', 1)[1]} {e.value:.3g}" for e in finding.parameters[:3]
-        )
+        values = ", ".join(f"{e.short} {e.value:.3g}{e.of_unit}" for e in finding.parameters[:3])
         instead = f", or {' or '.join(finding.group[1:])} instead" if finding.group else ""
         share = f"; {takes}" if finding.share >= 0.005 else ""  # else robots' own gains took it
         return f"{REFIT_IN_WORDS} ({values}{share}){instead}"

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares a model with measurements: how wrong it is, against the log's own floor, and where."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -231,10 +232,24 @@ def comparison(
     model_file: ModelFile, opened: Sequence[Opened], fitted_name: str = ""
 ) -> Comparison:
     """Of measurements as they stand; of a model that was fitted to them, by its new name."""
-    warnings = [f"{o.measurement.label}: {w}" for o in opened for w in o.measurement.warnings]
+    warnings = _warnings([o.measurement for o in opened])
     warnings += [f"{o.floor.reason}." for o in opened if o.floor and o.floor.reason]
     name = fitted_name or model_file.path.name
     return Comparison(name, [compare_robot(o) for o in opened], warnings)
+
+
+def _warnings(measurements: Sequence[Measurement | SteadyTable]) -> list[str]:
+    """What was said of each; what is said of all robots of a log is said once, of the log."""
+    said: dict[tuple[str, str], list[str]] = {}
+    for m in measurements:
+        for words in m.warnings:
+            said.setdefault((m.log_name, words), []).append(m.label)
+    robots = Counter(m.log_name for m in measurements)
+    found = []
+    for (log, words), labels in said.items():
+        of_all = len(labels) == robots[log] > 1
+        found += [f"{log}: {words}"] if of_all else [f"{label}: {words}" for label in labels]
+    return found
 
 
 def compare(measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile) -> Comparison:

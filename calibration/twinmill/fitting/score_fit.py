@@ -563,9 +563,16 @@ class ScoreFit:
                     at_bound,
                     seen,
                     not seen and bool(rest < SEEN * p.std),
+                    p.words,
                 )
             )
         return found
+
+    @property
+    def moved(self) -> dict[str, float]:
+        """How far each quantity came from its usual value, in standard deviations, by name."""
+        far = np.abs(self.x - self.usual) / np.maximum(self.stds, 1e-12)
+        return {u.parameter.name: float(f) for u, f in zip(self.unknowns, far, strict=True)}
 
     @property
     def shared_values(self) -> list[Parameter]:

@@ -44,6 +44,7 @@ class Parameter:
         central: differences are taken to both sides, where times make one-sided ones crude.
         role: "size", "place" (where in the room), "moment" or "lateness", as on the effect's card.
         strength: an effect's default less its neutral value.
+        words: what it is, where its name does not say so: `speed at 50 % duty`.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Parameter:
     central: bool = False
     role: str = "size"
     strength: float = 0.0
+    words: str = ""
 
     def at(self, value: float) -> "Parameter":
         """The same, begun elsewhere; no place or moment is usual: the prior of one goes with it."""
@@ -72,6 +74,7 @@ class ParameterEstimate:
         at_bound: it ended at a bound.
         seen: false where the log does not tell it by itself, and the prior holds it.
         together: the log tells it once others are known, as left wheels of which the sum is told.
+        words: as of the parameter.
     """
 
     name: str
@@ -81,6 +84,17 @@ class ParameterEstimate:
     at_bound: bool
     seen: bool
     together: bool = False
+    words: str = ""
+
+    @property
+    def short(self) -> str:
+        """For people: its words, or its name without the effect's before."""
+        return self.words or self.name.split(".", 1)[-1]
+
+    @property
+    def of_unit(self) -> str:
+        """The unit behind a number, for people; nothing behind a pure one."""
+        return "" if self.unit == "1" else f" {self.unit.replace('^2', '²')}"
 
     def to_json(self) -> dict:
         """Fields of the interface."""
@@ -198,6 +212,7 @@ def base_parameters(model: native.Model, names: Iterable[str]) -> list[Parameter
                 std=std,
                 step=step,
                 central=timed,
+                words=v["doc"],
             )
         )
     return found

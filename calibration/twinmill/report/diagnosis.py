@@ -4,7 +4,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 import twinmill_native as native
 from rich.console import Group, RenderableType
 from rich.text import Text
@@ -138,6 +137,20 @@ def each_robot(diagnosis: Diagnosis) -> Table:
     )
 
 
+def _would_show(diagnosis: Diagnosis) -> list[str]:
+    """How small a difference these logs would have shown, over all robots; nothing if none."""
+    told = []
+    for name, key in (("speed", "speed"), ("turning", "turn")):
+        known = [100 * d for r in diagnosis.robots if (d := getattr(r, key)) is not None]
+        if known:
+            ends = dict.fromkeys(f"{of(known):.1f}" for of in (min, max))
+            told.append(f"{' to '.join(ends)} % in {name}")
+    if not told:
+        return []
+    shown = " and ".join(told)
+    return [f"These logs would have shown a difference of {shown}; a smaller one may be there."]
+
+
 def _alone(diagnosis: Diagnosis) -> str:
     """What is beyond doubt of the only robot, in words."""
     if diagnosis.verdict == "model_adequate":
@@ -214,7 +227,7 @@ def _late(diagnosis: Diagnosis) -> str:
     late = diagnosis.late
     if late is None or late.sum_std_s is None:
         return ""
-    total = f"{late.sum_s:.2f} ± {late.sum_std_s:.1g} s in all"
+    total = f"{rounded(late.sum_s, late.sum_std_s)} ± {late.sum_std_s:.1g} s in all"
     if late.parted:
         return f"Late by {total}: {late.lag_s:.2f} s lag, {late.delay_s:.2f} s delay."
     if late.lag_s is not None:
@@ -290,7 +303,7 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
     return Section(
         f"What {before.model_name} lacks",
         [(label, number(value), tone(value)) for label, value in scores],
-        diagnosis.sentence,
+        "\n".join(diagnosis.lines),
         comparisons.facts(before),
         [
             *_detection_figures(diagnosis),
@@ -302,7 +315,7 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
         charts=charts(before, found_models(diagnosis)),
         next_step=next_run(diagnosis),
         commands=[(f"{why}:", command) for why, command in commands],
-        notes=lines(diagnosis),
+        notes=[*_would_show(diagnosis), *lines(diagnosis)],
         warnings=before.warnings,
         folded=[deciding(diagnosis)],
     )
@@ -400,7 +413,7 @@ def _gains(diagnosis: Diagnosis) -> list[Figure]:
 
 def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
     """Steps of the waterfall."""
-    names = {None: "as given, held out", REFIT: "base refitted"}
+    names = {None: "as given, held out", REFIT: REFIT_IN_WORDS}
     return [
         (names.get(s["effect"], f"+ {s['effect']}"), s["score_heldout"]) for s in steps(diagnosis)
     ]
@@ -413,11 +426,4 @@ def _named(effect: str) -> str:
 
 def estimates(parameters: Sequence[ParameterEstimate]) -> str:
     """Names, values and standard errors, in a line."""
-    return ", ".join(map(_estimate, parameters))
-
-
-def _estimate(estimate: ParameterEstimate) -> str:
-    name = estimate.name.split(".", 1)[-1]
-    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    spread = f" ± {estimate.std:.1g}" if np.isfinite(estimate.std) else ""
-    return f"{name} {rounded(estimate.value, estimate.std)}{spread}{unit}"
+    return ", ".join(map(tables.estimate, parameters))

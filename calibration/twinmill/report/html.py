@@ -42,7 +42,7 @@ class Section:
     Attributes:
         title: of the step.
         score: label, number and colour of each score shown large.
-        verdict: what the score means.
+        verdict: what the score means; each line stands alone.
         facts: label and text.
         figures, tables: in their order.
         charts: HTML, made when it is asked for, of which a page has one: that of its last section

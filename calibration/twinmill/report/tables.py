@@ -203,9 +203,10 @@ def parameters(estimates: list[ParameterEstimate]) -> Table:
     rows = []
     for e in estimates:
         told = e.seen or e.together
-        remark = "not determined by this log"
+        doubt = "not determined by this log"
         if told:
-            remark = "at its bound" if e.at_bound else "" if e.seen else "known only in combination"
+            doubt = "at its bound" if e.at_bound else "" if e.seen else "known only in combination"
+        remark = "; ".join(words for words in (e.words, doubt) if words)
         value, std = (
             (rounded(e.value, e.std), f"± {number(e.std)}") if told else (number(e.value), "-")
         )
@@ -214,8 +215,8 @@ def parameters(estimates: list[ParameterEstimate]) -> Table:
                 Cell(e.name, "" if told else "dim"),
                 Cell(value, "" if told else "dim"),
                 Cell(std),
-                Cell("" if e.unit == "1" else e.unit),
-                Cell(remark, "warn" if remark else ""),
+                Cell(e.of_unit.strip()),
+                Cell(remark, "warn" if doubt else "dim"),
             ]
         )
     together = any(e.together for e in estimates)
@@ -226,6 +227,12 @@ def parameters(estimates: list[ParameterEstimate]) -> Table:
         TOGETHER if together else "",
         words=(0, 3, 4),
     )
+
+
+def estimate(e: ParameterEstimate) -> str:
+    """In a line: `deceleration_mps2 0.70 ± 0.02 m/s²`."""
+    spread = f" ± {e.std:.1g}" if np.isfinite(e.std) else ""
+    return f"{e.short} {rounded(e.value, e.std)}{spread}{e.of_unit}"
 
 
 def rounded(value: float, std: float) -> str:

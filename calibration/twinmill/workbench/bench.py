@@ -47,6 +47,7 @@ class Bench:
         unkept: why the session is not kept at present; empty while it is.
         view: what the screen shows: cursor, stretch, robot, tab.
         told: a page has said why nothing can be opened.
+        threads: how many are at work.
         port: of the server, kept so that a page left open finds the next one; 0 before the first.
     """
 
@@ -57,6 +58,7 @@ class Bench:
         self.opening, self.failure, self.unkept = "starting", "", ""
         self.view: dict[str, Any] = state.read("view", {})
         self._waiting: Work | None = None
+        self.threads = 0
         self.port: int = state.read("port", 0)
         self._written: tuple = ()
         self._tried_s = 0.0
@@ -76,13 +78,13 @@ class Bench:
         """
         self.opening = f"cleaning {', '.join(p.name for p in self.session.paths)}"
         self.changed("work")
-        await asyncio.to_thread(self.session.measure)
+        await self.aside(self.session.measure)
         while left := self.session.unjudged:
             index = self.picked if self.picked in left else left[0]
             label = self.session.measurements[index].label
             self.opening = f"finding the noise floor of {label} ({len(left)} to go)"
             self.changed("work")
-            await asyncio.to_thread(self.session.judge, index)
+            await self.aside(self.session.judge, index)
             self.changed("names")
             if index == self.picked:
                 self.changed("robots", "model", "findings")
@@ -95,7 +97,7 @@ class Bench:
         self.changed("work")
         await self._read.wait()
         self._exclude_wrong()
-        await asyncio.to_thread(self.session.conclude)
+        await self.aside(self.session.conclude)
         self.opening = ""
         self.changed("work", "model", "score", "prediction")
         await self._look_ahead()
@@ -121,6 +123,14 @@ class Bench:
             self.view["robot"] = max(known, key=known.get)
             self.changed("robots")
 
+    async def aside(self, act: Callable[..., Any], *arguments: Any) -> Any:
+        """What takes long, in a thread of its own."""
+        self.threads += 1
+        try:
+            return await asyncio.to_thread(act, *arguments)
+        finally:
+            self.threads -= 1
+
     def changed(self, *what: str) -> None:
         """Notes what a screen must draw anew."""
         self.changes.update(what)
@@ -145,7 +155,7 @@ class Bench:
     async def act(self, act: Callable[..., None], *arguments: Any) -> None:
         """Does what moves the session to another model; one after another."""
         async with self._acting:
-            await asyncio.to_thread(act, *arguments)
+            await self.aside(act, *arguments)
         await self._settled()
 
     # -- long work ------------------------------------------------------------------------------
@@ -172,7 +182,7 @@ class Bench:
         self.changed("work")
         if kind in ("fit", "add") and moves(effect):
             asked = (effect, self.picked, work.robot_id)
-            previewed = await asyncio.to_thread(self.session.preview, *asked)
+            previewed = await self.aside(self.session.preview, *asked)
             if self.doing is work:  # not done or cancelled before
                 self.session.show(previewed)
                 self.changed("score", "prediction", "beside")
@@ -183,7 +193,7 @@ class Bench:
         beside = self.session.beside
         if beside and beside.label == beside_label(effect, robot_id):
             return self.leave_beside()
-        await asyncio.to_thread(self.session.try_beside, effect, self.picked, robot_id)
+        await self.aside(self.session.try_beside, effect, self.picked, robot_id)
         self.changed("prediction", "beside")
 
     def leave_beside(self) -> None:
@@ -228,13 +238,13 @@ class Bench:
         for finding in (self.session.diagnosis or {"findings": ()})["findings"]:
             of = "" if finding["effect"] == REFIT else finding["effect"]
             if self.ready and moves(of):
-                await asyncio.to_thread(self.session.preview, of, self.picked)
+                await self.aside(self.session.preview, of, self.picked)
 
     async def _settled(self) -> None:
         """The session stands at another model: its prediction first, then what takes longer."""
         self.changed("prediction", "beside")
-        await asyncio.to_thread(self.session.score_now)
-        await asyncio.to_thread(self.session.own_scores)
+        await self.aside(self.session.score_now)
+        await self.aside(self.session.own_scores)
         self.changed("work", "model", "score")
 
     def _next(self) -> None:

@@ -3,7 +3,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import tomlkit
 
@@ -19,7 +19,6 @@ from twinmill.model.parameters import (
 )
 
 WITHIN_95 = 1.96
-TABLE = "base.wheel_speed_mps."
 HAND = 500  # steps of a knob from end to end
 BASE_WORDS = {
     "base.forward_gain": "speed forward over the table's",
@@ -91,20 +90,12 @@ def knobs(model_file: ModelFile, told: ModelFile, opened: Sequence[Opened]) -> l
         for instance in effect_names(model)
         for p in catalogue_of(model)[instance.split("#")[0]]["parameters"]
     }
-    table = _table_words(model_file)
-    known = {**BASE_WORDS, **table, **words}
+    known = {**BASE_WORDS, **words}
     return [_worded(k, known.get(k.name, "")) for k in [*base, *effects, *others]]
 
 
 def _worded(knob: Knob, words: str) -> Knob:
-    label = words if knob.name.startswith(TABLE) else knob.label
-    return Knob(**{**vars(knob), "words": words, "label": label})
-
-
-def _table_words(model_file: ModelFile) -> dict[str, str]:
-    """Which duty each speed of the table stands for."""
-    duties = tomlkit.parse(model_file.text).get("base", {}).get("duty_pct", [])
-    return {f"{TABLE}{i}": f"rim speed at {duty:g} %" for i, duty in enumerate(duties)}
+    return replace(knob, words=knob.words or words)
 
 
 def _knob(
@@ -117,9 +108,9 @@ def _knob(
         reach = max(0.1, 1.5 * spread)
     middle = [p.value, *(interval or ())] if group == "base" else [p.value, p.usual]
     low, high = max(p.min, min(middle) - reach), min(p.max, max(middle) + reach)
-    label = p.name.split(".", 1)[1]
+    label = p.words or p.name.split(".", 1)[1]
     return Knob(
-        p.name, p.unit, group, label, "", p.value, low, high, p.min, p.max, interval, fitted
+        p.name, p.unit, group, label, p.words, p.value, low, high, p.min, p.max, interval, fitted
     )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from nicegui import ui
 
-from twinmill.workbench.panel import PageActions, check_free, scored, tone
+from twinmill.workbench.panel import PageActions, check_free, commands_html, scored, tone
 from twinmill.workbench.tree import Tried
 
 INDENT_PX = 14
@@ -65,10 +65,12 @@ class ModelsPanel:
         commands, _ = tree.written(tree.current.number, out)
         with self.commands:
             ui.label("The same from a terminal:").classes("soft")
-            text = html.escape("\n".join(commands))
-            ui.html(f'<pre class="command">{text}</pre>', sanitize=False).props(
-                'data-testid="commands"'
-            )
+            ui.html(commands_html(commands), sanitize=False).props('data-testid="commands"')
+            if self.bench.session.is_outdated:
+                ui.label(
+                    f"{tree.name} was changed since it was opened: now these commands make "
+                    "another model."
+                ).classes("note wrong").props('data-testid="outdated"')
 
     def _save(self) -> None:
         name = (self.path.value or "").strip()

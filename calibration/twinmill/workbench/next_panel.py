@@ -8,7 +8,7 @@ from nicegui import ui
 
 from twinmill.experiment.power import percent
 from twinmill.files import replacing
-from twinmill.workbench.panel import PageActions, check_free
+from twinmill.workbench.panel import PageActions, check_free, commands_html
 
 FLOOR_PX = 300  # the longer side of the floor, as drawn
 
@@ -98,8 +98,7 @@ class NextPanel:
             button = ui.button("Save", on_click=lambda: _written(plan, path.value))
             button.props('dense unelevated no-caps padding="4px 16px" data-testid="save-script"')
         ui.label("The same from a terminal, and what to do then:").classes("soft")
-        text = html.escape("\n".join(plan["commands"]))
-        ui.html(f'<pre class="command">{text}</pre>', sanitize=False).props(
+        ui.html(commands_html(plan["commands"]), sanitize=False).props(
             'data-testid="next-commands"'
         )
 
@@ -149,8 +148,8 @@ def _floor(plan: dict) -> dict:
 
     others = plan["paths"][1:]
     lines = [line("floor", corners, "#3c3c3c", 1.5)]
-    lines += [line("as the model is", plan["paths"][0], "#0072b2", 2.5)]
     lines += [line("with an effect", path, "#d55e00", 1) for path in others]
+    lines += [line("as the model is", plan["paths"][0], "#0072b2", 2.5)]  # above the others
     start = {"type": "scatter", "name": "start", "data": [[0, 0]], "symbolSize": 9}
     start["itemStyle"] = {"color": "#3c3c3c"}
     axis = {"type": "value", "splitLine": {"show": False}, "axisLine": {"onZero": False}}

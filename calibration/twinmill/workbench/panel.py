@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What all panels use: what their page does for them; numbers, tones and refusals in words."""
 
+import html
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
 from twinmill.fitting.compare import GOOD, MISSING
-from twinmill.report.tables import rounded
+from twinmill.model.parameters import ParameterEstimate
+from twinmill.report import tables
 from twinmill.workbench.bench import Bench
 
 
@@ -44,6 +47,15 @@ def check_free(path: Path) -> None:
         raise ValueError(f"{path}: exists; choose another name.")
 
 
+def commands_html(commands: Sequence[str]) -> str:
+    """Commands to be copied, a line each; lines break between words alone, not in `--n`."""
+    lines = [
+        " ".join(f"<span>{html.escape(word)}</span>" for word in line.split(" "))
+        for line in commands
+    ]
+    return '<pre class="command">' + "\n".join(lines) + "</pre>"
+
+
 def scored(score: float | None) -> str:
     """A score, or a dash."""
     return "-" if score is None or math.isnan(score) else f"{score:#.3g}".rstrip(".")
@@ -57,8 +69,6 @@ def tone(score: float | None) -> str:
 
 
 def estimate(entry: dict) -> str:
-    """A parameter as --json gives it: `deceleration 0.7 ± 0.02 m/s²`."""
-    name = entry["name"].split(".", 1)[-1]
-    unit = "" if entry["unit"] == "1" else f" {entry['unit'].replace('^2', '²')}"
-    spread = f" ± {entry['std']:.1g}" if entry["std"] is not None else ""
-    return f"{name} {rounded(entry['value'], entry['std'] or 0.0)}{spread}{unit}"
+    """A parameter as --json gives it, in the words of the reports."""
+    std = float("nan") if entry["std"] is None else entry["std"]
+    return tables.estimate(ParameterEstimate(**{**entry, "std": std}))

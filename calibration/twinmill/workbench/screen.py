@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page: a bar, the stage with floor and series, and panels at the side. It only draws."""
 
-import asyncio
 import json
 from collections import Counter
 
@@ -282,7 +281,7 @@ class Screen:
         if known and not (self.bench.ready and session.is_passing):
             self._say_score(known.fitted, known.exact)
         elif self.bench.ready:
-            score = await asyncio.to_thread(session.passing_score, self.bench.picked)
+            score = await self.bench.aside(session.passing_score, self.bench.picked)
             if self.bench.changes["score"] == of:
                 self._say_score(score, False)
         self.undo.set_enabled(session.tree.can_undo)

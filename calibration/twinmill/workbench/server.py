@@ -3,6 +3,7 @@
 
 import asyncio
 import logging
+import os
 import secrets
 import socket
 import sys
@@ -88,11 +89,17 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
                 await asyncio.sleep(SENT_S)
             app.shutdown()
 
+    def end() -> None:
+        bench.close()
+        if bench.threads and not failed:  # which would be waited for
+            sys.stdout.flush()
+            os._exit(0)
+
     tasks: list[asyncio.Task] = []
     failed: list[Exception] = []
     app.on_startup(begin)
     app.timer(TICK_S, bench.tick)
-    app.on_shutdown(bench.close)
+    app.on_shutdown(end)
     with suppress(KeyboardInterrupt):  # the way to end it
         ui.run(
             host=HOST,

@@ -164,6 +164,7 @@ class Session:
         """Finds clock and noise floor of one robot."""
         (opened,) = open_measurements([self.measurements[index]], self.given)
         self.robots = {**self.robots, index: OpenedView(opened)}
+        self.settled(self.tree.current.number, index)  # a screen that asks does not wait
 
     def exclude_wrong(self, findings: Sequence[InputFinding]) -> None:
         """Leaves out the robots that the checks of the commands found to be wrong.
@@ -192,6 +193,8 @@ class Session:
             on_clock = on_clock_of_others(view.opened, all_opened)
             if on_clock is not view.opened:
                 self.robots[k] = OpenedView(on_clock)
+                for known in [key for key in self._settled if key[1] == k]:
+                    del self._settled[known]
         self._previews.clear()
         self.score_now(exact=self.tree.current.number == 0)
 
@@ -218,6 +221,14 @@ class Session:
         if number not in self._files:
             self._files[number] = self.tree.model_file(number)
         return self._files[number]
+
+    @property
+    def is_outdated(self) -> bool:
+        """Whether the file of the model as given holds another one by now, or is gone."""
+        try:
+            return self.given.path.read_text() != self.given.text
+        except OSError:
+            return True
 
     @property
     def is_dragged(self) -> bool:

@@ -6,7 +6,7 @@ import html
 from nicegui import ui
 
 from twinmill.swarm.classes import COLORS
-from twinmill.workbench.panel import PageActions, scored
+from twinmill.workbench.panel import PageActions, commands_html, scored
 from twinmill.workbench.swarm import STARTS, has_poses
 
 AXIS = {
@@ -102,9 +102,8 @@ class SwarmPanel:
             ).classes("soft")
             chart = ui.echart(_diagram(swarm)).props('data-testid="diagram"')
             chart.style("height: 290px; width: 100%")
-            text = html.escape("\n".join(swarm["commands"]))
             ui.label("The first start from a terminal:").classes("soft")
-            ui.html(f'<pre class="command">{text}</pre>', sanitize=False).props(
+            ui.html(commands_html(swarm["commands"]), sanitize=False).props(
                 'data-testid="swarm-commands"'
             )
         self.page.javascript("twinmill.showSwarm()")

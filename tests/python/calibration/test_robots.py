@@ -232,6 +232,17 @@ def test_a_robot_that_stands_is_no_hindrance_to_what_others_tell(tanh_robot, mea
         assert any("commands never change" in w for w in both.warnings)
 
 
+def test_what_is_said_of_all_robots_of_a_log_is_said_once(tanh_robot, measure, model_file):
+    robots = [measure(tanh_robot(offset_s=0.06), seed, 30.0) for seed in (1, 2)]
+    told = [
+        replace(m, warnings=["frames were lost.", f"{k} was late."]) for k, m in enumerate(robots)
+    ]
+    assert compare(told, model_file()).warnings == [
+        f"{told[0].log_name}: frames were lost.",
+        *(f"{m.label}: {k} was late." for k, m in enumerate(told)),
+    ]
+
+
 def mute(track):
     """The track without the rests at its ends."""
     return replace(track, command=np.tile(track.command[100], (len(track.command), 1)))
@@ -247,6 +258,9 @@ def test_wheels_of_a_side_are_one_thing_in_words():
     # Speed and turning of its own hide how much each side lacks: the difference is what is told.
     assert words(fl=0.02, fr=-0.05) == "right wheels 7 % weaker than the left ones"
     assert "left" not in words(fl=0.0, fr=0.0, rl=0.0, rr=-0.07)
+    # The others' common part may as well be the robot's speed: how far the one is off is told.
+    odd = words(fl=-0.0965, fr=0.0257, rl=0.0306, rr=0.0302)
+    assert odd == "front left wheel 13 % weaker than the others"
 
 
 def test_an_effect_of_several_numbers_is_said_once():

@@ -87,6 +87,33 @@ def test_predictions_follow_a_knob_and_come_back(session):
     np.testing.assert_array_equal(predicted(session)["ahead"], before)
 
 
+def test_a_score_is_of_its_model_though_a_hand_leads_elsewhere_meanwhile(session, monkeypatch):
+    given = session.tree.scores[0]
+    session.set("base.yaw_gain", 0.5)
+    number, settled = session.tree.current.number, session.settled
+
+    def left_meanwhile(*which):
+        session.undo()
+        return settled(*which)
+
+    monkeypatch.setattr(session, "settled", left_meanwhile)
+    session.score_now()
+    assert session.tree.current.number == 0 and session.tree.scores[0] is given
+    assert session.tree.scores[number].fitted > given.fitted
+
+
+def test_a_file_that_changes_meanwhile_is_told(session):
+    path = session.given.path
+    text = path.read_text()
+    assert not session.is_outdated
+    path.write_text(text.replace("name", "# name", 1))
+    assert session.is_outdated
+    path.unlink()
+    assert session.is_outdated
+    path.write_text(text)
+    assert not session.is_outdated
+
+
 def test_errors_drawn_are_measured_less_predicted(session, compared):
     drawn = predicted(session)["errors"]
     rows = compared.main.errors[:, 2]  # half a second ahead
