@@ -121,12 +121,12 @@ def diagnose(
     opened = open_measurements(measurements, model_file)
     before = comparison(model_file, opened)
     unseen = _unseen(opened)
-    known = thinned(with_own_gains(judged(opened)), SETTINGS.starts)
+    known = _thinned(with_own_gains(judged(opened)))
     first = first_state(known, model_file, {*excluded, *unseen})
     usual = model_file.usual_score([o.measurement.log_sha256 for o in known])
     off = odd_of_two(known, first, GOOD * usual, progress)
     if off:
-        known = thinned(_without(judged(opened), off), SETTINGS.starts)
+        known = _thinned(_without(judged(opened), off))
         first = first_state(known, model_file, {*excluded, *unseen})
     done = search(first, progress, known=usual)
     lags_s = 0.0
@@ -345,6 +345,10 @@ def _concluded(
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
         base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),
     )
+
+
+def _thinned(opened: Sequence[Opened]) -> list[Opened]:
+    return thinned(opened, SETTINGS.starts, SETTINGS.starts_apart_s)
 
 
 def _with_all_starts(own: Opened, opened: Sequence[Opened]) -> Opened:

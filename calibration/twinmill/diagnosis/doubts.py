@@ -175,9 +175,11 @@ def _faster(name: str, own: Sequence[ParameterEstimate]) -> str:
 
 def _wanders(card: dict, own: Sequence[ParameterEstimate]) -> str:
     """A doubt where a loss from a moment on is no more than battery and heat do; else empty."""
+    if not with_role(card["name"], "moment"):
+        return ""
     sizes = [(away, e) for e, p, away in _sizes(card, own) if p["role"] == "size"]
     most, loss = max(sizes, key=lambda pair: pair[0])
-    if with_role(card["name"], "moment") and most < SETTINGS.drift_std:
+    if most < SETTINGS.drift_std:
         return f"{loss.name} = {loss.value:.3g}: speeds wander by as much with battery and heat"
     return ""
 

@@ -180,7 +180,8 @@ def _stale_clock(
     late = next(e for e in finding.parameters if e.name.split(".", 1)[1] == key)
     if abs(late.value) > SETTINGS.within * np.hypot(late.std, clock_std_s):
         return []
-    return [replace(late, name=CLOCK, value=model.get(CLOCK) + late.value)]
+    offset_s = model.get(CLOCK) + late.value
+    return [replace(late, name=CLOCK, value=offset_s, words="offset of the clocks")]
 
 
 def _is_error(own: ParameterEstimate, model: native.Model, stds: Mapping[str, float]) -> bool:

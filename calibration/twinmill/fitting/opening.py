@@ -26,6 +26,7 @@ from twinmill.model.parameters import (
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.steady_states import SteadyStates
+from twinmill.predict.windows import EVERY_S
 
 CLOCK_REACH_S = 1.0  # how far from its start an offset of the clocks is looked for
 RATE_REACH_PPM = 500.0
@@ -221,10 +222,13 @@ def of_few_commands(opened: Sequence[Opened]) -> str:
     )
 
 
-def thinned(opened: Sequence[Opened], most: int) -> list[Opened]:
-    """The same with so few starts that there are no more predictions than `most`, about."""
+def thinned(opened: Sequence[Opened], most: int, apart_s: float) -> list[Opened]:
+    """The same with so few starts that there are no more predictions than `most`, about.
+
+    But starts are no further apart than `apart_s`.
+    """
     total = sum(len(o.data.keep) for o in opened if o.floor)
-    every = -(-total // most)
+    every = min(-(-total // most), int(apart_s / EVERY_S))
     if every < 2:
         return list(opened)
     return [
