@@ -96,6 +96,24 @@ def test_files_whose_robots_are_not_clear_are_refused(imported, poses, commands,
         imported(poses, commands)
 
 
+def test_one_bad_file_among_many_is_left_out_with_its_reason(imported, tmp_path):
+    names = [f"{kind}_R{k}.csv" for kind in "pc" for k in range(3)]
+    imported(names[:3], names[3:])
+    (tmp_path / "p_R1.csv").write_text(_poses(1) + "camera lost\n")
+    files = [tmp_path / name for name in names]
+    options = ImportOptions(same_clock=True)
+    done = import_log(files[:3], files[3:], tmp_path / "l.lcmlog", options=options)
+    robots = read_log(tmp_path / "l.lcmlog").robots
+    _are({k: robots[k] for k in (0,)}, [0])
+    assert len(robots[1].pose) == 0 and len(robots[2].pose) == len(T_S)
+    assert "Left out: p_R1.csv: row 202: has 1 cells" in " ".join(done["warnings"])
+
+    (tmp_path / "p_R0.csv").write_text("lost\n")
+    (tmp_path / "p_R2.csv").write_text("lost\n")
+    with pytest.raises(LogError, match=r"p_R0.csv: has no rows"):
+        import_log(files[:3], files[3:], tmp_path / "m.lcmlog", options=options)
+
+
 def test_two_runs_of_one_robot_are_no_two_robots(tmp_path):
     for k, name in enumerate(("run1.csv", "run2.csv")):
         table = _poses(k).replace("t_s", "robot_id,t_s", 1).replace("\n", "\n4,").removesuffix("4,")

@@ -514,9 +514,9 @@ def _check(
 ) -> int:
     """Compare poses of a printed sheet with the ruler along which a hand pushed it.
 
-    Film a sheet on the floor that lies still for two seconds at each of some marks
-    of a ruler, and let `track` find it. Nothing else is needed, no robot either.
-    Exit code 1 says that a stop is off by more than 3 mm or 1 degree.
+    Film a sheet on the floor that lies still for two seconds at each of some
+    marks of a ruler, and let `track` find it. No robot is needed. Exit code 1
+    says that a stop is off by more than 3 mm or 1 degree.
 
     Example: twinmill track-check ruler.csv --marks-mm 0,100,200,300
     """

@@ -98,6 +98,8 @@ def read_each(
 ) -> list[Series]:
     """Series of all files, of which each must have robots of its own.
 
+    A file that cannot be read is left out, with its reason, if another can.
+
     Args:
         paths: files of one kind.
         numbers: robot_id by file, where its name tells it.
@@ -105,12 +107,18 @@ def read_each(
         what: `poses` or `commands`.
 
     Raises:
-        LogError: two files hold the same robot; what `read` raises.
+        LogError: two files hold the same robot, or none can be read.
     """
     found: list[Series] = []
+    left_out: list[LogError] = []
     holder: dict[int, Path] = {}
     for path in paths:
-        for series in read(path):
+        try:
+            own = read(path)
+        except LogError as error:
+            left_out.append(error)
+            continue
+        for series in own:
             if series.robot_id == numbers.get(path):
                 series.warnings.insert(0, f"{path.name} is taken for robot {series.robot_id}.")
             if series.robot_id in holder:
@@ -121,4 +129,7 @@ def read_each(
                 )
             holder[series.robot_id] = path
             found.append(series)
+    if not found:
+        raise left_out[0]
+    found[0].warnings.extend(f"Left out: {reason}" for reason in left_out)
     return found
