@@ -286,7 +286,6 @@ def _concluded(
         without=doubted,
     )
     findings = beside_more(of_another_form(findings, rest), rest)
-    findings.sort(key=lambda f: -f.share)  # for people: the chain's order is by what each loses
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
     told = [f.depends_on for f in findings if f.depends_on]
     rest = replace(rest, depends_on=[*dict.fromkeys([*told, *rest.depends_on])])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Findings of a diagnosis in their order: what each effect takes away, and its rivals."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -48,7 +48,8 @@ def findings_of(
     The chain adds the effects by what the final model loses without each. Shares are those of the
     chain. Effects that stand in for each other lose little alone, and what each
     takes depends on what was taken before: the first is the one that takes most on the average over
-    one order of adding and its reverse.
+    one order of adding and its reverse. Where an order is found in which none takes less than those
+    after it, it is that: effects that help each other alone have none.
 
     Args:
         done: the search.
@@ -67,6 +68,7 @@ def findings_of(
         if top != names[0]:
             names = [top, *(n for n in names if n != top)]
             chain = _chain(names, first, done.last)
+    names, chain = _falling(names, chain, lambda order: _chain(order, first, done.last))
     shares = _takes(names, chain)
     changes = changes_of(done.last)
     found = []
@@ -83,10 +85,24 @@ def findings_of(
     return found, [(n, t.held_score) for n, t in zip(names, chain[1:], strict=True)]
 
 
+def _falling(
+    names: list[str], chain: list[Trial], chained: Callable[[list[str]], list[Trial]]
+) -> tuple[list[str], list[Trial]]:
+    """An order in which shares fall, with its chain; as given if none is found in a few trials."""
+    order, trials = names, chain
+    for _ in names:
+        shares = _takes(order, trials)
+        ranked = sorted(order, key=lambda n: -shares[n])
+        if ranked == order:
+            return order, trials
+        order, trials = ranked, chained(ranked)
+    return names, chain
+
+
 def steps_of(
     found: Sequence[Finding], chain: Sequence[tuple[str, float]], first: State, last: Trial
 ) -> list[tuple[str, float]]:
-    """Held-out score after each finding, in their order, in which people read them.
+    """Held-out score after each finding, in their order.
 
     Args:
         found: findings; stale numbers stand for all of the chain that is named nowhere else.

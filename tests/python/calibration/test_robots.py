@@ -279,3 +279,5 @@ def test_the_verdict_is_on_the_robots_that_are_alike(logged):
     found = diagnose(*logged(late))
     assert [r.robot_id for r in found.robots_off] == [2]
     assert found.verdict in ("model_adequate", "refit_enough") and not found.findings
+    assert len(found.lines) == 2 and " ".join(found.lines) == found.sentence
+    assert found.lines[0].startswith("R02: ")

@@ -67,6 +67,7 @@ def test_a_robot_with_dead_zone_and_curve_is_seen_to_have_both(tmp_path):
     assert {"dead_zone", "speed_curve"} <= set(found.found)
     before, after = found.steps[0][1], found.steps[-1][1]
     assert after < 0.5 * before
+    assert [name for name, _ in found.steps[1:]] == [f.effect for f in found.findings]
     hidden = dict(found.not_identifiable)
     assert "starts and stops" in hidden["coasting"]
     assert {"motor_lag", "input_delay", "clock_offset", "marker_offset"} <= set(hidden)
