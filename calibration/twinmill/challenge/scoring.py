@@ -200,6 +200,8 @@ def _accepted(hidden: Hidden, case: Case) -> frozenset[str]:
         return frozenset({"input_delay", "clock_offset"})
     if (hidden.name, hidden.kind) == ("motor_lag", "cousin"):
         return frozenset({"motor_lag", "second_order_lag"})
+    if (hidden.name, hidden.kind) == ("dead_zone", "cousin"):  # it sticks
+        return frozenset({"dead_zone", "stiction"})
     return frozenset({hidden.name})
 
 

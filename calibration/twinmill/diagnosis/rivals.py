@@ -50,8 +50,9 @@ def better_formula(formulas: Formulas, less: Trial, whole: Trial) -> Term | None
     effect = [before[i] - after[i] for i, _ in formulas.logs]
     products = formulas.products(less.fit, effect)
     own, *gains = products.each_held_out()
+    least = max(SETTINGS.outdoes * own, max(own, 0.0) + SETTINGS.outdoes_by)
     for k in np.argsort(gains)[::-1]:
-        if gains[k] <= max(SETTINGS.outdoes * own, own + SETTINGS.outdoes_by):
+        if gains[k] <= least:
             return None
         both = np.isin(np.arange(1 + len(gains)), [0, 1 + k])
         beside = products.held_out(both, 0)[0] - gains[k]

@@ -146,14 +146,15 @@ class Grid:
     @classmethod
     def of(cls, candidate: Candidate, rows: Sequence[np.ndarray]) -> "Grid":
         """Of an effect with a limit: about the usual one."""
-        usual = {p["name"]: p["default"] for p in catalogue()[candidate.name]["parameters"]}
-        keys = with_role(candidate.name, "limit")
-        starts = [{f"{candidate.instance}.{key}": k * usual[key] for key in keys} for k in LIMITS]
+        card = {p["name"]: p for p in catalogue()[candidate.name]["parameters"]}
+        limits = {f"{candidate.instance}.{k}": card[k] for k in with_role(candidate.name, "limit")}
+        starts = [
+            {name: float(min(k * p["default"], p["max"])) for name, p in limits.items()}
+            for k in LIMITS
+        ]
 
         def values(parameters: list[Parameter]) -> np.ndarray:
-            low, high = (np.array([getattr(p, k) for p in parameters]) for k in ("min", "max"))
-            whole = [[start.get(p.name, p.value) for p in parameters] for start in starts]
-            return np.clip(np.array(whole), low, high)
+            return np.array([[start.get(p.name, p.value) for p in parameters] for start in starts])
 
         return cls(starts, [c[:, None] for c in candidate.changes(rows, values)])
 

@@ -85,6 +85,21 @@ def test_stale_gains_are_no_missing_effect(tanh_robot, measure, fitted):
     assert found.score_refit < 0.8 * found.before.score
 
 
+def test_wheels_that_stand_at_small_duties_and_go_as_usual_above(tanh_robot, measure, fitted):
+    """Duties are 25, 50, 75 and 100 %: the edge is told to lie between 50 and 75 %."""
+
+    class Sticks(tanh_robot):
+        def speed_mps(self, duty):
+            return np.where(np.abs(duty) > 0.6, super().speed_mps(duty), 0.0)
+
+    found = diagnose([measure(Sticks(), 4, 60.0)], fitted)
+    first, *others = found.findings
+    assert found.verdict == "effect_missing" and first.effect == "stiction"
+    assert first.share > 0.98 and all(f.certainty == "doubtful" for f in others)
+    (below,) = first.parameters
+    assert 0.5 < below.value < 0.75
+
+
 DELAY_S, MORE_LAG_S = 0.03, 0.05
 EULER_S = 1 / 480
 

@@ -10,6 +10,7 @@ import pytest
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.starts import Left, starts_of
 from twinmill.fitting.opening import open_measurements
+from twinmill.model.parameters import catalogue_of
 
 EULER_S = 1 / 480  # step of the robots here
 
@@ -110,3 +111,13 @@ def test_one_pass_with_it_always_on_finds_where_it_is_on(name, values, opened):
     for key, value in best.items():
         near = 0.15 if key.endswith("_m") else 2.0
         assert value == pytest.approx(values[key.split(".")[1]], abs=near), best
+
+
+def test_no_search_begins_beyond_the_bounds_of_a_limit(opened):
+    """Fast robots have their limits, and their duties that do nothing, far from the usual ones."""
+    card = catalogue_of(opened.model)["stiction"]["parameters"][0]
+    name = f"stiction.{card['name']}"
+    rows = opened.data.rows(opened.model, ["clock.offset_s"], np.zeros((1, 1)))
+    found = starts_of("stiction", [opened.model], [opened.data], list(rows)).starts
+    values = [start[name] for start in found]
+    assert card["min"] < min(values) < card["default"] < max(values) == card["max"]
