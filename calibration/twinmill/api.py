@@ -1232,7 +1232,7 @@ def fit(log: Log | str | Path, model: Model | str | Path | None = None) -> Fit:
         >>> fitted.score <= fitted.before.score
         True
         >>> list(fitted.table().columns)
-        ['name', 'value', 'std', 'unit', 'at_bound', 'seen', 'together']
+        ['name', 'value', 'std', 'unit', 'at_bound', 'seen', 'together', 'words']
     """
     start = _model(model)
     measurements = _log(log).measurements(start)

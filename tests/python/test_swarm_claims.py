@@ -203,7 +203,7 @@ def test_laboratories_in_mujoco_go_on_where_they_were(tmp_path, monkeypatch):
     def saw(tell=lambda done, of: told.append((done, of))):
         return prediction.laboratories_in_mujoco(request, said.points, tmp_path / "labs", tell)
 
-    monkeypatch.setattr(prediction.os, "sched_getaffinity", lambda _: {0})
+    monkeypatch.setattr(prediction, "available_cores", lambda: 1)
     monkeypatch.setattr(prediction, "run_part", stops)
     with pytest.raises(KeyboardInterrupt):
         saw()

@@ -286,6 +286,7 @@ def _concluded(
         without=doubted,
     )
     findings = beside_more(of_another_form(findings, rest), rest)
+    findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
     told = [f.depends_on for f in findings if f.depends_on]
     rest = replace(rest, depends_on=[*dict.fromkeys([*told, *rest.depends_on])])

@@ -61,10 +61,11 @@ def test_a_linear_robot_moves_steadily_as_algebra_says():
     assert steady == pytest.approx([forward, 0, turn, *(0.36 * np.array([left, right] * 2))])
 
 
-def test_a_robot_with_dead_zone_and_curve_is_seen_to_have_both(tmp_path):
+def test_a_robot_that_stands_at_small_duties_and_has_a_curve_is_seen_to_have_both(tmp_path):
     sheets = load_measurements([write_sheet(tmp_path / "sheet.csv", real_rim_mps)])
     found = diagnose(sheets, ModelFile.load("turbopi_nominal.toml"))
-    assert {"dead_zone", "speed_curve"} <= set(found.found)
+    # Beside a free curve a dead zone and stiction differ next to the edge alone.
+    assert "speed_curve" in found.found and {"dead_zone", "stiction"} & set(found.found)
     before, after = found.steps[0][1], found.steps[-1][1]
     assert after < 0.5 * before
     assert [name for name, _ in found.steps[1:]] == [f.effect for f in found.findings]
@@ -109,9 +110,11 @@ def real(data_dir):
     return load_measurements([path])
 
 
-def test_real_robots_lack_dead_zone_and_curve_and_these_explain_most(real):
+def test_real_robots_stick_at_small_duties_and_have_a_curve_and_these_explain_most(real):
     found = diagnose(real, ModelFile.load("turbopi_nominal.toml"))
-    assert {"dead_zone", "speed_curve"} <= set(found.found)
+    assert {"stiction", "speed_curve"} <= set(found.found)
+    # Seen on the floor: at 26 % a side stood still on all six robots, at 37 % on one of them.
+    assert 0.26 <= found.model.get("stiction.below") < 0.37
     # Robots 1 and 3 predicted from 2 and 4 and the other way. By hand: alone 0.0 and 0.3 of the
     # squared error, together 0.8.
     # On robots that were not fitted to; by hand, on the fitted ones, four fifths.

@@ -122,6 +122,8 @@ def import_log(
         LogError: one sentence on what is wrong; nothing was written.
     """
     options = options or ImportOptions()
+    if options.up not in ("y", "z", None):
+        raise LogError(f"--up {options.up}: must be y or z.")
     poses, commands = files_of(poses, "--poses"), files_of(commands, "--commands")
     captures = [path for path in (poses, motive, vicon) if path]
     if bag and (captures or commands or io_tsv):
@@ -131,8 +133,6 @@ def import_log(
             "a log needs one source of poses and one of commands: give --poses, --motive or "
             "--vicon, and --commands or --io-tsv."
         )
-    if options.up not in ("y", "z", None):
-        raise LogError(f"--up {options.up}: must be y or z.")
     several = max(len(poses), len(commands), len(io_tsv)) > 1
     if options.robot_id is not None and (not 0 <= options.robot_id <= 99 or several):
         raise LogError(
