@@ -480,17 +480,16 @@ def _rivals(
         settings: numbers that decide.
         beside: whether something else was found; if not, the first round has compared them.
     """
-    late = with_role(name, "lateness")
-    if not beside and not late:
-        return []
+    late = [n for n in candidates(base.state) if with_role(n, "lateness")]
+    late = [n for n in late if n != name] if with_role(name, "lateness") else []
+    if not beside:
+        return screen(base, starts, late) if late else []
     screened = screen(base, starts)
     own = next((s.gain for s in screened if s.name == name), 0.0)
     likely = [s for s in _promising(screened, settings) if s.gain > settings.rival * own]
-    likely = [s for s in likely if s.name != name][: settings.exchanged] if beside else []
-    names = {s.name for s in likely} | {name}
-    return likely + [
-        s for s in screened if late and s.name not in names and with_role(s.name, "lateness")
-    ]
+    likely = [s for s in likely if s.name != name][: settings.exchanged]
+    names = {s.name for s in likely}
+    return likely + [s for s in screened if s.name in late and s.name not in names]
 
 
 def _cost(trial: Trial, settings: Settings) -> float:
