@@ -265,6 +265,7 @@ static void report_packet(void)
     }
 }
 
+// What the board was told before a process ended is reported before its end, too.
 static void report_dead_children(void)
 {
     struct signalfd_siginfo info;
@@ -279,6 +280,7 @@ static void report_dead_children(void)
     {
         end.status = status;
         end.t_ns = now_ns();
+        report_board();
         send_message('e', &end, sizeof end);
     }
 }
