@@ -34,6 +34,22 @@ TEST(PlanarPlant, FollowsTheExactArcInStepsOfAnyLength)
     }
 }
 
+// The same circle, in ten thousand steps: the vector of the heading keeps its length.
+TEST(Course, FollowsTheExactArcInStepsOfAnyLength)
+{
+    const double vx = 0.3, vy = -0.1, omega = 1.5, t_s = 20;
+    const double s = std::sin(omega * t_s), c = std::cos(omega * t_s);
+    for (const double dt_s : {0.002, 0.02, 0.5, 2.0})
+    {
+        Course course({});
+        for (int i = 0; i < std::lround(t_s / dt_s); ++i)
+            course.Follow({vx, vy, omega}, dt_s);
+        EXPECT_NEAR(course.pose().x_m, (vx * s - vy * (1 - c)) / omega, 1e-12);
+        EXPECT_NEAR(course.pose().y_m, (vx * (1 - c) + vy * s) / omega, 1e-12);
+        EXPECT_NEAR(course.pose().theta_rad, omega * t_s, 1e-11);
+    }
+}
+
 // Either side of the angle below which the chord is taken for the arc.
 TEST(PlanarPlant, HasNoStepBetweenStraightAndCurved)
 {

@@ -9,12 +9,22 @@ namespace twin
 namespace
 {
 
-// sin(a) / a; below 0.05 rad by its series, whose next term is under 1e-15.
+// Below this square of an angle the series are exact: their next terms are under 1e-15.
+constexpr double kSmallSquare = 0.0025;
+
+// sin(a) / a
 double SinOver(double a)
 {
     const double square = a * a;
-    return square < 0.0025 ? 1 - square / 6 * (1 - square / 20 * (1 - square / 42))
-                           : std::sin(a) / a;
+    return square < kSmallSquare ? 1 - square / 6 * (1 - square / 20 * (1 - square / 42))
+                                 : std::sin(a) / a;
+}
+
+double Cos(double a)
+{
+    const double square = a * a;
+    return square < kSmallSquare ? 1 - square / 2 * (1 - square / 12 * (1 - square / 30))
+                                 : std::cos(a);
 }
 
 }  // namespace
@@ -28,6 +38,24 @@ Pose2 AlongArc(const Pose2 &from, const Twist &v, double dt_s)
     const double c = std::cos(middle_rad), s = std::sin(middle_rad);
     return {from.x_m + chord_s * (c * v.vx_mps - s * v.vy_mps),
             from.y_m + chord_s * (s * v.vx_mps + c * v.vy_mps), from.theta_rad + 2 * half_rad};
+}
+
+Course::Course(const Pose2 &start)
+    : pose_(start), cos_(std::cos(start.theta_rad)), sin_(std::sin(start.theta_rad))
+{
+}
+
+void Course::Follow(const Twist &v, double dt_s)
+{
+    const double half_rad = v.omega_radps * dt_s / 2;
+    const double over = SinOver(half_rad), c = Cos(half_rad), s = half_rad * over;
+    const double middle_c = cos_ * c - sin_ * s, middle_s = sin_ * c + cos_ * s;
+    const double chord_s = dt_s * over;
+    pose_.x_m += chord_s * (middle_c * v.vx_mps - middle_s * v.vy_mps);
+    pose_.y_m += chord_s * (middle_s * v.vx_mps + middle_c * v.vy_mps);
+    pose_.theta_rad += 2 * half_rad;
+    cos_ = middle_c * c - middle_s * s;
+    sin_ = middle_s * c + middle_c * s;
 }
 
 void PlanarStep(const DriveChain &chain, const Command &command, double t_s, double dt_s,

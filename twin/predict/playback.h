@@ -39,9 +39,9 @@ public:
     }
 
 private:
-    // Steps end at each command and are no longer than this: the ground stage sees the pose at
-    // their start.
-    static constexpr double kMaxStepS = 0.02;
+    // Steps end at each command and are no longer than this, as a swarm's are: the ground stage
+    // sees the pose at their start. Commands that come 45 times a second are one step each.
+    static constexpr double kMaxStepS = 0.025;
 
     Command Held() const
     {

@@ -22,33 +22,42 @@ struct Windows
     size_t Horizons() const { return starts.empty() ? 0 : ends.size() / starts.size(); }
 };
 
-// Poses at which some window starts or ends, ascending.
-std::vector<size_t> Events(const Windows &windows)
+// Poses at which some window starts or ends.
+class Events
 {
-    std::vector<size_t> events;
-    for (const auto &list : {windows.starts, windows.ends})
-        for (const int64_t k : list)
-            if (k >= 0)
-                events.push_back(static_cast<size_t>(k));
-    std::ranges::sort(events);
-    events.erase(std::unique(events.begin(), events.end()), events.end());
-    return events;
-}
+public:
+    explicit Events(const Windows &windows) : number_(windows.track.pose_t_s.size())
+    {
+        std::vector<char> used(number_.size(), false);
+        for (const auto &list : {windows.starts, windows.ends})
+            for (const int64_t pose : list)
+                if (pose >= 0)
+                    used.at(static_cast<size_t>(pose)) = true;
+        for (size_t pose = 0; pose < used.size(); ++pose)
+        {
+            number_[pose] = poses_.size();
+            if (used[pose])
+                poses_.push_back(pose);
+        }
+    }
 
-struct Event
-{
-    size_t pose;
-    Sample measured;
+    // Ascending.
+    const std::vector<size_t> &Poses() const { return poses_; }
+
+    // Which of them a pose is.
+    size_t At(int64_t pose) const { return number_[static_cast<size_t>(pose)]; }
+
+private:
+    std::vector<size_t> number_, poses_;
 };
 
-std::vector<Event> MeasuredAt(const DriveChain &chain, const Track &track,
-                              const std::vector<size_t> &poses)
+std::vector<Sample> MeasuredAt(const DriveChain &chain, const Track &track, const Events &events)
 {
-    std::vector<Event> events;
-    events.reserve(poses.size());
-    for (const size_t k : poses)
-        events.push_back({k, Measured(chain, track, k)});
-    return events;
+    std::vector<Sample> samples;
+    samples.reserve(events.Poses().size());
+    for (const size_t pose : events.Poses())
+        samples.push_back(Measured(chain, track, pose));
+    return samples;
 }
 
 struct WheelStep
@@ -63,54 +72,68 @@ struct Recording
     std::vector<WheelStep> steps;
     std::vector<size_t> reached;  // by event: steps made when its time is reached
 
-    bool IsAt(const std::vector<Event> &events) const
+    bool IsAt(const std::vector<Sample> &measured) const
     {
-        return std::ranges::equal(event_t_s, events, {}, {},
-                                  [](const Event &e) { return e.measured.t_s; });
+        return std::ranges::equal(event_t_s, measured, {}, {}, &Sample::t_s);
     }
 };
 
-Recording Record(const DriveChain &chain, const Track &track, const std::vector<Event> &events)
+Recording Record(const DriveChain &chain, const Track &track, const std::vector<Sample> &measured)
 {
     Recording recording;
     RobotState state = chain.Start({});
     Playback playback(track);
-    for (const Event &event : events)
+    for (const Sample &sample : measured)
     {
-        playback.Advance(event.measured.t_s, [&](const Command &command, double t_s, double dt_s) {
+        playback.Advance(sample.t_s, [&](const Command &command, double t_s, double dt_s) {
             recording.steps.push_back({t_s, dt_s, chain.DriveWheels(command, t_s, dt_s, state)});
         });
-        recording.event_t_s.push_back(event.measured.t_s);
+        recording.event_t_s.push_back(sample.t_s);
         recording.reached.push_back(recording.steps.size());
     }
     return recording;
 }
 
-// The robot moved over steps [from, to) of the recording.
+// The robot moved along its course over steps [from, to) of the recording.
 void Move(const DriveChain &chain, const Recording &recording, size_t from, size_t to,
-          RobotState &state)
+          Course &course, RobotState &state)
 {
     for (size_t i = from; i < to; ++i)
     {
         const WheelStep &step = recording.steps[i];
-        const Twist velocity = chain.BodyTwist(step.motion, step.t_s, step.dt_s, state, nullptr);
-        state.pose = AlongArc(state.pose, velocity, step.dt_s);
+        state.pose = course.pose();
+        course.Follow(chain.BodyTwist(step.motion, step.t_s, step.dt_s, state, nullptr), step.dt_s);
     }
 }
 
-// Where a robot that starts at `start` gets to while one that starts at `from` gets to `to`.
-Pose2 Moved(const Pose2 &start, const Pose2 &from, const Pose2 &to)
+// Where a robot that starts at `start` gets to while another that starts at `from` goes its way.
+class Shifted
 {
-    const double turn_rad = start.theta_rad - from.theta_rad;
-    const double c = std::cos(turn_rad), s = std::sin(turn_rad);
-    const double x_m = to.x_m - from.x_m, y_m = to.y_m - from.y_m;
-    return {start.x_m + c * x_m - s * y_m, start.y_m + s * x_m + c * y_m, to.theta_rad + turn_rad};
-}
+public:
+    Shifted(const Pose2 &start, const Pose2 &from)
+        : start_(start),
+          from_(from),
+          c_(std::cos(start.theta_rad - from.theta_rad)),
+          s_(std::sin(start.theta_rad - from.theta_rad))
+    {
+    }
+
+    Pose2 At(const Pose2 &to) const
+    {
+        const double x_m = to.x_m - from_.x_m, y_m = to.y_m - from_.y_m;
+        return {start_.x_m + c_ * x_m - s_ * y_m, start_.y_m + s_ * x_m + c_ * y_m,
+                start_.theta_rad + to.theta_rad - from_.theta_rad};
+    }
+
+private:
+    Pose2 start_, from_;
+    double c_, s_;
+};
 
 // By event: what effects on the ground remember there, moved from measured pose to measured pose;
 // empty where none remembers.
 std::vector<std::vector<double>> Remembered(const DriveChain &chain,
-                                            const std::vector<Event> &events,
+                                            const std::vector<Sample> &measured,
                                             const Recording &recording)
 {
     std::vector<std::vector<double>> remembered;
@@ -118,11 +141,10 @@ std::vector<std::vector<double>> Remembered(const DriveChain &chain,
         return remembered;
     RobotState state = chain.Start({});
     size_t done = 0;
-    for (size_t e = 0; e < events.size(); ++e)
+    for (size_t e = 0; e < measured.size(); ++e)
     {
-        if (e > 0)
-            state.pose = events[e - 1].measured.pose;
-        Move(chain, recording, done, recording.reached[e], state);
+        Course course(measured[e > 0 ? e - 1 : 0].pose);
+        Move(chain, recording, done, recording.reached[e], course, state);
         done = recording.reached[e];
         remembered.push_back(state.effect_state);
     }
@@ -130,49 +152,68 @@ std::vector<std::vector<double>> Remembered(const DriveChain &chain,
 }
 
 // All windows of one model, written to `out` (W, H, 3).
-void Predict(const DriveChain &chain, const Windows &windows, const std::vector<Event> &events,
-             const Recording &recording, double *out)
+struct Prediction
 {
-    const auto event_of = [&](int64_t pose) {
-        const auto at =
-            std::ranges::lower_bound(events, static_cast<size_t>(pose), {}, &Event::pose);
-        return static_cast<size_t>(at - events.begin());
-    };
-    RobotState state = chain.Start({});
-    std::vector<Pose2> path;  // by event: of a robot that begins at the origin
-    if (chain.IsHomogeneous())
+    const DriveChain &chain;
+    const Windows &windows;
+    const Events &events;
+    const std::vector<Sample> &measured;
+    const Recording &recording;
+    double *out;
+
+    void Write() const { chain.IsHomogeneous() ? AlongOnePath() : EachFromItsStart(); }
+
+private:
+    // Calls start(event) at each window's begin, then visit(event, out) at each of its ends.
+    template <class Start, class Visit>
+    void ForEach(Start start, Visit visit) const
     {
+        const size_t horizons = windows.Horizons();
+        for (size_t w = 0; w < windows.starts.size(); ++w)
+        {
+            start(events.At(windows.starts[w]));
+            for (size_t h = w * horizons; h < (w + 1) * horizons && windows.ends[h] >= 0; ++h)
+                visit(events.At(windows.ends[h]), out + 3 * h);
+        }
+    }
+
+    void AlongOnePath() const
+    {
+        std::vector<Pose2> path;  // by event
+        RobotState state = chain.Start({});
+        Course course({});
         size_t done = 0;
         for (const size_t reached : recording.reached)
         {
-            Move(chain, recording, done, reached, state);
-            path.push_back(state.pose);
+            Move(chain, recording, done, reached, course, state);
+            path.push_back(course.pose());
             done = reached;
         }
+        Shifted shifted({}, {});
+        ForEach([&](size_t from) { shifted = Shifted(measured[from].pose, path[from]); },
+                [&](size_t to, double *seen) { WriteSeen(chain, shifted.At(path[to]), seen); });
     }
-    const auto remembered = Remembered(chain, events, recording);
-    const size_t horizons = windows.Horizons();
-    for (size_t w = 0; w < windows.starts.size(); ++w)
+
+    void EachFromItsStart() const
     {
-        const size_t from = event_of(windows.starts[w]);
-        state.pose = events[from].measured.pose;
-        if (!remembered.empty())
-            state.effect_state = remembered[from];
-        size_t done = recording.reached[from];
-        for (size_t h = w * horizons; h < (w + 1) * horizons && windows.ends[h] >= 0; ++h)
-        {
-            const size_t to = event_of(windows.ends[h]);
-            if (chain.IsHomogeneous())
-            {
-                WriteSeen(chain, Moved(state.pose, path[from], path[to]), out + 3 * h);
-                continue;
-            }
-            Move(chain, recording, done, recording.reached[to], state);
-            done = recording.reached[to];
-            WriteSeen(chain, state.pose, out + 3 * h);
-        }
+        const auto remembered = Remembered(chain, measured, recording);
+        RobotState state = chain.Start({});
+        Course course({});
+        size_t done = 0;
+        ForEach(
+            [&](size_t from) {
+                course = Course(measured[from].pose);
+                if (!remembered.empty())
+                    state.effect_state = remembered[from];
+                done = recording.reached[from];
+            },
+            [&](size_t to, double *seen) {
+                Move(chain, recording, done, recording.reached[to], course, state);
+                done = recording.reached[to];
+                WriteSeen(chain, course.pose(), seen);
+            });
     }
-}
+};
 
 // By row of values: whether they leave the wheels' motion as it is, but for the times of poses.
 std::vector<char> OnGroundAlone(const Model &model, const std::vector<std::string> &names,
@@ -197,10 +238,12 @@ std::vector<double> PredictWindows(const Model &model, const Track &track,
                                    std::span<const int64_t> starts, std::span<const int64_t> ends)
 {
     const Windows windows{track, starts, ends};
+    const Events events(windows);
     const DriveChain chain(model);
-    const auto events = MeasuredAt(chain, track, Events(windows));
+    const auto measured = MeasuredAt(chain, track, events);
+    const Recording recording = Record(chain, track, measured);
     std::vector<double> predicted(3 * ends.size(), kNaN);
-    Predict(chain, windows, events, Record(chain, track, events), predicted.data());
+    Prediction{chain, windows, events, measured, recording, predicted.data()}.Write();
     return predicted;
 }
 
@@ -211,23 +254,28 @@ std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
                                         std::span<const double> values)
 {
     const Windows windows{track, starts, ends};
-    const std::vector<size_t> poses = Events(windows);
+    const Events events(windows);
     const std::vector<Model> models = ModelsOf(model, names, values);
     const std::vector<char> grounded = OnGroundAlone(model, names, values);
     Recording shared;
     if (std::ranges::count(grounded, true) > 0)
     {
         const DriveChain own(model);
-        shared = Record(own, track, MeasuredAt(own, track, poses));
+        shared = Record(own, track, MeasuredAt(own, track, events));
     }
     std::vector<double> predicted(models.size() * 3 * ends.size(), kNaN);
     InParallel(models.size(), [&](size_t b) {
         const DriveChain chain(models[b]);
-        const auto events = MeasuredAt(chain, track, poses);
-        const bool same = grounded[b] && shared.IsAt(events);
-        const Recording own = same ? Recording{} : Record(chain, track, events);
-        Predict(chain, windows, events, same ? shared : own,
-                predicted.data() + b * 3 * ends.size());
+        const auto measured = MeasuredAt(chain, track, events);
+        const bool same = grounded[b] && shared.IsAt(measured);
+        const Recording own = same ? Recording{} : Record(chain, track, measured);
+        Prediction{chain,
+                   windows,
+                   events,
+                   measured,
+                   same ? shared : own,
+                   predicted.data() + b * 3 * ends.size()}
+            .Write();
     });
     return predicted;
 }

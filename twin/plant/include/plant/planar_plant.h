@@ -13,6 +13,21 @@ namespace twin
 // The pose after `dt_s` at constant velocity: the exact arc.
 Pose2 AlongArc(const Pose2 &from, const Twist &twist, double dt_s);
 
+// The same arcs one after the other. The heading is a vector that turns, which is
+// quicker than its cosine and sine at every step.
+class Course
+{
+public:
+    explicit Course(const Pose2 &start);
+
+    void Follow(const Twist &twist, double dt_s);
+    const Pose2 &pose() const { return pose_; }
+
+private:
+    Pose2 pose_;
+    double cos_, sin_;
+};
+
 // Moves one robot by `dt_s`: wheels, ground velocity, then the exact arc at constant velocity.
 void PlanarStep(const DriveChain &chain, const Command &command, double t_s, double dt_s,
                 RobotState &state, Random *random);
