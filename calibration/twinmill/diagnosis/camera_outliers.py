@@ -8,8 +8,9 @@ import twinmill_native as native
 from scipy.stats import t
 
 from twinmill.diagnosis.outliers import Outlier, middle_and_scale, odd_ones
-from twinmill.diagnosis.search import camera_state, search
+from twinmill.diagnosis.search import search
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.trials import camera_state
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import Detections

@@ -13,7 +13,9 @@ from twinmill.diagnosis.camera_outliers import judge_cameras, odd_cameras
 from twinmill.diagnosis.finding import Finding, Ranked
 from twinmill.diagnosis.findings import ranking_of
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.search import Search, camera_state, search
+from twinmill.diagnosis.rounds import Search
+from twinmill.diagnosis.search import search
+from twinmill.diagnosis.trials import camera_state
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import ParameterEstimate, needing, newest_instance
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections

@@ -12,8 +12,8 @@ import numpy as np
 
 from twinmill.data.track import command_at
 from twinmill.diagnosis.library import TIME
-from twinmill.diagnosis.search import Trial
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.trials import Trial
 from twinmill.model.parameters import Parameter, effect_names, needing
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S

@@ -38,16 +38,11 @@ from twinmill.diagnosis.resolution import resolutions
 from twinmill.diagnosis.rest import Doubted, formulas_of, rest_of
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.rivals import less_each
-from twinmill.diagnosis.search import (
-    REFIT,
-    Search,
-    State,
-    Trial,
-    cross_validate,
-    instead_of_drift,
-    search,
-)
+from twinmill.diagnosis.rounds import Search
+from twinmill.diagnosis.search import search
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.ties import instead_of_drift
+from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
 from twinmill.fitting.compare import GOOD, Comparison, comparison, of_others
 from twinmill.fitting.fit import base_names

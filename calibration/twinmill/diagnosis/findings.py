@@ -12,17 +12,10 @@ from twinmill.diagnosis.constancy import Change, OneHeading, changes_of
 from twinmill.diagnosis.doubts import beside_larger, of_one, seen_once, stand_in, while_at
 from twinmill.diagnosis.finding import Finding, Late, Ranked, doubted
 from twinmill.diagnosis.library import TIME
-from twinmill.diagnosis.search import (
-    REFIT,
-    Round,
-    Search,
-    State,
-    Trial,
-    comes_again,
-    fitted,
-    with_effects,
-)
+from twinmill.diagnosis.rounds import Round, Search
+from twinmill.diagnosis.search import comes_again
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.trials import REFIT, State, Trial, fitted, with_effects
 from twinmill.model.parameters import (
     CLOCK,
     LAG,

@@ -14,8 +14,10 @@ import numpy as np
 import twinmill_native as native
 from scipy.stats import chi2
 
-from twinmill.diagnosis.search import REFIT, Search, State, Trial, cross_validate, fitted, screen
+from twinmill.diagnosis.rounds import Search
+from twinmill.diagnosis.screening import screen
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, fitted
 from twinmill.fitting.opening import Opened, wide_gains
 from twinmill.model.parameters import (
     GAINS,

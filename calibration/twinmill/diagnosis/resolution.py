@@ -4,8 +4,8 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
-from twinmill.diagnosis.search import State
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.trials import State
 from twinmill.fitting.opening import Opened, wide_gains
 from twinmill.model.parameters import GAINS
 

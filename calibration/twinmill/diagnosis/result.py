@@ -11,7 +11,8 @@ from twinmill.diagnosis.finding import Finding, Late, Ranked
 from twinmill.diagnosis.outliers import Outlier
 from twinmill.diagnosis.resolution import Resolution
 from twinmill.diagnosis.rest import Rest
-from twinmill.diagnosis.search import REFIT, Search
+from twinmill.diagnosis.rounds import Search
+from twinmill.diagnosis.trials import REFIT
 from twinmill.fitting.compare import Comparison
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.settings import FLOOR_SETTINGS

@@ -12,8 +12,9 @@ import numpy as np
 
 from twinmill.diagnosis.library import Term
 from twinmill.diagnosis.rest import Formulas, formulas_of
-from twinmill.diagnosis.search import REFIT, Search, Trial, without_effect
+from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.trials import REFIT, Trial, without_effect
 from twinmill.fitting.opening import Opened
 
 

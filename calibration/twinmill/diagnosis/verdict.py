@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from twinmill.diagnosis import moments
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.rest import MOMENTS, Rest
-from twinmill.diagnosis.search import REFIT, REFIT_IN_WORDS, of_levels
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.ties import of_levels
+from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.compare import GOOD, LACKING, MISSING
 
 

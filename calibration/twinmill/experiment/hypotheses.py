@@ -7,7 +7,7 @@ import numpy as np
 
 from twinmill.diagnosis.finding import Ranked
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.search import without_effect
+from twinmill.diagnosis.trials import without_effect
 from twinmill.experiment.candidates import Candidate, candidates
 from twinmill.experiment.information import CandidateEffect
 from twinmill.experiment.screen import screen

@@ -12,8 +12,8 @@ from twinmill.data.checks.settings import CHECKS
 from twinmill.diagnosis.explain import Explanation, steps
 from twinmill.diagnosis.outliers import Outlier, in_words
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.search import REFIT, REFIT_IN_WORDS
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.model.parameters import ParameterEstimate, catalogue
 from twinmill.report import Figure, Section, comparisons, detections, formula, show, tables

@@ -15,7 +15,7 @@ from twinmill.charts.arrays import RESTARTS, measured_path
 from twinmill.charts.packed import pack, pack_log, pack_prediction, pack_robot
 from twinmill.data.camera_frames import frames_of
 from twinmill.data.log import LogError
-from twinmill.diagnosis.search import REFIT
+from twinmill.diagnosis.trials import REFIT
 from twinmill.files import plain
 from twinmill.model.parameters import is_of_camera
 from twinmill.workbench.session import Session, beside_label

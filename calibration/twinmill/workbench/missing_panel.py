@@ -5,7 +5,7 @@ import html
 
 from nicegui import ui
 
-from twinmill.diagnosis.search import REFIT, REFIT_IN_WORDS
+from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.add import OWN_GAINS
 from twinmill.model.parameters import catalogue
 from twinmill.workbench.bench import moves

@@ -12,7 +12,9 @@ from twinmill.data.camera_frames import Frames, frames_of
 from twinmill.data.track import make_track
 from twinmill.diagnosis.camera_outliers import odd_cameras
 from twinmill.diagnosis.cameras import camera_findings, not_shown
-from twinmill.diagnosis.search import Search, camera_state, search
+from twinmill.diagnosis.rounds import Search
+from twinmill.diagnosis.search import search
+from twinmill.diagnosis.trials import camera_state
 from twinmill.predict.detection_errors import compare_detections
 from twinmill.predict.detections import BLOCK_S, Detections, majority, thue_morse
 

@@ -6,7 +6,7 @@ import pytest
 
 from twinmill.diagnosis.constancy import OneHeading, changes_of
 from twinmill.diagnosis.diagnose import first_state
-from twinmill.diagnosis.search import fitted, with_effects
+from twinmill.diagnosis.trials import fitted, with_effects
 from twinmill.fitting.opening import judged, open_measurements
 
 BIAS_RAD = 0.06

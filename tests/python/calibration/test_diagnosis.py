@@ -9,8 +9,10 @@ import pytest
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
-from twinmill.diagnosis.search import Round, Screened, _tied, canonical_correlation
+from twinmill.diagnosis.rounds import Round
+from twinmill.diagnosis.screening import Screened
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.ties import canonical_correlation, ties_of
 from twinmill.fitting.add import add
 from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
@@ -162,4 +164,4 @@ def test_what_can_do_all_that_another_does_stands_in_one_group_with_it(behind, t
         Screened(name, columns, 50.0, 20.0) for name, columns in (("line", line), ("plane", plane))
     ]
     this = Round(None, screened, trials, accepted=trials[0])
-    assert [t.names[0] for t in _tied(this, SETTINGS)] == (["plane"] if tied else [])
+    assert [t.names[0] for t in ties_of(this, SETTINGS)] == (["plane"] if tied else [])

@@ -15,9 +15,9 @@ from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.moments import _events
 from twinmill.diagnosis.rest import Rest
-from twinmill.diagnosis.search import cross_validate
-from twinmill.diagnosis.search import fitted as fitted_state
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.trials import cross_validate
+from twinmill.diagnosis.trials import fitted as fitted_state
 from twinmill.fitting.compare import MISSING, compare
 from twinmill.fitting.fit import base_names, fit
 from twinmill.fitting.opening import open_measurements

@@ -13,8 +13,8 @@ from twinmill.diagnosis.library import SHAPES, _wheel_terms
 from twinmill.diagnosis.notes import irregularity
 from twinmill.diagnosis.place import HORIZON, comes_again
 from twinmill.diagnosis.rest import Rest
-from twinmill.diagnosis.search import REFIT
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.trials import REFIT
 from twinmill.diagnosis.verdict import VerdictInputs
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.noise import ChannelNoise, Noise

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a search did, round by round."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from twinmill.diagnosis.screening import Screened
+from twinmill.diagnosis.settings import Settings
+from twinmill.diagnosis.trials import REFIT, Trial
+
+
+@dataclass
+class Round:
+    """One step of a search."""
+
+    before: Trial
+    screened: list[Screened]
+    trials: list[Trial]
+    accepted: Trial | None = None
+    tied: list[Trial] = field(default_factory=list)
+
+    def p_value(self, trial: Trial) -> float:
+        """Bound of the chance of such evidence if nothing were missing, for all candidates."""
+        return float(min(1.0, len(self.screened) * np.exp(-max(trial.evidence / 2, 0.0))))
+
+
+@dataclass
+class Search:
+    """A whole search: rounds, the last trial, and what was dropped again."""
+
+    rounds: list[Round]
+    last: Trial
+    dropped: list[str]
+    settings: Settings
+
+    @property
+    def found(self) -> list[str]:
+        """Names accepted and kept, in order."""
+        names = [n for r in self.rounds if r.accepted for n in r.accepted.names]
+        return [n for n in names if n not in self.dropped]
+
+    def round_of(self, name: str) -> Round:
+        """The last round in which an effect was accepted."""
+        return next(r for r in reversed(self.rounds) if r.accepted and name in r.accepted.names)
+
+    @property
+    def faint(self) -> list[tuple[str, str]]:
+        """Effects that could be there and not be seen, and why."""
+        hidden = []
+        for s in self.rounds[-1].screened:
+            if s.name == REFIT:
+                continue
+            if s.size < 1e-6:
+                hidden.append((s.name, "the data have no drive on which it acts"))
+            elif self.settings.traced**2 * s.size < self.settings.faint:
+                hidden.append((s.name, "even three times its usual size would not be visible"))
+        return hidden
+
+    @property
+    def passes(self) -> int:
+        """How often a plant ran over a whole data set, on the average."""
+        fits = [t.fit for r in self.rounds for t in (r.before, *r.trials)]
+        return round(sum(f.passes for f in fits) / max(len(self.last.state.datasets), 1))

@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What each effect of the catalogue would take away if all were linear."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.diagnosis.settings import SETTINGS, Settings
+from twinmill.diagnosis.starts import Left, Starts, starts_of
+from twinmill.diagnosis.trials import REFIT, State, Trial, with_effects
+from twinmill.fitting.detection_fit import DetectionFit
+from twinmill.model.parameters import (
+    LAG,
+    LAG_EFFECT,
+    Parameter,
+    base_lag_is_identifiable,
+    base_parameters,
+    catalogue_of,
+    effect_names,
+    effect_parameters,
+    making_late,
+    with_role,
+)
+
+SMALL = 0.05
+STALE = 0.3  # of the prior's width: a usual error of the base's numbers
+
+
+@dataclass(frozen=True)
+class Screened:
+    """What the linear screening says of one candidate.
+
+    Attributes:
+        columns: (R, k) of all data sets, weighted, what is free projected out.
+        gain: expected fall of the cost.
+        size: expected fall of the cost if it had its usual strength.
+        start: values that the fit begins at, by name; a place, moment or limit is searched.
+    """
+
+    name: str
+    columns: np.ndarray
+    gain: float
+    size: float
+    start: dict[str, float] = field(default_factory=dict)
+
+
+def candidates(state: State) -> list[str]:
+    """Effects that could be added to the model.
+
+    An effect that the model has with numbers that are held can be there once more: they changed.
+    """
+    model = state.model
+    moved = {p.name.split(".")[0].split("#")[0] for p in state.free}
+    if model.get(LAG) == 0 and base_lag_is_identifiable(model):
+        # Without a first lag, a second one is no other than the first.
+        moved |= {n for n in making_late("lag") if n != LAG_EFFECT}
+    names = []
+    if any(n not in {p.name for p in state.free} for n in state.base):
+        names.append(REFIT)
+    for name, entry in catalogue_of(model).items():
+        usable = entry["stage"] in state.datasets[0].stages and not entry["texts"]
+        if usable and name not in moved and name not in state.excluded:
+            names.append(name)
+    return names
+
+
+def screen(
+    before: Trial, starts: dict[str, Starts] | None = None, names: Sequence[str] | None = None
+) -> list[Screened]:
+    """Every candidate's expected worth, by its signature over what is free.
+
+    Args:
+        before: what is free in it is projected out.
+        starts: of effects whose start is searched, found in earlier rounds; new ones are added.
+            What was accepted since changes little of how a patch of the floor changes the rows, but
+            much of which limit is the right one.
+        names: of the candidates, where not all that the state can have are meant.
+    """
+    fit, state = before.fit, before.state
+    if state.of_cameras:
+        return [_screened_bits(name, before) for name in candidates(state)]
+    starts = {} if starts is None else starts
+    rows, _ = fit.state
+    weights = [np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)]
+    left, columns, _ = fit.whitened(range(len(rows)))
+    free = np.vstack([columns, np.diag(1 / fit.std)]) if len(fit.x) else np.zeros((len(left), 0))
+    padded = np.concatenate([left, (fit.usual - fit.x) / fit.std * -1]) if len(fit.x) else left
+    basis = np.linalg.qr(free)[0] if len(fit.x) else free
+    rest = padded - basis @ (basis.T @ padded)
+    ends = np.cumsum([len(r) for r in rows])[:-1]
+    parts = (np.split(whole[: len(left)], ends) for whole in (rest, basis))
+    what_is_left = Left(weights, *parts)
+    found = []
+    for name in candidates(state) if names is None else names:
+        if name not in starts or with_role(name, "limit"):
+            of = starts_of(name, state.models, state.datasets, rows)
+            starts |= {name: of} if of else {}
+        start = starts[name].best(what_is_left) if name in starts else {}
+        found.append(
+            _screened(name, state, rows=rows, weights=weights, basis=basis, rest=rest, start=start)
+        )
+    return found
+
+
+def _screened_bits(name: str, before: Trial) -> Screened:
+    """By a grid of values: the likelihood of detections has edges, and no signature."""
+    state = with_effects(before.state, (name,))
+    alone = DetectionFit(state.datasets, state.models, state.free[len(before.state.free) :])
+    gain, trace = alone.promise(), alone.trace(before.fit, SETTINGS.traced)
+    return Screened(name, np.zeros((0, 0)), gain, trace / SETTINGS.traced**2)
+
+
+def _reach(name: str, parameters: Sequence[Parameter], start: dict[str, float]) -> np.ndarray:
+    """(k,) how far from neutral the usual strength is; of the base's numbers a usual error."""
+    if name == REFIT:
+        return np.array([STALE * p.std for p in parameters])
+    return np.array([start.get(p.name, p.value) - p.usual for p in parameters])
+
+
+def _widths(name: str, parameters: Sequence[Parameter], start: dict[str, float]) -> np.ndarray:
+    """(k,) standard deviations of the prior, in usual strengths."""
+    reach = np.abs(_reach(name, parameters, start))
+    std = np.array([p.std for p in parameters])
+    return np.maximum(std / np.maximum(reach, 1e-12), 1.0)
+
+
+def _screened(
+    name: str,
+    state: State,
+    *,
+    rows: list[np.ndarray],
+    weights: list[np.ndarray],
+    basis: np.ndarray,
+    rest: np.ndarray,
+    start: dict[str, float],
+) -> Screened:
+    """Slopes at neutral, or the way to the usual strength where these say nothing of it."""
+    parameters, small, whole = _signatures(name, state, rows=rows, weights=weights, start=start)
+    pad = len(rest) - len(small)
+    small, whole = (np.vstack([c, np.zeros((pad, c.shape[1]))]) for c in (small, whole))
+    small, whole = (c - basis @ (basis.T @ c) for c in (small, whole))
+    linear = small.sum(axis=1)
+    size, reached = np.linalg.norm(linear), np.linalg.norm(whole)
+    agree = linear @ whole[:, 0] / max(size * reached, 1e-12)
+    used = small if agree > 0.5 and 1 / 3 < size / max(reached, 1e-12) < 3 else whole
+    # Columns are in default strengths, and the prior's width in these.
+    widths = np.ones(used.shape[1]) if used is whole else _widths(name, parameters, start)
+    gram = used.T @ used + np.diag(1 / widths**2)
+    moment = used.T @ rest
+    gain = float(moment @ np.linalg.solve(gram, moment))
+    size = float((whole**2).sum())
+    if used is small:  # half of the prior's width is a usual strength
+        size = float(np.max((small**2).sum(axis=0) * widths**2)) / 4
+    return Screened(name, used, gain, size, start)
+
+
+def _signatures(
+    name: str,
+    state: State,
+    *,
+    rows: list[np.ndarray],
+    weights: list[np.ndarray],
+    start: dict[str, float],
+) -> tuple[list[Parameter], np.ndarray, np.ndarray]:
+    """How the rows change with what is new.
+
+    Returns:
+        Its parameters; (R, k) change by a small part of each one's usual strength, scaled up to it;
+        (R, 1) change by the usual strength of all.
+    """
+    small, whole, parameters = [], [], []
+    for dataset, model, row, weight in zip(
+        state.datasets, state.models, rows, weights, strict=True
+    ):
+        parameters, names, points = _points(name, state, model, start)
+        values = dataset.rows(points.model, names, points.values)
+        steps = points.share
+        small.append(weight[:, None] * (row - values[:-1]).T / steps)
+        whole.append(weight[:, None] * (row - values[-1:]).T)
+    return parameters, np.concatenate(small), np.concatenate(whole)
+
+
+@dataclass(frozen=True)
+class _Points:
+    model: native.Model
+    values: np.ndarray
+    share: float
+
+
+def _points(
+    name: str, state: State, model: native.Model, start: dict[str, float]
+) -> tuple[list[Parameter], list[str], _Points]:
+    """Parameters, their names, and values: a small step of each alone, then the usual of all."""
+    model = model.copy()
+    if name == REFIT:
+        free = {p.name for p in state.free}
+        parameters = base_parameters(model, [n for n in state.base if n not in free])
+        origin = np.array([p.value for p in parameters])
+    else:
+        model.add_effect(name)
+        parameters = effect_parameters(model, effect_names(model)[-1], fresh=True)
+        origin = np.array([p.usual for p in parameters])
+        for p in parameters:
+            model.set(p.name, p.usual)
+    reach = _reach(name, parameters, start)
+    values = np.vstack([origin + SMALL * np.diag(reach), origin + reach])
+    low, high = (np.array([getattr(p, k) for p in parameters]) for k in ("min", "max"))
+    return (
+        parameters,
+        [p.name for p in parameters],
+        _Points(model, np.clip(values, low, high), SMALL),
+    )
+
+
+def promising(screened: list[Screened], settings: Settings) -> list[Screened]:
+    """Those whose linear gain leaves a chance of acceptance, best first."""
+    best = sorted(screened, key=lambda s: -s.gain)
+    return [s for s in best if s.gain > settings.evidence / 2 and s.gain > 0.02 * best[0].gain]
+
+
+def likely_pairs(
+    before: Trial, screened: list[Screened], settings: Settings
+) -> list[tuple[str, str]]:
+    """Pairs by what they explain together beyond the better one alone."""
+    fit = before.fit
+    top = sorted(screened, key=lambda s: -s.gain)[:10]
+    if before.held_score < 1.0 or before.state.of_cameras:
+        return []
+    left, *_ = fit.whitened(range(len(fit.datasets)))
+    worth = {}
+    for a, b in combinations(top, 2):
+        both = np.hstack([a.columns, b.columns])[: len(left)]
+        gram = both.T @ both + 0.25 * np.eye(both.shape[1])
+        moment = both.T @ left
+        worth[a.name, b.name] = float(moment @ np.linalg.solve(gram, moment)) - max(a.gain, b.gain)
+    best = sorted(worth, key=lambda pair: -worth[pair])
+    return [p for p in best if worth[p] > settings.evidence][: settings.pairs]

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is fitted: a state of a search, and trials of it with something added."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.diagnosis.settings import SETTINGS
+from twinmill.fitting.detection_fit import DetectionFit
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.model.parameters import (
+    CAMERA_STAGES,
+    Parameter,
+    all_effect_parameters,
+    base_parameters,
+    effect_names,
+    effect_parameters,
+    lasts_for_a_while,
+    needing,
+)
+from twinmill.predict.datasets import Dataset, Trajectory, total_score
+from twinmill.predict.detections import Detections
+
+REFIT = "refit"  # the base's numbers were stale: a candidate like any effect
+REFIT_IN_WORDS = "stale numbers of the base"
+SECONDS = 3.0  # of a log, in which what happened in a moment is seen
+
+
+@dataclass(frozen=True)
+class State:
+    """Where a search stands: data sets, a model for each, and what is free in all of them."""
+
+    datasets: Sequence[Dataset]
+    models: Sequence[native.Model]
+    free: tuple[Parameter, ...]
+    base: tuple[str, ...] = ()
+    excluded: frozenset[str] = frozenset()
+
+    @property
+    def model(self) -> native.Model:
+        """The common model: of a robot of which nothing special is stated, if there is one."""
+        ids = [d.robot_id for d in self.datasets]
+        stated = [len(m.stated_of(i)) for m, i in zip(self.models, ids, strict=True)]
+        return self.models[int(np.argmin(stated))]
+
+    @property
+    def by_channel(self) -> bool:
+        """Logs have enough errors for a scale of each channel; tables do not."""
+        return all(isinstance(d, Trajectory) for d in self.datasets)
+
+    @property
+    def of_cameras(self) -> bool:
+        """Whether the data are detections."""
+        return isinstance(self.datasets[0], Detections)
+
+    def fit_of(self, free: Sequence[Parameter]) -> ScoreFit | DetectionFit:
+        """What fits these parameters to the data, by the kind of data."""
+        if self.of_cameras:
+            return DetectionFit(self.datasets, self.models, free)
+        return ScoreFit(self.datasets, self.models, free, self.by_channel)
+
+    def begun(self) -> tuple[Parameter, ...]:
+        """Free parameters, begun at the model's values."""
+        return tuple(p.at(self.model.get(p.name)) for p in self.free)
+
+
+def camera_state(
+    cameras: Sequence[Detections], model: native.Model, excluded: Collection[str] = ()
+) -> State:
+    """Where a search for what the camera lacks starts: its effects are free, all else is held.
+
+    Args:
+        cameras: frames with poses; at least one robot's.
+        model: of all robots.
+        excluded: effects that are not considered.
+    """
+    raw = all(c.frames.has_raw for c in cameras)
+    hidden = {*excluded, *(() if raw else needing("raw_frames"))}
+    free = tuple(all_effect_parameters(model, CAMERA_STAGES))
+    models = [model.for_robot(c.robot_id) for c in cameras]
+    return State(cameras, models, free, excluded=frozenset(hidden))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A fit with something added.
+
+    Attributes:
+        names: what was added: effects, or REFIT.
+        fit: of all free parameters.
+        state: with the fitted models.
+        evidence: fall of the held-out cost against the state it started from.
+        without_best: the same without the block with the most evidence for it; of what lasts for a
+            while without the 3 s with the most, if enough is left.
+        blocks_t: t of the relative fall over blocks.
+    """
+
+    names: tuple[str, ...]
+    fit: ScoreFit | DetectionFit
+    state: State
+    evidence: float
+    without_best: float
+    blocks_t: float
+
+    @property
+    def held_score(self) -> float:
+        """On parts that were not fitted to."""
+        return total_score(self.fit.held_scores)
+
+
+def fitted(state: State) -> Trial:
+    """The state's free parameters fitted."""
+    fit = state.fit_of(state.begun()).fit()
+    return Trial((), fit, replace(state, models=fit.models), 0.0, 0.0, 0.0)
+
+
+def with_effects(
+    state: State, names: Sequence[str], start: dict[str, float] | None = None
+) -> State:
+    """The state with effects added at where their fit begins, or the base set free."""
+    models = [m.copy() for m in state.models]
+    free = list(state.begun())
+    for name in names:
+        if name == REFIT:
+            free += base_parameters(
+                models[0], [n for n in state.base if n not in {p.name for p in free}]
+            )
+            continue
+        for model in models:
+            model.add_effect(name)
+        fresh = effect_parameters(models[0], effect_names(models[0])[-1], fresh=True)
+        fresh = [p.at((start or {}).get(p.name, p.value)) for p in fresh]
+        for model in models:
+            for p in fresh:
+                model.set(p.name, p.value)
+        free += fresh
+    return replace(state, models=models, free=tuple(free))
+
+
+def cross_validate(
+    before: Trial, names: tuple[str, ...], start: dict[str, float] | None = None
+) -> Trial:
+    """A fit of the state before with something added, judged on held-out parts."""
+    state = with_effects(before.state, names, start)
+    fit = state.fit_of(state.free)
+    fit.begin_at_best(state.free[len(before.state.free) :])
+    fit.fit()
+    after = replace(state, models=fit.models)
+    evidence, without_best, blocks_t = fit.against(before.fit)
+    within = _without_best_seconds(names, after, fit, before)
+    if within > SETTINGS.lasts * evidence:
+        without_best = max(without_best, within)
+    return Trial(names, fit, after, evidence, without_best, blocks_t)
+
+
+def _without_best_seconds(
+    names: Sequence[str], state: State, fit: ScoreFit | DetectionFit, before: Trial
+) -> float:
+    """Evidence for what lasts for a while, without the SECONDS with the most; 0 for all else.
+
+    A while may lie within one block. What happened in a moment is seen for two seconds.
+    """
+    if len(names) > 1 or not lasts_for_a_while(names[0]):
+        return 0.0
+    logs = [d for d in state.datasets if isinstance(d, Trajectory)]
+    least = []
+    for shift in (0.0, 0.5):
+        numbers = [((d.start_s - d.start_s[0]) / SECONDS + shift).astype(int) for d in logs]
+        blocks = [np.repeat(p, d.measured[0].size) for p, d in zip(numbers, logs, strict=True)]
+        least.append(fit.least_against(before.fit, blocks))
+    return min(least)
+
+
+def without_effect(trial: Trial, name: str) -> Trial | None:
+    """The trial's state without an effect, refitted; None if it is not in the model."""
+    names = effect_names(trial.state.model)
+    own = [i for i, n in enumerate(names) if n.split("#")[0] == name]
+    if not own:
+        return None
+    models = []
+    for model in trial.state.models:
+        model = model.copy()
+        model.remove_effect(own[-1])
+        models.append(model)
+    free = tuple(p for p in trial.state.begun() if not p.name.startswith(f"{names[own[-1]]}."))
+    return fitted(replace(trial.state, models=models, free=free))
