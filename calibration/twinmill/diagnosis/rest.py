@@ -309,7 +309,13 @@ def _best_term(terms: list[Term], products: "Products", group: str) -> tuple[Ter
 
 
 class Products:
-    """Products of columns with each other and with the errors, block by block.
+    """Products of columns with each other, by fold, and with the errors, block by block.
+
+    Args:
+        columns: (R, T).
+        left: (R,) errors.
+        blocks: (R,) of errors that belong together; they ascend.
+        seen: see below.
 
     Attributes:
         seen: (T,) columns of which enough is left beside what is free.
@@ -320,29 +326,35 @@ class Products:
         self, columns: np.ndarray, left: np.ndarray, blocks: np.ndarray, seen: np.ndarray
     ) -> None:
         count = blocks.max() + 1
-        if count > MOST_BLOCKS:  # each has a matrix: of many, neighbours are one
+        if count > MOST_BLOCKS:  # each has a sign: of many, neighbours are one
             blocks = blocks * MOST_BLOCKS // count
-        order = np.argsort(blocks, kind="stable")
-        edges = np.searchsorted(blocks[order], np.arange(blocks.max() + 2))
-        parts = [order[a:b] for a, b in pairwise(edges)]
-        self.grams = np.array([columns[p].T @ columns[p] for p in parts])
+        self.edges = np.searchsorted(blocks, np.arange(blocks.max() + 2))
+        parts = [slice(a, b) for a, b in pairwise(self.edges)]
         self.moments = np.array([columns[p].T @ left[p] for p in parts])
+        self.energy = np.array([np.einsum("rt,rt->t", columns[p], columns[p]) for p in parts])
+        self.fold = np.arange(len(parts)) % FOLDS
+        folds = (columns[self.fold[blocks] == k] for k in range(FOLDS))
+        self.grams = np.array([x.T @ x for x in folds])
+        self.columns, self.own = columns, np.arange(columns.shape[1])
         self.seen, self.total = seen, float(left @ left)
 
     def of_seen(self) -> "Products":
         """The same without columns of which nothing is left."""
-        less = copy(self)
-        less.grams = self.grams[:, self.seen][:, :, self.seen]
-        less.moments, less.seen = self.moments[:, self.seen], self.seen[self.seen]
+        less, seen = copy(self), self.seen
+        less.grams, less.own = self.grams[:, seen][:, :, seen], self.own[seen]
+        less.moments, less.energy, less.seen = (
+            self.moments[:, seen],
+            self.energy[:, seen],
+            seen[seen],
+        )
         return less
 
     def each_held_out(self) -> np.ndarray:
         """(T,) fall of the cost by each column alone on blocks not fitted to."""
-        energy, moment = np.einsum("bii->bi", self.grams), self.moments
-        fold = np.arange(len(moment)) % FOLDS
+        energy, moment = self.energy, self.moments
         gain = np.zeros(moment.shape[1])
         for k in range(FOLDS):
-            test = fold == k
+            test = self.fold == k
             size = moment[~test].sum(0) / (energy[~test].sum(0) + 1.0)
             gain += 2 * size * moment[test].sum(0) - size**2 * energy[test].sum(0)
         return gain
@@ -353,16 +365,23 @@ class Products:
         Chance: random signs of what each block still scatters after the columns are fitted to all.
         """
         grams, moments = self.grams[:, own][:, :, own], self.moments[:, own]
-        signs = np.random.default_rng(1).choice([-1.0, 1.0], (flips, len(grams), 1))
-        prior = np.eye(own.sum())  # columns are in typical strengths
-        scatter = moments - grams @ np.linalg.solve(grams.sum(0) + prior, moments.sum(0))
-        moments = np.concatenate([moments[None], signs * scatter])
-        fold = np.arange(len(grams)) % FOLDS
+        whole = grams.sum(0) + np.eye(own.sum())  # columns are in typical strengths
+        moments = moments[None]
+        if flips:
+            moments = np.concatenate([moments, self._flipped(own, whole, flips)])
         gain = np.zeros(1 + flips)
         for k in range(FOLDS):
-            test = fold == k
-            gram = grams[~test].sum(0) + prior
-            fitted = np.linalg.solve(gram, moments[:, ~test].sum(1).T).T
+            test = self.fold == k
+            fitted = np.linalg.solve(whole - grams[k], moments[:, ~test].sum(1).T).T
             gain += 2 * np.sum(moments[:, test].sum(1) * fitted, axis=1)
-            gain -= np.sum(fitted @ grams[test].sum(0) * fitted, axis=1)
+            gain -= np.sum(fitted @ grams[k] * fitted, axis=1)
         return float(gain[0]), gain[1:]
+
+    def _flipped(self, own: np.ndarray, whole: np.ndarray, flips: int) -> np.ndarray:
+        """(F, B, k) moments of these columns, with random signs of what each block scatters."""
+        x, moments = self.columns[:, self.own[own]], self.moments[:, own]
+        fitted = x * (x @ np.linalg.solve(whole, moments.sum(0)))[:, None]
+        inside = np.add.reduceat(fitted, np.minimum(self.edges[:-1], len(x) - 1))
+        inside[np.diff(self.edges) == 0] = 0.0
+        signs = np.random.default_rng(1).choice([-1.0, 1.0], (flips, len(moments), 1))
+        return signs * (moments - inside)
