@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A formula outdoes an effect only by what it explains; truth: errors made of known columns."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from twinmill.diagnosis.rest import Products
+from twinmill.diagnosis.rivals import better_formula
+
+BLOCKS, LONG = 20, 50
+NAME = "the formula"
+
+
+def outdoing(effect: np.ndarray, formula: np.ndarray, errors: np.ndarray) -> str | None:
+    """What outdoes an effect that moves the rows by `effect`, all (R,)."""
+    blocks = np.repeat(np.arange(BLOCKS), LONG)
+    products = Products(np.column_stack([effect, formula]), errors, blocks, np.ones(2, bool))
+    formulas = SimpleNamespace(logs=[(0, None)], terms=[NAME], products=lambda *_: products)
+    less, whole = (
+        SimpleNamespace(fit=SimpleNamespace(state=([rows], None)))
+        for rows in (effect, np.zeros_like(effect))
+    )
+    return better_formula(formulas, less, whole)
+
+
+@pytest.fixture(params=range(5))
+def noise(request):
+    """(R, 3) of independent columns."""
+    return np.random.default_rng(request.param).normal(size=(BLOCKS * LONG, 3))
+
+
+def test_the_form_that_the_errors_have_outdoes_one_that_resembles_it(noise):
+    formula, other, rest = noise.T
+    assert outdoing(formula + other, formula, formula + rest) == NAME
+
+
+def test_the_effect_that_the_errors_have_is_outdone_by_nothing(noise):
+    effect, other, rest = noise.T
+    assert outdoing(effect, effect + other, effect + rest) is None
+
+
+def test_a_formula_that_explains_nothing_outdoes_no_effect(noise):
+    effect, formula, rest = noise.T
+    changing = np.repeat(np.resize([1, 1, -1, -1, 1], BLOCKS), LONG)  # worse than nothing if held
+    assert outdoing(effect, formula, changing * effect + rest) is None
+
+
+def test_a_formula_of_other_physics_does_not_take_the_effects_place(noise):
+    effect, formula, rest = noise.T
+    assert outdoing(effect, formula, effect + 2 * formula + rest) is None
