@@ -29,6 +29,7 @@ MOST_ROWS = 20_000  # at a time, where each has hundreds of columns
 FOLDS = 5
 FLIPS = 499  # random signs of blocks that make the null distribution
 MOMENTS = "single moments"
+FIRM, FEW, NOISE = "firm", "in too few stretches", "may be noise"
 PLACE = "place"
 
 
@@ -48,6 +49,7 @@ class Rest:
     Attributes:
         share: of the squared error above the floor that the model as given had.
         firm: the smooth response predicts left-out parts better, beyond doubt.
+        far: what is left is too large to be noise, in however few stretches it is.
         depends_on: groups, the strongest first.
         term, coefficient: the best single formula, in its unit; None if no group helps.
         takes: share of what is left that the formula takes on left-out parts.
@@ -70,6 +72,14 @@ class Rest:
     moments: tuple[Moment, ...] = ()
     again: float = 0.0
     proven: Formula | None = None
+    far: bool = False
+
+    @property
+    def certainty(self) -> str:
+        """In words: FIRM, FEW or NOISE."""
+        if self.firm:
+            return FIRM
+        return FEW if self.far else NOISE
 
     @property
     def formula(self) -> str | None:
@@ -204,6 +214,7 @@ def rest_of(
         found,
         share=share,
         firm=firm,
+        far=fit.held_square > SETTINGS.no_noise**2,
         depends_on=list(dict.fromkeys([*(proven.depends_on if proven else ()), *depends_on])),
         moments=tuple(moments),
         again=again,

@@ -118,6 +118,7 @@ class Diagnosis:
             "rest": {
                 "share": rest.share,
                 "firm": rest.firm,
+                "certainty": rest.certainty,
                 "depends_on": rest.depends_on,
                 "formula": rest.formula,
                 "moments": [m.to_json() for m in rest.moments],

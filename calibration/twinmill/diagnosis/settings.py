@@ -94,6 +94,9 @@ class Settings(Numbers):
     formula_again: float = number(0.5, "share of resamplings in which its dependence must win")
     formula_alike: float = number(0.05, "share of the gain that a simpler formula may lack")
     formula_beside: float = number(0.1, "share of the gain that one more term must add")
+    no_noise: float = number(
+        2.0, "errors of so many times the noise are none, however few there are"
+    )
     firm_t: float = number(3.0, "t over blocks: the smooth response predicts better")
     far: float = number(10.0, "times the median squared error: a single moment ...")
     several: int = number(3, "... of which so many are no accident")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from twinmill.diagnosis import moments
 from twinmill.diagnosis.finding import Finding
-from twinmill.diagnosis.rest import MOMENTS, Rest
+from twinmill.diagnosis.rest import FEW, MOMENTS, NOISE, Rest
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.ties import of_levels
 from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
@@ -202,11 +202,17 @@ class VerdictInputs:
             return events
         on = self._continuous
         depends = f", and depends on {' and '.join(on)}" if on else ""
-        if not (on or self.rest.firm):
-            return f" {100 * self.rest.share:.0f} % is left, which may be noise.{events}"
+        share = f"{100 * self.rest.share:.0f} %"
+        if not on and self.rest.certainty == NOISE:
+            return f" {share} is left, which may be noise.{events}"
+        if not on and self.rest.certainty == FEW:
+            return (
+                f" {share} is left, far above the noise, but in too few stretches of these logs to "
+                f"tell what it is.{events}"
+            )
         return (
-            f" Something else is left: {100 * self.rest.share:.0f} % of the squared error above "
-            f"the noise{depends}; no effect of the catalogue takes it.{events}"
+            f" Something else is left: {share} of the squared error above the noise{depends}; no "
+            f"effect of the catalogue takes it.{events}"
         )
 
     @property

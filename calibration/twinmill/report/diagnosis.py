@@ -63,7 +63,7 @@ def findings(diagnosis: Diagnosis) -> Table:
             [
                 Cell("left over", "dim"),
                 Cell(f"{100 * rest.share:.0f} %", "dim", rest.share),
-                Cell("firm" if rest.firm else "may be noise", "dim"),
+                Cell(rest.certainty, "dim"),
                 Cell(f"depends on {on}" if on else "", "dim"),
             ]
         )

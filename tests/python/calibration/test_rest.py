@@ -261,3 +261,12 @@ def test_what_is_sure_and_takes_much_is_missing_beside_what_has_another_form(sha
     weighed = VerdictInputs(2.9, 2.9, 2.3, 1.5, found, rest, [], [], [], 1.0)
     assert weighed.verdict == verdict
     assert "speed_limit" in weighed.sentence and "place" in weighed.sentence
+
+
+@pytest.mark.parametrize(("score", "words"), [(4.4, "too few stretches"), (1.4, "may be noise")])
+def test_errors_of_many_times_the_noise_are_not_called_noise(score, words):
+    """A robot that drove for three of thirty seconds: too little to be firm, and too much."""
+    found = [Finding("coulomb_friction", None, [], 0.06, "doubtful", "much is left")]
+    rest = Rest(0.9, False, [], far=score > SETTINGS.no_noise)
+    sentence = VerdictInputs(6, 7, 5, score, found, rest, [], [], [], 1.0).sentence
+    assert "90 % is left" in sentence and words in sentence
