@@ -10,7 +10,7 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.cameras import with_detections
-from twinmill.diagnosis.doubts import beside_more, of_another_form, within_the_table
+from twinmill.diagnosis.doubts import beside_more, of_another_form, undone, within_the_table
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.findings import (
     findings_of,
@@ -270,6 +270,7 @@ def _concluded(
     )
     if model_file.model.drive == "duty" and model_file.known_from_other_logs(hashes):
         findings = within_the_table(findings, less, last)
+    findings = undone(findings, last)
     doubted = _doubted(findings, less, known, start)
     whole = [_with_all_starts(o, opened) for o in known]
     rest = rest_of(

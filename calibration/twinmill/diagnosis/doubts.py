@@ -6,6 +6,7 @@ with the finding.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -20,10 +21,12 @@ from twinmill.diagnosis.ties import in_common, of_levels
 from twinmill.diagnosis.trials import REFIT, Trial
 from twinmill.fitting.compare import GOOD
 from twinmill.model.parameters import (
+    CLOCK,
     WHERE_OR_WHEN,
     ParameterEstimate,
     catalogue,
     catalogue_of,
+    effect_names,
     late_part,
     newest_instance,
     with_role,
@@ -57,6 +60,8 @@ def of_one(
     if doubt := _at_bound(card, own) or _faster(name, own):
         return doubt
     if done.last.state.model.drive == "duty" and (doubt := _wanders(card, own)):
+        return doubt
+    if with_role(name, "moment") and (doubt := _at_other_commands(done.last, own)):
         return doubt
     if not _stands_alone(done, name) and (doubt := _unusual(card, own)):
         return doubt
@@ -180,6 +185,28 @@ def _wanders(card: dict, own: Sequence[ParameterEstimate]) -> str:
     return ""
 
 
+def _at_other_commands(last: Trial, own: Sequence[ParameterEstimate]) -> str:
+    """A doubt where what begins at a moment begins with commands as there were none before."""
+    moments = {*with_role(own[0].name.split(".")[0].split("#")[0], "moment")}
+    begin_s, *end_s = (e.value for e in own if e.name.split(".", 1)[1] in moments)
+    tracks = [d.measurement.track for d in last.fit.datasets if isinstance(d, Trajectory)]
+    for track in tracks:
+        size = np.abs(track.command / np.maximum(np.abs(track.command).max(axis=0), 1e-9)).sum(1)
+        t_s = track.command_t_s - track.command_t_s[0]
+        held_s = np.diff(t_s, append=t_s[-1])
+        on = (t_s >= begin_s) & (t_s < min(end_s, default=np.inf))
+        inside, outside = (size > 0) & on, (size > 0) & ~on
+        if not inside.any() or not outside.any():
+            continue
+        most = np.quantile(size[outside], 0.95, weights=held_s[outside], method="inverted_cdf")
+        if np.average(size[inside] > most, weights=held_s[inside]) > SETTINGS.other_commands:
+            return (
+                "while it is there the commands are larger than at other times, so that it may be "
+                "a limit of them"
+            )
+    return ""
+
+
 def _visits(last: Trial, less: Trial, instance: str) -> int | None:
     """How many visits of an effect's place speak for it, in all logs; None for one without a place.
 
@@ -248,6 +275,38 @@ def stand_in(done: Search, name: str) -> str | None:
         if other in done.found and not alike:
             return other
     return None
+
+
+def undone(found: Sequence[Finding], last: Trial) -> list[Finding]:
+    """Findings, doubtful where one undoes much of what another does.
+
+    Two effects that are there take errors of their own each, so that what they do to the
+    predictions has little in common. Two that are needed together to do nothing else imitate a
+    third.
+
+    Args:
+        found: in the order of worth.
+        last: the final state.
+    """
+    names = [f.effect for f in found if f.effect != REFIT]
+    does = {n: _change_by(last, newest_instance(last.state.model, n)) for n in names}
+    for one, other in combinations(names, 2):
+        size = np.linalg.norm(does[one]) * np.linalg.norm(does[other])
+        if does[one] @ does[other] < -SETTINGS.undone * size:
+            why = f"{one} and {other} undo much of each other: both may be one other effect"
+            found = [doubted(f, why) if f.effect in (one, other) else f for f in found]
+    return list(found)
+
+
+def _change_by(last: Trial, instance: str) -> np.ndarray:
+    """(R,) by which the errors of all data sets change by an effect of the final model."""
+    less = []
+    for data, model in zip(last.fit.datasets, last.state.models, strict=True):
+        model = model.copy()
+        model.remove_effect(effect_names(model).index(instance))
+        kept = np.array([[model.get(CLOCK)]])  # any name: a row that changes nothing
+        less.append(data.rows(model, [CLOCK], kept)[0])
+    return np.concatenate(less) - last.fit.errors
 
 
 def beside_larger(finding: Finding, larger: str | None, before: Trial, after: Trial) -> Finding:
@@ -388,13 +447,16 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
     """Findings, doubtful where much is left, or more than all of them take, and it is no noise.
 
     A lag is doubtful where much is left at all: something else at changes of the command is late,
-    too.
+    too. Numbers of the base are where they alone were found: they take a part of most that is left.
     """
+    alone = all(f.effect == REFIT for f in found)
     taken = sum(f.share for f in found if f.effect != REFIT)
 
     def judged(finding: Finding) -> Finding:
         if finding.effect == REFIT:
-            return finding
+            no_noise = rest.share > SETTINGS.nothing_left and (rest.firm or rest.depends_on)
+            why = "something else is left, a part of which these numbers may stand for"
+            return doubted(finding, why) if alone and no_noise else finding
         if rest.share > taken and (rest.firm or rest.depends_on):
             why = "more is left than it takes, so that it may be a part of something else"
             on = next((on for of_kind, on, *_ in KINDS if of_kind(finding.effect)), "")

@@ -69,6 +69,8 @@ class Settings(Numbers):
     near: float = number(0.5, "... if another leaves less than this more of the squared score")
     weighty: float = number(0.1, "share of the loudest visit that another must bring to count")
     away_s: float = number(2.0, "s between two visits of a place")
+    other_commands: float = number(0.3, "of the time, that commands beyond 95 % of the others last")
+    undone: float = number(0.35, "cosine against each other of what two effects do")
     of_a_kind: int = number(3, "effects of one kind, which are one of another form")
     slight: float = number(0.3, "share of what is left that a second finding must take")
     much_left: float = number(0.3, "share left, beyond which no name is sure")

@@ -35,6 +35,7 @@ FEW_ROWS = 2000  # of all data sets: below it every part is fitted anew
 LEAST_SQUARE = 0.25  # of a squared score: errors far below the floor tell nothing more
 # Strengths at which a fit of something new may begin, times the usual, from where nothing happens.
 STARTS = (1.0, 0.3, 0.1, -0.1, -0.3, -1.0, 3.0)
+LIMIT_STARTS = (np.geomspace(1 / 8, 8, 37), np.geomspace(1 / 1.1, 1.1, 7))  # far, then near
 SEEN = 0.5  # times the prior's width: a wider estimate is the prior's
 AT_BOUND = 0.005  # share of the range
 NORMAL_95 = 1.96
@@ -240,14 +241,26 @@ class ScoreFit:
         return fit.fit().x
 
     def begin_at_best(self, fresh: Sequence[Parameter]) -> None:
-        """Begins with what is new at the best of several strengths."""
-        names = {p.name for p in fresh if p.role not in WHERE_OR_WHEN}
-        new = np.array([u.parameter.name in names for u in self.unknowns], bool)
-        points = [np.where(new, self.usual + s * (self.x - self.usual), self.x) for s in STARTS]
-        points = np.clip(np.array(points), self.low, self.high)
-        rows = [self.batch(i, points) for i in range(len(self.datasets))]
-        cost = [sum(self._misfit(i, r[k]) for i, r in enumerate(rows)) for k in range(len(points))]
-        self.x = points[int(np.argmin(cost))]
+        """Begins with what is new at the best of several limits, then of several strengths.
+
+        A limit that nothing reaches has no slope: a fit that begins there stays there.
+        """
+        roles = {p.name: p.role for p in fresh}
+        own = [roles.get(u.parameter.name, "known") for u in self.unknowns]
+        limits = np.array([role == "limit" for role in own], bool)
+        sizes = np.array([r not in ("known", "limit", *WHERE_OR_WHEN) for r in own], bool)
+        for factors in LIMIT_STARTS if limits.any() else ():
+            self._begin_at([np.where(limits, f * self.x, self.x) for f in factors])
+        if sizes.any():
+            away = self.x - self.usual
+            self._begin_at([np.where(sizes, self.usual + s * away, self.x) for s in STARTS])
+
+    def _begin_at(self, points: Sequence[np.ndarray]) -> None:
+        """Begins at the one of some points (P,) that misses least."""
+        within = np.clip(np.array(points), self.low, self.high)
+        rows = [self.batch(i, within) for i in range(len(self.datasets))]
+        cost = [sum(self._misfit(i, r[k]) for i, r in enumerate(rows)) for k in range(len(within))]
+        self.x = within[int(np.argmin(cost))]
 
     def fit(self, rounds: int = ROUNDS) -> "ScoreFit":
         """Minimises the cost and leaves the values in the models."""
