@@ -4,19 +4,21 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from twinmill.diagnosis import doubts
 from twinmill.diagnosis.diagnose import diagnose, first_state
-from twinmill.diagnosis.doubts import _faster, _wanders, beside_more, of_another_form
+from twinmill.diagnosis.doubts import _faster, _wanders, beside_more, of_another_form, undone
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.moments import _events
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.trials import cross_validate
+from twinmill.diagnosis.trials import REFIT, cross_validate
 from twinmill.diagnosis.trials import fitted as fitted_state
 from twinmill.fitting.compare import MISSING, compare
 from twinmill.fitting.fit import base_names, fit
@@ -309,6 +311,45 @@ def test_dead_zone_and_curve_are_both_found_in_a_log(tanh_robot, measure, model_
     for finding in found.findings:
         assert not set(finding.group or ()) & (set(found.found) - {finding.effect})
     assert found.steps[-1][1] < 0.4 * found.steps[0][1]
+
+
+MOST_SUM = 0.45  # of the four duties' sizes, as a share of the most
+
+
+def in_sum_limited(duty: np.ndarray) -> np.ndarray:
+    """Duties as a supply of limited power leaves them."""
+    size = np.abs(duty).mean(axis=1, keepdims=True)
+    return duty * np.minimum(1, MOST_SUM / np.maximum(size, 1e-9))
+
+
+def failing_at_32_s(duty: np.ndarray) -> np.ndarray:
+    """The same from a moment on: by a quarter."""
+    late = np.arange(len(duty)) * EULER_S > 32.5  # the script begins after half a second
+    return np.where(late[:, None], 0.75 * duty, duty)
+
+
+@pytest.mark.parametrize(
+    ("limited", "last_pct", "surely"),
+    [(in_sum_limited, (85, 90), False), (failing_at_32_s, (15, 45), True)],
+)
+def test_a_loss_is_sure_where_commands_are_as_before_it(
+    tanh_robot, measure, fitted, limited, last_pct, surely
+):
+    """Commands are below the limit for 32 s; in the last 12 s above it, or as they were."""
+
+    class Weak(tanh_robot):
+        def wheels_mps(self, duty):
+            return super().wheels_mps(limited(duty))
+
+    random = np.random.default_rng(3)
+    ways = np.array([(1, 1, 1, 1), (-1, 1, -1, 1), (-1, 1, 1, -1), (1, 0.4, 1, 0.4)])
+    steps = random.choice([-1, 1], 44)[:, None] * ways[random.integers(0, 4, 44)]
+    sizes_pct = [*random.uniform(15, 45, 32), *random.uniform(*last_pct, 12)]
+    steps *= np.array(sizes_pct)[:, None]
+    script = np.repeat(steps.round().astype(int), 48, axis=0)
+    found = diagnose([measure(Weak(), 33, script_pct=script)], fitted)
+    sure = [f.effect for f in found.findings if f.certainty == "sure"]
+    assert ("abrupt_loss" in sure) == surely
 
 
 FAILS_S, FOR_S = (8.0, 15.0, 22.0, 31.0), 0.4
@@ -692,6 +733,36 @@ def test_beside_much_that_depends_on_something_a_name_is_doubtful():
     found = [Finding("turn_asymmetry", None, [], 0.1, "sure")]
     (judged,) = beside_more(found, Rest(0.3, False, ["time"]))
     assert judged.certainty == "doubtful"
+
+
+@pytest.mark.parametrize(
+    ("effects", "rest", "certainty"),
+    [
+        ([], Rest(0.12, False, ["turning rate"]), "doubtful"),
+        ([], Rest(0.3, True, []), "doubtful"),
+        ([], Rest(0.3, False, []), "sure"),  # it may be noise
+        (["floor_tilt"], Rest(0.12, False, ["turning rate"]), "sure"),
+    ],
+)
+def test_numbers_that_alone_were_stale_may_stand_for_what_is_left(effects, rest, certainty):
+    """Friction of turning takes a share of most turns, and gains that are free take that."""
+    found = [Finding(REFIT, None, [], 0.8, "sure")]
+    found += [Finding(e, None, [], 0.1, "sure") for e in effects]
+    assert beside_more(found, rest)[0].certainty == certainty
+
+
+@pytest.mark.parametrize(
+    ("degrees", "certainty"), [(90, "sure"), (60, "sure"), (105, "sure"), (120, "doubtful")]
+)
+def test_effects_that_undo_each_other_are_doubtful(degrees, certainty, monkeypatch):
+    """What they do to the predictions stands at an angle of so many degrees."""
+    turned = np.radians(degrees)
+    does = {"mass_offset": (3.0, 0.0), "marker_offset": (np.cos(turned), np.sin(turned))}
+    monkeypatch.setattr(doubts, "newest_instance", lambda _, name: name)
+    monkeypatch.setattr(doubts, "_change_by", lambda _, name: np.array(does[name]))
+    found = [Finding(n, None, [], 0.4, "sure") for n in does]
+    last = SimpleNamespace(state=SimpleNamespace(model=None))
+    assert {f.certainty for f in undone(found, last)} == {certainty}
 
 
 def _loss(effect: str, size: float, *when_s: float) -> Finding:

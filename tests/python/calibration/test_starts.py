@@ -4,13 +4,16 @@
 Truth: a robot that shares no code with the twin, with something done to it where and when is known.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.starts import Left, starts_of
 from twinmill.fitting.opening import open_measurements
-from twinmill.model.parameters import catalogue_of
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.model.parameters import catalogue_of, effect_parameters
 
 EULER_S = 1 / 480  # step of the robots here
 
@@ -121,3 +124,20 @@ def test_no_search_begins_beyond_the_bounds_of_a_limit(opened):
     found = starts_of("stiction", [opened.model], [opened.data], list(rows)).starts
     values = [start[name] for start in found]
     assert card["min"] < min(values) < card["default"] < max(values) == card["max"]
+
+
+@pytest.mark.parametrize("edge", [0.29, 0.33, 0.37, 0.48, 0.57])
+def test_a_limit_is_found_from_where_nothing_reaches_it(edge, opened):
+    """Of wheels that stand below a duty: truth is the plant's own; few duties lie near it."""
+    model = opened.model.copy()
+    model.add_effect("stiction")
+    model.set("stiction.below", edge)
+    predicted = opened.data.windows.predicted(opened.measurement, model)
+    data = replace(opened.data, measured=predicted)
+    model.set("stiction.below", 0.0)
+    missed = data.score(model)
+    for begin in (0.05, 0.1, 0.68):
+        free = [p.at(begin) for p in effect_parameters(model, "stiction")]
+        fit = ScoreFit([data], [model], free)
+        fit.begin_at_best(free)
+        assert fit.fit().scores[0] < 0.1 * missed
