@@ -346,6 +346,7 @@ def _named_terms(
             above = np.maximum(np.abs(values) - bend, 0.0) * np.sign(values)
             group = "turning rate" if name == "omega" else "speed"
             terms[group, f"sign({name})*max(0, abs({name}) - {bend:g})"] = above
+    terms["starts", "after_start(moves)"] = moving * _since_start(moving, t_s)
     if np.ptp(theta) > 0.1:
         for n in (1, 2, 3):
             for name, wave in (("cos", np.cos(n * theta)), ("sin", np.sin(n * theta))):

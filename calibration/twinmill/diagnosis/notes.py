@@ -12,6 +12,7 @@ from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S, rms
 
+STRAFE = ("mecanum", "omni3", "none")  # layouts of robots that drive sideways, too
 NOTABLE = 0.01  # change of a gain that is worth a sentence
 LEAST_DRIVE = (2e-3, 2e-2)  # m/s, rad/s: no robot follows more regularly
 
@@ -36,16 +37,16 @@ def geometry_notes(model: native.Model) -> list[str]:
         return []
     forward, sideways, yaw = (model.get(f"base.{k}_gain") for k in ("forward", "sideways", "yaw"))
     notes = []
-    if abs(1 - sideways / forward) > NOTABLE:
-        more = "less" if sideways < forward else "more"
+    if model.wheel_kind in STRAFE and abs(1 - sideways / forward) > NOTABLE:
+        more = "less far" if sideways < forward else "farther"
         notes.append(
-            f"Sideways the robot rolls {100 * abs(1 - sideways / forward):.1f} % {more} far than "
+            f"Sideways the robot rolls {100 * abs(1 - sideways / forward):.1f} % {more} than "
             f"forward at the same wheel speeds (gains {sideways:.3f} and {forward:.3f})."
         )
     if abs(1 - yaw) > NOTABLE:
         notes.append(
-            f"It turns as if the wheels' lever (half wheelbase and half track) were {1 / yaw:.3f} "
-            "times as long as the model says."
+            f"It turns as if its wheels stood {1 / yaw:.3f} times as far from the middle as the "
+            "model says."
         )
     return notes
 

@@ -77,7 +77,7 @@ class Rest:
     @property
     def certainty(self) -> str:
         """In words: FIRM, FEW or NOISE."""
-        if self.firm:
+        if self.firm or self.depends_on:
             return FIRM
         return FEW if self.far else NOISE
 

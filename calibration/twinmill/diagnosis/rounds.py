@@ -46,10 +46,12 @@ class Search:
 
     @property
     def faint(self) -> list[tuple[str, str]]:
-        """Effects that could be there and not be seen, and why."""
+        """Effects that could be there and not be seen, and why; none that a trial made likely."""
+        trials = [t for r in self.rounds for t in r.trials if t.evidence > self.settings.evidence]
+        seen = {REFIT, *(n for t in trials for n in t.names)}
         hidden = []
         for s in self.rounds[-1].screened:
-            if s.name == REFIT:
+            if s.name in seen:
                 continue
             if s.size < 1e-6:
                 hidden.append((s.name, "the data have no drive on which it acts"))

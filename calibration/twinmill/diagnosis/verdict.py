@@ -154,7 +154,7 @@ class VerdictInputs:
             )
         if verdict == "cannot_tell" and self.noises:
             return (
-                "Nothing is missing that follows from the commands, but the motion is far less "
+                "Nothing was found that follows from the commands, but the motion is far less "
                 "regular than the model file says, and these logs do not tell why."
             )
         if verdict == "cannot_tell" and self.last > MISSING:
@@ -225,9 +225,9 @@ class VerdictInputs:
         events = moments.sentence(self.rest.moments) if self.rest.moments else ""
         if events and not self._outside:
             return f"Nothing is missing that acts all the time. {events}"
-        named = [_plain(f) for f in self.findings]
-        verb = "explains" if len(named) == 1 and named[0] != REFIT_IN_WORDS else "explain"
-        also = f" {' and '.join(named)} {verb} part of it." if named else ""
+        named = [_plain(f) for f in self.effects]
+        named += ["a refit of the base"] if len(self.effects) < len(self.findings) else []
+        also = f" Part of it is explained by {' and '.join(named)}." if named else ""
         if self.noises and not (self.rest.depends_on or self.rest.firm):
             what = "Something random disturbs the motion that no effect of the catalogue describes."
             return f"{what}{also}"

@@ -131,8 +131,9 @@ def each_robot(diagnosis: Diagnosis) -> Table:
         "Each robot",
         ["robot", "it is", "would show\nin speed", "in turning"],
         rows,
-        "Would show: the smallest difference from the model that these logs would have put beyond "
-        "doubt; a smaller one is not excluded." + (f" {TOO_FEW}" if too_few else ""),
+        "Would show: by how much all of its speed, or of its turning, would have had to differ "
+        "from the model to be beyond doubt; less is not excluded, nor what acts at some commands."
+        + (f" {TOO_FEW}" if too_few else ""),
         words=(1,),
     )
 

@@ -313,6 +313,27 @@ def test_dead_zone_and_curve_are_both_found_in_a_log(tanh_robot, measure, model_
     assert found.steps[-1][1] < 0.4 * found.steps[0][1]
 
 
+def test_a_kick_at_each_start_depends_on_starts(tanh_robot, measure, fitted):
+    """Casters that swing round: half a radian a second for 0.2 s, whatever way it is told."""
+
+    class Kicked(tanh_robot):
+        def hindered(self, motion):
+            moves = (np.abs(motion) > 0.02).any(axis=1)
+            kicks = np.zeros(len(motion), bool)
+            for k in np.flatnonzero(moves[1:] & ~moves[:-1]):
+                kicks[k : k + int(0.2 / EULER_S)] = True
+            return motion + np.outer(kicks, (0, 0, 0.5))
+
+    random = np.random.default_rng(8)
+    ways = np.array([(1, 1, 1, 1), (-1, 1, -1, 1), (-1, 1, 1, -1), (1, 0.4, 1, 0.4)])
+    steps = random.choice([-1, 1], 30)[:, None] * ways[random.integers(0, 4, 30)]
+    steps *= random.uniform(30, 80, 30)[:, None]
+    legs = np.stack([steps, 0 * steps], axis=1).reshape(-1, 4).round().astype(int)
+    found = diagnose([measure(Kicked(), 14, script_pct=np.repeat(legs, 48, axis=0))], fitted)
+    assert found.verdict == "outside_catalogue"
+    assert found.rest.depends_on[0] == "starts"
+
+
 MOST_SUM = 0.45  # of the four duties' sizes, as a share of the most
 
 
