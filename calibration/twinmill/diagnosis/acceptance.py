@@ -22,7 +22,7 @@ def best_of(
 ) -> Trial | None:
     """Of those with enough evidence, and that matter, the one with the least held-out cost.
 
-    Of two that do as well, the one with fewer numbers.
+    Of two that do as well, the one with fewer numbers; of two that are the same, by their names.
     """
     good = []
     for trial in trials:
@@ -34,7 +34,7 @@ def best_of(
         at_nothing = all(_is_neutral(trial, n) or began_before(trial, n) for n in trial.names)
         if not at_nothing and proven(trial, before.held_score, settings):
             good.append(trial)
-    best = min(good, key=lambda t: cost(t, settings), default=None)
+    best = min(good, key=lambda t: (round(cost(t, settings), 6), t.names), default=None)
     # Stale numbers of the base are more likely than an effect that does the same.
     stale = [
         t

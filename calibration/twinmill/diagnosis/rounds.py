@@ -47,7 +47,7 @@ class Search:
     @property
     def faint(self) -> list[tuple[str, str]]:
         """Effects that could be there and not be seen, and why; none that a trial made likely."""
-        trials = [t for r in self.rounds for t in r.trials if t.evidence > self.settings.evidence]
+        trials = [t for t in self.rounds[-1].trials if t.evidence > self.settings.evidence]
         seen = {REFIT, *(n for t in trials for n in t.names)}
         hidden = []
         for s in self.rounds[-1].screened:
