@@ -241,19 +241,19 @@ class ScoreFit:
         return fit.fit().x
 
     def begin_at_best(self, fresh: Sequence[Parameter]) -> None:
-        """Begins with what is new at the best of several limits, then of several strengths.
+        """Begins with what is new at the best of several strengths, or of several limits.
 
-        A limit that nothing reaches has no slope: a fit that begins there stays there.
+        What is a limit alone has no slope where nothing reaches it: a fit that begins there stays
+        there.
         """
-        roles = {p.name: p.role for p in fresh}
-        own = [roles.get(u.parameter.name, "known") for u in self.unknowns]
-        limits = np.array([role == "limit" for role in own], bool)
-        sizes = np.array([r not in ("known", "limit", *WHERE_OR_WHEN) for r in own], bool)
-        for factors in LIMIT_STARTS if limits.any() else ():
-            self._begin_at([np.where(limits, f * self.x, self.x) for f in factors])
-        if sizes.any():
-            away = self.x - self.usual
-            self._begin_at([np.where(sizes, self.usual + s * away, self.x) for s in STARTS])
+        roles = {p.name: p.role for p in fresh if p.role not in WHERE_OR_WHEN}
+        new = np.array([u.parameter.name in roles for u in self.unknowns], bool)
+        if {*roles.values()} == {"limit"}:
+            for factors in LIMIT_STARTS:
+                self._begin_at([np.where(new, f * self.x, self.x) for f in factors])
+            return
+        away = self.x - self.usual
+        self._begin_at([np.where(new, self.usual + s * away, self.x) for s in STARTS])
 
     def _begin_at(self, points: Sequence[np.ndarray]) -> None:
         """Begins at the one of some points (P,) that misses least."""
