@@ -71,7 +71,11 @@ class Store:
     @staticmethod
     def _write(path: Path, table: pa.Table) -> None:
         fresh = path.with_suffix(".tmp")
-        pq.write_table(table, fresh, compression="zstd")
+        try:
+            pq.write_table(table, fresh, compression="zstd")
+        except OSError as error:  # Arrow's names no file
+            fresh.unlink(missing_ok=True)
+            raise OSError(error.errno, os.strerror(error.errno or 0), str(path)) from error
         os.replace(fresh, path)
 
     @staticmethod
