@@ -2,6 +2,7 @@
 """Sealed predictions: calibrated where the truth is another plant, and proof against tampering."""
 
 import gzip
+import hashlib
 import json
 import subprocess
 from pathlib import Path
@@ -170,7 +171,7 @@ def test_a_run_may_come_as_a_log(planned: Path, tmp_path: Path, capsys):
     """The class of a recorded run is that of twinmill metrics."""
     log = tmp_path / "run.lcmlog"
     twin = [find_program("twin_run"), "--plant", "planar", "--model", planned / "m.toml"]
-    twin += ["--n", "6", "--seed", "4", "--duration-s", "40", "--log", log]
+    twin += ["--n", "6", "--seed", "4", "--duration-s", f"{SECONDS:g}", "--log", log]
     subprocess.run([*map(str, twin)], check=True, capture_output=True)
     run(["metrics", str(log), "--model", str(planned / "m.toml"), "--json"])
     ended = json.loads(capsys.readouterr().out)["class"]
@@ -190,8 +191,56 @@ def test_a_run_may_come_as_a_log(planned: Path, tmp_path: Path, capsys):
 
 
 @pytest.mark.parametrize(
+    ("robots", "seconds", "says"),
+    [
+        (5, SECONDS, "has 5 robots, but the plan's run has 6"),
+        (6, 20, r"for (19|20)\.\d s, but the plan's runs last 45 s"),
+    ],
+)
+def test_a_log_that_cannot_be_the_run_is_refused(planned, tmp_path, robots, seconds, says):
+    log = tmp_path / "run.lcmlog"
+    twin = [find_program("twin_run"), "--plant", "planar", "--model", planned / "m.toml"]
+    twin += ["--n", robots, "--duration-s", seconds, "--log", log]
+    subprocess.run([*map(str, twin)], check=True, capture_output=True)
+    (tmp_path / "o.csv").write_text("run,log\n1,run.lcmlog\n")
+    with pytest.raises(ValueError, match=says):
+        run(["score-floor", str(planned / "plan"), str(tmp_path / "o.csv")])
+
+
+def test_one_log_is_not_two_runs(planned, tmp_path):
+    log = tmp_path / "run.lcmlog"
+    twin = [find_program("twin_run"), "--plant", "planar", "--model", planned / "m.toml"]
+    subprocess.run(
+        [*map(str, twin), "--n", "6", "--duration-s", f"{SECONDS:g}", "--log", str(log)],
+        check=True,
+        capture_output=True,
+    )
+    (tmp_path / "o.csv").write_text("run,log\n1,run.lcmlog\n3,./run.lcmlog\n")
+    with pytest.raises(ValueError, match="is that of run 1 already"):
+        run(["score-floor", str(planned / "plan"), str(tmp_path / "o.csv")])
+
+
+def test_a_hash_that_is_empty_is_no_hash(planned):
+    """As of a shell's variable that was never set."""
+    with pytest.raises(ValueError, match="not '': the probabilities were changed"):
+        read_plan(planned / "plan", "")
+
+
+@pytest.mark.parametrize("key", ["cells", "order", "draws", "request", "bits", "repeats", "seed"])
+def test_a_sealed_file_that_lacks_a_part_is_named(planned, tmp_path, key):
+    sealed = json.loads(gzip.decompress((planned / "plan/probabilities.sealed").read_bytes()))
+    del sealed[key]
+    data = gzip.compress(json.dumps(sealed).encode())
+    (tmp_path / "probabilities.sealed").write_bytes(data)
+    with pytest.raises(ValueError, match="or not a whole one"):
+        read_plan(tmp_path, hashlib.sha256(data).hexdigest())
+
+
+@pytest.mark.parametrize(
     ("text", "says"),
     [
+        ("run,class\n²,milling\n", "line 2: run '²' is not one of the plan's"),
+        ("run,class,class\n1,milling,cluster\n", "more than one column 'class'"),
         ("run,class\n1,miling\n", "'miling' is no class"),
         ("run,class\n99,milling\n", "run '99' is not one of the plan's"),
         ("run,class\n1,milling\n1,milling\n", "run 1 is there twice"),

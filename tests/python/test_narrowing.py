@@ -74,6 +74,19 @@ def test_the_slope_is_that_of_a_planted_line():
     assert next(iter(found.parts())) == NAMES[0]  # 4 of 5 parts of the variance
 
 
+@pytest.mark.parametrize(("slope", "known"), [(0.0, False), (0.6, True)])
+def test_a_slope_that_is_chance_is_told_from_one_that_is_not(slope, known):
+    """Shares of 40 models by 20 runs each: binomial alone, or by the first of eight numbers."""
+    random, count = np.random.default_rng(7), 0
+    quantities = [SimpleNamespace(name=f"q{k}", std=0.1, source="std") for k in range(8)]
+    for _ in range(200):
+        samples = 0.1 * random.normal(size=(40, 8))
+        p = np.clip(0.6 + 4 * slope * samples[:, 0], 0, 1)
+        drawn = SimpleNamespace(quantities=quantities, samples=samples, covariance=np.eye(8) / 100)
+        count += Spread.of(drawn, random.binomial(20, p) / 20).foretold > 0
+    assert count > 190 if known else count < 30
+
+
 def test_what_a_known_number_takes_is_what_conditioning_leaves():
     """Of normal numbers: the variance of the outcome less that given one of them (Schur)."""
     columns = np.random.default_rng(4).normal(size=(3, 3))

@@ -22,6 +22,7 @@ from twinmill.swarm.experiments import (
 from twinmill.swarm.phase import CLASSES, Phase, phase_of
 from twinmill.swarm.questions import Curve, axes_for, curve_of
 from twinmill.swarm.request import Request
+from twinmill.swarm.store import read_sweep
 from twinmill.swarm.sweep import make_request, sweep
 from twinmill_cli import main as cli
 
@@ -106,6 +107,18 @@ def test_experiments_belong_to_the_cell_around_them_or_to_none():
 def test_a_wrong_sheet_is_told_in_one_sentence(text: str, says: str):
     with pytest.raises(ValueError, match=says):
         _read(text, made_phase({}), Path("floor.csv"))
+
+
+def test_a_sheet_in_another_encoding_is_told_by_name(tmp_path: Path):
+    (tmp_path / "floor.csv").write_bytes(b"\xff\xfev_mps")
+    with pytest.raises(ValueError, match=r"floor\.csv: is no CSV file in UTF-8"):
+        read_experiments(tmp_path / "floor.csv", made_phase({}))
+
+
+def test_a_damaged_sweep_is_told_by_name(tmp_path: Path):
+    (tmp_path / "sweep.parquet").write_bytes(b"PAR1 and no more")
+    with pytest.raises(ValueError, match=r"sweep\.parquet: is damaged; remove it"):
+        read_sweep(tmp_path)
 
 
 def test_the_next_run_is_where_the_model_is_least_sure():

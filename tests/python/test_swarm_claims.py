@@ -13,7 +13,7 @@ import typer
 from scipy.stats import chi2
 
 from twinmill.claims import bodies, claims, fidelity, last_figure, paper, pivot, prediction, rows
-from twinmill.claims.actuation import actuation
+from twinmill.claims.actuation import _spread_interval, actuation
 from twinmill.claims.claims import CLAIMS
 from twinmill.claims.swarms import KINDS, run, run_kept
 from twinmill.data.steady_table import read_steady_tables
@@ -316,3 +316,21 @@ def test_bodies_in_contact_are_no_mill_however_round():
     assert runs.mills.mean() > 0.9
     assert np.median(runs["radius_m"]) == pytest.approx(0.2, abs=0.01)
     assert (runs["class"] == "jammed").mean() > 0.9
+
+
+def test_intervals_of_a_spread_hold_what_they_promise():
+    """Of 3000 samples of four robots, 95 % of the intervals hold the spread they were drawn with.
+
+    One that is symmetric about the sample's, by the formula of large samples, holds it in 80 %.
+    """
+    random, held = np.random.default_rng(1), 0
+    for _ in range(3000):
+        low, high = _spread_interval(float(random.normal(0, 0.04, 4).std(ddof=1)), 4)
+        held += low <= 0.04 <= high
+    assert abs(held / 3000 - 0.95) < 3.5 * np.sqrt(0.05 * 0.95 / 3000)
+
+
+def test_the_table_of_speeds_is_a_claim_like_the_others(capsys):
+    cli.run(["claims", "--only", "actuation", "--json"])
+    (only,) = json.loads(capsys.readouterr().out)["claims"]
+    assert only["name"] == "actuation" and only["agrees"]

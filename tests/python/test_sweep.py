@@ -3,6 +3,7 @@
 
 import math
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -271,3 +272,18 @@ def test_the_program_tells_what_is_wrong_in_one_line(tmp_path: Path):
     assert done.returncode == 1 and done.stdout == ""
     assert done.stderr.startswith("twin_sweep: there is no axis 'speed'")
     assert done.stderr.count("\n") == 1 and not (tmp_path / "s").exists()
+
+
+def test_a_disk_that_is_full_is_told_with_the_file(tmp_path: Path):
+    """The system refuses: no file may grow beyond a byte."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    store = Store(tmp_path)
+    (tmp_path / "parts").mkdir()
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1, hard))
+    try:
+        with pytest.raises(OSError, match="too large") as told:
+            store.keep(0, {"x": list(range(1000))})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert str(tmp_path) in told.value.filename
+    assert not any((tmp_path / "parts").iterdir())

@@ -62,7 +62,9 @@ def _discover(
     generations: Annotated[
         int, typer.Option("--generations", min=1, help=f"Of {PER_GENERATION} swarms each.")
     ] = 100,
-    seeds: Annotated[int, typer.Option("--seeds", min=2, help="Runs of each swarm.")] = 8,
+    seeds: Annotated[
+        int, typer.Option("--seeds", min=2, max=10000, help="Runs of each swarm.")
+    ] = 8,
     duration_s: Annotated[float, typer.Option("--duration-s", min=1)] = 120,
     start: Annotated[str, typer.Option("--start")] = "square",
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the search.")] = 1,

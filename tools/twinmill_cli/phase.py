@@ -150,10 +150,7 @@ def _section(
     tables = [_next_table(phase, worth, has_rival)] if worth else []
     if match:
         score.append(("experiments as predicted", f"{match['agree']} of {match['of']}", ""))
-        verdict += (
-            f" {match['agree']} of {match['of']} experiments ended as the diagram says (95 % "
-            f"interval {100 * match['low']:.0f} to {100 * match['high']:.0f} %)."
-        )
+        verdict += _agreement(match)
         tables.insert(0, _run_table(phase, runs))
     figures = [map_figure(phase, place, runs, worth), probability_figure(phase, place)]
     figures += [thumbnail_figure(phase, place), slider_figure(phase)]
@@ -172,6 +169,19 @@ def _section(
         tables=tables,
         next_step=first + why if worth else "",
     )
+
+
+def _agreement(match: dict) -> str:
+    """How many experiments ended as predicted, and how many cannot tell, in words."""
+    told = ""
+    if match["of"]:
+        told = (
+            f" {match['agree']} of {match['of']} experiments ended as the diagram says (95 % "
+            f"interval {100 * match['low']:.0f} to {100 * match['high']:.0f} %)."
+        )
+    if outside := match["outside"]:
+        told += f" Outside the diagram, where no cell tells: {outside}."
+    return told
 
 
 def _run_table(phase: Phase, runs: list[Experiment]) -> Table:

@@ -6,6 +6,7 @@ theta_a of all runs here. A steady-state table has more robots and operating poi
 """
 
 import numpy as np
+from scipy.stats import chi2
 
 from twinmill.claims.rows import Claim, Row
 from twinmill.data.steady_table import SteadyTable
@@ -78,14 +79,20 @@ def _spreads(sheets: list[SteadyTable]) -> list[Row]:
             if len(known) < FEWEST or known.mean() < 0.05:
                 continue
             spread = float(known.std(ddof=1) / known.mean())
-            half = 1.96 * spread / np.sqrt(2 * (len(known) - 1))
+            low, high = _spread_interval(spread, len(known))
             what = f"spread of {name}, {len(known)} robots: input {speed:g}, {direction:g} degrees"
             what += f", turn {turn:g}" if turn else ""
-            low, high = max(spread - half, 0.0), spread + half
             by = {"turns": turn != 0}
             mean = f"mean {known.mean():.3g} {'m/s' if name == 'speed' else 'rad/s'}"
             rows.append(Row(what, spread, low, high, None, None, mean, "%", by))
     return rows
+
+
+def _spread_interval(spread: float, count: int) -> tuple[float, float]:
+    """95 % interval of a standard deviation of so many normal values: chi-squared."""
+    free = count - 1
+    low, high = (spread * np.sqrt(free / chi2.ppf(at, free)) for at in (0.975, 0.025))
+    return float(low), float(high)
 
 
 def _range(values: list[float]) -> str:

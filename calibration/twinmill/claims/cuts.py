@@ -48,9 +48,9 @@ def sensor(seeds: int) -> Claim:
         "How far and how wide a robot must see, and how often",
         "Sensing noise, view range, angle and sampling decide whether a behaviour comes about.",
         None,
-        f"Whole bodies seen: {_percent(near)} mill at 0.5 m, {_percent(far)} at 1.1 m. Of "
-        f"centres alone {_percent(narrow)} mill with a full cone of 49 degrees and "
-        f"{_percent(wide)} with 60: the next robot of six is 30 degrees beside the "
+        f"Whole bodies seen, to whose nearest part ranges are: {_percent(near)} mill at 0.5 m, "
+        f"{_percent(far)} at 1.1 m. Of centres alone {_percent(narrow)} mill with a full cone of "
+        f"49 degrees and {_percent(wide)} with 60: the next robot of six is 30 degrees beside the "
         f"heading. Of whole bodies, {_percent(none)} without errors, "
         f"{_percent(missed)} with half of all frames missed, {_percent(false)} with 30 % false "
         f"ones, {_percent(voted)} by a vote of 31 frames, which are 0.7 s.",

@@ -37,7 +37,9 @@ def questions(seeds: int) -> Claim:
         "Simulation answers how many robots a behaviour needs, how fast, with which sensor, and "
         "how alike they must be.",
         None,
-        " ".join(sentence[:1].upper() + sentence[1:] for sentence in told),
+        " ".join(sentence[:1].upper() + sentence[1:] for sentence in told)
+        + f" View ranges here are to a neighbour's centre, {RADIUS_M:g} m more than to its nearest "
+        "part.",
         rows,
         figures,
         transcript,

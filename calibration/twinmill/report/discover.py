@@ -151,8 +151,9 @@ def _table(shown: list[Entry]) -> Table:
         rows,
         "The first column goes after --behavior. So called: the share that is what its name says, "
         f"of {runs} runs with fresh seeds; in twins: of as many drawn from the model's errors, if "
-        "it knows them. Alike: 1 is the same whatever the seed. Odd ones: how far from the middle "
-        "they are, over the ring's radius, and 2 if farther.",
+        "it knows them; in MuJoCo: of the fewer runs there (--mujoco). Alike: 1 is the same "
+        "whatever the seed. Odd ones: how far from the middle they are, over the ring's radius, "
+        "and 2 if farther.",
     )
 
 

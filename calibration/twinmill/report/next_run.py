@@ -165,6 +165,12 @@ def _narrowed(found: Narrowing) -> list[str]:
         f"After a fit to this run of {found.rows.end_s:.0f} s it would be ± {100 * after:.1f} "
         f"points: {drive}.",
     ]
+    if found.spread.foretold <= 0:
+        said.append(
+            f"Which number moves it is not known: what {len(shares)} models tell of another is no "
+            "better than their mean, so these points and this drive may be chance. More --draws "
+            "and --seeds tell, or nothing here matters (twinmill matters)."
+        )
     if found.untold > SMALL_SHARE:
         said.append(
             f"{found.untold:.0%} of it no drive of one robot shows: measure that by itself."

@@ -39,7 +39,11 @@ def read_experiments(path: Path, phase: Phase) -> list[Experiment]:
         ValueError: in one sentence, with the line.
     """
     with open(path, newline="", encoding="utf-8-sig") as file:
-        reader = csv.DictReader(line for line in file if not line.startswith("#"))
+        try:
+            lines = [line for line in file if not line.startswith("#")]
+        except UnicodeDecodeError as error:
+            raise ValueError(f"{path}: is no CSV file in UTF-8 ({error}).") from error
+        reader = csv.DictReader(lines)
         names = {ALIASES.get(name, name): name for name in reader.fieldnames or []}
         for axis in [*(axis.name for axis in phase.axes), "class"]:
             if axis not in names:

@@ -60,12 +60,15 @@ class Spread:
         covariance: (P, P) of what the fits leave open.
         shares: (D,) of the models drawn.
         slope: (P,) of the share by each number.
+        foretold: part of the scatter of shares that the line tells of models which were left out
+            when it was drawn; 0 or less: it is no better than their mean, so the slope is chance.
     """
 
     names: list[str]
     covariance: np.ndarray
     shares: np.ndarray
     slope: np.ndarray
+    foretold: float = 1.0
 
     @classmethod
     def of(cls, known: Ranges, shares: np.ndarray) -> "Spread":
@@ -80,9 +83,15 @@ class Spread:
         size = max(float(shares.std()), 1e-6)
         left = max(float(centred @ centred) / len(shares) / 2, 1e-9)
         gram = rows.T @ rows + left / size**2 * np.eye(len(kept))
-        slope = np.linalg.solve(gram, rows.T @ centred) / std
+        scaled = np.linalg.solve(gram, rows.T @ centred)
+        # Errors of each model's share where the line is drawn through the others (Allen 1974).
+        leverage = np.einsum("dp,pd->d", rows, np.linalg.solve(gram, rows.T)) + 1 / len(shares)
+        missed = (centred - rows @ scaled) / np.maximum(1 - leverage, 1e-9)
+        alone = centred / (1 - 1 / len(shares))  # by the mean of the others
+        foretold = 1 - float(missed @ missed) / max(float(alone @ alone), 1e-12)
+        slope = scaled / std
         names = [known.quantities[i].name for i in kept]
-        return cls(names, known.covariance[np.ix_(kept, kept)], shares, slope)
+        return cls(names, known.covariance[np.ix_(kept, kept)], shares, slope, foretold)
 
     def std(self, covariance: np.ndarray) -> float:
         """Of the share, as far as it is linear in the numbers."""
@@ -173,6 +182,7 @@ class Narrowing:
             "std_bound": self.spread.std(self.bound),
             "parts": self.spread.parts(),
             "known_takes": self.spread.known_takes(),
+            "foretold": self.spread.foretold,
             "untold": self.untold,
             "draws": len(self.spread.shares),
             "moves": [m.name for m in self.moves],

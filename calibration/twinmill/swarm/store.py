@@ -71,7 +71,11 @@ class Store:
     @staticmethod
     def _write(path: Path, table: pa.Table) -> None:
         fresh = path.with_suffix(".tmp")
-        pq.write_table(table, fresh, compression="zstd")
+        try:
+            pq.write_table(table, fresh, compression="zstd")
+        except OSError as error:  # Arrow's names no file
+            fresh.unlink(missing_ok=True)
+            raise OSError(error.errno, os.strerror(error.errno or 0), str(path)) from error
         os.replace(fresh, path)
 
     @staticmethod
@@ -91,5 +95,10 @@ def read_sweep(folder: Path) -> tuple[Request, pa.Table]:
     if not store.result.exists():
         state = "a sweep that is not finished" if store._manifest.exists() else "no sweep"
         raise ValueError(f"{folder}: holds {state}; run twin_sweep --out {folder} to its end.")
-    table = pq.read_table(store.result)
+    try:
+        table = pq.read_table(store.result)
+    except pa.ArrowInvalid as error:
+        raise ValueError(
+            f"{store.result}: is damaged; remove it and run the same twin_sweep again."
+        ) from error
     return Request.from_json(table.schema.metadata[b"twinmill_request"].decode()), table

@@ -27,6 +27,7 @@ SEALED, PLAN, FORM, STARTS, MODEL = (
     "model.toml",
 )
 DIGITS = 6
+SHORT_S = 1.0  # that a log of a whole run may lack
 CLASSES = """\
 | class | mean over the last 10 s |
 |---|---|
@@ -93,9 +94,9 @@ class Plan:
             data = json.loads(gzip.decompress(sealed))
             points, swept, draws = (np.array(data[k]) for k in ("points", "swept", "draws"))
             request = Request.from_json(json.dumps(data["request"]))
-        except (OSError, EOFError, ValueError, KeyError) as error:
+            rest = {k: data[k] for k in ("cells", "bits", "repeats", "order", "seed")}
+        except (OSError, EOFError, ValueError, KeyError, TypeError) as error:
             raise ValueError("is no file of sealed probabilities, or not a whole one.") from error
-        rest = {k: data[k] for k in ("cells", "bits", "repeats", "order", "seed")}
         return cls(request=request, expected=Forecast(points, swept, draws), **rest)
 
 
@@ -142,8 +143,8 @@ def read_plan(folder: Path, digest: str | None) -> tuple[Plan, str]:
     sealed = path.read_bytes()
     found = hashlib.sha256(sealed).hexdigest()
     text = (folder / PLAN).read_text() if (folder / PLAN).exists() else ""
-    if (digest or found) != found or (digest is None and found not in text):
-        said = f"{digest}" if digest else f"the one in {folder / PLAN}"
+    if digest not in (None, found) or (digest is None and found not in text):
+        said = f"the one in {folder / PLAN}" if digest is None else f"'{digest}'"
         raise ValueError(
             f"{path}: its SHA-256 is {found}, not {said}: the probabilities were changed after "
             "they were sealed, or belong to another plan; nothing is scored."
@@ -163,22 +164,17 @@ def read_outcomes(path: Path, plan: Plan) -> tuple[np.ndarray, np.ndarray, list[
     Raises:
         ValueError: in one sentence, with the line.
     """
-    with open(path, newline="", encoding="utf-8-sig") as file:
-        reader = csv.DictReader(file)
-        names = set(reader.fieldnames or [])
-        if "run" not in names or not names & {"class", "log"}:
-            raise ValueError(
-                f"{path}: has no column 'run', or neither 'class' nor 'log'; fill in {FORM}."
-            )
-        seen: dict[int, int] = {}
-        for row in reader:
-            try:
-                number = _run_number(row["run"], plan, seen)
-                _check_cell(row, plan, plan.order[number - 1])
-                if (ended := _outcome(row, path, plan, plan.order[number - 1])) is not None:
-                    seen[number] = ended
-            except ValueError as error:
-                raise ValueError(f"{path}, line {reader.line_num}: {error}") from None
+    seen: dict[int, int] = {}
+    logs: dict[Path, int] = {}
+    for line, row in _rows(path):
+        try:
+            number = _run_number(row["run"], plan, seen)
+            _check_cell(row, plan, plan.order[number - 1])
+            _check_log_is_new(row, path, number, logs)
+            if (ended := _outcome(row, path, plan, plan.order[number - 1])) is not None:
+                seen[number] = ended
+        except ValueError as error:
+            raise ValueError(f"{path}, line {line}: {error}") from None
     if not seen:
         raise ValueError(
             f"{path}: no run has a class or a log; write one of them into the row of each run that "
@@ -190,9 +186,27 @@ def read_outcomes(path: Path, plan: Plan) -> tuple[np.ndarray, np.ndarray, list[
     return cells, np.array([seen[k] for k in numbers]), missing
 
 
+def _rows(path: Path) -> list[tuple[int, dict]]:
+    """Rows of a filled form, each with its line."""
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file)
+            names = list(reader.fieldnames or [])
+            rows = [(reader.line_num, row) for row in reader]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{path}: is no CSV file in UTF-8 ({error}); fill in {FORM}.") from error
+    if "run" not in names or not {"class", "log"} & set(names):
+        raise ValueError(
+            f"{path}: has no column 'run', or neither 'class' nor 'log'; fill in {FORM}."
+        )
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise ValueError(f"{path}: has more than one column '{twice[0]}'; leave one.")
+    return rows
+
+
 def _run_number(text: str | None, plan: Plan, seen: dict[int, int]) -> int:
     most = len(plan.order)
-    if not (text or "").strip().isdigit() or not 1 <= int(text or "") <= most:
+    if not (text or "").strip().isdecimal() or not 1 <= int(text or "") <= most:
         raise ValueError(f"run '{text}' is not one of the plan's, 1 to {most}.")
     if int(text or "") in seen:
         raise ValueError(f"run {text} is there twice.")
@@ -214,16 +228,23 @@ def _check_cell(row: dict, plan: Plan, cell: int) -> None:
             )
 
 
+def _check_log_is_new(row: dict, path: Path, number: int, logs: dict[Path, int]) -> None:
+    """Each run has a log of its own."""
+    log = (row.get("log") or "").strip()
+    if not log:
+        return
+    first = logs.setdefault((path.parent / log).resolve(), number)
+    if first != number:
+        raise ValueError(f"log '{log}' is that of run {first} already; give run {number}'s own.")
+
+
 def _outcome(row: dict, path: Path, plan: Plan, cell: int) -> int | None:
     name, log = (row.get("class") or "").strip(), (row.get("log") or "").strip()
     if log:
         place = path.parent / log
         if not place.exists():
             raise ValueError(f"log '{log}' is not there: {place.resolve()} does not exist.")
-        point = plan.expected.points[cell]
-        model = plan.request.cell_model(tuple(point))
-        scale = model.get("sensor.range_m"), model.get("robot.body_radius_m")
-        ended = swarm_metrics(read_log(place), *scale).final
+        ended = _class_of_log(place, log, plan, tuple(plan.expected.points[cell]))
         if name and name != ended:
             raise ValueError(f"class is '{name}', but the log '{log}' ended '{ended}'; keep one.")
         name = ended
@@ -232,6 +253,26 @@ def _outcome(row: dict, path: Path, plan: Plan, cell: int) -> int | None:
     if name not in OUTCOMES:
         raise ValueError(f"'{name}' is no class; the classes are {', '.join(OUTCOMES)}.")
     return OUTCOMES.index(name)
+
+
+def _class_of_log(place: Path, log: str, plan: Plan, point: tuple[float, ...]) -> str:
+    """The class of a log that may be the run: as many robots, and as long."""
+    model = plan.request.cell_model(point)
+    scale = model.get("sensor.range_m"), model.get("robot.body_radius_m")
+    found = swarm_metrics(read_log(place), *scale)
+    wanted = plan.request.robots(point)
+    if len(found.robots) != wanted:
+        raise ValueError(
+            f"log '{log}' has {len(found.robots)} robots, but the plan's run has {wanted}; give "
+            "the log of that run."
+        )
+    seconds = float(found.t_s[-1] - found.t_s[0])
+    if seconds < plan.request.duration_s - SHORT_S:
+        raise ValueError(
+            f"log '{log}' sees all robots for {seconds:.1f} s, but the plan's runs last "
+            f"{plan.request.duration_s:g} s; make the run again, or leave it without a log."
+        )
+    return found.final
 
 
 def _form(plan: Plan) -> str:
