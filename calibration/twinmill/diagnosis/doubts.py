@@ -10,6 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
+from twinmill.diagnosis.acceptance import when_s
 from twinmill.diagnosis.constancy import Change, OneHeading
 from twinmill.diagnosis.finding import Finding, doubted
 from twinmill.diagnosis.library import CHANGE, TIME
@@ -21,7 +22,6 @@ from twinmill.diagnosis.ties import in_common, of_levels
 from twinmill.diagnosis.trials import REFIT, Trial
 from twinmill.fitting.compare import GOOD
 from twinmill.model.parameters import (
-    CLOCK,
     WHERE_OR_WHEN,
     ParameterEstimate,
     catalogue,
@@ -31,7 +31,7 @@ from twinmill.model.parameters import (
     newest_instance,
     with_role,
 )
-from twinmill.predict.datasets import Trajectory
+from twinmill.predict.datasets import Trajectory, errors_of
 
 # Groups of a rest, and what the cards of effects that act by them need or are shown by.
 BY = {
@@ -61,7 +61,7 @@ def of_one(
         return doubt
     if done.last.state.model.drive == "duty" and (doubt := _wanders(card, own)):
         return doubt
-    if with_role(name, "moment") and (doubt := _at_other_commands(done.last, own)):
+    if with_role(name, "moment") and (doubt := _at_other_commands(done.last, name)):
         return doubt
     if not _stands_alone(done, name) and (doubt := _unusual(card, own)):
         return doubt
@@ -185,10 +185,9 @@ def _wanders(card: dict, own: Sequence[ParameterEstimate]) -> str:
     return ""
 
 
-def _at_other_commands(last: Trial, own: Sequence[ParameterEstimate]) -> str:
-    """A doubt where what begins at a moment begins with commands as there were none before."""
-    moments = {*with_role(own[0].name.split(".")[0].split("#")[0], "moment")}
-    begin_s, *end_s = (e.value for e in own if e.name.split(".", 1)[1] in moments)
+def _at_other_commands(last: Trial, name: str) -> str:
+    """A doubt where an effect of a moment is there while commands are larger than otherwise."""
+    begin_s, *end_s = when_s(last, name)
     tracks = [d.measurement.track for d in last.fit.datasets if isinstance(d, Trajectory)]
     for track in tracks:
         size = np.abs(track.command / np.maximum(np.abs(track.command).max(axis=0), 1e-9)).sum(1)
@@ -304,8 +303,7 @@ def _change_by(last: Trial, instance: str) -> np.ndarray:
     for data, model in zip(last.fit.datasets, last.state.models, strict=True):
         model = model.copy()
         model.remove_effect(effect_names(model).index(instance))
-        kept = np.array([[model.get(CLOCK)]])  # any name: a row that changes nothing
-        less.append(data.rows(model, [CLOCK], kept)[0])
+        less.append(errors_of(data, model))
     return np.concatenate(less) - last.fit.errors
 
 

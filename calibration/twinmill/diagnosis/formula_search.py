@@ -33,6 +33,7 @@ from twinmill.diagnosis.library import TIME, Term
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
+from twinmill.model.parameters import drives_sideways
 
 FEWEST = 4  # stretches
 SHORTLIST = 60  # forms that are weighed again once it is known what noise remains
@@ -65,7 +66,7 @@ def formula_of(
     """
     pairs = zip(logs, velocities, strict=True)
     motions = [Motion.of(own, v, HORIZONS) for (_, own), v in pairs]
-    sideways = fit.models[logs[0][0]].wheel_kind not in ("differential", "ackermann")
+    sideways = drives_sideways(fit.models[logs[0][0]])
     rows = Evidence(logs, motions, fit, changes)
     if len(rows.parts) < FEWEST:
         return None

@@ -16,7 +16,8 @@ from twinmill.data.track import command_at
 from twinmill.fitting.floor import body_velocity_at
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.response import Response
-from twinmill.model.parameters import CLOCK, effect_names, words
+from twinmill.model.parameters import effect_names, words
+from twinmill.predict.datasets import errors_of
 
 STILL = (0.002, 0.002, 0.01)  # m/s, m/s, rad/s: below it an axis does not move; wheels differ
 CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
@@ -256,7 +257,7 @@ def _sign(place_m: float) -> str:
 
 def _wheel_columns(own: Opened, model: native.Model, terms: Sequence[Term]) -> np.ndarray:
     """(R, T) change of the rows by each term of a wheel, by the plant itself."""
-    (before,) = own.data.rows(model, [CLOCK], np.array([[model.get(CLOCK)]]))
+    before = errors_of(own.data, model)
     columns = np.zeros((len(before), len(terms)))
     for k, term in enumerate(terms):
         with_it = model.copy()

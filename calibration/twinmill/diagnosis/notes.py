@@ -8,11 +8,11 @@ import twinmill_native as native
 
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened, of_few_commands
+from twinmill.model.parameters import drives_sideways
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S, rms
 
-STRAFE = ("mecanum", "omni3", "none")  # layouts of robots that drive sideways, too
 NOTABLE = 0.01  # change of a gain that is worth a sentence
 LEAST_DRIVE = (2e-3, 2e-2)  # m/s, rad/s: no robot follows more regularly
 
@@ -37,7 +37,7 @@ def geometry_notes(model: native.Model) -> list[str]:
         return []
     forward, sideways, yaw = (model.get(f"base.{k}_gain") for k in ("forward", "sideways", "yaw"))
     notes = []
-    if model.wheel_kind in STRAFE and abs(1 - sideways / forward) > NOTABLE:
+    if drives_sideways(model) and abs(1 - sideways / forward) > NOTABLE:
         more = "less far" if sideways < forward else "farther"
         notes.append(
             f"Sideways the robot rolls {100 * abs(1 - sideways / forward):.1f} % {more} than "

@@ -27,7 +27,7 @@ from twinmill.model.parameters import (
     lasts_for_a_while,
     stated_names,
 )
-from twinmill.predict.datasets import PARTS, ErrorDataset, Trajectory
+from twinmill.predict.datasets import PARTS, ErrorDataset, Trajectory, errors_of
 
 ROUNDS = 12
 CONVERGED = 1e-2  # change of the cost that decides nothing
@@ -129,10 +129,8 @@ class ScoreFit:
         """(B, R) of data set i at (B, P) values."""
         own = x[:, self.columns[i]]
         if not own.shape[1]:
-            name = "clock.offset_s"  # any name: one row that changes nothing
-            row = np.array([[self.models[i].get(name)]])
             self.passes += 1
-            return np.repeat(self.datasets[i].rows(self.models[i], [name], row), len(x), axis=0)
+            return np.repeat(errors_of(self.datasets[i], self.models[i])[None], len(x), axis=0)
         distinct, place = np.unique(own, axis=0, return_inverse=True)
         self.passes += len(distinct)
         rows = self.datasets[i].rows(self.models[i], self.names[i], np.ascontiguousarray(distinct))

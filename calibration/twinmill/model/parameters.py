@@ -131,6 +131,11 @@ def needing(need: str) -> list[str]:
     return [name for name, entry in catalogue().items() if entry["needs"] == need]
 
 
+def drives_sideways(model: native.Model) -> bool:
+    """Whether a robot on such wheels can; one of no wheels that are known may."""
+    return model.wheel_kind not in ("differential", "ackermann")
+
+
 def with_role(effect: str, role: str) -> list[str]:
     """Parameters of an effect that have this role on its card; none of what is no effect."""
     card = catalogue().get(effect, {"parameters": ()})

@@ -15,7 +15,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
-from twinmill.model.parameters import MOTION_STAGES, Parameter
+from twinmill.model.parameters import CLOCK, MOTION_STAGES, Parameter
 from twinmill.predict.windows import EVERY_S, HORIZONS_S, Windows, difference
 
 BLOCK_S = 8.0  # errors of different blocks count as independent
@@ -192,6 +192,12 @@ class Trajectory:
     def score(self, model: native.Model) -> float:
         """RMS over horizons and channels of error over floor."""
         return float(np.sqrt(np.sum((np.nan_to_num(self.errors(model)) * self.weight) ** 2)))
+
+
+def errors_of(dataset: ErrorDataset, model: native.Model) -> np.ndarray:
+    """(R,) errors over floor of a model as it is."""
+    (rows,) = dataset.rows(model, [CLOCK], np.array([[model.get(CLOCK)]]))  # any name would do
+    return rows
 
 
 def total_score(parts: Sequence[float]) -> float:
