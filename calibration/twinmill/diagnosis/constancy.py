@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinmill.data.track import command_at
-from twinmill.diagnosis.library import TIME
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.term import TIME
 from twinmill.diagnosis.trials import Trial
 from twinmill.model.parameters import Parameter, effect_names, needing
 from twinmill.predict.datasets import Trajectory

@@ -258,7 +258,8 @@ def _concluded(
 ) -> Diagnosis:
     """What the search of the motion tells, before cameras are looked at."""
     hashes = [o.measurement.log_sha256 for o in known]
-    less, formulas = less_each(done, known)
+    without = less_each(done, known)
+    less, formulas = without.less, without.formulas
     start, last = done.rounds[0].before, done.last
     findings, chain = findings_of(done, first, less)
     findings = with_stale_numbers(
@@ -270,7 +271,7 @@ def _concluded(
     )
     if model_file.model.drive == "duty" and model_file.known_from_other_logs(hashes):
         findings = within_the_table(findings, less, last)
-    findings = undone(findings, last)
+    findings = without.doubted(undone(findings, last))
     doubted = _doubted(findings, less, known, start)
     whole = [_with_all_starts(o, opened) for o in known]
     rest = rest_of(
@@ -284,8 +285,7 @@ def _concluded(
     findings = beside_more(of_another_form(findings, rest), rest)
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
-    told = [f.depends_on for f in findings if f.depends_on]
-    rest = replace(rest, depends_on=[*dict.fromkeys([*told, *rest.depends_on])])
+    rest = rest.with_findings(findings)
     models = zip(whole, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]

@@ -13,11 +13,11 @@ import numpy as np
 from twinmill.diagnosis.acceptance import when_s
 from twinmill.diagnosis.constancy import Change, OneHeading
 from twinmill.diagnosis.finding import Finding, doubted
-from twinmill.diagnosis.library import CHANGE, TIME
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.search import PAUSE_S
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.term import CHANGE, TIME
 from twinmill.diagnosis.ties import in_common, of_levels
 from twinmill.diagnosis.trials import REFIT, Trial
 from twinmill.fitting.compare import GOOD

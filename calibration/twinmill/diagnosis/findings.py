@@ -11,10 +11,10 @@ import twinmill_native as native
 from twinmill.diagnosis.constancy import Change, OneHeading, changes_of
 from twinmill.diagnosis.doubts import beside_larger, of_one, seen_once, stand_in, while_at
 from twinmill.diagnosis.finding import Finding, Late, Ranked, doubted
-from twinmill.diagnosis.library import TIME
 from twinmill.diagnosis.rounds import Round, Search
 from twinmill.diagnosis.search import comes_again
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.term import TIME
 from twinmill.diagnosis.trials import REFIT, State, Trial, fitted, with_effects
 from twinmill.model.parameters import (
     CLOCK,

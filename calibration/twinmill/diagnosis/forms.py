@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from twinmill.diagnosis.library import (
+from twinmill.diagnosis.term import (
     CHANNELS,
     STILL,
     SWELL,

@@ -29,8 +29,8 @@ from twinmill.diagnosis.evidence import (
 from twinmill.diagnosis.forms import Form, Motion, from_library, on_and_off, own_forms, sized
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.formula_telling import TRIED, stability, told
-from twinmill.diagnosis.library import TIME, Term
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.term import TIME, Term
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import drives_sideways

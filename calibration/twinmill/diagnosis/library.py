@@ -13,56 +13,30 @@ import twinmill_native as native
 from scipy.signal import lfilter
 
 from twinmill.data.track import command_at
+from twinmill.diagnosis.families import families_of
+from twinmill.diagnosis.term import (
+    CHANGE,
+    CHANNELS,
+    PLACE,
+    SPEEDS,
+    STILL,
+    SWELL,
+    TIME,
+    TYPICAL,
+    Term,
+    displaced,
+)
 from twinmill.fitting.floor import body_velocity_at
 from twinmill.fitting.opening import Opened
-from twinmill.fitting.response import Response
-from twinmill.model.parameters import effect_names, words
+from twinmill.model.parameters import effect_names
 from twinmill.predict.datasets import errors_of
 
-STILL = (0.002, 0.002, 0.01)  # m/s, m/s, rad/s: below it an axis does not move; wheels differ
-CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
-SPEEDS = ("vx", "vy", "omega")
-# m/s, m/s, rad/s, m/s: what a term of full size may add.
-TYPICAL = {"vx_mps": 0.01, "vy_mps": 0.01, "omega_radps": 0.05, "rim_mps": 0.01}
-# Rates, voltage, history: not at hand in a body's formula.
-NO_NAMES = {"dvx", "dvy", "domega", "V", "way", "after_reversal", "after_start", "after_rise"}
-SWELL = 0.05  # share of all speeds: a usual loss
-CHANGE = "change of the command"
-TIME = "time"
 WAY = "way driven"
 LEFT_OVER = 0.02  # share of a term's norm that must survive beside what is free
 REVERSAL_S = 0.15  # how long a reversal is felt
 START_S = 0.4  # the same of a start from rest, and of a rise of the speed
 # Of one wheel's command, with its half `h`; in proportion to u is a wheel's gain.
 SHAPES = ("u*abs(u)", "abs(u)", "sign(u)*max(0, abs(u) - h)")
-
-
-@dataclass(frozen=True)
-class Term:
-    """One candidate formula: adds p0 times `formula` to a velocity of the body or of a rim.
-
-    Attributes:
-        group: what it depends on.
-        adds_to, formula: as the effect `equation` takes them, but for names in NO_NAMES.
-        size: of the formula's values, 95th percentile.
-        family: of terms of the group that are tested together.
-    """
-
-    group: str
-    adds_to: str
-    formula: str
-    size: float
-    family: str = ""
-
-    @property
-    def addable(self) -> bool:
-        """The effect `equation` knows all its names."""
-        return not words(self.formula) & NO_NAMES
-
-    @property
-    def strength(self) -> float:
-        """p0 at which the term adds what is typical."""
-        return TYPICAL[self.adds_to] / self.size
 
 
 def library(
@@ -85,6 +59,7 @@ def library(
     times_s = [own.floor.response.middle_s for own in opened]
     ways_m = [_way_m(own, v) for own, v in zip(opened, velocities, strict=True)]
     waves = [Waves.along(times_s, TIME, "t", WAVE_S), Waves.along(ways_m, WAY, "way", WAVE_M)]
+    families = families_of(opened, velocities)
     columns = []
     for k, (own, model) in enumerate(pairs):
         body = _body_columns(own, velocities[k], values[k], sizes)
@@ -92,9 +67,11 @@ def library(
             w.columns(own, velocities[k], a[k])
             for w, a in zip(waves, (times_s, ways_m), strict=True)
         ]
+        narrow = [f.columns(own, velocities[k]) for f in families]
         of_wheel = _wheel_columns(own, model, of_wheels)
-        columns.append(np.hstack([body, body @ parts, *swells, of_wheel]))
-    every = [*terms, *of_all, *waves[0].terms, *waves[1].terms, *of_wheels]
+        columns.append(np.hstack([body, body @ parts, *swells, *narrow, of_wheel]))
+    of_families = [t for f in families for t in f.terms]
+    every = [*terms, *of_all, *waves[0].terms, *waves[1].terms, *of_families, *of_wheels]
     return every, columns, velocities
 
 
@@ -269,35 +246,6 @@ def _wheel_columns(own: Opened, model: native.Model, terms: Sequence[Term]) -> n
     return columns
 
 
-def displaced(
-    response: Response, velocity: np.ndarray, values: np.ndarray, axis: int
-) -> np.ndarray:
-    """(W, H, 3, T) change of windows' displacements by (N, T) velocities in a body axis, linear."""
-    step, heading = response.step_s[:, None], response.heading_rad
-    c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
-    start, ends = response.starts, np.maximum(response.ends, 0)
-    if axis < 2:
-        along = (c, s) if axis == 0 else (-s, c)
-        x, y = (np.cumsum(a * step * values, axis=0) for a in along)
-        dx, dy = x[ends] - x[start][:, None], y[ends] - y[start][:, None]
-        turn = np.zeros_like(dx)
-    else:
-        angle = np.cumsum(step * values, axis=0)
-        middle = angle - step * values / 2
-        wx = -(s[:, 0] * velocity[:, 0] + c[:, 0] * velocity[:, 1])[:, None] * step
-        wy = (c[:, 0] * velocity[:, 0] - s[:, 0] * velocity[:, 1])[:, None] * step
-        x, y = np.cumsum(middle * wx, axis=0), np.cumsum(middle * wy, axis=0)
-        ox, oy = np.cumsum(wx, axis=0), np.cumsum(wy, axis=0)
-        first = angle[start][:, None]
-        dx = x[ends] - x[start][:, None] - first * (ox[ends] - ox[start][:, None])
-        dy = y[ends] - y[start][:, None] - first * (oy[ends] - oy[start][:, None])
-        turn = angle[ends] - first
-    track = response.data.measurement.track
-    at = np.nan_to_num(track.heading_smooth[response.data.windows.starts])
-    ch, sh = np.cos(at)[:, None, None], np.sin(at)[:, None, None]
-    return np.stack([ch * dx + sh * dy, -sh * dx + ch * dy, turn], axis=2)
-
-
 def _named_terms(
     own: Opened, velocity: np.ndarray, middles: Mapping[str, float]
 ) -> dict[tuple[str, str], np.ndarray]:
@@ -354,7 +302,7 @@ def _named_terms(
                 for carrier, values in (("moves", moving), *speeds):
                     terms["heading", f"{name}({n}*theta)*{carrier}"] = wave * values
     for group, name, values in (
-        ("place", "x", x), ("place", "y", y), (TIME, "t", t_s), ("battery voltage", "V", voltage)
+        (PLACE, "x", x), (PLACE, "y", y), (TIME, "t", t_s), ("battery voltage", "V", voltage)
     ):  # fmt: skip
         if np.ptp(values) <= 0:
             continue
@@ -362,9 +310,9 @@ def _named_terms(
         text = f"({name} - {middles[name]:g})"
         for carrier, speed in speeds:
             terms[group, f"{text}*{carrier}"] = away * speed
-            if group == "place":
+            if group == PLACE:
                 terms[group, f"{text}*{text}*{carrier}"] = away**2 * speed
-        if group == "place":
+        if group == PLACE:
             for wave, part in (("cos", np.cos(theta)), ("sin", np.sin(theta))):
                 terms[group, f"{text}*{wave}(theta)*moves"] = away * part * moving
     for at_s in (middles[f"t{k}"] for k in range(len(PARTS))):

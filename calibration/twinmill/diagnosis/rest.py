@@ -14,12 +14,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.formula_search import formula_of
-from twinmill.diagnosis.library import LEFT_OVER, Term, library
+from twinmill.diagnosis.library import LEFT_OVER, library
 from twinmill.diagnosis.moments import Moment, moments_of
 from twinmill.diagnosis.place import comes_again
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.term import PLACE, Term
 from twinmill.fitting.compare import GOOD
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
@@ -30,7 +32,6 @@ FOLDS = 5
 FLIPS = 499  # random signs of blocks that make the null distribution
 MOMENTS = "single moments"
 FIRM, FEW, NOISE = "firm", "in too few stretches", "may be noise"
-PLACE = "place"
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,10 @@ class Rest:
         firm: the smooth response predicts left-out parts better, beyond doubt.
         far: what is left is too large to be noise, in however few stretches it is.
         depends_on: groups, the strongest first.
+        likely: no group is beyond chance; something is left, and this one stands out.
         term, coefficient: the best single formula, in its unit; None if no group helps.
         takes: share of what is left that the formula takes on left-out parts.
+        family_takes: the same of all that was tested of the first group together.
         left_over: fall of the cost per independent error by every group that brings any.
         old: groups that help no more than they did on other logs.
         moments: events that neither commands nor findings explain.
@@ -73,6 +76,25 @@ class Rest:
     again: float = 0.0
     proven: Formula | None = None
     far: bool = False
+    likely: bool = False
+    family_takes: float = 0.0
+
+    def with_findings(self, findings: Sequence[Finding]) -> "Rest":
+        """With what doubtful findings depend on: first, if they take more than is left.
+
+        Where they take less, and what is left tells by itself on what it depends, that stands.
+        """
+        told = [f.depends_on for f in findings if f.depends_on and f.share >= self.share]
+        if not self.depends_on:
+            told = [f.depends_on for f in findings if f.depends_on]
+        return replace(self, depends_on=list(dict.fromkeys([*told, *self.depends_on])))
+
+    @property
+    def on(self) -> str:
+        """On what it depends all the time, as `on X and Y`; empty if that is not known."""
+        names = [name for name in self.depends_on if name != MOMENTS]
+        most = "most likely " if self.likely else ""
+        return f"{most}on {' and '.join(names)}" if names else ""
 
     @property
     def certainty(self) -> str:
@@ -198,7 +220,8 @@ def rest_of(
         return Rest(share, False, [])
     logs = formulas.logs
     firm = _firm(logs, fit)
-    found = _dependences(formulas, fit, known)
+    there = firm and fit.held_square > GOOD**2
+    found = _dependences(formulas, fit, known, there=there)
     own_logs, models = [whole[i] for i, _ in logs], [fit.models[i] for i, _ in logs]
     moments = moments_of(own_logs, models)
     depends_on = [*found.depends_on, *([MOMENTS] if moments else [])]
@@ -215,7 +238,8 @@ def rest_of(
         share=share,
         firm=firm,
         far=fit.held_square > SETTINGS.no_noise**2,
-        depends_on=list(dict.fromkeys([*(proven.depends_on if proven else ()), *depends_on])),
+        depends_on=_in_order(proven, found, depends_on),
+        likely=found.likely and depends_on == found.depends_on and not proven,
         moments=tuple(moments),
         again=again,
         proven=proven,
@@ -223,7 +247,11 @@ def rest_of(
 
 
 def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:
-    """Whether the response predicts left-out blocks better than the model: t over blocks."""
+    """Whether the response predicts left-out blocks better than the model.
+
+    By t of the relative fall over blocks; or, where only a few drives show what is missing, by
+    blocks of a large fall, of which hardly any are as much worse.
+    """
     falls = []
     for i, own in logs:
         model = fit.block_squares[i]
@@ -233,34 +261,69 @@ def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:
     falls = np.array(falls)
     if len(falls) < 3:
         return False
+    better, worse = (np.sum(sign * falls > SETTINGS.firm_fall) for sign in (1, -1))
+    if better - worse >= SETTINGS.firm_blocks and better >= SETTINGS.firm_blocks * worse:
+        return True
     return bool(falls.mean() > SETTINGS.firm_t * np.std(falls, ddof=1) / np.sqrt(len(falls)))
 
 
 # -- what it depends on ----------------------------------------------------------------------------
 
 
-def _dependences(formulas: Formulas, fit: ScoreFit, known: Mapping[str, float]) -> Rest:
+def _in_order(proven: Formula | None, found: Rest, depends_on: Sequence[str]) -> list[str]:
+    """What the rest depends on; a formula's own comes first if it takes no less than the groups."""
+    own = proven.depends_on if proven else []
+    first = own if not found.depends_on or (proven and proven.takes >= found.family_takes) else []
+    return list(dict.fromkeys([*first, *depends_on, *own]))
+
+
+def _dependences(
+    formulas: Formulas, fit: ScoreFit, known: Mapping[str, float], *, there: bool
+) -> Rest:
     whole = formulas.products(fit)
     terms = [t for t, seen in zip(formulas.terms, whole.seen, strict=True) if seen]
-    return _verdict(terms, whole.of_seen(), whole.total, known)
+    return _verdict(terms, whole.of_seen(), whole.total, known, there=there)
 
 
 def _verdict(
-    terms: list[Term], products: "Products", total: float, known: Mapping[str, float]
+    terms: list[Term],
+    products: "Products",
+    total: float,
+    known: Mapping[str, float],
+    *,
+    there: bool,
 ) -> Rest:
+    """The groups beyond chance; where something is there, else the one that stands out."""
     every = _tested(terms, products)
     left_over = {d.group: d.gain / total for d in every if d.gain > 0}
     news = [d for d in every if d.gain / total > SETTINGS.again * known.get(d.group, 0.0)]
     sure = [d for d in news if d.sure]
     old = tuple(d.group for d in every if d.sure and d not in news)
-    groups = _without_redundant(sure, terms, products)
+    likely = there and not sure and not old and _stands_out(news)
+    groups = news[:1] if likely else _without_redundant(sure, terms, products)
     if not groups:
         return Rest(0.0, False, [], left_over=left_over, old=old)
     best, coefficient = _best_term(terms, products, groups[0].group)
     own = np.array([t == best for t in terms])
     takes = float(products.held_out(own)[0] / max(total, 1e-9))
-    names = [d.group for d in groups]
-    return Rest(0.0, False, names, best, coefficient, takes, left_over, old)
+    return Rest(
+        0.0,
+        False,
+        [d.group for d in groups],
+        best,
+        coefficient,
+        takes,
+        left_over,
+        old,
+        family_takes=groups[0].gain / max(total, 1e-9),
+        likely=likely,
+    )
+
+
+def _stands_out(groups: Sequence[Dependence]) -> bool:
+    """Whether the first of them brings so much more than the next that the data prefer it."""
+    first, second = ([g.gain for g in groups] + [0.0, 0.0])[:2]
+    return first > SETTINGS.likely and first > max(second, 0.0) + SETTINGS.tie
 
 
 def _tested(terms: list[Term], products: "Products") -> list[Dependence]:

@@ -120,6 +120,7 @@ class Diagnosis:
                 "firm": rest.firm,
                 "certainty": rest.certainty,
                 "depends_on": rest.depends_on,
+                "likely": rest.likely,
                 "formula": rest.formula,
                 "moments": [m.to_json() for m in rest.moments],
                 "proven": rest.proven.to_json() if rest.proven else None,

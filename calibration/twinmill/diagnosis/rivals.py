@@ -3,25 +3,64 @@
 
 What is not in the catalogue is taken in part by the effect that is most like it, surely and with a
 wrong name. Then a formula of the library takes more on left-out parts than the effect does, each
-with one free factor beside all else that was found.
+with one free factor beside all else that was found. Where it takes little more, and leaves the
+effect nothing, the effect is doubtful.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from twinmill.diagnosis.library import Term
+from twinmill.diagnosis.finding import Finding, doubted
 from twinmill.diagnosis.rest import Formulas, formulas_of
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.term import Term
 from twinmill.diagnosis.trials import REFIT, Trial, without_effect
 from twinmill.fitting.opening import Opened
 
 
-def less_each(done: Search, opened: Sequence[Opened]) -> tuple[dict[str, Trial], Formulas | None]:
-    """What was found, each with the final state refitted without it; what is outdone is dropped.
+@dataclass(frozen=True)
+class Rival:
+    """A formula that takes more than an effect does; `outdoes` if by so much that it is right."""
 
-    And the formulas over the logs as the final model moves.
+    term: Term
+    outdoes: bool
+
+
+@dataclass(frozen=True)
+class Without:
+    """The final state without each effect.
+
+    Attributes:
+        less: refitted without it, by effect.
+        formulas: over the logs, as the final model moves.
+        rivals: formulas that take a little more than an effect does, by effect.
+    """
+
+    less: dict[str, Trial]
+    formulas: Formulas | None
+    rivals: dict[str, Term]
+
+    def doubted(self, findings: Sequence[Finding]) -> list[Finding]:
+        """Findings, doubtful where a formula takes more."""
+
+        def judged(finding: Finding) -> Finding:
+            term = self.rivals.get(finding.effect)
+            if term is None:
+                return finding
+            why = (
+                f"{term.formula} in {term.adds_to} takes more than it and leaves it nothing, so "
+                "that it may have another form"
+            )
+            return doubted(finding, why)
+
+        return [judged(f) for f in findings]
+
+
+def less_each(done: Search, opened: Sequence[Opened]) -> Without:
+    """What was found, each with the final state refitted without it; what is outdone is dropped.
 
     Args:
         done: what is outdone moves from its findings to what was dropped.
@@ -29,17 +68,23 @@ def less_each(done: Search, opened: Sequence[Opened]) -> tuple[dict[str, Trial],
     """
     less = {n: without_effect(done.last, n) for n in dict.fromkeys(done.found) if n != REFIT}
     formulas = formulas_of(opened, done.last.fit)
+    rivals: dict[str, Term] = {}
     for name in list(less):
-        if formulas and better_formula(formulas, less[name], done.last):
-            done.last = less[name]
-            done.dropped.append(name)
-            less = {n: without_effect(done.last, n) for n in less if n != name}
-            formulas = formulas_of(opened, done.last.fit)
-    return less, formulas
+        rival = rival_of(formulas, less[name], done.last) if formulas else None
+        if rival is None:
+            continue
+        if not rival.outdoes:
+            rivals[name] = rival.term
+            continue
+        done.last = less[name]
+        done.dropped.append(name)
+        less = {n: without_effect(done.last, n) for n in less if n != name}
+        formulas = formulas_of(opened, done.last.fit)
+    return Without(less, formulas, rivals)
 
 
-def better_formula(formulas: Formulas, less: Trial, whole: Trial) -> Term | None:
-    """The formula that outdoes an effect, if there is one, and does what the effect does.
+def rival_of(formulas: Formulas, less: Trial, whole: Trial) -> Rival | None:
+    """The formula that takes more than an effect, if there is one, and does what the effect does.
 
     Args:
         formulas: over the logs.
@@ -51,12 +96,13 @@ def better_formula(formulas: Formulas, less: Trial, whole: Trial) -> Term | None
     effect = [before[i] - after[i] for i, _ in formulas.logs]
     products = formulas.products(less.fit, effect)
     own, *gains = products.each_held_out()
-    least = max(SETTINGS.outdoes * own, max(own, 0.0) + SETTINGS.outdoes_by)
+    own = max(own, 0.0)
     for k in np.argsort(gains)[::-1]:
-        if gains[k] <= least:
+        if gains[k] <= own + SETTINGS.outdoes_by:
             return None
         both = np.isin(np.arange(1 + len(gains)), [0, 1 + k])
         beside = products.held_out(both, 0)[0] - gains[k]
-        if beside < SETTINGS.kept * own:
-            return formulas.terms[k]
+        outdoes = gains[k] > SETTINGS.outdoes * own and beside < SETTINGS.kept * own
+        if outdoes or beside < SETTINGS.nothing_beside * own:
+            return Rival(formulas.terms[k], bool(outdoes))
     return None

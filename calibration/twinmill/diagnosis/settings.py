@@ -59,7 +59,8 @@ class Settings(Numbers):
     misses: float = number(1.5, "score of a final model whose errors are not noise")
     outdoes: float = number(1.15, "a formula outdoes an effect that takes so many times more ...")
     outdoes_by: float = number(6.0, "... and so much more of the cost ...")
-    kept: float = number(0.5, "... unless the effect keeps this share beside the formula")
+    kept: float = number(0.5, "... unless the effect keeps this share beside the formula ...")
+    nothing_beside: float = number(0.05, "... and if it keeps no more than this, it is doubtful")
 
     # Doubts.
     within: float = number(2.0, "standard deviations: what differs by less is an error")
@@ -90,6 +91,9 @@ class Settings(Numbers):
     dependence_chance: float = number(0.01, "that a dependence is named where nothing is left")
     beside: float = number(0.1, "by which a dependence must raise what better ones take ...")
     as_much: float = number(0.9, "... unless it takes this share of what the best one takes")
+    likely: float = number(
+        9.0, "fall of the cost from which the best dependence is likely, if something is left"
+    )
     again: float = number(2.0, "times what the model left in other logs: less is no news")
     formula_chance: float = number(0.02, "that a formula is offered where nothing is left ...")
     formula_takes: float = number(0.1, "... and its least share of that on the other half")
@@ -99,7 +103,9 @@ class Settings(Numbers):
     no_noise: float = number(
         2.0, "errors of so many times the noise are none, however few there are"
     )
-    firm_t: float = number(3.0, "t over blocks: the smooth response predicts better")
+    firm_t: float = number(3.0, "t over blocks: the smooth response predicts better ...")
+    firm_fall: float = number(0.2, "... or it does by this share of both squares ...")
+    firm_blocks: int = number(3, "... in so many blocks more, and so many times more, than not")
     far: float = number(10.0, "times the median squared error: a single moment ...")
     several: int = number(3, "... of which so many are no accident")
     place_chance: float = number(0.01, "that errors repeat so at a place, of the model ...")

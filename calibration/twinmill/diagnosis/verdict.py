@@ -200,8 +200,8 @@ class VerdictInputs:
         events = f" {moments.sentence(self.rest.moments)}" if self.rest.moments else ""
         if self.last <= GOOD or self.rest.share < SETTINGS.nothing_left:
             return events
-        on = self._continuous
-        depends = f", and depends on {' and '.join(on)}" if on else ""
+        on = self.rest.on
+        depends = f", and depends {on}" if on else ""
         share = f"{100 * self.rest.share:.0f} %"
         if not on and self.rest.certainty == NOISE:
             return f" {share} is left, which may be noise.{events}"
@@ -218,7 +218,7 @@ class VerdictInputs:
     @property
     def _continuous(self) -> list[str]:
         """What the rest depends on all the time."""
-        return [on for on in self.rest.depends_on if on != MOMENTS]
+        return [name for name in self.rest.depends_on if name != MOMENTS]
 
     @property
     def _outside_sentence(self) -> str:
@@ -231,8 +231,8 @@ class VerdictInputs:
         if self.noises and not (self.rest.depends_on or self.rest.firm):
             what = "Something random disturbs the motion that no effect of the catalogue describes."
             return f"{what}{also}"
-        on = " and ".join(self._continuous)
-        depends = f"it depends on {on}" if on else "no formula that was tried describes it"
+        on = self.rest.on
+        depends = f"it depends {on}" if on else "no formula that was tried describes it"
         return f"Something outside the catalogue is there; {depends}.{also} {events}".rstrip()
 
     @property

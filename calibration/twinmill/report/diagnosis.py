@@ -58,13 +58,14 @@ def findings(diagnosis: Diagnosis) -> Table:
         )
     if rows:
         rest = diagnosis.rest
-        on = ", ".join(rest.depends_on)
+        most = "most likely " if rest.likely else ""
+        on = f"{most}on {', '.join(rest.depends_on)}"
         rows.append(
             [
                 Cell("left over", "dim"),
                 Cell(f"{100 * rest.share:.0f} %", "dim", rest.share),
                 Cell(rest.certainty, "dim"),
-                Cell(f"depends on {on}" if on else "", "dim"),
+                Cell(f"depends {on}" if rest.depends_on else "", "dim"),
             ]
         )
     return Table(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinmill.diagnosis.formula import Formula
-from twinmill.diagnosis.rest import MOMENTS, Rest
+from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.units import ADDS_TO, NAMES
 from twinmill.report.canvas import MEASURED, PREDICTED, draw, legend_above
 from twinmill.report.html import Figure
@@ -20,12 +20,11 @@ def sentences(rest: Rest) -> list[str]:
     found = rest.proven
     if found:
         return [_said(found), _bounds(found)]
-    on = [name for name in rest.depends_on if name != MOMENTS]
-    if not on:
+    if not rest.on:
         return []
     return [
-        f"Something is left; it depends on {' and '.join(on)}. No formula for it held on drives "
-        "that it was not fitted to: more of this drive would tell."
+        f"Something is left; it depends {rest.on}. No formula for it held on drives that it was "
+        "not fitted to: more of this drive would tell."
     ]
 
 

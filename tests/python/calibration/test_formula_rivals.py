@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from twinmill.diagnosis.rest import Products
-from twinmill.diagnosis.rivals import better_formula
+from twinmill.diagnosis.rivals import Rival, rival_of
 
 BLOCKS, LONG = 20, 50
 NAME = "the formula"
 
 
-def outdoing(effect: np.ndarray, formula: np.ndarray, errors: np.ndarray) -> str | None:
+def outdoing(effect: np.ndarray, formula: np.ndarray, errors: np.ndarray) -> Rival | None:
     """What outdoes an effect that moves the rows by `effect`, all (R,)."""
     blocks = np.repeat(np.arange(BLOCKS), LONG)
     products = Products(np.column_stack([effect, formula]), errors, blocks, np.ones(2, bool))
@@ -22,7 +22,7 @@ def outdoing(effect: np.ndarray, formula: np.ndarray, errors: np.ndarray) -> str
         SimpleNamespace(fit=SimpleNamespace(state=([rows], None)))
         for rows in (effect, np.zeros_like(effect))
     )
-    return better_formula(formulas, less, whole)
+    return rival_of(formulas, less, whole)
 
 
 @pytest.fixture(params=range(5))
@@ -33,7 +33,13 @@ def noise(request):
 
 def test_the_form_that_the_errors_have_outdoes_one_that_resembles_it(noise):
     formula, other, rest = noise.T
-    assert outdoing(formula + other, formula, formula + rest) == NAME
+    assert outdoing(formula + other, formula, formula + rest) == Rival(NAME, outdoes=True)
+
+
+def test_a_form_that_takes_little_more_and_leaves_nothing_makes_doubtful(noise):
+    formula, other, rest = noise.T
+    # An effect at this angle to the errors takes 1 / (1 + 0.3^2) = 92 % of what they are.
+    assert outdoing(formula + 0.3 * other, formula, formula + rest) == Rival(NAME, outdoes=False)
 
 
 def test_the_effect_that_the_errors_have_is_outdone_by_nothing(noise):

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One candidate formula without a physics name, and what a velocity does to the errors of a log."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinmill.fitting.response import Response
+from twinmill.model.parameters import words
+
+STILL = (0.002, 0.002, 0.01)  # m/s, m/s, rad/s: below it an axis does not move; wheels differ
+CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
+SPEEDS = ("vx", "vy", "omega")
+# m/s, m/s, rad/s, m/s: what a term of full size may add.
+TYPICAL = {"vx_mps": 0.01, "vy_mps": 0.01, "omega_radps": 0.05, "rim_mps": 0.01}
+# Rates, voltage, history: not at hand in a body's formula.
+NO_NAMES = {"dvx", "dvy", "domega", "V", "way", "ago"} | {
+    f"after_{event}" for event in ("reversal", "start", "rise")
+}
+SWELL = 0.05  # share of all speeds: a usual loss
+CHANGE = "change of the command"
+TIME = "time"
+PLACE = "place"
+
+
+@dataclass(frozen=True)
+class Term:
+    """One candidate formula: adds p0 times `formula` to a velocity of the body or of a rim.
+
+    Attributes:
+        group: what it depends on.
+        adds_to, formula: as the effect `equation` takes them, but for names in NO_NAMES.
+        size: of the formula's values, 95th percentile.
+        family: of terms of the group that are tested together.
+    """
+
+    group: str
+    adds_to: str
+    formula: str
+    size: float
+    family: str = ""
+
+    @property
+    def addable(self) -> bool:
+        """The effect `equation` knows all its names."""
+        return not words(self.formula) & NO_NAMES
+
+    @property
+    def strength(self) -> float:
+        """p0 at which the term adds what is typical."""
+        return TYPICAL[self.adds_to] / self.size
+
+
+def displaced(
+    response: Response, velocity: np.ndarray, values: np.ndarray, axis: int
+) -> np.ndarray:
+    """(W, H, 3, T) change of windows' displacements by (N, T) velocities in a body axis, linear."""
+    step, heading = response.step_s[:, None], response.heading_rad
+    c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
+    start, ends = response.starts, np.maximum(response.ends, 0)
+    if axis < 2:
+        along = (c, s) if axis == 0 else (-s, c)
+        x, y = (np.cumsum(a * step * values, axis=0) for a in along)
+        dx, dy = x[ends] - x[start][:, None], y[ends] - y[start][:, None]
+        turn = np.zeros_like(dx)
+    else:
+        angle = np.cumsum(step * values, axis=0)
+        middle = angle - step * values / 2
+        wx = -(s[:, 0] * velocity[:, 0] + c[:, 0] * velocity[:, 1])[:, None] * step
+        wy = (c[:, 0] * velocity[:, 0] - s[:, 0] * velocity[:, 1])[:, None] * step
+        x, y = np.cumsum(middle * wx, axis=0), np.cumsum(middle * wy, axis=0)
+        ox, oy = np.cumsum(wx, axis=0), np.cumsum(wy, axis=0)
+        first = angle[start][:, None]
+        dx = x[ends] - x[start][:, None] - first * (ox[ends] - ox[start][:, None])
+        dy = y[ends] - y[start][:, None] - first * (oy[ends] - oy[start][:, None])
+        turn = angle[ends] - first
+    track = response.data.measurement.track
+    at = np.nan_to_num(track.heading_smooth[response.data.windows.starts])
+    ch, sh = np.cos(at)[:, None, None], np.sin(at)[:, None, None]
+    return np.stack([ch * dx + sh * dy, -sh * dx + ch * dy, turn], axis=2)

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What depends on one speed, one place or the time since a change is told, whatever its form.
+
+The robots are those of `conftest.py`; what hinders them is written here over whole motions.
+"""
+
+import numpy as np
+import pytest
+
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.families import _hump, _humps
+from twinmill.fitting.fit import fit
+from twinmill.model.model_file import ModelFile
+
+STEP_S = 1 / 480  # of the robot
+
+
+@pytest.fixture(scope="module")
+def base(tanh_robot, measure, model_file, tmp_path_factory) -> ModelFile:
+    """The base fitted to a log of the robot as it is; one clock stamps all."""
+    path = tmp_path_factory.mktemp("families") / "base.toml"
+    fit([measure(tanh_robot(), 1, 60.0)], model_file(extra="[clock]\nsame = true\n"), path, "")
+    return ModelFile.load(str(path))
+
+
+def swinging(motion: np.ndarray) -> np.ndarray:
+    """A tank of 1.3 Hz, damped by 8 %, whose liquid pushes forward by its own speed."""
+    rate_radps, damping, share = 2 * np.pi * 1.3, 0.08, 0.12
+    kept, at_m, now_mps = motion.copy(), 0.0, 0.0
+    change = np.diff(motion[:, 0], prepend=motion[0, 0])
+    for k, jump_mps in enumerate(change):
+        now_mps -= share * jump_mps
+        now_mps -= STEP_S * (rate_radps**2 * at_m + 2 * damping * rate_radps * now_mps)
+        at_m += STEP_S * now_mps
+        kept[k, 0] += now_mps
+    return kept
+
+
+def dipping(motion: np.ndarray) -> np.ndarray:
+    """Forward and back, 10 % are missing near a speed of 0.29 m/s, and nowhere else."""
+    kept = motion.copy()
+    kept[:, 0] *= 1 - 0.1 * np.exp(-(((np.abs(motion[:, 0]) - 0.29) / 0.03) ** 2))
+    return kept
+
+
+def in_a_strip(motion: np.ndarray) -> np.ndarray:
+    """All speeds are 10 % less over every second strip of floor of 0.35 m."""
+    heading = np.cumsum(motion[:, 2]) * STEP_S
+    kept, x_m = motion.copy(), 0.0
+    for k, (forward, left, _) in enumerate(motion):
+        kept[k] *= 0.9 if int(np.floor(x_m / 0.35)) % 2 else 1.0
+        x_m += STEP_S * (np.cos(heading[k]) * forward - np.sin(heading[k]) * left)
+    return kept
+
+
+@pytest.mark.parametrize(
+    ("hindrance", "depends_on"),
+    [(swinging, "change of the command"), (dipping, "speed"), (in_a_strip, "place")],
+    ids=["a liquid that swings", "a dip at one speed", "strips of floor"],
+)
+def test_dependence_is_told_where_no_form_is_known(
+    hindrance, depends_on, tanh_robot, measure, base
+):
+    class Hindered(tanh_robot):
+        def hindered(self, motion):
+            return hindrance(motion)
+
+    found = diagnose([measure(Hindered(), 101, 80.0)], base)
+    assert found.rest.depends_on[0] == depends_on
+    assert all(f.certainty == "doubtful" for f in found.findings)
+
+
+def test_humps_share_out_every_value_between_the_outer_ones():
+    middles, width = _humps(np.array([0.0, 0.8]), 8)
+    between = np.random.default_rng(1).uniform(middles[0], middles[-1], (50, 1))
+    assert _hump(between, middles, width).sum(axis=1) == pytest.approx(np.ones(50), abs=1e-6)
