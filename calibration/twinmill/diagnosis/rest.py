@@ -10,6 +10,7 @@ that it was not fitted to.
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -282,7 +283,7 @@ def _dependences(
 ) -> Rest:
     whole = formulas.products(fit)
     terms = [t for t, seen in zip(formulas.terms, whole.seen, strict=True) if seen]
-    return _verdict(terms, whole.of_seen(), whole.total, known, there=there)
+    return _verdict(terms, whole.only(whole.seen), whole.total, known, there=there)
 
 
 def _verdict(
@@ -407,20 +408,22 @@ class Products:
         self.moments = np.array([columns[p].T @ left[p] for p in parts])
         self.energy = np.array([np.einsum("rt,rt->t", columns[p], columns[p]) for p in parts])
         self.fold = np.arange(len(parts)) % FOLDS
-        folds = (columns[self.fold[blocks] == k] for k in range(FOLDS))
-        self.grams = np.array([x.T @ x for x in folds])
+        self.row_fold = self.fold[blocks]
         self.columns, self.own = columns, np.arange(columns.shape[1])
         self.seen, self.total = seen, float(left @ left)
 
-    def of_seen(self) -> "Products":
-        """The same without columns of which nothing is left."""
-        less, seen = copy(self), self.seen
-        less.grams, less.own = self.grams[:, seen][:, :, seen], self.own[seen]
-        less.moments, less.energy, less.seen = (
-            self.moments[:, seen],
-            self.energy[:, seen],
-            seen[seen],
-        )
+    @cached_property
+    def grams(self) -> np.ndarray:
+        """(FOLDS, T, T) products of columns."""
+        folds = (self.columns[self.row_fold == k] for k in range(FOLDS))
+        return np.array([x.T @ x for x in (f[:, self.own] for f in folds)])
+
+    def only(self, own: np.ndarray) -> "Products":
+        """The same of some (T,) columns."""
+        less = copy(self)
+        less.__dict__.pop("grams", None)
+        less.own, less.seen = self.own[own], self.seen[own]
+        less.moments, less.energy = self.moments[:, own], self.energy[:, own]
         return less
 
     def each_held_out(self) -> np.ndarray:

@@ -100,8 +100,8 @@ def rival_of(formulas: Formulas, less: Trial, whole: Trial) -> Rival | None:
     for k in np.argsort(gains)[::-1]:
         if gains[k] <= own + SETTINGS.outdoes_by:
             return None
-        both = np.isin(np.arange(1 + len(gains)), [0, 1 + k])
-        beside = products.held_out(both, 0)[0] - gains[k]
+        both = products.only(np.isin(np.arange(1 + len(gains)), [0, 1 + k]))
+        beside = both.held_out(np.ones(2, bool), 0)[0] - gains[k]
         outdoes = gains[k] > SETTINGS.outdoes * own and beside < SETTINGS.kept * own
         if outdoes or beside < SETTINGS.nothing_beside * own:
             return Rival(formulas.terms[k], bool(outdoes))
