@@ -60,7 +60,7 @@ def families_of(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> l
     pose = np.concatenate([own.floor.response.pose for own in opened])
     return [
         *(_of_speed(k, np.abs(moving[:, k])) for k in axes),
-        *(_of_past(k, float(np.std(moving[:, k]))) for k in axes),
+        *(_of_past(k, max(float(np.std(moving[:, k])), STILL[k])) for k in axes),
         *(f for k in range(2) for f in _of_place(k, pose[:, k])),
     ]
 

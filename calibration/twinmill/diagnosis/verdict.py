@@ -56,9 +56,10 @@ class VerdictInputs:
             return "outside_catalogue"
         if self._unexplained or self.noises:
             return "cannot_tell"
-        if self._stale and not self.silent and not self._instead:
+        enough = not (self.silent or self._instead or self._refit_leaves)
+        if self._stale and enough:
             return "refit_enough"
-        unsure = self.silent or self._instead or self.last > MISSING
+        unsure = not enough or self.last > MISSING
         return "cannot_tell" if unsure else "model_adequate"
 
     @property
@@ -83,6 +84,11 @@ class VerdictInputs:
     def _stale(self) -> bool:
         """The base's numbers are: a finding, or gains that were let drift took the error."""
         return bool(self.findings) or drifted(self.score, self.last, self.known)
+
+    @property
+    def _refit_leaves(self) -> bool:
+        """The base's numbers were stale, and more is left than is usual."""
+        return self._stale and self.last > GOOD * self.known
 
     @property
     def silent(self) -> list[str]:
@@ -170,10 +176,16 @@ class VerdictInputs:
                     f"{seen}; so would {' or '.join(self._instead)}, and these logs cannot tell "
                     "them apart."
                 )
+            if not self.silent:
+                return (
+                    "The base model's numbers were stale, and a refit takes most of the error away."
+                    f"{self._as_before}"
+                )
             return f"{seen}, but these logs cannot show {', '.join(self.silent)}."
         if verdict == "refit_enough":
             return (
                 "No effect is missing; the base model's numbers were stale, and a refit is enough."
+                f"{self._as_before}"
             )
         if verdict in ("effect_missing", "ambiguous"):
             return f"{LACKING}{_in_turn([_named(f) for f in self.findings])}.{self._left}"

@@ -198,6 +198,17 @@ def test_a_model_that_misses_as_before_is_not_said_to_miss_anew(known, words):
 
 
 @pytest.mark.parametrize(
+    ("last", "verdict", "words"),
+    [(1.05, "refit_enough", "a refit is enough"), (1.22, "cannot_tell", "most of the error")],
+)
+def test_a_refit_is_not_enough_where_more_than_the_noise_is_left(last, verdict, words):
+    found = [Finding(REFIT, None, [], 0.8, "sure")]
+    weighed = VerdictInputs(1.9, 1.9, last, last, found, Rest(0.2, False, []), [], [], [], 1.0)
+    assert weighed.verdict == verdict
+    assert words in weighed.sentence
+
+
+@pytest.mark.parametrize(
     ("takes", "certainty", "left", "verdict"),
     [
         (0.3, "doubtful", 0.4, "outside_catalogue"),
