@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import lfilter
 
 from twinmill.data.log import LogError
 from twinmill.data.track import Track, local_line
+from twinmill.filters import filtered
 
 SEARCH_S = 0.3
 COARSE_S, FINE_S = 0.02, 0.005
@@ -96,7 +96,7 @@ class _Regression:
         self.grid_s = np.arange(min(track.command_t_s[0], self.t_s[0]) - 1, end_s, GRID_S)
         shapes = _averaged(self.grid_s, track)
         decay = [np.exp(-GRID_S / lag) for lag in LAGS_S]
-        self.lagged = [lfilter([1 - a], [1, -a], shapes, axis=0) for a in decay]
+        self.lagged = [filtered([1 - a], [1, -a], shapes, axis=0) for a in decay]
         self.sums: list[list[tuple[np.ndarray, np.ndarray]]] = []
 
     def losses(self, offsets_s: np.ndarray) -> np.ndarray:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import chi2
 
+from twinmill.chance import chi2_median
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import Table, read_table
 
@@ -189,7 +189,7 @@ def _scatter(groups: Iterable[list[float]]) -> float:
     for group in groups:
         if (freedom := np.count_nonzero(group) - 1) > 0:
             values = np.array(group)[np.array(group) != 0]
-            usual = np.sqrt(chi2.median(freedom) / freedom)  # median of such an estimate over sigma
+            usual = np.sqrt(chi2_median(freedom) / freedom)  # median of such an estimate over sigma
             found.append(values.std(ddof=1) / abs(values.mean()) / usual)
     return float(np.median(found)) if found else np.nan
 

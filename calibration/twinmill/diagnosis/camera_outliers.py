@@ -5,8 +5,8 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 import twinmill_native as native
-from scipy.stats import t
 
+from twinmill.chance import t_above
 from twinmill.diagnosis.outliers import Outlier, middle_and_scale, odd_ones
 from twinmill.diagnosis.search import search
 from twinmill.diagnosis.settings import SETTINGS
@@ -92,7 +92,9 @@ def _judge_camera(
     done = search(camera_state(own, model.for_robot(robot_id), excluded), known=0.0)
     before, after = (trial.held_score for trial in (done.rounds[0].before, done.last))
     first = done.rounds[0].accepted
-    p_value = count * (done.rounds[0].p_value(first) if first else t.sf(away[robot_id], count - 1))
+    p_value = count * (
+        done.rounds[0].p_value(first) if first else t_above(away[robot_id], count - 1)
+    )
     parameters = [e for e in done.last.fit.estimates if e.name.split(".")[0] in done.found]
     told = f"the detections of its camera err {before:.2f} times as much as they should with the "
     told += f"model of all, those of the others {others:.2f} times; "

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-from scipy.stats import f as fisher
 
+from twinmill.chance import f_above
 from twinmill.diagnosis.evidence import (
     HORIZONS,
     Chosen,
@@ -249,4 +249,4 @@ def _by_f(x: np.ndarray, left: np.ndarray, errors: float) -> float:
     if errors - k < 1:
         return 1.0
     rest = max(total - fall, 1e-9) / (errors - k)
-    return float(fisher.sf(fall / k / rest, k, errors - k))
+    return f_above(fall / k / rest, k, errors - k)

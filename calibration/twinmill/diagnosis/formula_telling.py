@@ -6,8 +6,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import t as student
 
+from twinmill.chance import t_quantile
 from twinmill.diagnosis.evidence import Chosen, Evidence, Pool, Proof, Sums, best_of, made
 from twinmill.diagnosis.forms import USUAL, Form, names_in, variable_of
 from twinmill.diagnosis.formula import Curve, Formula, Number
@@ -99,7 +99,7 @@ def _numbers(rows: Evidence, found: Chosen) -> tuple[Number, ...]:
         for g, m in zip(grams, moments, strict=True)
     ]
     count = len(rows.parts)
-    half = student.ppf(0.975, count - 1) * np.sqrt(
+    half = t_quantile(0.975, count - 1) * np.sqrt(
         (count - 1) / count * np.sum(np.square(apart), axis=0)
     )
     strengths = np.concatenate([f.strengths for f in found.forms])

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
-from scipy.signal import lfilter
 
 from twinmill.data.track import command_at
 from twinmill.diagnosis.families import families_of
@@ -26,6 +25,7 @@ from twinmill.diagnosis.term import (
     Term,
     displaced,
 )
+from twinmill.filters import filtered
 from twinmill.fitting.floor import body_velocity_at
 from twinmill.fitting.opening import Opened
 from twinmill.model.parameters import effect_names
@@ -331,7 +331,7 @@ def _after_rise(speed: np.ndarray, step_s: np.ndarray) -> np.ndarray:
     """By how much a speed rose lately, fading with the time since; its sign is the speed's."""
     rise = np.maximum(np.diff(np.abs(speed), prepend=np.abs(speed[0])), 0.0) * np.sign(speed)
     period_s = float(np.median(step_s[step_s > 0]))
-    return lfilter([1.0], [1.0, -np.exp(-period_s / START_S)], rise)
+    return filtered([1.0], [1.0, -np.exp(-period_s / START_S)], rise)
 
 
 def _since_start(moving: np.ndarray, t_s: np.ndarray) -> np.ndarray:

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import twinmill_native as native
-from scipy.stats import chi2
 
+from twinmill.chance import chi2_above
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.screening import screen
 from twinmill.diagnosis.settings import SETTINGS
@@ -144,7 +144,7 @@ def spread_of_lags_s(alone: Sequence[Alone]) -> float:
         return 0.0
     lags_s, variances = np.array([(v[0], s[0, 0]) for v, s in map(_values, trials)]).T
     middle_s = np.average(lags_s, weights=1 / variances)
-    one_lag = chi2.sf(np.sum((lags_s - middle_s) ** 2 / variances), len(trials) - 1)
+    one_lag = chi2_above(np.sum((lags_s - middle_s) ** 2 / variances), len(trials) - 1)
     return float(np.std(lags_s, ddof=1)) if one_lag < SETTINGS.odd_chance else 0.0
 
 
@@ -329,7 +329,7 @@ def _p_value(own: Alone, name: str, alone: Sequence[Alone]) -> float:
     total = spread + np.diag(np.maximum(scale, least) ** 2)
     away = float((mine - middle) @ np.linalg.solve(total, mine - middle))
     free = len(mine) - (name == WHEELS)
-    return float(min(1.0, len(alone) * len(own.trials) * chi2.sf(away, free)))
+    return float(min(1.0, len(alone) * len(own.trials) * chi2_above(away, free)))
 
 
 def _estimates(trial: Trial) -> list[ParameterEstimate]:

@@ -341,10 +341,23 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
         tested += [(group, np.array([t.formula == f for t in terms])) for f in own]
     if not tested:
         return []
-    gains = np.array([products.held_out(own, 0)[0] for _, own in tested])
+    alone, _ = products.each_held_out()
+    single = {k: int(np.argmax(own)) for k, (_, own) in enumerate(tested) if own.sum() == 1}
+    gains = np.array(
+        [
+            alone[single[k]] if k in single else products.held_out(own, 0)[0]
+            for k, (_, own) in enumerate(tested)
+        ]
+    )
     sure = gains > 2 * np.log(len(tested) / SETTINGS.dependence_chance)
     if sure.any():
-        nulls = np.array([products.held_out(own)[1] for _, own in tested])
+        _, of_alone = products.each_held_out(FLIPS)
+        nulls = np.array(
+            [
+                of_alone[:, single[k]] if k in single else products.held_out(own)[1]
+                for k, (_, own) in enumerate(tested)
+            ]
+        )
         spread = np.maximum(nulls.std(axis=1), 1e-12)
         highest = (nulls / spread[:, None]).max(axis=0)
         sure &= gains / spread > np.quantile(highest, 1 - SETTINGS.dependence_chance)
@@ -426,15 +439,21 @@ class Products:
         less.moments, less.energy = self.moments[:, own], self.energy[:, own]
         return less
 
-    def each_held_out(self) -> np.ndarray:
-        """(T,) fall of the cost by each column alone on blocks not fitted to."""
-        energy, moment = self.energy, self.moments
-        gain = np.zeros(moment.shape[1])
+    def each_held_out(self, flips: int = 0) -> tuple[np.ndarray, np.ndarray]:
+        """(T,) and (F, T): what `held_out` gives for each column alone."""
+        energy, moments = self.energy, self.moments
+        scatter = moments - energy * (moments.sum(0) / (energy.sum(0) + 1.0))
+        signs = _signs(flips, len(energy))[..., 0]
+        gain = np.zeros((1 + flips, energy.shape[1]))
         for k in range(FOLDS):
             test = self.fold == k
-            size = moment[~test].sum(0) / (energy[~test].sum(0) + 1.0)
-            gain += 2 * size * moment[test].sum(0) - size**2 * energy[test].sum(0)
-        return gain
+            fitted, judged = (
+                np.vstack([moments[own].sum(0), signs[:, own] @ scatter[own]])
+                for own in (~test, test)
+            )
+            size = fitted / (energy[~test].sum(0) + 1.0)
+            gain += 2 * size * judged - size**2 * energy[test].sum(0)
+        return gain[0], gain[1:]
 
     def held_out(self, own: np.ndarray, flips: int = FLIPS) -> tuple[float, np.ndarray]:
         """Fall of the cost by these columns on blocks not fitted to, and (F,) what chance brings.
@@ -460,5 +479,9 @@ class Products:
         fitted = x * (x @ np.linalg.solve(whole, moments.sum(0)))[:, None]
         inside = np.add.reduceat(fitted, np.minimum(self.edges[:-1], len(x) - 1))
         inside[np.diff(self.edges) == 0] = 0.0
-        signs = np.random.default_rng(1).choice([-1.0, 1.0], (flips, len(moments), 1))
-        return signs * (moments - inside)
+        return _signs(flips, len(moments)) * (moments - inside)
+
+
+def _signs(flips: int, blocks: int) -> np.ndarray:
+    """(F, B, 1) random signs, the same for all that is tested."""
+    return np.random.default_rng(1).choice([-1.0, 1.0], (flips, blocks, 1))

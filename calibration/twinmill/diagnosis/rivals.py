@@ -95,7 +95,7 @@ def rival_of(formulas: Formulas, less: Trial, whole: Trial) -> Rival | None:
     after, _ = whole.fit.state
     effect = [before[i] - after[i] for i, _ in formulas.logs]
     products = formulas.products(less.fit, effect)
-    own, *gains = products.each_held_out()
+    (own, *gains), _ = products.each_held_out()
     own = max(own, 0.0)
     for k in np.argsort(gains)[::-1]:
         if gains[k] <= own + SETTINGS.outdoes_by:

@@ -14,8 +14,8 @@ from functools import cached_property
 
 import numpy as np
 import twinmill_native as native
-from scipy.signal import lfilter
 
+from twinmill.filters import filtered
 from twinmill.model.parameters import WHERE_OR_WHEN, effect_names, effect_parameters
 
 SHORTEST_S = 4.0  # period of a gain that changes with time
@@ -211,7 +211,7 @@ def _reversals(way: np.ndarray) -> np.ndarray:
 def _fading(events: np.ndarray, fade_s: float, step_s: np.ndarray) -> np.ndarray:
     """(N, n) events that each fade, on steps that are taken to be even."""
     period_s = float(np.median(step_s[step_s > 0]))
-    return lfilter([1.0], [1.0, -np.exp(-period_s / fade_s)], events, axis=0)
+    return filtered([1.0], [1.0, -np.exp(-period_s / fade_s)], events, axis=0)
 
 
 def _harmonics(angle: np.ndarray) -> np.ndarray:

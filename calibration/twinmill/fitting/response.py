@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import lfilter
 
+from twinmill.filters import filtered
 from twinmill.fitting.boosting import Learner, Parts, boosted
 from twinmill.fitting.dependence import Features, Motion
 from twinmill.fitting.settings import FLOOR_SETTINGS
@@ -229,7 +229,7 @@ class Response:
     @staticmethod
     def _low_pass(signal: np.ndarray, lag_s: float) -> np.ndarray:
         gain = 1 - np.exp(-GRID_S / lag_s)
-        return lfilter([gain], [1, gain - 1], signal, axis=0)
+        return filtered([gain], [1, gain - 1], signal, axis=0)
 
     def _lagged_base(self, base_mps: np.ndarray) -> np.ndarray:
         """(N, 3 lags) of each axis: the base's velocity, and late."""
@@ -237,7 +237,7 @@ class Response:
         parts = [base_mps]
         for lag_s in BASE_LAGS_S[1:]:
             gain = 1 - np.exp(-period_s / lag_s)
-            parts.append(lfilter([gain], [1, gain - 1], base_mps, axis=0))
+            parts.append(filtered([gain], [1, gain - 1], base_mps, axis=0))
         return np.stack(parts, axis=1)
 
     def _room(self, axis: int, soft: np.ndarray) -> np.ndarray:

@@ -15,9 +15,8 @@ from functools import cached_property
 import numpy as np
 import twinmill_native as native
 from scipy.linalg import eigh
-from scipy.stats import f as fisher
-from scipy.stats import t as student
 
+from twinmill.chance import f_above, t_quantile
 from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import (
     ALIGNMENT,
@@ -527,7 +526,7 @@ class ScoreFit:
         And by how far the prior pulled what came out far from it: G^-1 D (x - usual), to first
         order, by the curvature G and the prior's precision D.
         """
-        widening = student.ppf(0.975, max(self.blocks - 1, 1)) / NORMAL_95
+        widening = t_quantile(0.975, max(self.blocks - 1, 1)) / NORMAL_95
         pull = np.linalg.pinv(self._curvature) @ ((self.x - self.usual) / self.std**2)
         return self.covariance + (widening**2 - 1) * self._scatter_covariance + np.outer(pull, pull)
 
@@ -553,7 +552,7 @@ class ScoreFit:
             return 0.0
         away = (self.x - self.usual)[own]
         square = away @ np.linalg.pinv(self.covariance[np.ix_(own, own)]) @ away
-        return float(fisher.sf(square / len(own), len(own), max(self.blocks - 1, 1)))
+        return f_above(square / len(own), len(own), max(self.blocks - 1, 1))
 
     @cached_property
     def estimates(self) -> list[ParameterEstimate]:

@@ -7,10 +7,10 @@ room. It is never shown as a model; it only tells noise from what some model cou
 """
 
 import numpy as np
-from scipy.signal import lfilter
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import command_at
+from twinmill.filters import filtered
 from twinmill.predict.residual import StepGrid, rotate
 
 LEVELS = (0.15, 0.3, 0.5, 0.65, 0.8, 0.9, 1.0)  # of the largest command
@@ -124,4 +124,4 @@ def _lagged(signal: np.ndarray, grid: StepGrid) -> np.ndarray:
 
 def _lag(signal: np.ndarray, tau_s: float, grid: StepGrid) -> np.ndarray:
     keep = np.exp(-grid.period_s / tau_s) if tau_s > 0 else 0.0
-    return lfilter([1 - keep], [1, -keep], signal, axis=0)
+    return filtered([1 - keep], [1, -keep], signal, axis=0)

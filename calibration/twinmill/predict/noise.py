@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.signal import lfilter
-from scipy.signal.windows import hann
 
+from twinmill.filters import filtered
 from twinmill.predict.residual import StepGrid
 
 CHUNK = 256  # steps of one periodogram: 2 s at 120 Hz, a few times the disturbance's memory
@@ -94,7 +93,7 @@ class Noise:
             numerator, denominator, scale = noise.whitening(grid.period_s)
             for part in grid.slices:
                 white[..., part, channels] = (
-                    lfilter(numerator, denominator, errors[..., part, channels], axis=-2) / scale
+                    filtered(numerator, denominator, errors[..., part, channels], axis=-2) / scale
                 )
         for start in grid.starts:
             white[..., start : start + TRANSIENT, :] = 0
@@ -144,7 +143,7 @@ def _pieces(grid: StepGrid, moving: np.ndarray, chunk: int) -> np.ndarray | None
 
 def _bins(chunk: int) -> np.ndarray:
     """(F, chunk) weights whose sums over a stretch are its spectrum: taper, wave, mean left out."""
-    taper = hann(chunk, sym=False)
+    taper = np.hanning(chunk + 1)[:-1]
     wave = np.exp(-2j * np.pi * np.outer(np.arange(1, chunk // 2), np.arange(chunk)) / chunk)
     weights = taper * wave / np.sqrt(np.sum(taper**2))
     return weights - weights.mean(axis=1, keepdims=True)

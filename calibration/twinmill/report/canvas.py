@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One look for all figures, and SVG text that is the same for the same data."""
+"""One look for all figures, and SVG text that is the same for the same data.
 
-import io
-import re
+Matplotlib is imported where something is drawn: it takes a third of a second, and most commands
+that could draw print numbers alone.
+"""
+
+from __future__ import annotations
+
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-import matplotlib
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
-from matplotlib.ticker import LogLocator
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from twinmill.report.picture import Picture
 
 # Colours of Okabe and Ito (2008), told apart by colour-blind readers.
 MEASURED, PREDICTED, BEFORE, FLOOR = "#3c3c3c", "#d55e00", "#0072b2", "#009e73"
@@ -32,13 +37,6 @@ STYLE = {
 }
 
 
-class Picture(Canvas):
-    """A figure that a notebook shows without pyplot."""
-
-    def _repr_svg_(self) -> str:
-        return _svg_of(self)
-
-
 class Svg(str):
     """An SVG element, with the figure that it was made from.
 
@@ -51,34 +49,18 @@ class Svg(str):
 
 def draw(height_in: float, paint: Callable[..., None], **grid) -> Svg:
     """Paints axes laid out by `grid` (as for subplots) and gives the SVG element."""
-    with matplotlib.rc_context(STYLE):
-        picture = Picture(figsize=(WIDTH_IN, height_in), layout="constrained")
-        paint(picture.subplots(**grid))
-        svg = Svg(_svg_of(picture))
+    from twinmill.report.picture import Picture
+
+    picture = Picture.of(STYLE, (WIDTH_IN, height_in), lambda p: paint(p.subplots(**grid)))
+    svg = Svg(picture.svg)
     svg.picture = picture
-    return svg
-
-
-def _svg_of(picture: Picture) -> str:
-    with matplotlib.rc_context(STYLE):
-        text = io.StringIO()
-        picture.savefig(
-            text,
-            format="svg",
-            metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
-        )
-    svg = text.getvalue()
-    svg = svg[svg.index("<svg") :]
-    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
-    svg = re.sub(r'<g id="[^"]*">', "<g>", svg)  # names of groups repeat from figure to figure
-    svg = re.sub(
-        r'(<svg[^>]*?) width="[^"]*pt"', r"\1", re.sub(r'(<svg[^>]*?) height="[^"]*pt"', r"\1", svg)
-    )
     return svg
 
 
 def plain_ticks(axis) -> None:
     """Numbers without exponents on a logarithmic axis."""
+    from matplotlib.ticker import LogLocator
+
     axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axis.set_major_formatter(lambda value, _: f"{value:g}")
     axis.set_minor_formatter(lambda value, _: "")

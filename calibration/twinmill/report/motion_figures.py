@@ -2,7 +2,6 @@
 """Figure of motion: where on the floor it differs from what was predicted."""
 
 import numpy as np
-from matplotlib.ticker import MaxNLocator
 
 from twinmill.fitting.compare import RobotComparison
 from twinmill.predict.regimes import HORIZON
@@ -28,6 +27,8 @@ def floor_map(robot: RobotComparison) -> Figure:
     scale = 0.9 * span / CELLS / largest
 
     def paint(axes) -> None:
+        from matplotlib.ticker import MaxNLocator  # see canvas: only where something is drawn
+
         tip = place + scale * mean
         axes.scatter(*place.T, s=4 + 2 * np.sqrt(count), color="#bbbbbb", zorder=2)
         axes.quiver(

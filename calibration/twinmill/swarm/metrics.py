@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
-from scipy.signal import savgol_filter
 
 from twinmill.data.log import Log, LogError, RobotLog
 
@@ -135,6 +134,8 @@ def resample(robot: RobotLog, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def body_velocity(pose: np.ndarray) -> np.ndarray:
     """(T, ..., 3) forward, left, turn in m/s and rad/s, of poses STEP_S apart, angles unwrapped."""
+    from scipy.signal import savgol_filter  # most commands judge no swarm
+
     rate = savgol_filter(pose, SMOOTH, 2, deriv=1, delta=STEP_S, axis=0)
     c, s = np.cos(pose[..., 2]), np.sin(pose[..., 2])
     omega = np.where(np.abs(rate[..., 2]) < STILL_RADPS, 0.0, rate[..., 2])

@@ -10,9 +10,9 @@ from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import convolve1d
-from scipy.signal import lfilter
 
 from twinmill.data.track import Track, local_line
+from twinmill.filters import filtered
 
 GRID_S = 0.02
 HALF_S = 0.15  # of the window; three poses at least
@@ -103,7 +103,7 @@ class Motion:
     def felt(self, lag_s: float) -> Felt:
         """Commands through a first-order lag, averaged over the window."""
         keep = np.exp(-GRID_S / lag_s)
-        lagged = lfilter([1 - keep], [1, -keep], self.shapes, axis=0)
+        lagged = filtered([1 - keep], [1, -keep], self.shapes, axis=0)
         s = np.arange(-self.half_s, self.half_s + GRID_S / 2, GRID_S)
         weight = np.maximum(self.half_s**2 - s**2, 0)
         weight /= weight.sum()

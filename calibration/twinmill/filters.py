@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Linear filters with a short memory, forward in time.
+
+A recursive filter is the solution of a triangular system with a few diagonals. LAPACK solves that;
+`scipy.signal` does the same, and takes four tenths of a second to import.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg.lapack import dtbtrs
+
+
+def filtered(
+    numerator: Sequence[float], denominator: Sequence[float], signal: np.ndarray, axis: int = 0
+) -> np.ndarray:
+    """Output y of a filter that begins at rest: sum_k a_k y[n - k] = sum_k b_k x[n - k].
+
+    Args:
+        numerator: b; b[0] first.
+        denominator: a; its first is 1.
+        signal: x, of any shape.
+        axis: of time.
+    """
+    x = np.moveaxis(np.asarray(signal, float), axis, 0)
+    flat = x.reshape(len(x), -1)
+    now, *before = numerator
+    pushes = now * flat
+    for k, share in enumerate(before, 1):
+        pushes[k:] += share * flat[:-k]
+    if not flat.size:
+        return np.array(signal, float)
+    diagonals = np.repeat(np.asarray(denominator, float)[:, None], len(flat), axis=1)
+    found, _ = dtbtrs(diagonals, pushes, uplo="L", diag="U")
+    return np.moveaxis(found.reshape(x.shape), 0, axis)
