@@ -91,11 +91,17 @@ def seen_once(done: Search, name: str, less: Trial | None) -> list[str] | None:
     return [n for n in _same(done, name) if with_role(n, "moment")]
 
 
-def while_at(done: Search, name: str) -> list[str]:
-    """Effects of a place that do the same as one of a moment: the robot was there at that time."""
+def instead_of_moment(done: Search, name: str) -> list[str]:
+    """Effects that do the same as one of a moment.
+
+    Those of a place, where the robot was at that time; and those of the time that it has been
+    driving, as a motor that warms up early and stays warm.
+    """
     if not with_role(name, "moment"):
         return []
-    return [n for n in _same(done, name) if with_role(n, "place")]
+    placed = [n for n in _same(done, name) if with_role(n, "place")]
+    timed = [n for n in _same(done, name, SETTINGS.same_in_time) if _is_timed(n)]
+    return [*placed, *timed]
 
 
 def within_the_table(
@@ -246,8 +252,11 @@ def _beats(done: Search, one: Trial, other: Trial) -> bool:
     return evidence > least.evidence and without_best > least.without_best
 
 
-def _same(done: Search, name: str) -> list[str]:
-    """Effects that alone took the same errors as this one, when it was accepted."""
+def _same(done: Search, name: str, least: float = SETTINGS.same) -> list[str]:
+    """Effects that alone took the same errors as this one, when it was accepted.
+
+    By the fall of the error, and `least` of the cosine of what they take.
+    """
     this = done.round_of(name)
     if name == REFIT or this.accepted.names != (name,):
         return []
@@ -258,7 +267,7 @@ def _same(done: Search, name: str) -> list[str]:
         if len(t.names) == 1
         and t.names[0] not in (name, REFIT)
         and this.before.held_score**2 - t.held_score**2 > SETTINGS.same_fall * taken
-        and in_common(this.before, this.accepted, t) > SETTINGS.same
+        and in_common(this.before, this.accepted, t) > least
     ]
 
 

@@ -80,6 +80,7 @@ class Settings(Numbers):
     nearly_all: float = number(0.85, "... beyond which share it is still the same physics")
     same: float = number(0.8, "cosine of what two take, from which they take the same errors ...")
     same_fall: float = number(0.85, "... if one takes this share of what the other takes")
+    same_in_time: float = number(0.7, "the same cosine of a loss from a moment on and of heat")
     nothing: float = number(0.01, "chance of such sizes if there were no effect")
     companion_evidence: float = number(9.0, "fall of the cost if a size changed with the drive")
     companion_t: float = number(3.0, "the same over blocks: standard errors from zero")
