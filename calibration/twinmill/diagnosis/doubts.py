@@ -101,7 +101,7 @@ def instead_of_moment(done: Search, name: str) -> list[str]:
         return []
     placed = [n for n in _same(done, name) if with_role(n, "place")]
     timed = [n for n in _same(done, name, SETTINGS.same_in_time) if _is_timed(n)]
-    return [*placed, *timed]
+    return [*placed, *(n for n in timed if not with_role(n, "moment"))]
 
 
 def within_the_table(
