@@ -1125,13 +1125,14 @@ class Explanation(Reported):
         """The model as given, then with each finding.
 
         Returns:
-            effect (`as given` first; `refit` is of stale numbers) and score_heldout.
+            effect (`as given` first; `refit` is of stale numbers, `equation` a formula that was
+            proven) and score_heldout.
 
         Examples:
             >>> explained.steps()["score_heldout"].is_monotonic_decreasing
             True
         """
-        steps = self._result.diagnosis.steps
+        steps = self._result.steps
         return pd.DataFrame(
             {"effect": effect or "as given", "score_heldout": score} for effect, score in steps
         )
@@ -1287,6 +1288,7 @@ def explain(
     log: Log | str | Path,
     model: Model | str | Path | None = None,
     *,
+    formula: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Explanation:
     """Diagnoses, adds what is found, and fits all of it; every step on held-out data.
@@ -1294,6 +1296,7 @@ def explain(
     Args:
         log: a log, or the path of one.
         model: best one that was fitted to another log; None is TurboPi's.
+        formula: one that was proven for what no effect explains is added as well.
         progress: is told in words what is being done.
 
     Returns:
@@ -1309,6 +1312,7 @@ def explain(
         ['coasting']
     """
     log, model = _log(log), _model(model)
+    checked("formula", formula, (bool,), "True or False")
     checked("progress", progress, (Callable, NoneType), "a function that takes a text")
     measurements = log.measurements(model)
     result, file = _made(
@@ -1318,6 +1322,7 @@ def explain(
             out=out,
             command="twinmill.explain",
             progress=progress or (lambda _: None),
+            formula=formula,
         ),
     )
     return _told(Explanation(result, Model(file), log, model.file), measurements)

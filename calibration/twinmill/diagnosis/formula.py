@@ -95,6 +95,11 @@ class Formula:
         return " + ".join(terms).replace("+ -", "- ") + (f" with ds/dt = {rate}" if rate else "")
 
     @property
+    def equals(self) -> str:
+        """What is added to what, with its numbers."""
+        return f"{self.forms[0].adds_to} += {self.text}"
+
+    @property
     def like(self) -> str:
         """Known physics that it looks like; empty if none."""
         return resembles(self.forms, [n.value for n in self.numbers])
@@ -103,7 +108,7 @@ class Formula:
         """Fields of the interface."""
         return {
             "equation": self.equation,
-            "text": f"{self.forms[0].adds_to} += {self.text}",
+            "text": self.equals,
             "depends_on": self.depends_on,
             "numbers": [n.to_json() for n in self.numbers],
             "takes": self.takes,

@@ -120,7 +120,7 @@ class Diagnosis:
                 "firm": rest.firm,
                 "certainty": rest.certainty,
                 "depends_on": rest.depends_on,
-                "formula": rest.formula,
+                "formula": rest.proven.equals if rest.proven else None,
                 "moments": [m.to_json() for m in rest.moments],
                 "proven": rest.proven.to_json() if rest.proven else None,
             },

@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from twinmill.data.checks.settings import CHECKS
-from twinmill.diagnosis.explain import Explanation, steps
+from twinmill.diagnosis.explain import Explanation
 from twinmill.diagnosis.outliers import Outlier, in_words
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.settings import SETTINGS
@@ -285,8 +285,9 @@ def terminal_explanation(
     return Group(
         *_said(result.diagnosis),
         Text(),
-        show.table(tables.steps(_labelled(result.diagnosis))),
+        show.table(tables.steps(_labelled(result.steps))),
         show.table(tables.parameters(result.parameters)),
+        *(Text(line) for line in formula.taken(result.formula)),
         Text(not_written or f"Written: {result.path}"),
         *_next(result.diagnosis, commands),
     )
@@ -330,7 +331,11 @@ def explanation_section(
     return replace(
         page,
         tables=[*page.tables, tables.parameters(result.parameters)],
-        notes=[*page.notes, not_written or f"Written: `{result.path}`"],
+        notes=[
+            *page.notes,
+            *formula.taken(result.formula),
+            not_written or f"Written: `{result.path}`",
+        ],
     )
 
 
@@ -408,16 +413,14 @@ def _detection_figures(diagnosis: Diagnosis) -> list[Figure]:
 
 def _gains(diagnosis: Diagnosis) -> list[Figure]:
     """What each step took away; nothing where none did."""
-    labelled = _labelled(diagnosis)
+    labelled = _labelled(diagnosis.steps)
     return [waterfall(labelled)] if len(labelled) > 1 else []
 
 
-def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
+def _labelled(steps: Sequence[tuple[str | None, float]]) -> list[tuple[str, float]]:
     """Steps of the waterfall."""
     names = {None: "as given, held out", REFIT: REFIT_IN_WORDS}
-    return [
-        (names.get(s["effect"], f"+ {s['effect']}"), s["score_heldout"]) for s in steps(diagnosis)
-    ]
+    return [(names.get(effect, f"+ {effect}"), score) for effect, score in steps]
 
 
 def _named(effect: str) -> str:

@@ -7,6 +7,7 @@ The robots hide what no effect of the catalogue says, written here in NumPy over
 import io
 import json
 import shlex
+import subprocess
 from contextlib import redirect_stdout
 from pathlib import Path
 
@@ -14,16 +15,19 @@ import numpy as np
 import pytest
 from scipy.stats import linregress
 
+from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.forms import PAST, Form, Motion, State, joined, own_forms, sized
 from twinmill.diagnosis.formula_search import _by_f, _by_signs
 from twinmill.diagnosis.known_physics import resembles
 from twinmill.diagnosis.units import units_of
+from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
 from twinmill.fitting.floor import body_velocity_at
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names
+from twinmill.programs import find_program
 from twinmill_cli.main import run
 
 STEP_S = 1 / 480  # of the robot
@@ -96,6 +100,52 @@ def test_the_printed_command_adds_it_as_it_stands(found, playing, base, tmp_path
     assert effect_names(ModelFile.load(str(written)).model) == ["equation"]
     then = diagnosed([str(playing), "--model", str(written)])
     assert then["rest"]["proven"] is None and then["score"] < 1.3 < found["score"]
+
+
+@pytest.fixture(scope="module")
+def explained(playing, base, tmp_path_factory) -> dict:
+    """What `explain --json` says of that log; the model that it writes is under `model`."""
+    out = tmp_path_factory.mktemp("explained") / "explained.toml"
+    said = io.StringIO()
+    with redirect_stdout(said):
+        run(["explain", str(playing), "--model", str(base.path), "-o", str(out), "--json"])
+    return json.loads(said.getvalue())
+
+
+def test_explain_takes_the_formula_into_a_model_that_predicts_another_drive(
+    explained, base, run_log, tanh_robot
+):
+    beyond = explained["formula"]
+    assert beyond["kept"] and beyond["score_heldout"] < beyond["score_heldout_without"]
+    assert explained["steps"][-1]["effect"] == "equation"
+    assert [n["low"] < n["value"] < n["high"] for n in beyond["numbers"]]
+
+    class Playing(tanh_robot):
+        def hindered(self, motion):
+            return np.column_stack([motion[:, :2], stored(motion[:, 2])])
+
+    other = [load_measurements([run_log(Playing(), 77, 60.0)])[0]]
+    with_it = compare(other, ModelFile.load(explained["model"])).score
+    assert with_it < 1.3 < compare(other, base).score
+
+
+def test_the_model_that_explain_wrote_moves_on_both_plants(explained, tmp_path):
+    program, model = str(find_program("twin_run")), explained["model"]
+    words = [program, "--model", model, "--n", "1", "--duration-s", "1", "--json"]
+    for plant in ("planar", "mujoco"):
+        log = tmp_path / f"{plant}.lcmlog"
+        subprocess.run([*words, "--plant", plant, "--log", str(log)], check=True)
+        assert log.stat().st_size > 0
+
+
+def test_explain_leaves_the_formula_out_if_asked(playing, base, tmp_path):
+    out = tmp_path / "catalogue.toml"
+    said = io.StringIO()
+    with redirect_stdout(said):
+        words = ["explain", str(playing), "--model", str(base.path), "-o", str(out)]
+        run([*words, "--no-formula"])
+    assert "twinmill add equation" in said.getvalue()
+    assert "equation" not in effect_names(ModelFile.load(str(out)).model)
 
 
 def test_the_report_draws_it_over_the_data(found):
