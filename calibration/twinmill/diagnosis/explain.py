@@ -90,14 +90,15 @@ def explain(
     diagnosis = diagnose(measurements, model_file, progress)
     fit = _polished(diagnosis)
     proven = diagnosis.rest.proven if formula else None
-    logs = {m.log_name: m.log_sha256 for m in measurements}
-    beyond = taken(fit, proven, len({*logs.values()})) if proven else None
+    runs = len({m.log_sha256 for m in measurements})
+    beyond = taken(fit, proven, runs) if proven else None
     if beyond and beyond.kept:
         fit = beyond.fit
     model = _with_found(diagnosis, model_file, beyond)
     estimates = [*fit.shared_estimates(), *diagnosis.detection_estimates]
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
+    logs = {m.log_name: m.log_sha256 for m in measurements}
     noise = next((s.noise for s in diagnosis.modelled if s.noise), None)
     written = Fitted(
         model=model,

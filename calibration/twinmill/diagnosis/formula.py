@@ -87,6 +87,11 @@ class Formula:
         return list(dict.fromkeys(f.group for f in self.forms))
 
     @property
+    def names_time(self) -> bool:
+        """It has moments of the run."""
+        return any(f.names_time for f in self.forms)
+
+    @property
     def text(self) -> str:
         """With its numbers in place of their names."""
         texts = [text for form in self.forms for text in form.texts]

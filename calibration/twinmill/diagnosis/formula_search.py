@@ -12,6 +12,7 @@ many were tried, and their chances count for all four tests together, the first 
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -69,11 +70,12 @@ def formula_of(
     """
     pairs = zip(logs, velocities, strict=True)
     motions = [Motion.of(own, v, HORIZONS) for (_, own), v in pairs]
-    sideways = drives_sideways(fit.models[logs[0][0]])
+    model = fit.models[logs[0][0]]
     rows = Evidence(logs, motions, fit, changes)
     if len(rows.parts) < FEWEST:
         return None
-    forms = [*from_library(terms), *sized(own_forms(motions, sideways), motions)]
+    own = own_forms(motions, drives_sideways(model), bool(model.wheels()))
+    forms = [*from_library(terms), *sized(own, motions)]
     pool = Pool(forms, rows.raw(forms))
     other = rows.of_all(rival) if len(rival) else None
     half = np.arange(len(rows.parts)) % 2 == 0
@@ -82,8 +84,32 @@ def formula_of(
         rows.weighed(proof.scale)
         again = stability(rows, pool, proof.chosen.forms[0])
         if again >= SETTINGS.formula_again:
-            return told(rows, proof, len(forms), again)
+            whole = _completed(rows, pool, proof)
+            return told(rows, whole, len(forms), again)
     return None
+
+
+def _completed(rows: Evidence, pool: Pool, proof: Proof) -> Proof:
+    """With the form that has a proven one as a part, where both halves together ask for it.
+
+    One of two parts of a direction may be too small to be seen in one half.
+    """
+    if len(proof.chosen.forms) > 1:
+        return proof
+    own = proof.chosen.forms[0]
+    more = [k for k, f in enumerate(pool.forms) if _has(f, own)]
+    every = np.ones(len(rows.parts), bool)
+    if not more:
+        return proof
+    nothing = Chosen((), np.zeros((len(rows.stretch), 0)), 0.0)
+    known = best_of(rows, Pool([own], proof.chosen.raw), every, nothing)
+    best = max((best_of(rows, pool.some([k]), every, nothing) for k in more), key=lambda c: c.net)
+    return replace(proof, chosen=best) if best.net > known.net else proof
+
+
+def _has(form: Form, part: Form) -> bool:
+    same = (_kind(form), form.state_rate) == (_kind(part), part.state_rate)
+    return same and {*form.texts} > {*part.texts}
 
 
 def _net(rows: Evidence, proof: Proof) -> float:
@@ -215,8 +241,8 @@ def _alike(gain: float) -> float:
 
 
 def _complexity(form: Form) -> int:
-    """Numbers, and a state counts as one more."""
-    return form.numbers + bool(form.state)
+    """Numbers; a state, and moments of one run, count as one more each."""
+    return form.numbers + bool(form.state) + form.names_time
 
 
 def _polished(rows: Evidence, one: Pool, half: np.ndarray, found: Chosen) -> Chosen:

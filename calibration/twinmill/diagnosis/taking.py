@@ -12,7 +12,6 @@ from twinmill.model.parameters import Parameter, effect_names, effect_parameters
 from twinmill.predict.datasets import total_score
 
 EFFECT = "equation"
-TIME = "t"  # as formulas name it
 SEVERAL = 2  # runs that tell of a moment that they share
 STEP = 0.05  # of finite differences, times the number at which a shape adds what is typical
 
@@ -47,7 +46,7 @@ class Taken:
     @property
     def why_not(self) -> str:
         """What keeps it out of the model; empty if nothing does."""
-        if TIME in self.formula.holds and self.runs < SEVERAL:
+        if self.formula.names_time and self.runs < SEVERAL:
             return "it names the time of one run, and nothing shows that another run shares it"
         if self.after >= self.before:
             return "refitted with the rest, it predicts left-out data no better"

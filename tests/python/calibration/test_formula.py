@@ -169,6 +169,9 @@ def motion(tanh_robot, measure, base) -> tuple:
 
 LAG = State("omega", "(1/{c})")
 HEAT = State("(vx*vx + vy*vy)", "(1/{c})")
+REST = State("moves", "(1/{c})")
+WHEELS = State("target", "(1/{c})")
+AROUND = "vx*max(0, 1 - abs(abs(vx)/{c} - 1)/0.4)"
 
 
 @pytest.mark.parametrize(
@@ -180,6 +183,12 @@ HEAT = State("(vx*vx + vy*vy)", "(1/{c})")
         Form("omega_radps", ("cos(theta)*omega", "sin(theta)*omega"), "heading"),
         Form("omega_radps", ("(omega - s)",), PAST, LAG, 0.6, unit="s"),
         Form("theta_rad", ("cos(theta)", "sin(theta)"), "heading"),
+        Form("motion", ("(moves - s)",), "starts", REST, 0.8, unit="s"),
+        Form("motion", ("s",), "way driven", State("", "sqrt(vx*vx + vy*vy)")),
+        Form(
+            "vx_mps", ("vx*max(0, 1 - abs(abs(vx)/{c} - 1)/0.4)",), "speed", None, 0.2, unit="m/s"
+        ),
+        Form("rim_mps", ("(target - s)",), PAST, WHEELS, 0.5, unit="s"),
     ],
     ids=lambda f: f"{f.adds_to} {f.shapes[0]}",
 )
@@ -202,7 +211,7 @@ def test_a_form_changes_the_errors_as_the_plant_does_that_has_it(motion, form):
 
 def test_units_agree_in_every_form_and_are_told_of_its_numbers(motion):
     """By dimensions: a number in front of v |v| that gives a speed is in s/m."""
-    for form in own_forms([motion[1]], True):
+    for form in own_forms([motion[1]], True, True):
         assert units_of(form)
     assert units_of(Form("vx_mps", ("vx*abs(vx)",), "speed")) == ["s/m"]
     assert units_of(Form("travel", ("(vx*vx + vy*vy)",), "speed")) == ["s^2/m^2"]
