@@ -700,13 +700,18 @@ class Model(Shown):
         return [*(left.sentence() for left in done.left), *done.warnings]
 
     def explain(
-        self, log: "Log | str | Path", *, progress: Callable[[str], None] | None = None
+        self,
+        log: "Log | str | Path",
+        *,
+        formula: bool = True,
+        progress: Callable[[str], None] | None = None,
     ) -> "Explanation":
         """Diagnoses, and adds what is found.
 
         Args:
             log: a log, or the path of one.
-            progress: as of `explain`, which says more.
+            formula: as of `explain`, which says more.
+            progress: the same.
 
         Returns:
             As `explain`.
@@ -718,7 +723,7 @@ class Model(Shown):
             >>> tm.Model.load("fitted.toml").explain("run.lcmlog").model.effects
             ['coasting']
         """
-        return explain(log, self, progress=progress)
+        return explain(log, self, formula=formula, progress=progress)
 
     def next_run(self, log: "Log | str | Path", **options: Any) -> "NextRun":
         """Designs the run that best tells apart what these logs cannot.

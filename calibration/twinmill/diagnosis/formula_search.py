@@ -3,12 +3,11 @@
 
 Stretches of the logs alternate between two halves. On each half in turn a formula is chosen: of all
 forms, the one of fewest numbers among those that predict left-out stretches of that half equally
-well; then terms beside it, as long as they help. Another of the best that begins with another kind
-of form is chosen as well. What was chosen is judged on the other half, which neither chose nor
-fitted it: by an F test, and by the chance of so large a fall under random signs of blocks (both
-exact for what they assume; the larger chance counts). So two formulas are tested a half, however
-many were tried, and their chances count for all four tests together, the first choice's for most
-(weighted Bonferroni).
+well; then terms beside it, as long as they help. What was chosen is judged on the other half, which
+neither chose nor fitted it: by an F test, and by the chance of so large a fall under random signs
+of blocks (both exact for what they assume; the larger chance counts). So one formula is tested a
+half, however many were tried, and both halves together count twice (Bonferroni). Of two that are
+proven, the one that gains more on both halves is told.
 """
 
 from collections.abc import Sequence
@@ -45,7 +44,6 @@ MOST_NUMBERS = 4  # the effect `equation` has p0 to p3
 MOST_TERMS = 3
 ALL_SIGNS = 12  # up to so many blocks all signs are tried ...
 DRAWN = 4095  # ... of more so many
-SHARES = (0.4, 0.1)  # of the chance, that a half's first and second choice may use up
 LEVELS = (-0.7, -0.35, 0.0, 0.35, 0.7)  # of a wave that is sharpened
 
 
@@ -79,7 +77,7 @@ def formula_of(
     pool = Pool(forms, rows.raw(forms))
     other = rows.of_all(rival) if len(rival) else None
     half = np.arange(len(rows.parts)) % 2 == 0
-    proofs = [proof for own in (half, ~half) for proof in _proven(rows, pool, own, other)]
+    proofs = [proof for own in (half, ~half) if (proof := _proven(rows, pool, own, other))]
     for proof in sorted(proofs, key=lambda p: -_net(rows, p)):
         rows.weighed(proof.scale)
         again = stability(rows, pool, proof.chosen.forms[0])
@@ -123,8 +121,8 @@ def _net(rows: Evidence, proof: Proof) -> float:
     return float(sums.held_out(every)[0]) - SETTINGS.each * proof.chosen.numbers
 
 
-def _proven(rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | None) -> list[Proof]:
-    """Chooses on a half and judges on the other; what that bears out.
+def _proven(rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | None) -> Proof | None:
+    """Chooses on a half and judges on the other; None where that does not bear it out.
 
     Args:
         rows: are weighed anew.
@@ -136,24 +134,18 @@ def _proven(rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | No
     nothing = Chosen((), np.zeros((len(rows.stretch), 0)), 0.0)
     sums = Sums.of(rows, rows.seen(pool.raw), pool.forms, rows.seen(nothing.raw))
     net = sums.held_out(half) - SETTINGS.each * np.array([f.numbers for f in pool.forms])
-    best = [int(k) for k in np.argsort(-net)[:SHORTLIST]]
+    best = np.argsort(-net)[:SHORTLIST]
     if net[best[0]] <= 0:
-        return []
+        return None
     first = pool.some(best[:1])
     rows.weighed(_scales(rows, first.raw, half))
-    found, gone = [], set()
-    for share in SHARES:
-        short = [k for k in best if _kind(pool.forms[k]) not in gone]
-        chosen = _chosen(rows, pool, pool.some(short), half) if short else None
-        if not chosen:
-            break
-        gone.add(_kind(chosen.forms[0]))
-        if rival is not None and _outdone(rows, chosen, rival, half):
-            continue
-        proof = _proof(rows, chosen, half, share)
-        if proof.chance <= SETTINGS.formula_chance and proof.takes >= SETTINGS.formula_takes:
-            found.append(proof)
-    return found
+    chosen = _chosen(rows, pool, pool.some(best), half)
+    if not chosen or (rival is not None and _outdone(rows, chosen, rival, half)):
+        return None
+    proof = _proof(rows, chosen, half)
+    if proof.chance > SETTINGS.formula_chance or proof.takes < SETTINGS.formula_takes:
+        return None
+    return proof
 
 
 def _kind(form: Form) -> tuple[str, str]:
@@ -267,8 +259,8 @@ def _polished(rows: Evidence, one: Pool, half: np.ndarray, found: Chosen) -> Cho
 # -- proof -----------------------------------------------------------------------------------------
 
 
-def _proof(rows: Evidence, chosen: Chosen, half: np.ndarray, share: float) -> Proof:
-    """Judges on the half that did not choose; the test may use up a share of the chance."""
+def _proof(rows: Evidence, chosen: Chosen, half: np.ndarray) -> Proof:
+    """Judges on the half that did not choose."""
     numbers = fitted(rows, chosen, half)
     judging = ~half[rows.stretch]
     x, left = rows.seen(chosen.raw)[judging], rows.left[judging]
@@ -279,7 +271,7 @@ def _proof(rows: Evidence, chosen: Chosen, half: np.ndarray, share: float) -> Pr
     if gain > 0:
         errors = np.sum((left / rows.scale[judging]) ** 2)
         chance = max(_by_signs(np.bincount(block, (x @ numbers) * left)), _by_f(x, left, errors))
-    return Proof(chosen, min(1.0, chance / share), float(gain / max(total, 1e-9)), rows.scale)
+    return Proof(chosen, min(1.0, 2 * chance), float(gain / max(total, 1e-9)), rows.scale)
 
 
 def _by_signs(pushes: np.ndarray) -> float:
