@@ -3,10 +3,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import log
 
 import twinmill_native as native
 
 from twinmill.diagnosis.formula import Formula, Number
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.score_fit import NORMAL_95, ScoreFit
 from twinmill.model.parameters import Parameter, effect_names, effect_parameters, newest_instance
 from twinmill.predict.datasets import total_score
@@ -27,6 +29,7 @@ class Taken:
         before: held-out score without it, of a fit of the rest.
         after: with it.
         share: of the squared held-out error above the floor that it takes away.
+        evidence: fall of the held-out cost, and the same without the block with the most.
         runs: logs that bear it out.
     """
 
@@ -36,6 +39,7 @@ class Taken:
     before: float
     after: float
     share: float
+    evidence: tuple[float, float]
     runs: int
 
     @property
@@ -50,6 +54,11 @@ class Taken:
             return "it names the time of one run, and nothing shows that another run shares it"
         if self.after >= self.before:
             return "refitted with the rest, it predicts left-out data no better"
+        # The best of so many forms falls by 2 ln of their number more than one of them would.
+        chosen = 2 * log(self.formula.tried)
+        least = SETTINGS.evidence + chosen, SETTINGS.without_best
+        if any(own < enough for own, enough in zip(self.evidence, least, strict=True)):
+            return "refitted with the rest, it has less evidence than an effect needs"
         return ""
 
     @property
@@ -92,7 +101,17 @@ def taken(fit: ScoreFit, formula: Formula, runs: int) -> Taken:
     before, after = total_score(fit.held_scores), total_score(found.held_scores)
     above = max(fit.held_square - 1, fit.held_square - found.held_square, 1e-9)
     share = (fit.held_square - found.held_square) / above
-    return Taken(formula, found, _numbers(found, fresh, formula), before, after, share, runs)
+    fall, without_best, _ = found.against(fit)
+    return Taken(
+        formula=formula,
+        fit=found,
+        numbers=_numbers(found, fresh, formula),
+        before=before,
+        after=after,
+        share=share,
+        evidence=(fall, without_best),
+        runs=runs,
+    )
 
 
 def _without(model: native.Model, gone: Sequence[str]) -> native.Model:

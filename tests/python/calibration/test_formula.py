@@ -155,8 +155,8 @@ def test_the_report_draws_it_over_the_data(found):
 
 @pytest.mark.parametrize("seed", [301, 302])
 def test_no_formula_is_offered_where_only_noise_is_left(tanh_robot, measure, base, seed):
-    rest = diagnose([measure(tanh_robot(), seed, 60.0)], base).rest
-    assert rest.proven is None
+    found = diagnose([measure(tanh_robot(), seed, 60.0)], base)
+    assert found.rest.proven is None and found.to_json()["rest"]["formula"] is None
 
 
 @pytest.fixture(scope="module")
