@@ -34,7 +34,7 @@ from rivals import (
 )
 from rivals.protocol import DOCUMENTED, Answer, Problem, Rival, predicted_by
 from rivals.scoring import judged, middle, row
-from twinmill.challenge.cases import Case, draw, draw_robots, make_log, seal
+from twinmill.challenge.cases import CASES, Case, draw, draw_robots, make_log, seal
 from twinmill.files import check_new_folder
 from twinmill.model.model_file import write_whole
 from twinmill_cli.challenge import base_of
@@ -74,7 +74,8 @@ def main() -> int:
     check_new_folder(asked.out)
     (asked.out / "done").mkdir(parents=True, exist_ok=True)
     robots = draw_robots(asked.seed)
-    cases = [draw(n, asked.seed, robots, asked.duration_s) for n in range(asked.n)]
+    wanted = [n for n in range(asked.n) if CASES[n % len(CASES)] in asked.kinds]
+    cases = [draw(n, asked.seed, robots, asked.duration_s) for n in wanted]
     answers = seal(cases)
     console.print(f"sealed answers: sha256 {hashlib.sha256(answers.encode()).hexdigest()}")
     results = []
@@ -85,7 +86,7 @@ def main() -> int:
             base = base_of(asked.out, case.robot, robot, asked.seed, duration_s=asked.duration_s)
             results.append(_case(asked.out, base, case, asked.seed))
             if not console.is_terminal:
-                console.print(f"case {case.number + 1} of {len(cases)}")
+                console.print(f"case {case.number + 1} of {asked.n}")
     write_whole(asked.out / "answers.json", answers)
     real = _recordings(asked.out, console) if asked.real else []
     found = _found(asked, results, real)
@@ -107,6 +108,13 @@ def _asked() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=2026, help="same seed, same cases")
     parser.add_argument("--duration-s", type=float, default=90, help="of a log; differs by 30 %%")
     parser.add_argument("--out", type=Path, default=Path("build/rivals"), help="folder")
+    parser.add_argument(
+        "--kinds",
+        nargs="+",
+        choices=sorted({*CASES}),
+        default=sorted({*CASES}),
+        help="of the cases, only those where this is hidden",
+    )
     parser.add_argument("--json", action="store_true", help="prints results as JSON")
     parser.add_argument(
         "--real", action=argparse.BooleanOptionalAction, default=True, help="recordings, too"
@@ -114,6 +122,8 @@ def _asked() -> argparse.Namespace:
     asked = parser.parse_args()
     if asked.n < 1 or asked.duration_s < 30:
         parser.error(f"--n {asked.n} and --duration-s {asked.duration_s:g}: at least 1 and 30")
+    if asked.n <= min(CASES.index(kind) for kind in asked.kinds):
+        parser.error(f"--n {asked.n}: has no case of --kinds {' '.join(asked.kinds)}; take more")
     if asked.seed in RESERVED:
         parser.error(f"--seed {asked.seed}: Twinmill was developed on it; take another")
     return asked
@@ -202,6 +212,7 @@ def _found(asked: argparse.Namespace, results: list[dict], real: list[dict]) -> 
     return {
         "seed": asked.seed,
         "duration_s": asked.duration_s,
+        "kinds": asked.kinds,
         "rows": rows,
         "recordings": real,
         "cases": cases,

@@ -16,6 +16,7 @@ HEADS = {
     "name": "right\nname",
     "depends": "right\ndependence",
     "wrong": "surely named\nwrongly",
+    "within": "outside:\nwithin 1.3",
     "same_0.5": "same drive\n0.5 s",
     "same_2": "same drive\n2 s",
     "other_0.5": "other drive\n0.5 s",

@@ -32,7 +32,9 @@ RATES = (
     Column("name", "right name or family", True),
     Column("depends", "right dependence", True),
     Column("wrong", "named wrongly, and surely", False),
+    Column("within", "outside the catalogue: all errors within 1.3 of the truth's", True),
 )
+WITHIN = 1.3
 ERRORS = tuple(
     Column(f"{label}_{ahead_s:g}", f"error at {ahead_s:g} s over the truth's, {words}", False)
     for label, words in (("same", "same kind of drive"), ("other", "another kind"))
@@ -103,8 +105,14 @@ def row(cases: Iterable[dict]) -> dict:
         "name": rate([c["first"] for c in cases if c["kind"] in ("one", "cousin")]),
         "depends": rate([c["depends"] for c in cases if c["kind"] == "outside"]),
         "wrong": rate([c["wrong"] for c in cases]),
+        "within": rate([_within(c) for c in cases if c["kind"] == "outside"]),
     }
     return rates | {c.key: middle([case[c.key] for case in there]) for c in ERRORS}
+
+
+def _within(case: dict) -> bool:
+    """Whether every error of a case's predictions is near the truth's."""
+    return all(case[column.key] <= WITHIN for column in ERRORS)
 
 
 def middle(values: list[float]) -> dict:

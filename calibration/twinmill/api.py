@@ -700,13 +700,18 @@ class Model(Shown):
         return [*(left.sentence() for left in done.left), *done.warnings]
 
     def explain(
-        self, log: "Log | str | Path", *, progress: Callable[[str], None] | None = None
+        self,
+        log: "Log | str | Path",
+        *,
+        formula: bool = True,
+        progress: Callable[[str], None] | None = None,
     ) -> "Explanation":
         """Diagnoses, and adds what is found.
 
         Args:
             log: a log, or the path of one.
-            progress: as of `explain`, which says more.
+            formula: as of `explain`, which says more.
+            progress: the same.
 
         Returns:
             As `explain`.
@@ -718,7 +723,7 @@ class Model(Shown):
             >>> tm.Model.load("fitted.toml").explain("run.lcmlog").model.effects
             ['coasting']
         """
-        return explain(log, self, progress=progress)
+        return explain(log, self, formula=formula, progress=progress)
 
     def next_run(self, log: "Log | str | Path", **options: Any) -> "NextRun":
         """Designs the run that best tells apart what these logs cannot.
@@ -1125,13 +1130,14 @@ class Explanation(Reported):
         """The model as given, then with each finding.
 
         Returns:
-            effect (`as given` first; `refit` is of stale numbers) and score_heldout.
+            effect (`as given` first; `refit` is of stale numbers, `equation` a formula that was
+            proven) and score_heldout.
 
         Examples:
             >>> explained.steps()["score_heldout"].is_monotonic_decreasing
             True
         """
-        steps = self._result.diagnosis.steps
+        steps = self._result.steps
         return pd.DataFrame(
             {"effect": effect or "as given", "score_heldout": score} for effect, score in steps
         )
@@ -1287,6 +1293,7 @@ def explain(
     log: Log | str | Path,
     model: Model | str | Path | None = None,
     *,
+    formula: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Explanation:
     """Diagnoses, adds what is found, and fits all of it; every step on held-out data.
@@ -1294,6 +1301,7 @@ def explain(
     Args:
         log: a log, or the path of one.
         model: best one that was fitted to another log; None is TurboPi's.
+        formula: one that was proven for what no effect explains is added as well.
         progress: is told in words what is being done.
 
     Returns:
@@ -1309,6 +1317,7 @@ def explain(
         ['coasting']
     """
     log, model = _log(log), _model(model)
+    checked("formula", formula, (bool,), "True or False")
     checked("progress", progress, (Callable, NoneType), "a function that takes a text")
     measurements = log.measurements(model)
     result, file = _made(
@@ -1318,6 +1327,7 @@ def explain(
             out=out,
             command="twinmill.explain",
             progress=progress or (lambda _: None),
+            formula=formula,
         ),
     )
     return _told(Explanation(result, Model(file), log, model.file), measurements)

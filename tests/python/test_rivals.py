@@ -202,3 +202,11 @@ def test_answers_are_judged_by_the_rules_of_the_challenge(quiet, tmp_path):
     empty = dict.fromkeys(("same_0.5", "same_2", "other_0.5", "other_2"), 1.0)
     table = row([{"kind": "one", **right, **empty}, {"kind": "none", **silent, **empty}])
     assert (table["told"]["hits"], table["alarm"]["hits"], table["name"]["of"]) == (1, 0, 1)
+
+
+def test_a_case_is_within_if_none_of_its_errors_is_far_from_the_truths():
+    said = dict.fromkeys(("told", "first", "depends", "wrong"), True)
+    near = {key: 1.3 for key in ("same_0.5", "same_2", "other_0.5", "other_2")}
+    cases = [near, near | {"other_2": 1.31}]
+    table = row({"kind": "outside", **said, **own} for own in cases)
+    assert (table["within"]["hits"], table["within"]["of"]) == (1, 2)

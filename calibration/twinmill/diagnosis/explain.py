@@ -5,10 +5,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import twinmill_native as native
+
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.result import Diagnosis
+from twinmill.diagnosis.taking import EFFECT, Taken, taken
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.fit import common_clock
 from twinmill.fitting.score_fit import ScoreFit
@@ -32,27 +35,33 @@ class Explanation:
         after: comparison of the new model.
         parameters: all that was fitted.
         path: of the new model.
+        formula: that was proven for what is left, refitted with all; None if none was, or if it
+            was not asked for.
     """
 
     diagnosis: Diagnosis
     after: Comparison
     parameters: list[ParameterEstimate]
     path: Path
+    formula: Taken | None = None
+
+    @property
+    def steps(self) -> list[tuple[str | None, float]]:
+        """Those of the diagnosis, and the formula if the model has it."""
+        own = self.diagnosis.steps
+        kept = self.formula and self.formula.kept
+        return [*own, (EFFECT, self.formula.after)] if kept else own
 
     def to_json(self) -> dict:
         """The interface's object."""
         return {
             **self.diagnosis.to_json(),
-            "steps": steps(self.diagnosis),
+            "steps": [{"effect": name, "score_heldout": score} for name, score in self.steps],
+            "formula": self.formula.to_json() if self.formula else None,
             "score_after": self.after.score,
             "parameters": [e.to_json() for e in self.parameters],
             "model": str(self.path),
         }
-
-
-def steps(diagnosis: Diagnosis) -> list[dict]:
-    """The model as given, then each finding, on held-out data; stale numbers are named `refit`."""
-    return [{"effect": name, "score_heldout": score} for name, score in diagnosis.steps]
 
 
 def explain(
@@ -62,8 +71,17 @@ def explain(
     out: Path,
     command: str,
     progress: Callable[[str], None] = lambda _: None,
+    formula: bool = True,
 ) -> Explanation:
     """Adds what helps on left-out data until nothing more does, and writes the model.
+
+    Args:
+        measurements: one robot, or several of a kind.
+        model_file: the model; see `diagnose`.
+        out: the new model file.
+        command: recorded in it.
+        progress: told in words what is being done.
+        formula: one that is proven for what no effect explains goes into the model as well.
 
     Raises:
         LogError: no measurement can be judged.
@@ -71,12 +89,12 @@ def explain(
     """
     diagnosis = diagnose(measurements, model_file, progress)
     fit = _polished(diagnosis)
-    off = diagnosis.robots_off
-    model = model_file.model.copy()
-    own_effects = [e.name.split(".")[0] for r in off for e in r.parameters if e.name not in GAINS]
-    moved = diagnosis.model.effects[len(model.effects) :]
-    for effect in dict.fromkeys([*moved, *(f.effect for f in diagnosis.camera), *own_effects]):
-        model.add_effect(effect.split("#")[0])
+    proven = diagnosis.rest.proven if formula else None
+    runs = len({m.log_sha256 for m in measurements})
+    beyond = taken(fit, proven, runs) if proven else None
+    if beyond and beyond.kept:
+        fit = beyond.fit
+    model = _with_found(diagnosis, model_file, beyond)
     estimates = [*fit.shared_estimates(), *diagnosis.detection_estimates]
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
@@ -91,14 +109,37 @@ def explain(
         noise=noise,
         clock=common_clock(fit),
         base_told=bool(model_file.known_from_other_logs(logs.values())),
-        left_over=dict(diagnosis.rest.left_over or {}),
+        left_over=_left_over(diagnosis, beyond),
         robots=_own_values(diagnosis, fit),
         covariance=fit.shared_covariance(),
     )
     write_child(model_file, written, out, command)
     child = ModelFile.load(str(out))
     after = comparison(child, [o.with_model(child.model) for o in diagnosis.opened])
-    return Explanation(diagnosis, after, estimates, Path(out))
+    return Explanation(diagnosis, after, estimates, Path(out), beyond)
+
+
+def _with_found(diagnosis: Diagnosis, model_file: ModelFile, beyond: Taken | None) -> native.Model:
+    """The model as given with all that was found, before its numbers."""
+    model = model_file.model.copy()
+    off = diagnosis.robots_off
+    own_effects = [e.name.split(".")[0] for r in off for e in r.parameters if e.name not in GAINS]
+    moved = diagnosis.model.effects[len(model.effects) :]
+    kept = beyond.formula if beyond and beyond.kept else None
+    gone = kept.instead_of if kept else ()
+    moved = [name for name in moved if name.split("#")[0] not in gone]
+    for effect in dict.fromkeys([*moved, *(f.effect for f in diagnosis.camera), *own_effects]):
+        model.add_effect(effect.split("#")[0])
+    if kept:
+        model.add_effect(EFFECT, kept.equation)
+    return model
+
+
+def _left_over(diagnosis: Diagnosis, beyond: Taken | None) -> dict[str, float]:
+    """What the model still leaves, by what it depends on; a formula took its share of all."""
+    left = 1 - beyond.share if beyond and beyond.kept else 1.0
+    falls = diagnosis.rest.left_over or {}
+    return {group: left * fall for group, fall in falls.items() if left > 0}
 
 
 def _polished(diagnosis: Diagnosis) -> ScoreFit:

@@ -19,6 +19,7 @@ from twinmill.diagnosis.term import (
     SWELL,
     TIME,
     TYPICAL,
+    WAY,
     Term,
     displaced,
 )
@@ -26,7 +27,10 @@ from twinmill.fitting.opening import Opened
 from twinmill.fitting.response import Response
 
 PAST = "past motion"
+STARTS = "starts"
 HEADING = "heading"
+RIM, TARGET = "rim_mps", "target"  # of each wheel: where a formula acts, and what it names
+AXES = ("vx", "vy", "omega")
 ALL_AXES = {"travel": (0, 1), "motion": (0, 1, 2)}  # shares of these axes of the body
 HEADING_RAD = 0.02  # usual error of a captured heading
 USUAL = {**TYPICAL, "travel": SWELL, "motion": SWELL, "theta_rad": HEADING_RAD}
@@ -37,6 +41,16 @@ SHORTEST_S = 6.0  # what comes and goes with time
 MOMENTS = 12  # at which something may begin or end
 LONG_S = (5.0, 15.0, 45.0, 135.0)  # what warms up or recovers
 LAGS_S = (0.15, 0.4, 1.0, 2.5)
+RESTS_S = (0.3, 0.8, 2.0, 5.0)  # what a start or a rest is felt
+SPEEDS = (
+    0.2,
+    0.27,
+    0.36,
+    0.48,
+    0.64,
+    0.85,
+)  # of a high speed, around which some is lost
+WIDE = 0.4  # share of that speed, at which such a loss has ended
 STORED = {"vx": (0.003, 0.01, 0.03), "vy": (0.003, 0.01, 0.03), "omega": (0.02, 0.06, 0.2)}
 C, L = "{c}", "{l}"  # the constant and the lever in texts
 FUNCTIONS = {"abs": np.abs, "sign": np.sign, "sqrt": np.sqrt, "cos": np.cos, "sin": np.sin}
@@ -45,7 +59,10 @@ FUNCTIONS["max"] = np.maximum
 
 @dataclass(frozen=True)
 class State:
-    """What a form remembers: s goes to `goal` at `rate` per second, texts as the shapes are."""
+    """What a form remembers: s goes to `goal` at `rate` per second, texts as the shapes are.
+
+    Without a goal it adds up `rate`.
+    """
 
     goal: str
     rate: str
@@ -53,7 +70,7 @@ class State:
     @property
     def text(self) -> str:
         """The rate of change, as the effect `equation` takes it."""
-        return f"({self.goal} - s)*{self.rate}"
+        return f"({self.goal} - s)*{self.rate}" if self.goal else self.rate
 
 
 @dataclass(frozen=True)
@@ -89,8 +106,13 @@ class Form:
 
     @property
     def of_body(self) -> bool:
-        """All that it names is of the body's motion, and not of single wheels."""
-        return self.adds_to != "rim_mps"
+        """All that it names is of the body's motion, and not of wheels."""
+        return self.adds_to != RIM
+
+    @property
+    def names_time(self) -> bool:
+        """It holds of one run: no other shares its moments."""
+        return "t" in names_in([*self.texts, self.state_rate])
 
     @property
     def state_rate(self) -> str:
@@ -152,29 +174,34 @@ class Motion:
         return cls(own, velocity, names, horizons)
 
     def values(self, form: Form) -> np.ndarray:
-        """(N, k) of a form's shapes."""
-        key = (form.adds_to == "theta_rad", form.texts, form.state_rate)
+        """(N, k) of a form's shapes; of one of all wheels (N, k) for a robot that drives on."""
+        return self._along(form, "vx")
+
+    def _along(self, form: Form, axis: str) -> np.ndarray:
+        """The same, with a speed of the body in the place of the wheels'."""
+        key = (form.adds_to, axis if not form.of_body else "", form.texts, form.state_rate)
         if key not in self._known:
-            self._known[key] = self._computed(form)
+            self._known[key] = self._computed(form, {**self.names, TARGET: self.names[axis]})
         return self._known[key]
 
-    def _computed(self, form: Form) -> np.ndarray:
-        names = dict(self.names)
+    def _computed(self, form: Form, names: dict[str, np.ndarray]) -> np.ndarray:
         if form.adds_to == "theta_rad":
             track = self.own.measurement.track
             names["theta"] = np.nan_to_num(track.heading_smooth[self.own.floor.response.points])
         if form.state:
-            names["s"] = self._remembered(form)
+            names["s"] = self._remembered(form, names)
         found = [_value(text, names) for text in form.texts]
         return np.stack([np.broadcast_to(v, names["t"].shape) for v in found], axis=-1)
 
-    def _remembered(self, form: Form) -> np.ndarray:
+    def _remembered(self, form: Form, names: Mapping[str, np.ndarray]) -> np.ndarray:
         """(N,) the state's mean over each step."""
         step_s = self.own.floor.response.step_s
         goal, rate = (
-            np.broadcast_to(_value(form._with_constant(t), self.names), step_s.shape)
+            np.broadcast_to(_value(form._with_constant(t or "0"), names), step_s.shape)
             for t in (form.state.goal, form.state.rate)
         )
+        if not form.state.goal:
+            return np.cumsum(rate * step_s) - rate * step_s / 2
         keep = np.exp(-rate * step_s)
         push = (goal * (1 - keep)).tolist()
         found, s = [], 0.0
@@ -191,15 +218,18 @@ class Motion:
         found = np.empty((*weight.shape[:3], sum(len(f.shapes) for f in forms)))
         place = dict(zip(forms, np.cumsum([0, *(len(f.shapes) for f in forms)]), strict=False))
         for adds_to, own in parts.items():
-            values = np.hstack([self.values(f) * f.strengths for f in own])
             where = np.concatenate([place[f] + np.arange(len(f.shapes)) for f in own])
-            found[..., where] = weight * self._displaced(adds_to, values)
+            found[..., where] = weight * self._displaced(adds_to, own)
         return found
 
-    def _displaced(self, adds_to: str, values: np.ndarray) -> np.ndarray:
-        """(W, H, 3, K) change of displacements where (N, K) values are added."""
+    def _displaced(self, adds_to: str, forms: Sequence[Form]) -> np.ndarray:
+        """(W, H, 3, K) change of displacements by some forms, all of one place."""
         response = copy(self.own.floor.response)
         response.ends = response.ends[:, self.horizons]
+        if adds_to == RIM:  # wheels and body are in proportion, and so are these forms
+            every = [np.hstack([self._along(f, a) * f.strengths for f in forms]) for a in AXES]
+            return sum(displaced(response, self.velocity, v, k) for k, v in enumerate(every))
+        values = np.hstack([self.values(f) * f.strengths for f in forms])
         if adds_to == "theta_rad":
             return self._turned(response, values)
         if adds_to in CHANNELS:
@@ -247,12 +277,13 @@ def from_library(terms: Sequence[Term]) -> list[Form]:
     ]
 
 
-def own_forms(motions: Sequence[Motion], sideways: bool) -> list[Form]:
+def own_forms(motions: Sequence[Motion], sideways: bool, wheels: bool) -> list[Form]:
     """Forms beside the library's.
 
     Args:
         motions: of all logs.
         sideways: the robot can move to its left.
+        wheels: the model has wheels.
     """
     every = {n: np.concatenate([m.names[n] for m in motions]) for n in motions[0].names}
     return [
@@ -260,7 +291,9 @@ def own_forms(motions: Sequence[Motion], sideways: bool) -> list[Form]:
         *_of_time(every),
         *_of_load(),
         *_of_speed(),
-        *(f for axis in ("vx", "vy", "omega") if sideways or axis != "vy" for f in _late(axis)),
+        *_around_a_speed(every),
+        *(f for axis in AXES if sideways or axis != "vy" for f in _late(axis)),
+        *(_late_wheels() if wheels else ()),
     ]
 
 
@@ -303,15 +336,20 @@ def _wave(name: str, k: int, span: float) -> Form:
 
 
 def _of_load() -> list[Form]:
-    """What warms up, empties or recovers: a state that follows how hard the robot drives."""
+    """What warms up, empties, recovers or wears: a state that follows how hard the robot drives."""
     turning = f"{L}*{L}*omega*omega"
     load, rate = f"(vx*vx + vy*vy + {turning})", f"(1/{C})"
     way = f"sqrt(vx*vx + vy*vy + {turning})"
-    return [
+    found = [
         Form("motion", ("s",), PAST, State(of, rate), constant=long_s, spread=0.4, unit="s")
         for of in (load, way)
         for long_s in LONG_S
     ]
+    found += [
+        Form("motion", ("(moves - s)",), STARTS, State("moves", rate), rest_s, 0.4, "s")
+        for rest_s in RESTS_S
+    ]
+    return [*found, Form("motion", ("s",), WAY, State("", way))]
 
 
 def _of_speed() -> list[Form]:
@@ -323,6 +361,32 @@ def _of_speed() -> list[Form]:
         ("turning rate", "omega*omega"),
     )
     return [Form("travel", (shape,), group) for group, shape in shapes]
+
+
+def _around_a_speed(every: Mapping[str, np.ndarray]) -> list[Form]:
+    """What a motor or the body loses or gains around one speed, as at a resonance."""
+    found = []
+    speeds = {
+        "vx": ("vx_mps", "vx*", "abs(vx)"),
+        "vy": ("vy_mps", "vy*", "abs(vy)"),
+        "omega": ("omega_radps", "omega*", "abs(omega)"),
+        "": ("travel", "", "sqrt(vx*vx + vy*vy)"),
+    }
+    for axis, (to, carrier, speed) in speeds.items():
+        values = np.abs(_value(speed, every))
+        if not values.any():
+            continue
+        group, unit = ("turning rate", "rad/s") if axis == "omega" else ("speed", "m/s")
+        shape = f"{carrier}max(0, 1 - abs({speed}/{C} - 1)/{WIDE:g})"
+        for at in np.quantile(values[values > 0], 0.95) * np.array(SPEEDS):
+            found.append(Form(to, (shape,), group, None, float(f"{at:.3g}"), 0.25, unit))
+    return found
+
+
+def _late_wheels() -> list[Form]:
+    """A second lag of all wheels: they creep to their speed, or go beyond it first."""
+    lag = State(TARGET, f"(1/{C})")
+    return [Form(RIM, (f"({TARGET} - s)",), PAST, lag, lag_s, 0.4, "s") for lag_s in LAGS_S]
 
 
 def _late(axis: str) -> list[Form]:

@@ -87,12 +87,22 @@ class Formula:
         return list(dict.fromkeys(f.group for f in self.forms))
 
     @property
+    def names_time(self) -> bool:
+        """It has moments of the run."""
+        return any(f.names_time for f in self.forms)
+
+    @property
     def text(self) -> str:
         """With its numbers in place of their names."""
         texts = [text for form in self.forms for text in form.texts]
         terms = [f"{n.value:.3g}*{t}" for n, t in zip(self.numbers, texts, strict=False)]
         rate = self.equation.get("state_rate", "")
         return " + ".join(terms).replace("+ -", "- ") + (f" with ds/dt = {rate}" if rate else "")
+
+    @property
+    def equals(self) -> str:
+        """What is added to what, with its numbers."""
+        return f"{self.forms[0].adds_to} += {self.text}"
 
     @property
     def like(self) -> str:
@@ -103,7 +113,7 @@ class Formula:
         """Fields of the interface."""
         return {
             "equation": self.equation,
-            "text": f"{self.forms[0].adds_to} += {self.text}",
+            "text": self.equals,
             "depends_on": self.depends_on,
             "numbers": [n.to_json() for n in self.numbers],
             "takes": self.takes,

@@ -5,7 +5,8 @@ import re
 from collections.abc import Callable, Sequence
 from math import pi
 
-from twinmill.diagnosis.forms import PAST, Form
+from twinmill.diagnosis.forms import STARTS, Form
+from twinmill.diagnosis.term import WAY
 
 AXES = {"vx": "driving", "vy": "driving sideways", "omega": "turning"}
 CHANNEL_OF = {"vx_mps": "vx", "vy_mps": "vy", "omega_radps": "omega"}
@@ -54,6 +55,13 @@ def _of_speed(form: Form, own: Sequence[float]) -> str:
     return ""
 
 
+def _around_a_speed(form: Form, own: Sequence[float]) -> str:
+    if form.unit not in ("m/s", "rad/s"):
+        return ""
+    what = "less" if own[0] < 0 else "more"
+    return f"{what} around {form.constant:.3g} {form.unit} alone: like a resonance or a controller"
+
+
 def _of_two_speeds(form: Form, own: Sequence[float]) -> str:
     axis = CHANNEL_OF.get(form.adds_to)
     named = set(re.findall(r"vx|vy|omega", form.shapes[0]))
@@ -65,8 +73,20 @@ def _of_two_speeds(form: Form, own: Sequence[float]) -> str:
 
 
 def _of_past(form: Form, own: Sequence[float]) -> str:
-    if form.group != PAST or not form.state:
+    if not form.state:
         return ""
+    if form.group == WAY:
+        changes = "lost" if own[0] < 0 else "gained"
+        return f"speed is {changes} with the way driven: like tyres that wear, clog or warm up"
+    if form.group == STARTS:
+        way = "less" if own[0] < 0 else "more"
+        return (
+            f"it moves {way} for {form.constant:.3g} s after a start: like grease that sets, or "
+            "tyres that grip after a rest"
+        )
+    if not form.of_body:
+        first = "go beyond their speed first" if own[0] > 0 else "creep to their speed"
+        return f"all wheels {first}, over {form.constant:.3g} s: like a soft gear or a controller"
     if form.adds_to == "motion":
         falls = "falls" if own[0] < 0 else "rises"
         of = "heat of the motors" if form.state.goal.startswith("(") else "load of the battery"
@@ -101,6 +121,7 @@ def _of_place_or_time(form: Form, own: Sequence[float]) -> str:
 
 
 LOOKS: tuple[Callable[[Form, Sequence[float]], str], ...] = (
+    _around_a_speed,
     _of_speed,
     _of_two_speeds,
     _of_past,

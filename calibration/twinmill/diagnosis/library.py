@@ -22,6 +22,7 @@ from twinmill.diagnosis.term import (
     SWELL,
     TIME,
     TYPICAL,
+    WAY,
     Term,
     displaced,
 )
@@ -31,7 +32,6 @@ from twinmill.fitting.opening import Opened
 from twinmill.model.parameters import effect_names
 from twinmill.predict.datasets import errors_of
 
-WAY = "way driven"
 LEFT_OVER = 0.02  # share of a term's norm that must survive beside what is free
 REVERSAL_S = 0.15  # how long a reversal is felt
 START_S = 0.4  # the same of a start from rest, and of a rise of the speed

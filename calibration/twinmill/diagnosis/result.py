@@ -121,7 +121,7 @@ class Diagnosis:
                 "certainty": rest.certainty,
                 "depends_on": rest.depends_on,
                 "likely": rest.likely,
-                "formula": rest.formula,
+                "formula": rest.proven.equals if rest.proven else None,
                 "moments": [m.to_json() for m in rest.moments],
                 "proven": rest.proven.to_json() if rest.proven else None,
             },

@@ -20,6 +20,7 @@ NO_NAMES = {"dvx", "dvy", "domega", "V", "way", "ago"} | {
 SWELL = 0.05  # share of all speeds: a usual loss
 CHANGE = "change of the command"
 TIME = "time"
+WAY = "way driven"
 PLACE = "place"
 
 

@@ -36,7 +36,7 @@ class Unit:
         self + other
         return PLAIN
 
-    __sub__, __lt__, __radd__, __rmul__ = __add__, __gt__, __add__, __mul__
+    __sub__, __lt__, __radd__, __rsub__, __rmul__ = __add__, __gt__, __add__, __add__, __mul__
 
     def __str__(self) -> str:
         parts = [_power(n, p) for n, p in (("m", self.m), ("s", self.s)) if p > 0]
@@ -63,6 +63,7 @@ NAMES = {
     "left": PLAIN,
     "front": PLAIN,
     "lever": Unit(ONE),
+    "target": Unit(ONE, -ONE),
 }
 ADDS_TO = {
     "rim_mps": NAMES["vx"],
@@ -82,7 +83,7 @@ FUNCTIONS = {
     "max": lambda a, b: a if isinstance(a, Unit) else b,
 }
 CONSTANTS = {"": PLAIN, "rad": PLAIN, "s": NAMES["t"], "m": NAMES["x"], "1/s": NAMES["omega"]}
-CONSTANTS["1/m"] = PLAIN / NAMES["x"]
+CONSTANTS |= {"1/m": PLAIN / NAMES["x"], "m/s": NAMES["vx"], "rad/s": NAMES["omega"]}
 
 
 def units_of(form: Form) -> list[str]:
@@ -95,7 +96,9 @@ def units_of(form: Form) -> list[str]:
     if "?" in form.shapes[0]:  # the library's terms of one wheel: of commands, which have no unit
         return [str(to)]
     names = {**NAMES, "c": CONSTANTS[form.unit], "l": NAMES["x"]}
-    if form.state:
+    if form.state and not form.state.goal:
+        names["s"] = _unit(form.state.rate, names) * NAMES["t"]
+    elif form.state:
         names["s"] = _unit(form.state.goal, names)
         if (rate := _unit(form.state.rate, names)) != NAMES["omega"]:
             raise ValueError(f"a rate of change in {rate} is no 1/s: {form.state.rate}")

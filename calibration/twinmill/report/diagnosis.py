@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from twinmill.data.checks.settings import CHECKS
-from twinmill.diagnosis.explain import Explanation, steps
+from twinmill.diagnosis.explain import Explanation
 from twinmill.diagnosis.outliers import Outlier, in_words
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.settings import SETTINGS
@@ -30,6 +30,7 @@ TOO_FEW = (
 )
 
 Commands = Sequence[tuple[str, str]]  # what for, and the line to type
+Steps = Sequence[tuple[str | None, float]]  # what came into the model, and the score then
 
 TONES: dict[str, Tone] = {
     "cannot_tell": "warn",
@@ -286,15 +287,22 @@ def terminal_explanation(
     return Group(
         *_said(result.diagnosis),
         Text(),
-        show.table(tables.steps(_labelled(result.diagnosis))),
+        show.table(tables.steps(_labelled(result.steps))),
         show.table(tables.parameters(result.parameters)),
+        *(Text(line) for line in formula.taken(result.formula)),
         Text(not_written or f"Written: {result.path}"),
         *_next(result.diagnosis, commands),
     )
 
 
-def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
-    """The page of a diagnosis: verdict, figures, tables and the commands that follow."""
+def section(diagnosis: Diagnosis, commands: Commands = (), steps: Steps | None = None) -> Section:
+    """The page of a diagnosis: verdict, figures, tables and the commands that follow.
+
+    Args:
+        diagnosis: the result.
+        commands: what to type then, each with why.
+        steps: scores after each step; None: those of the diagnosis.
+    """
     before = diagnosis.before
     scores = [("as given", before.score), ("base refitted, held out", diagnosis.score_refit)]
     if len(diagnosis.detection_steps) > 1:
@@ -309,7 +317,7 @@ def section(diagnosis: Diagnosis, commands: Commands = ()) -> Section:
         comparisons.facts(before),
         [
             *_detection_figures(diagnosis),
-            *_gains(diagnosis),
+            *_gains(steps or diagnosis.steps),
             *formula.figures(diagnosis.rest),
             *robot_pictures(before),
         ],
@@ -327,11 +335,15 @@ def explanation_section(
     result: Explanation, commands: Commands = (), not_written: str = ""
 ) -> Section:
     """The page of the whole loop: that of its diagnosis, and what was fitted and written then."""
-    page = section(result.diagnosis, commands)
+    page = section(result.diagnosis, commands, result.steps)
     return replace(
         page,
         tables=[*page.tables, tables.parameters(result.parameters)],
-        notes=[*page.notes, not_written or f"Written: `{result.path}`"],
+        notes=[
+            *page.notes,
+            *formula.taken(result.formula),
+            not_written or f"Written: `{result.path}`",
+        ],
     )
 
 
@@ -407,18 +419,16 @@ def _detection_figures(diagnosis: Diagnosis) -> list[Figure]:
     return [detections.field_of_view(diagnosis.detections), *found]
 
 
-def _gains(diagnosis: Diagnosis) -> list[Figure]:
+def _gains(steps: Steps) -> list[Figure]:
     """What each step took away; nothing where none did."""
-    labelled = _labelled(diagnosis)
+    labelled = _labelled(steps)
     return [waterfall(labelled)] if len(labelled) > 1 else []
 
 
-def _labelled(diagnosis: Diagnosis) -> list[tuple[str, float]]:
+def _labelled(steps: Steps) -> list[tuple[str, float]]:
     """Steps of the waterfall."""
     names = {None: "as given, held out", REFIT: REFIT_IN_WORDS}
-    return [
-        (names.get(s["effect"], f"+ {s['effect']}"), s["score_heldout"]) for s in steps(diagnosis)
-    ]
+    return [(names.get(effect, f"+ {effect}"), score) for effect, score in steps]
 
 
 def _named(effect: str) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.rest import Rest
+from twinmill.diagnosis.taking import Taken
 from twinmill.diagnosis.units import ADDS_TO, NAMES
 from twinmill.report.canvas import MEASURED, PREDICTED, draw, legend_above
 from twinmill.report.html import Figure
@@ -38,7 +39,32 @@ def _said(found: Formula) -> str:
     )
 
 
+def taken(beyond: Taken | None) -> list[str]:
+    """What is said of a formula that was to go into the model; nothing if there was none."""
+    if not beyond:
+        return []
+    scores = f"{beyond.before:.2f} without it, {beyond.after:.2f} with it"
+    if not beyond.kept:
+        return [
+            f"The formula that was proven is not in the model: {beyond.why_not} (held-out score "
+            f"{scores})."
+        ]
+    instead = beyond.formula.instead_of
+    place = f" in place of {' and '.join(instead)}" if instead else ""
+    return [
+        f"The model has a formula{place}, fitted together with the rest: {beyond.added.equals}. It "
+        f"takes {100 * beyond.share:.0f} % of the squared error above the floor that was left "
+        f"(held-out score {scores}). {_numbers(beyond.added)}"
+        " --no-formula leaves it out."
+    ]
+
+
 def _bounds(found: Formula) -> str:
+    return f"{_numbers(found)} {100 * found.again:.0f} % of resamplings choose the same dependence."
+
+
+def _numbers(found: Formula) -> str:
+    """With their intervals, and where they were seen."""
     numbers = [
         f"{n.name or 'constant'} {n.value:.3g} ({n.low:.3g} to {n.high:.3g})"
         + ("" if n.unit in ("", "1") else f" {n.unit}")
@@ -49,10 +75,7 @@ def _bounds(found: Formula) -> str:
         for name, (low, high) in found.holds.items()
     ]
     where = f" Seen at {', '.join(seen)}; beyond that it is a guess." if seen else ""
-    return (
-        f"Its numbers with 95 % intervals: {', '.join(numbers)}.{where} "
-        f"{100 * found.again:.0f} % of resamplings choose the same dependence."
-    )
+    return f"Its numbers with 95 % intervals: {', '.join(numbers)}.{where}"
 
 
 def _unit(name: str) -> str:

@@ -7,6 +7,7 @@ The robots hide what no effect of the catalogue says, written here in NumPy over
 import io
 import json
 import shlex
+import subprocess
 from contextlib import redirect_stdout
 from pathlib import Path
 
@@ -14,16 +15,19 @@ import numpy as np
 import pytest
 from scipy.stats import linregress
 
+from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.forms import PAST, Form, Motion, State, joined, own_forms, sized
 from twinmill.diagnosis.formula_search import _by_f, _by_signs
 from twinmill.diagnosis.known_physics import resembles
 from twinmill.diagnosis.units import units_of
+from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
 from twinmill.fitting.floor import body_velocity_at
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names
+from twinmill.programs import find_program
 from twinmill_cli.main import run
 
 STEP_S = 1 / 480  # of the robot
@@ -98,6 +102,52 @@ def test_the_printed_command_adds_it_as_it_stands(found, playing, base, tmp_path
     assert then["rest"]["proven"] is None and then["score"] < 1.3 < found["score"]
 
 
+@pytest.fixture(scope="module")
+def explained(playing, base, tmp_path_factory) -> dict:
+    """What `explain --json` says of that log; the model that it writes is under `model`."""
+    out = tmp_path_factory.mktemp("explained") / "explained.toml"
+    said = io.StringIO()
+    with redirect_stdout(said):
+        run(["explain", str(playing), "--model", str(base.path), "-o", str(out), "--json"])
+    return json.loads(said.getvalue())
+
+
+def test_explain_takes_the_formula_into_a_model_that_predicts_another_drive(
+    explained, base, run_log, tanh_robot
+):
+    beyond = explained["formula"]
+    assert beyond["kept"] and beyond["score_heldout"] < beyond["score_heldout_without"]
+    assert explained["steps"][-1]["effect"] == "equation"
+    assert [n["low"] < n["value"] < n["high"] for n in beyond["numbers"]]
+
+    class Playing(tanh_robot):
+        def hindered(self, motion):
+            return np.column_stack([motion[:, :2], stored(motion[:, 2])])
+
+    other = [load_measurements([run_log(Playing(), 77, 60.0)])[0]]
+    with_it = compare(other, ModelFile.load(explained["model"])).score
+    assert with_it < 1.3 < compare(other, base).score
+
+
+def test_the_model_that_explain_wrote_moves_on_both_plants(explained, tmp_path):
+    program, model = str(find_program("twin_run")), explained["model"]
+    words = [program, "--model", model, "--n", "1", "--duration-s", "1", "--json"]
+    for plant in ("planar", "mujoco"):
+        log = tmp_path / f"{plant}.lcmlog"
+        subprocess.run([*words, "--plant", plant, "--log", str(log)], check=True)
+        assert log.stat().st_size > 0
+
+
+def test_explain_leaves_the_formula_out_if_asked(playing, base, tmp_path):
+    out = tmp_path / "catalogue.toml"
+    said = io.StringIO()
+    with redirect_stdout(said):
+        words = ["explain", str(playing), "--model", str(base.path), "-o", str(out)]
+        run([*words, "--no-formula"])
+    assert "twinmill add equation" in said.getvalue()
+    assert "equation" not in effect_names(ModelFile.load(str(out)).model)
+
+
 def test_the_report_draws_it_over_the_data(found):
     page = (found["page"] / "index.html").read_text()
     assert "The formula for what is left" in page and "neither chose nor fitted it" in page
@@ -105,8 +155,8 @@ def test_the_report_draws_it_over_the_data(found):
 
 @pytest.mark.parametrize("seed", [301, 302])
 def test_no_formula_is_offered_where_only_noise_is_left(tanh_robot, measure, base, seed):
-    rest = diagnose([measure(tanh_robot(), seed, 60.0)], base).rest
-    assert rest.proven is None
+    found = diagnose([measure(tanh_robot(), seed, 60.0)], base)
+    assert found.rest.proven is None and found.to_json()["rest"]["formula"] is None
 
 
 @pytest.fixture(scope="module")
@@ -119,6 +169,9 @@ def motion(tanh_robot, measure, base) -> tuple:
 
 LAG = State("omega", "(1/{c})")
 HEAT = State("(vx*vx + vy*vy)", "(1/{c})")
+REST = State("moves", "(1/{c})")
+WHEELS = State("target", "(1/{c})")
+AROUND = "vx*max(0, 1 - abs(abs(vx)/{c} - 1)/0.4)"
 
 
 @pytest.mark.parametrize(
@@ -130,6 +183,12 @@ HEAT = State("(vx*vx + vy*vy)", "(1/{c})")
         Form("omega_radps", ("cos(theta)*omega", "sin(theta)*omega"), "heading"),
         Form("omega_radps", ("(omega - s)",), PAST, LAG, 0.6, unit="s"),
         Form("theta_rad", ("cos(theta)", "sin(theta)"), "heading"),
+        Form("motion", ("(moves - s)",), "starts", REST, 0.8, unit="s"),
+        Form("motion", ("s",), "way driven", State("", "sqrt(vx*vx + vy*vy)")),
+        Form(
+            "vx_mps", ("vx*max(0, 1 - abs(abs(vx)/{c} - 1)/0.4)",), "speed", None, 0.2, unit="m/s"
+        ),
+        Form("rim_mps", ("(target - s)",), PAST, WHEELS, 0.5, unit="s"),
     ],
     ids=lambda f: f"{f.adds_to} {f.shapes[0]}",
 )
@@ -152,7 +211,7 @@ def test_a_form_changes_the_errors_as_the_plant_does_that_has_it(motion, form):
 
 def test_units_agree_in_every_form_and_are_told_of_its_numbers(motion):
     """By dimensions: a number in front of v |v| that gives a speed is in s/m."""
-    for form in own_forms([motion[1]], True):
+    for form in own_forms([motion[1]], True, True):
         assert units_of(form)
     assert units_of(Form("vx_mps", ("vx*abs(vx)",), "speed")) == ["s/m"]
     assert units_of(Form("travel", ("(vx*vx + vy*vy)",), "speed")) == ["s^2/m^2"]
