@@ -3,7 +3,7 @@
 
 A dip of the speed at one speed, a strip of floor that tilts, or a liquid that swings after each
 change of the command has no form that is known before. A few humps over the speed, over the place,
-or over the time since, take any of them.
+or over the time since, take any of them; and a few slow waves take a capture that drifts.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -18,6 +18,7 @@ from twinmill.diagnosis.term import (
     SPEEDS,
     STILL,
     SWELL,
+    TIME,
     TYPICAL,
     Term,
     displaced,
@@ -26,6 +27,7 @@ from twinmill.fitting.opening import Opened
 
 HUMPS = 8  # over the range of a speed, or of a place
 LEAST_M = 0.15  # between the middles of two humps over the place
+DRIFTS = 5  # waves of a drift, the slowest over the whole log
 AGO_S = (0.15, 0.3, 0.5, 0.8, 1.2, 1.8)  # since a change of the command: ends of ranges
 
 # From a log and the (N, 3) velocities of its robot to (N, k) additions in axes of the body.
@@ -62,6 +64,7 @@ def families_of(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> l
         *(_of_speed(k, np.abs(moving[:, k])) for k in axes),
         *(_of_past(k, max(float(np.std(moving[:, k])), STILL[k])) for k in axes),
         *(f for k in range(2) for f in _of_place(k, pose[:, k])),
+        *_of_drift(np.concatenate([own.floor.response.middle_s for own in opened])),
     ]
 
 
@@ -122,6 +125,31 @@ def _of_place(axis: int, place: np.ndarray) -> list[Family]:
     return [
         Family([Term(PLACE, "rim_mps", f"{t}*rim", size, f"grip at {name}") for t in texts], gain),
         Family([Term(PLACE, "vx_mps", t, 1.0, f"push at {name}") for t in along], push),
+    ]
+
+
+def _of_drift(t_s: np.ndarray) -> list[Family]:
+    """All that is captured moves or turns slowly, whatever the robot does."""
+    longest_s = 1.1 * float(np.ptp(t_s))
+    rates = [float(f"{2 * np.pi * k / longest_s:.4g}") for k in range(1, 1 + DRIFTS)]
+    texts = [f"{wave}({rate:g}*t)" for wave in ("cos", "sin") for rate in rates]
+
+    def swinging(own: Opened) -> np.ndarray:
+        angle = own.floor.response.middle_s[:, None] * np.array(rates)
+        return np.hstack([np.cos(angle), np.sin(angle)])
+
+    def moving(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
+        heading, waves = own.floor.response.heading_rad[:, None], swinging(own)
+        c, s = (TYPICAL["vx_mps"] * f(heading) * waves for f in (np.cos, np.sin))
+        return {0: np.hstack([c, s]), 1: np.hstack([-s, c])}
+
+    def turning(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
+        return {2: TYPICAL["omega_radps"] * swinging(own)}
+
+    along = [f"drift({axis}, {t})" for axis in "xy" for t in texts]
+    return [
+        Family([Term(TIME, "vx_mps", t, 1.0, "drift") for t in along], moving),
+        Family([Term(TIME, "omega_radps", t, 1.0, "drift of heading") for t in texts], turning),
     ]
 
 

@@ -263,7 +263,7 @@ def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:
     if len(falls) < 3:
         return False
     better, worse = (np.sum(sign * falls > SETTINGS.firm_fall) for sign in (1, -1))
-    if better - worse >= SETTINGS.firm_blocks and better >= SETTINGS.firm_blocks * worse:
+    if better >= SETTINGS.firm_blocks * max(worse, 1):
         return True
     return bool(falls.mean() > SETTINGS.firm_t * np.std(falls, ddof=1) / np.sqrt(len(falls)))
 

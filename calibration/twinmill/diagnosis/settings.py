@@ -102,11 +102,13 @@ class Settings(Numbers):
     formula_alike: float = number(0.05, "share of the gain that a simpler formula may lack")
     formula_beside: float = number(0.1, "share of the gain that one more term must add")
     no_noise: float = number(
-        2.0, "errors of so many times the noise are none, however few there are"
+        1.5, "errors of so many times the noise are none, however few there are"
     )
     firm_t: float = number(3.0, "t over blocks: the smooth response predicts better ...")
     firm_fall: float = number(0.2, "... or it does by this share of both squares ...")
-    firm_blocks: int = number(3, "... in so many blocks more, and so many times more, than not")
+    firm_blocks: int = number(
+        3, "... in so many blocks, and in so many times more than where it is as much worse"
+    )
     far: float = number(10.0, "times the median squared error: a single moment ...")
     several: int = number(3, "... of which so many are no accident")
     place_chance: float = number(0.01, "that errors repeat so at a place, of the model ...")

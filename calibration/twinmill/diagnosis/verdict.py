@@ -219,8 +219,8 @@ class VerdictInputs:
             return f" {share} is left, which may be noise.{events}"
         if not on and self.rest.certainty == FEW:
             return (
-                f" {share} is left, far above the noise, but in too few stretches of these logs to "
-                f"tell what it is.{events}"
+                f" {share} is left, well above the noise, but in too few stretches of these logs "
+                f"to tell what it is.{events}"
             )
         return (
             f" Something else is left: {share} of the squared error above the noise{depends}; no "

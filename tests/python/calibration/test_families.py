@@ -70,6 +70,15 @@ def test_dependence_is_told_where_no_form_is_known(
     assert all(f.certainty == "doubtful" for f in found.findings)
 
 
+def test_heading_that_the_capture_lets_drift_depends_on_time(measure, base):
+    def spoil(pose, valid):
+        t_s = np.arange(len(pose)) / 120
+        return pose + 0.06 * np.sin(2 * np.pi * t_s / 43)[:, None] * (0, 0, 1), valid
+
+    found = diagnose([measure(seed=102, duration_s=80.0, spoil=spoil)], base)
+    assert found.rest.depends_on[:1] == ["time"]
+
+
 def test_humps_share_out_every_value_between_the_outer_ones():
     middles, width = _humps(np.array([0.0, 0.8]), 8)
     between = np.random.default_rng(1).uniform(middles[0], middles[-1], (50, 1))
