@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Filters and chances are those of SciPy's own, larger packages."""
+
+import numpy as np
+import pytest
+from scipy import signal, stats
+
+from twinmill import chance
+from twinmill.filters import filtered
+
+
+@pytest.mark.parametrize(
+    ("numerator", "denominator"), [([0.1], [1, -0.9]), ([1, 0.3, 0.2], [1, -0.5, 0.1]), ([2], [1])]
+)
+@pytest.mark.parametrize("axis", [0, 1, -2])
+def test_filter_does_what_lfilter_does(numerator, denominator, axis):
+    values = np.random.default_rng(1).normal(size=(7, 60, 3))
+    expected = signal.lfilter(numerator, denominator, values, axis=axis)
+    assert filtered(numerator, denominator, values, axis) == pytest.approx(expected, abs=1e-12)
+
+
+def test_filter_of_nothing_is_nothing():
+    assert filtered([0.1], [1, -0.9], np.zeros((0, 3))).shape == (0, 3)
+
+
+@pytest.mark.parametrize("free", [1, 4, 30])
+@pytest.mark.parametrize("value", [0.0, 0.7, 12.0])
+def test_chances_are_those_of_the_distributions(free, value):
+    assert chance.t_above(value, free) == pytest.approx(stats.t.sf(value, free))
+    assert chance.f_above(value, free, 9) == pytest.approx(stats.f.sf(value, free, 9))
+    assert chance.chi2_above(value, free) == pytest.approx(stats.chi2.sf(value, free))
+    assert chance.t_quantile(0.975, free) == pytest.approx(stats.t.ppf(0.975, free))
+    assert chance.chi2_median(free) == pytest.approx(stats.chi2.median(free))
