@@ -22,14 +22,14 @@ def filtered(
         signal: x, of any shape.
         axis: of time.
     """
+    if not np.size(signal):
+        return np.array(signal, float)
     x = np.moveaxis(np.asarray(signal, float), axis, 0)
     flat = x.reshape(len(x), -1)
     now, *before = numerator
     pushes = now * flat
     for k, share in enumerate(before, 1):
         pushes[k:] += share * flat[:-k]
-    if not flat.size:
-        return np.array(signal, float)
     diagonals = np.repeat(np.asarray(denominator, float)[:, None], len(flat), axis=1)
     found, _ = dtbtrs(diagonals, pushes, uplo="L", diag="U")
     return np.moveaxis(found.reshape(x.shape), 0, axis)
