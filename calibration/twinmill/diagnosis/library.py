@@ -297,7 +297,7 @@ def _named_terms(
             terms[group, f"sign({name})*max(0, abs({name}) - {bend:g})"] = above
     terms["starts", "after_start(moves)"] = moving * _since_start(moving, t_s)
     if np.ptp(theta) > 0.1:
-        for n in (1, 2, 3):
+        for n in (1, 2, 3, 4):
             for name, wave in (("cos", np.cos(n * theta)), ("sin", np.sin(n * theta))):
                 for carrier, values in (("moves", moving), *speeds):
                     terms["heading", f"{name}({n}*theta)*{carrier}"] = wave * values
