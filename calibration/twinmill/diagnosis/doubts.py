@@ -95,13 +95,15 @@ def instead_of_moment(done: Search, name: str) -> list[str]:
     """Effects that do the same as one of a moment.
 
     Those of a place, where the robot was at that time; and those of the time that it has been
-    driving, as a motor that warms up early and stays warm.
+    driving, as a motor that warms up early and stays warm. One of these that ended at its bound
+    would do more, and need do half.
     """
     if not with_role(name, "moment"):
         return []
     placed = [n for n in _same(done, name) if with_role(n, "place")]
-    timed = [n for n in _same(done, name, SETTINGS.same_in_time) if _is_timed(n)]
-    return [*placed, *(n for n in timed if not with_role(n, "moment"))]
+    bounded = _same(done, name, SETTINGS.same_in_time, at_bound=SETTINGS.same_at_bound)
+    timed = [n for n in bounded if _is_timed(n) and not with_role(n, "moment")]
+    return [*placed, *timed]
 
 
 def within_the_table(
@@ -252,10 +254,19 @@ def _beats(done: Search, one: Trial, other: Trial) -> bool:
     return evidence > least.evidence and without_best > least.without_best
 
 
-def _same(done: Search, name: str, least: float = SETTINGS.same) -> list[str]:
+def _same(
+    done: Search,
+    name: str,
+    least: float = SETTINGS.same,
+    at_bound: float = SETTINGS.same_fall,
+) -> list[str]:
     """Effects that alone took the same errors as this one, when it was accepted.
 
-    By the fall of the error, and `least` of the cosine of what they take.
+    Args:
+        done: the search.
+        name: of the effect.
+        least: of the cosine of what they take.
+        at_bound: share of its fall of the error that is enough for one that is at its bound.
     """
     this = done.round_of(name)
     if name == REFIT or this.accepted.names != (name,):
@@ -266,9 +277,16 @@ def _same(done: Search, name: str, least: float = SETTINGS.same) -> list[str]:
         for t in this.trials
         if len(t.names) == 1
         and t.names[0] not in (name, REFIT)
-        and this.before.held_score**2 - t.held_score**2 > SETTINGS.same_fall * taken
+        and this.before.held_score**2 - t.held_score**2
+        > (at_bound if any(e.at_bound for e in _own(t)) else SETTINGS.same_fall) * taken
         and in_common(this.before, this.accepted, t) > least
     ]
+
+
+def _own(trial: Trial) -> list[ParameterEstimate]:
+    """Estimates of the effect that a trial is of."""
+    instance = newest_instance(trial.state.model, trial.names[0])
+    return [e for e in trial.fit.shared_estimates() if e.name.startswith(f"{instance}.")]
 
 
 def stand_in(done: Search, name: str) -> str | None:
