@@ -152,6 +152,7 @@ class Diagnosis:
             "bits_after": self.detections_after.to_json() if self.detections_after else None,
             "bit_steps": [{"effect": e, "score_heldout": s} for e, s in self.detection_steps],
             "notes": self.notes,
+            "warnings": self.before.warnings,
             "settings": asdict(self.search.settings),
             "floor_settings": asdict(FLOOR_SETTINGS),
             "check_settings": asdict(CHECKS),

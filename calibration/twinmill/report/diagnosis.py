@@ -255,7 +255,8 @@ def _said(diagnosis: Diagnosis) -> list[RenderableType]:
         Text(),
     ]
     parts += [show.table(t) for t in (*_tables(diagnosis), *_detection_steps(diagnosis))]
-    return parts + [Text(line) for line in lines(diagnosis)]
+    told = [Text(line) for line in lines(diagnosis)]
+    return [*parts, *told, *show.warned(diagnosis.before.warnings)]
 
 
 def _tone_of(diagnosis: Diagnosis) -> Tone:

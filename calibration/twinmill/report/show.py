@@ -28,7 +28,7 @@ def comparison(result: Comparison) -> RenderableType:
         Text(),
         *(table(t) for t in tables.robots(result)),
         *(table(t) for t in comparisons.robot_tables(result)),
-        *_warnings(result.warnings),
+        *warned(result.warnings),
         _next(result),
     )
 
@@ -48,7 +48,7 @@ def fit(result: FitResult, not_written: str = "") -> RenderableType:
         Text(),
         table(tables.parameters(result.parameters)),
         *(table(t) for t in tables.robots(result.after, result.before)),
-        *_warnings([*result.notes, *result.after.warnings]),
+        *warned([*result.notes, *result.after.warnings]),
         _written(result.path, not_written),
         _next(result.after, fitted=True),
     )
@@ -81,7 +81,7 @@ def added(result: AddResult, not_written: str = "") -> RenderableType:
         Text(f"  and {rest} more refitted (--json has all).", "dim"),
         *(table(t) for t in tables.robots(result.after, result.before)),
         *(table(t) for t in tables.held_out(result)),
-        *_warnings(result.after.warnings),
+        *warned(result.after.warnings),
         _written(result.path, not_written),
         _next(result.after, fitted=True),
     )
@@ -179,7 +179,8 @@ def _change(label: str, before: float, after: float, note: str = "") -> Text:
     )
 
 
-def _warnings(warnings: list[str]) -> list[RenderableType]:
+def warned(warnings: list[str]) -> list[RenderableType]:
+    """What was left out or cut, line by line, but for what would be too much."""
     lines: list[RenderableType] = [Text(f"! {text}", "yellow") for text in warnings[:WARNINGS]]
     if len(warnings) > WARNINGS:
         lines.append(Text(f"! and {len(warnings) - WARNINGS} more (--json has all).", "yellow"))
