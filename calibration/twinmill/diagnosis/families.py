@@ -100,7 +100,7 @@ def _ranges() -> Iterator[tuple[float, float]]:
 
 
 def _of_place(axis: int, place: np.ndarray) -> list[Family]:
-    """At some places all speeds change alike, or the floor pushes the robot."""
+    """At some places all speeds change alike, the floor pushes, or iron turns a compass."""
     name = "xy"[axis]
     count = min(HUMPS, int(np.ptp(place) / LEAST_M))
     if count < 2:
@@ -120,11 +120,18 @@ def _of_place(axis: int, place: np.ndarray) -> list[Family]:
         waves = [f(response.heading_rad)[:, None] for f in (np.cos, np.sin)]
         return {0: np.hstack([w * humps for w in waves])}
 
+    def turned(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
+        humps = SWELL * _hump(own.floor.response.pose[:, [axis]], middles, width)
+        return {0: -humps * velocity[:, [1]], 1: humps * velocity[:, [0]]}
+
     size = TYPICAL["rim_mps"] / SWELL
     along = [f"{t}*{wave}(theta)*moves" for wave in ("cos", "sin") for t in texts]
     return [
         Family([Term(PLACE, "rim_mps", f"{t}*rim", size, f"grip at {name}") for t in texts], gain),
         Family([Term(PLACE, "vx_mps", t, 1.0, f"push at {name}") for t in along], push),
+        Family(
+            [Term(PLACE, "vy_mps", f"{t}*vx", size, "compass of the place") for t in texts], turned
+        ),
     ]
 
 
