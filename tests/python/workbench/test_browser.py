@@ -176,8 +176,11 @@ def ask_for_the_drive_that_parts(page) -> None:
         before.wait_for_element_state("hidden")
         button.wait_for()
         expect(button).to_be_focused()
+    status = page.get_by_test_id("status")
+    expect(status).to_contain_text("turbopi-2.toml")  # what it was doing is done, and drawn
+    expect(button).to_be_focused()
     page.keyboard.press("Enter")
-    expect(page.get_by_test_id("status")).to_contain_text("Designing a run")
+    expect(status).to_contain_text("Designing a run")
     expect(page.get_by_test_id("design")).to_have_count(1)
     page.get_by_test_id("cancel").focus()
     page.keyboard.press(" ")
