@@ -42,14 +42,7 @@ MOMENTS = 12  # at which something may begin or end
 LONG_S = (5.0, 15.0, 45.0, 135.0)  # what warms up or recovers
 LAGS_S = (0.15, 0.4, 1.0, 2.5)
 RESTS_S = (0.3, 0.8, 2.0, 5.0)  # what a start or a rest is felt
-SPEEDS = (
-    0.2,
-    0.27,
-    0.36,
-    0.48,
-    0.64,
-    0.85,
-)  # of a high speed, around which some is lost
+SPEEDS = (0.2, 0.27, 0.36, 0.48, 0.64, 0.85)  # of a high speed, around which some is lost
 WIDE = 0.4  # share of that speed, at which such a loss has ended
 STORED = {"vx": (0.003, 0.01, 0.03), "vy": (0.003, 0.01, 0.03), "omega": (0.02, 0.06, 0.2)}
 C, L = "{c}", "{l}"  # the constant and the lever in texts

@@ -145,7 +145,7 @@ class MissingPanel:
         if found["findings"]:
             on = ", ".join(rest["depends_on"])
             words = f"Left over: {100 * rest['share']:.0f} %"
-            most = "most likely " if rest["likely"] else ""
+            most = "most likely " if rest.get("likely") else ""
             words += f", depends {most}on {on}" if on else ""
             ui.label(f"{words}: {rest['certainty']}.").classes("soft")
         for off in found["robots_off"]:
