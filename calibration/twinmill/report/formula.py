@@ -7,6 +7,7 @@ import numpy as np
 
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.rest import Rest
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.taking import Taken
 from twinmill.diagnosis.units import ADDS_TO, NAMES
 from twinmill.report.canvas import MEASURED, PREDICTED, draw, legend_above
@@ -21,7 +22,7 @@ def sentences(rest: Rest) -> list[str]:
     found = rest.proven
     if found:
         return [_said(found), _bounds(found)]
-    if not rest.on:
+    if not rest.on or rest.share < SETTINGS.nothing_left:
         return []
     return [
         f"Something is left; it depends {rest.on}. No formula for it held on drives that it was "
