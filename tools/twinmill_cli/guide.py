@@ -116,7 +116,8 @@ ANSWERS = (
     (
         "`outside_catalogue`",
         "something is missing that no effect explains; `rest` says when it comes",
-        "look there, or `add equation`",
+        "look there; `explain` takes a formula that was proven for it, `add equation` one of your "
+        "own",
     ),
     ("`cannot_tell`", "what the log does not show would change the answer", "`next`"),
     ("`bad_input`", "the log itself is wrong; `input` says what", "correct it, import again"),
