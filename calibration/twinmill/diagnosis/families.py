@@ -22,6 +22,7 @@ from twinmill.diagnosis.term import (
     TYPICAL,
     Term,
     displaced,
+    moves,
 )
 from twinmill.fitting.opening import Opened
 
@@ -114,9 +115,8 @@ def _of_place(axis: int, place: np.ndarray) -> list[Family]:
 
     def push(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         response = own.floor.response
-        moves = np.hypot(velocity[:, 0], velocity[:, 1]) + 0.1 * np.abs(velocity[:, 2]) > 0.01
         humps = TYPICAL["vx_mps"] * _hump(response.pose[:, [axis]], middles, width)
-        humps *= moves[:, None]
+        humps *= moves(velocity)[:, None]
         waves = [f(response.heading_rad)[:, None] for f in (np.cos, np.sin)]
         return {0: np.hstack([w * humps for w in waves])}
 

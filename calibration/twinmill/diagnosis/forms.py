@@ -15,6 +15,7 @@ import numpy as np
 
 from twinmill.diagnosis.term import (
     CHANNELS,
+    SPEEDS,
     STILL,
     SWELL,
     TIME,
@@ -30,7 +31,6 @@ PAST = "past motion"
 STARTS = "starts"
 HEADING = "heading"
 RIM, TARGET = "rim_mps", "target"  # of each wheel: where a formula acts, and what it names
-AXES = ("vx", "vy", "omega")
 ALL_AXES = {"travel": (0, 1), "motion": (0, 1, 2)}  # shares of these axes of the body
 HEADING_RAD = 0.02  # usual error of a captured heading
 USUAL = {**TYPICAL, "travel": SWELL, "motion": SWELL, "theta_rad": HEADING_RAD}
@@ -42,7 +42,7 @@ MOMENTS = 12  # at which something may begin or end
 LONG_S = (5.0, 15.0, 45.0, 135.0)  # what warms up or recovers
 LAGS_S = (0.15, 0.4, 1.0, 2.5)
 RESTS_S = (0.3, 0.8, 2.0, 5.0)  # what a start or a rest is felt
-SPEEDS = (0.2, 0.27, 0.36, 0.48, 0.64, 0.85)  # of a high speed, around which some is lost
+AROUND = (0.2, 0.27, 0.36, 0.48, 0.64, 0.85)  # of a high speed, around which some is lost
 WIDE = 0.4  # share of that speed, at which such a loss has ended
 STORED = {"vx": (0.003, 0.01, 0.03), "vy": (0.003, 0.01, 0.03), "omega": (0.02, 0.06, 0.2)}
 C, L = "{c}", "{l}"  # the constant and the lever in texts
@@ -220,7 +220,7 @@ class Motion:
         response = copy(self.own.floor.response)
         response.ends = response.ends[:, self.horizons]
         if adds_to == RIM:  # wheels and body are in proportion, and so are these forms
-            every = [np.hstack([self._along(f, a) * f.strengths for f in forms]) for a in AXES]
+            every = [np.hstack([self._along(f, a) * f.strengths for f in forms]) for a in SPEEDS]
             return sum(displaced(response, self.velocity, v, k) for k, v in enumerate(every))
         values = np.hstack([self.values(f) * f.strengths for f in forms])
         if adds_to == "theta_rad":
@@ -285,7 +285,7 @@ def own_forms(motions: Sequence[Motion], sideways: bool, wheels: bool) -> list[F
         *_of_load(),
         *_of_speed(),
         *_around_a_speed(every),
-        *(f for axis in AXES if sideways or axis != "vy" for f in _late(axis)),
+        *(f for axis in SPEEDS if sideways or axis != "vy" for f in _late(axis)),
         *(_late_wheels() if wheels else ()),
     ]
 
@@ -371,7 +371,7 @@ def _around_a_speed(every: Mapping[str, np.ndarray]) -> list[Form]:
             continue
         group, unit = ("turning rate", "rad/s") if axis == "omega" else ("speed", "m/s")
         shape = f"{carrier}max(0, 1 - abs({speed}/{C} - 1)/{WIDE:g})"
-        for at in np.quantile(values[values > 0], 0.95) * np.array(SPEEDS):
+        for at in np.quantile(values[values > 0], 0.95) * np.array(AROUND):
             found.append(Form(to, (shape,), group, None, float(f"{at:.3g}"), 0.25, unit))
     return found
 

@@ -106,8 +106,8 @@ def _completed(rows: Evidence, pool: Pool, proof: Proof) -> Proof:
 
 
 def _has(form: Form, part: Form) -> bool:
-    same = (_kind(form), form.state_rate) == (_kind(part), part.state_rate)
-    return same and {*form.texts} > {*part.texts}
+    where = [(f.adds_to, f.group, f.state_rate) for f in (form, part)]
+    return where[0] == where[1] and {*form.texts} > {*part.texts}
 
 
 def _net(rows: Evidence, proof: Proof) -> float:
@@ -146,10 +146,6 @@ def _proven(rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | No
     if proof.chance > SETTINGS.formula_chance or proof.takes < SETTINGS.formula_takes:
         return None
     return proof
-
-
-def _kind(form: Form) -> tuple[str, str]:
-    return form.adds_to, form.group
 
 
 def _outdone(rows: Evidence, chosen: Chosen, rival: np.ndarray, half: np.ndarray) -> bool:

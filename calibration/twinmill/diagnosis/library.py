@@ -25,6 +25,7 @@ from twinmill.diagnosis.term import (
     WAY,
     Term,
     displaced,
+    moves,
 )
 from twinmill.filters import filtered
 from twinmill.fitting.floor import body_velocity_at
@@ -251,11 +252,12 @@ def _named_terms(
 ) -> dict[tuple[str, str], np.ndarray]:
     """(group, formula) to values (N,) at the response's points, of (N, 3) `velocity` there."""
     response, track = own.floor.response, own.measurement.track
-    vx, vy, turn = np.where(np.abs(velocity) < STILL, 0.0, velocity).T
+    velocity = np.where(np.abs(velocity) < STILL, 0.0, velocity)
+    vx, vy, turn = velocity.T
     theta, t_s = response.heading_rad, response.middle_s
     x, y = response.pose[:, 0], response.pose[:, 1]
     voltage = command_at(t_s, track.command_t_s, np.nan_to_num(track.battery_V)[:, None])[:, 0]
-    moving = (np.hypot(vx, vy) + 0.1 * np.abs(turn) > 0.01) * 1.0
+    moving = moves(velocity) * 1.0
     change = [_rate(v, response.step_s) for v in (vx, vy, turn)]
     terms = {
         ("direction of rotation", "abs(vx)"): np.abs(vx),

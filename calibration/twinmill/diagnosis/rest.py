@@ -85,9 +85,8 @@ class Rest:
 
         Where they take less, and what is left tells by itself on what it depends, that stands.
         """
-        told = [f.depends_on for f in findings if f.depends_on and f.share >= self.share]
-        if not self.depends_on:
-            told = [f.depends_on for f in findings if f.depends_on]
+        least = self.share if self.depends_on else 0.0
+        told = [f.depends_on for f in findings if f.depends_on and f.share >= least]
         return replace(self, depends_on=list(dict.fromkeys([*told, *self.depends_on])))
 
     @property

@@ -52,6 +52,11 @@ class Term:
         return TYPICAL[self.adds_to] / self.size
 
 
+def moves(velocity: np.ndarray) -> np.ndarray:
+    """(N,) bool: whether the body moves, of (N, 3) m/s and rad/s."""
+    return np.hypot(velocity[:, 0], velocity[:, 1]) + 0.1 * np.abs(velocity[:, 2]) > 0.01
+
+
 def displaced(
     response: Response, velocity: np.ndarray, values: np.ndarray, axis: int
 ) -> np.ndarray:
