@@ -15,6 +15,7 @@ import pytest
 import turbopi
 
 from twinmill.data.measurement import Measurement, load_measurements
+from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 
 STEP_S = 1 / 480
@@ -205,3 +206,11 @@ def true_model(tanh_robot, model_file):
         ("motor_lag_s = 0.05", f"motor_lag_s = {robot.lag_s}\n{gains}"),
         name="true.toml",
     )
+
+
+@pytest.fixture(scope="session")
+def one_clock_base(tanh_robot, measure, model_file, tmp_path_factory) -> ModelFile:
+    """The base fitted to a log of the robot as it is; one clock stamps all."""
+    path = tmp_path_factory.mktemp("one_clock") / "base.toml"
+    fit([measure(tanh_robot(), 1, 60.0)], model_file(extra="[clock]\nsame = true\n"), path, "")
+    return ModelFile.load(str(path))

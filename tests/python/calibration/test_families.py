@@ -9,18 +9,8 @@ import pytest
 
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.families import _hump, _humps
-from twinmill.fitting.fit import fit
-from twinmill.model.model_file import ModelFile
 
 STEP_S = 1 / 480  # of the robot
-
-
-@pytest.fixture(scope="module")
-def base(tanh_robot, measure, model_file, tmp_path_factory) -> ModelFile:
-    """The base fitted to a log of the robot as it is; one clock stamps all."""
-    path = tmp_path_factory.mktemp("families") / "base.toml"
-    fit([measure(tanh_robot(), 1, 60.0)], model_file(extra="[clock]\nsame = true\n"), path, "")
-    return ModelFile.load(str(path))
 
 
 def swinging(motion: np.ndarray) -> np.ndarray:
@@ -59,23 +49,23 @@ def in_a_strip(motion: np.ndarray) -> np.ndarray:
     ids=["a liquid that swings", "a dip at one speed", "strips of floor"],
 )
 def test_dependence_is_told_where_no_form_is_known(
-    hindrance, depends_on, tanh_robot, measure, base
+    hindrance, depends_on, tanh_robot, measure, one_clock_base
 ):
     class Hindered(tanh_robot):
         def hindered(self, motion):
             return hindrance(motion)
 
-    found = diagnose([measure(Hindered(), 101, 80.0)], base)
+    found = diagnose([measure(Hindered(), 101, 80.0)], one_clock_base)
     assert found.rest.depends_on[0] == depends_on
     assert all(f.certainty == "doubtful" for f in found.findings)
 
 
-def test_heading_that_the_capture_lets_drift_depends_on_time(measure, base):
+def test_heading_that_the_capture_lets_drift_depends_on_time(measure, one_clock_base):
     def spoil(pose, valid):
         t_s = np.arange(len(pose)) / 120
         return pose + 0.06 * np.sin(2 * np.pi * t_s / 43)[:, None] * (0, 0, 1), valid
 
-    found = diagnose([measure(seed=102, duration_s=80.0, spoil=spoil)], base)
+    found = diagnose([measure(seed=102, duration_s=80.0, spoil=spoil)], one_clock_base)
     assert found.rest.depends_on[:1] == ["time"]
 
 

@@ -22,7 +22,6 @@ from twinmill.diagnosis.formula_search import _by_f, _by_signs
 from twinmill.diagnosis.known_physics import resembles
 from twinmill.diagnosis.units import units_of
 from twinmill.fitting.compare import compare
-from twinmill.fitting.fit import fit
 from twinmill.fitting.floor import body_velocity_at
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
@@ -32,14 +31,6 @@ from twinmill_cli.main import run
 
 STEP_S = 1 / 480  # of the robot
 REACH_RAD = 0.08
-
-
-@pytest.fixture(scope="module")
-def base(tanh_robot, measure, model_file, tmp_path_factory) -> ModelFile:
-    """The base fitted to a log of the robot as it is; one clock stamps all."""
-    path = tmp_path_factory.mktemp("formula") / "base.toml"
-    fit([measure(tanh_robot(), 1, 60.0)], model_file(extra="[clock]\nsame = true\n"), path, "")
-    return ModelFile.load(str(path))
 
 
 def stored(turn_radps: np.ndarray) -> np.ndarray:
@@ -64,10 +55,12 @@ def playing(tanh_robot, run_log) -> Path:
 
 
 @pytest.fixture(scope="module")
-def found(playing, base, tmp_path_factory) -> dict:
+def found(playing, one_clock_base, tmp_path_factory) -> dict:
     """What `diagnose --json` says of that log, and the page of its report."""
     out = tmp_path_factory.mktemp("report")
-    return diagnosed([str(playing), "--model", str(base.path), "--out", str(out)]) | {"page": out}
+    return diagnosed([str(playing), "--model", str(one_clock_base.path), "--out", str(out)]) | {
+        "page": out
+    }
 
 
 def diagnosed(words: list[str]) -> dict:
@@ -89,11 +82,13 @@ def test_way_that_reversals_store_is_found_with_its_reach(found):
     assert proven["holds"]["omega"][0] < -1 < 1 < proven["holds"]["omega"][1]
 
 
-def test_the_printed_command_adds_it_as_it_stands(found, playing, base, tmp_path, monkeypatch):
+def test_the_printed_command_adds_it_as_it_stands(
+    found, playing, one_clock_base, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     said = io.StringIO()
     with redirect_stdout(said):
-        run(["diagnose", str(playing), "--model", str(base.path)])
+        run(["diagnose", str(playing), "--model", str(one_clock_base.path)])
     (line,) = [x for x in said.getvalue().splitlines() if x.strip().startswith("twinmill add")]
     run(shlex.split(line)[1:])
     (written,) = tmp_path.glob("*.toml")
@@ -103,17 +98,19 @@ def test_the_printed_command_adds_it_as_it_stands(found, playing, base, tmp_path
 
 
 @pytest.fixture(scope="module")
-def explained(playing, base, tmp_path_factory) -> dict:
+def explained(playing, one_clock_base, tmp_path_factory) -> dict:
     """What `explain --json` says of that log; the model that it writes is under `model`."""
     out = tmp_path_factory.mktemp("explained") / "explained.toml"
     said = io.StringIO()
     with redirect_stdout(said):
-        run(["explain", str(playing), "--model", str(base.path), "-o", str(out), "--json"])
+        run(
+            ["explain", str(playing), "--model", str(one_clock_base.path), "-o", str(out), "--json"]
+        )
     return json.loads(said.getvalue())
 
 
 def test_explain_takes_the_formula_into_a_model_that_predicts_another_drive(
-    explained, base, run_log, tanh_robot
+    explained, one_clock_base, run_log, tanh_robot
 ):
     beyond = explained["formula"]
     assert beyond["kept"] and beyond["score_heldout"] < beyond["score_heldout_without"]
@@ -126,7 +123,7 @@ def test_explain_takes_the_formula_into_a_model_that_predicts_another_drive(
 
     other = [load_measurements([run_log(Playing(), 77, 60.0)])[0]]
     with_it = compare(other, ModelFile.load(explained["model"])).score
-    assert with_it < 1.3 < compare(other, base).score
+    assert with_it < 1.3 < compare(other, one_clock_base).score
 
 
 def test_the_model_that_explain_wrote_moves_on_both_plants(explained, tmp_path):
@@ -138,11 +135,11 @@ def test_the_model_that_explain_wrote_moves_on_both_plants(explained, tmp_path):
         assert log.stat().st_size > 0
 
 
-def test_explain_leaves_the_formula_out_if_asked(playing, base, tmp_path):
+def test_explain_leaves_the_formula_out_if_asked(playing, one_clock_base, tmp_path):
     out = tmp_path / "catalogue.toml"
     said = io.StringIO()
     with redirect_stdout(said):
-        words = ["explain", str(playing), "--model", str(base.path), "-o", str(out)]
+        words = ["explain", str(playing), "--model", str(one_clock_base.path), "-o", str(out)]
         run([*words, "--no-formula"])
     assert "twinmill add equation" in said.getvalue()
     assert "equation" not in effect_names(ModelFile.load(str(out)).model)
@@ -154,15 +151,15 @@ def test_the_report_draws_it_over_the_data(found):
 
 
 @pytest.mark.parametrize("seed", [301, 302])
-def test_no_formula_is_offered_where_only_noise_is_left(tanh_robot, measure, base, seed):
-    found = diagnose([measure(tanh_robot(), seed, 60.0)], base)
+def test_no_formula_is_offered_where_only_noise_is_left(tanh_robot, measure, one_clock_base, seed):
+    found = diagnose([measure(tanh_robot(), seed, 60.0)], one_clock_base)
     assert found.rest.proven is None and found.to_json()["rest"]["formula"] is None
 
 
 @pytest.fixture(scope="module")
-def motion(tanh_robot, measure, base) -> tuple:
+def motion(tanh_robot, measure, one_clock_base) -> tuple:
     """A log as the base moves in it, at all horizons."""
-    (own,) = open_measurements([measure(tanh_robot(), 2, 40.0)], base)
+    (own,) = open_measurements([measure(tanh_robot(), 2, 40.0)], one_clock_base)
     velocity = body_velocity_at(own.data, own.model, own.floor.response.points)
     return own, Motion.of(own, velocity, range(5))
 

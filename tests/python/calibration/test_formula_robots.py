@@ -9,7 +9,6 @@ import pytest
 
 from twinmill.diagnosis.explain import Explanation, explain
 from twinmill.fitting.compare import compare
-from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names
 
@@ -49,14 +48,6 @@ def switched(motion: np.ndarray) -> np.ndarray:
     return motion * (1 - 0.1 * (np.sin(2 * np.pi * t_s / 16 - 1.0) > 0.3))[:, None]
 
 
-@pytest.fixture(scope="module")
-def base(tanh_robot, measure, model_file, tmp_path_factory) -> ModelFile:
-    """The base fitted to a log of the robot as it is; one clock stamps all."""
-    path = tmp_path_factory.mktemp("robots") / "base.toml"
-    fit([measure(tanh_robot(), 1, 60.0)], model_file(extra="[clock]\nsame = true\n"), path, "")
-    return ModelFile.load(str(path))
-
-
 @pytest.fixture
 def hiding(tanh_robot):
     """A robot whose motion is hindered so."""
@@ -72,26 +63,26 @@ def hiding(tanh_robot):
 
 
 @pytest.fixture
-def explained(measure, hiding, base, tmp_path):
+def explained(measure, hiding, one_clock_base, tmp_path):
     """What `explain` makes of drives of 80 s each."""
 
     def make(hindered, *seeds) -> Explanation:
         logs = [measure(hiding(hindered), seed, 80.0) for seed in seeds]
-        return explain(logs, base, out=tmp_path / "explained.toml", command="")
+        return explain(logs, one_clock_base, out=tmp_path / "explained.toml", command="")
 
     return make
 
 
 @pytest.mark.parametrize("hindered", [gripping_after_rests, resonant, creeping])
 def test_a_model_with_the_formula_predicts_a_drive_that_nobody_fitted(
-    explained, hiding, measure, base, hindered
+    explained, hiding, measure, one_clock_base, hindered
 ):
     """Errors over the log's own noise: 1 is all that can be had."""
     result = explained(hindered, 101)
     assert result.formula and result.formula.kept
     other = [measure(hiding(hindered), 77, 60.0)]
     with_it = compare(other, ModelFile.load(str(result.path))).score
-    assert with_it < 1.1 < 1.3 < compare(other, base).score
+    assert with_it < 1.1 < 1.3 < compare(other, one_clock_base).score
 
 
 def test_a_formula_of_the_moments_of_one_run_is_told_and_not_taken(explained):
