@@ -124,6 +124,15 @@ TEST(Equation, ChangesWayAndMotionByAShare)
     EXPECT_NEAR(motion.state.omega_radps, 0.75 * usual.state.omega_radps, 1e-12);
 }
 
+TEST(Equation, LeadsAsideByTheCourse)
+{
+    Player usual(Model{}, 0.02), aside(WithFormula("aside", "p0*cos(course - theta)", {0.1}), 0.02);
+    for (Player *player : {&usual, &aside})
+        player->Play(kForward, 0.5);
+    EXPECT_NEAR(aside.state.vx_mps, usual.state.vx_mps, 1e-12);
+    EXPECT_NEAR(aside.state.vy_mps, 0.1 * usual.state.vx_mps, 1e-12);
+}
+
 TEST(Equation, MovesTheCapturedHeadingAndBack)
 {
     const DriveChain chain(WithFormula("theta_rad", "p0*sin(theta + 1)", {0.2}));

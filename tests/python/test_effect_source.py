@@ -22,6 +22,7 @@ EQUATIONS = {
         "state_rate": "(u*u - s)/60",
     },
     "tiles": {"adds_to": "travel", "formula": "p0*cos(9.9*x) + p1*sin(9.9*x)"},
+    "grooves": {"adds_to": "aside", "formula": "p0*cos(2*course) + p1*sin(2*course)"},
     "slack_duty": {"adds_to": "duty", "formula": "left > 0 && u > 0 ? p0*u*abs(u) : 0"},
     "compass": {"adds_to": "theta_rad", "formula": "p0*cos(1*theta) + p1*sin(1*theta)"},
 }

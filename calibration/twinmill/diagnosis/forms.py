@@ -33,7 +33,7 @@ HEADING = "heading"
 RIM, TARGET = "rim_mps", "target"  # of each wheel: where a formula acts, and what it names
 ALL_AXES = {"travel": (0, 1), "motion": (0, 1, 2)}  # shares of these axes of the body
 HEADING_RAD = 0.02  # usual error of a captured heading
-USUAL = {**TYPICAL, "travel": SWELL, "motion": SWELL, "theta_rad": HEADING_RAD}
+USUAL = {**TYPICAL, "travel": SWELL, "motion": SWELL, "aside": SWELL, "theta_rad": HEADING_RAD}
 LEVER_M = 0.1  # turning counts as driving at this radius
 SHORTEST_M = 0.3  # wave along the room
 MOST_WAVES = 40
@@ -45,6 +45,8 @@ RESTS_S = (0.3, 0.8, 2.0, 5.0)  # what a start or a rest is felt
 AROUND = (0.2, 0.27, 0.36, 0.48, 0.64, 0.85)  # of a high speed, around which some is lost
 WIDE = 0.4  # share of that speed, at which such a loss has ended
 STORED = {"vx": (0.003, 0.01, 0.03), "vy": (0.003, 0.01, 0.03), "omega": (0.02, 0.06, 0.2)}
+NAMED = ("vx", "vy", "omega", "x", "y", "theta", "course", "t")  # as formulas are told
+ANGLES = ("theta", "course")
 C, L = "{c}", "{l}"  # the constant and the lever in texts
 FUNCTIONS = {"abs": np.abs, "sign": np.sign, "sqrt": np.sqrt, "cos": np.cos, "sin": np.sin}
 FUNCTIONS["max"] = np.maximum
@@ -162,6 +164,7 @@ class Motion:
             x=x,
             y=y,
             theta=response.heading_rad,
+            course=response.heading_rad + np.arctan2(vy, vx),
             t=response.middle_s,
         )
         return cls(own, velocity, names, horizons)
@@ -227,6 +230,10 @@ class Motion:
             return self._turned(response, values)
         if adds_to in CHANNELS:
             return displaced(response, self.velocity, values, CHANNELS.index(adds_to))
+        if adds_to == "aside":
+            ahead, left = self.velocity[:, [0]], self.velocity[:, [1]]
+            every = (-left * values, ahead * values)
+            return sum(displaced(response, self.velocity, v, k) for k, v in enumerate(every))
         axes = ALL_AXES[adds_to]
         parts = (
             displaced(response, self.velocity, self.velocity[:, [a]] * values, a) for a in axes
@@ -280,7 +287,7 @@ def own_forms(motions: Sequence[Motion], sideways: bool, wheels: bool) -> list[F
     """
     every = {n: np.concatenate([m.names[n] for m in motions]) for n in motions[0].names}
     return [
-        *_of_room(every),
+        *_of_room(every, sideways),
         *_of_time(every),
         *_of_load(),
         *_of_speed(),
@@ -290,8 +297,8 @@ def own_forms(motions: Sequence[Motion], sideways: bool, wheels: bool) -> list[F
     ]
 
 
-def _of_room(every: Mapping[str, np.ndarray]) -> list[Form]:
-    """What depends on place and heading."""
+def _of_room(every: Mapping[str, np.ndarray], sideways: bool) -> list[Form]:
+    """What depends on place, heading and, where they differ, the direction in which it drives."""
     found = []
     for name in ("x", "y"):
         span = np.ptp(every[name])
@@ -306,6 +313,9 @@ def _of_room(every: Mapping[str, np.ndarray]) -> list[Form]:
             pair = f"cos({n}*theta)", f"sin({n}*theta)"
             found += [Form(to, pair, HEADING) for to in ("travel", "theta_rad")]
             found.append(Form("omega_radps", tuple(f"{p}*omega" for p in pair), HEADING))
+            courses = tuple(p.replace("theta", "course") for p in pair)
+            found.append(Form("aside", courses, HEADING))
+            found += [Form("travel", courses, HEADING)] * sideways
     return found
 
 
@@ -422,7 +432,7 @@ def joined(forms: Sequence[Form]) -> dict[str, str]:
 def names_in(texts: Sequence[str]) -> list[str]:
     """Names of the motion that formulas have, in the order of the motion's."""
     words = set(re.findall(r"[A-Za-z_]\w*", " ".join(texts)))
-    return [n for n in ("vx", "vy", "omega", "x", "y", "theta", "t") if n in words]
+    return [n for n in NAMED if n in words]
 
 
 def variable_of(forms: Sequence[Form]) -> tuple[str, str]:

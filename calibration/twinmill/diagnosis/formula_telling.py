@@ -9,7 +9,7 @@ import numpy as np
 
 from twinmill.chance import t_quantile
 from twinmill.diagnosis.evidence import Chosen, Evidence, Pool, Proof, Sums, best_of, made
-from twinmill.diagnosis.forms import USUAL, Form, names_in, variable_of
+from twinmill.diagnosis.forms import ANGLES, USUAL, Form, names_in, variable_of
 from twinmill.diagnosis.formula import Curve, Formula, Number
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.units import units_of
@@ -53,9 +53,9 @@ def _curve(rows: Evidence, forms: Sequence[Form], numbers: Sequence[Number]) -> 
     """What is left in bins of the first variable of the first term, and the formula there."""
     name, carrier = variable_of(forms)
     at = np.concatenate([m.names[name] for m in rows.motions])
-    if name == "theta":
+    if name in ANGLES:
         middles = np.linspace(-np.pi, np.pi, BINS, endpoint=False)
-        inside = [f"(cos(theta - {a:.4f}) > {np.cos(np.pi / BINS):.6f})" for a in middles]
+        inside = [f"(cos({name} - {a:.4f}) > {np.cos(np.pi / BINS):.6f})" for a in middles]
     else:
         edges = np.unique(np.quantile(at, np.linspace(0, 1, BINS + 1)))
         edges[-1] += 1e-9 + 1e-6 * abs(edges[-1])

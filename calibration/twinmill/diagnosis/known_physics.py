@@ -110,6 +110,10 @@ def _of_place_or_time(form: Form, own: Sequence[float]) -> str:
         return "the captured heading is off by the heading: like a compass or a tag seen aslant"
     if form.adds_to == "omega_radps" and form.group == "heading":
         return "turns more toward one heading: like a slope, or a compass that is pulled"
+    if form.adds_to == "travel" and "(1*course)" in form.shapes[0]:
+        return "more in one direction of the room, less in the other: like wind, pile or a slope"
+    if form.adds_to == "aside":
+        return "led aside by the direction in which it drives: like grooves, joints or pile"
     if form.group == "time" and (wave or "sin(" in form.shapes[0]):
         rate = form.constant or float(re.search(r"sin\(([\d.]+)\*t", form.shapes[0])[1])
         return f"comes and goes every {2 * pi / rate:.3g} s: like a load that is switched"

@@ -13,9 +13,12 @@ import twinmill_native as native
 
 from twinmill.data.track import command_at
 from twinmill.diagnosis.families import families_of
+from twinmill.diagnosis.families.family import Humps
+from twinmill.diagnosis.families.of_time import PARTS
 from twinmill.diagnosis.term import (
     CHANGE,
     CHANNELS,
+    COUPLING,
     PLACE,
     SPEEDS,
     STILL,
@@ -37,6 +40,7 @@ LEFT_OVER = 0.02  # share of a term's norm that must survive beside what is free
 REVERSAL_S = 0.15  # how long a reversal is felt
 START_S = 0.4  # the same of a start from rest, and of a rise of the speed
 # Of one wheel's command, with its half `h`; in proportion to u is a wheel's gain.
+OF_ALL_WHEELS = "command of the wheels"
 SHAPES = ("u*abs(u)", "abs(u)", "sign(u)*max(0, abs(u) - h)")
 
 
@@ -54,7 +58,11 @@ def library(
     middles = _middles(opened) | _bends(velocities)
     values = [_named_terms(own, v, middles) for own, v in zip(opened, velocities, strict=True)]
     sizes = _sizes(values)
-    terms = [Term(g, CHANNELS[a], f, s) for (g, f), s in sizes.items() for a in range(3)]
+    terms = [
+        Term(_across(g, f, CHANNELS[a]), CHANNELS[a], f, s)
+        for (g, f), s in sizes.items()
+        for a in range(3)
+    ]
     of_wheels = _wheel_terms(opened, models[0])
     of_all, parts = _terms_of_all_speeds(terms)
     times_s = [own.floor.response.middle_s for own in opened]
@@ -74,6 +82,13 @@ def library(
     of_families = [t for f in families for t in f.terms]
     every = [*terms, *of_all, *waves[0].terms, *waves[1].terms, *of_families, *of_wheels]
     return every, columns, velocities
+
+
+def _across(group: str, formula: str, to: str) -> str:
+    """The group, or of a speed whose size moves another axis that speed."""
+    if group != "direction of rotation" or CHANNELS[SPEEDS.index(formula[4:-1])] == to:
+        return group
+    return "turning rate" if formula == "abs(omega)" else "speed"
 
 
 def _terms_of_all_speeds(terms: Sequence[Term]) -> tuple[list[Term], np.ndarray]:
@@ -171,9 +186,6 @@ def _bends(velocities: Sequence[np.ndarray]) -> dict[str, float]:
     return found
 
 
-PARTS = (0.2, 0.35, 0.5, 0.65, 0.8)  # of the time of all logs: where something may have changed
-
-
 def _middles(opened: Sequence[Opened]) -> dict[str, float]:
     """Of place, time and voltage over all logs, to four digits, as a formula has them.
 
@@ -205,7 +217,7 @@ def _body_columns(own: Opened, velocity: np.ndarray, terms: dict, sizes: dict) -
 
 
 def _wheel_terms(opened: Sequence[Opened], model: native.Model) -> list[Term]:
-    """Of each wheel that has a command of its own."""
+    """Of each wheel that has a command of its own, and of all at some commands."""
     if model.drive not in ("duty", "wheel_speed"):
         return []
     command = np.abs(np.concatenate([own.measurement.track.command for own in opened]))
@@ -222,11 +234,13 @@ def _wheel_terms(opened: Sequence[Opened], model: native.Model) -> list[Term]:
         sides[side] = f"command of the {named}"
     half = f"{largest / 2:.4g}"
     sizes = (largest**2, largest, largest / 2)
+    table = model.drive == "duty"  # which has the speed at each duty
+    humps = [] if table else Humps.over(0.0, largest).texts("abs(u)")
     return [
         Term(group, "rim_mps", f"({side} ? {shape.replace('h', half)} : 0)", size)
         for side, group in sides.items()
         for shape, size in zip(SHAPES, sizes, strict=True)
-    ]
+    ] + [Term(OF_ALL_WHEELS, "rim_mps", f"sign(u)*{h}", 1.0, "at some u") for h in humps]
 
 
 def _sign(place_m: float) -> str:
@@ -269,15 +283,15 @@ def _named_terms(
         ("speed", "sign(vx)"): np.tanh(vx / 0.02),
         ("speed", "sign(vy)"): np.tanh(vy / 0.02),
         ("turning rate", "sign(omega)"): np.tanh(turn / 0.1),
-        ("coupling of the axes", "vx*omega"): vx * turn,
-        ("coupling of the axes", "vy*omega"): vy * turn,
-        ("coupling of the axes", "vx*vy"): vx * vy,
-        ("coupling of the axes", "vx*abs(omega)"): vx * np.abs(turn),
-        ("coupling of the axes", "vx*abs(vy)"): vx * np.abs(vy),
-        ("coupling of the axes", "vy*abs(vx)"): vy * np.abs(vx),
-        ("coupling of the axes", "vy*abs(omega)"): vy * np.abs(turn),
-        ("coupling of the axes", "omega*abs(vx)"): turn * np.abs(vx),
-        ("coupling of the axes", "omega*abs(vy)"): turn * np.abs(vy),
+        (COUPLING, "vx*omega"): vx * turn,
+        (COUPLING, "vy*omega"): vy * turn,
+        (COUPLING, "vx*vy"): vx * vy,
+        (COUPLING, "vx*abs(omega)"): vx * np.abs(turn),
+        (COUPLING, "vx*abs(vy)"): vx * np.abs(vy),
+        (COUPLING, "vy*abs(vx)"): vy * np.abs(vx),
+        (COUPLING, "vy*abs(omega)"): vy * np.abs(turn),
+        (COUPLING, "omega*abs(vx)"): turn * np.abs(vx),
+        (COUPLING, "omega*abs(vy)"): turn * np.abs(vy),
         (CHANGE, "dvx"): change[0],
         (CHANGE, "dvy"): change[1],
         (CHANGE, "domega"): change[2],

@@ -30,6 +30,7 @@ from twinmill.fitting.score_fit import ScoreFit
 MOST_BLOCKS = 200
 MOST_ROWS = 20_000  # at a time, where each has hundreds of columns
 FOLDS = 5
+RIDGES = (1.0, 0.03)  # of what is of usual strength, and of what is far stronger
 FLIPS = 499  # random signs of blocks that make the null distribution
 MOMENTS = "single moments"
 FIRM, FEW, NOISE = "firm", "in too few stretches", "may be noise"
@@ -340,32 +341,36 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
         tested += [(group, np.array([t.formula == f for t in terms])) for f in own]
     if not tested:
         return []
-    alone, _ = products.each_held_out()
-    single = {k: int(np.argmax(own)) for k, (_, own) in enumerate(tested) if own.sum() == 1}
-    gains = np.array(
-        [
-            alone[single[k]] if k in single else products.held_out(own, 0)[0]
-            for k, (_, own) in enumerate(tested)
-        ]
-    )
+    gains, nulls = _gains(products, [own for _, own in tested], 0)
     sure = gains > 2 * np.log(len(tested) / SETTINGS.dependence_chance)
     if sure.any():
-        _, of_alone = products.each_held_out(FLIPS)
-        nulls = np.array(
-            [
-                of_alone[:, single[k]] if k in single else products.held_out(own)[1]
-                for k, (_, own) in enumerate(tested)
-            ]
-        )
-        spread = np.maximum(nulls.std(axis=1), 1e-12)
-        highest = (nulls / spread[:, None]).max(axis=0)
+        _, nulls = _gains(products, [own for _, own in tested], FLIPS)
+        spread = np.maximum(nulls.std(axis=-1), 1e-12)
+        highest = (nulls / spread[..., None]).max(axis=(0, 1))
         sure &= gains / spread > np.quantile(highest, 1 - SETTINGS.dependence_chance)
     best: dict[str, Dependence] = {}
-    for (group, _), gain, beyond in zip(tested, gains, sure, strict=True):
-        this = Dependence(group, float(gain), bool(beyond))
-        if group not in best or (this.sure, gain) > (best[group].sure, best[group].gain):
-            best[group] = this
+    for of_ridge, beyond in zip(gains, sure, strict=True):
+        for (group, _), gain, is_sure in zip(tested, of_ridge, beyond, strict=True):
+            this = Dependence(group, float(gain), bool(is_sure))
+            if group not in best or (this.sure, gain) > (best[group].sure, best[group].gain):
+                best[group] = this
     return sorted(best.values(), key=lambda d: -d.gain)
+
+
+def _gains(
+    products: "Products", tested: Sequence[np.ndarray], flips: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """(K, N) of N tests, each of (T,) terms, at K ridges, and (K, N, F) what chance brings."""
+    gains, nulls = np.zeros((len(RIDGES), len(tested))), np.zeros((len(RIDGES), len(tested), flips))
+    for k, ridge in enumerate(RIDGES):
+        alone, of_alone = products.each_held_out(flips, ridge)
+        for n, own in enumerate(tested):
+            if own.sum() == 1:
+                (one,) = np.flatnonzero(own)
+                gains[k, n], nulls[k, n] = alone[one], of_alone[:, one]
+            else:
+                gains[k, n], nulls[k, n] = products.held_out(own, flips, ridge)
+    return gains, nulls
 
 
 def _without_redundant(
@@ -438,10 +443,10 @@ class Products:
         less.moments, less.energy = self.moments[:, own], self.energy[:, own]
         return less
 
-    def each_held_out(self, flips: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    def each_held_out(self, flips: int = 0, ridge: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """(T,) and (F, T): what `held_out` gives for each column alone."""
         energy, moments = self.energy, self.moments
-        scatter = moments - energy * (moments.sum(0) / (energy.sum(0) + 1.0))
+        scatter = moments - energy * (moments.sum(0) / (energy.sum(0) + ridge))
         signs = _signs(flips, len(energy))[..., 0]
         gain = np.zeros((1 + flips, energy.shape[1]))
         for k in range(FOLDS):
@@ -450,17 +455,19 @@ class Products:
                 np.vstack([moments[own].sum(0), signs[:, own] @ scatter[own]])
                 for own in (~test, test)
             )
-            size = fitted / (energy[~test].sum(0) + 1.0)
+            size = fitted / (energy[~test].sum(0) + ridge)
             gain += 2 * size * judged - size**2 * energy[test].sum(0)
         return gain[0], gain[1:]
 
-    def held_out(self, own: np.ndarray, flips: int = FLIPS) -> tuple[float, np.ndarray]:
+    def held_out(
+        self, own: np.ndarray, flips: int = FLIPS, ridge: float = 1.0
+    ) -> tuple[float, np.ndarray]:
         """Fall of the cost by these columns on blocks not fitted to, and (F,) what chance brings.
 
         Chance: random signs of what each block still scatters after the columns are fitted to all.
         """
         grams, moments = self.grams[:, own][:, :, own], self.moments[:, own]
-        whole = grams.sum(0) + np.eye(own.sum())  # columns are in typical strengths
+        whole = grams.sum(0) + ridge * np.eye(own.sum())  # columns are in typical strengths
         moments = moments[None]
         if flips:
             moments = np.concatenate([moments, self._flipped(own, whole, flips)])

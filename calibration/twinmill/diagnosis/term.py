@@ -14,10 +14,21 @@ SPEEDS = ("vx", "vy", "omega")
 # m/s, m/s, rad/s, m/s: what a term of full size may add.
 TYPICAL = {"vx_mps": 0.01, "vy_mps": 0.01, "omega_radps": 0.05, "rim_mps": 0.01}
 # Rates, voltage, history: not at hand in a body's formula.
-NO_NAMES = {"dvx", "dvy", "domega", "V", "way", "ago", "drift"} | {
-    f"after_{event}" for event in ("reversal", "start", "rise")
-}
+NO_NAMES = {
+    "dvx",
+    "dvy",
+    "domega",
+    "V",
+    "way",
+    "ago",
+    "drift",
+    "course",
+    "travel",
+    "spot",
+    "wheel_rad",
+} | {f"after_{event}" for event in ("reversal", "start", "rise")}
 SWELL = 0.05  # share of all speeds: a usual loss
+COUPLING = "coupling of the axes"
 CHANGE = "change of the command"
 TIME = "time"
 WAY = "way driven"

@@ -57,6 +57,7 @@ NAMES = {
     "x": Unit(ONE),
     "y": Unit(ONE),
     "theta": PLAIN,
+    "course": PLAIN,
     "t": Unit(s=ONE),
     "moves": PLAIN,
     "u": PLAIN,
@@ -71,6 +72,7 @@ ADDS_TO = {
     "vy_mps": NAMES["vx"],
     "omega_radps": NAMES["omega"],
     "travel": PLAIN,
+    "aside": PLAIN,
     "motion": PLAIN,
     "theta_rad": PLAIN,
 }

@@ -39,6 +39,7 @@ BODY = {
     "x": "in.x_m",
     "y": "in.y_m",
     "theta": "in.theta_rad",
+    "course": "(in.theta_rad + std::atan2(in.vy_mps, in.vx_mps))",
     "moves": "(in.moves ? 1.0 : 0.0)",
     "t": "in.t_s",
 }
@@ -67,6 +68,7 @@ def _on_body(*acts: str) -> Place:
     return Place("ground", "GroundSignals", "OnGround{Step}", BODY, acts)
 
 
+SHARES = ("travel", "motion", "aside")  # of the way or of all motion
 PLACES = {
     "duty": Place(
         "duty", "DutySignals", "OnDuty{Step}", WHEEL, ("in.duty[k] += {};",), "kMaxWheels"
@@ -90,6 +92,12 @@ PLACES = {
         "in.vx_mps *= share;",
         "in.vy_mps *= share;",
         "in.omega_radps *= share;",
+    ),
+    "aside": _on_body(
+        "const double share = {};",
+        "const double vx_mps = in.vx_mps;",
+        "in.vx_mps -= share * in.vy_mps;",
+        "in.vy_mps += share * vx_mps;",
     ),
     "theta_rad": Place("observe", "ObservedPose", "OnObservation{Observe, Invert}", POSE),
 }
@@ -165,7 +173,7 @@ def _source(name: str, texts: dict[str, str], values: dict[str, float], model: s
     used = words(" ".join([texts["formula"], rate]))
     state = {"s": "s"} if rate else {}
     formula = _function(texts["formula"], place.names, state)
-    what = "adds" if texts["adds_to"] not in ("travel", "motion") else "changes by a share"
+    what = "adds" if texts["adds_to"] not in SHARES else "changes by a share"
     equation = f"{what} to {texts['adds_to']}: {texts['formula']}"
     equation += f"; ds/dt = {rate}, s = 0 at the start" if rate else ""
     return (
@@ -207,7 +215,7 @@ def _numbers(texts: dict[str, str]) -> list[str]:
 
 def _kind(used: set[str], remembers: bool, stage: str) -> dict[str, str]:
     """Family, needs and drives of the card, by what the texts name."""
-    if used & {"x", "y", "theta"}:
+    if used & {"x", "y", "theta", "course"}:
         family = "kFrame" if stage == "observe" else "kPlace"
         return {"family": family, "needs": "kRoom", "identify": "kPlaces | kHeadings"}
     if remembers:

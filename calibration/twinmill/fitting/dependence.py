@@ -16,6 +16,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.filters import filtered
+from twinmill.fitting.wheel_angles import Wheel
 from twinmill.model.parameters import WHERE_OR_WHEN, effect_names, effect_parameters
 
 SHORTEST_S = 4.0  # period of a gain that changes with time
@@ -42,6 +43,7 @@ class Motion:
         heading_rad: (N,) in the middle of the step to each point.
         t_s: (N,) robot's clock.
         step_s: (N,) from the point before; 0 where a stretch begins.
+        moved: (N, 3) measured, from the point before, in axes of the body.
     """
 
     velocity: np.ndarray
@@ -50,6 +52,7 @@ class Motion:
     heading_rad: np.ndarray
     t_s: np.ndarray
     step_s: np.ndarray
+    moved: np.ndarray
 
     @property
     def speed_mps(self) -> np.ndarray:
@@ -86,6 +89,7 @@ def dependences(motion: Motion) -> Iterator[Features]:
     turned = np.cumsum(motion.base[:, 2] * motion.step_s)
     hours = _hats(motion.t_s, motion.t_s.min(), motion.t_s.max(), _count(motion.t_s, 6.0, 24))
     yield from place_gains(motion)
+    yield from _courses(motion)
     for gain in (head, hours, _hats(turned, turned.min(), turned.max(), TURNED)):
         yield _scaled(motion, gain)
     way = _way_m(motion)
@@ -158,6 +162,23 @@ def _crossed(motion: Motion, gain: np.ndarray) -> Features:
     return turning, turning, np.hstack([forward, left])
 
 
+def _courses(motion: Motion) -> Iterator[Features]:
+    """Driving made quicker, and led aside, by the direction in the room in which it goes."""
+    forward, left, _ = motion.velocity.T[..., None]
+    course = motion.heading_rad + np.arctan2(motion.base[:, 1], motion.base[:, 0])
+    for waves in (_harmonics(course), _harmonics(4 * course)[:, :2]):
+        along, aside = waves * forward, waves * left
+        yield np.hstack([along, -aside]), np.hstack([aside, along]), np.zeros((len(waves), 0))
+
+
+def wheel_angles(motion: Motion, wheels: Sequence[Wheel]) -> Iterator[Features]:
+    """Each wheel's rolling made quicker and slower by its own angle."""
+    for wheel in wheels:
+        waves = wheel.waves(motion.moved) * (motion.velocity @ wheel.rate)[:, None]
+        forward, left, turning = (part * waves for part in wheel.body)
+        yield forward, left, turning
+
+
 def _drifts(motion: Motion, gain: np.ndarray) -> Iterator[Features]:
     """Motion along the room's axes, and turning, while the robot moves, times (N, k) gains."""
     drift = gain * motion.moves[:, None]
@@ -178,13 +199,15 @@ def _curves(motion: Motion) -> Iterator[Features]:
 
 
 def _events(motion: Motion) -> Iterator[Features]:
-    """What fades after speeds rose, after reversals, and after the robot started from rest."""
+    """What fades after speeds rose or fell, after reversals, and after starts from rest."""
     base, step_s = motion.base, motion.step_s
     largest = np.maximum(np.abs(base).max(axis=0), 1e-9)
-    rises = np.maximum(np.diff(np.abs(base), axis=0, prepend=np.abs(base[:1])), 0) * np.sign(base)
+    change = np.diff(np.abs(base), axis=0, prepend=np.abs(base[:1]))
+    rises = np.maximum(change, 0) * np.sign(base)
+    falls = np.maximum(-change, 0) * np.sign(np.vstack([base[:1], base[:-1]]))
     ways = np.where(np.abs(base) > MOVES * largest, np.sign(base), 0.0)
     reversals = np.column_stack([_reversals(way) for way in ways.T])
-    for event in (rises, reversals):
+    for event in (rises, falls, reversals):
         fading = np.hstack([_fading(event, fade_s, step_s) for fade_s in FADES_S])
         yield fading, fading, fading
     still = (np.abs(base) < STILL * largest).all(axis=1)

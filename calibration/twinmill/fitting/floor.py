@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import twinmill_native as native
 
-from twinmill.fitting.dependence import dependences, known_physics, place_gains
+from twinmill.fitting.dependence import dependences, known_physics, place_gains, wheel_angles
 from twinmill.fitting.response import Response
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.fitting.settings import FLOOR_SETTINGS
@@ -87,7 +87,9 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
         response = response.of_windows(calm)
     points = response.points
     known = known_physics(base, velocity[points], lambda m: body_velocity_at(data, m, points))
-    response.boost([*dependences(response.motion), *known])
+    response.find_wheels(base)
+    motion = response.motion
+    response.boost([*dependences(motion), *wheel_angles(motion, response.wheels), *known])
     within, across = (
         np.where(calm[:, None, None], e, np.nan) for e in (response.within, response.across)
     )

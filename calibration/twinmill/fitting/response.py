@@ -18,8 +18,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.filters import filtered
+from twinmill.fitting import wheel_angles
 from twinmill.fitting.boosting import Learner, Parts, boosted
 from twinmill.fitting.dependence import Features, Motion
 from twinmill.fitting.settings import FLOOR_SETTINGS
@@ -323,6 +325,28 @@ class Response:
             heading_rad=self.heading_rad,
             t_s=self.middle_s,
             step_s=self.step_s,
+            moved=self.moved,
+        )
+
+    @property
+    def moved(self) -> np.ndarray:
+        """(N, 3) m, m, rad that the body was captured to move in its own axes, to each point."""
+        heading = np.nan_to_num(self.data.measurement.track.heading_smooth[self.points])
+        at = np.column_stack([self.pose[:, :2], heading])
+        x, y, turn = np.diff(at, axis=0, prepend=at[:1]).T * (self.step_s > 0)
+        c, s = np.cos(self.heading_rad), np.sin(self.heading_rad)  # half way
+        return np.column_stack([c * x + s * y, -s * x + c * y, turn])
+
+    def find_wheels(self, model: native.Model) -> None:
+        """The model's wheels, of the radius that this log's errors tell, if they do."""
+        horizon = wheel_angles.HORIZON
+        there = self.ends[:, horizon] >= 0
+        errors = self.across[there, horizon] / np.maximum(self.errors[horizon], 1e-12)
+        self.wheels = wheel_angles.with_own_radius(
+            wheel_angles.wheels_of(model),
+            self.moved,
+            errors,
+            np.column_stack([self.starts, self.ends[:, horizon]])[there],
         )
 
     def boost(self, groups: Sequence[Features]) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from twinmill.diagnosis.forms import ANGLES
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.settings import SETTINGS
@@ -13,7 +14,12 @@ from twinmill.diagnosis.units import ADDS_TO, NAMES
 from twinmill.report.canvas import MEASURED, PREDICTED, draw, legend_above
 from twinmill.report.html import Figure
 
-PARTS = {"motion": "share of all speeds", "travel": "share of the way", "theta_rad": "heading, rad"}
+PARTS = {
+    "motion": "share of all speeds",
+    "travel": "share of the way",
+    "aside": "share of the way led aside",
+    "theta_rad": "heading, rad",
+}
 SIDES = 1.96  # standard errors: 95 %
 
 
@@ -80,7 +86,7 @@ def _numbers(found: Formula) -> str:
 
 
 def _unit(name: str) -> str:
-    if name == "theta":
+    if name in ANGLES:
         return "rad"
     return "rad/s" if name == "omega" else str(NAMES[name])
 

@@ -56,8 +56,8 @@ constexpr Card kCard = {
         "start. Per wheel, duty: u (duty or command), "
         "V (battery), left and front (1 or -1), t (s); rim_mps, speed the wheel tends to: these, "
         "target and rim (m/s, now), angle (rad). Body: vx, vy (m/s), omega (rad/s), x, y (m), "
-        "theta (rad), moves (0 or 1), t (s); travel and motion: the share of way that is more. "
-        "Heading as captured, theta_rad: x, y, theta. Functions: abs sign min max sqrt exp ln sin "
+        "theta and course, the direction in which it drives (rad), moves (0 or 1), t (s); travel and "
+        "motion: the share of way that is more. Heading as captured, theta_rad: x, y, theta. Functions: abs sign min max sqrt exp ln sin "
         "cos tan asin acos atan atan2 sinh cosh tanh and more of muParser; a ? b : c; _pi",
     .leaves_out =
         "more than one state; where the formula has no finite value, nothing is added, and where "
@@ -79,7 +79,8 @@ constexpr ParameterSpec kParameters[] = {
 constexpr TextParameter kTexts[] = {
     {"adds_to", "vx_mps",
      "one of duty, rim_mps (per wheel), vx_mps, vy_mps, omega_radps (body), travel (share of vx "
-     "and vy), motion (share of vx, vy, omega), theta_rad (captured heading)"},
+     "and vy), motion (share of vx, vy, omega), aside (share of the way led to its left), "
+     "theta_rad (captured heading)"},
     {"formula", "p0*vx + p1*vy + p2*omega + p3*vx*abs(vx)",
      "what is added, in the unit of adds_to; should be 0 where p0 to p3 are"},
     {"state_rate", "",
@@ -119,6 +120,8 @@ constexpr Name<GroundSignals> kBodyNames[] = {
     {"x", [](const GroundSignals &s, int) { return s.x_m; }},
     {"y", [](const GroundSignals &s, int) { return s.y_m; }},
     {"theta", [](const GroundSignals &s, int) { return s.theta_rad; }},
+    {"course",
+     [](const GroundSignals &s, int) { return s.theta_rad + std::atan2(s.vy_mps, s.vx_mps); }},
     {"moves", [](const GroundSignals &s, int) { return s.moves ? 1.0 : 0.0; }},
 };
 
@@ -171,6 +174,14 @@ void AddShare(GroundSignals &s, const Numbers &v, double *state)
     s.vx_mps *= share;
     s.vy_mps *= share;
     s.omega_radps *= turning ? share : 1;
+}
+
+void LeadAside(GroundSignals &s, const Numbers &v, double *state)
+{
+    const double share = Value<GroundSignals>(kBodyNames, s, 0, *v.formula, state);
+    const double vx_mps = s.vx_mps;
+    s.vx_mps -= share * s.vy_mps;
+    s.vy_mps += share * vx_mps;
 }
 
 double HeadingError(const ObservedPose &p, Formula &formula)
@@ -232,6 +243,7 @@ const Quantity &FindQuantity(const std::string &name)
         {"omega_radps", OnGround{AddToBody<&GroundSignals::omega_radps>}, NamesOf(kBodyNames)},
         {"travel", OnGround{AddShare<false>}, NamesOf(kBodyNames)},
         {"motion", OnGround{AddShare<true>}, NamesOf(kBodyNames)},
+        {"aside", OnGround{LeadAside}, NamesOf(kBodyNames)},
         {"theta_rad", OnObservation{AddToHeading, TakeFromHeading}, NamesOf(kPoseNames)},
     };
     std::set<std::string> known;

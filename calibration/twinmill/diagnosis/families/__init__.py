@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Families of terms that are judged together, each of which acts in one narrow range.
+
+A dip of the speed at one speed, a strip of floor that tilts, or a liquid that swings after each
+change of the command has no form that is known before. A few humps over the speed, over the place,
+or over the time since, take any of them; and a few slow waves take a capture that drifts.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twinmill.diagnosis.families.family import Family
+from twinmill.diagnosis.families.of_past import of_past
+from twinmill.diagnosis.families.of_room import of_course, of_place
+from twinmill.diagnosis.families.of_speed import across_axes, of_speed
+from twinmill.diagnosis.families.of_time import of_drift
+from twinmill.diagnosis.families.of_wheels import of_wheels
+from twinmill.diagnosis.term import STILL
+from twinmill.fitting.opening import Opened
+
+COURSES = (1, 2, 4)  # times a turn
+
+
+def families_of(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> list[Family]:
+    """Over the speeds, the places, the wheels and the past of all logs.
+
+    Args:
+        opened: logs over their floors.
+        velocities: (N, 3) of the body in each, m/s and rad/s, at the points of its response.
+    """
+    moving = np.concatenate(velocities)
+    axes = [k for k in range(3) if np.abs(moving[:, k]).max() > STILL[k]]
+    pose = np.concatenate([own.floor.response.pose for own in opened])
+    return [
+        *(of_speed(k, np.abs(moving[:, k])) for k in axes),
+        *across_axes(moving),
+        *(of_past(k, max(float(np.std(moving[:, k])), STILL[k])) for k in axes),
+        *(f for k in range(2) for f in of_place(k, pose[:, k])),
+        *(of_course(n) for n in COURSES),
+        *of_drift(np.concatenate([own.floor.response.middle_s for own in opened])),
+        *of_wheels(opened),
+    ]
