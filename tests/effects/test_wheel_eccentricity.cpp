@@ -32,6 +32,22 @@ TEST(WheelEccentricity, RipplesOnceInATurnOfTheWheel)
     }
 }
 
+// The same on wheels of 1.2 times the radius, which the rims' speeds do not tell.
+TEST(WheelEccentricity, RipplesMoreSlowlyOnLargerWheels)
+{
+    const double c = 0.1, s = -0.05, ratio = 1.2, dt_s = 0.02;
+    Player player(With("wheel_eccentricity", {c, s, c, s, c, s, c, s, ratio}), dt_s);
+    for (int step = 1; step < 30; ++step)
+    {
+        player.Play(kForward, dt_s);
+        const double way_m = kFull_mps * step * dt_s, radius_m = ratio * kRadius_m;
+        const double phi_rad = way_m / radius_m;
+        EXPECT_NEAR(player.state.pose.x_m,
+                    way_m + radius_m * (c * std::sin(phi_rad) + s * (1 - std::cos(phi_rad))),
+                    1e-12);
+    }
+}
+
 TEST(WheelEccentricity, LeavesTheWayOfWholeTurnsAndTheWheelsSpeedAlone)
 {
     const double turn_s = 2 * std::numbers::pi * kRadius_m / kFull_mps;

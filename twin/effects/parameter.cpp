@@ -22,6 +22,7 @@ const char *RoleName(Role role)
         case Role::kMoment: return "moment";
         case Role::kLateness: return "lateness";
         case Role::kLimit: return "limit";
+        case Role::kRadius: return "radius";
     }
     return "";
 }

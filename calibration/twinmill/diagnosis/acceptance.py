@@ -8,7 +8,7 @@ from twinmill.diagnosis.starts import MARGIN
 from twinmill.diagnosis.trials import REFIT, Trial
 from twinmill.model.parameters import (
     GAINS,
-    WHERE_OR_WHEN,
+    NO_SIZE,
     catalogue_of,
     lasts_for_a_while,
     newest_instance,
@@ -130,7 +130,7 @@ def _is_neutral(trial: Trial, name: str) -> bool:
         return False
     instance = newest_instance(trial.state.model, name)
     for p in catalogue_of(trial.state.model)[name]["parameters"]:
-        if p["role"] in WHERE_OR_WHEN:
+        if p["role"] in NO_SIZE:
             continue
         value = trial.state.model.get(f"{instance}.{p['name']}")
         if abs(value - p["neutral"]) > 1e-3 * abs(p["default"] - p["neutral"]):

@@ -58,6 +58,7 @@ class Rest:
         term, coefficient: the best single formula, in its unit; None if no group helps.
         takes: share of what is left that the formula takes on left-out parts.
         family_takes: the same of all that was tested of the first group together.
+        little: no more than what is called good, however sure it is.
         left_over: fall of the cost per independent error by every group that brings any.
         old: groups that help no more than they did on other logs.
         moments: events that neither commands nor findings explain.
@@ -80,6 +81,7 @@ class Rest:
     far: bool = False
     likely: bool = False
     family_takes: float = 0.0
+    little: bool = False
 
     def with_findings(self, findings: Sequence[Finding]) -> "Rest":
         """With what doubtful findings depend on: first, if they take more than is left.
@@ -100,7 +102,7 @@ class Rest:
     @property
     def certainty(self) -> str:
         """In words: FIRM, FEW or NOISE."""
-        if self.firm or self.depends_on:
+        if self.depends_on or (self.firm and not self.little):
             return FIRM
         return FEW if self.far else NOISE
 
@@ -239,6 +241,7 @@ def rest_of(
         share=share,
         firm=firm,
         far=fit.held_square > SETTINGS.no_noise**2,
+        little=fit.held_square <= GOOD**2,
         depends_on=_in_order(proven, found, depends_on),
         likely=found.likely and depends_on == found.depends_on and not proven,
         moments=tuple(moments),

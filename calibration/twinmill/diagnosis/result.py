@@ -10,7 +10,7 @@ from twinmill.data.checks.settings import CHECKS
 from twinmill.diagnosis.finding import Finding, Late, Ranked
 from twinmill.diagnosis.outliers import Outlier
 from twinmill.diagnosis.resolution import Resolution
-from twinmill.diagnosis.rest import Rest
+from twinmill.diagnosis.rest import FIRM, Rest
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.trials import REFIT
 from twinmill.fitting.compare import Comparison
@@ -117,7 +117,7 @@ class Diagnosis:
             "findings": [f.to_json() for f in self.findings],
             "rest": {
                 "share": rest.share,
-                "firm": rest.firm,
+                "firm": rest.firm and rest.certainty == FIRM,
                 "certainty": rest.certainty,
                 "depends_on": rest.depends_on,
                 "likely": rest.likely,

@@ -117,7 +117,12 @@ def _reach(name: str, parameters: Sequence[Parameter], start: dict[str, float]) 
     """(k,) how far from neutral the usual strength is; of the base's numbers a usual error."""
     if name == REFIT:
         return np.array([STALE * p.std for p in parameters])
-    return np.array([start.get(p.name, p.value) - p.usual for p in parameters])
+    return np.array([start.get(p.name, p.value) - _origin(p, start) for p in parameters])
+
+
+def _origin(p: Parameter, start: dict[str, float]) -> float:
+    """Where nothing happens; a radius that is known stays there while sizes move."""
+    return start.get(p.name, p.usual) if p.role == "radius" else p.usual
 
 
 def _widths(name: str, parameters: Sequence[Parameter], start: dict[str, float]) -> np.ndarray:
@@ -202,7 +207,7 @@ def _points(
     else:
         model.add_effect(name)
         parameters = effect_parameters(model, effect_names(model)[-1], fresh=True)
-        origin = np.array([p.usual for p in parameters])
+        origin = np.array([_origin(p, start) for p in parameters])
         for p in parameters:
             model.set(p.name, p.usual)
     reach = _reach(name, parameters, start)

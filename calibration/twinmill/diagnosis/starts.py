@@ -133,7 +133,27 @@ def starts_of(
         return Whiles.of(candidate, rows) if lasts_for_a_while(name) else _moments(candidate, rows)
     if with_role(name, "place"):
         return _places(candidate, rows) if candidate.logs else None
+    if with_role(name, "radius"):
+        return Told.of(candidate) if candidate.logs else None
     return Grid.of(candidate, rows) if with_role(name, "limit") else None
+
+
+@dataclass(frozen=True)
+class Told:
+    """A start that the data sets tell by themselves."""
+
+    start: dict[str, float]
+
+    @classmethod
+    def of(cls, candidate: Candidate) -> "Told":
+        """Of an effect of wheels whose radius the logs tell; the median of those that do."""
+        told = [d.radius_ratio for d in candidate.logs if d.radius_ratio != 1.0]
+        ratio = float(np.median(told)) if told else 1.0
+        return cls(dict.fromkeys(candidate.named("radius"), ratio))
+
+    def best(self, left: Left) -> dict[str, float]:
+        """See Starts."""
+        return self.start
 
 
 @dataclass(frozen=True)

@@ -147,7 +147,8 @@ def _open(measurement: Measurement | SteadyTable, model_file: ModelFile, number:
     floor = noise_floor(data, model, told or declared)
     if floor.kind is None:
         return Opened(measurement, None, model, floor, told or declared)
-    data = replace(data.over(floor.rms, floor.keep), first_part=number)
+    ratio = floor.response.radius_ratio
+    data = replace(data.over(floor.rms, floor.keep), first_part=number, radius_ratio=ratio)
     return Opened(measurement, data, model, floor, told or declared).aligned(model)
 
 

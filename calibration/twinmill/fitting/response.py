@@ -339,15 +339,12 @@ class Response:
 
     def find_wheels(self, model: native.Model) -> None:
         """The model's wheels, of the radius that this log's errors tell, if they do."""
-        horizon = wheel_angles.HORIZON
+        horizon, wheels = wheel_angles.HORIZON, wheel_angles.wheels_of(model)
         there = self.ends[:, horizon] >= 0
         errors = self.across[there, horizon] / np.maximum(self.errors[horizon], 1e-12)
-        self.wheels = wheel_angles.with_own_radius(
-            wheel_angles.wheels_of(model),
-            self.moved,
-            errors,
-            np.column_stack([self.starts, self.ends[:, horizon]])[there],
-        )
+        ends = np.column_stack([self.starts, self.ends[:, horizon]])[there]
+        self.radius_ratio = wheel_angles.radius_ratio(wheels, self.moved, errors, ends)
+        self.wheels = [wheel.larger(self.radius_ratio) for wheel in wheels]
 
     def boost(self, groups: Sequence[Features]) -> None:
         """Adds what is left and left-out blocks agree on, a group of features at a time."""

@@ -20,7 +20,7 @@ from twinmill.chance import f_above, t_quantile
 from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import (
     ALIGNMENT,
-    WHERE_OR_WHEN,
+    NO_SIZE,
     Parameter,
     ParameterEstimate,
     lasts_for_a_while,
@@ -243,7 +243,7 @@ class ScoreFit:
         What is a limit alone has no slope where nothing reaches it: a fit that begins there stays
         there.
         """
-        roles = {p.name: p.role for p in fresh if p.role not in WHERE_OR_WHEN}
+        roles = {p.name: p.role for p in fresh if p.role not in NO_SIZE}
         new = np.array([u.parameter.name in roles for u in self.unknowns], bool)
         if {*roles.values()} == {"limit"}:
             for factors in LIMIT_STARTS:

@@ -17,9 +17,11 @@ TIMES = (1, 2, 3)  # a turn: an axle off the centre, an oval, a flat place
 NOT_ROLLED = ("none", "ackermann")  # no wheels, or steered ones
 HORIZON = 1  # number of the windows' horizon that is short beside a turn
 BIN_RAD = 0.25
-PADDED = 4  # times as many bins, so that a peak between two is seen
-RADIUS_ERROR = 0.15  # share
-BEYOND_CHANCE = 12.0  # times the mean of a power that is noise; e^-12 of those are larger
+PADDED = 8  # times as many bins, so that a peak between two is seen
+RATIOS = np.linspace(0.85, 1.15, 1201)  # of the radius over the model's
+# Times the mean of a power that is noise. Of sums of three that are noise 3 in a million are larger
+# (Erlang), and a log has some hundred that are independent.
+BEYOND_CHANCE = 18.0
 
 
 @dataclass(frozen=True)
@@ -69,10 +71,10 @@ def _side(wheel: dict) -> str:
     return "left" if wheel["y_m"] > 0 else "right"
 
 
-def with_own_radius(
+def radius_ratio(
     wheels: Sequence[Wheel], moved: np.ndarray, errors: np.ndarray, ends: np.ndarray
-) -> list[Wheel]:
-    """Each with the radius at which errors swing with its angle, if they do beyond chance.
+) -> float:
+    """Radius at which errors swing with a wheel's angle over the model's; 1 if none do.
 
     Args:
         wheels: as the model has them.
@@ -80,29 +82,29 @@ def with_own_radius(
         errors: (W, 3) of windows, weighted.
         ends: (W, 2) points between which each window lies.
     """
-    spectra = [_spectrum(w, moved, np.nan_to_num(errors), ends) for w in wheels]
-    if not spectra:
-        return []
-    noise = np.median(np.concatenate([power for _, power in spectra])) / np.log(2)
-    found = []
-    for wheel, (k, power) in zip(wheels, spectra, strict=True):
-        near = np.abs(k / np.rint(k) - 1) < RADIUS_ERROR
-        best = int(np.argmax(np.where(near, power, 0.0)))
-        swings = power[best] > BEYOND_CHANCE * noise
-        found.append(wheel.larger(float(np.rint(k[best]) / k[best])) if swings else wheel)
-    return found
+    if not wheels:
+        return 1.0
+    power = np.array([_powers(w, moved, np.nan_to_num(errors), ends) for w in wheels])
+    noise = np.median(power) / np.log(2)
+    of_all = power.sum(axis=1)  # of what swings TIMES a turn
+    best = np.unravel_index(int(np.argmax(of_all)), of_all.shape)
+    return float(RATIOS[best[1]]) if of_all[best] > BEYOND_CHANCE * noise else 1.0
+
+
+def _powers(wheel: Wheel, moved: np.ndarray, errors: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """(TIMES, RATIOS) power of errors of windows that swing so many times a turn."""
+    k, power = _spectrum(wheel, moved, errors, ends)
+    return np.array([np.interp(n / RATIOS, k, power) for n in TIMES])
 
 
 def _spectrum(
     wheel: Wheel, moved: np.ndarray, errors: np.ndarray, ends: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(K,) swings a turn, and the power of errors of windows at each."""
+    """(K,) swings a turn, and the power of errors of windows at each, of noise alike at all."""
     first, last = np.cumsum(moved @ wheel.rate)[ends].T
     rolled_rad, place = last - first, np.rint((first + last) / 2 / BIN_RAD).astype(int)
     pulled = np.bincount(place - place.min(), rolled_rad * (errors @ wheel.body))
     several = PADDED * len(pulled)
     scale = np.sum(rolled_rad**2) * (wheel.body @ wheel.body)
     power = np.abs(np.fft.rfft(pulled, several)) ** 2 / max(scale, 1e-12)
-    k = 2 * np.pi * np.fft.rfftfreq(several, BIN_RAD)
-    seen = (k > TIMES[0] - 0.5) & (k < TIMES[-1] + 0.5)
-    return k[seen], power[seen]
+    return 2 * np.pi * np.fft.rfftfreq(several, BIN_RAD), power

@@ -26,7 +26,8 @@ BASE_STEP = {LAG: 0.004, CLOCK: 0.006, CLOCK_RATE: 5.0, HEADING: 0.005}
 GAIN_STEP = 0.004
 # Which part of a robot's lateness an effect changes, by its stage; "lag" at the others.
 LATE_PARTS = {"duty": "delay", "observe": "clock"}
-WHERE_OR_WHEN = ("place", "moment")  # roles of what says nothing of how strong an effect is
+WHERE_OR_WHEN = ("place", "moment")  # roles of what says where an effect is, or from when on
+NO_SIZE = (*WHERE_OR_WHEN, "radius")  # roles of what says nothing of how strong an effect is
 EFFECT_STEP = 0.05  # times the distance of an effect's default from its neutral value
 
 
@@ -62,7 +63,7 @@ class Parameter:
 
     def at(self, value: float) -> "Parameter":
         """The same, begun elsewhere; no place or moment is usual: the prior of one goes with it."""
-        return replace(self, value=value, usual=value if self.role in WHERE_OR_WHEN else self.usual)
+        return replace(self, value=value, usual=value if self.role in NO_SIZE else self.usual)
 
 
 @dataclass(frozen=True)

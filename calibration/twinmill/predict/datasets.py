@@ -76,6 +76,8 @@ class Trajectory:
         first_part: part that the log begins with. Logs often begin alike, so that of several each
             begins with another one: else a drive of all of them is left out at once.
         every_s: between two starts.
+        radius_ratio: of the wheels, over the model's radius, as errors that swing with their angle
+            tell it; 1 if none do.
     """
 
     measurement: Measurement
@@ -86,6 +88,7 @@ class Trajectory:
     own: tuple[Parameter, ...] = ()
     first_part: int = 0
     every_s: float = EVERY_S
+    radius_ratio: float = 1.0
     weight: np.ndarray = field(init=False, repr=False)
     block: np.ndarray = field(init=False, repr=False)
     part: np.ndarray = field(init=False, repr=False)

@@ -92,19 +92,6 @@ def test_dependence_is_told_where_no_form_is_known(
     assert all(f.certainty == "doubtful" for f in found.findings)
 
 
-def test_an_oval_wheel_is_told_though_its_radius_is_not_known(tanh_robot, measure, one_clock_base):
-    """Twice a turn 15 % more and less; the wheels are 5 % larger than the model says."""
-
-    class Oval(tanh_robot):
-        def wheels_mps(self, duty):
-            rims = super().wheels_mps(duty)
-            angle = np.cumsum(rims[:, 1]) * STEP_S / (1.05 * 0.0325)
-            return rims * (1 + 0.15 * np.cos(2 * angle)[:, None] * (0, 1, 0, 0))
-
-    found = diagnose([measure(Oval(), 103, 80.0)], one_clock_base)
-    assert found.rest.depends_on[:1] == ["angle of the front right wheel"]
-
-
 def test_heading_that_the_capture_lets_drift_depends_on_time(measure, one_clock_base):
     def spoil(pose, valid):
         t_s = np.arange(len(pose)) / 120

@@ -12,7 +12,7 @@ import numpy as np
 
 from twinmill.diagnosis.families.family import Family
 from twinmill.diagnosis.families.of_past import of_past
-from twinmill.diagnosis.families.of_room import of_course, of_place
+from twinmill.diagnosis.families.of_room import of_course, of_places
 from twinmill.diagnosis.families.of_speed import across_axes, of_speed
 from twinmill.diagnosis.families.of_time import of_drift
 from twinmill.diagnosis.families.of_wheels import of_wheels
@@ -36,7 +36,7 @@ def families_of(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> l
         *(of_speed(k, np.abs(moving[:, k])) for k in axes),
         *across_axes(moving),
         *(of_past(k, max(float(np.std(moving[:, k])), STILL[k])) for k in axes),
-        *(f for k in range(2) for f in of_place(k, pose[:, k])),
+        *of_places(pose[:, :2]),
         *(of_course(n) for n in COURSES),
         *of_drift(np.concatenate([own.floor.response.middle_s for own in opened])),
         *of_wheels(opened),

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What acts at some places of the room, or while the robot moves in some of its directions."""
 
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import product
+
 import numpy as np
 
 from twinmill.diagnosis.families.family import HUMPS, Family, Humps
@@ -8,39 +12,67 @@ from twinmill.diagnosis.term import PLACE, SWELL, TYPICAL, Term, moves
 from twinmill.fitting.opening import Opened
 
 LEAST_M = 0.15  # between the middles of two humps over the place
+SQUARES = 3  # along each side
 SIZE = TYPICAL["rim_mps"] / SWELL
 
 
-def of_place(axis: int, place: np.ndarray) -> list[Family]:
-    """At some places all speeds change alike, the floor pushes, or iron turns a compass."""
-    name = "xy"[axis]
-    count = min(HUMPS, int(np.ptp(place) / LEAST_M))
-    if count < 2:
-        return []
-    humps = Humps.over(float(place.min()), float(place.max()), count)
-    texts = humps.texts(name)
+def of_places(pose: np.ndarray) -> list[Family]:
+    """Over all (N, 2) places of logs: in strips along either side of the floor, and in squares."""
+    along = [_over(axis, pose[:, axis], HUMPS) for axis in range(2)]
+    found = []
+    for axis, humps in enumerate(along):
+        if humps:
+            found += _at("xy"[axis], humps.texts("xy"[axis]), partial(_strips, axis, humps))
+    sides = [_over(axis, pose[:, axis], SQUARES) for axis in range(2)]
+    if all(sides):
+        across = product(*(humps.texts(name) for humps, name in zip(sides, "xy", strict=True)))
+        found += _at("squares", ["*".join(pair) for pair in across], partial(_squares, sides))
+    return found
+
+
+def _over(axis: int, place: np.ndarray, most: int) -> Humps | None:
+    """Humps over one side; None if it is too short for two."""
+    count = min(most, int(np.ptp(place) / LEAST_M))
+    return Humps.over(float(place.min()), float(place.max()), count) if count > 1 else None
+
+
+def _strips(axis: int, humps: Humps, own: Opened) -> np.ndarray:
+    return humps.of(own.floor.response.pose[:, [axis]])
+
+
+def _squares(sides: Sequence[Humps], own: Opened) -> np.ndarray:
+    x, y = (_strips(axis, humps, own) for axis, humps in enumerate(sides))
+    return (x[:, :, None] * y[:, None, :]).reshape(len(x), -1)
+
+
+def _at(where: str, texts: Sequence[str], bells: Callable[[Opened], np.ndarray]) -> list[Family]:
+    """At some places all speeds change alike, the floor pushes, or iron turns a compass.
+
+    Args:
+        where: a name for the places.
+        texts: of the K bells.
+        bells: (N, K) of a log: 1 in the middle of each place.
+    """
 
     def gain(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        gains = SWELL * humps.of(own.floor.response.pose[:, [axis]])
+        gains = SWELL * bells(own)
         return {k: gains * velocity[:, [k]] for k in range(3)}
 
     def push(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        response = own.floor.response
-        pushes = TYPICAL["vx_mps"] * humps.of(response.pose[:, [axis]])
-        pushes *= moves(velocity)[:, None]
-        waves = [f(response.heading_rad)[:, None] for f in (np.cos, np.sin)]
-        return {0: np.hstack([w * pushes for w in waves])}
+        pushes = TYPICAL["vx_mps"] * bells(own) * moves(velocity)[:, None]
+        c, s = (f(own.floor.response.heading_rad)[:, None] * pushes for f in (np.cos, np.sin))
+        return {0: np.hstack([c, s]), 1: np.hstack([-s, c])}
 
     def turned(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        angles = SWELL * humps.of(own.floor.response.pose[:, [axis]])
+        angles = SWELL * bells(own)
         return {0: -angles * velocity[:, [1]], 1: angles * velocity[:, [0]]}
 
-    along = [f"{t}*{wave}(theta)*moves" for wave in ("cos", "sin") for t in texts]
+    toward = [f"{t}*{wave}(theta)*moves" for wave in ("cos", "sin") for t in texts]
     return [
-        Family([Term(PLACE, "rim_mps", f"{t}*rim", SIZE, f"grip at {name}") for t in texts], gain),
-        Family([Term(PLACE, "vx_mps", t, 1.0, f"push at {name}") for t in along], push),
+        Family([Term(PLACE, "rim_mps", f"{t}*rim", SIZE, f"grip at {where}") for t in texts], gain),
+        Family([Term(PLACE, "vx_mps", t, 1.0, f"push at {where}") for t in toward], push),
         Family(
-            [Term(PLACE, "vy_mps", f"{t}*vx", SIZE, "compass of the place") for t in texts], turned
+            [Term(PLACE, "vy_mps", f"{t}*vx", SIZE, f"compass at {where}") for t in texts], turned
         ),
     ]
 

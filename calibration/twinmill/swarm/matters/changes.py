@@ -9,7 +9,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import WHERE_OR_WHEN, catalogue_of, effect_names
+from twinmill.model.parameters import NO_SIZE, catalogue_of, effect_names
 from twinmill.model.ranges import NORMAL_95, Quantity, ranges
 from twinmill.swarm.matters.hidden import Hidden
 from twinmill.swarm.model_text import for_all_robots, with_effect, with_robot, with_values
@@ -97,7 +97,7 @@ def factors(
 def neutral(model: native.Model, instance: str) -> dict[str, float]:
     """Values at which an effect of the model does nothing, by parameter."""
     parameters = catalogue_of(model)[instance.split("#")[0]]["parameters"]
-    return {p["name"]: p["neutral"] for p in parameters if p["role"] not in WHERE_OR_WHEN}
+    return {p["name"]: p["neutral"] for p in parameters if p["role"] not in NO_SIZE}
 
 
 def _effects(file: ModelFile) -> list[Factor]:
@@ -220,7 +220,7 @@ def _at(card: Mapping, times: float) -> dict[str, float]:
     moved = left or [p["name"] for p in card["parameters"]]
     values = {}
     for p in card["parameters"]:
-        if p["role"] in WHERE_OR_WHEN:
+        if p["role"] in NO_SIZE:
             values[p["name"]] = p["default"]
             continue
         step = times * (p["default"] - p["neutral"]) if p["name"] in moved else 0.0
@@ -229,7 +229,7 @@ def _at(card: Mapping, times: float) -> dict[str, float]:
 
 
 def _acts(card: Mapping, values: Mapping[str, float]) -> bool:
-    strong = (p for p in card["parameters"] if p["role"] not in WHERE_OR_WHEN)
+    strong = (p for p in card["parameters"] if p["role"] not in NO_SIZE)
     return any(values[p["name"]] != p["neutral"] for p in strong)
 
 
@@ -257,7 +257,7 @@ def _words(card: Mapping, values: Mapping[str, float]) -> str:
     told = [
         f"{p['name']} {_short(values[p['name']])}{_unit(p['unit'])}"
         for p in card["parameters"]
-        if p["role"] not in WHERE_OR_WHEN and values[p["name"]] != p["neutral"]
+        if p["role"] not in NO_SIZE and values[p["name"]] != p["neutral"]
     ]
     return f"{card['name']} ({', '.join(told)})"
 

@@ -16,6 +16,7 @@ enum class Role
     kMoment,    // when it begins: a search starts from several
     kLateness,  // how late a response comes: only the sum with other such parameters is firm
     kLimit,     // beyond which something happens, with no trace below: a search starts from several
+    kRadius,    // of a wheel, by which its angle grows: the errors of a log tell where to start
 };
 
 // A row of an effect's table, the only place of the parameter's name, unit and bounds. A name that
