@@ -331,6 +331,9 @@ def _named_terms(
         if group == PLACE:
             for wave, part in (("cos", np.cos(theta)), ("sin", np.sin(theta))):
                 terms[group, f"{text}*{wave}(theta)*moves"] = away * part * moving
+    if np.ptp(t_s) > 0:
+        for (carrier, _), rate in zip(speeds, change, strict=True):
+            terms[TIME, f"(t - {middles['t']:g})*d{carrier}"] = (t_s - middles["t"]) * rate
     for at_s in (middles[f"t{k}"] for k in range(len(PARTS))):
         for carrier, speed in speeds:
             terms[TIME, f"sign(t - {at_s:g})*{carrier}"] = np.sign(t_s - at_s) * speed

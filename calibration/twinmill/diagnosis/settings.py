@@ -110,8 +110,8 @@ class Settings(Numbers):
     firm_blocks: int = number(
         3, "... in so many blocks, and in so many times more than where it is as much worse"
     )
-    far: float = number(10.0, "times the median squared error: a single moment ...")
-    several: int = number(3, "... of which so many are no accident")
+    far: float = number(6.0, "times the median squared error: a single moment ...")
+    several: int = number(4, "... of which so many are no accident")
     place_chance: float = number(0.01, "that errors repeat so at a place, of the model ...")
     place_chance_of_floor: float = number(0.05, "... and of the smooth response, too ...")
     place_share: float = number(0.1, "... if this share of their square repeats")

@@ -12,10 +12,10 @@ import numpy as np
 
 from twinmill.diagnosis.families.family import Family
 from twinmill.diagnosis.families.of_past import of_past
-from twinmill.diagnosis.families.of_room import of_course, of_places
+from twinmill.diagnosis.families.of_room import of_course, of_places, of_pushes
 from twinmill.diagnosis.families.of_speed import across_axes, of_speed
 from twinmill.diagnosis.families.of_time import of_drift
-from twinmill.diagnosis.families.of_wheels import of_wheels
+from twinmill.diagnosis.families.of_wheels import of_rims, of_wheels
 from twinmill.diagnosis.term import STILL
 from twinmill.fitting.opening import Opened
 
@@ -37,7 +37,9 @@ def families_of(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> l
         *across_axes(moving),
         *(of_past(k, max(float(np.std(moving[:, k])), STILL[k])) for k in axes),
         *of_places(pose[:, :2]),
+        of_pushes(),
         *(of_course(n) for n in COURSES),
         *of_drift(np.concatenate([own.floor.response.middle_s for own in opened])),
         *of_wheels(opened),
+        *(of_rims(opened, velocities) if opened[0].model.drive == "twist" else ()),
     ]

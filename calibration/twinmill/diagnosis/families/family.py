@@ -10,6 +10,7 @@ from twinmill.diagnosis.term import STILL, Term, displaced
 from twinmill.fitting.opening import Opened
 
 HUMPS = 8  # over the range of a speed, or of a place
+MOST = 0.99  # quantile of a speed up to which humps reach
 
 # From a log and the (N, 3) velocities of its robot to (N, k) additions in axes of the body.
 Values = Callable[[Opened, np.ndarray], dict[int, np.ndarray]]

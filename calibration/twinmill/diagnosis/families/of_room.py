@@ -8,12 +8,13 @@ from itertools import product
 import numpy as np
 
 from twinmill.diagnosis.families.family import HUMPS, Family, Humps
-from twinmill.diagnosis.term import PLACE, SWELL, TYPICAL, Term, moves
+from twinmill.diagnosis.term import CHANNELS, PLACE, SWELL, TYPICAL, Term, moves
 from twinmill.fitting.opening import Opened
 
 LEAST_M = 0.15  # between the middles of two humps over the place
 SQUARES = 3  # along each side
 SIZE = TYPICAL["rim_mps"] / SWELL
+TURNS = TYPICAL["omega_radps"] / SWELL
 
 
 def of_places(pose: np.ndarray) -> list[Family]:
@@ -28,6 +29,23 @@ def of_places(pose: np.ndarray) -> list[Family]:
         across = product(*(humps.texts(name) for humps, name in zip(sides, "xy", strict=True)))
         found += _at("squares", ["*".join(pair) for pair in across], partial(_squares, sides))
     return found
+
+
+def of_pushes() -> Family:
+    """The whole floor pushes, as if it sloped."""
+    texts = [f"{wave}(theta)*moves" for wave in ("cos", "sin")]
+
+    def push(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
+        return _pushed(own, moves(velocity)[:, None])
+
+    return Family([Term("heading", "vx_mps", t, 1.0, "push") for t in texts], push)
+
+
+def _pushed(own: Opened, shares: np.ndarray) -> dict[int, np.ndarray]:
+    """Along the room's x and y, by (N, K) shares of what is typical."""
+    pushes = TYPICAL["vx_mps"] * shares
+    c, s = (f(own.floor.response.heading_rad)[:, None] * pushes for f in (np.cos, np.sin))
+    return {0: np.hstack([c, s]), 1: np.hstack([-s, c])}
 
 
 def _over(axis: int, place: np.ndarray, most: int) -> Humps | None:
@@ -46,7 +64,7 @@ def _squares(sides: Sequence[Humps], own: Opened) -> np.ndarray:
 
 
 def _at(where: str, texts: Sequence[str], bells: Callable[[Opened], np.ndarray]) -> list[Family]:
-    """At some places all speeds change alike, the floor pushes, or iron turns a compass.
+    """All speeds change alike there, or turning alone; the floor pushes; iron turns a compass.
 
     Args:
         where: a name for the places.
@@ -59,9 +77,11 @@ def _at(where: str, texts: Sequence[str], bells: Callable[[Opened], np.ndarray])
         return {k: gains * velocity[:, [k]] for k in range(3)}
 
     def push(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        pushes = TYPICAL["vx_mps"] * bells(own) * moves(velocity)[:, None]
-        c, s = (f(own.floor.response.heading_rad)[:, None] * pushes for f in (np.cos, np.sin))
-        return {0: np.hstack([c, s]), 1: np.hstack([-s, c])}
+        shares = bells(own)  # less what pushes everywhere: that is of the heading alone
+        return _pushed(own, (shares - shares.mean(axis=0)) * moves(velocity)[:, None])
+
+    def turn(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
+        return {2: SWELL * bells(own) * velocity[:, [2]]}
 
     def turned(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         angles = SWELL * bells(own)
@@ -70,6 +90,10 @@ def _at(where: str, texts: Sequence[str], bells: Callable[[Opened], np.ndarray])
     toward = [f"{t}*{wave}(theta)*moves" for wave in ("cos", "sin") for t in texts]
     return [
         Family([Term(PLACE, "rim_mps", f"{t}*rim", SIZE, f"grip at {where}") for t in texts], gain),
+        Family(
+            [Term(PLACE, CHANNELS[2], f"{t}*omega", TURNS, f"turns at {where}") for t in texts],
+            turn,
+        ),
         Family([Term(PLACE, "vx_mps", t, 1.0, f"push at {where}") for t in toward], push),
         Family(
             [Term(PLACE, "vy_mps", f"{t}*vx", SIZE, f"compass at {where}") for t in texts], turned

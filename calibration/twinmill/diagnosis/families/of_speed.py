@@ -5,12 +5,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from twinmill.diagnosis.families.family import Family, Humps
+from twinmill.diagnosis.families.family import MOST, Family, Humps
 from twinmill.diagnosis.term import CHANNELS, COUPLING, SPEEDS, STILL, SWELL, TYPICAL, Term
 from twinmill.fitting.opening import Opened
 
 TURN = TYPICAL["omega_radps"]
-MOST = 0.99  # quantile of a speed up to which humps reach
 
 
 def of_speed(axis: int, speed: np.ndarray) -> Family:
