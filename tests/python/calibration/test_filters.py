@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Filters and chances are those of SciPy's own, larger packages."""
+"""Filters, sums and chances are those of SciPy's and NumPy's own, larger or slower ones."""
 
 import numpy as np
 import pytest
+import twinmill_native as native
 from scipy import signal, stats
 
 from twinmill import chance
@@ -21,6 +22,15 @@ def test_filter_does_what_lfilter_does(numerator, denominator, axis):
 
 def test_filter_of_nothing_is_nothing():
     assert filtered([0.1], [1, -0.9], np.zeros((0, 3))).shape == (0, 3)
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (1, 1), (5, 0), (7, 2), (100, 3)])
+def test_running_sums_are_cumsum(shape):
+    random = np.random.default_rng(1)
+    values, weights = random.normal(size=shape), random.normal(size=shape[0])
+    assert native.running_sums(values, weights) == pytest.approx(
+        np.cumsum(weights[:, None] * values, axis=0), abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("free", [1, 4, 30])
