@@ -18,7 +18,7 @@ import numpy as np
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.formula_search import formula_of
-from twinmill.diagnosis.library import LEFT_OVER, library
+from twinmill.diagnosis.library import LEFT_OVER, library, norms
 from twinmill.diagnosis.moments import Moment, moments_of
 from twinmill.diagnosis.place import comes_again
 from twinmill.diagnosis.settings import SETTINGS
@@ -150,7 +150,7 @@ class Formulas:
                 for (i, _), changed in zip(self.logs, changes, strict=True)
             ]
         )
-        before = np.linalg.norm(columns, axis=0)
+        before = norms(columns)
         if free.shape[1]:
             basis = np.linalg.qr(free)[0]
             along, parts = basis.T @ columns, 1 + len(columns) // MOST_ROWS
@@ -158,7 +158,7 @@ class Formulas:
                 np.array_split(columns, parts), np.array_split(basis, parts), strict=True
             ):
                 some -= own @ along
-        seen = np.linalg.norm(columns, axis=0) > LEFT_OVER * np.maximum(before, 1e-12)
+        seen = norms(columns) > LEFT_OVER * np.maximum(before, 1e-12)
         seen &= before > 1e-9
         columns[:, ~seen] = 0.0
         return Products(columns, left, blocks, seen)
@@ -464,12 +464,11 @@ class Products:
         moments = moments[None]
         if flips:
             moments = np.concatenate([moments, self._flipped(own, whole, flips)])
-        gain = np.zeros(1 + flips)
-        for k in range(FOLDS):
-            test = self.fold == k
-            fitted = np.linalg.solve(whole - grams[k], moments[:, ~test].sum(1).T).T
-            gain += 2 * np.sum(moments[:, test].sum(1) * fitted, axis=1)
-            gain -= np.sum(fitted @ grams[k] * fitted, axis=1)
+        folds = (self.fold == np.arange(FOLDS)[:, None]).astype(float)
+        judged = (folds @ moments).transpose(1, 0, 2)  # (FOLDS, 1 + F, k)
+        others = judged.sum(0) - judged
+        fitted = np.linalg.solve(whole - grams, others.swapaxes(1, 2)).swapaxes(1, 2)
+        gain = np.sum(fitted * (2 * judged - fitted @ grams), axis=(0, 2))
         return float(gain[0]), gain[1:]
 
     def _flipped(self, own: np.ndarray, whole: np.ndarray, flips: int) -> np.ndarray:
