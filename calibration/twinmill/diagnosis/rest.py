@@ -10,7 +10,7 @@ that it was not fitted to.
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -28,7 +28,7 @@ from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
 
 MOST_BLOCKS = 200
-MOST_ROWS = 20_000  # at a time, where each has hundreds of columns
+MOST_ROWS = 1000  # at a time, where each has hundreds of columns: they stay near the processor
 FOLDS = 5
 FLIPS = 499  # random signs of blocks that make the null distribution
 MOMENTS = "single moments"
@@ -144,12 +144,9 @@ class Formulas:
         changes = self.changes
         if beside:
             changes = [np.column_stack(pair) for pair in zip(beside, changes, strict=True)]
-        columns = np.concatenate(
-            [
-                np.sqrt(fit.weight(i, rows[i]))[:, None] * changed
-                for (i, _), changed in zip(self.logs, changes, strict=True)
-            ]
-        )
+        weight = np.concatenate([np.sqrt(fit.weight(i, rows[i])) for i, _ in self.logs])
+        columns = np.concatenate(changes)
+        columns *= weight[:, None]
         before = norms(columns)
         if free.shape[1]:
             basis = np.linalg.qr(free)[0]
@@ -442,7 +439,7 @@ class Products:
         """(T,) and (F, T): what `held_out` gives for each column alone."""
         energy, moments = self.energy, self.moments
         scatter = moments - energy * (moments.sum(0) / (energy.sum(0) + 1.0))
-        signs = _signs(flips, len(energy))[..., 0]
+        signs = _signs(flips, len(energy))
         gain = np.zeros((1 + flips, energy.shape[1]))
         for k in range(FOLDS):
             test = self.fold == k
@@ -461,25 +458,28 @@ class Products:
         """
         grams, moments = self.grams[:, own][:, :, own], self.moments[:, own]
         whole = grams.sum(0) + np.eye(own.sum())  # columns are in typical strengths
-        moments = moments[None]
-        if flips:
-            moments = np.concatenate([moments, self._flipped(own, whole, flips)])
-        folds = (self.fold == np.arange(FOLDS)[:, None]).astype(float)
-        judged = (folds @ moments).transpose(1, 0, 2)  # (FOLDS, 1 + F, k)
-        others = judged.sum(0) - judged
-        fitted = np.linalg.solve(whole - grams, others.swapaxes(1, 2)).swapaxes(1, 2)
+        scatter = self._scatter(own, whole) if flips else moments
+        signs = _signs(flips, len(moments))
+        judged = np.array(  # (FOLDS, 1 + F, k)
+            [
+                np.vstack([moments[test].sum(0), signs[:, test] @ scatter[test]])
+                for test in (self.fold == k for k in range(FOLDS))
+            ]
+        )
+        fitted = (judged.sum(0) - judged) @ np.linalg.inv(whole - grams)
         gain = np.sum(fitted * (2 * judged - fitted @ grams), axis=(0, 2))
         return float(gain[0]), gain[1:]
 
-    def _flipped(self, own: np.ndarray, whole: np.ndarray, flips: int) -> np.ndarray:
-        """(F, B, k) moments of these columns, with random signs of what each block scatters."""
+    def _scatter(self, own: np.ndarray, whole: np.ndarray) -> np.ndarray:
+        """(B, k) what each block's moments of these columns are beside those of the fit to all."""
         x, moments = self.columns[:, self.own[own]], self.moments[:, own]
         fitted = x * (x @ np.linalg.solve(whole, moments.sum(0)))[:, None]
         inside = np.add.reduceat(fitted, np.minimum(self.edges[:-1], len(x) - 1))
         inside[np.diff(self.edges) == 0] = 0.0
-        return _signs(flips, len(moments)) * (moments - inside)
+        return moments - inside
 
 
+@cache
 def _signs(flips: int, blocks: int) -> np.ndarray:
-    """(F, B, 1) random signs, the same for all that is tested."""
-    return np.random.default_rng(1).choice([-1.0, 1.0], (flips, blocks, 1))
+    """(F, B) random signs, the same for all that is tested."""
+    return np.random.default_rng(1).choice([-1.0, 1.0], (flips, blocks))
