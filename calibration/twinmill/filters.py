@@ -33,3 +33,9 @@ def filtered(
     diagonals = np.repeat(np.asarray(denominator, float)[:, None], len(flat), axis=1)
     found, _ = dtbtrs(diagonals, pushes, uplo="L", diag="U")
     return np.moveaxis(found.reshape(x.shape), 0, axis)
+
+
+def faded(keep: np.ndarray, pushes: np.ndarray) -> np.ndarray:
+    """(N,) y[n] = keep[n] y[n - 1] + pushes[n], from rest."""
+    found, _ = dtbtrs([np.ones(len(keep)), np.append(-keep[1:], 0.0)], pushes, uplo="L", diag="U")
+    return found

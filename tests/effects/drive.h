@@ -66,8 +66,9 @@ public:
         }
         if (const auto *on = std::get_if<OnGround>(&effect_.act()))
         {
-            GroundSignals ground{s.robot, s.t_s,       s.dt_s,   s.moves,  s.x_m,
-                                 s.y_m,   s.theta_rad, s.vx_mps, s.vy_mps, s.omega_radps};
+            GroundSignals ground{s.robot,  s.t_s,    s.dt_s,       s.moves,
+                                 s.x_m,    s.y_m,    s.theta_rad,  Direction::Of(s.theta_rad),
+                                 s.vx_mps, s.vy_mps, s.omega_radps};
             on->step(ground, numbers, state);
             s.vx_mps = ground.vx_mps;
             s.vy_mps = ground.vy_mps;

@@ -254,7 +254,7 @@ TEST(ModelFile, ReadsFormulasAndNarrowerBounds)
     model.Set("equation.p1", 1.1);
     const BoundEffect effect = model.effects[0].Bind();
     const RobotFacts robot;
-    GroundSignals s{robot, 0, 0, false, 0, 0, 0, 2, 0, 0};
+    GroundSignals s{robot, 0, 0, false, 0, 0, 0, {}, 2, 0, 0};
     std::get<OnGround>(effect.act()).step(s, effect.numbers(), nullptr);
     EXPECT_EQ(s.vy_mps, 2);
 }

@@ -50,6 +50,18 @@ TEST(Course, FollowsTheExactArcInStepsOfAnyLength)
     }
 }
 
+TEST(Direction, IsTheCosineAndTheSineOfItsAngle)
+{
+    for (const double rad : {-3.0, -0.051, -0.049, 0.0, 0.02, 0.049, 0.051, 1.0, 7.0})
+    {
+        const Direction ahead = Direction::Of(rad), turned = ahead.Turned(Direction::Of(0.3));
+        EXPECT_NEAR(ahead.c, std::cos(rad), 1e-15);
+        EXPECT_NEAR(ahead.s, std::sin(rad), 1e-15);
+        EXPECT_NEAR(turned.c, std::cos(rad + 0.3), 1e-15);
+        EXPECT_NEAR(turned.s, std::sin(rad + 0.3), 1e-15);
+    }
+}
+
 // Either side of the angle below which the chord is taken for the arc.
 TEST(PlanarPlant, HasNoStepBetweenStraightAndCurved)
 {

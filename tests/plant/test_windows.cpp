@@ -151,6 +151,23 @@ TEST(Windows, AreWhatThePlantDoesWhereTheRoomMatters)
                1e-3);
 }
 
+// Of poses that are rarer than the shortest horizon one ends where it begins, and two ends are one.
+TEST(Windows, EndWhereverTheyAreTold)
+{
+    const RandomDrive run;
+    const Model model = With("floor_patch", {0.3, 0.2, 0.4, 0.3}, Lagging(0.08));
+    const std::vector<int64_t> starts{3, 3, 7}, ends{3, 5, 5, 5, 7, -1};
+    const auto seen = PredictWindows(model, run.track(), starts, ends);
+    for (size_t axis = 0; axis < 3; ++axis)
+    {
+        EXPECT_NEAR(seen[axis], run.pose[3 * 3 + axis], 1e-15);
+        EXPECT_EQ(seen[3 + axis], seen[6 + axis]);
+        EXPECT_EQ(seen[6 + axis], seen[9 + axis]);
+        EXPECT_NEAR(seen[12 + axis], run.pose[3 * 7 + axis], 1e-15);
+        EXPECT_TRUE(std::isnan(seen[15 + axis]));
+    }
+}
+
 // What a formula remembers of the ground was there before a window began. Without a lag the speed
 // is constant from command to command, and the state is exact.
 TEST(Windows, BeginWithWhatTheGroundRemembers)

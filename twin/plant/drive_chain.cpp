@@ -267,27 +267,39 @@ void DriveChain::Disturb(Twist &twist, double dt_s, RobotState &state, Random &r
 Twist DriveChain::BodyTwist(const WheelMotion &motion, double t_s, double dt_s, RobotState &state,
                             Random *random) const
 {
-    Twist twist = kinematics_.Forward(motion);
+    const Direction ahead = ground_.empty() ? Direction{} : Direction::Of(state.pose.theta_rad);
+    return OnFloor(Roll(motion), ahead, t_s, dt_s, state, random);
+}
+
+Rolling DriveChain::Roll(const WheelMotion &motion) const
+{
+    return {kinematics_.Forward(motion),
+            std::any_of(motion.rim_mps.begin(), motion.rim_mps.end(),
+                        [](double v) { return std::abs(v) > kStandstill_mps; })};
+}
+
+Twist DriveChain::OnFloor(const Rolling &rolling, const Direction &ahead, double t_s, double dt_s,
+                          RobotState &state, Random *random) const
+{
+    Twist twist = rolling.twist;
     twist.vx_mps *= base_.forward_gain * theta_a1_;
     twist.vy_mps *= base_.sideways_gain * theta_a1_;
     twist.omega_radps *= base_.yaw_gain * theta_a2_;
     if (kinematics_.steers())
         twist.vy_mps += kinematics_.SidewaysOfTurning(twist.omega_radps);
 
-    const bool moves = std::any_of(motion.rim_mps.begin(), motion.rim_mps.end(),
-                                   [](double v) { return std::abs(v) > kStandstill_mps; });
-    if (random && moves)
+    if (random && rolling.moves)
         Disturb(twist, dt_s, state, *random);
     if (!ground_.empty())
-        ActOnGround(twist, moves, t_s, dt_s, state);
+        ActOnGround(twist, rolling.moves, ahead, t_s, dt_s, state);
     state.vx_mps = twist.vx_mps;
     state.vy_mps = twist.vy_mps;
     state.omega_radps = twist.omega_radps;
     return twist;
 }
 
-void DriveChain::ActOnGround(Twist &twist, bool moves, double t_s, double dt_s,
-                             RobotState &state) const
+void DriveChain::ActOnGround(Twist &twist, bool moves, const Direction &ahead, double t_s,
+                             double dt_s, RobotState &state) const
 {
     GroundSignals s{robot_,
                     t_s,
@@ -296,6 +308,7 @@ void DriveChain::ActOnGround(Twist &twist, bool moves, double t_s, double dt_s,
                     state.pose.x_m,
                     state.pose.y_m,
                     state.pose.theta_rad,
+                    ahead,
                     twist.vx_mps,
                     twist.vy_mps,
                     twist.omega_radps};

@@ -6,29 +6,6 @@
 namespace twin
 {
 
-namespace
-{
-
-// Below this square of an angle the series are exact: their next terms are under 1e-15.
-constexpr double kSmallSquare = 0.0025;
-
-// sin(a) / a
-double SinOver(double a)
-{
-    const double square = a * a;
-    return square < kSmallSquare ? 1 - square / 6 * (1 - square / 20 * (1 - square / 42))
-                                 : std::sin(a) / a;
-}
-
-double Cos(double a)
-{
-    const double square = a * a;
-    return square < kSmallSquare ? 1 - square / 2 * (1 - square / 12 * (1 - square / 30))
-                                 : std::cos(a);
-}
-
-}  // namespace
-
 Pose2 AlongArc(const Pose2 &from, const Twist &v, double dt_s)
 {
     // Chord of the arc: its direction is the middle heading, its length shrinks by sin(a)/a.
@@ -40,22 +17,17 @@ Pose2 AlongArc(const Pose2 &from, const Twist &v, double dt_s)
             from.y_m + chord_s * (s * v.vx_mps + c * v.vy_mps), from.theta_rad + 2 * half_rad};
 }
 
-Course::Course(const Pose2 &start)
-    : pose_(start), cos_(std::cos(start.theta_rad)), sin_(std::sin(start.theta_rad))
-{
-}
+Course::Course(const Pose2 &start) : pose_(start), ahead_(Direction::Of(start.theta_rad)) {}
 
 void Course::Follow(const Twist &v, double dt_s)
 {
     const double half_rad = v.omega_radps * dt_s / 2;
-    const double over = SinOver(half_rad), c = Cos(half_rad), s = half_rad * over;
-    const double middle_c = cos_ * c - sin_ * s, middle_s = sin_ * c + cos_ * s;
-    const double chord_s = dt_s * over;
-    pose_.x_m += chord_s * (middle_c * v.vx_mps - middle_s * v.vy_mps);
-    pose_.y_m += chord_s * (middle_s * v.vx_mps + middle_c * v.vy_mps);
+    const double over = SinOver(half_rad), chord_s = dt_s * over;
+    const Direction turn{Cos(half_rad), half_rad * over}, middle = ahead_.Turned(turn);
+    pose_.x_m += chord_s * (middle.c * v.vx_mps - middle.s * v.vy_mps);
+    pose_.y_m += chord_s * (middle.s * v.vx_mps + middle.c * v.vy_mps);
     pose_.theta_rad += 2 * half_rad;
-    cos_ = middle_c * c - middle_s * s;
-    sin_ = middle_s * c + middle_c * s;
+    ahead_ = middle.Turned(turn);
 }
 
 void PlanarStep(const DriveChain &chain, const Command &command, double t_s, double dt_s,

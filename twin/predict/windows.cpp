@@ -63,7 +63,7 @@ std::vector<Sample> MeasuredAt(const DriveChain &chain, const Track &track, cons
 struct WheelStep
 {
     double t_s, dt_s;
-    WheelMotion motion;
+    Rolling rolling;
 };
 
 struct Recording
@@ -86,7 +86,8 @@ Recording Record(const DriveChain &chain, const Track &track, const std::vector<
     for (const Sample &sample : measured)
     {
         playback.Advance(sample.t_s, [&](const Command &command, double t_s, double dt_s) {
-            recording.steps.push_back({t_s, dt_s, chain.DriveWheels(command, t_s, dt_s, state)});
+            const WheelMotion motion = chain.DriveWheels(command, t_s, dt_s, state);
+            recording.steps.push_back({t_s, dt_s, chain.Roll(motion)});
         });
         recording.event_t_s.push_back(sample.t_s);
         recording.reached.push_back(recording.steps.size());
@@ -94,16 +95,20 @@ Recording Record(const DriveChain &chain, const Track &track, const std::vector<
     return recording;
 }
 
-// The robot moved along its course over steps [from, to) of the recording.
+// The robot moved along its course by a step.
+void Move(const DriveChain &chain, const WheelStep &step, Course &course, RobotState &state)
+{
+    state.pose = course.pose();
+    course.Follow(chain.OnFloor(step.rolling, course.ahead(), step.t_s, step.dt_s, state, nullptr),
+                  step.dt_s);
+}
+
+// The same over steps [from, to) of the recording.
 void Move(const DriveChain &chain, const Recording &recording, size_t from, size_t to,
           Course &course, RobotState &state)
 {
     for (size_t i = from; i < to; ++i)
-    {
-        const WheelStep &step = recording.steps[i];
-        state.pose = course.pose();
-        course.Follow(chain.BodyTwist(step.motion, step.t_s, step.dt_s, state, nullptr), step.dt_s);
-    }
+        Move(chain, recording.steps[i], course, state);
 }
 
 // Where a robot that starts at `start` gets to while another that starts at `from` goes its way.
@@ -194,24 +199,50 @@ private:
                 [&](size_t to, double *seen) { WriteSeen(chain, shifted.At(path[to]), seen); });
     }
 
+    // A window under way: where its robot is, and which of its ends come next.
+    struct Walker
+    {
+        Course course;
+        RobotState state;
+        size_t next, last;
+    };
+
+    // All windows that are under way make a step together: the processor begins with one while it
+    // waits for what another one's step came to.
     void EachFromItsStart() const
     {
         const auto remembered = Remembered(chain, measured, recording);
-        RobotState state = chain.Start({});
-        Course course({});
-        size_t done = 0;
-        ForEach(
-            [&](size_t from) {
-                course = Course(measured[from].pose);
+        const size_t horizons = windows.Horizons();
+        std::vector<Walker> walkers;
+        size_t window = 0, step = 0;
+        for (size_t event = 0; event < measured.size(); ++event)
+        {
+            for (; step < recording.reached[event]; ++step)
+                for (Walker &walker : walkers)
+                    Move(chain, recording.steps[step], walker.course, walker.state);
+            for (; window < windows.starts.size() && events.At(windows.starts[window]) == event;
+                 ++window)
+            {
+                RobotState state = chain.Start({});
                 if (!remembered.empty())
-                    state.effect_state = remembered[from];
-                done = recording.reached[from];
-            },
-            [&](size_t to, double *seen) {
-                Move(chain, recording, done, recording.reached[to], course, state);
-                done = recording.reached[to];
-                WriteSeen(chain, course.pose(), seen);
-            });
+                    state.effect_state = remembered[event];
+                walkers.push_back({Course(measured[event].pose), std::move(state),
+                                   window * horizons, (window + 1) * horizons});
+            }
+            std::erase_if(walkers, [&](Walker &walker) { return IsThrough(walker, event); });
+        }
+    }
+
+    // Writes what is seen at those of a window's ends that are at an event; true if no other comes.
+    bool IsThrough(Walker &walker, size_t event) const
+    {
+        for (; walker.next < walker.last && windows.ends[walker.next] >= 0; ++walker.next)
+        {
+            if (events.At(windows.ends[walker.next]) != event)
+                return false;
+            WriteSeen(chain, walker.course.pose(), out + 3 * walker.next);
+        }
+        return true;
     }
 };
 

@@ -334,6 +334,23 @@ Array Steady(const Model &model, Matrix commands, const std::vector<std::string>
     return ToNumpy(std::move(steady), {rows, commands.shape(0), kSteadyValues});
 }
 
+// What numpy.cumsum does of weighted rows, row by row and not value by value.
+Array RunningSums(Matrix values, Vector weights)
+{
+    const size_t count = values.shape(0), width = values.shape(1);
+    if (weights.size() != count)
+        throw std::invalid_argument("weights must be as many as rows of values");
+    std::vector<double> sums(count * width), row(width);
+    for (size_t n = 0; n < count; ++n)
+    {
+        const double weight = weights.data()[n], *value = values.data() + n * width;
+        for (size_t f = 0; f < width; ++f)
+            row[f] += weight * value[f];
+        std::ranges::copy(row, sums.begin() + static_cast<std::ptrdiff_t>(n * width));
+    }
+    return ToNumpy(std::move(sums), {count, width});
+}
+
 }  // namespace
 
 NB_MODULE(twinmill_native, m)
@@ -427,6 +444,9 @@ NB_MODULE(twinmill_native, m)
         },
         "model"_a, "track"_a, "seed"_a,
         "(N, 3) poses had this model, with its noise, been driven.");
+
+    m.def("running_sums", &RunningSums, "values"_a, "weights"_a,
+          "(N, F) sums of rows of values (N, F), each times its weight (N,), up to each.");
 
     BindSwarms(m);
     BindThreshold(m);

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
-from scipy.optimize import minimize
 
 from twinmill.data.log import RobotLog
 
@@ -72,6 +71,8 @@ def find_time_base(robot: RobotLog) -> TimeBase | None:
     corners = np.array([(offset_s, rate, rate)] * 4) + np.vstack(
         [np.zeros(3), np.diag([OFFSETS_S, 0.01, -0.03])]
     )
+    from scipy.optimize import minimize  # few logs get here
+
     found = minimize(
         problem.loss, corners[0], method="Nelder-Mead", options={"initial_simplex": corners}
     )

@@ -24,6 +24,7 @@ from twinmill.diagnosis.term import (
     Term,
     displaced,
 )
+from twinmill.filters import faded
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.response import Response
 
@@ -199,13 +200,8 @@ class Motion:
         if not form.state.goal:
             return np.cumsum(rate * step_s) - rate * step_s / 2
         keep = np.exp(-rate * step_s)
-        push = (goal * (1 - keep)).tolist()
-        found, s = [], 0.0
-        for k, p in zip(keep.tolist(), push, strict=True):
-            before = s
-            s = k * s + p
-            found.append((before + s) / 2)
-        return np.array(found)
+        after = faded(keep, goal * (1 - keep))
+        return (after + np.append(0.0, after[:-1])) / 2
 
     def columns(self, forms: Sequence[Form]) -> np.ndarray:
         """(W, H, 3, K) change of the log's errors by each number of some forms, in floors."""

@@ -91,6 +91,11 @@ def _across(group: str, formula: str, to: str) -> str:
     return "turning rate" if formula == "abs(omega)" else "speed"
 
 
+def norms(columns: np.ndarray) -> np.ndarray:
+    """(T,) lengths of (R, T) columns, which are too large for another array of their squares."""
+    return np.sqrt(np.einsum("rt,rt->t", columns, columns))
+
+
 def _terms_of_all_speeds(terms: Sequence[Term]) -> tuple[list[Term], np.ndarray]:
     """What changes all speeds alike with time, and (T, n) its parts among the body's terms."""
     carriers = dict(zip(CHANNELS, SPEEDS, strict=True))

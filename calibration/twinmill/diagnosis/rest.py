@@ -10,7 +10,7 @@ that it was not fitted to.
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +18,7 @@ import numpy as np
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.formula_search import formula_of
-from twinmill.diagnosis.library import LEFT_OVER, library
+from twinmill.diagnosis.library import LEFT_OVER, library, norms
 from twinmill.diagnosis.moments import Moment, moments_of
 from twinmill.diagnosis.place import comes_again
 from twinmill.diagnosis.settings import SETTINGS
@@ -28,7 +28,7 @@ from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
 
 MOST_BLOCKS = 200
-MOST_ROWS = 20_000  # at a time, where each has hundreds of columns
+MOST_ROWS = 1000  # at a time, where each has hundreds of columns: they stay near the processor
 FOLDS = 5
 RIDGES = (1.0, 0.03)  # of what is of usual strength, and of what is far stronger
 FLIPS = 499  # random signs of blocks that make the null distribution
@@ -147,13 +147,10 @@ class Formulas:
         changes = self.changes
         if beside:
             changes = [np.column_stack(pair) for pair in zip(beside, changes, strict=True)]
-        columns = np.concatenate(
-            [
-                np.sqrt(fit.weight(i, rows[i]))[:, None] * changed
-                for (i, _), changed in zip(self.logs, changes, strict=True)
-            ]
-        )
-        before = np.linalg.norm(columns, axis=0)
+        weight = np.concatenate([np.sqrt(fit.weight(i, rows[i])) for i, _ in self.logs])
+        columns = np.concatenate(changes)
+        columns *= weight[:, None]
+        before = norms(columns)
         if free.shape[1]:
             basis = np.linalg.qr(free)[0]
             along, parts = basis.T @ columns, 1 + len(columns) // MOST_ROWS
@@ -161,7 +158,7 @@ class Formulas:
                 np.array_split(columns, parts), np.array_split(basis, parts), strict=True
             ):
                 some -= own @ along
-        seen = np.linalg.norm(columns, axis=0) > LEFT_OVER * np.maximum(before, 1e-12)
+        seen = norms(columns) > LEFT_OVER * np.maximum(before, 1e-12)
         seen &= before > 1e-9
         columns[:, ~seen] = 0.0
         return Products(columns, left, blocks, seen)
@@ -450,7 +447,7 @@ class Products:
         """(T,) and (F, T): what `held_out` gives for each column alone."""
         energy, moments = self.energy, self.moments
         scatter = moments - energy * (moments.sum(0) / (energy.sum(0) + ridge))
-        signs = _signs(flips, len(energy))[..., 0]
+        signs = _signs(flips, len(energy))
         gain = np.zeros((1 + flips, energy.shape[1]))
         for k in range(FOLDS):
             test = self.fold == k
@@ -471,26 +468,28 @@ class Products:
         """
         grams, moments = self.grams[:, own][:, :, own], self.moments[:, own]
         whole = grams.sum(0) + ridge * np.eye(own.sum())  # columns are in typical strengths
-        moments = moments[None]
-        if flips:
-            moments = np.concatenate([moments, self._flipped(own, whole, flips)])
-        gain = np.zeros(1 + flips)
-        for k in range(FOLDS):
-            test = self.fold == k
-            fitted = np.linalg.solve(whole - grams[k], moments[:, ~test].sum(1).T).T
-            gain += 2 * np.sum(moments[:, test].sum(1) * fitted, axis=1)
-            gain -= np.sum(fitted @ grams[k] * fitted, axis=1)
+        scatter = self._scatter(own, whole) if flips else moments
+        signs = _signs(flips, len(moments))
+        judged = np.array(  # (FOLDS, 1 + F, k)
+            [
+                np.vstack([moments[test].sum(0), signs[:, test] @ scatter[test]])
+                for test in (self.fold == k for k in range(FOLDS))
+            ]
+        )
+        fitted = (judged.sum(0) - judged) @ np.linalg.inv(whole - grams)
+        gain = np.sum(fitted * (2 * judged - fitted @ grams), axis=(0, 2))
         return float(gain[0]), gain[1:]
 
-    def _flipped(self, own: np.ndarray, whole: np.ndarray, flips: int) -> np.ndarray:
-        """(F, B, k) moments of these columns, with random signs of what each block scatters."""
+    def _scatter(self, own: np.ndarray, whole: np.ndarray) -> np.ndarray:
+        """(B, k) what each block's moments of these columns are beside those of the fit to all."""
         x, moments = self.columns[:, self.own[own]], self.moments[:, own]
         fitted = x * (x @ np.linalg.solve(whole, moments.sum(0)))[:, None]
         inside = np.add.reduceat(fitted, np.minimum(self.edges[:-1], len(x) - 1))
         inside[np.diff(self.edges) == 0] = 0.0
-        return _signs(flips, len(moments)) * (moments - inside)
+        return moments - inside
 
 
+@cache
 def _signs(flips: int, blocks: int) -> np.ndarray:
-    """(F, B, 1) random signs, the same for all that is tested."""
-    return np.random.default_rng(1).choice([-1.0, 1.0], (flips, blocks, 1))
+    """(F, B) random signs, the same for all that is tested."""
+    return np.random.default_rng(1).choice([-1.0, 1.0], (flips, blocks))

@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.fitting.response import Response
 from twinmill.model.parameters import words
@@ -72,21 +73,20 @@ def displaced(
     response: Response, velocity: np.ndarray, values: np.ndarray, axis: int
 ) -> np.ndarray:
     """(W, H, 3, T) change of windows' displacements by (N, T) velocities in a body axis, linear."""
-    step, heading = response.step_s[:, None], response.heading_rad
-    c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
+    step, c, s = response.step_s, np.cos(response.heading_rad), np.sin(response.heading_rad)
     start, ends = response.starts, np.maximum(response.ends, 0)
     if axis < 2:
         along = (c, s) if axis == 0 else (-s, c)
-        x, y = (np.cumsum(a * step * values, axis=0) for a in along)
+        x, y = (native.running_sums(values, a * step) for a in along)
         dx, dy = x[ends] - x[start][:, None], y[ends] - y[start][:, None]
         turn = np.zeros_like(dx)
     else:
-        angle = np.cumsum(step * values, axis=0)
-        middle = angle - step * values / 2
-        wx = -(s[:, 0] * velocity[:, 0] + c[:, 0] * velocity[:, 1])[:, None] * step
-        wy = (c[:, 0] * velocity[:, 0] - s[:, 0] * velocity[:, 1])[:, None] * step
-        x, y = np.cumsum(middle * wx, axis=0), np.cumsum(middle * wy, axis=0)
-        ox, oy = np.cumsum(wx, axis=0), np.cumsum(wy, axis=0)
+        angle = native.running_sums(values, step)
+        middle = angle - step[:, None] * values / 2
+        wx = -(s * velocity[:, 0] + c * velocity[:, 1]) * step
+        wy = (c * velocity[:, 0] - s * velocity[:, 1]) * step
+        x, y = native.running_sums(middle, wx), native.running_sums(middle, wy)
+        ox, oy = np.cumsum(wx)[:, None], np.cumsum(wy)[:, None]
         first = angle[start][:, None]
         dx = x[ends] - x[start][:, None] - first * (ox[ends] - ox[start][:, None])
         dy = y[ends] - y[start][:, None] - first * (oy[ends] - oy[start][:, None])

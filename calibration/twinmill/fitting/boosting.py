@@ -8,6 +8,7 @@ Binder 2006). It ends where none lowers that error by what is worth it.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -48,6 +49,17 @@ class Parts:
         """(R,) bool: rows of part k."""
         return self.inside == k
 
+    @cached_property
+    def slices(self) -> list[slice]:
+        """Of each part, where rows are in the order of their parts."""
+        edges = np.searchsorted(self.inside, np.arange(self.count + 1))
+        return [slice(a, b) for a, b in pairwise(edges)]
+
+    @cached_property
+    def neighbours(self) -> list[np.ndarray]:
+        """Numbers of the rows beside each part."""
+        return [np.flatnonzero(self.beside(k)) for k in range(self.count)]
+
     def beside(self, k: int) -> np.ndarray:
         """(R,) bool: rows of other parts that touch part k."""
         return ((self.begins == k) | (self.ends == k)) & (self.inside != k)
@@ -63,12 +75,12 @@ class Learner:
 
     def __init__(self, x: np.ndarray, parts: Parts) -> None:
         self.x = x.astype(np.float32)
-        edges = np.searchsorted(parts.inside, np.arange(parts.count + 1))
-        self.within = [slice(a, b) for a, b in pairwise(edges)]
-        self.beside = [np.flatnonzero(parts.beside(k)) for k in range(parts.count)]
+        self.within, self.beside = parts.slices, parts.neighbours
         self.x_beside = [self.x[k] for k in self.beside]
-        inside = np.array([x[k].T @ x[k] for k in self.within])
-        beside = np.array([x[k].T @ x[k] for k in self.beside])
+        inside, beside = (
+            np.array([own.T @ own for own in (x[k] for k in rows)])
+            for rows in (self.within, self.beside)
+        )
         self.total = inside.sum(axis=0)
         self.mean = max(float(np.diag(self.total).mean()), 1e-30)
         values, self.vectors = np.linalg.eigh(self.total - inside - beside)

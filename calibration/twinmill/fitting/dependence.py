@@ -11,6 +11,7 @@ would change in a robot that lacks them.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import twinmill_native as native
@@ -249,8 +250,9 @@ def _count(along: np.ndarray, shortest: float, most: int) -> int:
 def _waves(along: np.ndarray, shortest: float) -> Iterator[np.ndarray]:
     """(N, 4) two neighbouring frequencies at a time, so that one between them is matched."""
     angle = np.pi * along / max(1.1 * np.ptp(along), 1e-9)
-    for k in range(2, 2 * _count(along, shortest, MOST_WAVES)):
-        yield np.hstack([_harmonics(k * angle)[:, :2], _harmonics((k + 1) * angle)[:, :2]])
+    last = 2 * _count(along, shortest, MOST_WAVES)
+    waves = [np.column_stack([np.cos(k * angle), np.sin(k * angle)]) for k in range(2, last + 1)]
+    yield from (np.hstack(two) for two in pairwise(waves))
 
 
 def _levels(size: np.ndarray) -> np.ndarray:

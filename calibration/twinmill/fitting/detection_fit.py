@@ -14,7 +14,6 @@ from itertools import product
 
 import numpy as np
 import twinmill_native as native
-from scipy.optimize import minimize
 
 from twinmill.fitting.detection_evidence import VOTE_WEIGHT, HeldOutFrames, weigh
 from twinmill.model.parameters import Parameter, ParameterEstimate, stated_names
@@ -97,6 +96,8 @@ class DetectionFit:
         unit = np.array([abs(p.strength) for p in self.shared])
         low, high = (np.array([getattr(p, k) for p in self.shared]) for k in ("min", "max"))
         low, high = np.maximum(low, begin - REACH * unit), np.minimum(high, begin + REACH * unit)
+        from scipy.optimize import minimize  # most logs have no detections
+
         found = minimize(
             lambda x: -self.likelihood(x * unit, half),
             np.clip(begin, low, high) / unit,

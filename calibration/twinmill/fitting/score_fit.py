@@ -84,6 +84,9 @@ class ScoreFit:
         self.by_channel = by_channel
         self.scales = [d.channel if by_channel else np.zeros_like(d.channel) for d in datasets]
         self.datasets, self.shared = list(datasets), list(shared)
+        # (G,) share of each data set's score that each scale makes up.
+        pairs = zip(self.scales, self.datasets, strict=True)
+        self.judged = [np.bincount(scale, d.judged) for scale, d in pairs]
         self.models = [m.copy() for m in models]
         self.unknowns = self._unknowns()
         parts = [u.parameter for u in self.unknowns]
@@ -139,8 +142,10 @@ class ScoreFit:
         """(R,) rows of each data set at (P,) values."""
         return [self.batch(i, x[None])[0] for i in range(len(self.datasets))]
 
-    def _slopes(self, x: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Rows of each data set, and (R, P_i) slopes by its own columns."""
+    def _slopes(
+        self, x: np.ndarray, known: Sequence[np.ndarray] = ()
+    ) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Rows of each data set, which may be known, and (R, P_i) slopes by its own columns."""
         up = np.where(x + self.step <= self.high, self.step, -self.step)
         both = self.central & (x + self.step <= self.high) & (x - self.step >= self.low)
         rows, slopes = [], []
@@ -151,7 +156,10 @@ class ScoreFit:
                     point = x.copy()
                     point[c] += sign * up[c]
                     points.append(point)
-            values = self.batch(i, np.array(points))
+            if known and len(own):
+                values = np.vstack([known[i], self.batch(i, np.array(points[1:]))])
+            else:
+                values = self.batch(i, np.array(points))
             columns, k = [], 1
             for c in own:
                 if both[c]:
@@ -184,16 +192,12 @@ class ScoreFit:
     def _squares(self, i: int, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(G,) squared score of each scale of data set i, and its number of independent errors."""
         scale = self.scales[i]
-        square = np.bincount(scale, rows**2, scale.max() + 1)
-        judged = self._judged(i)
+        judged = self.judged[i]
+        square = np.bincount(scale, rows**2, len(judged))
         share = judged / max(judged.sum(), 1e-12)
         n = self.datasets[i].n_eff * (judged > 0) / max(np.count_nonzero(judged), 1)
         square = np.where(judged > 0, square / np.where(judged > 0, share, 1), 1.0)
         return np.maximum(square, LEAST_SQUARE), n
-
-    def _judged(self, i: int) -> np.ndarray:
-        """(G,) share of data set i's score that each scale makes up."""
-        return np.bincount(self.scales[i], self.datasets[i].judged, self.scales[i].max() + 1)
 
     def _normal(
         self, rows: list[np.ndarray], slopes: list[np.ndarray], x: np.ndarray
@@ -210,7 +214,7 @@ class ScoreFit:
     def weight(self, i: int, rows: np.ndarray) -> np.ndarray:
         """(R,) weights with which squares of rows add up to the cost, near these rows."""
         square, n = self._squares(i, rows)
-        judged = self._judged(i)
+        judged = self.judged[i]
         share = np.where(judged > 0, judged / max(judged.sum(), 1e-12), 1.0)
         return (n / square / share)[self.scales[i]]
 
@@ -285,7 +289,7 @@ class ScoreFit:
                 if done == rounds:  # slopes are found where they are asked for
                     slopes = None
                     break
-                rows, slopes = self._slopes(x)
+                rows, slopes = self._slopes(x, then)
                 if fell < CONVERGED * max(1.0, self.sizes.sum() * 1e-2):
                     break
             if slopes is not None:

@@ -9,7 +9,6 @@ phi = exp(-dt / tau). Whitened, they have unit variance and no memory.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from twinmill.filters import filtered
 from twinmill.predict.residual import StepGrid
@@ -22,6 +21,13 @@ TRANSIENT = 20  # steps after a break in which the filter settles
 # Residuals of a noise-free log are numerical error.
 LEAST = ((1e-5, 1e-4), (1e-4, 1e-3))
 LEAST_MEMORY_S = 0.15
+MEMORIES_S = (0.03, 0.15, 0.6)  # at which a fit begins
+MEMORY_S = (0.01, 2.0)  # beyond these a fit is held back ...
+HELD_BACK = 1e3  # ... by this times the square of the logarithm
+LOGS = (-25.0, 5.0)  # of all quantities
+ROUNDS = 60
+CONVERGED = 1e-9  # fall of the cost
+TINY = 1e-9  # curvature of what has no trace
 
 
 @dataclass(frozen=True)
@@ -34,10 +40,23 @@ class ChannelNoise:
 
     def spectrum(self, frequency_Hz: np.ndarray, period_s: float) -> np.ndarray:
         """Power of one-step errors per sample at these frequencies."""
+        sensor, drive, _ = self.spectra(frequency_Hz, period_s)
+        return sensor + drive
+
+    def spectra(
+        self, frequency_Hz: np.ndarray, period_s: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Power of the sensor and of the drive, and the drive's slope by the log of its memory."""
         cosine = np.cos(2 * np.pi * frequency_Hz * period_s)
         phi = np.exp(-period_s / self.memory_s)
-        drive = (period_s * self.drive) ** 2 * (1 - phi**2) / (1 + phi**2 - 2 * phi * cosine)
-        return self.sensor**2 * (2 - 2 * cosine) + drive
+        poles = 1 + phi**2 - 2 * phi * cosine
+        drive = (period_s * self.drive) ** 2 * (1 - phi**2) / poles
+        by_phi = -2 * phi / (1 - phi**2) - 2 * (phi - cosine) / poles
+        return (
+            self.sensor**2 * (2 - 2 * cosine),
+            drive,
+            drive * by_phi * phi * period_s / self.memory_s,
+        )
 
     def displaced(self, horizon_s: np.ndarray) -> np.ndarray:
         """Variance of a displacement over these times: the drive's integral, two readings."""
@@ -178,20 +197,51 @@ def _fit_channel(
     sensor = np.sqrt(power[-len(power) // 4 :].mean() / 4)
     drive = np.sqrt(power[: len(power) // 8].mean()) / period_s / 5
 
-    def unpack(logs: np.ndarray) -> ChannelNoise:
-        return ChannelNoise(*np.exp(np.clip(logs, -25, 5)))
+    whittle = _Whittle(power, taken, frequency_Hz, period_s)
+    fits = [whittle.least(np.log([sensor, drive, memory_s])) for memory_s in MEMORIES_S]
+    return ChannelNoise(*np.exp(min(fits, key=lambda fit: fit[0])[1]))
 
-    def cost(logs: np.ndarray) -> float:
-        model = taken @ unpack(logs).spectrum(frequency_Hz, period_s)
-        outside = np.clip(np.log(0.01) - logs[2], 0, None) + np.clip(logs[2] - np.log(2.0), 0, None)
-        return float(np.sum(np.log(model) + power / model) + 1e3 * outside**2)
 
-    starts = [np.log([sensor, drive, memory_s]) for memory_s in (0.03, 0.15, 0.6)]
-    best = min(
-        (
-            minimize(cost, s, method="Nelder-Mead", options={"maxiter": 600, "xatol": 1e-4})
-            for s in starts
-        ),
-        key=lambda found: found.fun,
-    )
-    return unpack(best.x)
+@dataclass(frozen=True)
+class _Whittle:
+    """The cost of a noise whose sensor, drive and memory have these logarithms.
+
+    Attributes:
+        power: (F,) that was found.
+        taken: (F, N) what each bin takes in of N frequencies.
+        frequency_Hz: (N,) these.
+        period_s: of the steps.
+    """
+
+    power: np.ndarray
+    taken: np.ndarray
+    frequency_Hz: np.ndarray
+    period_s: float
+
+    def at(self, logs: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        """Cost, its (3,) slope and (3, 3) expected curvature (Fisher's information)."""
+        spectra = ChannelNoise(*np.exp(logs)).spectra(self.frequency_Hz, self.period_s)
+        sensor, drive, bent = (self.taken @ np.stack(spectra, axis=-1)).T
+        model = sensor + drive
+        slopes = np.array([2 * sensor, 2 * drive, bent]) / model
+        over = logs[2] - np.clip(logs[2], *np.log(MEMORY_S))
+        cost = np.sum(np.log(model) + self.power / model) + HELD_BACK * over**2
+        push = slopes @ (1 - self.power / model) + (0, 0, 2 * HELD_BACK * over)
+        curvature = slopes @ slopes.T + np.diag([0, 0, 2 * HELD_BACK * (over != 0)])
+        return float(cost), push, curvature
+
+    def least(self, logs: np.ndarray) -> tuple[float, np.ndarray]:
+        """Least cost near some logs, and where it is: Fisher's scoring, damped."""
+        damping, (cost, push, curvature) = 1e-3, self.at(logs)
+        for _ in range(ROUNDS):
+            lifted = curvature + np.diag(damping * np.diag(curvature) + TINY)
+            moved = np.clip(logs - np.linalg.solve(lifted, push), *LOGS)
+            then = self.at(moved)
+            if not then[0] < cost:
+                damping *= 10
+                continue
+            fell, logs, damping = cost - then[0], moved, damping / 10
+            cost, push, curvature = then
+            if fell < CONVERGED:
+                break
+        return cost, logs

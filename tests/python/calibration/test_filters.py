@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Filters and chances are those of SciPy's own, larger packages."""
+"""Filters, sums and chances are those of SciPy's and NumPy's own, larger or slower ones."""
 
 import numpy as np
 import pytest
+import twinmill_native as native
 from scipy import signal, stats
 
 from twinmill import chance
-from twinmill.filters import filtered
+from twinmill.filters import faded, filtered
 
 
 @pytest.mark.parametrize(
@@ -21,6 +22,26 @@ def test_filter_does_what_lfilter_does(numerator, denominator, axis):
 
 def test_filter_of_nothing_is_nothing():
     assert filtered([0.1], [1, -0.9], np.zeros((0, 3))).shape == (0, 3)
+
+
+def test_what_fades_evenly_does_what_lfilter_does():
+    values = np.random.default_rng(1).normal(size=60)
+    expected = signal.lfilter([1], [1, -0.9], values)
+    assert faded(np.full(60, 0.9), values) == pytest.approx(expected, abs=1e-12)
+
+
+def test_what_is_forgotten_at_once_leaves_the_last_push():
+    keep, pushes = np.array([0.5, 1.0, 0.0, 1.0]), np.array([1.0, 2.0, 4.0, 8.0])
+    assert faded(keep, pushes) == pytest.approx([1, 3, 4, 12])
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (1, 1), (5, 0), (7, 2), (100, 3)])
+def test_running_sums_are_cumsum(shape):
+    random = np.random.default_rng(1)
+    values, weights = random.normal(size=shape), random.normal(size=shape[0])
+    assert native.running_sums(values, weights) == pytest.approx(
+        np.cumsum(weights[:, None] * values, axis=0), abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("free", [1, 4, 30])

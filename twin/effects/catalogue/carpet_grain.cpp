@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
-
 #include "effects/effect.h"
 
 namespace twin
@@ -38,8 +36,7 @@ void Step(GroundSignals &s, const Numbers &v, double *)
     const double squared = s.vx_mps * s.vx_mps + s.vy_mps * s.vy_mps;
     if (squared <= 0)
         return;
-    const double heading_rad = s.theta_rad + s.omega_radps * s.dt_s / 2;
-    const double c = std::cos(heading_rad), d = std::sin(heading_rad);
+    const auto [c, d] = s.AheadAfter(s.dt_s / 2);
     const double x_mps = c * s.vx_mps - d * s.vy_mps, y_mps = d * s.vx_mps + c * s.vy_mps;
     const double cos2 = (x_mps * x_mps - y_mps * y_mps) / squared;
     const double sin2 = 2 * x_mps * y_mps / squared;

@@ -54,8 +54,7 @@ void Step(GroundSignals &s, const Numbers &v, double *)
     if (v[0] == 0)
         return;
     const double half_s = s.dt_s / 2 * Factor(s.x_m, s.y_m, v);
-    const double heading_rad = s.theta_rad + s.omega_radps * half_s / 2;
-    const double c = std::cos(heading_rad), d = std::sin(heading_rad);
+    const auto [c, d] = s.AheadAfter(half_s / 2);
     const double factor = Factor(s.x_m + half_s * (c * s.vx_mps - d * s.vy_mps),
                                  s.y_m + half_s * (d * s.vx_mps + c * s.vy_mps), v);
     s.vx_mps *= factor;

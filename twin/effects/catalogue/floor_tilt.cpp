@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
-
 #include "effects/effect.h"
 
 namespace twin
@@ -34,8 +32,7 @@ void Step(GroundSignals &s, const Numbers &v, double *)
 {
     if (!s.moves)
         return;
-    const double heading_rad = s.theta_rad + s.omega_radps * s.dt_s / 2;
-    const double c = std::cos(heading_rad), d = std::sin(heading_rad);
+    const auto [c, d] = s.AheadAfter(s.dt_s / 2);
     s.vx_mps += c * v[0] + d * v[1];
     s.vy_mps += -d * v[0] + c * v[1];
 }

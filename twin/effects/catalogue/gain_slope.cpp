@@ -36,8 +36,7 @@ constexpr ParameterSpec kParameters[] = {
 void Step(GroundSignals &s, const Numbers &v, double *)
 {
     const double x_per_m = v[0], y_per_m = v[1];
-    const double heading_rad = s.theta_rad + s.omega_radps * s.dt_s / 2;
-    const double c = std::cos(heading_rad), d = std::sin(heading_rad);
+    const auto [c, d] = s.AheadAfter(s.dt_s / 2);
     const double rise =
         (x_per_m * (c * s.vx_mps - d * s.vy_mps) + y_per_m * (d * s.vx_mps + c * s.vy_mps)) *
         s.dt_s;

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 
+#include "effects/direction.h"
+
 namespace twin
 {
 
@@ -78,7 +80,14 @@ struct GroundSignals
     const double t_s, dt_s;
     const bool moves;                    // some wheel turns
     const double x_m, y_m, theta_rad;    // pose in W at the start of the step
+    const Direction ahead;               // along theta_rad
     double vx_mps, vy_mps, omega_radps;  // body frame
+
+    // Where the robot heads after `after_s` of the step.
+    Direction AheadAfter(double after_s) const
+    {
+        return ahead.Turned(Direction::Of(omega_radps * after_s));
+    }
 };
 
 // What motion capture reports.

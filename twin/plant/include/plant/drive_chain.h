@@ -15,6 +15,13 @@
 namespace twin
 {
 
+// What the wheels alone make of the body, before gains and effects of the floor.
+struct Rolling
+{
+    Twist twist;
+    bool moves;  // some wheel turns
+};
+
 class DriveChain
 {
 public:
@@ -30,6 +37,11 @@ public:
     // not null, drive noise included. Stores it in `state`.
     Twist BodyTwist(const WheelMotion &motion, double t_s, double dt_s, RobotState &state,
                     Random *random) const;
+    // The same in two parts. The first depends on nothing but the motion; the second is told where
+    // the robot heads.
+    Rolling Roll(const WheelMotion &motion) const;
+    Twist OnFloor(const Rolling &rolling, const Direction &ahead, double t_s, double dt_s,
+                  RobotState &state, Random *random) const;
 
     // Observe stage: the pose and time stamp that motion capture reports, and the way back.
     void Observe(Pose2 &pose, double &t_s) const;
@@ -58,7 +70,8 @@ private:
     WheelMotion Target(const Wheels &command) const;
     void DrivePart(const DutySignals &duty, double whole_s, RobotState &state,
                    WheelMotion &mean) const;
-    void ActOnGround(Twist &twist, bool moves, double t_s, double dt_s, RobotState &state) const;
+    void ActOnGround(Twist &twist, bool moves, const Direction &ahead, double t_s, double dt_s,
+                     RobotState &state) const;
     void Disturb(Twist &twist, double dt_s, RobotState &state, Random &random) const;
 
     Base base_;

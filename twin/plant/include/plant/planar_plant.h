@@ -22,10 +22,11 @@ public:
 
     void Follow(const Twist &twist, double dt_s);
     const Pose2 &pose() const { return pose_; }
+    const Direction &ahead() const { return ahead_; }
 
 private:
     Pose2 pose_;
-    double cos_, sin_;
+    Direction ahead_;
 };
 
 // Moves one robot by `dt_s`: wheels, ground velocity, then the exact arc at constant velocity.

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Angles as the vectors along them: a heading that turns by little in each step needs no cosine
+// then.
+#ifndef EFFECTS_DIRECTION_H
+#define EFFECTS_DIRECTION_H
+
+#include <cmath>
+
+namespace twin
+{
+
+// Below this square of an angle the series are exact: their next terms are under 1e-15.
+constexpr double kSmallSquare = 0.0025;
+
+// sin(a) / a
+inline double SinOver(double a)
+{
+    const double square = a * a;
+    return square < kSmallSquare ? 1 - square / 6 * (1 - square / 20 * (1 - square / 42))
+                                 : std::sin(a) / a;
+}
+
+inline double Cos(double a)
+{
+    const double square = a * a;
+    return square < kSmallSquare ? 1 - square / 2 * (1 - square / 12 * (1 - square / 30))
+                                 : std::cos(a);
+}
+
+// A vector of length 1: cosine and sine of its angle.
+struct Direction
+{
+    double c = 1, s = 0;
+
+    static Direction Of(double rad) { return {Cos(rad), rad * SinOver(rad)}; }
+
+    Direction Turned(const Direction &by) const
+    {
+        return {c * by.c - s * by.s, s * by.c + c * by.s};
+    }
+};
+
+}  // namespace twin
+
+#endif
