@@ -30,6 +30,7 @@ from twinmill.fitting.score_fit import ScoreFit
 MOST_BLOCKS = 200
 MOST_ROWS = 1000  # at a time, where each has hundreds of columns: they stay near the processor
 FOLDS = 5
+HOLDS = 0.9  # share of a square
 RIDGES = (1.0, 0.03)  # of what is of usual strength, and of what is far stronger
 FLIPS = 499  # random signs of blocks that make the null distribution
 MOMENTS = "single moments"
@@ -38,11 +39,16 @@ FIRM, FEW, NOISE = "firm", "in too few stretches", "may be noise"
 
 @dataclass(frozen=True)
 class Dependence:
-    """A group of terms: the held-out fall of the cost that it brings, and whether chance could."""
+    """A group of terms: the held-out fall of the cost that it brings, and whether chance could.
+
+    Attributes:
+        own: (T,) bool, the terms of it that bring most.
+    """
 
     group: str
     gain: float
     sure: bool
+    own: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -350,8 +356,8 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
         sure &= gains / spread > np.quantile(highest, 1 - SETTINGS.dependence_chance)
     best: dict[str, Dependence] = {}
     for of_ridge, beyond in zip(gains, sure, strict=True):
-        for (group, _), gain, is_sure in zip(tested, of_ridge, beyond, strict=True):
-            this = Dependence(group, float(gain), bool(is_sure))
+        for (group, own), gain, is_sure in zip(tested, of_ridge, beyond, strict=True):
+            this = Dependence(group, float(gain), bool(is_sure), own)
             if group not in best or (this.sure, gain) > (best[group].sure, best[group].gain):
                 best[group] = this
     return sorted(best.values(), key=lambda d: -d.gain)
@@ -376,12 +382,16 @@ def _gains(
 def _without_redundant(
     groups: list[Dependence], terms: list[Term], products: "Products"
 ) -> list[Dependence]:
-    """Those groups that bring something beside the better ones, or as much as the best."""
+    """Those groups that bring something beside the better ones, or as much as the best.
+
+    As much brings what the best is a part of, too, as places do all of which push alike: that is
+    left out.
+    """
     kept: list[Dependence] = []
     gain = 0.0
     for group in groups:
         if kept and group.gain > SETTINGS.as_much * kept[0].gain:
-            kept = [*kept, group]
+            kept += [] if products.holds(group.own, kept[0].own) else [group]
             continue
         names = {d.group for d in [*kept, group]}
         together, _ = products.held_out(np.array([t.group in names for t in terms]))
@@ -442,6 +452,14 @@ class Products:
         less.own, less.seen = self.own[own], self.seen[own]
         less.moments, less.energy = self.moments[:, own], self.energy[:, own]
         return less
+
+    def holds(self, many: np.ndarray, few: np.ndarray) -> bool:
+        """Whether many columns make up a few of them (nearly) whole."""
+        gram = self.grams.sum(0)
+        inside = gram[np.ix_(many, many)] + 1e-9 * np.trace(gram) * np.eye(many.sum())
+        across = gram[np.ix_(many, few)]
+        made = np.sum(across * np.linalg.solve(inside, across))
+        return bool(many.sum() > few.sum() and made > HOLDS * np.trace(gram[np.ix_(few, few)]))
 
     def each_held_out(self, flips: int = 0, ridge: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """(T,) and (F, T): what `held_out` gives for each column alone."""

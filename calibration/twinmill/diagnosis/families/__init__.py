@@ -37,7 +37,7 @@ def families_of(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> l
         *across_axes(moving),
         *(of_past(k, max(float(np.std(moving[:, k])), STILL[k])) for k in axes),
         *of_places(pose[:, :2]),
-        of_pushes(),
+        *of_pushes(),
         *(of_course(n) for n in COURSES),
         *of_drift(np.concatenate([own.floor.response.middle_s for own in opened])),
         *of_wheels(opened),

@@ -31,14 +31,22 @@ def of_places(pose: np.ndarray) -> list[Family]:
     return found
 
 
-def of_pushes() -> Family:
-    """The whole floor pushes, as if it sloped."""
+def of_pushes() -> list[Family]:
+    """The whole floor pushes, as if it sloped, or a wind on a fin turns the robot."""
     texts = [f"{wave}(theta)*moves" for wave in ("cos", "sin")]
 
     def push(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         return _pushed(own, moves(velocity)[:, None])
 
-    return Family([Term("heading", "vx_mps", t, 1.0, "push") for t in texts], push)
+    def veer(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
+        heading = own.floor.response.heading_rad
+        waves = np.column_stack([np.cos(heading), np.sin(heading)])
+        return {2: TYPICAL["omega_radps"] * waves * moves(velocity)[:, None]}
+
+    return [
+        Family([Term("heading", CHANNELS[0], t, 1.0, "push") for t in texts], push),
+        Family([Term("heading", CHANNELS[2], t, 1.0, "veers by heading") for t in texts], veer),
+    ]
 
 
 def _pushed(own: Opened, shares: np.ndarray) -> dict[int, np.ndarray]:
@@ -77,8 +85,7 @@ def _at(where: str, texts: Sequence[str], bells: Callable[[Opened], np.ndarray])
         return {k: gains * velocity[:, [k]] for k in range(3)}
 
     def push(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        shares = bells(own)  # less what pushes everywhere: that is of the heading alone
-        return _pushed(own, (shares - shares.mean(axis=0)) * moves(velocity)[:, None])
+        return _pushed(own, bells(own) * moves(velocity)[:, None])
 
     def turn(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         return {2: SWELL * bells(own) * velocity[:, [2]]}
