@@ -20,6 +20,7 @@ from twinmill.diagnosis.findings import (
     with_stale_numbers,
 )
 from twinmill.diagnosis.notes import (
+    disturbed_notes,
     few_commands_notes,
     geometry_notes,
     irregularity_notes,
@@ -331,6 +332,7 @@ def _concluded(
             *time_base_notes(modelled),
             *geometry_notes(last.state.model),
             *noise,
+            *([] if rest.moments else disturbed_notes(after)),
             *lag_notes(lags_s),
             *marker_notes(modelled),
             *few_commands_notes(known),

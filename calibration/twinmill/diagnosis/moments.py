@@ -18,6 +18,7 @@ from twinmill.fitting.opening import Opened
 from twinmill.predict.windows import HORIZONS_S
 
 APART_S = 1.0  # between the starts of windows of two moments
+LEAST_S = 1.0  # between the first and the last window of a stretch that is worth a sentence
 SEEN = 2  # windows overlap, so that more than one sees what lasts
 HORIZON = HORIZONS_S.index(0.5)
 LESS, MORE = 0.9, 1.1  # of the predicted way
@@ -67,8 +68,7 @@ def _of_log(own: Opened, model: native.Model) -> list[Moment]:
     events = _events(missed, data.start_s)
     if len(events) < SETTINGS.several:
         return []
-    predicted = data.windows.predicted(data.measurement, model)
-    way = _way(data.measured[:, HORIZON], predicted[:, HORIZON])
+    way = _ways(own, model)
     track = data.measurement.track
     return [
         Moment(
@@ -90,6 +90,27 @@ def _events(missed: np.ndarray, start_s: np.ndarray) -> list[np.ndarray]:
     """
     clusters = np.split(missed, 1 + np.flatnonzero(np.diff(start_s[missed]) > APART_S))
     return [c for c in clusters if len(c) >= SEEN]
+
+
+def left_out(own: Opened) -> list[tuple[float, float, float]]:
+    """Stretches that the floor left out as disturbed: starts of the first and the last window, s.
+
+    And the share of the predicted way that was gone there in half a second.
+    """
+    gone = np.flatnonzero(~own.floor.keep)
+    if not len(gone):
+        return []
+    start_s, way = own.data.start_s, _ways(own, own.model)
+    parts = [p for p in _events(gone, start_s) if start_s[p[-1]] - start_s[p[0]] >= LEAST_S]
+    return [
+        (float(start_s[p[0]]), float(start_s[p[-1]]), float(np.nanmedian(way[p]))) for p in parts
+    ]
+
+
+def _ways(own: Opened, model: native.Model) -> np.ndarray:
+    """(W,) share of the predicted way that was gone in half a second."""
+    predicted = own.data.windows.predicted(own.measurement, model)
+    return _way(own.data.measured[:, HORIZON], predicted[:, HORIZON])
 
 
 def _way(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import twinmill_native as native
 
+from twinmill.diagnosis.moments import left_out
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened, of_few_commands
 from twinmill.model.parameters import drives_sideways
@@ -13,6 +14,7 @@ from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S, rms
 
+MOST_TOLD = 3  # stretches
 NOTABLE = 0.01  # change of a gain that is worth a sentence
 LEAST_DRIVE = (2e-3, 2e-2)  # m/s, rad/s: no robot follows more regularly
 
@@ -75,6 +77,24 @@ def irregularity_notes(
                 f"{own.measurement.label}: the unexplained scatter is {ratio:.1f} times "
                 "the noise in the model file (more random disturbance, slipping wheels, "
                 "play in the gears or a rough floor may be)."
+            )
+    return notes
+
+
+def disturbed_notes(opened: Sequence[Opened]) -> list[str]:
+    """A sentence for each log of which something is judged nowhere, as a push would be."""
+    notes = []
+    for own in opened:
+        stretches = left_out(own) if own.floor and own.data is not None else []
+        told = [
+            f"{a:.1f} to {b:.1f} s ({100 * w:.0f} % of the predicted way)" for a, b, w in stretches
+        ]
+        if told:
+            more = f" and {len(told) - MOST_TOLD} more" if len(told) > MOST_TOLD else ""
+            notes.append(
+                f"{own.measurement.label}: at {', '.join(told[:MOST_TOLD])}{more} it moved unlike "
+                "all the rest. That is left out, as a push or a slip would be; if it was the floor "
+                "or the robot, drive there again, and longer."
             )
     return notes
 

@@ -77,12 +77,15 @@ def _numbers(found: Formula) -> str:
         + ("" if n.unit in ("", "1") else f" {n.unit}")
         for n in found.numbers
     ]
-    seen = [
-        f"{name} {low:.2g} to {high:.2g} {_unit(name)}".rstrip()
-        for name, (low, high) in found.holds.items()
-    ]
+    seen = [_range(name, low, high) for name, (low, high) in found.holds.items()]
     where = f" Seen at {', '.join(seen)}; beyond that it is a guess." if seen else ""
     return f"Its numbers with 95 % intervals: {', '.join(numbers)}.{where}"
+
+
+def _range(name: str, low: float, high: float) -> str:
+    if name in ANGLES and high - low >= 2 * np.pi:
+        return f"{name} all round"
+    return f"{name} {low:.2g} to {high:.2g} {_unit(name)}".rstrip()
 
 
 def _unit(name: str) -> str:

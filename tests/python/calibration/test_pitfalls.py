@@ -855,3 +855,19 @@ def test_two_curves_of_the_speed_over_the_command_may_be_one():
     judged = of_another_form(found, NOTHING_LEFT)
     assert [f.certainty for f in judged] == ["sure", "doubtful", "sure"]
     assert "dead_zone" in judged[1].why
+
+
+def test_a_stretch_that_is_left_out_is_told(tanh_robot, measure, fitted):
+    """At the begin the robot has half its speed: that is left out of what is judged, and told."""
+    until_s = 3.0
+
+    class Slow(tanh_robot):
+        def wheels_mps(self, duty):
+            rims = super().wheels_mps(duty)
+            rims[: round(until_s / EULER_S)] *= 0.5
+            return rims
+
+    found = diagnose([measure(Slow(), 57, 60.0)], fitted)
+    (told,) = [note for note in found.notes if "left out, as a push" in note]
+    begin_s, end_s = (float(t) for t in re.search(r"at ([\d.]+) to ([\d.]+) s", told).groups())
+    assert 0 <= begin_s < end_s == pytest.approx(until_s, abs=0.75)
