@@ -38,6 +38,7 @@ if working():  # not for --help
     )
 
 TWIN_RUNS = 50
+STOPPED = 130  # as a shell has it of Ctrl-C
 TABLE = 1  # telemetry_t.mode
 
 
@@ -74,7 +75,7 @@ def _diagnose(
         data["rest"]["proven"]["command"] = next(c for why, c in then if "the formula" in why)
     section = partial(present.section, result, then)
     finish(data, present.terminal(result, then), source, section=section, as_json=as_json, out=out)
-    return result
+    return _whole(result)
 
 
 def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str, str]]:
@@ -218,4 +219,16 @@ def _explain(
         as_json=as_json,
         out=out,
     )
+    _whole(result.diagnosis)
     return result
+
+
+def _whole(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis, if it was not stopped.
+
+    Raises:
+        Exit: it was; what was found is told by then.
+    """
+    if diagnosis.search.stopped:
+        raise typer.Exit(STOPPED)
+    return diagnosis

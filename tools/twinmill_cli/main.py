@@ -220,7 +220,7 @@ def _options(
 
     `twinmill --install-completion` lets the shell complete commands and options.
 
-    Exit codes: 0 done, 1 failed (one sentence on stderr), 2 wrong command line.
+    Exit codes: 0 done, 1 failed (one sentence on stderr), 2 wrong command line, 130 stopped.
     """
 
 

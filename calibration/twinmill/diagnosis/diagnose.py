@@ -126,7 +126,7 @@ def diagnose(
         first = first_state(known, model_file, {*excluded, *unseen})
     done = search(first, progress, known=usual)
     lags_s = 0.0
-    if not off:
+    if not off and not done.stopped:
         progress("looking for robots that differ")
         alone = one_by_one(known, done, progress)
         off = outliers(alone)
@@ -150,7 +150,17 @@ def diagnose(
         off=off,
         lags_s=lags_s,
     )
+    if done.stopped:
+        return _so_far(found)
     return _robots_first(with_detections(found, model_file, progress, excluded))
+
+
+def _so_far(found: Diagnosis) -> Diagnosis:
+    """Of a search that was stopped: what was not tried may be there, too."""
+    if not found.found:
+        words = "Stopped before all was tried; nothing had been found."
+        return replace(found, verdict="cannot_tell", sentence=words)
+    return replace(found, sentence=f"Stopped before all was tried. So far: {found.sentence}")
 
 
 def _robots_first(diagnosis: Diagnosis) -> Diagnosis:

@@ -112,6 +112,7 @@ class Diagnosis:
         return {
             "verdict": self.verdict,
             "sentence": self.sentence,
+            "stopped": self.search.stopped,
             "score": self.before.score,
             "score_refit": self.score_refit,
             "findings": [f.to_json() for f in self.findings],

@@ -27,12 +27,17 @@ class Round:
 
 @dataclass
 class Search:
-    """A whole search: rounds, the last trial, and what was dropped again."""
+    """A whole search: rounds, the last trial, and what was dropped again.
+
+    Attributes:
+        stopped: by Ctrl-C, before all was tried.
+    """
 
     rounds: list[Round]
     last: Trial
     dropped: list[str]
     settings: Settings
+    stopped: bool = False
 
     @property
     def found(self) -> list[str]:

@@ -6,7 +6,7 @@ are fitted. One is accepted if its held-out evidence is beyond doubt, blocks agr
 matters. Afterwards those that later ones made needless are dropped.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 from twinmill.diagnosis.acceptance import began_before, best_of, cost, proven, when_s
@@ -27,7 +27,7 @@ def search(
     settings: Settings = SETTINGS,
     known: float = 1.0,
 ) -> Search:
-    """Adds what is missing until nothing is worth it.
+    """Adds what is missing until nothing is worth it, or until Ctrl-C.
 
     Args:
         state: where it starts.
@@ -37,42 +37,51 @@ def search(
             What it missed there it misses here, too, and in the same way over and over, so that
             evidence must be stronger where the score is no worse than that.
     """
-    before = fitted(state)
-    if before.held_score < settings.news * known:
+    first = fitted(state)
+    if first.held_score < settings.news * known:
         settings = settings.stricter(settings.usual * known)
-    rounds: list[Round] = []
-    dropped: list[str] = []
+    done = Search([], first, [], settings)
     starts: dict[str, Starts] = {}
-    first_excess = max(before.held_score**2 - 1, 0.0)
+    try:
+        _forward(done, starts, progress)
+        progress(f"{_told(done)}exchanging what was found for other effects")
+        done = _exchanged(done, starts)
+    except KeyboardInterrupt:
+        if not done.rounds:
+            raise
+        done.stopped = True
+    return done
+
+
+def _forward(done: Search, starts: dict[str, Starts], progress: Callable[[str], None]) -> None:
+    """Round after round, until one accepts nothing."""
+    settings, first_excess = done.settings, max(done.last.held_score**2 - 1, 0.0)
     for number in range(settings.most):
-        progress(f"round {number + 1}: screening the catalogue")
+        before, words = done.last, f"{_told(done)}round {number + 1}: "
+        progress(f"{words}screening the catalogue")
         screened = screen(before, starts)
         this = Round(before, screened, [])
-        rounds.append(this)
+        done.rounds.append(this)
         for candidate in promising(screened, settings)[: settings.fitted]:
-            progress(f"round {number + 1}: trying {candidate.name}")
+            progress(f"{words}trying {candidate.name}")
             this.trials.append(cross_validate(before, (candidate.name,), candidate.start))
-        this.accepted = best_of(before, this.trials, first_excess, settings)
-        if this.accepted is None:
-            progress(f"round {number + 1}: trying pairs")
+        accepted = best_of(before, this.trials, first_excess, settings)
+        if accepted is None:
+            progress(f"{words}trying pairs")
             for pair in likely_pairs(before, screened, settings):
                 this.trials.append(cross_validate(before, pair))
-            this.accepted = best_of(before, this.trials, first_excess, settings)
+            accepted = best_of(before, this.trials, first_excess, settings)
         this.trials.sort(key=lambda t: t.fit.held_cost)
-        if this.accepted is None:
-            break
+        if accepted is None:
+            return
+        last, gone = _pruned(accepted, [*done.found, *accepted.names], settings)
+        this.accepted, done.last, done.dropped = accepted, last, [*done.dropped, *gone]
         this.tied = ties_of(this, settings)
-        before, gone = _pruned(
-            this.accepted,
-            [n for r in rounds for n in r.accepted.names if n not in dropped],
-            settings,
-        )
-        dropped += gone
-    progress("exchanging what was found for other effects")
-    found = [n for r in rounds if r.accepted for n in r.accepted.names if n not in dropped]
-    before, kept = _exchanged(rounds, before, found=found, starts=starts, settings=settings)
-    accepted = [n for r in rounds if r.accepted for n in r.accepted.names]
-    return Search(rounds, before, [n for n in accepted if n not in kept], settings)
+
+
+def _told(done: Search) -> str:
+    """What was found so far, for who waits."""
+    return f"found {', '.join(done.found)}; " if done.found else ""
 
 
 def comes_again(done: Search, name: str) -> tuple[float, float] | None:
@@ -90,25 +99,16 @@ def comes_again(done: Search, name: str) -> tuple[float, float] | None:
     return (again_s, over_s) if fresh and apart_s > PAUSE_S else None
 
 
-def _exchanged(
-    rounds: list[Round],
-    last: Trial,
-    *,
-    found: Sequence[str],
-    starts: dict[str, Starts],
-    settings: Settings,
-) -> tuple[Trial, list[str]]:
-    """The last state with each effect exchanged for another one, if that is better.
+def _exchanged(done: Search, starts: dict[str, Starts]) -> Search:
+    """With each effect exchanged for another one, if that is better; an exchange is one more round.
 
     An effect was accepted beside what was known in its round; what came later may do a part of it,
     and leave a rest that another one takes as well or better (a forward search alone cannot see
     that; Miller 2002 calls this sequential replacement). What is as good is tied.
-
-    Returns:
-        The best, and the findings that are left; an exchange is one more round.
     """
-    kept = list(found)
-    for name in [n for n in found if n != REFIT]:
+    rounds, last, settings = list(done.rounds), done.last, done.settings
+    kept = list(done.found)
+    for name in [n for n in done.found if n != REFIT]:
         if name not in kept:
             continue
         base = without_effect(last, name)
@@ -134,7 +134,8 @@ def _exchanged(
         kept = [n for n in kept if n != name]
         last, gone = _pruned(best, kept, settings)
         kept = [*(n for n in kept if n not in gone), *best.names]
-    return last, kept
+    accepted = [n for r in rounds if r.accepted for n in r.accepted.names]
+    return Search(rounds, last, [n for n in accepted if n not in kept], settings)
 
 
 def _rivals(

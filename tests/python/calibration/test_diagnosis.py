@@ -165,3 +165,33 @@ def test_what_can_do_all_that_another_does_stands_in_one_group_with_it(behind, t
     ]
     this = Round(None, screened, trials, accepted=trials[0])
     assert [t.names[0] for t in ties_of(this, SETTINGS)] == (["plane"] if tied else [])
+
+
+def stopping_at(words: str):
+    """Progress that is interrupted once these words come."""
+
+    def tell(said: str) -> None:
+        if words in said:
+            raise KeyboardInterrupt
+
+    return tell
+
+
+def test_stopped_it_tells_what_was_found_so_far(calibrated, case, diagnosed):
+    """Of two effects the first round finds the one that takes most; the second round is not run."""
+    whole = diagnosed("a")
+    found = diagnose(case("a"), calibrated, progress=stopping_at("round 2: "))
+    assert found.search.stopped and found.to_json()["stopped"]
+    assert found.found and found.found[0] in whole.found
+    assert found.sentence.startswith("Stopped before all was tried. So far: ")
+
+
+def test_stopped_with_nothing_found_it_does_not_say_that_nothing_is_missing(calibrated, case):
+    found = diagnose(case("e"), calibrated, progress=stopping_at("round 1: trying"))
+    assert found.verdict == "cannot_tell" and found.found == []
+    assert "nothing had been found" in found.sentence
+
+
+def test_stopped_before_it_has_tried_anything_it_tells_nothing(calibrated, case):
+    with pytest.raises(KeyboardInterrupt):
+        diagnose(case("e"), calibrated, progress=stopping_at("round 1: screening"))
