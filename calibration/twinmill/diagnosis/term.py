@@ -27,6 +27,7 @@ NO_NAMES = {
     "travel",
     "spot",
     "wheel_rad",
+    "wheel_radps",
 } | {f"after_{event}" for event in ("reversal", "start", "rise")}
 SWELL = 0.05  # share of all speeds: a usual loss
 COUPLING = "coupling of the axes"

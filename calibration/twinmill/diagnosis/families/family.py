@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinmill.diagnosis.term import STILL, Term, displaced
+from twinmill.diagnosis.term import STILL, TYPICAL, Term, displaced
 from twinmill.fitting.opening import Opened
 
 HUMPS = 8  # over the range of a speed, or of a place
@@ -58,3 +58,10 @@ class Humps:
     def texts(self, name: str) -> list[str]:
         """Of each over a name, as the effect `equation` takes it."""
         return [f"max(0, 1 - abs({name} - {m:g})/{self.width:g})" for m in self.middles]
+
+
+def pushed(own: Opened, shares: np.ndarray) -> dict[int, np.ndarray]:
+    """Values along the room's x, then its y, by (N, K) shares of what is typical."""
+    pushes = TYPICAL["vx_mps"] * shares
+    c, s = (f(own.floor.response.heading_rad)[:, None] * pushes for f in (np.cos, np.sin))
+    return {0: np.hstack([c, s]), 1: np.hstack([-s, c])}

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from twinmill.diagnosis.families.family import HUMPS, Family, Humps
+from twinmill.diagnosis.families.family import HUMPS, Family, Humps, pushed
 from twinmill.diagnosis.term import CHANNELS, PLACE, SWELL, TYPICAL, Term, moves
 from twinmill.fitting.opening import Opened
 
@@ -36,7 +36,7 @@ def of_pushes() -> list[Family]:
     texts = [f"{wave}(theta)*moves" for wave in ("cos", "sin")]
 
     def push(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        return _pushed(own, moves(velocity)[:, None])
+        return pushed(own, moves(velocity)[:, None])
 
     def veer(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         heading = own.floor.response.heading_rad
@@ -47,13 +47,6 @@ def of_pushes() -> list[Family]:
         Family([Term("heading", CHANNELS[0], t, 1.0, "push") for t in texts], push),
         Family([Term("heading", CHANNELS[2], t, 1.0, "veers by heading") for t in texts], veer),
     ]
-
-
-def _pushed(own: Opened, shares: np.ndarray) -> dict[int, np.ndarray]:
-    """Along the room's x and y, by (N, K) shares of what is typical."""
-    pushes = TYPICAL["vx_mps"] * shares
-    c, s = (f(own.floor.response.heading_rad)[:, None] * pushes for f in (np.cos, np.sin))
-    return {0: np.hstack([c, s]), 1: np.hstack([-s, c])}
 
 
 def _over(axis: int, place: np.ndarray, most: int) -> Humps | None:
@@ -85,7 +78,7 @@ def _at(where: str, texts: Sequence[str], bells: Callable[[Opened], np.ndarray])
         return {k: gains * velocity[:, [k]] for k in range(3)}
 
     def push(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        return _pushed(own, bells(own) * moves(velocity)[:, None])
+        return pushed(own, bells(own) * moves(velocity)[:, None])
 
     def turn(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         return {2: SWELL * bells(own) * velocity[:, [2]]}

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from twinmill.diagnosis.families.family import Family
+from twinmill.diagnosis.families.family import Family, pushed
 from twinmill.diagnosis.term import CHANNELS, TIME, TYPICAL, Term, moves
 from twinmill.fitting.opening import Opened
 
@@ -22,9 +22,7 @@ def of_drift(t_s: np.ndarray) -> list[Family]:
         return np.hstack([np.cos(angle), np.sin(angle)])
 
     def moving(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        heading, waves = own.floor.response.heading_rad[:, None], swinging(own)
-        c, s = (TYPICAL["vx_mps"] * f(heading) * waves for f in (np.cos, np.sin))
-        return {0: np.hstack([c, s]), 1: np.hstack([-s, c])}
+        return pushed(own, swinging(own))
 
     def turning(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         return {2: TYPICAL["omega_radps"] * swinging(own)}

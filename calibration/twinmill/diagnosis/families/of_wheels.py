@@ -35,7 +35,7 @@ def of_rims(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> list[
         added = [(w, np.sign(r) * humps.of(np.abs(r))) for w, r in turns]
         return {k: SWELL * top_radps * sum(w.body[k] * a for w, a in added) for k in range(3)}
 
-    texts = [f"sign(rim)*{text}" for text in humps.texts("abs(rim)")]
+    texts = [f"sign(wheel_radps)*{text}" for text in humps.texts("abs(wheel_radps)")]
     return [Family([Term("speed", "rim_mps", t, 1.0, "at some rims") for t in texts], values)]
 
 
