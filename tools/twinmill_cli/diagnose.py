@@ -61,7 +61,7 @@ def _diagnose(
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with telling(f"diagnosing with {model}") as progress:
         measurements = load(logs, model_file, as_json)
-        result = diagnose(measurements, model_file, progress)
+        result = diagnose(measurements, model_file, progress, stoppable=True)
         swarm = None
         if robots_recorded(logs[0], measurements) > 1:
             progress("the swarm as a whole")
@@ -202,6 +202,7 @@ def _explain(
             command=source.command,
             progress=progress,
             formula=formula,
+            stoppable=True,
         )
     settling = _settling(result.diagnosis, logs, str(output))
     adding = _adding(result.diagnosis, logs, given=model, explained=str(output))

@@ -101,6 +101,8 @@ def diagnose(
     model_file: ModelFile,
     progress: Callable[[str], None] = lambda _: None,
     excluded: Collection[str] = (),
+    *,
+    stoppable: bool = False,
 ) -> Diagnosis:
     """Diagnoses all measurements with one model.
 
@@ -109,6 +111,7 @@ def diagnose(
         model_file: the model; what other logs told of it is held, its gains may drift.
         progress: told in words what is being done.
         excluded: effects that are not to be thought of.
+        stoppable: Ctrl-C ends the search for what all robots lack, and what was found is told.
 
     Raises:
         LogError: no measurement can be judged.
@@ -124,7 +127,7 @@ def diagnose(
     if off:
         known = _thinned(_without(judged(opened), off))
         first = first_state(known, model_file, {*excluded, *unseen})
-    done = search(first, progress, known=usual)
+    done = search(first, progress, known=usual, stoppable=stoppable)
     lags_s = 0.0
     if not off and not done.stopped:
         progress("looking for robots that differ")
@@ -137,7 +140,7 @@ def diagnose(
             known = with_own_lags(known, lags_s) if lags_s else known
             progress("looking again without them" if off else "looking again, each with its lag")
             first = first_state(known, model_file, {*excluded, *unseen})
-            done = search(first, progress, known=usual)
+            done = search(first, progress, known=usual, stoppable=stoppable)
     progress("looking for what no effect explains")
     found = _concluded(
         opened,

@@ -72,6 +72,7 @@ def explain(
     command: str,
     progress: Callable[[str], None] = lambda _: None,
     formula: bool = True,
+    stoppable: bool = False,
 ) -> Explanation:
     """Adds what helps on left-out data until nothing more does, and writes the model.
 
@@ -82,12 +83,13 @@ def explain(
         command: recorded in it.
         progress: told in words what is being done.
         formula: one that is proven for what no effect explains goes into the model as well.
+        stoppable: see `diagnose`.
 
     Raises:
         LogError: no measurement can be judged.
         ModelError: the new file cannot be written.
     """
-    diagnosis = diagnose(measurements, model_file, progress)
+    diagnosis = diagnose(measurements, model_file, progress, stoppable=stoppable)
     fit = _polished(diagnosis)
     proven = diagnosis.rest.proven if formula else None
     runs = len({m.log_sha256 for m in measurements})

@@ -26,8 +26,10 @@ def search(
     progress: Callable[[str], None] = lambda _: None,
     settings: Settings = SETTINGS,
     known: float = 1.0,
+    *,
+    stoppable: bool = False,
 ) -> Search:
-    """Adds what is missing until nothing is worth it, or until Ctrl-C.
+    """Adds what is missing until nothing is worth it.
 
     Args:
         state: where it starts.
@@ -36,6 +38,7 @@ def search(
         known: score that the model has on the logs that it was fitted to; 0 where none is known.
             What it missed there it misses here, too, and in the same way over and over, so that
             evidence must be stronger where the score is no worse than that.
+        stoppable: Ctrl-C ends the search with what it has by then.
     """
     first = fitted(state)
     if first.held_score < settings.news * known:
@@ -47,7 +50,7 @@ def search(
         progress(f"{_told(done)}exchanging what was found for other effects")
         done = _exchanged(done, starts)
     except KeyboardInterrupt:
-        if not done.rounds:
+        if not stoppable or not done.rounds:
             raise
         done.stopped = True
     return done

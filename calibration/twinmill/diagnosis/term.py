@@ -14,7 +14,7 @@ CHANNELS = ("vx_mps", "vy_mps", "omega_radps")
 SPEEDS = ("vx", "vy", "omega")
 # m/s, m/s, rad/s, m/s: what a term of full size may add.
 TYPICAL = {"vx_mps": 0.01, "vy_mps": 0.01, "omega_radps": 0.05, "rim_mps": 0.01}
-# Rates, voltage, history: not at hand in a body's formula.
+# Rates, voltage, history, wheels, and what names a part of the motion: no names of a formula.
 NO_NAMES = {
     "dvx",
     "dvy",
@@ -23,8 +23,8 @@ NO_NAMES = {
     "way",
     "ago",
     "drift",
-    "course",
     "travel",
+    "aside",
     "spot",
     "wheel_rad",
     "wheel_radps",

@@ -180,18 +180,24 @@ def stopping_at(words: str):
 def test_stopped_it_tells_what_was_found_so_far(calibrated, case, diagnosed):
     """Of two effects the first round finds the one that takes most; the second round is not run."""
     whole = diagnosed("a")
-    found = diagnose(case("a"), calibrated, progress=stopping_at("round 2: "))
+    found = diagnose(case("a"), calibrated, progress=stopping_at("round 2: "), stoppable=True)
     assert found.search.stopped and found.to_json()["stopped"]
     assert found.found and found.found[0] in whole.found
     assert found.sentence.startswith("Stopped before all was tried. So far: ")
 
 
 def test_stopped_with_nothing_found_it_does_not_say_that_nothing_is_missing(calibrated, case):
-    found = diagnose(case("e"), calibrated, progress=stopping_at("round 1: trying"))
+    found = diagnose(case("e"), calibrated, progress=stopping_at("round 1: trying"), stoppable=True)
     assert found.verdict == "cannot_tell" and found.found == []
     assert "nothing had been found" in found.sentence
 
 
 def test_stopped_before_it_has_tried_anything_it_tells_nothing(calibrated, case):
     with pytest.raises(KeyboardInterrupt):
-        diagnose(case("e"), calibrated, progress=stopping_at("round 1: screening"))
+        diagnose(case("e"), calibrated, progress=stopping_at("round 1: screening"), stoppable=True)
+
+
+def test_who_calls_it_from_a_program_is_interrupted_as_by_any_other(calibrated, case):
+    """An exam's worker must not take half a search for a whole one."""
+    with pytest.raises(KeyboardInterrupt):
+        diagnose(case("e"), calibrated, progress=stopping_at("round 1: trying"))
