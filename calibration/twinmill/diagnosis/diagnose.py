@@ -16,6 +16,7 @@ from twinmill.diagnosis.findings import (
     findings_of,
     lateness,
     ranking_of,
+    slight_lags,
     steps_of,
     with_stale_numbers,
 )
@@ -275,6 +276,7 @@ def _concluded(
     without = less_each(done, known)
     less, formulas = without.less, without.formulas
     start, last = done.rounds[0].before, done.last
+    given = _as_given(before, opened, known)
     findings, chain = findings_of(done, first, less)
     findings = with_stale_numbers(
         findings,
@@ -282,6 +284,7 @@ def _concluded(
         lag_std_s=model_file.lag_std_s(hashes),
         clock_std_s=model_file.clock_std_s(hashes),
         stds=model_file.effect_stds,
+        slight=slight_lags(done, first, given),
     )
     if model_file.model.drive == "duty" and model_file.known_from_other_logs(hashes):
         findings = within_the_table(findings, less, last)
@@ -309,9 +312,8 @@ def _concluded(
     faint = [(name, why) for name, why in done.faint if name not in named]
     faint_names = [name for name, _ in faint]
     hidden = [*faint, *unseen.items()]
-    refit = _refit(done)
+    refit = _refit(done, findings)
     usual = model_file.usual_score(hashes)
-    given = _as_given(before, opened, known)
     weighed = VerdictInputs(
         given,
         start.held_score,
@@ -387,8 +389,10 @@ def _with_found(own: Opened, fitted: dict[int, Opened], model: native.Model) -> 
     return fitted.get(id(own.measurement)) or own.aligned(model)
 
 
-def _refit(done: Search) -> float:
-    """Score after a refit of the base alone."""
+def _refit(done: Search, findings: Sequence[Finding]) -> float:
+    """Score after a refit of the base alone, with its lag if nothing else was found."""
+    if findings and all(f.effect == REFIT for f in findings):
+        return done.last.held_score
     start = done.rounds[0].before
     trial = next((t for t in done.rounds[0].trials if t.names == (REFIT,)), None)
     if trial is None and start.state.base:

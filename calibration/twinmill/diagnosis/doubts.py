@@ -19,7 +19,7 @@ from twinmill.diagnosis.search import PAUSE_S
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import CHANGE, TIME
 from twinmill.diagnosis.ties import in_common, of_levels
-from twinmill.diagnosis.trials import REFIT, Trial
+from twinmill.diagnosis.trials import REFIT, Trial, own_estimates
 from twinmill.fitting.compare import GOOD
 from twinmill.model.parameters import (
     WHERE_OR_WHEN,
@@ -94,16 +94,44 @@ def seen_once(done: Search, name: str, less: Trial | None) -> list[str] | None:
 def instead_of_moment(done: Search, name: str) -> list[str]:
     """Effects that do the same as one of a moment.
 
-    Those of a place, where the robot was at that time; and those of the time that it has been
-    driving, as a motor that warms up early and stays warm. One of these that ended at its bound
-    would do more, and need do half.
+    Those of a place, where the robot was at that time: any, if it was nowhere else near; and those
+    of the time that it has been driving, as a motor that warms up early and stays warm. One of
+    these that ended at its bound would do more, and need do half.
     """
     if not with_role(name, "moment"):
         return []
-    placed = [n for n in _same(done, name) if with_role(n, "place")]
+    anywhere = _is_even(done.last, name) and _in_a_place_of_its_own(done.last, name)
+    placed = [n for n in (catalogue() if anywhere else _same(done, name)) if with_role(n, "place")]
     bounded = _same(done, name, SETTINGS.same_in_time, at_bound=SETTINGS.same_at_bound)
     timed = [n for n in bounded if _is_timed(n) and not with_role(n, "moment")]
     return [*placed, *timed]
+
+
+def _is_even(last: Trial, name: str) -> bool:
+    """Whether one size says all of an effect: a loss that is one of both sides."""
+    instance, card = newest_instance(last.state.model, name), catalogue_of(last.state.model)[name]
+    own = [e for e in last.fit.shared_estimates() if e.name.startswith(f"{instance}.")]
+    sizes = [(e, away) for e, p, away in _sizes(card, own) if p["role"] == "size"]
+    return sum(away > SETTINGS.within * e.std for e, away in sizes) < 2
+
+
+def _in_a_place_of_its_own(last: Trial, name: str) -> bool:
+    """Whether the robot, while an effect of a moment is there, drives where it drives at no other.
+
+    Then the floor there may be as it is, and no log of this drive tells.
+    """
+    begin_s, *end_s = when_s(last, name)
+    (data,) = (d for d in last.fit.datasets if isinstance(d, Trajectory))
+    place, away_s = data.measurement.track.pose[data.windows.starts, :2], SETTINGS.away_s
+    until_s = min(end_s, default=np.inf)
+    there = (data.start_s >= begin_s) & (data.start_s < until_s)
+    elsewhen = (data.start_s < begin_s - away_s) | (data.start_s > until_s + away_s)
+    if not (there.any() and elsewhen.any()):
+        return False
+    way_m = np.hypot(*np.diff(place, axis=0, append=place[-1:]).T)
+    apart_m = np.hypot(*(place[there].T[:, :, None] - place[elsewhen].T[:, None]))
+    again = apart_m.min(axis=1) < SETTINGS.again_m
+    return bool(way_m[there] @ again < SETTINGS.comes_by * way_m[there].sum())
 
 
 def within_the_table(
@@ -278,15 +306,9 @@ def _same(
         if len(t.names) == 1
         and t.names[0] not in (name, REFIT)
         and this.before.held_score**2 - t.held_score**2
-        > (at_bound if any(e.at_bound for e in _own(t)) else SETTINGS.same_fall) * taken
+        > (at_bound if any(e.at_bound for e in own_estimates(t)) else SETTINGS.same_fall) * taken
         and in_common(this.before, this.accepted, t) > least
     ]
-
-
-def _own(trial: Trial) -> list[ParameterEstimate]:
-    """Estimates of the effect that a trial is of."""
-    instance = newest_instance(trial.state.model, trial.names[0])
-    return [e for e in trial.fit.shared_estimates() if e.name.startswith(f"{instance}.")]
 
 
 def stand_in(done: Search, name: str) -> str | None:

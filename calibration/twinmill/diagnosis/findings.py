@@ -15,7 +15,8 @@ from twinmill.diagnosis.rounds import Round, Search
 from twinmill.diagnosis.search import comes_again
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import TIME
-from twinmill.diagnosis.trials import REFIT, State, Trial, fitted, with_effects
+from twinmill.diagnosis.trials import REFIT, State, Trial, fitted, own_estimates, with_effects
+from twinmill.fitting.compare import MISSING
 from twinmill.model.parameters import (
     CLOCK,
     LAG,
@@ -133,6 +134,7 @@ def with_stale_numbers(
     lag_std_s: float,
     clock_std_s: float,
     stds: Mapping[str, float],
+    slight: Mapping[str, ParameterEstimate],
 ) -> list[Finding]:
     """Findings in which what the model may well have by its own error is a stale number.
 
@@ -142,12 +144,15 @@ def with_stale_numbers(
         lag_std_s: how well other logs told the model's lag; 0 where none did.
         clock_std_s: the same of the clocks' offset, which a delay cannot be told from.
         stds: how well other logs told the numbers of the model's effects, by name.
+        slight: lags that do what effects do and hardly differ from the model's, by effect.
     """
     gone: list[Finding] = []
     own: list[ParameterEstimate] = []
     for finding in found:
         numbers = _stale_numbers(finding, model, lag_std_s, stds)
         numbers = numbers or _stale_clock(finding, model, clock_std_s)
+        if not numbers and finding.effect in slight:
+            numbers = [slight[finding.effect]]
         if numbers:
             gone.append(finding)
             own += numbers
@@ -161,6 +166,44 @@ def with_stale_numbers(
         whole = replace(stale, parameters=[*stale.parameters, *own], share=stale.share + share)
         place = stale
     return [whole if f is place else f for f in found if f is place or f not in gone]
+
+
+def slight_lags(done: Search, first: State, score: float) -> dict[str, ParameterEstimate]:
+    """By effect, the lag of the base that does nearly what it does, and is nearly as it was.
+
+    A robot that is driven in another way is a little later or sooner than the model, though nothing
+    new is there. Where the model as given hardly misses, that says no more.
+
+    Args:
+        done: the search.
+        first: where it started.
+        score: of the model as given.
+    """
+    if score > MISSING:
+        return {}
+    lag_s, late_s = done.last.state.model.get(LAG), _late_s(first.model)
+    found = {}
+    for name in done.found:
+        this = done.round_of(name)
+        trial = next((t for t in this.trials if t.names == (LAG_EFFECT,)), None)
+        if trial is None or this.accepted.names != (name,) or not _does_as_much(this, trial):
+            continue
+        extra, *_ = own_estimates(trial)
+        if abs(extra.value) <= SETTINGS.told_lag * late_s:
+            found[name] = replace(extra, name=LAG, value=lag_s + extra.value)
+    return found
+
+
+def _does_as_much(this: Round, trial: Trial) -> bool:
+    """Whether a trial takes about what the accepted one does."""
+    before = this.before.held_score**2
+    return before - trial.held_score**2 > SETTINGS.rival * (before - this.accepted.held_score**2)
+
+
+def _late_s(model: native.Model) -> float:
+    """How late a model is by its lags and delays."""
+    own = [(i, late_part(i.split("#")[0])) for i in effect_names(model)]
+    return model.get(LAG) + sum(model.get(f"{i}.{late[1]}") for i, late in own if late)
 
 
 def _stale_numbers(

@@ -13,12 +13,14 @@ from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     CAMERA_STAGES,
     Parameter,
+    ParameterEstimate,
     all_effect_parameters,
     base_parameters,
     effect_names,
     effect_parameters,
     lasts_for_a_while,
     needing,
+    newest_instance,
 )
 from twinmill.predict.datasets import Dataset, Trajectory, total_score
 from twinmill.predict.detections import Detections
@@ -108,6 +110,12 @@ class Trial:
     def held_score(self) -> float:
         """On parts that were not fitted to."""
         return total_score(self.fit.held_scores)
+
+
+def own_estimates(trial: Trial) -> list[ParameterEstimate]:
+    """Estimates of the effect that a trial is of."""
+    instance = newest_instance(trial.state.model, trial.names[0])
+    return [e for e in trial.fit.shared_estimates() if e.name.startswith(f"{instance}.")]
 
 
 def fitted(state: State) -> Trial:

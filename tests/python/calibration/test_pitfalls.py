@@ -273,6 +273,24 @@ def with_play(duty: np.ndarray) -> np.ndarray:
     return played
 
 
+@pytest.mark.parametrize(("more_s", "effects"), [(0.006, {REFIT}), (0.011, {"motor_lag"})])
+def test_a_lag_that_is_nearly_as_it_was_is_a_stale_number(
+    more_s, effects, tanh_robot, measure, fitted
+):
+    """90 ms in the log that the model is of; a little more is how robots differ from day to day.
+
+    A little more than that shows in so calm a log, and is told.
+    """
+    robot = tanh_robot()
+    run = measure(replace(robot, lag_s=robot.lag_s + more_s), 12, 60.0)
+    found = diagnose([run], fitted)
+    assert {f.effect for f in found.findings} == effects
+    if effects == {REFIT}:
+        assert found.score_refit == found.search.last.held_score
+        (lag,) = found.findings[0].parameters
+        assert lag.value == pytest.approx(robot.lag_s + more_s, abs=2 * lag.std + EULER_S)
+
+
 @pytest.mark.parametrize(
     ("spoilt", "name"), [(slewed, "slew_limit"), (with_play, "reversal_dead_time")]
 )
@@ -356,7 +374,10 @@ def failing_at_32_s(duty: np.ndarray) -> np.ndarray:
 def test_a_loss_is_sure_where_commands_are_as_before_it(
     tanh_robot, measure, fitted, limited, last_pct, surely
 ):
-    """Commands are below the limit for 32 s; in the last 12 s above it, or as they were."""
+    """Commands are below the limit for 32 s; in the last 12 s above it, or as they were.
+
+    Each leg is driven there and back, so that the place is as before, too.
+    """
 
     class Weak(tanh_robot):
         def wheels_mps(self, duty):
@@ -364,9 +385,10 @@ def test_a_loss_is_sure_where_commands_are_as_before_it(
 
     random = np.random.default_rng(3)
     ways = np.array([(1, 1, 1, 1), (-1, 1, -1, 1), (-1, 1, 1, -1), (1, 0.4, 1, 0.4)])
-    steps = random.choice([-1, 1], 44)[:, None] * ways[random.integers(0, 4, 44)]
-    sizes_pct = [*random.uniform(15, 45, 32), *random.uniform(*last_pct, 12)]
-    steps *= np.array(sizes_pct)[:, None]
+    legs = ways[random.integers(0, 4, 22)]
+    sizes_pct = [*random.uniform(15, 45, 16), *random.uniform(*last_pct, 6)]
+    legs *= np.array(sizes_pct)[:, None]
+    steps = np.stack([legs, -legs], axis=1).reshape(44, 4)
     script = np.repeat(steps.round().astype(int), 48, axis=0)
     found = diagnose([measure(Weak(), 33, script_pct=script)], fitted)
     sure = [f.effect for f in found.findings if f.certainty == "sure"]
@@ -444,7 +466,8 @@ def test_a_weakness_for_a_while_is_named_with_its_times(tanh_robot, measure, fit
 
     found = diagnose([measure(Tired(), 22, 40.0)], fitted)
     (finding,) = found.findings
-    assert (finding.effect, finding.certainty) == ("transient_loss", "sure")
+    assert finding.effect == "transient_loss"
+    assert set(finding.group) == {"transient_loss", "floor_patch"}  # it was nowhere there before
     loss, from_s, until_s = finding.parameters
     assert abs(loss.value - 0.33) < 2 * loss.std < 0.15
     for moment, true_s in ((from_s, 15), (until_s, 22)):

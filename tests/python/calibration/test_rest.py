@@ -148,7 +148,7 @@ def test_a_lag_within_the_models_own_error_is_a_stale_number(lag_s, known_s, eff
     model.set("base.motor_lag_s", lag_s)
     extra = ParameterEstimate("motor_lag.extra_s", -0.0108, 0.0028, "s", False, True)
     lag = Finding("motor_lag", None, [extra], 0.6, "sure")
-    found = with_stale_numbers([lag], model, lag_std_s=known_s, clock_std_s=0.0, stds={})
+    found = with_stale_numbers([lag], model, lag_std_s=known_s, clock_std_s=0.0, stds={}, slight={})
     assert [f.effect for f in found] == [effect]
     if effect == REFIT:
         (lag,) = found[0].parameters
@@ -162,7 +162,7 @@ def test_an_effect_that_changed_within_the_models_own_error_is_a_stale_number(kn
     own = ParameterEstimate("heading_bias#2.bias_rad", 0.05, 0.01, "rad", False, True)
     again = Finding("heading_bias", None, [own], 0.6, "sure", again=True)
     stds = {"heading_bias.bias_rad": known}
-    found = with_stale_numbers([again], model, lag_std_s=0.0, clock_std_s=0.0, stds=stds)
+    found = with_stale_numbers([again], model, lag_std_s=0.0, clock_std_s=0.0, stds=stds, slight={})
     assert [f.effect for f in found] == [effect]
 
 
@@ -182,7 +182,9 @@ def test_a_delay_within_the_error_of_the_clocks_is_a_stale_number(known_s, group
     model.set("clock.offset_s", -0.127)
     own = ParameterEstimate("input_delay.delay_s", 0.0134, 0.002, "s", False, True)
     late = Finding("input_delay", group, [own], 0.8, "group" if group else "sure")
-    (found,) = with_stale_numbers([late], model, lag_std_s=0.0, clock_std_s=known_s, stds={})
+    (found,) = with_stale_numbers(
+        [late], model, lag_std_s=0.0, clock_std_s=known_s, stds={}, slight={}
+    )
     assert found.effect == effect
     if effect == REFIT:
         (offset,) = found.parameters
