@@ -396,6 +396,22 @@ def _swings(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding |
     return doubted(finding, why, wrong_form=True, depends_on=CHANGE)
 
 
+def _heading_is_late(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
+    """Turning comes late, and in curves the robot drifts inwards by as much.
+
+    A heading that is told late by T is off by omega T, so that a robot that drives with v seems to
+    drift by v omega T to the inside: as slip of -T does.
+    """
+    numbers = {f.effect: f.parameters[0] for f in found if f.effect in ("yaw_lag", "lateral_slip")}
+    if finding.effect not in numbers or len(numbers) < 2:
+        return None
+    turn, drift = numbers["yaw_lag"], numbers["lateral_slip"]
+    if abs(turn.value + drift.value) > SETTINGS.within * np.hypot(turn.std, drift.std):
+        return None
+    why = f"both are what a heading does that is told {turn.value:.3f} s later than the place is"
+    return doubted(finding, why, wrong_form=True, depends_on=CHANGE)
+
+
 def _comes_and_goes(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
     """Losses come at several times, or as large ones at a place and at a moment."""
     losses = _alike_losses(found)
@@ -444,7 +460,14 @@ def _is_second(finding: Finding, found: Sequence[Finding], rest: Rest) -> Findin
     return None
 
 
-FORM_RULES = (_swings, _comes_and_goes, _is_some_moments, _leaves_its_own, _is_second)
+FORM_RULES = (
+    _swings,
+    _heading_is_late,
+    _comes_and_goes,
+    _is_some_moments,
+    _leaves_its_own,
+    _is_second,
+)
 
 
 def _much_left_by(rest: Rest, group: str) -> bool:

@@ -106,13 +106,17 @@ class VerdictInputs:
         Less is enough where the smooth response predicts much of it.
         """
         depends = bool(self.rest.again or self._continuous)
-        firm = self.rest.firm and self.rest.share > SETTINGS.much_left
-        return depends or self.last > (GOOD if firm else SETTINGS.worse) * self.known
+        return depends or self.last > (MISSING if self._firm else SETTINGS.worse) * self.known
 
     @property
     def _unexplained(self) -> bool:
         """More is left than is usual, and neither an effect nor a formula takes it."""
-        return self.last > MISSING * self.known
+        return self.last > (GOOD if self._firm else MISSING) * self.known
+
+    @property
+    def _firm(self) -> bool:
+        """The smooth response predicts much of what is left."""
+        return self.rest.firm and self.rest.share > SETTINGS.much_left
 
     @property
     def _noise_outweighs(self) -> bool:

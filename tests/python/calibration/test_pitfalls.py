@@ -52,6 +52,7 @@ def on_own_clock(fitted, tmp_path_factory) -> ModelFile:
     return ModelFile.load(str(path))
 
 
+KEPT = np.exp(-1 / 120 / 0.04)  # of a filter of 40 ms at 120 Hz
 NOTHING_LEFT = Rest(0.0, False, [])
 FLEXIBLE = "p0*sin(7*theta) + p1*cos(7*theta) + p2*sin(5*theta) + p3*cos(5*theta)"
 
@@ -271,6 +272,21 @@ def with_play(duty: np.ndarray) -> np.ndarray:
         left_s = np.where(turned, PLAY_S, np.maximum(left_s - EULER_S, 0))
         played[k] = np.where(left_s > 0, 0, wanted)
     return played
+
+
+def test_a_heading_that_comes_late_is_no_slip(tanh_robot, measure, fitted):
+    """A tracker that smooths the heading alone: 40 ms. Curves seem to drift to the inside."""
+
+    def smoothed(pose, valid):
+        heading = lfilter([1 - KEPT], [1, -KEPT], pose[:, 2] - pose[0, 2]) + pose[0, 2]
+        return np.column_stack([pose[:, :2], heading]), valid
+
+    sides = np.random.default_rng(5).choice((25, 50, 75, 100), (60, 2))
+    script = np.repeat(sides[:, [0, 1, 0, 1]], 48, axis=0)
+    found = diagnose([measure(tanh_robot(), 31, script_pct=script, spoil=smoothed)], fitted)
+    assert {f.effect for f in found.findings} == {"yaw_lag", "lateral_slip"}
+    assert all(f.certainty == "doubtful" for f in found.findings)
+    assert found.verdict == "outside_catalogue" and "change of the command" in found.sentence
 
 
 @pytest.mark.parametrize(("more_s", "effects"), [(0.006, {REFIT}), (0.011, {"motor_lag"})])

@@ -210,6 +210,13 @@ def test_a_refit_is_not_enough_where_more_than_the_noise_is_left(last, verdict, 
     assert words in weighed.sentence
 
 
+@pytest.mark.parametrize(("last", "verdict"), [(1.17, "cannot_tell"), (1.4, "outside_catalogue")])
+def test_a_little_that_follows_from_something_unknown_is_not_told_why(last, verdict):
+    weighed = VerdictInputs(last, last, last, last, [], Rest(1.0, True, []), [], [], [], 1.0)
+    assert weighed.verdict == verdict
+    assert "Nothing is missing" not in weighed.sentence
+
+
 @pytest.mark.parametrize(
     ("takes", "certainty", "left", "verdict"),
     [
