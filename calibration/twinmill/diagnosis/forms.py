@@ -37,6 +37,7 @@ HEADING_RAD = 0.02  # usual error of a captured heading
 USUAL = {**TYPICAL, "travel": SWELL, "motion": SWELL, "aside": SWELL, "theta_rad": HEADING_RAD}
 LEVER_M = 0.1  # turning counts as driving at this radius
 SHORTEST_M = 0.3  # wave along the room
+SHARP = 0.005  # share of the rate of a beat within which a better one may lie
 MOST_WAVES = 40
 SHORTEST_S = 6.0  # what comes and goes with time
 MOMENTS = 12  # at which something may begin or end
@@ -273,11 +274,14 @@ def from_library(terms: Sequence[Term]) -> list[Form]:
     ]
 
 
-def own_forms(motions: Sequence[Motion], sideways: bool, wheels: bool) -> list[Form]:
+def own_forms(
+    motions: Sequence[Motion], beat_radps: float, sideways: bool, wheels: bool
+) -> list[Form]:
     """Forms beside the library's.
 
     Args:
         motions: of all logs.
+        beat_radps: rate at which errors swing in time; 0 if at none.
         sideways: the robot can move to its left.
         wheels: the model has wheels.
     """
@@ -285,6 +289,7 @@ def own_forms(motions: Sequence[Motion], sideways: bool, wheels: bool) -> list[F
     return [
         *_of_room(every, sideways),
         *_of_time(every),
+        *(_swinging(to, "t", beat_radps, SHARP) for to in ("motion", "travel") if beat_radps),
         *_of_load(),
         *_of_speed(),
         *_around_a_speed(every),
@@ -328,10 +333,15 @@ def _of_time(every: Mapping[str, np.ndarray]) -> list[Form]:
 
 def _wave(name: str, k: int, span: float) -> Form:
     """That has k half waves in what the logs span of a name of the motion."""
+    return _swinging("motion" if name == "t" else "travel", name, np.pi * k / span, 0.5 / k)
+
+
+def _swinging(adds_to: str, name: str, rate: float, spread: float) -> Form:
+    """That swings at a rate, known to a share, over time or place."""
     pair = f"cos({C}*{name})", f"sin({C}*{name})"
-    adds_to, group, unit = ("motion", TIME, "1/s") if name == "t" else ("travel", "place", "1/m")
-    rate = float(f"{np.pi * k / span:.4g}")
-    return Form(adds_to, pair, group, constant=rate, spread=0.5 / k, unit=unit)
+    group, unit = (TIME, "1/s") if name == "t" else ("place", "1/m")
+    constant = float(f"{rate:.4g}")
+    return Form(adds_to, pair, group, constant=constant, spread=spread, unit=unit)
 
 
 def _of_load() -> list[Form]:

@@ -72,7 +72,8 @@ def formula_of(
     rows = Evidence(logs, motions, fit, changes)
     if len(rows.parts) < FEWEST:
         return None
-    own = own_forms(motions, drives_sideways(model), bool(model.wheels()))
+    beat_radps = motions[0].own.floor.response.beat_radps if len(motions) == 1 else 0.0
+    own = own_forms(motions, beat_radps, drives_sideways(model), bool(model.wheels()))
     forms = [*from_library(terms), *sized(own, motions)]
     pool = Pool(forms, rows.raw(forms))
     other = rows.of_all(rival) if len(rival) else None

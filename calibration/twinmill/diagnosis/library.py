@@ -41,7 +41,7 @@ REVERSAL_S = 0.15  # how long a reversal is felt
 START_S = 0.4  # the same of a start from rest, and of a rise of the speed
 # Of one wheel's command, with its half `h`; in proportion to u is a wheel's gain.
 OF_ALL_WHEELS = "command of the wheels"
-SHAPES = ("u*abs(u)", "abs(u)", "sign(u)*max(0, abs(u) - h)")
+SHAPES = ("u*abs(u)", "abs(u)", "sign(u)", "sign(u)*max(0, abs(u) - h)")
 
 
 def library(
@@ -238,7 +238,7 @@ def _wheel_terms(opened: Sequence[Opened], model: native.Model) -> list[Term]:
             side += f" && front {_sign(wheel['x_m'])}"
         sides[side] = f"command of the {named}"
     half = f"{largest / 2:.4g}"
-    sizes = (largest**2, largest, largest / 2)
+    sizes = (largest**2, largest, 1.0, largest / 2)
     table = model.drive == "duty"  # which has the speed at each duty
     humps = [] if table else Humps.over(0.0, largest).texts("abs(u)")
     return [

@@ -23,6 +23,7 @@ NO_NAMES = {
     "way",
     "ago",
     "drift",
+    "push",
     "travel",
     "aside",
     "spot",

@@ -21,6 +21,7 @@ from twinmill.fitting.wheel_angles import Wheel
 from twinmill.model.parameters import WHERE_OR_WHEN, effect_names, effect_parameters
 
 SHORTEST_S = 4.0  # period of a gain that changes with time
+SLOW_S = 8.0  # the same of a push
 SHORTEST_M = 0.7  # the same with the way driven
 MOST_WAVES = 36
 PLACES = 5  # along each side of the floor that was driven
@@ -99,6 +100,8 @@ def dependences(motion: Motion) -> Iterator[Features]:
             yield _scaled(motion, wave)
     for gain in (always, *motion.where, hours):
         yield from _drifts(motion, gain)
+    for wave in _waves(motion.t_s - motion.t_s.min(), SLOW_S):
+        yield _pushes(motion, wave)
     for gain in (always, *motion.where):
         yield _crossed(motion, gain)
     yield from _curves(motion)
@@ -180,13 +183,29 @@ def wheel_angles(motion: Motion, wheels: Sequence[Wheel]) -> Iterator[Features]:
         yield forward, left, turning
 
 
+def beat(motion: Motion, rate_radps: float) -> Iterator[Features]:
+    """Gains and drifts that swing in time at a rate; nothing where it is 0."""
+    if rate_radps:
+        angle = rate_radps * motion.t_s[:, None]
+        wave = np.hstack([np.cos(angle), np.sin(angle)])
+        yield _scaled(motion, wave)
+        yield from _drifts(motion, wave)
+
+
 def _drifts(motion: Motion, gain: np.ndarray) -> Iterator[Features]:
     """Motion along the room's axes, and turning, while the robot moves, times (N, k) gains."""
-    drift = gain * motion.moves[:, None]
-    c, s = np.cos(motion.heading_rad)[:, None], np.sin(motion.heading_rad)[:, None]
-    yield np.hstack([drift * c, drift * s]), np.hstack([-drift * s, drift * c]), drift
+    along, aside, _ = _pushes(motion, gain)
+    yield along, aside, gain * motion.moves[:, None]
     none = np.zeros((len(gain), 0))
     yield none, none, gain * motion.speed_mps[:, None]
+
+
+def _pushes(motion: Motion, gain: np.ndarray) -> Features:
+    """Motion along the room's axes while the robot moves, times (N, k) gains."""
+    drift = gain * motion.moves[:, None]
+    c, s = np.cos(motion.heading_rad)[:, None], np.sin(motion.heading_rad)[:, None]
+    none = np.zeros((len(gain), 0))
+    return np.hstack([drift * c, drift * s]), np.hstack([-drift * s, drift * c]), none
 
 
 def _curves(motion: Motion) -> Iterator[Features]:

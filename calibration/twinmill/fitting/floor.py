@@ -10,7 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import twinmill_native as native
 
-from twinmill.fitting.dependence import dependences, known_physics, place_gains, wheel_angles
+from twinmill.fitting.dependence import (
+    beat,
+    dependences,
+    known_physics,
+    place_gains,
+    wheel_angles,
+)
 from twinmill.fitting.response import Response
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.fitting.settings import FLOOR_SETTINGS
@@ -88,8 +94,10 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     points = response.points
     known = known_physics(base, velocity[points], lambda m: body_velocity_at(data, m, points))
     response.find_wheels(base)
+    response.find_beat()
     motion = response.motion
-    response.boost([*dependences(motion), *wheel_angles(motion, response.wheels), *known])
+    angles, beats = wheel_angles(motion, response.wheels), beat(motion, response.beat_radps)
+    response.boost([*dependences(motion), *angles, *beats, *known])
     within, across = (
         np.where(calm[:, None, None], e, np.nan) for e in (response.within, response.across)
     )

@@ -23,6 +23,8 @@ from scipy.linalg import lapack
 
 from twinmill.filters import filtered
 from twinmill.fitting import wheel_angles
+from twinmill.fitting.beat import HORIZON as BEAT_HORIZON
+from twinmill.fitting.beat import beat_radps
 from twinmill.fitting.boosting import Learner, Parts, boosted
 from twinmill.fitting.dependence import Features, Motion
 from twinmill.fitting.settings import FLOOR_SETTINGS
@@ -347,6 +349,22 @@ class Response:
         ends = np.column_stack([self.starts, self.ends[:, horizon]])[there]
         self.radius_ratio = wheel_angles.radius_ratio(wheels, self.moved, errors, ends)
         self.wheels = [wheel.larger(self.radius_ratio) for wheel in wheels]
+
+    def find_beat(self) -> None:
+        """At what rate errors of its gains, pushes along its axes or along the room's swing."""
+        there = self.ends[:, BEAT_HORIZON] >= 0
+        errors = self.across[there, BEAT_HORIZON] / np.maximum(self.errors[BEAT_HORIZON], 1e-12)
+        made = (self.data.measured - self.across)[there, BEAT_HORIZON]
+        errors, made = np.nan_to_num(errors).T, np.nan_to_num(made).T
+        at = self.starts[there]
+        c, s = np.cos(self.heading_rad[at]), np.sin(self.heading_rad[at])
+        room = (c * errors[0] - s * errors[1], s * errors[0] + c * errors[1])
+        gains = errors * made / np.maximum(made.std(axis=1, keepdims=True), 1e-12)
+        waves = [w.waves(self.moved)[at] for w in self.wheels]
+        turned = [f(n * self.heading_rad[at]) for f in (np.cos, np.sin) for n in (1, 2, 4)]
+        done = [*made, *np.abs(made), *turned, *self.pose[at, :2].T, *np.hstack([*waves, made.T]).T]
+        swings = [*errors, *room, *gains, gains.sum(axis=0)]
+        self.beat_radps = beat_radps(self.data.start_s[there], swings, done)
 
     def boost(self, groups: Sequence[Features]) -> None:
         """Adds what is left and left-out blocks agree on, a group of features at a time."""

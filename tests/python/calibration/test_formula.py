@@ -208,7 +208,7 @@ def test_a_form_changes_the_errors_as_the_plant_does_that_has_it(motion, form):
 
 def test_units_agree_in_every_form_and_are_told_of_its_numbers(motion):
     """By dimensions: a number in front of v |v| that gives a speed is in s/m."""
-    for form in own_forms([motion[1]], True, True):
+    for form in own_forms([motion[1]], 5.0, True, True):
         assert units_of(form)
     assert units_of(Form("vx_mps", ("vx*abs(vx)",), "speed")) == ["s/m"]
     assert units_of(Form("travel", ("(vx*vx + vy*vy)",), "speed")) == ["s^2/m^2"]

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What drifts with time: all that is captured moves or turns, or the robot veers."""
+"""What changes with time: all that is captured drifts or turns, the robot veers, or all swings."""
+
+from collections.abc import Sequence
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from twinmill.diagnosis.families.family import Family, pushed
-from twinmill.diagnosis.term import CHANNELS, TIME, TYPICAL, Term, moves
+from twinmill.diagnosis.term import CHANNELS, SPEEDS, SWELL, TIME, TYPICAL, Term, moves
 from twinmill.fitting.opening import Opened
 
 PARTS = (0.2, 0.35, 0.5, 0.65, 0.8)  # of the time of all logs: where something may have changed
@@ -15,11 +19,10 @@ def of_drift(t_s: np.ndarray) -> list[Family]:
     """Slow waves over the time of all logs, (N,) s."""
     longest_s = 1.1 * float(np.ptp(t_s))
     rates = [float(f"{2 * np.pi * k / longest_s:.4g}") for k in range(1, 1 + DRIFTS)]
-    texts = [f"{wave}({rate:g}*t)" for wave in ("cos", "sin") for rate in rates]
+    texts = _texts(rates)
 
     def swinging(own: Opened) -> np.ndarray:
-        angle = own.floor.response.middle_s[:, None] * np.array(rates)
-        return np.hstack([np.cos(angle), np.sin(angle)])
+        return _swinging(own, rates)
 
     def moving(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         return pushed(own, swinging(own))
@@ -38,7 +41,57 @@ def of_drift(t_s: np.ndarray) -> list[Family]:
         Family([Term(TIME, CHANNELS[2], t, 1.0, "drift of heading") for t in texts], turning),
         Family([Term(TIME, CHANNELS[2], t, 1.0, "veers at times") for t in veers], veering),
         *(_veering_from(a) for a in at_s),
+        *(_pushing(two) for two in pairwise(rates)),
     ]
+
+
+def of_beat(rate_radps: float) -> list[Family]:
+    """Speeds, turning or pushes swing at a rate that the log's errors tell; none at 0."""
+    if not rate_radps:
+        return []
+    rates = [float(f"{rate_radps:.5g}")]
+    texts = _texts(rates)
+
+    def veering(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
+        return {2: TYPICAL["omega_radps"] * _swinging(own, rates) * moves(velocity)[:, None]}
+
+    def gaining(axes: Sequence[int], own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
+        return {k: SWELL * _swinging(own, rates) * velocity[:, [k]] for k in axes}
+
+    def of_gain(axes: Sequence[int], name: str, to: str) -> Family:
+        size, words = TYPICAL[to] / SWELL, f"{name} swings"
+        terms = [Term(TIME, to, f"{t}*{name}", size, words) for t in texts]
+        return Family(terms, partial(gaining, axes))
+
+    turns = [Term(TIME, CHANNELS[2], f"{t}*moves", 1.0, "turning swings") for t in texts]
+    return [
+        _pushing(rates),
+        Family(turns, veering),
+        of_gain((0, 1, 2), "rim", "rim_mps"),
+        *(of_gain((k,), SPEEDS[k], CHANNELS[k]) for k in range(3)),
+    ]
+
+
+def _pushing(rates: Sequence[float]) -> Family:
+    """The robot is pushed along the room while it moves, at one of a few rates."""
+    texts = [f"push({axis}, {t})" for axis in "xy" for t in _texts(rates)]
+    family = f"pushes at {rates[0]:g} 1/s"
+
+    def values(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
+        return pushed(own, _swinging(own, rates) * moves(velocity)[:, None])
+
+    return Family([Term(TIME, CHANNELS[0], t, 1.0, family) for t in texts], values)
+
+
+def _swinging(own: Opened, rates: Sequence[float]) -> np.ndarray:
+    """(N, 2 k) at a log's points."""
+    angle = own.floor.response.middle_s[:, None] * np.array(rates)
+    return np.hstack([np.cos(angle), np.sin(angle)])
+
+
+def _texts(rates: Sequence[float]) -> list[str]:
+    """Of the same in a formula."""
+    return [f"{wave}({rate:g}*t)" for wave in ("cos", "sin") for rate in rates]
 
 
 def _veering_from(at_s: float) -> Family:

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""At what rate errors swing in time, as a regulator does that hunts, or a fan that turns.
+
+A line in the spectrum of a log's errors stands far above its neighbours, and nothing that the robot
+did has one there: neither its motion nor its heading, its place, or the angles of its wheels.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+HORIZON = 1  # number of the windows' horizon that is short beside a period
+BIN_S = 0.05
+PADDED = 4  # times as many bins, so that a line between two is seen
+SHORTEST_S = 0.5  # period
+LEAST_PERIODS = 8  # in a log
+NEIGHBOURS = 24  # lines on either side, whose median tells the noise
+# Times the mean of a power that is noise: of noise one in 65 million is larger (exponential), and a
+# log has some thousand that are independent.
+BEYOND_CHANCE = 18.0
+IN_THE_DRIVE = 6.0  # the same of what the robot did
+
+
+def beat_radps(t_s: np.ndarray, errors: Sequence[np.ndarray], done: Sequence[np.ndarray]) -> float:
+    """Rate at which errors swing and nothing that the robot did does, rad/s; 0 if there is none.
+
+    Args:
+        t_s: (W,) of windows, in order.
+        errors: (W,) of each channel that may swing.
+        done: (W,) of each thing that the robot did.
+    """
+    bins = np.rint((t_s - t_s[0]) / BIN_S).astype(int)
+    lines = PADDED * (bins[-1] + 1)
+    rate_hz = np.fft.rfftfreq(lines, BIN_S)
+    asked = (rate_hz > LEAST_PERIODS / (t_s[-1] - t_s[0])) & (rate_hz < 1 / SHORTEST_S)
+    if bins[-1] < 4 * NEIGHBOURS or not asked.any():
+        return 0.0
+    power, of_drive = (
+        np.max([_over_noise(bins, signal) for signal in every], axis=0) for every in (errors, done)
+    )
+    power *= asked & (of_drive < IN_THE_DRIVE)
+    best = int(np.argmax(power))
+    return float(2 * np.pi * rate_hz[best]) if power[best] > BEYOND_CHANCE else 0.0
+
+
+def _over_noise(bins: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    """(K,) power of a signal's lines over the mean of noise around each."""
+    even = np.bincount(bins, signal) / np.maximum(np.bincount(bins), 1)
+    tapered = (even - even.mean()) * np.hanning(len(even))
+    power = np.abs(np.fft.rfft(tapered, PADDED * len(even))) ** 2
+    padded = np.pad(power[::PADDED], NEIGHBOURS, mode="reflect")
+    around = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1)
+    noise = np.repeat(np.median(around, axis=1), PADDED)[: len(power)] / np.log(2)
+    return power / np.maximum(noise, 1e-30)

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What swings in time by itself is told, and what the drive makes swing is not taken for it."""
+
+import numpy as np
+import pytest
+
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.fitting.beat import beat_radps
+from twinmill.fitting.opening import open_measurements
+
+STEP_S = 1 / 480  # of the robot
+POSE_S = 1 / 120
+
+
+def test_a_regulator_that_hunts_is_told_with_its_rate(tanh_robot, measure, one_clock_base):
+    """All wheels are quicker and slower by 15 % at 0.9 Hz."""
+    rate_radps = 2 * np.pi * 0.9
+
+    class Hunting(tanh_robot):
+        def wheels_mps(self, duty):
+            swing = 0.15 * np.sin(rate_radps * np.arange(len(duty)) * STEP_S)
+            return super().wheels_mps(duty) * (1 + swing)[:, None]
+
+    run = measure(Hunting(), 51, 60.0)
+    found = diagnose([run], one_clock_base)
+    assert found.verdict == "outside_catalogue" and found.rest.depends_on[0] == "time"
+    (opened,) = open_measurements([run], one_clock_base)
+    assert opened.floor.response.beat_radps == pytest.approx(rate_radps, abs=2 * np.pi / 60 / 4)
+
+
+def test_a_fan_that_swings_slowly_is_told(tanh_robot, measure, one_clock_base):
+    """It pushes along the room by up to 20 mm/s, with a period of 17 s."""
+    direction, rate_radps = 0.7, 2 * np.pi / 17
+
+    def blown(pose, valid):
+        t_s = np.arange(len(pose)) * POSE_S
+        blown_m = 0.02 / rate_radps * (1 - np.cos(rate_radps * t_s))[:, None]
+        moved = pose[:, :2] + blown_m * [np.cos(direction), np.sin(direction)]
+        return np.column_stack([moved, pose[:, 2]]), valid
+
+    found = diagnose([measure(tanh_robot(), 52, 80.0, spoil=blown)], one_clock_base)
+    assert found.verdict == "outside_catalogue" and found.rest.depends_on[0] == "time"
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_a_calm_robot_has_no_beat(seed, tanh_robot, measure, one_clock_base):
+    (opened,) = open_measurements([measure(tanh_robot(), seed, 60.0)], one_clock_base)
+    assert opened.floor.response.beat_radps == 0.0
+
+
+def test_what_the_drive_makes_swing_is_no_beat():
+    """Noise with a line at 0.8 Hz, which the drive has, too, or has not."""
+    random, t_s = np.random.default_rng(6), np.arange(0, 90, 0.05)
+    line = np.sin(2 * np.pi * 0.8 * t_s)
+    errors, drive = line + random.normal(size=len(t_s)), random.normal(size=len(t_s))
+    assert beat_radps(t_s, [errors], [drive]) == pytest.approx(2 * np.pi * 0.8, abs=0.02)
+    assert beat_radps(t_s, [errors], [drive, line + 0.5 * drive]) == 0.0
