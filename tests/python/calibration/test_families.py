@@ -101,6 +101,20 @@ def test_heading_that_the_capture_lets_drift_depends_on_time(measure, one_clock_
     assert found.rest.depends_on[:1] == ["time"]
 
 
+def test_a_stiff_gear_of_one_wheel_is_told_with_its_wheel(tanh_robot, measure, one_clock_base):
+    """The front right wheel loses 25 mm/s at every speed."""
+
+    class Stiff(tanh_robot):
+        def wheels_mps(self, duty):
+            rims = super().wheels_mps(duty)
+            loss_mps = np.minimum(np.abs(rims), 0.025) * (0, 1, 0, 0)
+            return rims - np.sign(rims) * loss_mps
+
+    found = diagnose([measure(Stiff(), 61, 60.0)], one_clock_base)
+    assert not [f.effect for f in found.findings if f.certainty == "sure"]
+    assert found.rest.depends_on[:1] == ["command of the front right wheel"]
+
+
 def test_humps_share_out_every_value_between_the_outer_ones():
     humps = Humps.over(0.0, 0.8)
     between = np.random.default_rng(1).uniform(*humps.middles[[0, -1]], (50, 1))
