@@ -81,6 +81,7 @@ struct Recording
 Recording Record(const DriveChain &chain, const Track &track, const std::vector<Sample> &measured)
 {
     Recording recording;
+    recording.steps.reserve(track.command_t_s.size() + 2 * measured.size());
     RobotState state = chain.Start({});
     Playback playback(track);
     for (const Sample &sample : measured)
