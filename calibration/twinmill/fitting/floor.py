@@ -160,18 +160,20 @@ def body_velocity_at(
     """
     track = data.measurement.track
     seen = np.flatnonzero(track.segment >= 0)
-    predicted = native.one_step(model, data.measurement.played)[seen]
-    t_s, pose = track.pose_t_s[seen], np.column_stack([track.pose[:, :2], track.heading_rad])[seen]
-    step_s = np.diff(t_s, prepend=t_s[0] - 1.0)
-    before = np.roll(pose, 1, axis=0)
-    step = predicted - before
-    middle = before[:, 2] + step[:, 2] / 2
+    place = np.searchsorted(seen, np.arange(len(track.pose_t_s))[points])
+    there = place < len(seen)
+    before, at = seen[place[there] - 1], seen[place[there]]
+    heading_rad = track.heading_rad[before]
+    predicted = native.one_step(model, data.measurement.played)[at]
+    along, across = (predicted[:, :2] - track.pose[before, :2]).T
+    turn = predicted[:, 2] - heading_rad
+    middle = heading_rad + turn / 2
     c, s = np.cos(middle), np.sin(middle)
-    body = np.column_stack(
-        [c * step[:, 0] + s * step[:, 1], c * step[:, 1] - s * step[:, 0], step[:, 2]]
-    )
-    rates = np.vstack([np.nan_to_num(body / step_s[:, None]), np.zeros(3)])
-    return rates[np.searchsorted(seen, np.arange(len(track.pose_t_s))[points])]
+    body = np.column_stack([c * along + s * across, c * across - s * along, turn])
+    step_s = track.pose_t_s[at] - track.pose_t_s[before]
+    rates = np.zeros((len(place), 3))
+    rates[there] = np.nan_to_num(body / step_s[:, None])
+    return rates
 
 
 def coarse_offset_s(data: Trajectory, base: native.Model) -> float:
