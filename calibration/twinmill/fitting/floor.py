@@ -74,9 +74,9 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
         model: of the robot; only its form is used.
         same_clock: commands and poses are stamped by one clock.
     """
-    reason = _too_poor(data)
+    reason = too_poor(data)
     if reason:
-        return _none(data, reason)
+        return no_floor(data, reason)
     velocity, base = base_response(data, model, same_clock)
     offset_s = base.get(CLOCK)
     response = Response(data, velocity, base.get(LAG), offset_s)
@@ -249,7 +249,7 @@ def is_far(errors: np.ndarray, floor: np.ndarray, times: float) -> np.ndarray:
     return mean > times * np.nanmedian(mean)
 
 
-def _too_poor(data: Trajectory) -> str:
+def too_poor(data: Trajectory) -> str:
     """Why a log can give no floor; empty if it can."""
     whole = np.count_nonzero(np.isfinite(data.measured[:, -1, 0]))
     few = len(data.windows.starts) < FLOOR_SETTINGS.fewest_windows
@@ -265,7 +265,8 @@ def _too_poor(data: Trajectory) -> str:
     return ""
 
 
-def _none(data: Trajectory, reason: str) -> NoiseFloor:
+def no_floor(data: Trajectory, reason: str) -> NoiseFloor:
+    """Of a log that gives none."""
     nothing = np.full(data.floor.shape, np.nan)
     empty = np.full(data.measured.shape, np.nan)
     everything = np.ones(len(data.measured), bool)
