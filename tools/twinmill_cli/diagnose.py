@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shlex
+import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -22,7 +23,9 @@ if working():  # not for --help
     from twinmill.data.steady_table import is_steady_table
     from twinmill.diagnosis.diagnose import diagnose
     from twinmill.diagnosis.explain import Explanation, explain
+    from twinmill.diagnosis.first_sight import at_first_sight
     from twinmill.diagnosis.result import Diagnosis
+    from twinmill.model.model_file import ModelFile
     from twinmill.report import diagnosis as present
     from twinmill.swarm.metrics import swarm_metrics
     from twinmill.terminal import progress_bar
@@ -61,6 +64,7 @@ def _diagnose(
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with telling(f"diagnosing with {model}") as progress:
         measurements = load(logs, model_file, as_json)
+        _hint(measurements, model_file)
         result = diagnose(measurements, model_file, progress, stoppable=True)
         swarm = None
         if robots_recorded(logs[0], measurements) > 1:
@@ -76,6 +80,12 @@ def _diagnose(
     section = partial(present.section, result, then)
     finish(data, present.terminal(result, then), source, section=section, as_json=as_json, out=out)
     return _whole(result)
+
+
+def _hint(measurements: Measurements, model_file: ModelFile) -> None:
+    """Says what stands out, before anything is tested, to a person who waits."""
+    if sys.stderr.isatty() and (seen := at_first_sight(measurements, model_file)):
+        typer.echo(f"twinmill: at first sight {seen}; this is now tested.", err=True)
 
 
 def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str, str]]:
@@ -195,6 +205,7 @@ def _explain(
     check_output(output, model_file, force)
     with telling(f"explaining with {model}") as progress:
         measurements = load(logs, model_file, as_json)
+        _hint(measurements, model_file)
         result = explain(
             measurements,
             model_file,

@@ -64,8 +64,8 @@ void ForEach(Model &model, std::string_view name, Visit visit)
     if (name.empty() || name.starts_with(kTable))
         for (size_t i = 1; i < model.base.wheel_speed_mps.size();
              ++i)  // speed 0 at duty 0 is fixed
-            if (const Parameter p = TableSpeed(model, i); name.empty() || name == p.name)
-                visit(p, model.base.wheel_speed_mps[i]);
+            if (name.empty() || name.substr(kTable.size()) == std::to_string(i))
+                visit(TableSpeed(model, i), model.base.wheel_speed_mps[i]);
     for (size_t i = 0; i < model.effects.size(); ++i)
     {
         const std::string prefix = InstanceName(model.effects, i) + ".";

@@ -218,9 +218,15 @@ WheelMotion DriveChain::DriveWheels(const Command &command, double t_s, double d
 void DriveChain::DrivePart(const DutySignals &duty, double whole_s, RobotState &state,
                            WheelMotion &mean) const
 {
-    const WheelMotion target = Target(duty.duty);
+    if (state.told != duty.duty)
+    {
+        const WheelMotion target = Target(duty.duty);
+        state.told = duty.duty;
+        state.asked_mps = target.rim_mps;
+        state.asked_steering_rad = target.steering_rad;
+    }
     WheelSignals s{robot_,    duty.t_s,      duty.dt_s,       duty.battery_V,
-                   duty.duty, state.rim_mps, state.wheel_rad, target.rim_mps};
+                   duty.duty, state.rim_mps, state.wheel_rad, state.asked_mps};
     s.tau_s.fill(base_.motor_lag_s);
     Run(wheel_, s, state);
 
@@ -242,8 +248,8 @@ void DriveChain::DrivePart(const DutySignals &duty, double whole_s, RobotState &
         state.wheel_rad[k] += mean_mps[k] * rad_per_mps;
         mean.rim_mps[k] += mean_mps[k] * roll.radius_ratio[k] * part;
     }
-    const Relaxed steering =
-        Approach(state.steering_rad, target.steering_rad, base_.steering_lag_s, duty.dt_s, decays);
+    const Relaxed steering = Approach(state.steering_rad, state.asked_steering_rad,
+                                      base_.steering_lag_s, duty.dt_s, decays);
     state.steering_rad = steering.end;
     mean.steering_rad += steering.mean * part;
 }

@@ -17,19 +17,6 @@ Pose2 AlongArc(const Pose2 &from, const Twist &v, double dt_s)
             from.y_m + chord_s * (s * v.vx_mps + c * v.vy_mps), from.theta_rad + 2 * half_rad};
 }
 
-Course::Course(const Pose2 &start) : pose_(start), ahead_(Direction::Of(start.theta_rad)) {}
-
-void Course::Follow(const Twist &v, double dt_s)
-{
-    const double half_rad = v.omega_radps * dt_s / 2;
-    const double over = SinOver(half_rad), chord_s = dt_s * over;
-    const Direction turn{Cos(half_rad), half_rad * over}, middle = ahead_.Turned(turn);
-    pose_.x_m += chord_s * (middle.c * v.vx_mps - middle.s * v.vy_mps);
-    pose_.y_m += chord_s * (middle.s * v.vx_mps + middle.c * v.vy_mps);
-    pose_.theta_rad += 2 * half_rad;
-    ahead_ = middle.Turned(turn);
-}
-
 void PlanarStep(const DriveChain &chain, const Command &command, double t_s, double dt_s,
                 RobotState &state, Random *random)
 {

@@ -4,6 +4,7 @@
 // ground alone, share it.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 #include "playback.h"
@@ -81,6 +82,7 @@ struct Recording
 Recording Record(const DriveChain &chain, const Track &track, const std::vector<Sample> &measured)
 {
     Recording recording;
+    recording.steps.reserve(track.command_t_s.size() + 2 * measured.size());
     RobotState state = chain.Start({});
     Playback playback(track);
     for (const Sample &sample : measured)
@@ -246,6 +248,36 @@ private:
     }
 };
 
+// The short way round.
+double Wrapped(double rad)
+{
+    constexpr double kHalf = std::numbers::pi, kTurn = 2 * kHalf;
+    const double part_rad = std::fmod(rad + kHalf, kTurn);
+    return (part_rad < 0 ? part_rad + kTurn : part_rad) - kHalf;
+}
+
+// Makes weighted errors of poses (W, H, 3) that were predicted.
+void MakeErrors(const Displaced &displaced, double *poses)
+{
+    const size_t windows = displaced.start.size() / 3;
+    const size_t width = windows > 0 ? displaced.measured.size() / windows : 0;
+    for (size_t w = 0; w < windows; ++w)
+    {
+        const double *start = &displaced.start[3 * w];
+        const double c = std::cos(start[2]), s = std::sin(start[2]);
+        for (size_t at = w * width; at < (w + 1) * width; at += 3)
+        {
+            const double *measured = &displaced.measured[at], *weight = &displaced.weight[at];
+            const double x_m = poses[at] - start[0], y_m = poses[at + 1] - start[1];
+            const double error[3] = {measured[0] - (c * x_m + s * y_m),
+                                     measured[1] - (c * y_m - s * x_m),
+                                     Wrapped(measured[2] - (poses[at + 2] - start[2]))};
+            for (size_t k = 0; k < 3; ++k)
+                poses[at + k] = std::isnan(error[k]) ? 0 : error[k] * weight[k];
+        }
+    }
+}
+
 // By row of values: whether they leave the wheels' motion as it is, but for the times of poses.
 std::vector<char> OnGroundAlone(const Model &model, const std::vector<std::string> &names,
                                 std::span<const double> values)
@@ -309,6 +341,18 @@ std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
             .Write();
     });
     return predicted;
+}
+
+std::vector<double> WindowErrorsBatch(const Model &model, const Track &track,
+                                      std::span<const int64_t> starts,
+                                      std::span<const int64_t> ends,
+                                      const std::vector<std::string> &names,
+                                      std::span<const double> values, const Displaced &displaced)
+{
+    auto rows = PredictWindowsBatch(model, track, starts, ends, names, values);
+    for (size_t at = 0; at < rows.size(); at += 3 * ends.size())
+        MakeErrors(displaced, &rows[at]);
+    return rows;
 }
 
 }  // namespace twin

@@ -275,18 +275,23 @@ Array Windows(const Model &model, const PyTrack &track, Indices starts, IndexMat
     return ToNumpy(std::move(predicted), {starts.size(), ends.shape(1), 3});
 }
 
-Array WindowsBatch(const Model &model, const PyTrack &track, Indices starts, IndexMatrix ends,
-                   const std::vector<std::string> &names, Matrix values)
+Array WindowErrorsOf(const Model &model, const PyTrack &track, Indices starts, IndexMatrix ends,
+                     const std::vector<std::string> &names, Matrix values, Matrix start,
+                     Cube measured, Cube weight)
 {
-    if (ends.shape(0) != starts.size() || values.shape(1) != names.size())
+    const size_t count = starts.size(), width = 3 * ends.shape(1);
+    if (ends.shape(0) != count || values.shape(1) != names.size())
         throw std::invalid_argument("ends must have one row per start, values one column per name");
-    std::vector<double> predicted;
+    if (start.size() != 3 * count || measured.size() != count * width ||
+        weight.size() != count * width)
+        throw std::invalid_argument("start must be (W, 3), measured and weight (W, H, 3), of ends");
+    std::vector<double> errors;
     {
         nb::gil_scoped_release unlocked;
-        predicted =
-            PredictWindowsBatch(model, track.View(), Span(starts), Span(ends), names, Span(values));
+        errors = WindowErrorsBatch(model, track.View(), Span(starts), Span(ends), names,
+                                   Span(values), {Span(start), Span(measured), Span(weight)});
     }
-    return ToNumpy(std::move(predicted), {values.shape(0), starts.size(), ends.shape(1), 3});
+    return ToNumpy(std::move(errors), {values.shape(0), count * width});
 }
 
 Array OneStep(const Model &model, const PyTrack &track)
@@ -430,8 +435,11 @@ NB_MODULE(twinmill_native, m)
           "(B, K, 7) steady vx_mps, vy_mps, omega_radps and rim speeds at K constant commands.");
     m.def("windows", &Windows, "model"_a, "track"_a, "starts"_a, "ends"_a,
           "(W, H, 3) poses predicted at `ends` from the poses at `starts`.");
-    m.def("windows_batch", &WindowsBatch, "model"_a, "track"_a, "starts"_a, "ends"_a, "names"_a,
-          "values"_a, "(B, W, H, 3) the same for B rows of values, on all cores.");
+    m.def(
+        "window_errors", &WindowErrorsOf, "model"_a, "track"_a, "starts"_a, "ends"_a, "names"_a,
+        "values"_a, "start"_a, "measured"_a, "weight"_a,
+        "(B, R) weighted errors for B rows of values, on all cores: displacements measured (W, H, "
+        "3) less predicted, seen from `start` (W, 3); 0 where there is none.");
     m.def("mix", &MixedDuties, "speed_input_pct"_a, "turn_input_milli"_a,
           "Duties in percent (fl, fr, rl, rr) that the firmware gives at these inputs.");
     m.def("in_view", &InViewOf, "model"_a, "self"_a, "poses"_a, "position_m"_a, "heading_rad"_a,

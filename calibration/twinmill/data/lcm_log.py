@@ -70,8 +70,8 @@ def split_events(data: bytes, name: str) -> Events:
     """
     events, position = Events(), 0
     while position < len(data):
-        end = _event_end(data, position)
-        if end is None:
+        event = _event_at(data, position)
+        if event is None:
             following = data.find(SYNC, position + 1)
             if following < 0:
                 events.warnings.append(
@@ -85,10 +85,9 @@ def split_events(data: bytes, name: str) -> Events:
                 )
             position = following
             continue
-        _, _, stamp_us, channel_size, _ = HEADER.unpack_from(data, position)
-        start = position + HEADER.size
-        channel = data[start : start + channel_size].decode("utf-8", "replace")
-        events.by_channel.setdefault(channel, []).append(data[start + channel_size : end])
+        stamp_us, start, end = event
+        channel = data[position + HEADER.size : start].decode("utf-8", "replace")
+        events.by_channel.setdefault(channel, []).append(data[start:end])
         events.stamps_us.setdefault(channel, []).append(stamp_us)
         position = end
     if not events.by_channel:
@@ -99,15 +98,18 @@ def split_events(data: bytes, name: str) -> Events:
     return events
 
 
-def _event_end(data: bytes, position: int) -> int | None:
-    """First byte after the event at `position`, or None if no complete event is there."""
+def _event_at(data: bytes, position: int) -> tuple[int, int, int] | None:
+    """Stamp of the event at `position`, where its payload begins, and where it ends.
+
+    None if no complete event is there.
+    """
     if position + HEADER.size > len(data):
         return None
-    sync, _, _, channel_size, data_size = HEADER.unpack_from(data, position)
+    sync, _, stamp_us, channel_size, data_size = HEADER.unpack_from(data, position)
     if sync != SYNC or not 0 < channel_size <= MAX_CHANNEL or data_size < 0:
         return None
-    end = position + HEADER.size + channel_size + data_size
-    return end if end <= len(data) else None
+    start = position + HEADER.size + channel_size
+    return (stamp_us, start, start + data_size) if start + data_size <= len(data) else None
 
 
 @cache

@@ -11,7 +11,6 @@ regressed on the commands, so that neither the wheels nor their geometry need be
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from twinmill.data.log import RobotLog
 
@@ -104,8 +103,7 @@ class _Regression:
         every = round(step_s / GRID_S)
         self.step_s, self.grid_s = step_s, fine_s[::every]
         held = np.searchsorted(t_s, fine_s, side="right") - 1
-        width = max(1, round(SMOOTH_S / GRID_S))
-        self.command = uniform_filter1d(robot.command[held], width, axis=0)[::every]
+        self.command = _smoothed(robot.command[held])[::every]
         self.pose_s, self.velocity = _velocity(robot)
         self.share = np.zeros(len(self.grid_s))
         self.moves = bool(np.any(self.command)) and bool(np.any(self.velocity))
@@ -148,15 +146,21 @@ class _Regression:
         )
 
 
+def _smoothed(signal: np.ndarray) -> np.ndarray:
+    """(K, n) on the grid, averaged over SMOOTH_S."""
+    from scipy.ndimage import uniform_filter1d  # most logs do not get here
+
+    return uniform_filter1d(signal, max(1, round(SMOOTH_S / GRID_S)), axis=0)
+
+
 def _velocity(robot: RobotLog) -> tuple[np.ndarray, np.ndarray]:
     """(K,) s and (K, 3) forward, left, LEVER_M * turning; m/s, smoothed twice; gaps bridged."""
     index = np.flatnonzero(robot.valid)
     t_s = np.arange(robot.pose_t_s[index[0]], robot.pose_t_s[index[-1]], GRID_S)
-    width = max(1, round(SMOOTH_S / GRID_S))
     pose = np.column_stack(
         [np.interp(t_s, robot.pose_t_s[index], robot.pose[index, k]) for k in range(3)]
     )
-    x, y, heading = uniform_filter1d(pose, width, axis=0).T
+    x, y, heading = _smoothed(pose).T
     rate = np.gradient(np.column_stack([x, y, heading]), GRID_S, axis=0)
     c, s = np.cos(heading), np.sin(heading)
     body = np.column_stack(
@@ -166,4 +170,4 @@ def _velocity(robot: RobotLog) -> tuple[np.ndarray, np.ndarray]:
             LEVER_M * rate[:, 2],
         ]
     )
-    return t_s, uniform_filter1d(body, width, axis=0)
+    return t_s, _smoothed(body)

@@ -120,7 +120,7 @@ def diagnose(
     progress("finding the noise floor")
     opened = open_measurements(measurements, model_file)
     before = comparison(model_file, opened)
-    unseen = _unseen(opened)
+    unseen = not_shown(opened)
     known = _thinned(with_own_gains(judged(opened)))
     first = first_state(known, model_file, {*excluded, *unseen})
     usual = model_file.usual_score([o.measurement.log_sha256 for o in known])
@@ -235,7 +235,7 @@ def _robot_of(own: Opened) -> int:
     return own.measurement.track.robot_id if own.floor else own.measurement.robot_id
 
 
-def _unseen(opened: Sequence[Opened]) -> dict[str, str]:
+def not_shown(opened: Sequence[Opened]) -> dict[str, str]:
     """Effects that these measurements cannot show by their kind, and why."""
     tables = all(o.floor is None for o in opened)
     found = {}

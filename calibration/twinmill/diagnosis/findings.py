@@ -54,15 +54,16 @@ def findings_of(
     given = _as_given(done.last, first) if REFIT in names else None
     loss = {n: _loss(done.last, given if n == REFIT else less[n]) for n in names}
     names.sort(key=lambda n: -loss[n])
-    chain = _chain(names, first, done.last)
+    chains = _Chains(first, done.rounds[0].before, done.last)
+    chain = chains.of(names)
     if len(names) > 1:
         there = _takes(names, chain)
-        back = _takes(names[::-1], _chain(names[::-1], first, done.last))
+        back = _takes(names[::-1], chains.of(names[::-1]))
         top = max(names, key=lambda n: there[n] + back[n])
         if top != names[0]:
             names = [top, *(n for n in names if n != top)]
-            chain = _chain(names, first, done.last)
-    names, chain = _falling(names, chain, lambda order: _chain(order, first, done.last))
+            chain = chains.of(names)
+    names, chain = _falling(names, chain, chains.of)
     shares = _takes(names, chain)
     changes = changes_of(done.last)
     found = []
@@ -245,13 +246,28 @@ def _is_error(own: ParameterEstimate, model: native.Model, stds: Mapping[str, fl
     return abs(own.value - card["neutral"]) <= SETTINGS.within * np.hypot(own.std, known)
 
 
-def _chain(names: Sequence[str], first: State, last: Trial) -> list[Trial]:
-    """Fits of the first state, and of it with one effect more each time."""
-    state, chain = first, [fitted(first)]
-    for name in names:
-        state = with_effects(state, [name])
-        chain.append(_from_final(state, last))
-    return chain
+class _Chains:
+    """Fits of the first state, and of it with one effect more each time, in any order.
+
+    Orders that begin alike share what they begin with.
+    """
+
+    def __init__(self, first: State, begun: Trial, last: Trial) -> None:
+        self._last = last
+        self._known = {(): (first, begun)}
+
+    def of(self, names: Sequence[str]) -> list[Trial]:
+        """In this order."""
+        upto: tuple[str, ...] = ()
+        chain = [self._known[upto][1]]
+        for name in names:
+            state, _ = self._known[upto]
+            upto = (*upto, name)
+            if upto not in self._known:
+                state = with_effects(state, [name])
+                self._known[upto] = state, _from_final(state, self._last)
+            chain.append(self._known[upto][1])
+        return chain
 
 
 def _from_final(state: State, last: Trial) -> Trial:

@@ -7,10 +7,10 @@ regression of the errors on groups of velocity terms without physics names, each
 that it was not fitted to.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -49,6 +49,15 @@ class Dependence:
     gain: float
     sure: bool
     own: np.ndarray
+
+
+@dataclass(frozen=True)
+class Tested:
+    """Terms of a group, (T,) bool, that are tested together, and their products."""
+
+    group: str
+    own: np.ndarray
+    grams: "Grams"
 
 
 @dataclass(frozen=True)
@@ -339,43 +348,53 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
     It is if it is more than the largest of all that is tested is under random signs of blocks, each
     over its own spread there, and if it is evidence enough for one of so many.
     """
-    tested: list[tuple[str, np.ndarray]] = []
-    for group, family in dict.fromkeys((t.group, t.family) for t in terms):
-        together = np.array([(t.group, t.family) == (group, family) for t in terms])
-        tested.append((group, together))
-        own = dict.fromkeys(t.formula for t, used in zip(terms, together, strict=True) if used)
-        tested += [(group, np.array([t.formula == f for t in terms])) for f in own]
+    tested = list(_tests(terms, products))
     if not tested:
         return []
-    gains, nulls = _gains(products, [own for _, own in tested], 0)
+    gains, nulls = _gains(products, tested, 0)
     sure = gains > 2 * np.log(len(tested) / SETTINGS.dependence_chance)
     if sure.any():
-        _, nulls = _gains(products, [own for _, own in tested], FLIPS)
+        _, nulls = _gains(products, tested, FLIPS)
         spread = np.maximum(nulls.std(axis=-1), 1e-12)
         highest = (nulls / spread[..., None]).max(axis=(0, 1))
         sure &= gains / spread > np.quantile(highest, 1 - SETTINGS.dependence_chance)
     best: dict[str, Dependence] = {}
     for of_ridge, beyond in zip(gains, sure, strict=True):
-        for (group, own), gain, is_sure in zip(tested, of_ridge, beyond, strict=True):
-            this = Dependence(group, float(gain), bool(is_sure), own)
-            if group not in best or (this.sure, gain) > (best[group].sure, best[group].gain):
-                best[group] = this
+        for test, gain, is_sure in zip(tested, of_ridge, beyond, strict=True):
+            this = Dependence(test.group, float(gain), bool(is_sure), test.own)
+            known = best.get(test.group)
+            if known is None or (this.sure, gain) > (known.sure, known.gain):
+                best[test.group] = this
     return sorted(best.values(), key=lambda d: -d.gain)
 
 
+def _tests(terms: Sequence[Term], products: "Products") -> Iterator[Tested]:
+    """Each family, and each formula that it has."""
+    kinds = [(t.group, t.family) for t in terms]
+    formulas = np.array([t.formula for t in terms])
+    for kind in dict.fromkeys(kinds):
+        together = np.array([k == kind for k in kinds])
+        grams = products.grams(together)
+        yield Tested(kind[0], together, grams)
+        for formula in dict.fromkeys(formulas[together]):
+            own = formulas == formula
+            inside = not np.any(own & ~together)
+            yield Tested(kind[0], own, grams.only(own[together]) if inside else products.grams(own))
+
+
 def _gains(
-    products: "Products", tested: Sequence[np.ndarray], flips: int
+    products: "Products", tested: Sequence[Tested], flips: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(K, N) of N tests, each of (T,) terms, at K ridges, and (K, N, F) what chance brings."""
+    """(K, N) of N tests at K ridges, and (K, N, F) what chance brings."""
     gains, nulls = np.zeros((len(RIDGES), len(tested))), np.zeros((len(RIDGES), len(tested), flips))
     for k, ridge in enumerate(RIDGES):
         alone, of_alone = products.each_held_out(flips, ridge)
-        for n, own in enumerate(tested):
-            if own.sum() == 1:
-                (one,) = np.flatnonzero(own)
+        for n, test in enumerate(tested):
+            if test.own.sum() == 1:
+                (one,) = np.flatnonzero(test.own)
                 gains[k, n], nulls[k, n] = alone[one], of_alone[:, one]
             else:
-                gains[k, n], nulls[k, n] = products.held_out(own, flips, ridge)
+                gains[k, n], nulls[k, n] = products.held_out(test.own, flips, ridge, test.grams)
     return gains, nulls
 
 
@@ -404,14 +423,26 @@ def _best_term(terms: list[Term], products: "Products", group: str) -> tuple[Ter
     """The single term of a group that explains most, and its coefficient in its own unit."""
     own = [i for i, t in enumerate(terms) if t.group == group]
     moment = products.moments.sum(0)[own]
-    energy = np.diag(products.grams.sum(0))[own] + 1.0
+    energy = products.energy.sum(0)[own] + 1.0
     best = int(np.argmax(moment**2 / energy))
     term = terms[own[best]]
     return term, float(moment[best] / energy[best] * term.strength)
 
 
+@dataclass(frozen=True)
+class Grams:
+    """Products of k columns with each other: (B, k, k) by block, and (FOLDS, k, k) by fold."""
+
+    blocks: np.ndarray
+    folds: np.ndarray
+
+    def only(self, own: np.ndarray) -> "Grams":
+        """Of some (k,) of them."""
+        return Grams(self.blocks[:, own][:, :, own], self.folds[:, own][:, :, own])
+
+
 class Products:
-    """Products of columns with each other, by fold, and with the errors, block by block.
+    """Products of columns with each other and with the errors, block by block.
 
     Args:
         columns: (R, T).
@@ -430,33 +461,32 @@ class Products:
         count = blocks.max() + 1
         if count > MOST_BLOCKS:  # each has a sign: of many, neighbours are one
             blocks = blocks * MOST_BLOCKS // count
-        self.edges = np.searchsorted(blocks, np.arange(blocks.max() + 2))
-        parts = [slice(a, b) for a, b in pairwise(self.edges)]
-        self.moments = np.array([columns[p].T @ left[p] for p in parts])
-        self.energy = np.array([np.einsum("rt,rt->t", columns[p], columns[p]) for p in parts])
-        self.fold = np.arange(len(parts)) % FOLDS
-        self.row_fold = self.fold[blocks]
+        edges = np.searchsorted(blocks, np.arange(blocks.max() + 2))
+        self.parts = [slice(a, b) for a, b in pairwise(edges)]
+        self.moments = np.array([columns[p].T @ left[p] for p in self.parts])
+        self.energy = np.array([np.einsum("rt,rt->t", columns[p], columns[p]) for p in self.parts])
+        self.fold = np.arange(len(self.parts)) % FOLDS
         self.columns, self.own = columns, np.arange(columns.shape[1])
         self.seen, self.total = seen, float(left @ left)
 
-    @cached_property
-    def grams(self) -> np.ndarray:
-        """(FOLDS, T, T) products of columns."""
-        folds = (self.columns[self.row_fold == k] for k in range(FOLDS))
-        return np.array([x.T @ x for x in (f[:, self.own] for f in folds)])
+    def grams(self, own: np.ndarray) -> Grams:
+        """Of some (T,) columns with each other."""
+        columns = self.columns[:, self.own[own]]
+        blocks = np.array([x.T @ x for x in (columns[p] for p in self.parts)])
+        return Grams(blocks, np.array([blocks[self.fold == k].sum(0) for k in range(FOLDS)]))
 
     def only(self, own: np.ndarray) -> "Products":
         """The same of some (T,) columns."""
         less = copy(self)
-        less.__dict__.pop("grams", None)
         less.own, less.seen = self.own[own], self.seen[own]
         less.moments, less.energy = self.moments[:, own], self.energy[:, own]
         return less
 
     def holds(self, many: np.ndarray, few: np.ndarray) -> bool:
         """Whether many columns make up a few of them (nearly) whole."""
-        gram = self.grams.sum(0)
-        inside = gram[np.ix_(many, many)] + 1e-9 * np.trace(gram) * np.eye(many.sum())
+        either = many | few
+        gram, many, few = self.grams(either).folds.sum(0), many[either], few[either]
+        inside = gram[np.ix_(many, many)] + 1e-9 * self.energy.sum() * np.eye(many.sum())
         across = gram[np.ix_(many, few)]
         made = np.sum(across * np.linalg.solve(inside, across))
         return bool(many.sum() > few.sum() and made > HOLDS * np.trace(gram[np.ix_(few, few)]))
@@ -478,15 +508,19 @@ class Products:
         return gain[0], gain[1:]
 
     def held_out(
-        self, own: np.ndarray, flips: int = FLIPS, ridge: float = 1.0
+        self,
+        own: np.ndarray,
+        flips: int = FLIPS,
+        ridge: float = 1.0,
+        grams: Grams | None = None,
     ) -> tuple[float, np.ndarray]:
         """Fall of the cost by these columns on blocks not fitted to, and (F,) what chance brings.
 
         Chance: random signs of what each block still scatters after the columns are fitted to all.
         """
-        grams, moments = self.grams[:, own][:, :, own], self.moments[:, own]
-        whole = grams.sum(0) + ridge * np.eye(own.sum())  # columns are in typical strengths
-        scatter = self._scatter(own, whole) if flips else moments
+        grams, moments = grams or self.grams(own), self.moments[:, own]
+        whole = grams.folds.sum(0) + ridge * np.eye(own.sum())  # columns are in typical strengths
+        scatter = moments - grams.blocks @ np.linalg.solve(whole, moments.sum(0))
         signs = _signs(flips, len(moments))
         judged = np.array(  # (FOLDS, 1 + F, k)
             [
@@ -494,17 +528,9 @@ class Products:
                 for test in (self.fold == k for k in range(FOLDS))
             ]
         )
-        fitted = (judged.sum(0) - judged) @ np.linalg.inv(whole - grams)
-        gain = np.sum(fitted * (2 * judged - fitted @ grams), axis=(0, 2))
+        fitted = (judged.sum(0) - judged) @ np.linalg.inv(whole - grams.folds)
+        gain = np.sum(fitted * (2 * judged - fitted @ grams.folds), axis=(0, 2))
         return float(gain[0]), gain[1:]
-
-    def _scatter(self, own: np.ndarray, whole: np.ndarray) -> np.ndarray:
-        """(B, k) what each block's moments of these columns are beside those of the fit to all."""
-        x, moments = self.columns[:, self.own[own]], self.moments[:, own]
-        fitted = x * (x @ np.linalg.solve(whole, moments.sum(0)))[:, None]
-        inside = np.add.reduceat(fitted, np.minimum(self.edges[:-1], len(x) - 1))
-        inside[np.diff(self.edges) == 0] = 0.0
-        return moments - inside
 
 
 @cache

@@ -2,7 +2,7 @@
 """What is fitted: a state of a search, and trials of it with something added."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import twinmill_native as native
@@ -97,6 +97,7 @@ class Trial:
         without_best: the same without the block with the most evidence for it; of what lasts for a
             while without the 3 s with the most, if enough is left.
         blocks_t: t of the relative fall over blocks.
+        less: the same refitted without an effect, by its name, as far as that was asked for.
     """
 
     names: tuple[str, ...]
@@ -105,6 +106,7 @@ class Trial:
     evidence: float
     without_best: float
     blocks_t: float
+    less: dict[str, "Trial | None"] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def held_score(self) -> float:
@@ -182,7 +184,13 @@ def _without_best_seconds(
 
 
 def without_effect(trial: Trial, name: str) -> Trial | None:
-    """The trial's state without an effect, refitted; None if it is not in the model."""
+    """The trial's state without an effect, refitted once; None if it is not in the model."""
+    if name not in trial.less:
+        trial.less[name] = _without_effect(trial, name)
+    return trial.less[name]
+
+
+def _without_effect(trial: Trial, name: str) -> Trial | None:
     names = effect_names(trial.state.model)
     own = [i for i, n in enumerate(names) if n.split("#")[0] == name]
     if not own:

@@ -18,7 +18,12 @@ import twinmill_native as native
 
 from twinmill.filters import filtered
 from twinmill.fitting.wheel_angles import Wheel
-from twinmill.model.parameters import WHERE_OR_WHEN, effect_names, effect_parameters
+from twinmill.model.parameters import (
+    MOTION_STAGES,
+    WHERE_OR_WHEN,
+    effect_names,
+    effect_parameters,
+)
 
 SHORTEST_S = 4.0  # period of a gain that changes with time
 SLOW_S = 8.0  # the same of a push
@@ -126,7 +131,7 @@ def known_physics(
     """
     for card in native.catalogue():
         parameters = {p["name"]: p["role"] for p in card["parameters"]}
-        if set(parameters.values()) & set(WHERE_OR_WHEN) or not parameters:
+        if set(parameters.values()) & set(WHERE_OR_WHEN) or card["stage"] not in MOTION_STAGES:
             continue
         changes = []
         for strength in STRENGTHS:

@@ -80,9 +80,9 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
         model: of the robot; only its form is used.
         same_clock: commands and poses are stamped by one clock.
     """
-    reason = _too_poor(data)
+    reason = too_poor(data)
     if reason:
-        return _none(data, reason)
+        return no_floor(data, reason)
     velocity, base = base_response(data, model, same_clock)
     offset_s = base.get(CLOCK)
     response = Response(data, velocity, base.get(LAG), offset_s)
@@ -168,18 +168,20 @@ def body_velocity_at(
     """
     track = data.measurement.track
     seen = np.flatnonzero(track.segment >= 0)
-    predicted = native.one_step(model, data.measurement.played)[seen]
-    t_s, pose = track.pose_t_s[seen], np.column_stack([track.pose[:, :2], track.heading_rad])[seen]
-    step_s = np.diff(t_s, prepend=t_s[0] - 1.0)
-    before = np.roll(pose, 1, axis=0)
-    step = predicted - before
-    middle = before[:, 2] + step[:, 2] / 2
+    place = np.searchsorted(seen, np.arange(len(track.pose_t_s))[points])
+    there = place < len(seen)
+    before, at = seen[place[there] - 1], seen[place[there]]
+    heading_rad = track.heading_rad[before]
+    predicted = native.one_step(model, data.measurement.played)[at]
+    along, across = (predicted[:, :2] - track.pose[before, :2]).T
+    turn = predicted[:, 2] - heading_rad
+    middle = heading_rad + turn / 2
     c, s = np.cos(middle), np.sin(middle)
-    body = np.column_stack(
-        [c * step[:, 0] + s * step[:, 1], c * step[:, 1] - s * step[:, 0], step[:, 2]]
-    )
-    rates = np.vstack([np.nan_to_num(body / step_s[:, None]), np.zeros(3)])
-    return rates[np.searchsorted(seen, np.arange(len(track.pose_t_s))[points])]
+    body = np.column_stack([c * along + s * across, c * across - s * along, turn])
+    step_s = track.pose_t_s[at] - track.pose_t_s[before]
+    rates = np.zeros((len(place), 3))
+    rates[there] = np.nan_to_num(body / step_s[:, None])
+    return rates
 
 
 def coarse_offset_s(data: Trajectory, base: native.Model) -> float:
@@ -255,7 +257,7 @@ def is_far(errors: np.ndarray, floor: np.ndarray, times: float) -> np.ndarray:
     return mean > times * np.nanmedian(mean)
 
 
-def _too_poor(data: Trajectory) -> str:
+def too_poor(data: Trajectory) -> str:
     """Why a log can give no floor; empty if it can."""
     whole = np.count_nonzero(np.isfinite(data.measured[:, -1, 0]))
     few = len(data.windows.starts) < FLOOR_SETTINGS.fewest_windows
@@ -271,7 +273,8 @@ def _too_poor(data: Trajectory) -> str:
     return ""
 
 
-def _none(data: Trajectory, reason: str) -> NoiseFloor:
+def no_floor(data: Trajectory, reason: str) -> NoiseFloor:
+    """Of a log that gives none."""
     nothing = np.full(data.floor.shape, np.nan)
     empty = np.full(data.measured.shape, np.nan)
     everything = np.ones(len(data.measured), bool)

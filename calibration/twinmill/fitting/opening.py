@@ -10,7 +10,7 @@ import twinmill_native as native
 from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
-from twinmill.fitting.floor import NoiseFloor, noise_floor
+from twinmill.fitting.floor import NoiseFloor, coarse_offset_s, no_floor, noise_floor, too_poor
 from twinmill.fitting.score_fit import ROUNDS, ScoreFit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
@@ -26,13 +26,14 @@ from twinmill.model.parameters import (
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.steady_states import SteadyStates
-from twinmill.predict.windows import EVERY_S
+from twinmill.predict.windows import EVERY_S, rms
 
 CLOCK_REACH_S = 1.0  # how far from its start an offset of the clocks is looked for
 RATE_REACH_PPM = 500.0
 FEW_COMMANDS = 4  # different ones, below which a log tells nothing of others
 SPREAD = 0.03  # standard deviation of gains among robots of a kind where the model states none
 WIDE_STD = 0.15  # of a robot's gains where they are in question
+ROUGH = 4  # of so many starts of predictions one is looked at first
 
 
 @dataclass(frozen=True)
@@ -138,18 +139,41 @@ def _open(measurement: Measurement | SteadyTable, model_file: ModelFile, number:
     if isinstance(measurement, SteadyTable):
         table = SteadyStates.of(measurement, model_file.model)
         return Opened(measurement, table, table.model, None, True)
+    model, same_clock = _on_its_clock(measurement, model_file)
+    data = Trajectory.of(measurement)
+    floor = noise_floor(data, model, same_clock)
+    if floor.kind is None:
+        return Opened(measurement, None, model, floor, same_clock)
+    ratio = floor.response.radius_ratio
+    data = replace(data.over(floor.rms, floor.keep), first_part=number, radius_ratio=ratio)
+    return Opened(measurement, data, model, floor, same_clock).aligned(model)
+
+
+def _on_its_clock(measurement: Measurement, model_file: ModelFile) -> tuple[native.Model, bool]:
+    """The model of a log's robot, and whether one clock stamped commands and poses."""
     model = model_file.model.for_robot(measurement.track.robot_id)
     told = model.clock_known and measurement.log_sha256 not in model_file.clock_logs
     declared = measurement.same_clock
     if declared and not told:
         model.set(CLOCK, 0.0)
-    data = Trajectory.of(measurement)
-    floor = noise_floor(data, model, told or declared)
-    if floor.kind is None:
-        return Opened(measurement, None, model, floor, told or declared)
-    ratio = floor.response.radius_ratio
-    data = replace(data.over(floor.rms, floor.keep), first_part=number, radius_ratio=ratio)
-    return Opened(measurement, data, model, floor, told or declared).aligned(model)
+    return model, told or declared
+
+
+def open_roughly(measurement: Measurement, model_file: ModelFile) -> Opened | None:
+    """A log with few predictions, over the model's own errors; None if it cannot give a floor.
+
+    A tenth of a second, where the floor takes more than one.
+    """
+    model, same_clock = _on_its_clock(measurement, model_file)
+    data = Trajectory.of(measurement).thinned(ROUGH)
+    if too_poor(data) or not measurement.track.has_heading:
+        return None
+    if not same_clock:
+        model.set(CLOCK, coarse_offset_s(data, model))
+    errors = rms(data.errors(model))
+    floor = replace(no_floor(data, ""), rms=errors, offset_s=model.get(CLOCK))
+    rough = Opened(measurement, data.over(errors), model, floor, same_clock).aligned(model)
+    return replace(rough, data=rough.data.over(rms(rough.data.errors(rough.model))))
 
 
 def _clock(model: native.Model) -> list[Parameter]:

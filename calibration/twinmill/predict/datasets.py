@@ -9,6 +9,7 @@ it by likelihood.
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -180,11 +181,16 @@ class Trajectory:
 
     def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
         """See ErrorDataset."""
-        ahead = native.windows_batch(
-            model, self.measurement.started, self.windows.starts, self.windows.ends, names, values
+        windows, run = self.windows, self.measurement.started
+        return native.window_errors(
+            model, run, windows.starts, windows.ends, names, values, *self._displaced
         )
-        apart = difference(self.measured, self.windows.seen(self.measurement.track, ahead))
-        return (np.nan_to_num(apart) * self.weight).reshape(len(values), -1)
+
+    @cached_property
+    def _displaced(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where predictions start, what was measured, and how much each error counts."""
+        start = self.windows.seen_from(self.measurement.track)
+        return start, np.ascontiguousarray(self.measured), self.weight
 
     def as_errors(self, rows: np.ndarray) -> np.ndarray:
         """(R,) rows to (W, H, 3) errors in m, m, rad; NaN where not judged."""

@@ -67,12 +67,15 @@ class Windows:
         ahead = native.windows(model, measurement.started, self.starts, self.ends)
         return self.seen(measurement.track, ahead)
 
+    def seen_from(self, track: Track) -> np.ndarray:
+        """(W, 3) poses at the starts, with smoothed headings."""
+        return np.column_stack([track.pose[self.starts, :2], track.heading_smooth[self.starts]])
+
     def seen(self, track: Track, end: np.ndarray) -> np.ndarray:
         """(..., W, H, 3) poses at the ends to displacements, seen from the smoothed start."""
-        heading_rad = track.heading_smooth[self.starts]
-        start = np.column_stack([track.pose[self.starts, :2], heading_rad])
+        start = self.seen_from(track)
         step = end - start[:, None]
-        turned = rotate(step[..., 0], step[..., 1], -heading_rad[:, None])
+        turned = rotate(step[..., 0], step[..., 1], -start[:, None, 2])
         seen = np.stack([*turned, step[..., 2]], -1)
         seen[..., self.ends < 0, :] = np.nan
         return seen

@@ -9,6 +9,7 @@ import pytest
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
+from twinmill.diagnosis.first_sight import at_first_sight
 from twinmill.diagnosis.rounds import Round
 from twinmill.diagnosis.screening import Screened
 from twinmill.diagnosis.settings import SETTINGS
@@ -85,6 +86,12 @@ def test_the_one_hidden_effect_is_named_with_its_strength(diagnosed, letter):
     assert found.ranking[0].effect == effect and found.ranking[0].p_value < 0.01
     assert found.steps[-1][1] < 1.3
     assert found.rest.formula is None
+
+
+@pytest.mark.parametrize("letter", "bcf")
+def test_the_hidden_effect_stands_out_at_first_sight(calibrated, case, letter):
+    name, _, _ = ANSWERS[letter]
+    assert name in at_first_sight(case(letter), calibrated).split(" or ")
 
 
 def test_a_marker_off_by_6_mm_is_found_though_it_hardly_matters(diagnosed):

@@ -18,9 +18,19 @@ Pose2 AlongArc(const Pose2 &from, const Twist &twist, double dt_s);
 class Course
 {
 public:
-    explicit Course(const Pose2 &start);
+    explicit Course(const Pose2 &start) : pose_(start), ahead_(Direction::Of(start.theta_rad)) {}
 
-    void Follow(const Twist &twist, double dt_s);
+    void Follow(const Twist &v, double dt_s)
+    {
+        const double half_rad = v.omega_radps * dt_s / 2;
+        const double over = SinOver(half_rad), chord_s = dt_s * over;
+        const Direction turn{Cos(half_rad), half_rad * over}, middle = ahead_.Turned(turn);
+        pose_.x_m += chord_s * (middle.c * v.vx_mps - middle.s * v.vy_mps);
+        pose_.y_m += chord_s * (middle.s * v.vx_mps + middle.c * v.vy_mps);
+        pose_.theta_rad += 2 * half_rad;
+        ahead_ = middle.Turned(turn);
+    }
+
     const Pose2 &pose() const { return pose_; }
     const Direction &ahead() const { return ahead_; }
 

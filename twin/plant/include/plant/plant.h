@@ -5,6 +5,7 @@
 #define PLANT_PLANT_H
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "effects/signals.h"
@@ -29,13 +30,19 @@ struct Command
     double battery_V = 0;  // 0: the model's nominal voltage
 };
 
+constexpr double kUntold = std::numeric_limits<double>::quiet_NaN();
+
 struct RobotState
 {
     Pose2 pose;
     double vx_mps = 0, vy_mps = 0, omega_radps = 0;  // body frame, mean over the last step
     Wheels rim_mps{};
-    Wheels wheel_rad{};                   // angle turned since the start
-    double steering_rad = 0;              // Ackermann
+    Wheels wheel_rad{};       // angle turned since the start
+    double steering_rad = 0;  // Ackermann
+    // Commands as the stage of duty left them, and the rim speeds and steering that they ask for:
+    // most often the next step has the same.
+    Wheels told{kUntold, kUntold, kUntold, kUntold}, asked_mps{};
+    double asked_steering_rad = 0;
     std::array<double, 3> drive_noise{};  // velocity disturbance: forward, left, turn
     std::vector<double> effect_state;
 };

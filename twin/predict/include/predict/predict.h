@@ -41,6 +41,22 @@ std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
                                         const std::vector<std::string> &names,
                                         std::span<const double> values);
 
+// What predictions over windows are compared with, as it is seen from the start of each.
+struct Displaced
+{
+    std::span<const double> start;     // (W, 3): x_m, y_m, theta_rad
+    std::span<const double> measured;  // (W, H, 3): forward_m, left_m, turn_rad
+    std::span<const double> weight;    // (W, H, 3)
+};
+
+// For many parameter vectors as above the weighted errors, measured less predicted and headings the
+// short way round: (B, W, H, 3), 0 where nothing was measured or predicted.
+std::vector<double> WindowErrorsBatch(const Model &model, const Track &track,
+                                      std::span<const int64_t> starts,
+                                      std::span<const int64_t> ends,
+                                      const std::vector<std::string> &names,
+                                      std::span<const double> values, const Displaced &displaced);
+
 // What motion capture would have reported had this model driven: (N, 3), each segment started at
 // its first measured pose, with the model's drive and sensor noise.
 std::vector<double> SimulateReplica(const Model &model, const Track &track, uint64_t seed);
