@@ -6,6 +6,7 @@ with the finding.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -153,7 +154,7 @@ def within_the_table(
             f"it changes the way by less than {100 * SETTINGS.told_speeds:.1f} %, and speeds that "
             "another log told are seldom known better"
         )
-        return doubted(finding, why)
+        return replace(doubted(finding, why), within_told=True)
 
     return [judged(f) for f in found]
 

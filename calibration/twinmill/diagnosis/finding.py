@@ -19,6 +19,7 @@ class Finding:
         again: the model given has the effect already, with other numbers.
         wrong_form: something of another form stands behind it.
         depends_on: what that depends on, where the doubt tells it; else empty.
+        within_told: it is no more than numbers that other logs told may be wrong by.
     """
 
     effect: str
@@ -30,6 +31,7 @@ class Finding:
     again: bool = False
     wrong_form: bool = False
     depends_on: str = ""
+    within_told: bool = False
 
     @property
     def takes(self) -> str:

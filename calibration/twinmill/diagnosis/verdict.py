@@ -64,9 +64,13 @@ class VerdictInputs:
 
     @property
     def _all_doubtful(self) -> list[Finding]:
-        """Effects of which none is beyond doubt, where the model as given misses nothing."""
+        """Effects of which none is beyond doubt, where the model as given misses nothing.
+
+        Or no more than numbers of its base that other logs told may be wrong by.
+        """
         doubtful = all(f.certainty == "doubtful" for f in self.effects)
-        passes = self.score <= GOOD  # as compare says
+        told = all(f.within_told for f in self.effects)
+        passes = self.score <= (SETTINGS.worse if told else GOOD)  # as compare says
         well = passes and not (self.rest.depends_on or self.noises or self.silent)
         return self.effects if doubtful and well else []
 

@@ -256,15 +256,20 @@ def test_noise_outweighs_a_name_that_leaves_much(of_base, of_effect, verdict):
 
 
 @pytest.mark.parametrize(
-    ("score", "certainty", "verdict"),
+    ("score", "certainty", "within_told", "verdict"),
     [
-        (1.05, "doubtful", "model_adequate"),
-        (1.4, "doubtful", "effect_missing"),
-        (1.05, "sure", "effect_missing"),
+        (1.05, "doubtful", False, "model_adequate"),
+        (1.4, "doubtful", False, "effect_missing"),
+        (1.4, "doubtful", True, "model_adequate"),
+        (1.6, "doubtful", True, "effect_missing"),
+        (1.05, "sure", False, "effect_missing"),
     ],
 )
-def test_a_doubtful_effect_is_not_missing_where_nothing_is_missed(score, certainty, verdict):
-    found = [Finding("speed_curve", None, [], 0.9, certainty, "its size may be nothing")]
+def test_a_doubtful_effect_is_not_missing_where_nothing_is_missed(
+    score, certainty, within_told, verdict
+):
+    why = "its size may be nothing"
+    found = [Finding("speed_curve", None, [], 0.9, certainty, why, within_told=within_told)]
     weighed = VerdictInputs(score, score, score, 1.0, found, Rest(0.0, False, []), [], [], [], 1.0)
     assert weighed.verdict == verdict
     assert "speed_curve" in weighed.sentence
