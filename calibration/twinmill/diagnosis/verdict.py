@@ -48,6 +48,8 @@ class VerdictInputs:
         """One of the verdicts that `Diagnosis.verdict` lists."""
         if self._all_doubtful:
             return "model_adequate"
+        if self._within_told:
+            return "cannot_tell"
         outweighed = self._noise_outweighs or self._rest_outweighs or self._of_another_form
         if self.effects and not outweighed:
             top = self.effects[0]
@@ -64,15 +66,18 @@ class VerdictInputs:
 
     @property
     def _all_doubtful(self) -> list[Finding]:
-        """Effects of which none is beyond doubt, where the model as given misses nothing.
-
-        Or no more than numbers of its base that other logs told may be wrong by.
-        """
+        """Effects of which none is beyond doubt, where the model as given misses nothing."""
         doubtful = all(f.certainty == "doubtful" for f in self.effects)
-        told = all(f.within_told for f in self.effects)
-        passes = self.score <= (SETTINGS.worse if told else GOOD)  # as compare says
+        passes = self.score <= GOOD  # as compare says
         well = passes and not (self.rest.depends_on or self.noises or self.silent)
         return self.effects if doubtful and well else []
+
+    @property
+    def _within_told(self) -> str:
+        """Effects that are no more than what other logs told may be wrong by, where all are."""
+        told = self.effects and all(f.within_told for f in self.effects)
+        well = self.score <= SETTINGS.worse and not (self.rest.depends_on or self.noises)
+        return " or ".join(f.effect for f in self.effects) if told and well else ""
 
     @property
     def _instead(self) -> list[str]:
@@ -161,6 +166,11 @@ class VerdictInputs:
             maybe = " or ".join(f.effect for f in self._all_doubtful)
             there = f" {maybe} may be there, and is too small to be sure." if maybe else ""
             return f"Nothing is missing that these logs would show.{there}{self._as_before}"
+        if verdict == "cannot_tell" and self._within_told:
+            return (
+                "The model misses by no more than speeds may be wrong by that another log told; "
+                f"{self._within_told} may be there, and is too small to be sure."
+            )
         if verdict == "cannot_tell" and self._unexplained:
             return (
                 f"The model misses by more than the noise (score {self.last:.2f}), and these logs "

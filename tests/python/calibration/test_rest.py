@@ -260,7 +260,7 @@ def test_noise_outweighs_a_name_that_leaves_much(of_base, of_effect, verdict):
     [
         (1.05, "doubtful", False, "model_adequate"),
         (1.4, "doubtful", False, "effect_missing"),
-        (1.4, "doubtful", True, "model_adequate"),
+        (1.4, "doubtful", True, "cannot_tell"),
         (1.6, "doubtful", True, "effect_missing"),
         (1.05, "sure", False, "effect_missing"),
     ],
