@@ -18,19 +18,6 @@ from twinmill_cli import main as cli
 from twinmill_cli.lazy import LazyCommand
 
 
-@pytest.fixture
-def twinmill(monkeypatch, capsys):
-    """Runs the command line: exit code, stdout, stderr."""
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["twinmill", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stopped:
-            cli.main()
-        return stopped.value.code, *capsys.readouterr()
-
-    return run
-
-
 def strict(text):
     """One JSON object without the NaN and Infinity that only Python reads."""
 

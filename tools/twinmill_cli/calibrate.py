@@ -15,6 +15,7 @@ from twinmill_cli.options import Force, Hold, Logs, Model, NewModel, Out, effect
 from twinmill_cli.output import AsJson, busy
 
 if working():  # not for --help
+    from twinmill.files import check_new_file
     from twinmill.fitting.add import OWN_GAINS, AddResult, add
     from twinmill.fitting.compare import Comparison, compare
     from twinmill.fitting.fit import FitResult, fit
@@ -26,7 +27,6 @@ if working():  # not for --help
         show,
     )
     from twinmill_cli.frame import (
-        check_output,
         command_line,
         finish,
         holding,
@@ -90,7 +90,7 @@ def _fit(
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
-    check_output(output, model_file, force)
+    check_new_file(output, force, [model_file.path, *logs])
     with busy(f"fitting {model}"):
         measurements = load(logs, model_file, as_json)
         result = fit(measurements, model_file, output, source.command, held=held)
@@ -153,7 +153,7 @@ def _add(
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
-    check_output(output, model_file, force)
+    check_new_file(output, force, [model_file.path, *logs])
     measurements = load(logs, model_file, as_json)
     with busy(f"adding {effect} to {model}"):
         result = add(

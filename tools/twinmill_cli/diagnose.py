@@ -23,12 +23,12 @@ if working():  # not for --help
     from twinmill.diagnosis.diagnose import diagnose
     from twinmill.diagnosis.explain import Explanation, explain
     from twinmill.diagnosis.result import Diagnosis
+    from twinmill.files import check_new_file
     from twinmill.report import diagnosis as present
     from twinmill.swarm.metrics import swarm_metrics
     from twinmill.terminal import progress_bar
     from twinmill_cli.calibrate import option
     from twinmill_cli.frame import (
-        check_output,
         command_line,
         finish,
         load,
@@ -192,7 +192,7 @@ def _explain(
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
-    check_output(output, model_file, force)
+    check_new_file(output, force, [model_file.path, *logs])
     with telling(f"explaining with {model}") as progress:
         measurements = load(logs, model_file, as_json)
         result = explain(

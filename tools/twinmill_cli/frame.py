@@ -12,7 +12,7 @@ import typer
 from rich.console import RenderableType
 
 from twinmill.data.measurement import BadInputError, Measurements, load_measurements
-from twinmill.files import check_new_file, check_new_folder
+from twinmill.files import check_new_folder
 from twinmill.model.model_file import ModelFile
 from twinmill.report import Provenance, Section, write_report
 from twinmill.report.html import SCORE_NOTE
@@ -40,16 +40,6 @@ def open_model(model: str, out: Path | None) -> ModelFile:
     if out:
         check_new_folder(out)
     return ModelFile.load(model)
-
-
-def check_output(output: Path, model_file: ModelFile, force: bool) -> None:
-    """Raises ValueError if the new model could not be written, before the long work."""
-    if output.resolve() == model_file.path.resolve():
-        raise ValueError(
-            f"{output}: is the model that is read, and models are never changed in place; "
-            "choose another name."
-        )
-    check_new_file(output, force)
 
 
 def provenance(command: str, model: ModelFile) -> Provenance:

@@ -179,7 +179,7 @@ def import_log(
     seen = _detections(detections, options, by_robot) if detections else []
     paths = (*poses, motive, vicon, *commands, *io_tsv, detections)
     sources = [path for path in paths if path is not None]
-    with replacing(out, options.force) as temporary:
+    with replacing(out, options.force, inputs=[*sources, bag, options.mapping]) as temporary:
         provenance = _provenance(sources, options)
         write_log(temporary, pose_series, command_series, config_toml=provenance, detections=seen)
         warnings = [w for series in (*pose_series, *command_series, *seen) for w in series.warnings]
