@@ -16,7 +16,7 @@ from twinmill.files import check_new_folder
 from twinmill.model.model_file import ModelFile
 from twinmill.report import Provenance, Section, write_report
 from twinmill.report.html import SCORE_NOTE
-from twinmill_cli.output import deliver
+from twinmill_cli.output import STOPPED, deliver
 
 
 def command_line(verb: str, logs: list[Path], model: str, output: Path | None = None) -> str:
@@ -82,11 +82,31 @@ def finish(
     out: Path | None,
     note: str = SCORE_NOTE,
 ) -> None:
-    """Report, then JSON or text; the section's pictures are drawn for a report alone."""
-    report = None
-    if out:
-        drawn = section()
-        report = write_report(out, drawn.title, source, [drawn], note=note)
+    """Report, then JSON or text; the section's pictures are drawn for a report alone.
+
+    What was found is told though the report cannot be written, or Ctrl-C stops its drawing; of work
+    that was stopped before (`stopped` in data) none is drawn.
+
+    Raises:
+        ValueError: the report cannot be written.
+        Exit: Ctrl-C stopped the work, or the report.
+    """
+    report, failed, done = None, None, not data.get("stopped")
+    if out and done:
+        try:
+            drawn = section()
+            report = write_report(out, drawn.title, source, [drawn], note=note)
+        except KeyboardInterrupt:
+            done = False
+        except (OSError, ValueError) as error:
+            failed = error
+    data = data if done else {**data, "stopped": True}
     deliver({**data, **source.to_json(), "report": str(report) if report else None}, text, as_json)
     if report and not as_json:
         typer.echo(f"Report: {report}")
+    if failed:
+        raise ValueError(f"what is told above stands, but there is no report: {failed}")
+    if not done:
+        if out:
+            typer.echo("twinmill: stopped; no report was drawn.", err=True)
+        raise typer.Exit(STOPPED)
