@@ -140,13 +140,17 @@ def _add(
     Example: twinmill add coasting run.lcmlog --model fitted.toml -o better.toml
     """
     gains = robot is not None and effect == OWN_GAINS
-    known = [] if gains else [text["name"] for text in find_effect(effect)["texts"]]
+    known = {} if gains else {t["name"]: t["default"] for t in find_effect(effect)["texts"]}
     texts = {"adds_to": adds_to, "formula": formula, "state_rate": state_rate}
     texts = {name: text for name, text in texts.items() if text is not None}
     if extra := [name for name in texts if name not in known]:
         raise ValueError(
             f"{option(extra[0])}: {effect} has none; it is for `twinmill add equation`."
         )
+    if "formula" in known and formula is None:
+        used = {**known, **texts}
+        usual = f"{used['adds_to']} += {used['formula']}"
+        typer.echo(f"twinmill: without --formula, {usual} is fitted.", err=True)
     held = hold or []
     given = [w for name, text in texts.items() for w in (option(name), text)]
     verb = shlex.join(["add", effect, *of_robot(robot), *given, *holding(held)])
