@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import tomllib
@@ -374,3 +375,41 @@ def test_a_report_that_cannot_be_written_keeps_what_was_found(
     assert code == 1 and told["report"] is None and "score" in told
     assert "there is no report" in err and "No space left" in err and "index.html" in err
     assert out.exists() == (verb == "explain") and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "ascii"])
+def test_a_terminal_without_our_signs_is_told_all_the_same(compared_in, encoding):
+    code, out, err = compared_in(encoding)
+    assert (code, err) == (0, "")
+    assert "score" in out and "?" in out
+
+
+@pytest.fixture
+def compared_in(brief_coasting_robot):
+    """Runs a comparison whose output is in another encoding; what that lacks is a question mark."""
+
+    def run(encoding):
+        robot = brief_coasting_robot
+        words = ["compare", str(robot.log), "--model", str(robot.model)]
+        ended = subprocess.run(
+            [sys.executable, "-m", "twinmill_cli.main", *words],
+            env={**os.environ, "PYTHONIOENCODING": encoding},
+            capture_output=True,
+        )
+        return ended.returncode, ended.stdout.decode(encoding), ended.stderr.decode()
+
+    return run
+
+
+def test_ctrl_c_while_it_starts_leaves_no_traceback():
+    """From the first line of ours on: the interpreter's own start is not ours."""
+    seen = "import sys; sys.addaudithook(lambda e, a: e == 'import' and a[0] == 'typer' and stop())"
+    stop = "import os, signal; stop = lambda: os.kill(os.getpid(), signal.SIGINT)"
+    run = "from twinmill_cli.main import main; main()"
+    ended = subprocess.run(
+        [sys.executable, "-c", f"{stop}; {seen}; {run}"],
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (-signal.SIGINT, "", "")
