@@ -5,7 +5,7 @@ import math
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -24,25 +24,40 @@ def plain(value: Any) -> Any:
     return value
 
 
-def check_new_file(path: Path, force: bool) -> None:
-    """Raises ValueError if a file could not be written here; tried before the long work."""
+def check_new_file(path: Path, force: bool, inputs: Iterable[Path | None] = ()) -> None:
+    """Raises ValueError if a file could not be written here; tried before the long work.
+
+    Args:
+        path: of the file.
+        force: replace one that is there.
+        inputs: what is read, and so is never replaced; None where nothing was given.
+    """
     if path.is_dir():
         raise ValueError(f"{path}: is a folder; name a file in it.")
     if path.exists() and not path.is_file():
         raise ValueError(f"{path}: is a device, not a file; choose another name.")
+    _check_no_input(path, inputs)
     if path.exists() and not force:
         raise ValueError(f"{path}: exists; choose another name, or replace it with --force.")
     _check_folder(path, path.parent)
 
 
 @contextmanager
-def replacing(out: Path, force: bool, mode: int = 0o644) -> Iterator[Path]:
+def replacing(
+    out: Path, force: bool, mode: int = 0o644, *, inputs: Iterable[Path | None] = ()
+) -> Iterator[Path]:
     """A temporary file beside `out` that takes its place if the block succeeds.
+
+    Args:
+        out: the file.
+        force: replace one that is there.
+        mode: its permissions.
+        inputs: see `check_new_file`.
 
     Raises:
         ValueError: a file cannot be written there.
     """
-    check_new_file(out, force)
+    check_new_file(out, force, inputs)
     handle, name = tempfile.mkstemp(prefix=f".{out.name}.", dir=out.parent)
     os.close(handle)
     try:
@@ -55,12 +70,20 @@ def replacing(out: Path, force: bool, mode: int = 0o644) -> Iterator[Path]:
 
 
 @contextmanager
-def replacing_folder(out: Path, force: bool) -> Iterator[Path]:
+def replacing_folder(
+    out: Path, force: bool, *, inputs: Iterable[Path | None] = ()
+) -> Iterator[Path]:
     """The path of a new folder that takes the place of `out` if the block succeeds.
 
+    Args:
+        out: the folder.
+        force: replace one that is there, with all that is in it.
+        inputs: see `check_new_file`.
+
     Raises:
-        ValueError: it exists, or a folder cannot be made there.
+        ValueError: it exists, has an input in it, or a folder cannot be made there.
     """
+    _check_no_input(out, inputs)
     if out.exists() and not (force and out.is_dir()):
         raise ValueError(f"{out}: exists; choose another name, or replace it with --force.")
     with folder_beside(out) as folder:
@@ -96,6 +119,19 @@ def check_new_folder(path: Path) -> None:
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
     _check_folder(path, existing)
+
+
+def _check_no_input(out: Path, inputs: Iterable[Path | None]) -> None:
+    """Raises ValueError if this is an input, by whatever name, or a folder that holds one."""
+    for given in inputs:
+        if given is None or not (out.exists() and given.exists()):
+            continue
+        if out.samefile(given) or out.resolve() in given.resolve().parents:
+            which = "" if given == out else f" (as {given})"
+            raise ValueError(
+                f"{out}: is read by this command{which}, and what is read is never replaced; "
+                "choose another name."
+            )
 
 
 def _check_folder(path: Path, folder: Path) -> None:

@@ -2,6 +2,7 @@
 """Fixtures that several test files share."""
 
 import os
+import sys
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do, before numpy is loaded
 
@@ -17,6 +18,7 @@ import twinmill_native as native
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import RobotLog
+from twinmill_cli import main
 
 NOISE = """
 [noise]
@@ -147,6 +149,19 @@ class CoastingRobot:
 def coasting_robot(tmp_path_factory, model_text) -> CoastingRobot:
     """120 s of a robot with noise that rolls on after each stop; its model knows all but that."""
     return _coasting(tmp_path_factory.mktemp("coasting"), model_text, 120, 0.01)
+
+
+@pytest.fixture
+def twinmill(monkeypatch, capsys):
+    """Runs the command line: exit code, stdout, stderr."""
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["twinmill", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stopped:
+            main.main()
+        return stopped.value.code, *capsys.readouterr()
+
+    return run
 
 
 @pytest.fixture(scope="session")

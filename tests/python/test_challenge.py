@@ -2,8 +2,15 @@
 """The exam draws what it says, its plants obey algebra, and it cannot be passed by cheating."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
+import time
 from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +25,7 @@ from twinmill.challenge.rollers import drive_by_forces
 from twinmill.challenge.run import Plan, play
 from twinmill.challenge.scoring import BARS, rate, scored, summary
 from twinmill.model.parameters import catalogue
+from twinmill_cli import challenge as command
 
 SEED, SECONDS = 7, 40
 ROBOTS = draw_robots(SEED)
@@ -328,3 +336,54 @@ def test_a_robot_of_forces_drifts_outward_in_arcs_as_its_mass_asks(plant):
     outward = (left[1] - right[1]) / 2
     assert abs(straight[1]) < 1e-3
     assert outward < -0.01 * left[0] * left[2]  # s times the centripetal acceleration
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
+def test_one_ctrl_c_ends_all_processes_and_keeps_what_was_done(tmp_path):
+    """A terminal sends it to all processes of its session at once."""
+    words = ["challenge", "--intervals", "6", "--duration-s", "30", "--workers", "2", "--out", "c"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "twinmill_cli.main", *words],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    begin_s = time.monotonic()
+    while not (kept := list((tmp_path / "c/done").glob("*.json"))):
+        assert process.poll() is None and time.monotonic() - begin_s < 100
+        time.sleep(0.05)
+    stopped_s = time.monotonic()
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert time.monotonic() - stopped_s < 5  # on a busy machine; a case takes several seconds
+    assert (process.returncode, out) == (130, "") and "Traceback" not in err
+    assert all(path.exists() for path in kept)
+    time.sleep(0.5)
+    assert not [p for p in living() if p == process.pid]
+
+
+def living():
+    """Sessions of all processes that run."""
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, _, _, session, *_ = stat.read_text().rpartition(")")[2].split()
+            if state != "Z":
+                yield int(session)
+
+
+def test_no_base_model_is_kept_of_half_an_explanation(tmp_path, monkeypatch):
+    """A command that Ctrl-C stopped gives 130, and may have written what it had found."""
+
+    def stopped(words):
+        Path(words[words.index("-o") + 1]).write_text("half a model")
+        return 130
+
+    monkeypatch.setattr(command, "play", lambda *_, **__: None)
+    monkeypatch.setattr(command, "write_log", lambda plan, played, path: path.write_text("a log"))
+    monkeypatch.setattr(command, "run", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        command.base_of(tmp_path, 1, ROBOTS[1], SEED, duration_s=SECONDS)
+    assert [path.name for path in tmp_path.iterdir()] == ["sheet_1.toml"]

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import twinmill_native as native
 
-from twinmill.data.checks import check_poses, check_tracks
-from twinmill.data.log import RobotLog
+from twinmill.data.checks import check_commanded, check_poses, check_tracks
+from twinmill.data.log import LogError, RobotLog
 from twinmill.data.measurement import load_measurements
 from twinmill.data.track import make_track
 from twinmill_cli.diagnose import robots_recorded
@@ -76,7 +76,7 @@ def robot():
 
 def _findings(robots, drive="duty"):
     model = native.Model.from_toml(MODEL.format(drive=drive), "test")
-    found = [f for r in robots for f in check_poses(r, "log")]
+    found = [f for r in robots for f in check_commanded(r, "log") or check_poses(r, "log")]
     if not any(f.fatal for f in found):
         found += check_tracks([("log", make_track(r)) for r in robots], model)
     return found
@@ -307,3 +307,72 @@ def test_a_turn_of_the_wrong_sign_is_named_where_the_robot_seldom_turns(robot, s
     found = _findings([log], "twist")
     assert any("omega_radps has the wrong sign" in f.what for f in found), found
     assert _findings([replace(log, command=command * [1, 1, -1, 1])], "twist") == []
+
+
+def _told(robot, until_s, last=None, every=1):
+    """The robot without telemetry, its commands recorded until then; one row of so many."""
+    kept = np.flatnonzero(robot.command_t_s <= until_s)[::every]
+    command = robot.command[kept].copy()
+    if last is not None:
+        command[-1] = last
+    none = np.empty(0, np.int8)
+    series = {"command_t_s": robot.command_t_s[kept], "command": command, "mode": none}
+    return replace(robot, **series, battery_V=robot.battery_V[kept])
+
+
+def _used_s(robot):
+    """When the last pose is that is used."""
+    track = make_track(robot)
+    return track.pose_t_s[track.segment >= 0][-1], " ".join(track.notes)
+
+
+@pytest.mark.parametrize("last", [None, 0.0], ids=["driving", "zeros"])
+def test_poses_after_the_record_of_commands_are_left_out_with_a_word(robot, last):
+    """The robot is driven for a minute, and the recorder of its commands ends after half of it."""
+    used_s, notes = _used_s(_told(robot, 30.0, last))
+    assert 29.9 < used_s < 30.1
+    assert "the last is at 29." in notes or "the last is at 30.000" in notes
+
+
+def test_a_command_that_is_sent_when_it_changes_may_hold_for_long(robot):
+    rows = robot.command_t_s.searchsorted([0, 12, 24, 36])
+    changed = {"command_t_s": robot.command_t_s[rows], "command": robot.command[rows]}
+    none = np.empty(0, np.int8)
+    used_s, notes = _used_s(replace(robot, **changed, mode=none, battery_V=robot.battery_V[rows]))
+    assert used_s > 59.9 and "no commands" not in notes
+    alone = {name: values[:1] for name, values in changed.items()}
+    used_s, _ = _used_s(replace(robot, **alone, mode=none, battery_V=robot.battery_V[:1]))
+    assert used_s > 59.9
+
+
+def test_a_robot_that_was_told_to_stand_and_stands_is_used_to_the_end(robot):
+    pose = robot.pose.copy()
+    late = robot.pose_t_s > 30.5
+    pose[late] = pose[late][0] + (pose[late] - pose[late]).round()
+    used_s, notes = _used_s(replace(_told(robot, 30.0, 0.0), pose=pose))
+    assert used_s > 59.9 and "no commands" not in notes
+
+
+@pytest.mark.parametrize("wrong", [1e20, -1e4, np.inf])
+def test_a_command_that_no_robot_follows_is_named_by_its_row(robot, wrong):
+    command = robot.command.copy()
+    command[100:103, 1] = wrong
+    _one([replace(robot, command=command)], "none that a robot could follow", "correct or delete")
+    (found,) = check_commanded(replace(robot, command=command), "log")
+    assert "wheel 2" in found.evidence and "row 101 " in found.evidence
+
+
+def test_commands_in_another_unit_are_not_taken_for_single_mistakes(robot):
+    """Millimetres a second as metres: all of them are large."""
+    twist = np.zeros_like(robot.command)
+    twist[:, 0] = 720 * np.sign(robot.command[:, 0])
+    large = replace(robot, command_kind="twist", command=twist)
+    assert check_commanded(large, "log") == []
+
+
+def test_one_valid_pose_is_not_told_as_none(robot):
+    """As import says it: the two had disagreed."""
+    valid = np.zeros(len(robot.valid), bool)
+    valid[3] = True
+    with pytest.raises(LogError, match=rf"1 of its {len(valid)} poses are valid"):
+        make_track(replace(robot, valid=valid))

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
+import errno
 import hashlib
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+import tomllib
 from importlib.metadata import version
 
 import pytest
@@ -16,19 +19,6 @@ from twinmill.files import plain
 from twinmill.report.tables import number
 from twinmill_cli import main as cli
 from twinmill_cli.lazy import LazyCommand
-
-
-@pytest.fixture
-def twinmill(monkeypatch, capsys):
-    """Runs the command line: exit code, stdout, stderr."""
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["twinmill", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stopped:
-            cli.main()
-        return stopped.value.code, *capsys.readouterr()
-
-    return run
 
 
 def strict(text):
@@ -343,3 +333,83 @@ def test_a_package_that_is_not_installed_is_one_sentence(monkeypatch, capsys):
     assert capsys.readouterr().err.strip() == (
         "twinmill: the Python package of 'cv2' is not installed; `make build` does that."
     )
+
+
+@pytest.mark.parametrize(
+    ("formula", "says"), [("p0/0", "has no finite value"), ("omega", "names none of p0 to p3")]
+)
+def test_a_formula_that_cannot_be_fitted_is_refused(
+    twinmill, brief_coasting_robot, tmp_path, formula, says
+):
+    robot, out = brief_coasting_robot, tmp_path / "m.toml"
+    words = ["add", "equation", robot.log, "--model", robot.model, "-o", out]
+    code, said, err = twinmill(*words, "--adds-to", "omega_radps", "--formula", formula)
+    assert (code, said) == (1, "") and not out.exists()
+    assert len(err.splitlines()) == 1 and f"formula '{formula}'" in err and says in err
+
+
+def test_the_formula_that_is_fitted_where_none_is_given_is_said(
+    twinmill, brief_coasting_robot, tmp_path
+):
+    robot, out = brief_coasting_robot, tmp_path / "m.toml"
+    _, _, err = twinmill("add", "equation", robot.log, "--model", robot.model, "-o", out)
+    kept = tomllib.loads(out.read_text())["effect"][-1]
+    assert f"{kept['adds_to']} += {kept['formula']} is fitted" in err
+
+
+@pytest.mark.parametrize("verb", ["explain", "compare"])
+def test_a_report_that_cannot_be_written_keeps_what_was_found(
+    twinmill, brief_coasting_robot, tmp_path, monkeypatch, verb
+):
+    """The disk is full once the model is written."""
+
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(tmp_path / "r/index.html"))
+
+    monkeypatch.setattr("twinmill_cli.frame.write_report", full)
+    robot, out = brief_coasting_robot, tmp_path / "m.toml"
+    more = ["-o", out] if verb == "explain" else []
+    words = [verb, robot.log, "--model", robot.model, *more, "--out", tmp_path / "r"]
+    code, said, err = twinmill(*words, "--json")
+    told = strict(said)
+    assert code == 1 and told["report"] is None and "score" in told
+    assert "there is no report" in err and "No space left" in err and "index.html" in err
+    assert out.exists() == (verb == "explain") and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "ascii"])
+def test_a_terminal_without_our_signs_is_told_all_the_same(compared_in, encoding):
+    code, out, err = compared_in(encoding)
+    assert (code, err) == (0, "")
+    assert "score" in out and "?" in out
+
+
+@pytest.fixture
+def compared_in(brief_coasting_robot):
+    """Runs a comparison whose output is in another encoding; what that lacks is a question mark."""
+
+    def run(encoding):
+        robot = brief_coasting_robot
+        words = ["compare", str(robot.log), "--model", str(robot.model)]
+        ended = subprocess.run(
+            [sys.executable, "-m", "twinmill_cli.main", *words],
+            env={**os.environ, "PYTHONIOENCODING": encoding},
+            capture_output=True,
+        )
+        return ended.returncode, ended.stdout.decode(encoding), ended.stderr.decode()
+
+    return run
+
+
+def test_ctrl_c_while_it_starts_leaves_no_traceback():
+    """From the first line of ours on: the interpreter's own start is not ours."""
+    seen = "import sys; sys.addaudithook(lambda e, a: e == 'import' and a[0] == 'typer' and stop())"
+    stop = "import os, signal; stop = lambda: os.kill(os.getpid(), signal.SIGINT)"
+    run = "from twinmill_cli.main import main; main()"
+    ended = subprocess.run(
+        [sys.executable, "-c", f"{stop}; {seen}; {run}"],
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (-signal.SIGINT, "", "")

@@ -98,6 +98,13 @@ def test_what_cannot_be_written_is_said_and_nothing_is(words, says, copy, model)
     assert sorted(copy.rglob("*")) == before
 
 
+def test_a_part_of_the_source_is_told_what_it_lacks(tmp_path, model):
+    (tmp_path / "twin/effects/catalogue").mkdir(parents=True)
+    words = ["effects", "new", "play", "--from", str(model(EQUATIONS["tiles"]))]
+    with pytest.raises(ValueError, match=r"holds no tests/effects/CMakeLists\.txt"):
+        run([*words, "--into", str(tmp_path)])
+
+
 def test_a_power_that_c_has_not_is_refused(copy, model):
     path = model({"adds_to": "vx_mps", "formula": "p0*vx^2"})
     with pytest.raises(ValueError, match="has no power"):

@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Outputs appear whole or not at all, and a place that cannot be written is told in a sentence."""
+"""Outputs appear whole or not at all, and a place that cannot be written is told in a sentence.
+
+What a command reads it never replaces: a recording cannot be made again.
+"""
 
 import errno
+import os
 
 import pytest
 
 from twinmill.files import replacing, replacing_folder
 from twinmill_cli import main
 
+POSES = "t_s,robot_id,x_m,y_m,theta_rad\n0.0,1,0.0,0.0,0.0\n0.1,1,0.0,0.0,0.0\n"
+COMMANDS = "t_s,robot_id,vx_mps,vy_mps,omega_radps\n0.0,1,0.0,0.0,0.0\n"
 FULL = OSError(errno.ENOSPC, "No space left on device")
 
 
@@ -49,3 +55,62 @@ def test_no_command_ends_with_the_number_of_an_error(monkeypatch, capsys, tmp_pa
         main.main()
     assert left.value.code == 1
     assert capsys.readouterr().err == f"twinmill: {tmp_path}/absent: No such file or directory.\n"
+
+
+@pytest.fixture
+def keeping(twinmill):
+    """Runs a command that must refuse to write over this file; the file stays as it is."""
+
+    def run(kept, *arguments):
+        before = kept.read_bytes()
+        code, out, err = twinmill(*arguments, "--force")
+        assert (code, out) == (1, "") and len(err.splitlines()) == 1
+        assert "is read by this command" in err and "choose another name" in err
+        assert kept.read_bytes() == before
+
+    return run
+
+
+@pytest.mark.parametrize(
+    "verb", [["fit"], ["add", "coasting"], ["explain"], ["next"]], ids=lambda verb: verb[0]
+)
+def test_no_command_writes_over_its_recording(keeping, coasting_robot, tmp_path, verb):
+    log = tmp_path / "run.lcmlog"
+    log.write_bytes(coasting_robot.log.read_bytes())
+    keeping(log, *verb, log, "--model", coasting_robot.model, "-o", log)
+
+
+def test_another_name_of_the_recording_is_the_recording(keeping, coasting_robot, tmp_path):
+    log, link = tmp_path / "run.lcmlog", tmp_path / "link.toml"
+    log.write_bytes(coasting_robot.log.read_bytes())
+    os.symlink(log, link)
+    keeping(log, "fit", log, "--model", coasting_robot.model, "-o", link)
+    assert link.is_symlink()
+
+
+@pytest.mark.parametrize("given", ["p.csv", "c.csv"])
+def test_import_writes_over_no_table_that_it_reads(keeping, tmp_path, given):
+    poses, commands = tmp_path / "p.csv", tmp_path / "c.csv"
+    poses.write_text(POSES)
+    commands.write_text(COMMANDS)
+    out = tmp_path / given
+    keeping(out, "import", "--poses", poses, "--commands", commands, "-o", out)
+
+
+def test_export_and_plot_write_over_no_log(keeping, coasting_robot, tmp_path):
+    log = tmp_path / "run.png"
+    log.write_bytes(coasting_robot.log.read_bytes())
+    keeping(log, "export", log, "--to", "mcap", "-o", log)
+    keeping(log, "plot", log, "-o", log)
+
+
+def test_a_folder_that_holds_an_input_is_not_replaced(tmp_path):
+    log = tmp_path / "runs" / "deep" / "run.lcmlog"
+    log.parent.mkdir(parents=True)
+    log.write_text("a log")
+    with (
+        pytest.raises(ValueError, match="is read by this command"),
+        replacing_folder(tmp_path / "runs", force=True, inputs=[log]),
+    ):
+        pass
+    assert log.read_text() == "a log"

@@ -233,7 +233,7 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(put, tmp_path, poses, 
 def test_existing_and_unwritable_outputs_are_refused(put, tmp_path):
     poses, commands = put("p.csv", POSES), put("c.csv", COMMANDS)
     with pytest.raises(ValueError, match=r"exists; .* --force"):
-        import_log(poses, commands, commands)
+        import_log(poses, commands, put("o.csv", "mine"))
     with pytest.raises(ValueError, match=r"o\.lcmlog: cannot be written"):
         import_log(poses, commands, tmp_path / "none" / "o.lcmlog")
     with pytest.raises(ValueError, match=r"/dev/null: is a device"):

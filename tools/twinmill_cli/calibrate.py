@@ -15,6 +15,7 @@ from twinmill_cli.options import Force, Hold, Logs, Model, NewModel, Out, effect
 from twinmill_cli.output import AsJson, busy
 
 if working():  # not for --help
+    from twinmill.files import check_new_file
     from twinmill.fitting.add import OWN_GAINS, AddResult, add
     from twinmill.fitting.compare import Comparison, compare
     from twinmill.fitting.fit import FitResult, fit
@@ -26,7 +27,6 @@ if working():  # not for --help
         show,
     )
     from twinmill_cli.frame import (
-        check_output,
         command_line,
         finish,
         holding,
@@ -90,7 +90,7 @@ def _fit(
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
-    check_output(output, model_file, force)
+    check_new_file(output, force, [model_file.path, *logs])
     with busy(f"fitting {model}"):
         measurements = load(logs, model_file, as_json)
         result = fit(measurements, model_file, output, source.command, held=held)
@@ -140,20 +140,24 @@ def _add(
     Example: twinmill add coasting run.lcmlog --model fitted.toml -o better.toml
     """
     gains = robot is not None and effect == OWN_GAINS
-    known = [] if gains else [text["name"] for text in find_effect(effect)["texts"]]
+    known = {} if gains else {t["name"]: t["default"] for t in find_effect(effect)["texts"]}
     texts = {"adds_to": adds_to, "formula": formula, "state_rate": state_rate}
     texts = {name: text for name, text in texts.items() if text is not None}
     if extra := [name for name in texts if name not in known]:
         raise ValueError(
             f"{option(extra[0])}: {effect} has none; it is for `twinmill add equation`."
         )
+    if "formula" in known and formula is None:
+        used = {**known, **texts}
+        usual = f"{used['adds_to']} += {used['formula']}"
+        typer.echo(f"twinmill: without --formula, {usual} is fitted.", err=True)
     held = hold or []
     given = [w for name, text in texts.items() for w in (option(name), text)]
     verb = shlex.join(["add", effect, *of_robot(robot), *given, *holding(held)])
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
-    check_output(output, model_file, force)
+    check_new_file(output, force, [model_file.path, *logs])
     measurements = load(logs, model_file, as_json)
     with busy(f"adding {effect} to {model}"):
         result = add(

@@ -15,7 +15,7 @@ from typing import Annotated
 import typer
 
 from twinmill_cli.lazy import working
-from twinmill_cli.output import AsJson, deliver
+from twinmill_cli.output import STOPPED, AsJson, deliver, unstopped
 
 if working():  # not for --help
     import hashlib
@@ -141,8 +141,11 @@ def base_of(folder: Path, number: int, robot: Robot, seed: int, *, duration_s: f
     write_whole(sheet, robot.sheet(np.random.default_rng([seed, 3, number])))
     how = "explain" if number % 2 else "fit"
     with contextlib.redirect_stdout(io.StringIO()):
-        run([how, str(log), "--model", str(sheet), "-o", str(base), "--json"])
+        code = run([how, str(log), "--model", str(sheet), "-o", str(base), "--json"])
     log.unlink()
+    if code == STOPPED:
+        base.unlink(missing_ok=True)  # of half an explanation
+        raise KeyboardInterrupt
     return base
 
 
@@ -218,12 +221,23 @@ def _all(
 
 
 def _done(calls: Sequence[tuple], what: str, workers: int) -> Iterator:
-    """What functions with their arguments return, as each is done; shows progress and time left."""
+    """What functions with their arguments return, as each is done; shows progress and time left.
+
+    Ctrl-C reaches all processes of a terminal. Workers do not hear it, from their start on: they
+    are ended here, and what they had done before is kept.
+    """
     pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
-    with progress_bar() as progress, pool as running:
-        waiting = [running.submit(*call) for call in calls]
-        for done in progress.track(as_completed(waiting), len(calls), description=what):
-            yield done.result()
+    with unstopped():
+        waiting = [pool.submit(*call) for call in calls]
+    try:
+        with progress_bar() as progress:
+            for done in progress.track(as_completed(waiting), len(calls), description=what):
+                yield done.result()
+    finally:
+        if not all(future.done() for future in waiting):
+            for worker in multiprocessing.active_children():
+                worker.terminate()
+        pool.shutdown(cancel_futures=True)
 
 
 def _one(folder: Path, base: Path, case: Case) -> tuple[int, dict, float]:

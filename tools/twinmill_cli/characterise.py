@@ -117,7 +117,7 @@ def _characterise(
             force=force,
             as_json=as_json,
         )
-    check_new_file(out, force)
+    check_new_file(out, force, [Path(script)])
     end_s = check_script(Path(script), cap_pct)
     name = Path(script).name
     if host:

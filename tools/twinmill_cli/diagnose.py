@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +17,7 @@ import typer
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Force, Logs, Model, NewModel, Out
-from twinmill_cli.output import AsJson, telling
+from twinmill_cli.output import STOPPED, AsJson, deliver, telling
 
 if working():  # not for --help
     from twinmill.data.log import read_log
@@ -25,13 +27,15 @@ if working():  # not for --help
     from twinmill.diagnosis.explain import Explanation, explain
     from twinmill.diagnosis.first_sight import at_first_sight
     from twinmill.diagnosis.result import Diagnosis
+    from twinmill.diagnosis.stopped import NOTHING_TRIED, stopped
+    from twinmill.files import check_new_file
     from twinmill.model.model_file import ModelFile
+    from twinmill.report import Provenance
     from twinmill.report import diagnosis as present
     from twinmill.swarm.metrics import swarm_metrics
     from twinmill.terminal import progress_bar
     from twinmill_cli.calibrate import option
     from twinmill_cli.frame import (
-        check_output,
         command_line,
         finish,
         load,
@@ -41,7 +45,6 @@ if working():  # not for --help
     )
 
 TWIN_RUNS = 50
-STOPPED = 130  # as a shell has it of Ctrl-C
 TABLE = 1  # telemetry_t.mode
 
 
@@ -62,15 +65,13 @@ def _diagnose(
     Example: twinmill diagnose run.lcmlog --model fitted.toml
     """
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
-    with telling(f"diagnosing with {model}") as progress:
+    with _told_if_stopped(source, as_json), telling(f"diagnosing with {model}") as progress:
         measurements = load(logs, model_file, as_json)
         _hint(measurements, model_file)
         result = diagnose(measurements, model_file, progress, stoppable=True)
-        swarm = None
-        if robots_recorded(logs[0], measurements) > 1:
-            progress("the swarm as a whole")
-            note, swarm = _judge_swarm(logs[0], result)
-            result = replace(result, notes=[*result.notes, note])
+    swarm = None
+    if robots_recorded(logs[0], measurements) > 1 and not result.search.stopped:
+        result, swarm = _with_swarm(logs[0], result)
     data = {**result.to_json(), **told(measurements), "swarm": swarm}
     then = [*_mending(result, logs, model), *_settling(result, logs, model)]
     if data["next_experiment"]:
@@ -79,7 +80,32 @@ def _diagnose(
         data["rest"]["proven"]["command"] = next(c for why, c in then if "the formula" in why)
     section = partial(present.section, result, then)
     finish(data, present.terminal(result, then), source, section=section, as_json=as_json, out=out)
-    return _whole(result)
+    return result
+
+
+@contextmanager
+def _told_if_stopped(source: Provenance, as_json: bool) -> Iterator[None]:
+    """Ctrl-C before anything was tried: that nothing can be said is said, too.
+
+    Raises:
+        Exit: so it was.
+    """
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        data = {"verdict": "cannot_tell", "sentence": NOTHING_TRIED, "stopped": True}
+        deliver({**data, "findings": [], "found": [], **source.to_json()}, NOTHING_TRIED, as_json)
+        raise typer.Exit(STOPPED) from stop
+
+
+def _with_swarm(path: Path, result: Diagnosis) -> tuple[Diagnosis, dict | None]:
+    """With what is said of the swarm as a whole; Ctrl-C leaves that out."""
+    try:
+        with telling("the swarm as a whole"):
+            note, swarm = _judge_swarm(path, result)
+    except KeyboardInterrupt:
+        return stopped(result, "Stopped before the swarm as a whole was judged."), None
+    return replace(result, notes=[*result.notes, note]), swarm
 
 
 def _hint(measurements: Measurements, model_file: ModelFile) -> None:
@@ -202,8 +228,8 @@ def _explain(
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
-    check_output(output, model_file, force)
-    with telling(f"explaining with {model}") as progress:
+    check_new_file(output, force, [model_file.path, *logs])
+    with _told_if_stopped(source, as_json), telling(f"explaining with {model}") as progress:
         measurements = load(logs, model_file, as_json)
         _hint(measurements, model_file)
         result = explain(
@@ -215,32 +241,22 @@ def _explain(
             formula=formula,
             stoppable=True,
         )
-    settling = _settling(result.diagnosis, logs, str(output))
-    adding = _adding(result.diagnosis, logs, given=model, explained=str(output))
+    explained = str(result.path or model)
+    settling = _settling(result.diagnosis, logs, explained)
+    adding = _adding(result.diagnosis, logs, given=model, explained=explained)
     kept = result.formula and result.formula.kept
     then = [*(() if kept else adding), *settling]
-    section = partial(present.explanation_section, result, then)
+    not_written = "" if result.path else f"Not written: {output}; nothing was found for it."
+    section = partial(present.explanation_section, result, then, not_written)
     data = {**result.to_json(), **told(measurements)}
     if settling:
         data["next_experiment"]["command"] = settling[-1][1]
     finish(
         data,
-        present.terminal_explanation(result, then),
+        present.terminal_explanation(result, then, not_written),
         source,
         section=section,
         as_json=as_json,
         out=out,
     )
-    _whole(result.diagnosis)
     return result
-
-
-def _whole(diagnosis: Diagnosis) -> Diagnosis:
-    """The diagnosis, if it was not stopped.
-
-    Raises:
-        Exit: it was; what was found is told by then.
-    """
-    if diagnosis.search.stopped:
-        raise typer.Exit(STOPPED)
-    return diagnosis

@@ -12,11 +12,11 @@ import typer
 from rich.console import RenderableType
 
 from twinmill.data.measurement import BadInputError, Measurements, load_measurements
-from twinmill.files import check_new_file, check_new_folder
+from twinmill.files import check_new_folder
 from twinmill.model.model_file import ModelFile
 from twinmill.report import Provenance, Section, write_report
 from twinmill.report.html import SCORE_NOTE
-from twinmill_cli.output import deliver
+from twinmill_cli.output import STOPPED, deliver
 
 
 def command_line(verb: str, logs: list[Path], model: str, output: Path | None = None) -> str:
@@ -40,16 +40,6 @@ def open_model(model: str, out: Path | None) -> ModelFile:
     if out:
         check_new_folder(out)
     return ModelFile.load(model)
-
-
-def check_output(output: Path, model_file: ModelFile, force: bool) -> None:
-    """Raises ValueError if the new model could not be written, before the long work."""
-    if output.resolve() == model_file.path.resolve():
-        raise ValueError(
-            f"{output}: is the model that is read, and models are never changed in place; "
-            "choose another name."
-        )
-    check_new_file(output, force)
 
 
 def provenance(command: str, model: ModelFile) -> Provenance:
@@ -92,11 +82,31 @@ def finish(
     out: Path | None,
     note: str = SCORE_NOTE,
 ) -> None:
-    """Report, then JSON or text; the section's pictures are drawn for a report alone."""
-    report = None
-    if out:
-        drawn = section()
-        report = write_report(out, drawn.title, source, [drawn], note=note)
+    """Report, then JSON or text; the section's pictures are drawn for a report alone.
+
+    What was found is told though the report cannot be written, or Ctrl-C stops its drawing; of work
+    that was stopped before (`stopped` in data) none is drawn.
+
+    Raises:
+        ValueError: the report cannot be written.
+        Exit: Ctrl-C stopped the work, or the report.
+    """
+    report, failed, done = None, None, not data.get("stopped")
+    if out and done:
+        try:
+            drawn = section()
+            report = write_report(out, drawn.title, source, [drawn], note=note)
+        except KeyboardInterrupt:
+            done = False
+        except (OSError, ValueError) as error:
+            failed = error
+    data = data if done else {**data, "stopped": True}
     deliver({**data, **source.to_json(), "report": str(report) if report else None}, text, as_json)
     if report and not as_json:
         typer.echo(f"Report: {report}")
+    if failed:
+        raise ValueError(f"what is told above stands, but there is no report: {failed}")
+    if not done:
+        if out:
+            typer.echo("twinmill: stopped; no report was drawn.", err=True)
+        raise typer.Exit(STOPPED)

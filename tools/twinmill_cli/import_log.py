@@ -278,7 +278,8 @@ def _explain(
     if not explained:
         raise LogError("--explain-columns: give the tables with --poses and --commands.")
     guesses = {kind: columns for kind, (_, columns) in explained.items()}
-    with replacing(out, force) as temporary:
+    inputs = [path for paths in asked.values() for path in paths]
+    with replacing(out, force, inputs=inputs) as temporary:
         temporary.write_text(to_toml(guesses), encoding="utf-8")
     for kind, (read, columns) in explained.items():
         for note in read.notes:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command `twinmill`: all subcommands, and one sentence on what went wrong."""
 
+import errno
+import io
 import os
 import sys
 from typing import Annotated, Any
@@ -238,6 +240,9 @@ def run(arguments: list[str]) -> Any:
 
 def main() -> None:
     """Entry point: leaves with the exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a degree sign in ASCII is no reason to fail
     try:
         result = run(sys.argv[1:] or ["--help"])
         code = result if isinstance(result, int) else 0
@@ -253,7 +258,9 @@ def main() -> None:
         _complain(f"the Python package of '{error.name}' is not installed; `make build` does that.")
     except OSError as error:
         code = 1
-        _complain(f"{error.filename}: {error.strerror}." if error.filename else str(error))
+        full = "no space is left where the output goes; make room, then do it again."
+        told = full if error.errno == errno.ENOSPC else str(error)
+        _complain(f"{error.filename}: {error.strerror}." if error.filename else told)
     except ValueError as error:
         code = 1
         _complain(str(error))

@@ -96,7 +96,7 @@ def _next(
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
-    check_new_file(output, force)
+    check_new_file(output, force, [model_file.path, *logs])
     if script_as:
         check_new_script(script_as, ros_path(script_as, output), force)
     if behavior:

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import signal
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Annotated
@@ -23,12 +25,29 @@ AsJson = Annotated[
 ]
 
 
+STOPPED = 130  # exit code after Ctrl-C, as a shell has it
+
+
+@contextmanager
+def unstopped() -> Iterator[None]:
+    """Meanwhile Ctrl-C does nothing: what takes a moment is told whole."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def deliver(data: dict, text: RenderableType, as_json: bool) -> None:
     """Prints the one or the other on stdout; text that must not wrap is not cut either."""
-    if as_json:
-        print(json.dumps(plain(data), allow_nan=False))
-    else:
-        Console().print(text, crop=False)
+    with unstopped():
+        if as_json:
+            print(json.dumps(plain(data), allow_nan=False), flush=True)
+        else:
+            Console().print(text, crop=False)
 
 
 @contextmanager
@@ -41,6 +60,11 @@ def busy(what: str) -> Iterator[None]:
 @contextmanager
 def telling(what: str) -> Iterator[Callable[[str], None]]:
     """The same, with a function that tells in words where the work has got to."""
-    with progress_words() as progress:
-        task = progress.add_task(what, total=None)
+    progress = progress_words()
+    task = progress.add_task(what, total=None)
+    progress.start()
+    try:
         yield lambda words: progress.update(task, description=f"{what}: {words}")
+    finally:
+        with unstopped():
+            progress.stop()

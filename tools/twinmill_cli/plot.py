@@ -54,7 +54,7 @@ def _plot(
     out = out or Path(f"{log.stem}.png")
     if out.suffix not in SUFFIXES:
         raise ValueError(f"{out}: must end in {', '.join(SUFFIXES)}: the end says what is drawn.")
-    with busy(f"drawing {log}"), replacing(out, force) as temporary:
+    with busy(f"drawing {log}"), replacing(out, force, inputs=[log]) as temporary:
         multi_log = read_multi_log(log)
         panels = _panels(multi_log, log)
         command = shlex.join(["twinmill", "plot", str(log), "-o", str(out)])

@@ -14,9 +14,9 @@ from twinmill_cli.options import Force, Model, NewModel
 from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
-    from twinmill.files import replacing
+    from twinmill.files import check_new_file, replacing
     from twinmill.model.set_values import with_values
-    from twinmill_cli.frame import check_output, command_line, open_model
+    from twinmill_cli.frame import command_line, open_model
 
 
 def register(app: typer.Typer) -> None:
@@ -45,7 +45,7 @@ def _set(
     """
     wanted = dict(map(_parsed, values))
     model_file = open_model(model, None)
-    check_output(output, model_file, force)
+    check_new_file(output, force, [model_file.path])
     command = command_line(shlex.join(["set", *values]), [], model, output)
     text = with_values(model_file, wanted, command)
     with replacing(output, force) as temporary:

@@ -86,7 +86,7 @@ def _threshold(
     if write and not robot:
         raise ValueError("--write needs --robot: whose configuration is it?")
     if picture:
-        check_new_file(picture, force)
+        check_new_file(picture, force, [*(images or []), config])
     size_px = _parse_size(size)
     remote = Remote(robot, ssh_config) if robot else None
     with busy("looking"):

@@ -166,7 +166,7 @@ def _track(
             as_json=as_json,
         )
     out = out or Path(f"{videos[0].stem}.csv")
-    check_new_file(out, force)
+    check_new_file(out, force, [*videos, *lens, *floor, commands])
     if len(starts_s) not in (0, 1, count):
         raise ValueError(f"--start-s: {len(starts_s)} are given for {count} films; give one each.")
     measured = [read_floor(path) for path in floors]
@@ -461,7 +461,7 @@ def _calibrate(
 
     Example: twinmill track-calibrate board.mp4 --out camera.toml
     """
-    check_new_file(out, force)
+    check_new_file(out, force, [video])
     pattern, film = _board(board, squares, square_m), _film(video, None)
     pictures = (picture for _, picture in _shown(f"looking for the board in {video}", film))
     views, frames = pick_views(pictures, pattern)

@@ -73,7 +73,7 @@ def _watch(
     _need_rerun()
     model_file, warnings = open_model(model, None), []
     if save:
-        check_new_file(save, force)
+        check_new_file(save, force, [log, model_file.path])
     batches = from_log(log, warnings) if log else from_bus(lcm_url, duration_s, _warn)
     with replacing(save, force) if save else nullcontext() as file:
         show = _show(batches, model_file, log.name if log else None, file, url=connect)

@@ -123,10 +123,14 @@ def laboratories_in_mujoco(
         return lab, ended
 
     with ThreadPoolExecutor(available_cores()) as pool:
-        for done, future in enumerate(as_completed([pool.submit(ends, lab) for lab in todo]), 1):
-            lab, ended = future.result()
-            store.keep(lab, {"lab": [lab] * len(ended), "class": ended})
-            tell(LABS - len(todo) + done, LABS)
+        waiting = [pool.submit(ends, lab) for lab in todo]
+        try:
+            for done, future in enumerate(as_completed(waiting), 1):
+                lab, ended = future.result()
+                store.keep(lab, {"lab": [lab] * len(ended), "class": ended})
+                tell(LABS - len(todo) + done, LABS)
+        finally:
+            pool.shutdown(cancel_futures=True)  # at Ctrl-C only those that run go on
     if not store.result.exists():
         store.finish(asked, LABS)
     _, table = read_sweep(store.folder)

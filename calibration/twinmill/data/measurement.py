@@ -10,7 +10,13 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.camera_frames import Frames, frames_of
-from twinmill.data.checks import InputFinding, check_driven, check_poses, check_recorded
+from twinmill.data.checks import (
+    InputFinding,
+    check_commanded,
+    check_driven,
+    check_poses,
+    check_recorded,
+)
 from twinmill.data.log import Log, LogError, RobotLog, read_log
 from twinmill.data.steady_table import SteadyTable, is_steady_table, read_steady_tables
 from twinmill.data.time_base import TimeBase, find_time_base, retimed
@@ -192,7 +198,7 @@ def clean_measurements(
             continue
         runs = len(paths) * len(log.robots)
         for robot in log.robots.values():
-            wrong = check_poses(robot, log.path.name)
+            wrong = check_commanded(robot, log.path.name) or check_poses(robot, log.path.name)
             findings += wrong
             if any(f.fatal for f in wrong):
                 continue

@@ -10,6 +10,8 @@ from twinmill.data.log import CommandKind, LogError, RobotLog
 
 LIFT_M = 0.05  # height above the median that no driving robot has
 SILENCE_S = 0.25  # telemetry comes every 22 ms: after this the duties are not known any more
+HELD_S, HELDS = 2.0, 3  # a last command holds for this, or so many times the longest before it
+STANDING_M = 0.05  # within which a robot that stands is seen
 CLOCK_S = 0.3  # more than any offset between the clocks
 FROZEN_S = 0.5  # a pose that keeps its very bits for longer while driven is no measurement
 REST_S = 1.5  # coasting ends within 0.5 s; the rest is for lag and clocks
@@ -99,10 +101,11 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
         LogError: without commands, or with fewer than two valid poses.
     """
     if not len(robot.command_t_s) or np.count_nonzero(robot.valid) < 2:
-        missing = "commands" if not len(robot.command_t_s) else "valid poses"
+        valid = f"{np.count_nonzero(robot.valid)} of its {len(robot.pose_t_s)} poses are valid"
+        why = valid if len(robot.command_t_s) else "the log has no commands of it"
         raise LogError(
-            f"robot {robot.robot_id}: the log has no {missing}, so nothing can be "
-            "predicted; record telemetry and motion capture together."
+            f"robot {robot.robot_id}: {why}, so nothing can be predicted; record telemetry and "
+            "motion capture together."
         )
     notes: list[str] = []
     usable = _trackable(robot, notes)
@@ -162,9 +165,10 @@ def _trackable(robot: RobotLog, notes: list[str]) -> np.ndarray:
     silent = _silent(robot)
     if (silent & robot.valid).any():
         first = robot.pose_t_s[silent & robot.valid][0]
+        ended = f"; the last is at {robot.command_t_s[-1]:.3f} s" if silent[-1] else ""
         notes.append(
             f"{np.count_nonzero(silent & robot.valid)} poses from {first:.3f} s on were "
-            "taken while no commands are in the log; left out."
+            f"taken while no commands are in the log{ended}; left out."
         )
     return robot.valid & ~lifted & ~silent
 
@@ -174,10 +178,28 @@ def _silent(robot: RobotLog) -> np.ndarray:
     t, stamps = robot.pose_t_s, robot.command_t_s
     outside = (t < stamps[0] - CLOCK_S) | (t > stamps[-1] + CLOCK_S)
     if len(robot.mode) == 0:  # drive messages come when they change: held for as long as it takes
-        return t < stamps[0] - CLOCK_S
+        return (t < stamps[0] - CLOCK_S) | _after_the_last(robot)
     for k in np.flatnonzero(np.diff(stamps) > SILENCE_S):
         outside |= (t > stamps[k] + CLOCK_S) & (t < stamps[k + 1] - CLOCK_S)
     return outside
+
+
+def _after_the_last(robot: RobotLog) -> np.ndarray:
+    """(N,) bool: poses after the last command, where they go on for longer than it can have held.
+
+    One that is sent when it changes may hold for long, and so may the only one. After a last row of
+    zeros a robot that stands goes on standing. What is left out begins as soon as a command was
+    followed by another before.
+    """
+    t_s, end_s, held_s = robot.pose_t_s, robot.command_t_s[-1], np.diff(robot.command_t_s)
+    if len(held_s) < 2 or t_s[-1] <= end_s + max(HELD_S, HELDS * held_s.max()):
+        return np.zeros(len(t_s), bool)
+    after = t_s > end_s + held_s.max()
+    seen = robot.pose[after & robot.valid, :2]
+    if not robot.command[-1].any() and len(seen):
+        span_m = np.ptp(np.quantile(seen, (0.01, 0.99), axis=0), axis=0)
+        return after & bool((span_m > STANDING_M).any())
+    return after
 
 
 def _continuous(pose: np.ndarray, segment: np.ndarray) -> np.ndarray:

@@ -43,6 +43,7 @@ from twinmill.diagnosis.rivals import less_each
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.search import search
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.stopped import Course
 from twinmill.diagnosis.ties import instead_of_drift
 from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
@@ -112,15 +113,36 @@ def diagnose(
         model_file: the model; what other logs told of it is held, its gains may drift.
         progress: told in words what is being done.
         excluded: effects that are not to be thought of.
-        stoppable: Ctrl-C ends the search for what all robots lack, and what was found is told.
+        stoppable: Ctrl-C ends it, and what was found until then is told; if nothing was tried yet
+            there is nothing to tell, and KeyboardInterrupt goes on.
 
     Raises:
         LogError: no measurement can be judged.
     """
+    course = Course()
+    try:
+        return _diagnosed(measurements, model_file, progress, excluded, course=course)
+    except KeyboardInterrupt:
+        told = course.told() if stoppable else None
+        if told is None:
+            raise
+        return told
+
+
+def _diagnosed(
+    measurements: Sequence[Measurement | SteadyTable],
+    model_file: ModelFile,
+    progress: Callable[[str], None],
+    excluded: Collection[str],
+    *,
+    course: Course,
+) -> Diagnosis:
+    """The same, with what there is by now written down in its course."""
     progress("finding the noise floor")
     opened = open_measurements(measurements, model_file)
     before = comparison(model_file, opened)
     unseen = not_shown(opened)
+    course.opened, course.before, course.unseen = opened, before, unseen
     known = _thinned(with_own_gains(judged(opened)))
     first = first_state(known, model_file, {*excluded, *unseen})
     usual = model_file.usual_score([o.measurement.log_sha256 for o in known])
@@ -128,12 +150,14 @@ def diagnose(
     if off:
         known = _thinned(_without(judged(opened), off))
         first = first_state(known, model_file, {*excluded, *unseen})
-    done = search(first, progress, known=usual, stoppable=stoppable)
+    course.off = off
+    done = search(first, progress, known=usual, begun=course.searches.append)
+    course.searches.append(done)
     lags_s = 0.0
-    if not off and not done.stopped:
+    if not off:
         progress("looking for robots that differ")
         alone = one_by_one(known, done, progress)
-        off = outliers(alone)
+        course.off = off = outliers(alone)
         gone = {r.robot_id for r in off}
         lags_s = spread_of_lags_s([a for a in alone if a.robot_id not in gone])
         if off or lags_s:
@@ -141,9 +165,10 @@ def diagnose(
             known = with_own_lags(known, lags_s) if lags_s else known
             progress("looking again without them" if off else "looking again, each with its lag")
             first = first_state(known, model_file, {*excluded, *unseen})
-            done = search(first, progress, known=usual, stoppable=stoppable)
+            done = search(first, progress, known=usual, begun=course.searches.append)
+            course.searches.append(done)
     progress("looking for what no effect explains")
-    found = _concluded(
+    course.motion = _concluded(
         opened,
         known=known,
         first=first,
@@ -154,17 +179,7 @@ def diagnose(
         off=off,
         lags_s=lags_s,
     )
-    if done.stopped:
-        return _so_far(found)
-    return _robots_first(with_detections(found, model_file, progress, excluded))
-
-
-def _so_far(found: Diagnosis) -> Diagnosis:
-    """Of a search that was stopped: what was not tried may be there, too."""
-    if not found.found:
-        words = "Stopped before all was tried; nothing had been found."
-        return replace(found, verdict="cannot_tell", sentence=words)
-    return replace(found, sentence=f"Stopped before all was tried. So far: {found.sentence}")
+    return _robots_first(with_detections(course.motion, model_file, progress, excluded))
 
 
 def _robots_first(diagnosis: Diagnosis) -> Diagnosis:

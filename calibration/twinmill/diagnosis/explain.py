@@ -11,11 +11,12 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.result import Diagnosis
+from twinmill.diagnosis.stopped import stopped
 from twinmill.diagnosis.taking import EFFECT, Taken, taken
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.fit import common_clock
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.model.model_file import Fitted, ModelFile, write_child
+from twinmill.model.model_file import Fitted, ModelFile, child_of
 from twinmill.model.parameters import (
     GAINS,
     LAG,
@@ -34,7 +35,7 @@ class Explanation:
         diagnosis: with its steps on held-out data.
         after: comparison of the new model.
         parameters: all that was fitted.
-        path: of the new model.
+        path: of the new model; None if it was stopped before anything was found, and none written.
         formula: that was proven for what is left, refitted with all; None if none was, or if it
             was not asked for.
     """
@@ -42,7 +43,7 @@ class Explanation:
     diagnosis: Diagnosis
     after: Comparison
     parameters: list[ParameterEstimate]
-    path: Path
+    path: Path | None
     formula: Taken | None = None
 
     @property
@@ -60,7 +61,7 @@ class Explanation:
             "formula": self.formula.to_json() if self.formula else None,
             "score_after": self.after.score,
             "parameters": [e.to_json() for e in self.parameters],
-            "model": str(self.path),
+            "model": str(self.path) if self.path else None,
         }
 
 
@@ -83,26 +84,53 @@ def explain(
         command: recorded in it.
         progress: told in words what is being done.
         formula: one that is proven for what no effect explains goes into the model as well.
-        stoppable: see `diagnose`.
+        stoppable: see `diagnose`; the model then has what was found until then, as it was found.
 
     Raises:
         LogError: no measurement can be judged.
         ModelError: the new file cannot be written.
     """
     diagnosis = diagnose(measurements, model_file, progress, stoppable=stoppable)
+    if not diagnosis.search.stopped:
+        try:
+            fit, beyond = _whole(diagnosis, formula)
+            return _written(diagnosis, model_file, fit, beyond, out=out, command=command)
+        except KeyboardInterrupt:
+            if not stoppable:
+                raise
+            diagnosis = stopped(diagnosis, "Stopped before all was fitted together.")
+    if not (diagnosis.found or diagnosis.robots_off):
+        return Explanation(diagnosis, diagnosis.before, [], None)
+    fit = diagnosis.search.last.fit
+    return _written(diagnosis, model_file, fit, None, out=out, command=command)
+
+
+def _whole(diagnosis: Diagnosis, formula: bool) -> tuple[ScoreFit, Taken | None]:
+    """All that was found fitted together, and a proven formula where that is asked for."""
     fit = _polished(diagnosis)
     proven = diagnosis.rest.proven if formula else None
-    runs = len({m.log_sha256 for m in measurements})
+    runs = len({own.measurement.log_sha256 for own in diagnosis.opened})
     beyond = taken(fit, proven, runs) if proven else None
-    if beyond and beyond.kept:
-        fit = beyond.fit
+    return (beyond.fit if beyond and beyond.kept else fit), beyond
+
+
+def _written(
+    diagnosis: Diagnosis,
+    model_file: ModelFile,
+    fit: ScoreFit,
+    beyond: Taken | None,
+    *,
+    out: Path,
+    command: str,
+) -> Explanation:
+    """Writes the model last of all: Ctrl-C before leaves no file of which nothing is said."""
     model = _with_found(diagnosis, model_file, beyond)
     estimates = [*fit.shared_estimates(), *diagnosis.detection_estimates]
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
-    logs = {m.log_name: m.log_sha256 for m in measurements}
+    logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
     noise = next((s.noise for s in diagnosis.modelled if s.noise), None)
-    written = Fitted(
+    fitted = Fitted(
         model=model,
         estimates=[e for e in estimates if e.seen],
         logs=logs,
@@ -115,10 +143,10 @@ def explain(
         robots=_own_values(diagnosis, fit),
         covariance=fit.shared_covariance(),
     )
-    write_child(model_file, written, out, command)
-    child = ModelFile.load(str(out))
+    child = child_of(model_file, fitted, Path(out), command)
     after = comparison(child, [o.with_model(child.model) for o in diagnosis.opened])
-    return Explanation(diagnosis, after, estimates, Path(out), beyond)
+    child.write()
+    return Explanation(diagnosis, after, estimates, child.path, beyond)
 
 
 def _with_found(diagnosis: Diagnosis, model_file: ModelFile, beyond: Taken | None) -> native.Model:

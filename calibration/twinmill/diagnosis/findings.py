@@ -32,6 +32,7 @@ from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
 HORIZON = HORIZONS_S.index(0.5)
+NOT_WEIGHED = "the search was stopped before what else may take the same errors was looked for"
 
 
 def findings_of(
@@ -360,6 +361,30 @@ def _finding(
         doubt = f"one visit of its place speaks for {name}: it may be that time and not the place"
     certainty = "doubtful" if doubt else "group" if group else "sure"
     return Finding(name, group, own, share, certainty, doubt, "#" in instance)
+
+
+def not_weighed(done: Search) -> list[Finding]:
+    """What a search has found that was stopped, most first; no fit is made for it.
+
+    Shares are of the squared held-out score above the noise, each in the round that accepted it.
+    """
+    estimates, last = done.last.fit.shared_estimates(), done.last.held_score**2
+    excess = max(done.rounds[0].before.held_score ** 2 - min(last, 1.0), 1e-9)
+    found = []
+    for name in dict.fromkeys(done.found):
+        this = done.round_of(name)
+        fall = this.before.held_score**2 - this.accepted.held_score**2
+        share = float(np.clip(fall / len(this.accepted.names) / excess, 0.0, 1.0))
+        if name == REFIT:
+            instance, own = "", [e for e in estimates if e.name in done.last.state.base]
+        else:
+            instance = newest_instance(done.last.state.model, name)
+            own = [e for e in estimates if e.name.startswith(f"{instance}.")]
+        rivals = [n for t in _rivals(done, name) for n in t.names]
+        group = (name, *rivals) if rivals else None
+        again = "#" in instance
+        found.append(Finding(name, group, own, share, "doubtful", NOT_WEIGHED, again))
+    return sorted(found, key=lambda f: -f.share)
 
 
 def ranking_of(done: Search, found: Sequence[Finding]) -> list[Ranked]:

@@ -35,6 +35,7 @@ RIDGES = (1.0, 0.03)  # of what is of usual strength, and of what is far stronge
 FLIPS = 499  # random signs of blocks that make the null distribution
 MOMENTS = "single moments"
 FIRM, FEW, NOISE = "firm", "in too few stretches", "may be noise"
+NOT_LOOKED_AT = "not looked at"
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,7 @@ class Rest:
         again: least share of the squared error of way that comes again at the same places. The
             floor counts it as noise, since it follows from no command.
         proven: a formula for it that blocks which neither chose nor fitted it bear out.
+        looked_at: false where the share alone is known.
     """
 
     share: float
@@ -97,6 +99,7 @@ class Rest:
     likely: bool = False
     family_takes: float = 0.0
     little: bool = False
+    looked_at: bool = True
 
     def with_findings(self, findings: Sequence[Finding]) -> "Rest":
         """With what doubtful findings depend on: first, if they take more than is left.
@@ -116,7 +119,9 @@ class Rest:
 
     @property
     def certainty(self) -> str:
-        """In words: FIRM, FEW or NOISE."""
+        """In words: FIRM, FEW, NOISE or NOT_LOOKED_AT."""
+        if not self.looked_at:
+            return NOT_LOOKED_AT
         if self.depends_on or (self.firm and not self.little):
             return FIRM
         return FEW if self.far else NOISE

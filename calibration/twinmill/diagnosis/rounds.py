@@ -30,7 +30,7 @@ class Search:
     """A whole search: rounds, the last trial, and what was dropped again.
 
     Attributes:
-        stopped: by Ctrl-C, before all was tried.
+        stopped: by Ctrl-C, before the diagnosis was whole.
     """
 
     rounds: list[Round]

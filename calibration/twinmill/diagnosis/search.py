@@ -27,7 +27,7 @@ def search(
     settings: Settings = SETTINGS,
     known: float = 1.0,
     *,
-    stoppable: bool = False,
+    begun: Callable[[Search], None] = lambda _: None,
 ) -> Search:
     """Adds what is missing until nothing is worth it.
 
@@ -38,22 +38,17 @@ def search(
         known: score that the model has on the logs that it was fitted to; 0 where none is known.
             What it missed there it misses here, too, and in the same way over and over, so that
             evidence must be stronger where the score is no worse than that.
-        stoppable: Ctrl-C ends the search with what it has by then.
+        begun: told the search as it begins; it grows, and is whole at any moment.
     """
     first = fitted(state)
     if first.held_score < settings.news * known:
         settings = settings.stricter(settings.usual * known)
     done = Search([], first, [], settings)
     starts: dict[str, Starts] = {}
-    try:
-        _forward(done, starts, progress)
-        progress(f"{_told(done)}exchanging what was found for other effects")
-        done = _exchanged(done, starts)
-    except KeyboardInterrupt:
-        if not stoppable or not done.rounds:
-            raise
-        done.stopped = True
-    return done
+    begun(done)
+    _forward(done, starts, progress)
+    progress(f"{_told(done)}exchanging what was found for other effects")
+    return _exchanged(done, starts)
 
 
 def _forward(done: Search, starts: dict[str, Starts], progress: Callable[[str], None]) -> None:

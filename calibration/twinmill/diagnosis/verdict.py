@@ -206,7 +206,7 @@ class VerdictInputs:
                 f"{self._as_before}"
             )
         if verdict in ("effect_missing", "ambiguous"):
-            return f"{LACKING}{_in_turn([_named(f) for f in self.findings])}.{self._left}"
+            return f"{lacking(self.findings)}{self._left}"
         return self._outside_sentence
 
     @property
@@ -297,6 +297,11 @@ def drifted(score: float, last: float, known: float) -> bool:
         known: that is no news.
     """
     return score > GOOD * known and last < SETTINGS.drifted * score
+
+
+def lacking(findings: Sequence[Finding]) -> str:
+    """What a model lacks, in a sentence."""
+    return f"{LACKING}{_in_turn([_named(f) for f in findings])}."
 
 
 def _in_turn(names: list[str]) -> str:

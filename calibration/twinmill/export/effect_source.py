@@ -159,10 +159,11 @@ def _check(name: str, root: Path, files: Sequence[Path]) -> None:
         )
     if name in catalogue():
         raise ValueError(f"effect '{name}': the catalogue has it already; take another name.")
-    if not (root / CATALOGUE).is_dir() or not (root / TESTS / "CMakeLists.txt").is_file():
+    needed = (CATALOGUE, TESTS / "CMakeLists.txt")
+    if missing := next((place for place in needed if not (root / place).exists()), None):
         raise ModelError(
-            f"{root}: holds no {CATALOGUE}; run this in the project's source, or name it with "
-            "--into."
+            f"{root}: holds no {missing}, so it is not the project's source; run this there, or "
+            "name it with --into."
         )
     if there := next((f for f in files if f.exists()), None):
         raise ValueError(f"{there}: exists already; take another name, or remove it.")

@@ -80,10 +80,10 @@ def export_log(
     }
     files, warnings = [out], list(recording.warnings)
     if to is LogFormat.MCAP:
-        with replacing(out, force) as temporary:
+        with replacing(out, force, inputs=[log]) as temporary:
             write_mcap(recording, temporary, provenance, Body.of(model))
     elif to is LogFormat.ROSBAG2:
-        with replacing_folder(out, force) as temporary:
+        with replacing_folder(out, force, inputs=[log]) as temporary:
             write_rosbag2(recording, temporary)
         if strange := left_out(recording):
             warnings.append(f"ROS has no messages for {', '.join(strange)}: left out.")

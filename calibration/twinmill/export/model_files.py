@@ -92,7 +92,7 @@ def export_model(
         texts |= _range_files(robot, found, ranges_stem)
         warnings = _truncated(found)
     for path in texts:
-        check_new_file(path, force)
+        check_new_file(path, force, [robot.file.path])
     with ExitStack() as stack:
         for path, text in texts.items():
             temporary = stack.enter_context(replacing(path, force))

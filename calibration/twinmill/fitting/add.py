@@ -9,6 +9,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
@@ -151,6 +152,7 @@ def add(
         moved, found = fitted(enlarged, [*old, *fresh], fresh)
     else:
         moved, found = fitted(with_own(enlarged, robot_id, fresh), old, fresh)
+    _check_acts(found, fresh, texts or {})
     held = [HeldOut.of(f) for f in (fitted(opened, [])[1], fitted(opened, old)[1], found)]
     before = comparison(model_file, opened)
     after = comparison(model_file, [o.realigned() for o in moved], Path(out).name)
@@ -225,8 +227,25 @@ def with_effect(
         return model, effect, list(wide_gains(model))
     richer = model.copy()
     richer.add_effect(effect, texts)
-    name = effect_names(richer)[-1]
-    return richer, name, effect_parameters(richer, name, fresh=True)
+    name, text = effect_names(richer)[-1], texts.get("formula", "")
+    fresh = effect_parameters(richer, name, fresh=True)
+    if text and not fresh:
+        raise ValueError(
+            f"formula '{text}': names none of p0 to p3, so nothing of it can be fitted; write one "
+            f"before it, as in 'p0*({text})'."
+        )
+    return richer, name, fresh
+
+
+def _check_acts(found: ScoreFit, fresh: Sequence[Parameter], texts: dict[str, str]) -> None:
+    """Raises ValueError where a formula changes no prediction, whatever its numbers."""
+    names = {p.name for p in fresh}
+    own = [k for k, u in enumerate(found.unknowns) if u.parameter.name in names]
+    if "formula" in texts and not any(np.any(slopes[:, own]) for slopes in found.state[1]):
+        raise ValueError(
+            f"formula '{texts['formula']}': changes no prediction of these logs, since it has no "
+            "finite value in them, or is always zero; write another."
+        )
 
 
 def with_own(opened: Sequence[Opened], robot_id: int, own: Sequence[Parameter]) -> list[Opened]:

@@ -51,6 +51,14 @@ class ModelFile:
         except (ValueError, OSError) as error:
             raise ModelError(str(error)) from error
 
+    def write(self) -> None:
+        """Writes its file, whole or not at all.
+
+        Raises:
+            ModelError: it cannot be written.
+        """
+        write_whole(self.path, self.text)
+
     @cached_property
     def _document(self) -> dict:
         """What the text says, without how it says it, which takes tomlkit long to read."""
@@ -210,6 +218,11 @@ def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> 
     Raises:
         ModelError: the file cannot be written.
     """
+    child_of(parent, fitted, path, command).write()
+
+
+def child_of(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> ModelFile:
+    """The fitted model as its file has it, before that is written."""
     document = tomlkit.parse(parent.text)
     document["parent"] = parent.hash
     document["created_by"] = command
@@ -240,7 +253,8 @@ def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> 
         document["fit"]["left_over"] = old
     if covariance.names:
         document["fit"]["covariance"] = covariance.to_toml()
-    write_whole(Path(path), tomlkit.dumps(document))
+    text = tomlkit.dumps(document)
+    return ModelFile(Path(path), text, native.Model.from_toml(text, str(path)))
 
 
 def write_whole(path: Path, text: str) -> None:

@@ -17,10 +17,17 @@ from twinmill.data.checks.commands import (
     check_exchange,
 )
 from twinmill.data.checks.finding import InputFinding
-from twinmill.data.checks.series import check_length, check_poses, check_track
+from twinmill.data.checks.series import check_commanded, check_length, check_poses, check_track
 from twinmill.data.track import Track
 
-__all__ = ["InputFinding", "check_driven", "check_poses", "check_recorded", "check_tracks"]
+__all__ = [
+    "InputFinding",
+    "check_commanded",
+    "check_driven",
+    "check_poses",
+    "check_recorded",
+    "check_tracks",
+]
 
 Tracks = list[tuple[str, Track]]  # name of the log, and one robot in it
 

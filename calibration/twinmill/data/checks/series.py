@@ -10,8 +10,41 @@ from twinmill.data.track import Track, command_at
 
 # Commands from here on move any robot on a floor, and for how long they must: in all, and of it.
 STRONG = {"duty": (0.3,) * 4, "wheel_speed": (2.0,) * 4, "twist": (0.05, 0.05, 0.3, np.inf)}
+# Commands beyond these no robot on wheels follows: twenty times the fastest there are.
+ABSURD = {"duty": (20.0,) * 4, "wheel_speed": (1e4,) * 4, "twist": (500.0, 500.0, 1e3, np.inf)}
+NAMES = {"twist": ("vx_mps", "vy_mps", "omega_radps")}  # of the others: wheels by their number
 # Nothing moves within this much, nor within five times the noise where that is as little as this.
 STANDS, STANDS_NOISY = np.array([0.005, 0.005, 0.035]), np.array([0.05, 0.05, 0.2])
+
+
+def check_commanded(robot: RobotLog, label: str) -> list[InputFinding]:
+    """A finding where a command is beyond what any robot follows, and far beyond most others.
+
+    Units that are wrong make most of those large that are not zero, and are told by the motion.
+    """
+    if robot.command_kind not in ABSURD or not len(robot.command_t_s):
+        return []
+    size = np.abs(robot.command)
+    over = ~(size <= ABSURD[robot.command_kind])
+    others = np.where(over, 0.0, size).max(axis=0)
+    few = over.sum(axis=0) < np.count_nonzero(size, axis=0) / 2
+    rows, columns = np.nonzero(over & few & ~(size <= CHECKS.absurd * others))
+    if not len(rows):
+        return []
+    row, column = int(rows[0]), int(columns[0])
+    names = NAMES.get(robot.command_kind, tuple(f"wheel {k}" for k in range(1, 5)))
+    return [
+        InputFinding(
+            "a command is none that a robot could follow",
+            f"{names[column]} is {robot.command[row, column]:.3g} at "
+            f"{robot.command_t_s[row]:.3f} s, row {row + 1} of its commands, and "
+            f"{others[column]:.3g} at most in the rows that make sense",
+            "correct or delete such rows, and import anew",
+            True,
+            label,
+            robot.robot_id,
+        )
+    ]
 
 
 def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:

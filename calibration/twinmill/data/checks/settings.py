@@ -52,6 +52,7 @@ class CheckSettings(Numbers):
     slow_s: float = number(0.15, "time between poses that is worth a sentence")
     short_s: float = number(13.0, "usable poses, below which a log is short")
     still_rad: float = number(1e-6, "range of a heading that was not measured")
+    absurd: float = number(100.0, "times all other commands: one is a mistake of the record")
     driven_s: float = number(3.0, "strong commands that must move the robot, in all ...")
     driven: float = number(0.05, "... and as a share of the time")
 

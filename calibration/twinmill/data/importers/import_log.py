@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import tomlkit
 
-from twinmill.data.checks import check_driven, check_poses, check_recorded
+from twinmill.data.checks import check_commanded, check_driven, check_poses, check_recorded
 from twinmill.data.importers.columns import Guess, explain, read_mapping
 from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
@@ -179,7 +179,7 @@ def import_log(
     seen = _detections(detections, options, by_robot) if detections else []
     paths = (*poses, motive, vicon, *commands, *io_tsv, detections)
     sources = [path for path in paths if path is not None]
-    with replacing(out, options.force) as temporary:
+    with replacing(out, options.force, inputs=[*sources, bag, options.mapping]) as temporary:
         provenance = _provenance(sources, options)
         write_log(temporary, pose_series, command_series, config_toml=provenance, detections=seen)
         warnings = [w for series in (*pose_series, *command_series, *seen) for w in series.warnings]
@@ -455,7 +455,7 @@ def _judged(robot: RobotLog) -> list[str]:
     Cuts and a heading that seems turned may follow from a mistake. Duties and wheel speeds need a
     model to be judged by.
     """
-    found, notes = check_poses(robot, ""), []
+    found, notes = check_commanded(robot, "") or check_poses(robot, ""), []
     if not found:
         track = make_track(robot)
         tracks = [("", track)]
