@@ -13,7 +13,7 @@ from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.floor import NoiseFloor
 from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import CLOCK, HEADING
+from twinmill.model.parameters import CLOCK, HEADING, starting_angles
 from twinmill.predict.datasets import total_score
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import all_detections
@@ -81,6 +81,13 @@ class RobotComparison:
         recorded = self.measurement.track.has_heading
         return None if recorded else self.model.get(HEADING)
 
+    @property
+    def wheel_angles_rad(self) -> dict[str, float] | None:
+        """Where each wheel begins the log, -pi..pi; None where the model does not act by it."""
+        angles_rad = [p.value for p in starting_angles(self.model)]
+        named = zip(self.model.wheels(), angles_rad, strict=False)
+        return {w["name"]: float(np.angle(np.exp(1j * a))) for w, a in named} or None
+
     def error_rows(self) -> list[dict]:
         """errors[] of the interface: one row per channel and horizon."""
         found = rms(self.errors)
@@ -109,6 +116,7 @@ class RobotComparison:
             "where": [r.to_json() for r in self.where],
             "time_offset_s": self.time_offset_s,
             "held_heading_rad": self.held_heading_rad,
+            "wheel_angles_rad": self.wheel_angles_rad,
             "time_base": base.to_json() if (base := self.measurement.time_base) else None,
         }
 
