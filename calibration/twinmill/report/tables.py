@@ -113,7 +113,7 @@ def _wheel_angles(robot: RobotComparison) -> list[tuple[str, str]]:
     """At which angle each wheel begins the log, where that matters to the model."""
     if robot.wheel_angles_rad is None:
         return []
-    angles = ", ".join(f"{w} {np.degrees(a):.0f}°" for w, a in robot.wheel_angles_rad.items())
+    angles = ", ".join(f"{w} {round(np.degrees(a))}°" for w, a in robot.wheel_angles_rad.items())
     said = f"not recorded; the log begins at {angles}, where the model fits best"
     return [("wheel angles", said)]
 

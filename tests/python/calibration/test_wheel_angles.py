@@ -14,6 +14,7 @@ from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import effect_parameters
 
 STEP_S = 1 / 480  # of the robot
 TOLD_M = 0.0325
@@ -103,3 +104,15 @@ def test_an_axle_is_found_in_two_logs_together(two_runs, one_clock_base):
     found = diagnose(two_runs, one_clock_base)
     assert found.findings[0].effect == "wheel_eccentricity"
     assert size_of(found.model) == pytest.approx(OFF, abs=0.02)
+
+
+def test_a_robot_on_one_axle_has_two_wheels(model_file):
+    """Its speeds are half the sum of theirs, and their difference over the track."""
+    one_axle = ("half_wheelbase_m = 0.059", "half_wheelbase_m = 0")
+    model = model_file(one_axle, ('"mecanum"', '"differential"')).model
+    assert [w["words"] for w in model.wheels()] == ["left wheel", "right wheel"]
+    rolled_radps = [0.1 / TOLD_M, 0.3 / TOLD_M]
+    assert model.body_velocity(rolled_radps) == pytest.approx([0.2, 0, 0.2 / (2 * 0.067)])
+    model.add_effect("wheel_eccentricity")
+    names = [p.name.split(".")[1] for p in effect_parameters(model, "wheel_eccentricity")]
+    assert names == ["fl_cos", "fl_sin", "fr_cos", "fr_sin", "radius_ratio"]
