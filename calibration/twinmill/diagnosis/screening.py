@@ -28,6 +28,7 @@ from twinmill.model.parameters import (
 )
 
 SMALL = 0.05
+MOST_APART = 8  # data sets with columns of their own: those of more would fill the memory
 STALE = 0.3  # of the prior's width: a usual error of the base's numbers
 
 
@@ -179,8 +180,9 @@ def _signatures(
 
     Returns:
         Its parameters; (R, k) change by a small part of each one's usual strength, scaled up to it;
-        (R, 1) change by the usual strength of all. By an angle at which wheels begin, that is not
-        the same in all logs, (R, k) of each data set beside each other.
+        (R, 1) change by the usual strength of all. Where it acts by the angles at which wheels
+        begin, which are not the same in all logs, the k columns of each of some data sets stand
+        beside each other.
     """
     small, whole, parameters = [], [], []
     for dataset, model, row, weight in zip(
@@ -191,7 +193,7 @@ def _signatures(
         steps = points.share
         small.append(weight[:, None] * (row - values[:-1]).T / steps)
         whole.append(weight[:, None] * (row - values[-1:]).T)
-    apart = name in needing("wheel_angle")
+    apart = name in needing("wheel_angle") and len(small) <= MOST_APART
     joined = block_diag(*small) if apart else np.concatenate(small)
     return parameters, joined, np.concatenate(whole)
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters of a model: what a fit may change, within which bounds, and what is usual."""
 
+import math
 import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
@@ -161,6 +162,18 @@ def starting_angles(model: native.Model) -> list[Parameter]:
     if not acting_by_wheel_angle(model):
         return []
     return base_parameters(model, WHEEL_ANGLES[: len(model.wheels())])
+
+
+def unevenness(model: native.Model, wheel: str) -> float:
+    """Of a wheel by its angle, as a share of its way; 0 where a formula alone says how it acts."""
+    cards = catalogue_of(model)
+    own = [
+        model.get(f"{instance}.{p['name']}")
+        for instance in acting_by_wheel_angle(model)
+        for p in cards[instance.split("#")[0]]["parameters"]
+        if p["name"].startswith(f"{wheel}_")
+    ]
+    return math.hypot(*own)
 
 
 def drives_sideways(model: native.Model) -> bool:
