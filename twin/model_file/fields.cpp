@@ -43,6 +43,10 @@ static const Field kFields[] = {
     {"clock", "offset_s", "s", -10, 10, AT(clock.offset_s), false, 0, "observe"},
     {"clock", "rate_ppm", "ppm", -1e6, 1e6, AT(clock.rate_ppm), false, 0, "observe"},
     {"frame", "heading_rad", "rad", -3.1416, 3.1416, AT(frame.heading_rad), false, 0, "observe"},
+    {"frame", "wheel_0_rad", "rad", -6.2832, 6.2832, AT(frame.wheel_rad[0]), false, 0, "wheel"},
+    {"frame", "wheel_1_rad", "rad", -6.2832, 6.2832, AT(frame.wheel_rad[1]), false, 0, "wheel"},
+    {"frame", "wheel_2_rad", "rad", -6.2832, 6.2832, AT(frame.wheel_rad[2]), false, 0, "wheel"},
+    {"frame", "wheel_3_rad", "rad", -6.2832, 6.2832, AT(frame.wheel_rad[3]), false, 0, "wheel"},
     {"", "theta_a1", "1", 0.05, 5, AT(theta_a1), true, 0, "ground"},
     {"", "theta_a2", "1", 0.05, 5, AT(theta_a2), true, 0, "ground"},
 };

@@ -19,6 +19,12 @@ std::vector<Wheel> FourAt(double x_m, double y_m, Tread front_left, Tread front_
             {"rr", "rear right wheel", -x_m, -y_m, 1, 0, front_left}};
 }
 
+std::vector<Wheel> TwoAt(double y_m)
+{
+    return {{"fl", "left wheel", 0, y_m, 1, 0, Tread::kPlain},
+            {"fr", "right wheel", 0, -y_m, 1, 0, Tread::kPlain}};
+}
+
 std::vector<Wheel> ThreeAround(double lever_m)
 {
     static constexpr const char *kNames[] = {"w1", "w2", "w3"};
@@ -95,7 +101,8 @@ std::vector<Wheel> DrivenWheels(const Robot &robot, WheelKind kind)
     const double x_m = robot.half_wheelbase_m, y_m = robot.half_track_m;
     switch (kind)
     {
-        case WheelKind::kDifferential: return FourAt(x_m, y_m, Tread::kPlain, Tread::kPlain);
+        case WheelKind::kDifferential:
+            return x_m > 0 ? FourAt(x_m, y_m, Tread::kPlain, Tread::kPlain) : TwoAt(y_m);
         case WheelKind::kOmni3: return ThreeAround(robot.half_track_m);
         case WheelKind::kAckermann:
             return {{"rl", "rear left wheel", -x_m, y_m, 1, 0, Tread::kPlain},

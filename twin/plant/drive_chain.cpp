@@ -168,6 +168,7 @@ RobotState DriveChain::Start(const Pose2 &pose) const
 {
     RobotState state;
     state.pose = pose;
+    state.wheel_rad = frame_.wheel_rad;
     state.effect_state.assign(static_cast<size_t>(state_size_), 0.0);
     return state;
 }

@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import twinmill_native as native
+from scipy.linalg import block_diag
 
 from twinmill.diagnosis.settings import SETTINGS, Settings
 from twinmill.diagnosis.starts import Left, Starts, starts_of
@@ -22,10 +23,12 @@ from twinmill.model.parameters import (
     effect_names,
     effect_parameters,
     making_late,
+    needing,
     with_role,
 )
 
 SMALL = 0.05
+MOST_APART = 8  # data sets with columns of their own: those of more would fill the memory
 STALE = 0.3  # of the prior's width: a usual error of the base's numbers
 
 
@@ -152,10 +155,13 @@ def _screened(
     agree = linear @ whole[:, 0] / max(size * reached, 1e-12)
     used = small if agree > 0.5 and 1 / 3 < size / max(reached, 1e-12) < 3 else whole
     # Columns are in default strengths, and the prior's width in these.
-    widths = np.ones(used.shape[1]) if used is whole else _widths(name, parameters, start)
+    times = used.shape[1] // len(parameters)
+    widths = np.ones(1) if used is whole else np.tile(_widths(name, parameters, start), times)
     gram = used.T @ used + np.diag(1 / widths**2)
     moment = used.T @ rest
     gain = float(moment @ np.linalg.solve(gram, moment))
+    if times > 1:  # so many more columns take so much more of the noise
+        gain -= (1 - 1 / times) * float(np.trace(np.linalg.solve(gram, used.T @ used)))
     size = float((whole**2).sum())
     if used is small:  # half of the prior's width is a usual strength
         size = float(np.max((small**2).sum(axis=0) * widths**2)) / 4
@@ -174,7 +180,9 @@ def _signatures(
 
     Returns:
         Its parameters; (R, k) change by a small part of each one's usual strength, scaled up to it;
-        (R, 1) change by the usual strength of all.
+        (R, 1) change by the usual strength of all. Where it acts by the angles at which wheels
+        begin, which are not the same in all logs, the k columns of each of some data sets stand
+        beside each other.
     """
     small, whole, parameters = [], [], []
     for dataset, model, row, weight in zip(
@@ -185,7 +193,9 @@ def _signatures(
         steps = points.share
         small.append(weight[:, None] * (row - values[:-1]).T / steps)
         whole.append(weight[:, None] * (row - values[-1:]).T)
-    return parameters, np.concatenate(small), np.concatenate(whole)
+    apart = name in needing("wheel_angle") and len(small) <= MOST_APART
+    joined = block_diag(*small) if apart else np.concatenate(small)
+    return parameters, joined, np.concatenate(whole)
 
 
 @dataclass(frozen=True)

@@ -146,7 +146,9 @@ def with_effects(
             for p in fresh:
                 model.set(p.name, p.value)
         free += fresh
-    return replace(state, models=models, free=tuple(free))
+    pairs = zip(state.datasets, models, strict=True)
+    datasets = [d.with_starting_angles(m) if isinstance(d, Trajectory) else d for d, m in pairs]
+    return replace(state, datasets=datasets, models=models, free=tuple(free))
 
 
 def cross_validate(

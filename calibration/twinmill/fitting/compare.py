@@ -13,7 +13,7 @@ from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.floor import NoiseFloor
 from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import CLOCK, HEADING
+from twinmill.model.parameters import CLOCK, HEADING, starting_angles, unevenness
 from twinmill.predict.datasets import total_score
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import all_detections
@@ -26,6 +26,7 @@ from twinmill.predict.windows import CHANNELS, HORIZONS_S, Windows, rms
 # Scores: stop; something is missing; the smooth response is not good enough, or data leaked.
 GOOD, MISSING, SUSPECT = 1.15, 1.3, 0.9
 LACKING = "Missing: "  # how a sentence on what a model lacks begins
+TELLING = 0.1  # of the most uneven wheel; the angle of one that is less so is hardly told
 NAMED = 3  # robots that are missed; of more the number is told
 
 
@@ -81,6 +82,17 @@ class RobotComparison:
         recorded = self.measurement.track.has_heading
         return None if recorded else self.model.get(HEADING)
 
+    @property
+    def wheel_angles_rad(self) -> dict[str, float] | None:
+        """Where uneven wheels begin the log, -pi..pi; None where the model does not act by it."""
+        angles_rad = {
+            w["name"]: float(np.angle(np.exp(1j * p.value)))
+            for w, p in zip(self.model.wheels(), starting_angles(self.model), strict=False)
+        }
+        uneven = {w: unevenness(self.model, w) for w in angles_rad}
+        least = TELLING * max(uneven.values(), default=0.0)
+        return {w: a for w, a in angles_rad.items() if uneven[w] >= least} or None
+
     def error_rows(self) -> list[dict]:
         """errors[] of the interface: one row per channel and horizon."""
         found = rms(self.errors)
@@ -109,6 +121,7 @@ class RobotComparison:
             "where": [r.to_json() for r in self.where],
             "time_offset_s": self.time_offset_s,
             "held_heading_rad": self.held_heading_rad,
+            "wheel_angles_rad": self.wheel_angles_rad,
             "time_base": base.to_json() if (base := self.measurement.time_base) else None,
         }
 

@@ -21,7 +21,9 @@ from twinmill.model.parameters import (
     HEADING,
     LAG,
     Parameter,
+    acting_by_wheel_angle,
     base_parameters,
+    starting_angles,
 )
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.modelled_log import ModelledLog
@@ -78,17 +80,19 @@ class Opened:
     def aligned(
         self, model: native.Model, offset_s: float | None = None, rounds: int = ROUNDS
     ) -> "Opened":
-        """The same with another model, on the clock and heading with which that predicts best.
+        """The same with another model, on the clock, heading and angles of the wheels that suit it.
 
-        One clock for commands and poses is kept, a heading that was recorded, and both of a
-        measurement without a floor.
+        They are those with which it predicts best. One clock for commands and poses is kept, a
+        heading that was recorded, and all of a measurement without a floor. The wheels' angles at
+        the begin are found if the model acts by them: no other log tells them.
 
         Args:
             model: of all robots.
             offset_s: where the search begins; by default where the floor was found.
             rounds: of the search.
         """
-        if self.data is None or (self.same_clock and not self.heading_held):
+        free = not self.same_clock or self.heading_held or acting_by_wheel_angle(model)
+        if self.data is None or self.floor is None or not free:
             return self.with_model(model)
         own = self.with_model(model).model
         unknown = []
@@ -98,9 +102,11 @@ class Opened:
         if self.heading_held:
             own.set(HEADING, self.floor.heading_rad)
             unknown += base_parameters(own, [HEADING])
+        unknown += starting_angles(own)
         data = replace(self.data, own=tuple(unknown))
-        fit = ScoreFit([data], [own], []).fit(rounds)
-        return replace(self, data=data, model=fit.models[0])
+        fit = ScoreFit([data], [own], [])
+        fit.begin_at_angles()
+        return replace(self, data=data, model=fit.fit(rounds).models[0])
 
     def realigned(self) -> "Opened":
         """The same on the clock and heading that would be found for its model anew."""
@@ -112,13 +118,13 @@ class Opened:
 
     def with_model(self, model: native.Model) -> "Opened":
         """The same with another model, on the same clock."""
-        own = model.for_robot(self.measurement.track.robot_id) if self.floor else model
-        if self.floor:
-            for name in ALIGNMENT:
-                own.set(name, self.model.get(name))
-        else:
-            own = model.for_robot(self.measurement.robot_id)
-        return replace(self, model=own)
+        if self.floor is None:
+            return replace(self, model=model.for_robot(self.measurement.robot_id))
+        own = model.for_robot(self.measurement.track.robot_id)
+        for name in ALIGNMENT:
+            own.set(name, self.model.get(name))
+        data = self.data and self.data.with_starting_angles(own)
+        return replace(self, model=own, data=data)
 
 
 def open_measurements(

@@ -21,8 +21,10 @@ from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import (
     ALIGNMENT,
     NO_SIZE,
+    WHEEL_ANGLES,
     Parameter,
     ParameterEstimate,
+    acting_by_wheel_angle,
     lasts_for_a_while,
     stated_names,
 )
@@ -35,6 +37,7 @@ LEAST_SQUARE = 0.25  # of a squared score: errors far below the floor tell nothi
 # Strengths at which a fit of something new may begin, times the usual, from where nothing happens.
 STARTS = (1.0, 0.3, 0.1, -0.1, -0.3, -1.0, 3.0)
 LIMIT_STARTS = (np.geomspace(1 / 8, 8, 37), np.geomspace(1 / 1.1, 1.1, 7))  # far, then near
+ANGLES_RAD = np.radians(np.arange(-180.0, 180.0, 30.0))  # of wheels, where a fit may begin
 SEEN = 0.5  # times the prior's width: a wider estimate is the prior's
 AT_BOUND = 0.005  # share of the range
 NORMAL_95 = 1.96
@@ -113,9 +116,14 @@ class ScoreFit:
             if members:
                 unknowns.append(Unknown(p, members))
         by_robot: dict[tuple[int, str], list[int]] = {}
+        held = self._held_angles()
         for i, d in enumerate(self.datasets):
             for p in d.own:
-                if p.name not in ALIGNMENT:  # of the robot, in all its logs
+                if p.name in WHEEL_ANGLES:
+                    if i not in held:
+                        now = p.at(self.models[i].get(p.name))
+                        unknowns.append(Unknown(now, frozenset([i])))
+                elif p.name not in ALIGNMENT:  # of the robot, in all its logs
                     by_robot.setdefault((d.robot_id, p.name), []).append(i)
                 else:
                     unknowns.append(Unknown(p, frozenset([i])))
@@ -124,6 +132,26 @@ class ScoreFit:
             p = next(p for p in first.own if p.name == name)
             unknowns.append(Unknown(p, frozenset(members)))
         return unknowns
+
+    def _held_angles(self) -> set[int]:
+        """Data sets whose wheels' starting angles are held, or tell nothing.
+
+        Where sizes of an effect of these angles are free, they are counted from one data set's
+        angles: to turn all angles is no other than to turn its cosines into sines.
+        """
+        held: set[int] = set()
+        counted: set[int | None] = set()  # robots with sizes of their own; None: all
+        shared = {p.name.split(".")[0] for p in self.shared}
+        for i, (d, model) in enumerate(zip(self.datasets, self.models, strict=True)):
+            acting = set(acting_by_wheel_angle(model))
+            own = acting & {p.name.split(".")[0] for p in d.own}
+            whose = None if acting & shared else d.robot_id
+            first = bool(acting & shared or own) and whose not in counted
+            if first or not acting:
+                held.add(i)
+            if first and isinstance(d, Trajectory):
+                counted.add(whose)
+        return held
 
     # -- errors ---------------------------------------------------------------------------------
 
@@ -247,6 +275,9 @@ class ScoreFit:
         What is a limit alone has no slope where nothing reaches it: a fit that begins there stays
         there.
         """
+        if self._angles and any(p.name.split(".")[0] in self._by_angle for p in fresh):
+            self._begin_with_one(fresh)
+            return
         roles = {p.name: p.role for p in fresh if p.role not in NO_SIZE}
         new = np.array([u.parameter.name in roles for u in self.unknowns], bool)
         if {*roles.values()} == {"limit"}:
@@ -255,6 +286,38 @@ class ScoreFit:
             return
         away = self.x - self.usual
         self._begin_at([np.where(new, self.usual + s * away, self.x) for s in STARTS])
+
+    @property
+    def _angles(self) -> list[int]:
+        """Columns of wheels' starting angles."""
+        return [c for c, u in enumerate(self.unknowns) if u.parameter.name in WHEEL_ANGLES]
+
+    @property
+    def _by_angle(self) -> list[str]:
+        """Effects that depend on these."""
+        return acting_by_wheel_angle(self.models[0])
+
+    def _begin_with_one(self, fresh: Sequence[Parameter]) -> None:
+        """Begins as one data set tells what is new, the angles of the others as they suit that."""
+        others = {i for c in self._angles for i in self.unknowns[c].members}
+        one = next(i for i in range(len(self.datasets)) if i not in others)
+        alone = ScoreFit([self.datasets[one]], [self.models[one]], self.shared, self.by_channel)
+        alone.begin_at_best(fresh)
+        alone.fit()
+        told = dict(zip(alone.names[0], alone.x[alone.columns[0]], strict=True))
+        for c, u in enumerate(self.unknowns):
+            if one in u.members:
+                self.x[c] = told[u.parameter.name]
+        self.begin_at_angles()
+
+    def begin_at_angles(self) -> None:
+        """Begins with wheels' angles at the best of a whole turn, one after the other, twice."""
+        for c in 2 * self._angles:
+            (i,) = self.unknowns[c].members
+            points = np.repeat(self.x[None], 1 + len(ANGLES_RAD), axis=0)
+            points[1:, c] = ANGLES_RAD
+            missed = [self._misfit(i, rows) for rows in self.batch(i, points)]
+            self.x = points[int(np.argmin(missed))]
 
     def _begin_at(self, points: Sequence[np.ndarray]) -> None:
         """Begins at the one of some points (P,) that misses least."""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters of a model: what a fit may change, within which bounds, and what is usual."""
 
+import math
 import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
@@ -13,16 +14,30 @@ MOTION_STAGES = ("duty", "wheel", "ground", "observe")  # what the path of one r
 CAMERA_STAGES = ("view", "decide")  # what detections show
 CLOCK, CLOCK_RATE = "clock.offset_s", "clock.rate_ppm"
 HEADING = "frame.heading_rad"  # that a robot holds in a log that does not record it
-ALIGNMENT = (CLOCK, CLOCK_RATE, HEADING)  # of one log, not of a robot
+WHEEL_ANGLES = tuple(f"frame.wheel_{k}_rad" for k in range(4))  # at which the wheels begin a log
+ALIGNMENT = (CLOCK, CLOCK_RATE, HEADING, *WHEEL_ANGLES)  # of one log, not of a robot
 GAINS = ("theta_a1", "theta_a2")  # of one robot: speed, and rate of turn
 BASE_GAINS = ("base.forward_gain", "base.sideways_gain", "base.yaw_gain")
 LAG = "base.motor_lag_s"
 LAG_EFFECT = "motor_lag"  # adds to LAG: beside it only their sum can be told
 
 # Standard deviations of the base's priors: as robots differ from their data sheets.
-USUAL_STD = {LAG: 0.3, CLOCK: 0.3, CLOCK_RATE: 30.0, HEADING: 1.0}
+ANY_ANGLE_RAD = 10.0  # so wide that it draws an angle nowhere
+USUAL_STD = {
+    LAG: 0.3,
+    CLOCK: 0.3,
+    CLOCK_RATE: 30.0,
+    HEADING: 1.0,
+    **dict.fromkeys(WHEEL_ANGLES, ANY_ANGLE_RAD),
+}
 GAIN_STD = 0.15
-BASE_STEP = {LAG: 0.004, CLOCK: 0.006, CLOCK_RATE: 5.0, HEADING: 0.005}
+BASE_STEP = {
+    LAG: 0.004,
+    CLOCK: 0.006,
+    CLOCK_RATE: 5.0,
+    HEADING: 0.005,
+    **dict.fromkeys(WHEEL_ANGLES, 0.01),
+}
 GAIN_STEP = 0.004
 # Which part of a robot's lateness an effect changes, by its stage; "lag" at the others.
 LATE_PARTS = {"duty": "delay", "observe": "clock"}
@@ -130,6 +145,35 @@ def is_of_camera(effect: str) -> bool:
 def needing(need: str) -> list[str]:
     """Effects that show only in data that hold this, as `needs` on their cards says."""
     return [name for name, entry in catalogue().items() if entry["needs"] == need]
+
+
+def acting_by_wheel_angle(model: native.Model) -> list[str]:
+    """Instances of a model's effects that depend on where a wheel stands in its turn."""
+    phased = needing("wheel_angle")
+    return [
+        instance
+        for instance, texts in zip(effect_names(model), model.texts, strict=True)
+        if instance.split("#")[0] in phased or any("angle" in words(t) for t in texts.values())
+    ]
+
+
+def starting_angles(model: native.Model) -> list[Parameter]:
+    """Angles at which the wheels begin a log, from where the model has them; none if none acts."""
+    if not acting_by_wheel_angle(model):
+        return []
+    return base_parameters(model, WHEEL_ANGLES[: len(model.wheels())])
+
+
+def unevenness(model: native.Model, wheel: str) -> float:
+    """Of a wheel by its angle, as a share of its way; 0 where a formula alone says how it acts."""
+    cards = catalogue_of(model)
+    own = [
+        model.get(f"{instance}.{p['name']}")
+        for instance in acting_by_wheel_angle(model)
+        for p in cards[instance.split("#")[0]]["parameters"]
+        if p["name"].startswith(f"{wheel}_")
+    ]
+    return math.hypot(*own)
 
 
 def drives_sideways(model: native.Model) -> bool:

@@ -96,6 +96,7 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
             f"{'ahead of' if robot.time_offset_s >= 0 else 'behind'} the robot",
         ),
         *_held_heading(robot),
+        *_wheel_angles(robot),
     ]
 
 
@@ -106,6 +107,15 @@ def _held_heading(robot: RobotComparison) -> list[tuple[str, str]]:
     angle_deg = np.degrees(robot.held_heading_rad)
     said = f"not recorded; held at {angle_deg:.0f}°, where the motion fits the commands best"
     return [("heading", said)]
+
+
+def _wheel_angles(robot: RobotComparison) -> list[tuple[str, str]]:
+    """At which angle each wheel begins the log, where that matters to the model."""
+    if robot.wheel_angles_rad is None:
+        return []
+    angles = ", ".join(f"{w} {round(np.degrees(a))}°" for w, a in robot.wheel_angles_rad.items())
+    said = f"not recorded; the log begins at {angles}, where the model fits best"
+    return [("wheel angles", said)]
 
 
 def _noise(noise: Noise, has_heading: bool) -> str:

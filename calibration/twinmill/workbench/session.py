@@ -312,8 +312,8 @@ class Session:
             known, shared = with_own(known, robot_id, fresh), free
         else:
             shared = [*free, *fresh]
-        models = [o.with_model(model).model for o in known]
-        fit = ScoreFit([o.data for o in known], models, shared)
+        known = [o.with_model(model) for o in known]
+        fit = ScoreFit([o.data for o in known], [o.model for o in known], shared)
         if fresh:
             fit.begin_at_best(fresh)
         fit.fit(rounds=FORESEEN_ROUNDS)

@@ -15,9 +15,12 @@ constexpr Card kCard = {
         "A wheel that is not round, or not centred, rolls faster and slower once in each "
         "turn.",
     .equation =
-        "way = rim way (1 + cos_k cos(phi_k) + sin_k sin(phi_k)), phi_k the wheel's angle "
-        "since the start of the log, of wheels of radius_ratio times the model's radius",
-    .leaves_out = "ripple of single rollers; slip, which makes the angle of a long log uncertain",
+        "way = rim way (1 + cos_k cos(phi_k) + sin_k sin(phi_k)), phi_k the wheel's angle, "
+        "0 where the log began that told them, found anew in any other; of wheels of radius_ratio "
+        "times the model's radius",
+    .leaves_out =
+        "ripple of single rollers; what turns a wheel unseen: slip in a long log, a robot that is "
+        "lifted or pushed",
     .measure =
         "slow straight drives of several turns of the wheels in one log; the mean over a turn"
         " is wheel_gain's",

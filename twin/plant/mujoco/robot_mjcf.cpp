@@ -18,7 +18,8 @@ constexpr double kStall_Nm = 0.1, kGain_Nms = 0.15, kArmature_kgm2 = 1.5e-4;
 
 bool OnOneAxle(const Model &model)
 {
-    return model.base.wheels == WheelKind::kDifferential && !model.States("robot.half_wheelbase_m");
+    return model.base.wheels == WheelKind::kDifferential &&
+           (model.robot.half_wheelbase_m == 0 || !model.States("robot.half_wheelbase_m"));
 }
 
 void WriteHull(std::ostream &out, const Model &model, double mass_kg)

@@ -50,7 +50,7 @@ struct WheelSignals
     const double t_s, dt_s, battery_V;
     const Wheels &duty;       // as the duty stage left it
     const Wheels &rim_mps;    // rim speed at the start of the step
-    const Wheels &wheel_rad;  // angle turned since the start
+    const Wheels &wheel_rad;  // angle at the start and what was turned since
     Wheels target_mps{};      // rim speed that the wheel tends to
     Wheels tau_s{};           // time constant with which it gets there
     Wheels max_decel_mps2{kNoLimit, kNoLimit, kNoLimit, kNoLimit};  // limit on slowing down
@@ -69,7 +69,7 @@ struct RollSignals
     const Wheels &duty;
     const Wheels &mean_mps;           // rim speed, mean over the step
     const Wheels &end_mps;            // at its end
-    const Wheels &wheel_rad;          // angle turned since the start, at the start of the step
+    const Wheels &wheel_rad;          // angle at the start of the step
     Wheels radius_ratio{1, 1, 1, 1};  // way over the floor per way of the rim
 };
 

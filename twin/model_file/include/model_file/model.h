@@ -74,10 +74,11 @@ struct Clock
     double offset_s = 0, rate_ppm = 0;
 };
 
-// Where a robot heads in the frame of poses whose heading is zero because none was recorded.
+// What is so in one log alone.
 struct Frame
 {
-    double heading_rad = 0;
+    double heading_rad = 0;  // of the robot where poses have heading zero because none was recorded
+    Wheels wheel_rad{};      // angles at which its wheels begin
 };
 
 struct EffectInstance

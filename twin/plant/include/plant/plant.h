@@ -37,7 +37,7 @@ struct RobotState
     Pose2 pose;
     double vx_mps = 0, vy_mps = 0, omega_radps = 0;  // body frame, mean over the last step
     Wheels rim_mps{};
-    Wheels wheel_rad{};       // angle turned since the start
+    Wheels wheel_rad{};       // angle at the start and what was turned since
     double steering_rad = 0;  // Ackermann
     // Commands as the stage of duty left them, and the rim speeds and steering that they ask for:
     // most often the next step has the same.
