@@ -10,8 +10,10 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.taking import EFFECT, Taken, taken
+from twinmill.diagnosis.trials import REFIT
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.fit import common_clock
 from twinmill.fitting.score_fit import ScoreFit
@@ -93,7 +95,7 @@ def explain(
     fit = _polished(diagnosis)
     proven = diagnosis.rest.proven if formula else None
     runs = len({m.log_sha256 for m in measurements})
-    beyond = taken(fit, proven, runs) if proven else None
+    beyond = _beyond(diagnosis, fit, proven, runs) if proven else None
     if beyond and beyond.kept:
         fit = beyond.fit
     model = _with_found(diagnosis, model_file, beyond)
@@ -119,6 +121,17 @@ def explain(
     child = ModelFile.load(str(out))
     after = comparison(child, [o.with_model(child.model) for o in diagnosis.opened])
     return Explanation(diagnosis, after, estimates, Path(out), beyond)
+
+
+def _beyond(diagnosis: Diagnosis, fit: ScoreFit, proven: Formula, runs: int) -> Taken:
+    """The formula in the model, beside what was found and is not in its place."""
+    *_, (_, before) = diagnosis.steps
+    doubtful = [
+        f.effect
+        for f in diagnosis.findings
+        if f.certainty == "doubtful" and f.effect not in (REFIT, *proven.instead_of)
+    ]
+    return taken(fit, proven, before=before, doubtful=doubtful, runs=runs)
 
 
 def _with_found(diagnosis: Diagnosis, model_file: ModelFile, beyond: Taken | None) -> native.Model:

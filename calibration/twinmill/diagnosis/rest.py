@@ -172,7 +172,7 @@ class Formulas:
 
 @dataclass(frozen=True)
 class Doubted:
-    """Findings of which none is sure, and what is there without them.
+    """Findings that are in doubt, and what is there without them.
 
     Attributes:
         names: of the findings.
@@ -218,7 +218,7 @@ def rest_of(
         first: of the model as given.
         known: what the model left in other logs already, as `left_over`.
         whole: the data sets, with all starts of predictions.
-        without: the findings, where all are in doubt, and the fit and formulas without them.
+        without: the findings that are in doubt, and the fit and formulas without them.
     """
     left = max(fit.held_square - 1, 0.0)
     share = left / max(first.held_square - 1, left, 1e-9)
