@@ -344,7 +344,8 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
         together = np.array([(t.group, t.family) == (group, family) for t in terms])
         tested.append((group, together))
         own = dict.fromkeys(t.formula for t, used in zip(terms, together, strict=True) if used)
-        tested += [(group, np.array([t.formula == f for t in terms])) for f in own]
+        alike = [(group, f) for f in own]  # the same formula of another group is something else
+        tested += [(group, np.array([(t.group, t.formula) == a for t in terms])) for a in alike]
     if not tested:
         return []
     gains, nulls = _gains(products, [own for _, own in tested], 0)

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from twinmill.diagnosis.explain import Explanation, explain
+from twinmill.diagnosis.taking import taken
 from twinmill.fitting.compare import compare
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import effect_names
+from twinmill.model.parameters import effect_names, effect_parameters
 
 STEP_S = 1 / 480  # of the robot
 
@@ -128,6 +130,23 @@ def test_a_push_that_grows_with_speed_stands_in_the_place_of_one_that_does_not(e
     east, north = (n.value for n in result.formula.numbers)
     assert np.hypot(east, north) == pytest.approx(0.1, rel=0.1)
     assert np.arctan2(north, east) == pytest.approx(0.7, abs=0.1)
+
+
+def test_a_doubtful_effect_that_says_nothing_beside_the_formula_goes(explained):
+    """The floor that the robot drives on is level."""
+    result = explained(resonant, 101)
+    state = result.diagnosis.search.last.state
+    models = [m.copy() for m in state.models]
+    for model in models:
+        model.add_effect("floor_tilt")
+    tilt = effect_parameters(models[0], "floor_tilt", fresh=True)
+    fit = ScoreFit(state.datasets, models, [*state.begun(), *tilt]).fit()
+    formula, before = result.formula.formula, result.formula.before
+    whole = taken(fit, formula, before=before, doubtful=(), runs=1)
+    less = taken(fit, formula, before=before, doubtful=("floor_tilt",), runs=1)
+    assert "floor_tilt" in effect_names(whole.fit.models[0])
+    assert "floor_tilt" not in effect_names(less.fit.models[0])
+    assert less.formula.instead_of == (*formula.instead_of, "floor_tilt") and less.kept
 
 
 def test_the_score_without_the_formula_is_the_last_one_of_the_steps(explained):
