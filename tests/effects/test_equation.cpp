@@ -133,6 +133,21 @@ TEST(Equation, LeadsAsideByTheCourse)
     EXPECT_NEAR(aside.state.vy_mps, 0.1 * usual.state.vx_mps, 1e-12);
 }
 
+TEST(Equation, PushesAlongTheRoomWhereverTheRobotLooks)
+{
+    for (const double theta_rad : {0.0, 0.7, -2.0})
+    {
+        Signals s;
+        s.vx_mps = 0.3, s.vy_mps = 0.4, s.theta_rad = theta_rad;
+        Signals pushed = s;
+        Formula("room_mps", "0.1*sqrt(vx*vx + vy*vy), 2*vx").Step(pushed, nullptr);
+        const double ahead = pushed.vx_mps - s.vx_mps, left = pushed.vy_mps - s.vy_mps;
+        const double c = std::cos(theta_rad), si = std::sin(theta_rad);
+        EXPECT_NEAR(c * ahead - si * left, 0.05, 1e-12);
+        EXPECT_NEAR(si * ahead + c * left, 0.6, 1e-12);
+    }
+}
+
 TEST(Equation, MovesTheCapturedHeadingAndBack)
 {
     const DriveChain chain(WithFormula("theta_rad", "p0*sin(theta + 1)", {0.2}));
@@ -208,6 +223,7 @@ TEST(Equation, SaysWhatIsWrongAndWhere)
         {"vx_mps", "", {"empty"}},
         {"vx_mps", "vx = 2", {"letter 4"}},
         {"vx_mps", "vx, vy", {"one value"}},
+        {"room_mps", "vx", {"two values"}},
         {"vx_mps", "\"p0\"", {"letter 1"}},
         {"vx_mps", "max()", {"max", "letter"}},
     };

@@ -109,3 +109,9 @@ def test_a_power_that_c_has_not_is_refused(copy, model):
     path = model({"adds_to": "vx_mps", "formula": "p0*vx^2"})
     with pytest.raises(ValueError, match="has no power"):
         run(["effects", "new", "play", "--from", str(path), "--into", str(copy)])
+
+
+def test_a_push_of_two_values_is_not_written_as_an_effect(copy, model):
+    path = model({"adds_to": "room_mps", "formula": "p0*vx, p1*vx"})
+    with pytest.raises(ValueError, match="two values"):
+        run(["effects", "new", "play", "--from", str(path), "--into", str(copy)])

@@ -45,7 +45,7 @@ from twinmill.diagnosis.search import search
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.stopped import Course
 from twinmill.diagnosis.ties import instead_of_drift
-from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate
+from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, without_effect
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
 from twinmill.fitting.compare import GOOD, Comparison, comparison, of_others
 from twinmill.fitting.fit import base_names
@@ -304,7 +304,7 @@ def _concluded(
     if model_file.model.drive == "duty" and model_file.known_from_other_logs(hashes):
         findings = within_the_table(findings, less, last)
     findings = without.doubted(undone(findings, last))
-    doubted = _doubted(findings, less, known, start)
+    doubted = _doubted(findings, less, known)
     whole = [_with_all_starts(o, opened) for o in known]
     rest = rest_of(
         formulas,
@@ -388,15 +388,17 @@ def _with_all_starts(own: Opened, opened: Sequence[Opened]) -> Opened:
 
 
 def _doubted(
-    findings: Sequence[Finding], less: dict[str, Trial], known: Sequence[Opened], start: Trial
+    findings: Sequence[Finding], less: dict[str, Trial], known: Sequence[Opened]
 ) -> Doubted | None:
-    """The effects that were found, where all are in doubt, and the fit without them."""
-    names = tuple(f.effect for f in findings if f.effect != REFIT)
-    if not names or any(f.certainty != "doubtful" for f in findings):
+    """The effects that are in doubt, and the fit without them."""
+    names = tuple(f.effect for f in findings if f.effect in less and f.certainty == "doubtful")
+    if not names:
         return None
-    fit = less[names[0]].fit if len(names) == 1 else start.fit
-    formulas = formulas_of(known, fit)
-    return Doubted(names, formulas, fit) if formulas else None
+    trial = less[names[0]]
+    for name in names[1:]:
+        trial = without_effect(trial, name)
+    formulas = formulas_of(known, trial.fit)
+    return Doubted(names, formulas, trial.fit) if formulas else None
 
 
 def _with_found(own: Opened, fitted: dict[int, Opened], model: native.Model) -> Opened:

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from twinmill.diagnosis.forms import Form, Motion, sized
+from twinmill.diagnosis.forms import GAINS, Form, Motion, sized
 from twinmill.diagnosis.library import LEFT_OVER
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened
@@ -20,7 +20,10 @@ HORIZONS = (0, 2, 4)  # of HORIZONS_S: those between would choose the same
 
 
 class Evidence:
-    """Rows of the logs, whitened, and the columns of forms beside what is free in the fit.
+    """Rows of the logs, whitened, and the columns of forms beside what is free.
+
+    Free is what the fit had free, and the gains of the base: a form that is nearly a gain is worth
+    what it says beside that gain, which goes back when the form is in the model.
 
     Rows whose window reaches from one stretch into the next are left out.
 
@@ -48,6 +51,7 @@ class Evidence:
         self.weight = self.more * weight[self.kept]
         self._left, self._free = self.more * left[self.kept], self.more * free[self.kept]
         self._changes = np.concatenate(list(changes))[self.kept]
+        self._free = np.hstack([self._free, self.raw(sized(GAINS, motions))])
         self.weighed(np.ones(len(self._left)))
 
     def _divide(self) -> None:
@@ -116,6 +120,18 @@ class Evidence:
         seen = np.linalg.norm(columns, axis=0) > LEFT_OVER * np.maximum(before, 1e-9)
         return columns if seen.all() else np.where(seen, columns, 0.0)
 
+    def lifted(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same, each as long as it is with what is free, and (K,) how many times longer.
+
+        A number is unlikely if what is seen of it is large. Of a form that is nearly free little
+        is seen, so that by its own size its number would be pulled to nothing.
+        """
+        before = np.linalg.norm(self.scale[:, None] * raw, axis=0)
+        columns = self.seen(raw)
+        after = np.linalg.norm(columns, axis=0)
+        times = np.where(after > 0, before / np.maximum(after, 1e-12), 0.0)
+        return columns * times, times
+
 
 @dataclass(frozen=True)
 class Sums:
@@ -125,11 +141,10 @@ class Sums:
     moments: np.ndarray
 
     @classmethod
-    def of(
-        cls, rows: Evidence, columns: np.ndarray, forms: Sequence[Form], beside: np.ndarray
-    ) -> "Sums":
-        """By stretch, after those of (R, q) chosen columns; a second column may be zero."""
-        widths = np.array([len(f.shapes) for f in forms])
+    def of(cls, rows: Evidence, pool: "Pool", chosen: np.ndarray) -> "Sums":
+        """By stretch, after those of (R, q) chosen raw columns; a second column may be zero."""
+        (columns, _), (beside, _) = rows.lifted(pool.raw), rows.lifted(chosen)
+        widths = np.array([len(f.shapes) for f in pool.forms])
         first = np.cumsum([0, *widths[:-1]])
         second = np.minimum(first + 1, columns.shape[1] - 1)
         there = widths == 2
@@ -153,7 +168,7 @@ class Sums:
         return cls(grams, moments)
 
     def fitted(self, weight: np.ndarray) -> np.ndarray:
-        """(T, k) numbers, in usual strengths, of (S,) weighted stretches."""
+        """(T, k) numbers of (S,) weighted stretches."""
         gram = np.tensordot(weight, self.grams, 1) + np.eye(self.grams.shape[-1])
         return np.linalg.solve(gram, np.tensordot(weight, self.moments, 1)[..., None])[..., 0]
 
@@ -219,8 +234,9 @@ class Proof:
 def fitted(rows: Evidence, chosen: Chosen, half: np.ndarray) -> np.ndarray:
     """(K,) numbers in usual strengths, of a half."""
     own = half[rows.stretch]
-    x, left = rows.seen(chosen.raw)[own], rows.left[own]
-    return np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ left)
+    columns, times = rows.lifted(chosen.raw)
+    x, left = columns[own], rows.left[own]
+    return times * np.linalg.solve(x.T @ x + np.eye(x.shape[1]), x.T @ left)
 
 
 def made(rows: Evidence, forms: Sequence[Form], half: np.ndarray, found: Chosen) -> Chosen:
@@ -231,7 +247,7 @@ def made(rows: Evidence, forms: Sequence[Form], half: np.ndarray, found: Chosen)
 
 def best_of(rows: Evidence, pool: Pool, half: np.ndarray, found: Chosen) -> Chosen:
     """The form of a pool that gains most on left-out stretches of a half beside what was found."""
-    gains = Sums.of(rows, rows.seen(pool.raw), pool.forms, rows.seen(found.raw)).held_out(half)
+    gains = Sums.of(rows, pool, found.raw).held_out(half)
     k = int(np.argmax(gains))
     one = pool.some([k])
     return Chosen((*found.forms, *one.forms), np.hstack([found.raw, one.raw]), float(gains[k]))

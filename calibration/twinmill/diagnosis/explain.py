@@ -2,7 +2,7 @@
 """Diagnoses, adds what was found, and writes the model that has it."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import twinmill_native as native
@@ -10,9 +10,11 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.stopped import stopped
 from twinmill.diagnosis.taking import EFFECT, Taken, taken
+from twinmill.diagnosis.trials import REFIT, fitted, without_effect
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.fit import common_clock
 from twinmill.fitting.score_fit import ScoreFit
@@ -20,9 +22,13 @@ from twinmill.model.model_file import Fitted, ModelFile, child_of
 from twinmill.model.parameters import (
     GAINS,
     LAG,
+    LAG_EFFECT,
     ParameterEstimate,
     base_lag_is_identifiable,
     base_parameters,
+    effect_parameters,
+    late_part,
+    newest_instance,
 )
 from twinmill.predict.datasets import total_score
 
@@ -93,6 +99,7 @@ def explain(
     diagnosis = diagnose(measurements, model_file, progress, stoppable=stoppable)
     if not diagnosis.search.stopped:
         try:
+            diagnosis = _with_stale_lag(diagnosis)
             fit, beyond = _whole(diagnosis, formula)
             return _written(diagnosis, model_file, fit, beyond, out=out, command=command)
         except KeyboardInterrupt:
@@ -105,12 +112,31 @@ def explain(
     return _written(diagnosis, model_file, fit, None, out=out, command=command)
 
 
+def _with_stale_lag(diagnosis: Diagnosis) -> Diagnosis:
+    """The same with the lag refitted, where effects that make the robot late stand for it alone."""
+    stale = next((f for f in diagnosis.findings if f.effect == REFIT), None)
+    if stale is None or LAG not in {p.name for p in stale.parameters}:
+        return diagnosis
+    last, named = diagnosis.search.last, {f.effect for f in diagnosis.findings}
+    for name in diagnosis.search.found:
+        is_new = "#" not in newest_instance(last.state.model, name)
+        if name not in named and (is_new or late_part(name)):
+            last = without_effect(last, name) or last
+    model = last.state.model
+    told = base_lag_is_identifiable(model)
+    lag = base_parameters(model, [LAG]) if told else effect_parameters(model, LAG_EFFECT)
+    known = {p.name for p in last.state.free}
+    free = [*last.state.begun(), *(p for p in lag if p.name not in known)]
+    last = fitted(replace(last.state, free=tuple(free)))
+    return replace(diagnosis, search=replace(diagnosis.search, last=last))
+
+
 def _whole(diagnosis: Diagnosis, formula: bool) -> tuple[ScoreFit, Taken | None]:
     """All that was found fitted together, and a proven formula where that is asked for."""
     fit = _polished(diagnosis)
     proven = diagnosis.rest.proven if formula else None
     runs = len({own.measurement.log_sha256 for own in diagnosis.opened})
-    beyond = taken(fit, proven, runs) if proven else None
+    beyond = _beyond(diagnosis, fit, proven, runs) if proven else None
     return (beyond.fit if beyond and beyond.kept else fit), beyond
 
 
@@ -130,7 +156,7 @@ def _written(
         model.set(estimate.name, estimate.value)
     logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
     noise = next((s.noise for s in diagnosis.modelled if s.noise), None)
-    fitted = Fitted(
+    told = Fitted(
         model=model,
         estimates=[e for e in estimates if e.seen],
         logs=logs,
@@ -143,10 +169,21 @@ def _written(
         robots=_own_values(diagnosis, fit),
         covariance=fit.shared_covariance(),
     )
-    child = child_of(model_file, fitted, Path(out), command)
+    child = child_of(model_file, told, Path(out), command)
     after = comparison(child, [o.with_model(child.model) for o in diagnosis.opened])
     child.write()
     return Explanation(diagnosis, after, estimates, child.path, beyond)
+
+
+def _beyond(diagnosis: Diagnosis, fit: ScoreFit, proven: Formula, runs: int) -> Taken:
+    """The formula in the model, beside what was found and is not in its place."""
+    *_, (_, before) = diagnosis.steps
+    doubtful = [
+        f.effect
+        for f in diagnosis.findings
+        if f.certainty == "doubtful" and f.effect not in (REFIT, *proven.instead_of)
+    ]
+    return taken(fit, proven, before=before, doubtful=doubtful, runs=runs)
 
 
 def _with_found(diagnosis: Diagnosis, model_file: ModelFile, beyond: Taken | None) -> native.Model:

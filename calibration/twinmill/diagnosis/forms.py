@@ -23,18 +23,22 @@ from twinmill.diagnosis.term import (
     WAY,
     Term,
     displaced,
+    times,
 )
 from twinmill.filters import faded
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.response import Response
+from twinmill.model.parameters import words
 
 PAST = "past motion"
 STARTS = "starts"
 HEADING = "heading"
 RIM, TARGET = "rim_mps", "target"  # of each wheel: where a formula acts, and what it names
+ROOM = "room_mps"  # a push along x and along y of the room, of which each has a shape
 ALL_AXES = {"travel": (0, 1), "motion": (0, 1, 2)}  # shares of these axes of the body
 HEADING_RAD = 0.02  # usual error of a captured heading
 USUAL = {**TYPICAL, "travel": SWELL, "motion": SWELL, "aside": SWELL, "theta_rad": HEADING_RAD}
+USUAL |= {ROOM: TYPICAL["vx_mps"]}
 LEVER_M = 0.1  # turning counts as driving at this radius
 SHORTEST_M = 0.3  # wave along the room
 SHARP = 0.005  # share of the rate of a beat within which a better one may lie
@@ -84,6 +88,7 @@ class Form:
         unit: of the constant.
         column: number of the library's term whose column it has; -1: it is made here.
         sizes: of the shapes' values; empty until `sized`.
+        command_unit: of the command u, where a shape names it.
     """
 
     adds_to: str
@@ -95,6 +100,7 @@ class Form:
     unit: str = ""
     column: int = -1
     sizes: tuple[float, ...] = ()
+    command_unit: str = ""
 
     @property
     def texts(self) -> tuple[str, ...]:
@@ -105,6 +111,11 @@ class Form:
     def of_body(self) -> bool:
         """All that it names is of the body's motion, and not of wheels."""
         return self.adds_to != RIM
+
+    @property
+    def of_one_value(self) -> bool:
+        """Of the body's motion it changes one quantity, which can be drawn over a variable."""
+        return self.of_body and self.adds_to != ROOM
 
     @property
     def names_time(self) -> bool:
@@ -132,6 +143,9 @@ class Form:
 
     def _with_constant(self, text: str) -> str:
         return text.replace(C, f"{self.constant:.4g}").replace(L, f"{LEVER_M:g}")
+
+
+GAINS = tuple(Form(to, (axis,), "") for to, axis in zip(CHANNELS, SPEEDS, strict=True))
 
 
 @dataclass(frozen=True)
@@ -227,6 +241,9 @@ class Motion:
             return self._turned(response, values)
         if adds_to in CHANNELS:
             return displaced(response, self.velocity, values, CHANNELS.index(adds_to))
+        if adds_to == ROOM:
+            every = self._in_body(values)
+            return sum(displaced(response, self.velocity, v, k) for k, v in enumerate(every))
         if adds_to == "aside":
             ahead, left = self.velocity[:, [0]], self.velocity[:, [1]]
             every = (-left * values, ahead * values)
@@ -236,6 +253,13 @@ class Motion:
             displaced(response, self.velocity, self.velocity[:, [a]] * values, a) for a in axes
         )
         return sum(parts)
+
+    def _in_body(self, pushes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Two (N, K), ahead and to the left, of (N, K) along x and along y of the room in turn."""
+        theta = self.names["theta"][:, None]
+        along_x = np.arange(pushes.shape[1]) % 2 == 0
+        c, s = np.cos(theta), np.sin(theta)
+        return pushes * np.where(along_x, c, s), pushes * np.where(along_x, -s, c)
 
     def _turned(self, response: Response, error_rad: np.ndarray) -> np.ndarray:
         """The same by (N, K) errors of the captured heading."""
@@ -262,13 +286,20 @@ def sized(forms: Sequence[Form], motions: Sequence[Motion]) -> list[Form]:
     return found
 
 
-def from_library(terms: Sequence[Term]) -> list[Form]:
+def from_library(terms: Sequence[Term], command_unit: str) -> list[Form]:
     """The library's terms that the effect `equation` can have.
 
     Not what changes all speeds at once with time: the form `motion` says that without the wheels.
     """
     return [
-        Form(t.adds_to, (t.formula,), t.group, column=k, sizes=(t.size,))
+        Form(
+            t.adds_to,
+            (t.formula,),
+            t.group,
+            column=k,
+            sizes=(t.size,),
+            command_unit=command_unit if "u" in words(t.formula) else "",
+        )
         for k, t in enumerate(terms)
         if t.addable and not t.family and not t.formula.endswith("*rim")
     ]
@@ -310,8 +341,9 @@ def _of_room(every: Mapping[str, np.ndarray], sideways: bool) -> list[Form]:
             found.append(_wave(name, k, span))
         found.append(Form("travel", (name,), "place"))
     if np.ptp(every["theta"]) > 0.5:
+        found.append(Form(ROOM, ("sqrt(vx*vx + vy*vy)",) * 2, HEADING))
         for n in (1, 2, 3, 4):
-            pair = f"cos({n}*theta)", f"sin({n}*theta)"
+            pair = f"cos({times(n, 'theta')})", f"sin({times(n, 'theta')})"
             found += [Form(to, pair, HEADING) for to in ("travel", "theta_rad")]
             found.append(Form("omega_radps", tuple(f"{p}*omega" for p in pair), HEADING))
             courses = tuple(p.replace("theta", "course") for p in pair)
@@ -352,6 +384,12 @@ def _of_load() -> list[Form]:
     found = [
         Form("motion", ("s",), PAST, State(of, rate), constant=long_s, spread=0.4, unit="s")
         for of in (load, way)
+        for long_s in LONG_S
+    ]
+    found += [
+        Form(to, (f"s*{axis}",), PAST, State(of, rate), constant=long_s, spread=0.4, unit="s")
+        for to, axis in zip(CHANNELS, SPEEDS, strict=True)
+        for of in (f"{axis}*{axis}", f"abs({axis})")
         for long_s in LONG_S
     ]
     found += [
@@ -428,11 +466,22 @@ def on_and_off(wave: Form, numbers: np.ndarray, levels: Sequence[float]) -> list
 
 def joined(forms: Sequence[Form]) -> dict[str, str]:
     """Texts of the effect `equation` that has these terms, all of one place, one with a state."""
-    shapes = [text for form in forms for text in form.texts]
-    formula = " + ".join(f"p{k}*{text}" for k, text in enumerate(shapes))
+    count = sum(len(form.shapes) for form in forms)
+    formula = summed(forms, [f"p{k}" for k in range(count)])
     rate = next((f.state_rate for f in forms if f.state), "")
     texts = {"adds_to": forms[0].adds_to, "formula": formula}
     return texts | ({"state_rate": rate} if rate else {})
+
+
+def summed(forms: Sequence[Form], numbers: Sequence[str]) -> str:
+    """The formula of terms, all of one place, with these texts in the place of their numbers.
+
+    Of a push in the room two, along x and along y.
+    """
+    texts = [text for form in forms for text in form.texts]
+    terms = [f"{number}*{text}" for number, text in zip(numbers, texts, strict=True)]
+    values = [terms[0::2], terms[1::2]] if forms[0].adds_to == ROOM else [terms]
+    return ", ".join(" + ".join(own) for own in values).replace("+ -", "- ")
 
 
 def names_in(texts: Sequence[str]) -> list[str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinmill.diagnosis.forms import Form, joined
+from twinmill.diagnosis.forms import Form, joined, summed
 from twinmill.diagnosis.known_physics import resembles
 
 
@@ -62,7 +62,7 @@ class Formula:
         tried: forms that it was chosen of.
         again: share of resamplings of the stretches in which the same place and dependence win.
         holds: names of the motion in it, with the least and largest value seen.
-        curve: what the report draws; None of single wheels.
+        curve: what the report draws; None of single wheels and of a push in the room.
         instead_of: findings in doubt, without which it was found.
     """
 
@@ -94,10 +94,9 @@ class Formula:
     @property
     def text(self) -> str:
         """With its numbers in place of their names."""
-        texts = [text for form in self.forms for text in form.texts]
-        terms = [f"{n.value:.3g}*{t}" for n, t in zip(self.numbers, texts, strict=False)]
+        text = summed(self.forms, [f"{n.value:.3g}" for n in self.numbers if n.name])
         rate = self.equation.get("state_rate", "")
-        return " + ".join(terms).replace("+ -", "- ") + (f" with ds/dt = {rate}" if rate else "")
+        return text + (f" with ds/dt = {rate}" if rate else "")
 
     @property
     def equals(self) -> str:

@@ -74,7 +74,8 @@ def formula_of(
         return None
     beat_radps = motions[0].own.floor.response.beat_radps if len(motions) == 1 else 0.0
     own = own_forms(motions, beat_radps, drives_sideways(model), bool(model.wheels()))
-    forms = [*from_library(terms), *sized(own, motions)]
+    command_unit = "rad/s" if model.drive == "wheel_speed" else ""  # a duty is a plain figure
+    forms = [*from_library(terms, command_unit), *sized(own, motions)]
     pool = Pool(forms, rows.raw(forms))
     other = rows.of_all(rival) if len(rival) else None
     half = np.arange(len(rows.parts)) % 2 == 0
@@ -118,7 +119,7 @@ def _net(rows: Evidence, proof: Proof) -> float:
     last = proof.chosen.forms[-1]
     width = len(last.shapes)
     raw = proof.chosen.raw
-    sums = Sums.of(rows, rows.seen(raw[:, -width:]), [last], rows.seen(raw[:, :-width]))
+    sums = Sums.of(rows, Pool([last], raw[:, -width:]), raw[:, :-width])
     return float(sums.held_out(every)[0]) - SETTINGS.each * proof.chosen.numbers
 
 
@@ -132,8 +133,7 @@ def _proven(rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | No
         rival: (R, 1) raw column of what it must outdo.
     """
     rows.weighed(np.ones(len(rows.stretch)))
-    nothing = Chosen((), np.zeros((len(rows.stretch), 0)), 0.0)
-    sums = Sums.of(rows, rows.seen(pool.raw), pool.forms, rows.seen(nothing.raw))
+    sums = Sums.of(rows, pool, pool.raw[:, :0])
     net = sums.held_out(half) - SETTINGS.each * np.array([f.numbers for f in pool.forms])
     best = np.argsort(-net)[:SHORTLIST]
     if net[best[0]] <= 0:
@@ -152,13 +152,13 @@ def _proven(rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | No
 def _outdone(rows: Evidence, chosen: Chosen, rival: np.ndarray, half: np.ndarray) -> bool:
     """Whether a rival predicts left-out stretches as well."""
     one = Pool([Form("motion", ("1",), "", sizes=(1.0,))], rival)
-    sums = Sums.of(rows, rows.seen(rival), one.forms, rows.seen(rival[:, :0]))
+    sums = Sums.of(rows, one, rival[:, :0])
     return bool(sums.held_out(half)[0] >= chosen.gain - _alike(chosen.gain))
 
 
 def _scales(rows: Evidence, raw: np.ndarray, half: np.ndarray) -> np.ndarray:
     """(R,) weights with which what these columns leave of each channel counts as noise."""
-    x, own = rows.seen(raw), half[rows.stretch]
+    (x, _), own = rows.lifted(raw), half[rows.stretch]
     numbers = np.linalg.solve(x[own].T @ x[own] + np.eye(x.shape[1]), x[own].T @ rows.left[own])
     after = rows.left[own] - x[own] @ numbers
     channel = rows.channel[own]
@@ -210,8 +210,7 @@ def _fits_beside(form: Form, found: Chosen) -> bool:
 
 def _best(rows: Evidence, pool: Pool, half: np.ndarray, found: Chosen) -> Chosen | None:
     """The simplest that gains as much as any beside what was found, its constant polished."""
-    sums = Sums.of(rows, rows.seen(pool.raw), pool.forms, rows.seen(found.raw))
-    gains = sums.held_out(half)
+    gains = Sums.of(rows, pool, found.raw).held_out(half)
     net = gains - SETTINGS.each * np.array([f.numbers for f in pool.forms])
     if net.max() <= 0:
         return None

@@ -45,7 +45,7 @@ def told(rows: Evidence, proof: Proof, tried: int, again: float) -> Formula:
         tried=tried,
         again=again,
         holds={n: (float(v.min()), float(v.max())) for n, v in seen.items()},
-        curve=_curve(rows, found.forms, numbers) if found.forms[0].of_body else None,
+        curve=_curve(rows, found.forms, numbers) if found.forms[0].of_one_value else None,
     )
 
 
@@ -132,8 +132,7 @@ def _slope(rows: Evidence, found: Chosen, k: int) -> np.ndarray:
 
 def stability(rows: Evidence, pool: Pool, first: Form) -> float:
     """Share of resamplings of the stretches in which a form of the same kind gains most."""
-    beside = np.zeros((len(rows.stretch), 0))
-    sums = Sums.of(rows, rows.seen(pool.raw), pool.forms, beside)
+    sums = Sums.of(rows, pool, pool.raw[:, :0])
     cost = SETTINGS.each * np.array([f.numbers for f in pool.forms])
     random, count, same = np.random.default_rng(1), len(rows.parts), 0
     for _ in range(DRAWS):

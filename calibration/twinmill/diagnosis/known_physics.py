@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Sequence
 from math import pi
 
-from twinmill.diagnosis.forms import STARTS, Form
+from twinmill.diagnosis.forms import ROOM, STARTS, Form
 from twinmill.diagnosis.term import WAY
 
 AXES = {"vx": "driving", "vy": "driving sideways", "omega": "turning"}
@@ -92,6 +92,12 @@ def _of_past(form: Form, own: Sequence[float]) -> str:
         of = "heat of the motors" if form.state.goal.startswith("(") else "load of the battery"
         return f"speed {falls} with a memory of {form.constant:.3g} s of how hard it drove: {of}"
     axis = CHANNEL_OF[form.adds_to]
+    if form.shapes == (f"s*{axis}",):
+        falls = "falls" if own[0] < 0 else "rises"
+        return (
+            f"{AXES[axis]} {falls} with a memory of {form.constant:.3g} s of how hard it was done: "
+            "heat of a gear or of motors"
+        )
     reach = f"{form.constant:.3g} {form.unit}"
     if "abs" not in form.state.rate:
         return f"{AXES[axis]} follows later, within {reach}: like a second lag, or a soft mount"
@@ -110,7 +116,9 @@ def _of_place_or_time(form: Form, own: Sequence[float]) -> str:
         return "the captured heading is off by the heading: like a compass or a tag seen aslant"
     if form.adds_to == "omega_radps" and form.group == "heading":
         return "turns more toward one heading: like a slope, or a compass that is pulled"
-    if form.adds_to == "travel" and "(1*course)" in form.shapes[0]:
+    if form.adds_to == ROOM:
+        return "pushed to one side of the room, the more the faster it drives: like wind or pile"
+    if form.adds_to == "travel" and form.shapes[0] == "cos(course)":
         return "more in one direction of the room, less in the other: like wind, pile or a slope"
     if form.adds_to == "aside":
         return "led aside by the direction in which it drives: like grooves, joints or pile"

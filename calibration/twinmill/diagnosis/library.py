@@ -29,6 +29,7 @@ from twinmill.diagnosis.term import (
     Term,
     displaced,
     moves,
+    times,
 )
 from twinmill.filters import filtered
 from twinmill.fitting.floor import body_velocity_at
@@ -321,7 +322,7 @@ def _named_terms(
         for n in (1, 2, 3, 4):
             for name, wave in (("cos", np.cos(n * theta)), ("sin", np.sin(n * theta))):
                 for carrier, values in (("moves", moving), *speeds):
-                    terms["heading", f"{name}({n}*theta)*{carrier}"] = wave * values
+                    terms["heading", f"{name}({times(n, 'theta')})*{carrier}"] = wave * values
     for group, name, values in (
         (PLACE, "x", x), (PLACE, "y", y), (TIME, "t", t_s), ("battery voltage", "V", voltage)
     ):  # fmt: skip

@@ -186,7 +186,7 @@ class Formulas:
 
 @dataclass(frozen=True)
 class Doubted:
-    """Findings of which none is sure, and what is there without them.
+    """Findings that are in doubt, and what is there without them.
 
     Attributes:
         names: of the findings.
@@ -232,7 +232,7 @@ def rest_of(
         first: of the model as given.
         known: what the model left in other logs already, as `left_over`.
         whole: the data sets, with all starts of predictions.
-        without: the findings, where all are in doubt, and the fit and formulas without them.
+        without: the findings that are in doubt, and the fit and formulas without them.
     """
     left = max(fit.held_square - 1, 0.0)
     share = left / max(first.held_square - 1, left, 1e-9)
@@ -374,15 +374,15 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
 
 
 def _tests(terms: Sequence[Term], products: "Products") -> Iterator[Tested]:
-    """Each family, and each formula that it has."""
+    """Each family, and each formula that it has: the same of another group is something else."""
     kinds = [(t.group, t.family) for t in terms]
-    formulas = np.array([t.formula for t in terms])
+    groups, formulas = (np.array([getattr(t, k) for t in terms]) for k in ("group", "formula"))
     for kind in dict.fromkeys(kinds):
         together = np.array([k == kind for k in kinds])
         grams = products.grams(together)
         yield Tested(kind[0], together, grams)
         for formula in dict.fromkeys(formulas[together]):
-            own = formulas == formula
+            own = (groups == kind[0]) & (formulas == formula)
             inside = not np.any(own & ~together)
             yield Tested(kind[0], own, grams.only(own[together]) if inside else products.grams(own))
 

@@ -26,7 +26,7 @@ class Taken:
         formula: as it was proven.
         fit: with it, and without the findings that it stands for.
         numbers: as they are in this fit.
-        before: held-out score without it, of a fit of the rest.
+        before: held-out score without it.
         after: with it.
         share: of the squared held-out error above the floor that it takes away.
         evidence: fall of the held-out cost, and the same without the block with the most.
@@ -83,14 +83,29 @@ class Taken:
         }
 
 
-def taken(fit: ScoreFit, formula: Formula, runs: int) -> Taken:
+def taken(
+    fit: ScoreFit, formula: Formula, *, before: float, doubtful: Sequence[str], runs: int
+) -> Taken:
     """The fit with a formula added, and without the findings that it stands for.
 
     Args:
         fit: of all that was found; stays as it is.
         formula: proven on these data.
+        before: held-out score without it, as it is told.
+        doubtful: findings beside it; those that bring nothing any more go.
         runs: logs that these are.
     """
+    found = _added(fit, formula, before, runs)
+    for name in doubtful if found.kept else ():
+        gone = (*found.formula.instead_of, name)
+        less = _added(fit, replace(formula, instead_of=gone), before, runs)
+        if less.kept and found.fit.against(less.fit)[0] <= SETTINGS.tie:
+            found = less
+    return found
+
+
+def _added(fit: ScoreFit, formula: Formula, before: float, runs: int) -> Taken:
+    """The fit with a formula, and without those in the place of which it is."""
     models = [_without(m, formula.instead_of) for m in fit.models]
     gone = {*effect_names(fit.models[0])} - {*effect_names(models[0])}
     free = [p for p in fit.shared_values if p.name.split(".")[0] not in gone]
@@ -98,7 +113,6 @@ def taken(fit: ScoreFit, formula: Formula, runs: int) -> Taken:
         model.add_effect(EFFECT, formula.equation)
     fresh = _begun(models[0], formula)
     found = ScoreFit(fit.datasets, models, [*free, *fresh], fit.by_channel).fit()
-    before, after = total_score(fit.held_scores), total_score(found.held_scores)
     above = max(fit.held_square - 1, fit.held_square - found.held_square, 1e-9)
     share = (fit.held_square - found.held_square) / above
     fall, without_best, _ = found.against(fit)
@@ -107,7 +121,7 @@ def taken(fit: ScoreFit, formula: Formula, runs: int) -> Taken:
         fit=found,
         numbers=_numbers(found, fresh, formula),
         before=before,
-        after=after,
+        after=total_score(found.held_scores),
         share=share,
         evidence=(fall, without_best),
         runs=runs,

@@ -66,6 +66,11 @@ class Term:
         return TYPICAL[self.adds_to] / self.size
 
 
+def times(n: int, name: str) -> str:
+    """So many times a name, as a formula has it."""
+    return f"{n}*{name}" if n > 1 else name
+
+
 def moves(velocity: np.ndarray) -> np.ndarray:
     """(N,) bool: whether the body moves, of (N, 3) m/s and rad/s."""
     return np.hypot(velocity[:, 0], velocity[:, 1]) + 0.1 * np.abs(velocity[:, 2]) > 0.01

@@ -70,6 +70,7 @@ ADDS_TO = {
     "rim_mps": NAMES["vx"],
     "vx_mps": NAMES["vx"],
     "vy_mps": NAMES["vx"],
+    "room_mps": NAMES["vx"],
     "omega_radps": NAMES["omega"],
     "travel": PLAIN,
     "aside": PLAIN,
@@ -95,9 +96,12 @@ def units_of(form: Form) -> list[str]:
         ValueError: the form adds or compares what differs in unit, or its rate is not one.
     """
     to = ADDS_TO[form.adds_to]
-    if "?" in form.shapes[0]:  # the library's terms of one wheel: of commands, which have no unit
-        return [str(to)]
-    names = {**NAMES, "c": CONSTANTS[form.unit], "l": NAMES["x"]}
+    names = {
+        **NAMES,
+        "c": CONSTANTS[form.unit],
+        "l": NAMES["x"],
+        "u": CONSTANTS[form.command_unit],
+    }
     if form.state and not form.state.goal:
         names["s"] = _unit(form.state.rate, names) * NAMES["t"]
     elif form.state:
@@ -109,4 +113,6 @@ def units_of(form: Form) -> list[str]:
 
 def _unit(text: str, names: dict[str, Unit]) -> Unit:
     plain = text.replace(C, "c").replace(L, "l")
+    if "?" in plain:  # of one wheel, and 0 of the others
+        plain = plain.partition("?")[2].rpartition(":")[0].strip()
     return eval(plain, {"__builtins__": {}, **FUNCTIONS}, names) * PLAIN

@@ -143,6 +143,11 @@ def write_effect(name: str, model_file: ModelFile, instance: str, root: Path) ->
             + (f"its equations are {', '.join(has)}." if has else "it has no equation at all.")
         )
     texts = model.texts[effect_names(model).index(instance)]
+    if texts["adds_to"] not in PLACES:
+        raise ValueError(
+            f"{instance}: adds to {texts['adds_to']}, which has two values, and only formulas of "
+            "one value are written as an effect; keep the equation in the model."
+        )
     values = {p: model.get(f"{instance}.{p}") for p in PARAMETERS}
     made = _source(name, texts, values, model_file.path.name)
     tested = _test(name, texts, values)

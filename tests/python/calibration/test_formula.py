@@ -9,6 +9,7 @@ import json
 import shlex
 import subprocess
 from contextlib import redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -180,6 +181,8 @@ AROUND = "vx*max(0, 1 - abs(abs(vx)/{c} - 1)/0.4)"
         Form("omega_radps", ("cos(theta)*omega", "sin(theta)*omega"), "heading"),
         Form("omega_radps", ("(omega - s)",), PAST, LAG, 0.6, unit="s"),
         Form("theta_rad", ("cos(theta)", "sin(theta)"), "heading"),
+        Form("room_mps", ("sqrt(vx*vx + vy*vy)",) * 2, "heading"),
+        Form("omega_radps", ("s*omega",), PAST, State("abs(omega)", "(1/{c})"), 15.0, unit="s"),
         Form("motion", ("(moves - s)",), "starts", REST, 0.8, unit="s"),
         Form("motion", ("s",), "way driven", State("", "sqrt(vx*vx + vy*vy)")),
         Form(
@@ -212,6 +215,9 @@ def test_units_agree_in_every_form_and_are_told_of_its_numbers(motion):
         assert units_of(form)
     assert units_of(Form("vx_mps", ("vx*abs(vx)",), "speed")) == ["s/m"]
     assert units_of(Form("travel", ("(vx*vx + vy*vy)",), "speed")) == ["s^2/m^2"]
+    of_wheel = Form("rim_mps", ("(left > 0 ? u*abs(u) : 0)",), "", command_unit="rad/s")
+    assert units_of(of_wheel) == ["m s"]  # m/s over (rad/s)^2; an angle has no unit
+    assert units_of(replace(of_wheel, command_unit="")) == ["m/s"]  # of a duty, a plain figure
     with pytest.raises(ValueError, match="is added"):
         units_of(Form("vx_mps", ("(vx + x)",), "speed"))
 

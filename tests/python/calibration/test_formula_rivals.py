@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from twinmill.diagnosis import diagnose
 from twinmill.diagnosis.rest import Products
 from twinmill.diagnosis.rivals import Rival, rival_of
 
@@ -56,3 +57,15 @@ def test_a_formula_that_explains_nothing_outdoes_no_effect(noise):
 def test_a_formula_of_other_physics_does_not_take_the_effects_place(noise):
     effect, formula, rest = noise.T
     assert outdoing(effect, formula, effect + 2 * formula + rest) is None
+
+
+def test_a_formula_may_stand_in_the_place_of_a_doubtful_effect_beside_a_sure_one(monkeypatch):
+    monkeypatch.setattr(diagnose, "formulas_of", lambda opened, fit: "formulas")
+    findings = [
+        SimpleNamespace(effect="coasting", certainty="sure"),
+        SimpleNamespace(effect="floor_tilt", certainty="doubtful"),
+    ]
+    less = {f.effect: SimpleNamespace(fit=f"without {f.effect}") for f in findings}
+    doubted = diagnose._doubted(findings, less, [])
+    assert doubted.names == ("floor_tilt",) and doubted.fit == "without floor_tilt"
+    assert diagnose._doubted(findings[:1], less, []) is None

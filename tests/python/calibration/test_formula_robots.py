@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from twinmill.diagnosis.explain import Explanation, explain
+from twinmill.diagnosis.taking import taken
 from twinmill.fitting.compare import compare
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import effect_names
+from twinmill.model.parameters import effect_names, effect_parameters
 
 STEP_S = 1 / 480  # of the robot
 
@@ -48,6 +50,25 @@ def switched(motion: np.ndarray) -> np.ndarray:
     return motion * (1 - 0.1 * (np.sin(2 * np.pi * t_s / 16 - 1.0) > 0.3))[:, None]
 
 
+def oiled(motion: np.ndarray) -> np.ndarray:
+    """Turning loses with its square, as in oil."""
+    turn = motion[:, 2]
+    return np.column_stack([motion[:, :2], turn - 0.15 * turn * np.abs(turn)])
+
+
+def heated(motion: np.ndarray) -> np.ndarray:
+    """Turning loses with heat that turning makes and 12 s carry away."""
+    heat = followed(np.abs(motion[:, [2]]), 12.0)
+    return np.column_stack([motion[:, :2], motion[:, 2] * (1 - 0.4 * heat[:, 0])])
+
+
+def windblown(motion: np.ndarray) -> np.ndarray:
+    """Pushed along 40 degrees of the room by a tenth of its speed."""
+    toward = 0.7 - np.cumsum(motion[:, 2]) * STEP_S
+    push = 0.1 * np.hypot(motion[:, 0], motion[:, 1])
+    return motion + push[:, None] * np.column_stack([np.cos(toward), np.sin(toward), 0 * toward])
+
+
 @pytest.fixture
 def hiding(tanh_robot):
     """A robot whose motion is hindered so."""
@@ -73,7 +94,9 @@ def explained(measure, hiding, one_clock_base, tmp_path):
     return make
 
 
-@pytest.mark.parametrize("hindered", [gripping_after_rests, resonant, creeping])
+@pytest.mark.parametrize(
+    "hindered", [gripping_after_rests, resonant, creeping, oiled, heated, windblown]
+)
 def test_a_model_with_the_formula_predicts_a_drive_that_nobody_fitted(
     explained, hiding, measure, one_clock_base, hindered
 ):
@@ -83,6 +106,52 @@ def test_a_model_with_the_formula_predicts_a_drive_that_nobody_fitted(
     other = [measure(hiding(hindered), 77, 60.0)]
     with_it = compare(other, ModelFile.load(str(result.path))).score
     assert with_it < 1.1 < 1.3 < compare(other, one_clock_base).score
+
+
+def test_a_form_that_is_nearly_a_gain_is_told_as_it_is(explained):
+    """The base's gain takes most of a square; the rest looks like a loss from some speed on."""
+    result = explained(oiled, 101)
+    (form,) = result.formula.formula.forms
+    (number,) = result.formula.numbers
+    assert form.texts == ("omega*abs(omega)",)
+    assert number.value == pytest.approx(-0.15, rel=0.1)
+
+
+def test_heat_of_one_axis_is_told_with_its_time(explained):
+    (form,) = explained(heated, 101).formula.formula.forms
+    assert form.texts == ("s*omega",)
+    assert 12 / 1.5 < form.constant < 12 * 1.5  # as the square, too, makes nearly that heat
+
+
+def test_a_push_that_grows_with_speed_stands_in_the_place_of_one_that_does_not(explained):
+    result = explained(windblown, 101)
+    assert result.formula.formula.instead_of == ("floor_tilt",)
+    assert "floor_tilt" not in effect_names(ModelFile.load(str(result.path)).model)
+    east, north = (n.value for n in result.formula.numbers)
+    assert np.hypot(east, north) == pytest.approx(0.1, rel=0.1)
+    assert np.arctan2(north, east) == pytest.approx(0.7, abs=0.1)
+
+
+def test_a_doubtful_effect_that_says_nothing_beside_the_formula_goes(explained):
+    """The floor that the robot drives on is level."""
+    result = explained(resonant, 101)
+    state = result.diagnosis.search.last.state
+    models = [m.copy() for m in state.models]
+    for model in models:
+        model.add_effect("floor_tilt")
+    tilt = effect_parameters(models[0], "floor_tilt", fresh=True)
+    fit = ScoreFit(state.datasets, models, [*state.begun(), *tilt]).fit()
+    formula, before = result.formula.formula, result.formula.before
+    whole = taken(fit, formula, before=before, doubtful=(), runs=1)
+    less = taken(fit, formula, before=before, doubtful=("floor_tilt",), runs=1)
+    assert "floor_tilt" in effect_names(whole.fit.models[0])
+    assert "floor_tilt" not in effect_names(less.fit.models[0])
+    assert less.formula.instead_of == (*formula.instead_of, "floor_tilt") and less.kept
+
+
+def test_the_score_without_the_formula_is_the_last_one_of_the_steps(explained):
+    result = explained(resonant, 101)
+    assert result.formula.before == result.diagnosis.steps[-1][1]
 
 
 def test_a_formula_of_the_moments_of_one_run_is_told_and_not_taken(explained):

@@ -12,8 +12,9 @@ from twinmill.diagnosis.findings import with_stale_numbers
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
 from twinmill.diagnosis.notes import irregularity
 from twinmill.diagnosis.place import HORIZON, comes_again
-from twinmill.diagnosis.rest import Rest
+from twinmill.diagnosis.rest import Products, Rest, _tested
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.term import Term
 from twinmill.diagnosis.trials import REFIT
 from twinmill.diagnosis.verdict import VerdictInputs
 from twinmill.model.parameters import ParameterEstimate
@@ -121,6 +122,22 @@ def test_a_floor_as_the_noise_makes_it_is_regular_and_one_three_times_as_high_is
         found = irregularity(own, Noise(*channels), model)
         assert found == pytest.approx(times)
         assert (found > SETTINGS.irregular) == (times > 1)
+
+
+def test_a_round_wheel_is_not_named_for_what_an_oval_one_does():
+    """The same formula of another wheel is another formula; errors follow the left one's."""
+    left, right, noise = np.random.default_rng(4).normal(size=(3, 800))
+    terms = [
+        Term(f"angle of the {side} wheels", "rim_mps", "cos(2*wheel_rad)*rim", 1.0, "angle")
+        for side in ("left", "right")
+    ]
+    blocks = np.repeat(np.arange(16), 50)
+    columns = np.column_stack([left, right])
+    products = Products(columns, left + 0.3 * noise, blocks, np.ones(2, bool))
+    assert {d.group: d.sure for d in _tested(terms, products)} == {
+        "angle of the left wheels": True,
+        "angle of the right wheels": False,
+    }
 
 
 def test_each_wheel_with_a_command_of_its_own_has_its_formulas():

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <set>
@@ -19,9 +20,9 @@ namespace twin
 class Formula
 {
 public:
-    // `rate`: of the state `s`; empty: there is none.
+    // `rate`: of the state `s`; empty: there is none. `values`: that the text has, 1 or 2.
     Formula(std::span<const char *const> names, std::span<const double> parameters,
-            const std::string &text, const std::string &rate);
+            const std::string &text, const std::string &rate, int values);
 
     // Places in the list of names that the texts use.
     std::span<const size_t> used() const { return used_; }
@@ -30,12 +31,13 @@ public:
     // Takes the state through a step; the formula then has its mean over the step.
     void Remember(double &state, double dt_s);
     double Evaluate() const { return formula_.Eval(); }
+    std::array<double, 2> EvaluateBoth() const;
 
 private:
     void Define(mu::Parser &parser, std::span<const char *const> names,
                 std::span<const double> parameters);
     void Parse(mu::Parser &parser, std::span<const char *const> names, const std::string &key,
-               const std::string &text);
+               const std::string &text, int values);
 
     std::vector<double> values_;
     std::vector<size_t> used_;
@@ -57,7 +59,7 @@ constexpr Card kCard = {
         "V (battery), left and front (1 or -1), t (s); rim_mps, speed the wheel tends to: these, "
         "target and rim (m/s, now), angle (rad). Body: vx, vy (m/s), omega (rad/s), x, y (m), "
         "theta and course, the direction in which it drives (rad), moves (0 or 1), t (s); travel and "
-        "motion: the share of way that is more. Heading as captured, theta_rad: x, y, theta. Functions: abs sign min max sqrt exp ln sin "
+        "motion: the share of way that is more; room_mps: two values, along x, along y. Heading as captured, theta_rad: x, y, theta. Functions: abs sign min max sqrt exp ln sin "
         "cos tan asin acos atan atan2 sinh cosh tanh and more of muParser; a ? b : c; _pi",
     .leaves_out =
         "more than one state; where the formula has no finite value, nothing is added, and where "
@@ -80,6 +82,7 @@ constexpr TextParameter kTexts[] = {
     {"adds_to", "vx_mps",
      "one of duty, rim_mps (per wheel), vx_mps, vy_mps, omega_radps (body), travel (share of vx "
      "and vy), motion (share of vx, vy, omega), aside (share of the way led to its left), "
+     "room_mps (push along x and along y of the room: two values with a comma between), "
      "theta_rad (captured heading)"},
     {"formula", "p0*vx + p1*vy + p2*omega + p3*vx*abs(vx)",
      "what is added, in the unit of adds_to; should be 0 where p0 to p3 are"},
@@ -131,22 +134,28 @@ constexpr Name<ObservedPose> kPoseNames[] = {
     {"theta", [](const ObservedPose &p, int) { return p.theta_rad; }},
 };
 
-// The formula's value; where it is not finite, nothing.
-double Finite(const Formula &formula)
+// A formula's value; where it is not finite, nothing.
+double Finite(double value)
 {
-    const double value = formula.Evaluate();
     return std::isfinite(value) ? value : 0;
 }
 
-// The formula's value for wheel k at the end of its state's step.
+// Gives the formula what it names of wheel k, and its state the end of its step.
 template <class S>
-double Value(std::span<const Name<S>> names, const S &s, int k, Formula &formula, double *state)
+void Tell(std::span<const Name<S>> names, const S &s, int k, Formula &formula, double *state)
 {
     for (const size_t i : formula.used())
         formula[i] = names[i].value(s, k);
     if (formula.remembers())
         formula.Remember(state[k], s.dt_s);
-    return Finite(formula);
+}
+
+// The formula's value for wheel k.
+template <class S>
+double Value(std::span<const Name<S>> names, const S &s, int k, Formula &formula, double *state)
+{
+    Tell(names, s, k, formula, state);
+    return Finite(formula.Evaluate());
 }
 
 void AddToDuty(DutySignals &s, const Numbers &v, double *state)
@@ -184,11 +193,21 @@ void LeadAside(GroundSignals &s, const Numbers &v, double *state)
     s.vy_mps += share * vx_mps;
 }
 
+void PushInRoom(GroundSignals &s, const Numbers &v, double *state)
+{
+    Tell<GroundSignals>(kBodyNames, s, 0, *v.formula, state);
+    const auto [x, y] = v.formula->EvaluateBoth();
+    const double x_mps = Finite(x), y_mps = Finite(y);
+    const double ahead = std::cos(s.theta_rad), left = std::sin(s.theta_rad);
+    s.vx_mps += ahead * x_mps + left * y_mps;
+    s.vy_mps += ahead * y_mps - left * x_mps;
+}
+
 double HeadingError(const ObservedPose &p, Formula &formula)
 {
     for (const size_t i : formula.used())
         formula[i] = kPoseNames[i].value(p, 0);
-    return Finite(formula);
+    return Finite(formula.Evaluate());
 }
 
 void AddToHeading(ObservedPose &p, const Numbers &v)
@@ -231,6 +250,7 @@ struct Quantity
     const char *name;
     Act act;
     std::vector<const char *> names;
+    int values = 1;  // of the formula
 };
 
 const Quantity &FindQuantity(const std::string &name)
@@ -244,6 +264,7 @@ const Quantity &FindQuantity(const std::string &name)
         {"travel", OnGround{AddShare<false>}, NamesOf(kBodyNames)},
         {"motion", OnGround{AddShare<true>}, NamesOf(kBodyNames)},
         {"aside", OnGround{LeadAside}, NamesOf(kBodyNames)},
+        {"room_mps", OnGround{PushInRoom}, NamesOf(kBodyNames), 2},
         {"theta_rad", OnObservation{AddToHeading, TakeFromHeading}, NamesOf(kPoseNames)},
     };
     std::set<std::string> known;
@@ -299,22 +320,30 @@ EffectSpec::Compiled Compile(std::span<const double> values, std::span<const std
         Fail("state_rate", rate, -1,
              "what is added to " + texts[0] + " has no state; leave it empty, or add to " +
                  (duty ? "rim_mps" : "omega_radps"));
-    return {quantity.act, std::make_shared<Formula>(quantity.names, values, texts[1], rate)};
+    return {quantity.act,
+            std::make_shared<Formula>(quantity.names, values, texts[1], rate, quantity.values)};
 }
 
 }  // namespace
 
 Formula::Formula(std::span<const char *const> names, std::span<const double> parameters,
-                 const std::string &text, const std::string &rate)
+                 const std::string &text, const std::string &rate, int values)
     : values_(names.size()), remembers_(!rate.empty())
 {
     Define(formula_, names, parameters);
-    Parse(formula_, names, "formula", text);
+    Parse(formula_, names, "formula", text, values);
     if (remembers_)
     {
         Define(rate_, names, parameters);
-        Parse(rate_, names, "state_rate", rate);
+        Parse(rate_, names, "state_rate", rate, 1);
     }
+}
+
+std::array<double, 2> Formula::EvaluateBoth() const
+{
+    int count = 0;
+    const double *both = formula_.Eval(count);
+    return {both[0], both[1]};
 }
 
 void Formula::Define(mu::Parser &parser, std::span<const char *const> names,
@@ -329,7 +358,7 @@ void Formula::Define(mu::Parser &parser, std::span<const char *const> names,
 }
 
 void Formula::Parse(mu::Parser &parser, std::span<const char *const> names, const std::string &key,
-                    const std::string &text)
+                    const std::string &text, int values)
 {
     // The parser would take these for assignments and texts.
     for (size_t i = 0; i < text.size(); ++i)
@@ -344,8 +373,10 @@ void Formula::Parse(mu::Parser &parser, std::span<const char *const> names, cons
         parser.SetExpr(text);
         int results = 0;
         parser.Eval(results);
-        if (results != 1)
-            Fail(key, text, -1, "it must be one value, not a list of them");
+        if (results != values)
+            Fail(key, text, -1,
+                 values == 1 ? "it must be one value, not a list of them"
+                             : "it must be two values, along x and along y, with a comma between");
         const mu::varmap_type in_text = parser.GetUsedVar();
         for (size_t i = 0; i < names.size(); ++i)
             if (in_text.contains(names[i]) && std::ranges::find(used_, i) == used_.end())

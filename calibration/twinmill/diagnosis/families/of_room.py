@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from twinmill.diagnosis.families.family import HUMPS, Family, Humps, pushed
-from twinmill.diagnosis.term import CHANNELS, PLACE, SWELL, TYPICAL, Term, moves
+from twinmill.diagnosis.term import CHANNELS, PLACE, SWELL, TYPICAL, Term, moves, times
 from twinmill.fitting.opening import Opened
 
 LEAST_M = 0.15  # between the middles of two humps over the place
@@ -103,7 +103,7 @@ def _at(where: str, texts: Sequence[str], bells: Callable[[Opened], np.ndarray])
 
 def of_course(n: int) -> Family:
     """The floor's pile, a wind: n times a turn of the course, it is quicker, or is led aside."""
-    texts = [f"{w}({n}*course)*{t}" for t in ("travel", "aside") for w in ("cos", "sin")]
+    texts = [f"{w}({times(n, 'course')})*{t}" for t in ("travel", "aside") for w in ("cos", "sin")]
 
     def values(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         ahead, left = velocity[:, [0]], velocity[:, [1]]
