@@ -274,6 +274,17 @@ def with_play(duty: np.ndarray) -> np.ndarray:
     return played
 
 
+def test_a_stale_lag_is_written_as_a_lag(tanh_robot, measure, fitted, tmp_path):
+    """No effect that imitates the lag goes into the explained model."""
+    robot = tanh_robot()
+    run = measure(replace(robot, lag_s=robot.lag_s + 0.006), 12, 60.0)
+    found = explain([run], fitted, out=tmp_path / "explained.toml", command="test")
+    model = ModelFile.load(str(found.path)).model
+    assert [f.effect for f in found.diagnosis.findings] == [REFIT] and not model.effects
+    assert model.get("base.motor_lag_s") == pytest.approx(robot.lag_s + 0.006, abs=0.004)
+    assert found.after.score < found.diagnosis.before.score
+
+
 def test_a_heading_that_comes_late_is_no_slip(tanh_robot, measure, fitted):
     """A tracker that smooths the heading alone: 40 ms. Curves seem to drift to the inside."""
 
