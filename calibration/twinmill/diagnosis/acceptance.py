@@ -45,13 +45,13 @@ def best_of(
 
 
 def began_before(trial: Trial, name: str) -> bool:
-    """An effect of a moment that is hardly within the logs: it is there all the time, or never."""
+    """An effect no moment of which is within the logs: it is there all the time, or never."""
     if not with_role(name, "moment"):
         return False
     logs = [d for d in trial.state.datasets if isinstance(d, Trajectory)]
     times_s = np.concatenate([d.start_s for d in logs])
     low_s, high_s = np.quantile(times_s, (MARGIN, 1 - MARGIN))
-    return not all(low_s < t_s < high_s for t_s in when_s(trial, name))
+    return not any(low_s < t_s < high_s for t_s in when_s(trial, name))
 
 
 def when_s(trial: Trial, name: str) -> list[float]:

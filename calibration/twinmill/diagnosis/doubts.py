@@ -28,6 +28,7 @@ from twinmill.model.parameters import (
     catalogue,
     catalogue_of,
     effect_names,
+    lasts_for_a_while,
     late_part,
     newest_instance,
     with_role,
@@ -105,7 +106,19 @@ def instead_of_moment(done: Search, name: str) -> list[str]:
     placed = [n for n in (catalogue() if anywhere else _same(done, name)) if with_role(n, "place")]
     bounded = _same(done, name, SETTINGS.same_in_time, at_bound=SETTINGS.same_at_bound)
     timed = [n for n in bounded if _is_timed(n) and not with_role(n, "moment")]
-    return [*placed, *timed]
+    for_good = [n for n in catalogue() if with_role(n, "moment") and not lasts_for_a_while(n)]
+    return [*placed, *timed, *(for_good if _may_not_end(done.last, name) else ())]
+
+
+def _may_not_end(last: Trial, name: str) -> bool:
+    """Whether the end of an effect of a while may lie beyond its log."""
+    if not lasts_for_a_while(name):
+        return False
+    key = with_role(name, "moment")[-1]
+    instance = newest_instance(last.state.model, name)
+    (end,) = (e for e in last.fit.shared_estimates() if e.name == f"{instance}.{key}")
+    latest_s = max(d.start_s[-1] for d in last.fit.datasets if isinstance(d, Trajectory))
+    return end.value + SETTINGS.within * (end.std or 0.0) > latest_s
 
 
 def _is_even(last: Trial, name: str) -> bool:

@@ -19,6 +19,7 @@ from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import Term
 from twinmill.diagnosis.trials import REFIT, Trial, without_effect
 from twinmill.fitting.opening import Opened
+from twinmill.model.parameters import with_role
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ def less_each(done: Search, opened: Sequence[Opened]) -> Without:
     formulas = formulas_of(opened, done.last.fit)
     rivals: dict[str, Term] = {}
     for name in list(less):
-        rival = rival_of(formulas, less[name], done.last) if formulas else None
+        rival = rival_of(formulas, name, less[name], done.last) if formulas else None
         if rival is None:
             continue
         if not rival.outdoes:
@@ -83,11 +84,12 @@ def less_each(done: Search, opened: Sequence[Opened]) -> Without:
     return Without(less, formulas, rivals)
 
 
-def rival_of(formulas: Formulas, less: Trial, whole: Trial) -> Rival | None:
+def rival_of(formulas: Formulas, name: str, less: Trial, whole: Trial) -> Rival | None:
     """The formula that takes more than an effect, if there is one, and does what the effect does.
 
     Args:
         formulas: over the logs.
+        name: of the effect.
         less: without the effect.
         whole: with it; the way from one to the other is the effect as it was found.
     """
@@ -100,6 +102,8 @@ def rival_of(formulas: Formulas, less: Trial, whole: Trial) -> Rival | None:
     for k in np.argsort(gains)[::-1]:
         if gains[k] <= own + SETTINGS.outdoes_by:
             return None
+        if with_role(name, "moment") and formulas.terms[k].is_step:
+            continue  # the same, at a moment that is not fitted
         both = products.only(np.isin(np.arange(1 + len(gains)), [0, 1 + k]))
         beside = both.held_out(np.ones(2, bool), 0)[0] - gains[k]
         outdoes = gains[k] > SETTINGS.outdoes * own and beside < SETTINGS.kept * own

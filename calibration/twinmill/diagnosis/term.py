@@ -61,6 +61,11 @@ class Term:
         return not words(self.formula) & NO_NAMES
 
     @property
+    def is_step(self) -> bool:
+        """Before a moment it is the opposite of what it is after it."""
+        return self.formula.startswith("sign(t - ")
+
+    @property
     def strength(self) -> float:
         """p0 at which the term adds what is typical."""
         return TYPICAL[self.adds_to] / self.size

@@ -54,8 +54,10 @@ class VerdictInputs:
         if self.effects and not outweighed:
             top = self.effects[0]
             return "ambiguous" if top.group else "effect_missing"
-        if self._outside or self.rest.moments or self.effects:
+        if self._outside or self.rest.moments or (self.effects and self.score > MISSING):
             return "outside_catalogue"
+        if self.effects:
+            return "cannot_tell"
         if self._unexplained or self.noises:
             return "cannot_tell"
         enough = not (self.silent or self._instead or self._refit_leaves)
@@ -170,6 +172,12 @@ class VerdictInputs:
             return (
                 "The model misses by no more than speeds may be wrong by that another log told; "
                 f"{self._within_told} may be there, and is too small to be sure."
+            )
+        if verdict == "cannot_tell" and self.effects:
+            names = " or ".join(f.effect for f in self.effects)
+            return (
+                f"The model misses by a little more than the noise (score {self.score:.2f}); "
+                f"{names} may be there, or something of another form."
             )
         if verdict == "cannot_tell" and self._unexplained:
             return (

@@ -23,7 +23,7 @@ def outdoing(effect: np.ndarray, formula: np.ndarray, errors: np.ndarray) -> Riv
         SimpleNamespace(fit=SimpleNamespace(state=([rows], None)))
         for rows in (effect, np.zeros_like(effect))
     )
-    return rival_of(formulas, less, whole)
+    return rival_of(formulas, "speed_curve", less, whole)
 
 
 @pytest.fixture(params=range(5))

@@ -234,6 +234,15 @@ def test_a_little_that_follows_from_something_unknown_is_not_told_why(last, verd
     assert "Nothing is missing" not in weighed.sentence
 
 
+@pytest.mark.parametrize(("score", "verdict"), [(1.2, "cannot_tell"), (1.6, "outside_catalogue")])
+def test_a_little_that_a_doubtful_effect_half_takes_is_not_called_outside(score, verdict):
+    why = "more is left than it takes"
+    found = [Finding("lateral_slip", None, [], 0.5, "doubtful", why, wrong_form=True)]
+    weighed = VerdictInputs(score, score, score, 1.12, found, Rest(0.54, False, []), [], [], [], 1)
+    assert weighed.verdict == verdict
+    assert "lateral_slip" in weighed.sentence and "Nothing is missing" not in weighed.sentence
+
+
 @pytest.mark.parametrize(
     ("takes", "certainty", "left", "verdict"),
     [

@@ -41,6 +41,21 @@ def test_a_loss_of_some_seconds_is_named(low_s, high_s, tanh_robot, measure, tru
     assert told["until_s"].value == pytest.approx(high_s, abs=1.0)
 
 
+def test_a_loss_from_before_the_log_on_is_told_with_its_end(tanh_robot, measure, true_model):
+    found = diagnose([measure(weaker(tanh_robot, -1.0, 9.0, 0.3), 4, 90.0)], true_model)
+    assert found.verdict in ("effect_missing", "ambiguous")
+    assert found.found == ["transient_loss"]
+    told = {e.name.split(".")[1]: e for e in found.findings[0].parameters}
+    assert told["until_s"].value == pytest.approx(9.0, abs=1.0)
+    assert told["loss"].value == pytest.approx(0.3, abs=2 * told["loss"].std)
+
+
+def test_a_loss_whose_end_is_hardly_in_the_log_may_be_for_good(tanh_robot, measure, true_model):
+    found = diagnose([measure(weaker(tanh_robot, 60.0, 87.5, 0.2), 4, 90.0)], true_model)
+    (finding,) = found.findings
+    assert "abrupt_loss" in {finding.effect, *(finding.group or ())}
+
+
 def test_a_loss_in_the_one_stretch_that_was_driven_elsewhere_may_be_of_the_floor(
     tanh_robot, measure, true_model
 ):
