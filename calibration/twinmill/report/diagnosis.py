@@ -304,8 +304,10 @@ def section(diagnosis: Diagnosis, commands: Commands = (), steps: Steps | None =
         commands: what to type then, each with why.
         steps: scores after each step; None: those of the diagnosis.
     """
-    before = diagnosis.before
+    before, steps = diagnosis.before, steps or diagnosis.steps
     scores = [("as given", before.score), ("base refitted, held out", diagnosis.score_refit)]
+    if len(steps) > 1:
+        scores.append(("with all that was found, held out", steps[-1][1]))
     if len(diagnosis.detection_steps) > 1:
         scores += [
             ("detections", diagnosis.detection_steps[0][1]),
@@ -318,7 +320,7 @@ def section(diagnosis: Diagnosis, commands: Commands = (), steps: Steps | None =
         comparisons.facts(before),
         [
             *_detection_figures(diagnosis),
-            *_gains(steps or diagnosis.steps),
+            *_gains(steps),
             *formula.figures(diagnosis.rest),
             *robot_pictures(before),
         ],
