@@ -360,9 +360,9 @@ class Response:
         c, s = np.cos(self.heading_rad[at]), np.sin(self.heading_rad[at])
         room = (c * errors[0] - s * errors[1], s * errors[0] + c * errors[1])
         gains = errors * made / np.maximum(made.std(axis=1, keepdims=True), 1e-12)
-        waves = [w.waves(self.moved)[at] for w in self.wheels]
+        rolled = [wave for w in self.wheels for wave in w.waves(self.moved)[at].T]
         turned = [f(n * self.heading_rad[at]) for f in (np.cos, np.sin) for n in (1, 2, 4)]
-        done = [*made, *np.abs(made), *turned, *self.pose[at, :2].T, *np.hstack([*waves, made.T]).T]
+        done = [*made, *np.abs(made), *turned, *self.pose[at, :2].T, *rolled]
         swings = [*errors, *room, *gains, gains.sum(axis=0)]
         self.beat_radps = beat_radps(self.data.start_s[there], swings, done)
 

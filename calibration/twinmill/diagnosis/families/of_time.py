@@ -21,25 +21,18 @@ def of_drift(t_s: np.ndarray) -> list[Family]:
     rates = [float(f"{2 * np.pi * k / longest_s:.4g}") for k in range(1, 1 + DRIFTS)]
     texts = _texts(rates)
 
-    def swinging(own: Opened) -> np.ndarray:
-        return _swinging(own, rates)
-
     def moving(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        return pushed(own, swinging(own))
+        return pushed(own, _swinging(own, rates))
 
     def turning(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        return {2: TYPICAL["omega_radps"] * swinging(own)}
-
-    def veering(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        return {2: TYPICAL["omega_radps"] * swinging(own) * moves(velocity)[:, None]}
+        return {2: TYPICAL["omega_radps"] * _swinging(own, rates)}
 
     at_s = [float(f"{a:.4g}") for a in np.quantile(t_s, PARTS)]
     along = [f"drift({axis}, {t})" for axis in "xy" for t in texts]
-    veers = [f"{t}*moves" for t in texts]
     return [
         Family([Term(TIME, CHANNELS[0], t, 1.0, "drift") for t in along], moving),
         Family([Term(TIME, CHANNELS[2], t, 1.0, "drift of heading") for t in texts], turning),
-        Family([Term(TIME, CHANNELS[2], t, 1.0, "veers at times") for t in veers], veering),
+        _veering(rates, "veers at times"),
         *(_veering_from(a) for a in at_s),
         *(_pushing(two) for two in pairwise(rates)),
     ]
@@ -50,26 +43,32 @@ def of_beat(rate_radps: float) -> list[Family]:
     if not rate_radps:
         return []
     rates = [float(f"{rate_radps:.5g}")]
-    texts = _texts(rates)
-
-    def veering(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        return {2: TYPICAL["omega_radps"] * _swinging(own, rates) * moves(velocity)[:, None]}
 
     def gaining(axes: Sequence[int], own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         return {k: SWELL * _swinging(own, rates) * velocity[:, [k]] for k in axes}
 
     def of_gain(axes: Sequence[int], name: str, to: str) -> Family:
         size, words = TYPICAL[to] / SWELL, f"{name} swings"
-        terms = [Term(TIME, to, f"{t}*{name}", size, words) for t in texts]
+        terms = [Term(TIME, to, f"{t}*{name}", size, words) for t in _texts(rates)]
         return Family(terms, partial(gaining, axes))
 
-    turns = [Term(TIME, CHANNELS[2], f"{t}*moves", 1.0, "turning swings") for t in texts]
     return [
         _pushing(rates),
-        Family(turns, veering),
+        _veering(rates, "turning swings"),
         of_gain((0, 1, 2), "rim", "rim_mps"),
         *(of_gain((k,), SPEEDS[k], CHANNELS[k]) for k in range(3)),
     ]
+
+
+def _veering(rates: Sequence[float], family: str) -> Family:
+    """It veers while it moves, to one side and the other at some rates."""
+
+    def values(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
+        return {2: TYPICAL["omega_radps"] * _swinging(own, rates) * moves(velocity)[:, None]}
+
+    return Family(
+        [Term(TIME, CHANNELS[2], f"{t}*moves", 1.0, family) for t in _texts(rates)], values
+    )
 
 
 def _pushing(rates: Sequence[float]) -> Family:
