@@ -416,10 +416,10 @@ def _heading_is_late(finding: Finding, found: Sequence[Finding], rest: Rest) -> 
     A heading that is told late by T is off by omega T, so that a robot that drives with v seems to
     drift by v omega T to the inside: as slip of -T does.
     """
-    numbers = {f.effect: f.parameters[0] for f in found if f.effect in ("yaw_lag", "lateral_slip")}
-    if finding.effect not in numbers or len(numbers) < 2:
+    both = {f.effect: f for f in found if f.effect in ("yaw_lag", "lateral_slip")}
+    if finding.effect not in both or len(both) < 2:
         return None
-    turn, drift = numbers["yaw_lag"], numbers["lateral_slip"]
+    turn, drift = (both[name].parameters[0] for name in ("yaw_lag", "lateral_slip"))
     if abs(turn.value + drift.value) > SETTINGS.within * np.hypot(turn.std, drift.std):
         return None
     why = f"both are what a heading does that is told {turn.value:.3f} s later than the place is"

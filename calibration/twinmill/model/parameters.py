@@ -212,12 +212,12 @@ def making_late(part: str) -> list[str]:
     return [name for name in catalogue() if (late := late_part(name)) and late[0] == part]
 
 
-_of_kind: dict[tuple[str, str], dict[str, dict]] = {}
+_of_kind: dict[tuple[str, str, int], dict[str, dict]] = {}
 
 
 def catalogue_of(model: native.Model) -> dict[str, dict]:
     """Effects that a robot like the model's can have, parameters by its own wheels."""
-    kind = (model.wheel_kind, model.drive)
+    kind = (model.wheel_kind, model.drive, len(model.wheels()))
     if kind not in _of_kind:
         _of_kind[kind] = {entry["name"]: entry for entry in model.catalogue()}
     return _of_kind[kind]
