@@ -107,7 +107,13 @@ def test_an_axle_is_found_in_two_logs_together(two_runs, one_clock_base):
 
 
 def test_a_robot_on_one_axle_has_two_wheels(model_file):
-    """Its speeds are half the sum of theirs, and their difference over the track."""
+    """Its speeds are half the sum of theirs, and their difference over the track.
+
+    One of four wheels that was asked before has four.
+    """
+    four = model_file(('"mecanum"', '"differential"')).model
+    four.add_effect("wheel_eccentricity")
+    assert len(effect_parameters(four, "wheel_eccentricity")) == 9
     one_axle = ("half_wheelbase_m = 0.059", "half_wheelbase_m = 0")
     model = model_file(one_axle, ('"mecanum"', '"differential"')).model
     assert [w["words"] for w in model.wheels()] == ["left wheel", "right wheel"]
