@@ -20,7 +20,7 @@ from twinmill.diagnosis.search import PAUSE_S
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import CHANGE, TIME
 from twinmill.diagnosis.ties import in_common, of_levels
-from twinmill.diagnosis.trials import REFIT, Trial, own_estimates
+from twinmill.diagnosis.trials import REFIT, Trial, estimates_of
 from twinmill.fitting.compare import GOOD
 from twinmill.model.parameters import (
     WHERE_OR_WHEN,
@@ -115,16 +115,14 @@ def _may_not_end(last: Trial, name: str) -> bool:
     if not lasts_for_a_while(name):
         return False
     key = with_role(name, "moment")[-1]
-    instance = newest_instance(last.state.model, name)
-    (end,) = (e for e in last.fit.shared_estimates() if e.name == f"{instance}.{key}")
+    (end,) = (e for e in estimates_of(last, name) if e.name.endswith(f".{key}"))
     latest_s = max(d.start_s[-1] for d in last.fit.datasets if isinstance(d, Trajectory))
     return end.value + SETTINGS.within * (end.std or 0.0) > latest_s
 
 
 def _is_even(last: Trial, name: str) -> bool:
     """Whether one size says all of an effect: a loss that is one of both sides."""
-    instance, card = newest_instance(last.state.model, name), catalogue_of(last.state.model)[name]
-    own = [e for e in last.fit.shared_estimates() if e.name.startswith(f"{instance}.")]
+    card, own = catalogue_of(last.state.model)[name], estimates_of(last, name)
     sizes = [(e, away) for e, p, away in _sizes(card, own) if p["role"] == "size"]
     return sum(away > SETTINGS.within * e.std for e, away in sizes) < 2
 
@@ -314,13 +312,18 @@ def _same(
     if name == REFIT or this.accepted.names != (name,):
         return []
     taken = this.before.held_score**2 - this.accepted.held_score**2
+
+    def takes_enough(trial: Trial) -> bool:
+        bounded = any(e.at_bound for e in estimates_of(trial, trial.names[0]))
+        share = at_bound if bounded else SETTINGS.same_fall
+        return this.before.held_score**2 - trial.held_score**2 > share * taken
+
     return [
         t.names[0]
         for t in this.trials
         if len(t.names) == 1
         and t.names[0] not in (name, REFIT)
-        and this.before.held_score**2 - t.held_score**2
-        > (at_bound if any(e.at_bound for e in own_estimates(t)) else SETTINGS.same_fall) * taken
+        and takes_enough(t)
         and in_common(this.before, this.accepted, t) > least
     ]
 

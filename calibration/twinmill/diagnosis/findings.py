@@ -15,7 +15,7 @@ from twinmill.diagnosis.rounds import Round, Search
 from twinmill.diagnosis.search import comes_again
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import TIME
-from twinmill.diagnosis.trials import REFIT, State, Trial, fitted, own_estimates, with_effects
+from twinmill.diagnosis.trials import REFIT, State, Trial, estimates_of, fitted, with_effects
 from twinmill.fitting.compare import MISSING
 from twinmill.model.parameters import (
     CLOCK,
@@ -190,7 +190,7 @@ def slight_lags(done: Search, first: State, score: float) -> dict[str, Parameter
         trial = next((t for t in this.trials if t.names == (LAG_EFFECT,)), None)
         if trial is None or this.accepted.names != (name,) or not _does_as_much(this, trial):
             continue
-        extra, *_ = own_estimates(trial)
+        extra, *_ = estimates_of(trial, LAG_EFFECT)
         if abs(extra.value) <= SETTINGS.told_lag * late_s:
             found[name] = replace(extra, name=LAG, value=lag_s + extra.value)
     return found
@@ -341,16 +341,14 @@ def _finding(
     share: float,
     changes: Mapping[str, Change | OneHeading],
 ) -> Finding:
-    estimates = done.last.fit.shared_estimates()
+    own = estimates_of(done.last, name)
     if name == REFIT:
         moved = done.last.fit.moved
-        own = [e for e in estimates if e.name in done.last.state.base]
         own.sort(key=lambda e: -moved[e.name])
         alike = tuple(n for t in _rivals(done, REFIT) for n in t.names)
         group = (REFIT, *alike) if alike else None
         return Finding(REFIT, group, own, share, "group" if alike else "sure")
     instance = newest_instance(done.last.state.model, name)
-    own = [e for e in estimates if e.name.startswith(f"{instance}.")]
     instead = seen_once(done, name, less)
     tied = [n for t in _rivals(done, name) for n in t.names]
     tied += [*(instead or ()), *instead_of_moment(done, name)]
@@ -368,21 +366,16 @@ def not_weighed(done: Search) -> list[Finding]:
 
     Shares are of the squared held-out score above the noise, each in the round that accepted it.
     """
-    estimates, last = done.last.fit.shared_estimates(), done.last.held_score**2
-    excess = max(done.rounds[0].before.held_score ** 2 - min(last, 1.0), 1e-9)
+    excess = max(done.rounds[0].before.held_score ** 2 - min(done.last.held_score**2, 1.0), 1e-9)
     found = []
     for name in dict.fromkeys(done.found):
         this = done.round_of(name)
         fall = this.before.held_score**2 - this.accepted.held_score**2
         share = float(np.clip(fall / len(this.accepted.names) / excess, 0.0, 1.0))
-        if name == REFIT:
-            instance, own = "", [e for e in estimates if e.name in done.last.state.base]
-        else:
-            instance = newest_instance(done.last.state.model, name)
-            own = [e for e in estimates if e.name.startswith(f"{instance}.")]
+        own = estimates_of(done.last, name)
         rivals = [n for t in _rivals(done, name) for n in t.names]
         group = (name, *rivals) if rivals else None
-        again = "#" in instance
+        again = name != REFIT and "#" in newest_instance(done.last.state.model, name)
         found.append(Finding(name, group, own, share, "doubtful", NOT_WEIGHED, again))
     return sorted(found, key=lambda f: -f.share)
 

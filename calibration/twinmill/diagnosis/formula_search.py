@@ -28,6 +28,7 @@ from twinmill.diagnosis.evidence import (
     fitted,
     made,
 )
+from twinmill.diagnosis.families.of_time import beat_of
 from twinmill.diagnosis.forms import Form, Motion, from_library, on_and_off, own_forms, sized
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.formula_telling import TRIED, stability, told
@@ -72,7 +73,7 @@ def formula_of(
     rows = Evidence(logs, motions, fit, changes)
     if len(rows.parts) < FEWEST:
         return None
-    beat_radps = motions[0].own.floor.response.beat_radps if len(motions) == 1 else 0.0
+    beat_radps = beat_of([m.own for m in motions])
     own = own_forms(motions, beat_radps, drives_sideways(model), bool(model.wheels()))
     command_unit = "rad/s" if model.drive == "wheel_speed" else ""  # a duty is a plain figure
     forms = [*from_library(terms, command_unit), *sized(own, motions)]

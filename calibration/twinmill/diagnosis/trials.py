@@ -114,10 +114,13 @@ class Trial:
         return total_score(self.fit.held_scores)
 
 
-def own_estimates(trial: Trial) -> list[ParameterEstimate]:
-    """Estimates of the effect that a trial is of."""
-    instance = newest_instance(trial.state.model, trial.names[0])
-    return [e for e in trial.fit.shared_estimates() if e.name.startswith(f"{instance}.")]
+def estimates_of(trial: Trial, name: str) -> list[ParameterEstimate]:
+    """Estimates of an effect of a trial, of several instances the newest one's; or of its base."""
+    estimates = trial.fit.shared_estimates()
+    if name == REFIT:
+        return [e for e in estimates if e.name in trial.state.base]
+    instance = newest_instance(trial.state.model, name)
+    return [e for e in estimates if e.name.startswith(f"{instance}.")]
 
 
 def fitted(state: State) -> Trial:

@@ -360,7 +360,8 @@ class Response:
         c, s = np.cos(self.heading_rad[at]), np.sin(self.heading_rad[at])
         room = (c * errors[0] - s * errors[1], s * errors[0] + c * errors[1])
         gains = errors * made / np.maximum(made.std(axis=1, keepdims=True), 1e-12)
-        rolled = [wave for w in self.wheels for wave in w.waves(self.moved)[at].T]
+        moved = self.moved
+        rolled = [wave for w in self.wheels for wave in w.waves(moved)[at].T]
         turned = [f(n * self.heading_rad[at]) for f in (np.cos, np.sin) for n in (1, 2, 4)]
         done = [*made, *np.abs(made), *turned, *self.pose[at, :2].T, *rolled]
         swings = [*errors, *room, *gains, gains.sum(axis=0)]

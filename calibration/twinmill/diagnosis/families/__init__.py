@@ -14,7 +14,7 @@ from twinmill.diagnosis.families.family import Family
 from twinmill.diagnosis.families.of_past import of_past
 from twinmill.diagnosis.families.of_room import of_course, of_places, of_pushes
 from twinmill.diagnosis.families.of_speed import across_axes, of_speed
-from twinmill.diagnosis.families.of_time import of_beat, of_drift
+from twinmill.diagnosis.families.of_time import beat_of, of_beat, of_drift
 from twinmill.diagnosis.families.of_wheels import of_rims, of_wheels
 from twinmill.diagnosis.term import STILL
 from twinmill.fitting.opening import Opened
@@ -40,7 +40,7 @@ def families_of(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> l
         *of_pushes(),
         *(of_course(n) for n in COURSES),
         *of_drift(np.concatenate([own.floor.response.middle_s for own in opened])),
-        *(of_beat(opened[0].floor.response.beat_radps) if len(opened) == 1 else ()),
+        *of_beat(beat_of(opened)),
         *of_wheels(opened),
         *(of_rims(opened, velocities) if opened[0].model.drive == "twist" else ()),
     ]

@@ -38,6 +38,11 @@ def of_drift(t_s: np.ndarray) -> list[Family]:
     ]
 
 
+def beat_of(opened: Sequence[Opened]) -> float:
+    """Rate at which the errors of a log swing, rad/s; 0 at none, and of several logs."""
+    return opened[0].floor.response.beat_radps if len(opened) == 1 else 0.0
+
+
 def of_beat(rate_radps: float) -> list[Family]:
     """Speeds, turning or pushes swing at a rate that the log's errors tell; none at 0."""
     if not rate_radps:
