@@ -235,6 +235,7 @@ def first_state(
         tuple(free),
         base,
         frozenset(excluded),
+        told_speeds=bool(told) and model.drive == "duty",
     )
 
 
@@ -301,7 +302,7 @@ def _concluded(
         stds=model_file.effect_stds,
         slight=slight_lags(done, first, given),
     )
-    if model_file.model.drive == "duty" and model_file.known_from_other_logs(hashes):
+    if first.told_speeds:
         findings = within_the_table(findings, less, last)
     findings = without.doubted(undone(findings, last))
     doubted = _doubted(findings, less, known)

@@ -19,7 +19,7 @@ from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.search import PAUSE_S
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import CHANGE, TIME
-from twinmill.diagnosis.ties import in_common, of_levels
+from twinmill.diagnosis.ties import bends_speed, in_common, way_apart
 from twinmill.diagnosis.trials import REFIT, Trial, estimates_of
 from twinmill.fitting.compare import GOOD
 from twinmill.model.parameters import (
@@ -158,8 +158,8 @@ def within_the_table(
     """
 
     def judged(finding: Finding) -> Finding:
-        bends = finding.effect in less and _bends(finding.effect)
-        if not bends or _share_of_way(less[finding.effect], last) > SETTINGS.told_speeds:
+        bends = finding.effect in less and bends_speed(finding.effect)
+        if not bends or way_apart(less[finding.effect], last) > SETTINGS.told_speeds:
             return finding
         why = (
             f"it changes the way by less than {100 * SETTINGS.told_speeds:.1f} %, and speeds that "
@@ -168,18 +168,6 @@ def within_the_table(
         return replace(doubted(finding, why), within_told=True)
 
     return [judged(f) for f in found]
-
-
-def _share_of_way(less: Trial, whole: Trial) -> float:
-    """Of two states, how far apart their predictions are at the longest horizon, over the way."""
-    apart, way = 0.0, 0.0
-    rows = zip(whole.fit.datasets, less.fit.state[0], whole.fit.state[0], strict=True)
-    for data, before, after in rows:
-        if isinstance(data, Trajectory):
-            moved = data.as_errors(before) - data.as_errors(after)
-            apart += float(np.nansum(moved[:, -1, :2] ** 2))
-            way += float(np.nansum(data.measured[:, -1, :2] ** 2))
-    return float(np.sqrt(apart / max(way, 1e-12)))
 
 
 def _sizes(
@@ -570,11 +558,6 @@ def _is_late(effect: str) -> bool:
     return bool(late_part(effect)) or always
 
 
-def _bends(effect: str) -> bool:
-    """Whether it bends the steady speed over the command."""
-    return effect in of_levels() and "steady_speed" in _acts_by(effect)
-
-
 def _is_placed(effect: str) -> bool:
     """Whether it changes with the place in the room."""
     return "places" in _acts_by(effect)
@@ -592,7 +575,7 @@ def _is_timed(effect: str) -> bool:
 
 # Effects of which a second one may be the rest of the first in another form: what they act by.
 KINDS = (
-    (_bends, "speed", "bends the speed over the command", "curve"),
+    (bends_speed, "speed", "bends the speed over the command", "curve"),
     (_is_late, CHANGE, "is late at changes of the command", "lag"),
     (_is_placed, "place", "changes with the place", "floor"),
     (_is_timed, TIME, "changes with time", "loss"),

@@ -28,6 +28,8 @@ from twinmill.model.parameters import (
 )
 
 SMALL = 0.05
+STRONGER = (3.0, 6.0)  # usual strengths, where a stronger effect is not the same made larger ...
+BENT = 0.9  # ... as it is below this cosine of a small part of it and of the usual strength
 MOST_APART = 8  # data sets with columns of their own: those of more would fill the memory
 STALE = 0.3  # of the prior's width: a usual error of the base's numbers
 
@@ -145,11 +147,18 @@ def _screened(
     rest: np.ndarray,
     start: dict[str, float],
 ) -> Screened:
-    """Slopes at neutral, or the way to the usual strength where these say nothing of it."""
+    """Slopes at neutral, or the way to the usual strength where these say nothing of it.
+
+    Where a stronger effect is no multiple of a weak one, as of play in a gear, it is the way to the
+    strength that takes most.
+    """
     parameters, small, whole = _signatures(name, state, rows=rows, weights=weights, start=start)
-    pad = len(rest) - len(small)
-    small, whole = (np.vstack([c, np.zeros((pad, c.shape[1]))]) for c in (small, whole))
-    small, whole = (c - basis @ (basis.T @ c) for c in (small, whole))
+
+    def projected(columns: np.ndarray) -> np.ndarray:
+        padded = np.vstack([columns, np.zeros((len(rest) - len(columns), columns.shape[1]))])
+        return padded - basis @ (basis.T @ padded)
+
+    small, whole = projected(small), projected(whole)
     linear = small.sum(axis=1)
     size, reached = np.linalg.norm(linear), np.linalg.norm(whole)
     agree = linear @ whole[:, 0] / max(size * reached, 1e-12)
@@ -165,7 +174,29 @@ def _screened(
     size = float((whole**2).sum())
     if used is small:  # half of the prior's width is a usual strength
         size = float(np.max((small**2).sum(axis=0) * widths**2)) / 4
+    if agree < BENT and len(parameters) == 1 and parameters[0].role == "size":
+        for column in projected(_stronger(name, state, rows, weights)).T:
+            taken = max(float(column @ rest), 0.0) ** 2 / (float(column @ column) + 1)
+            if taken > gain:
+                used, gain = column[:, None], taken
     return Screened(name, used, gain, size, start)
+
+
+def _stronger(
+    name: str, state: State, rows: list[np.ndarray], weights: list[np.ndarray]
+) -> np.ndarray:
+    """(R, 2) change of the rows by an effect of one number at STRONGER strengths."""
+    columns = []
+    for dataset, given, row, weight in zip(
+        state.datasets, state.models, rows, weights, strict=True
+    ):
+        model = given.copy()
+        model.add_effect(name)
+        (p,) = effect_parameters(model, effect_names(model)[-1], fresh=True)
+        values = p.usual + np.array(STRONGER)[:, None] * _reach(name, [p], {})
+        changed = dataset.rows(model, [p.name], np.clip(values, p.min, p.max))
+        columns.append(weight[:, None] * (row - changed).T)
+    return np.concatenate(columns)
 
 
 def _signatures(

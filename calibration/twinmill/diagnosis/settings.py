@@ -67,6 +67,7 @@ class Settings(Numbers):
     stated_lag: float = number(0.05, "standard deviation of a motor lag that no log told, a share")
     told_lag: float = number(0.15, "share of a robot's lateness by which it may be off as well")
     told_speeds: float = number(0.015, "share of the way by which speeds of another log may be off")
+    same_way: float = number(0.1, "... and share of a bend's own change: two such bends are one")
     beyond: float = number(3.0, "usual sizes, or standard deviations at a bound: too far ...")
     near: float = number(0.5, "... if another leaves less than this more of the squared score")
     weighty: float = number(0.1, "share of the loudest visit that another must bring to count")

@@ -12,6 +12,7 @@ from twinmill.diagnosis.screening import candidates
 from twinmill.diagnosis.settings import Settings
 from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, fitted
 from twinmill.model.parameters import catalogue
+from twinmill.predict.datasets import Trajectory
 
 
 def ties_of(this: Round, settings: Settings) -> list[Trial]:
@@ -35,10 +36,22 @@ def ties_of(this: Round, settings: Settings) -> list[Trial]:
         below = max(accepted.held_score, trial.held_score) < 1.0  # differences there are no news
         close = apart < settings.tie and (blocks_t < 2.0 or below)
         rivals = close and in_common(this.before, accepted, trial) > settings.unlike
-        if rivals or (same > settings.alike and apart < settings.evidence):
+        told = _is_within_the_table(this.before, accepted, trial, settings)
+        if rivals or told or (same > settings.alike and apart < settings.evidence):
             tied.append((same, trial))
     nearest = sorted(tied, key=lambda pair: -pair[0])[: settings.group - 1]
     return [trial for _, trial in nearest]
+
+
+def _is_within_the_table(before: Trial, one: Trial, other: Trial, settings: Settings) -> bool:
+    """Whether speeds that other logs told may be wrong by what two bends of them differ in.
+
+    Then the better one is better by an error of the table alone.
+    """
+    if not (before.state.told_speeds and bends_speed(one.names[0]) and bends_speed(other.names[0])):
+        return False
+    most = min(settings.told_speeds, settings.same_way * way_apart(before, one))
+    return way_apart(one, other) < most
 
 
 def canonical_correlation(a: np.ndarray, b: np.ndarray) -> float:
@@ -64,6 +77,25 @@ def in_common(before: Trial, one: Trial, other: Trial) -> float:
     first, second = rows[0] - rows[1], rows[0] - rows[2]
     size = float(np.linalg.norm(first) * np.linalg.norm(second))
     return float(first @ second) / max(size, 1e-300)
+
+
+def way_apart(one: Trial, other: Trial) -> float:
+    """How far apart predictions of two states are at the longest horizon, as a share of the way."""
+    apart, way = 0.0, 0.0
+    for data, first, second in zip(
+        one.fit.datasets, one.fit.state[0], other.fit.state[0], strict=True
+    ):
+        if isinstance(data, Trajectory):
+            moved = data.as_errors(first) - data.as_errors(second)
+            apart += float(np.nansum(moved[:, -1, :2] ** 2))
+            way += float(np.nansum(data.measured[:, -1, :2] ** 2))
+    return float(np.sqrt(apart / max(way, 1e-12)))
+
+
+def bends_speed(effect: str) -> bool:
+    """Whether it bends the steady speed over the command."""
+    card = catalogue().get(effect, {"identify": (), "needs": "", "family": ""})
+    return effect in of_levels() and "steady_speed" in {*card["identify"], card["needs"]}
 
 
 def of_levels() -> list[str]:

@@ -32,13 +32,20 @@ SECONDS = 3.0  # of a log, in which what happened in a moment is seen
 
 @dataclass(frozen=True)
 class State:
-    """Where a search stands: data sets, a model for each, and what is free in all of them."""
+    """Where a search stands: data sets, a model for each, and what is free in all of them.
+
+    Attributes:
+        base: names of the base's numbers that a refit sets free.
+        excluded: effects that are no candidates.
+        told_speeds: the speeds of the base's duties are held as other logs told them.
+    """
 
     datasets: Sequence[Dataset]
     models: Sequence[native.Model]
     free: tuple[Parameter, ...]
     base: tuple[str, ...] = ()
     excluded: frozenset[str] = frozenset()
+    told_speeds: bool = False
 
     @property
     def model(self) -> native.Model:
