@@ -351,7 +351,8 @@ def _swelling(rim, v, _):
 
 
 def _several_losses(rim, v, _):
-    away = np.sin(2 * np.pi * (v["times"] * np.arange(len(rim)) / len(rim) + v["moment"])) > 0.4
+    t_s = STEP_S * np.arange(len(rim))
+    away = np.sin(2 * np.pi * (t_s / v["every_s"] + v["moment"])) > 0.4
     return rim * np.where(away, 1 - v["loss"], 1.0)[:, None]
 
 
@@ -543,7 +544,7 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
     if robot.drive != "wheel_speed":
         time = ("time", "moment", "event")
         past = ("past", "history", "change", "start", "stop", "transient", "accel")
-        several = {"moment": moment, "loss": 0.05, "times": float(random.uniform(2.5, 4.5))}
+        several = {"moment": moment, "loss": 0.05, "every_s": float(random.uniform(20.0, 36.0))}
         drops = {"per_s": 0.12}
         swing = {"share": 0.4, "hz": hz}
         found += [
