@@ -12,6 +12,7 @@ from twinmill.diagnosis.outliers import Outlier
 from twinmill.diagnosis.resolution import Resolution
 from twinmill.diagnosis.rest import FIRM, Rest
 from twinmill.diagnosis.rounds import Search
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import REFIT
 from twinmill.fitting.compare import Comparison
 from twinmill.fitting.opening import Opened
@@ -104,6 +105,11 @@ class Diagnosis:
         """The common model with the findings of the motion."""
         return self.search.last.state.model
 
+    @property
+    def is_left(self) -> bool:
+        """Whether the rest is worth telling: more than nothing is left, or doubtful names are."""
+        return self.rest.share >= SETTINGS.nothing_left or self.verdict == "outside_catalogue"
+
     def to_json(self) -> dict:
         """The interface's object."""
         top = next((r.group for r in self.ranking if r.group is not None), None)
@@ -120,6 +126,7 @@ class Diagnosis:
                 "share": rest.share,
                 "firm": rest.firm and rest.certainty == FIRM,
                 "certainty": rest.certainty,
+                "told": self.is_left,
                 "depends_on": rest.depends_on,
                 "likely": rest.likely,
                 "formula": rest.proven.equals if rest.proven else None,

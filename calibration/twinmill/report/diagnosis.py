@@ -60,13 +60,13 @@ def findings(diagnosis: Diagnosis) -> Table:
     if rows:
         rest = diagnosis.rest
         most = "most likely " if rest.likely else ""
-        on = f"{most}on {', '.join(rest.depends_on)}"
+        on = f"depends {most}on {', '.join(rest.depends_on)}" if rest.depends_on else ""
         rows.append(
             [
                 Cell("left over", "dim"),
                 Cell(f"{100 * rest.share:.0f} %", "dim", rest.share),
-                Cell(rest.certainty, "dim"),
-                Cell(f"depends {on}" if rest.depends_on else "", "dim"),
+                Cell(rest.certainty if diagnosis.is_left else "no more than noise", "dim"),
+                Cell(on if diagnosis.is_left else "", "dim"),
             ]
         )
     return Table(

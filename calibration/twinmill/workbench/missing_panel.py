@@ -146,8 +146,9 @@ class MissingPanel:
             on = ", ".join(rest["depends_on"])
             words = f"Left over: {100 * rest['share']:.0f} %"
             most = "most likely " if rest.get("likely") else ""
-            words += f", depends {most}on {on}" if on else ""
-            ui.label(f"{words}: {rest['certainty']}.").classes("soft")
+            words += f", depends {most}on {on}" if on and rest.get("told", True) else ""
+            certainty = rest["certainty"] if rest.get("told", True) else "no more than noise"
+            ui.label(f"{words}: {certainty}.").classes("soft")
         for off in found["robots_off"]:
             self._robot(off)
         self._would_show(found.get("robots", []))
