@@ -323,6 +323,7 @@ def _concluded(
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]
     modelled = [r.modelled.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
+    disturbed = [] if rest.moments else disturbed_notes(after)
     noise = irregularity_notes(opened, [s.noise for s in modelled], model_file.model)
     named = {name for f in findings for name in (f.effect, *(f.group or ()))}
     faint = [(name, why) for name, why in done.faint if name not in named]
@@ -341,6 +342,7 @@ def _concluded(
         _instead_of_drift(given, done, first, usual),
         noise,
         usual,
+        disturbed,
     )
     drives = drives_for(faint_names, _shown(done, faint), first.model.wheel_kind)
     same_clock = all(o.same_clock for o in known if o.floor)
@@ -363,7 +365,7 @@ def _concluded(
             *time_base_notes(modelled),
             *geometry_notes(last.state.model),
             *noise,
-            *([] if rest.moments else disturbed_notes(after)),
+            *disturbed,
             *lag_notes(lags_s),
             *marker_notes(modelled),
             *few_commands_notes(known),

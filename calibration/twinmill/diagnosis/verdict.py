@@ -25,6 +25,7 @@ class VerdictInputs:
         imitators: effects that would take what drifting gains took.
         noises: what was said of unusual noise.
         known: score that is no news: that of the model on the logs that it was fitted to.
+        disturbed: what was said of stretches that are judged nowhere.
     """
 
     score: float
@@ -37,6 +38,7 @@ class VerdictInputs:
     imitators: Collection[str]
     noises: Sequence[str]
     known: float
+    disturbed: Sequence[str] = ()
 
     @property
     def effects(self) -> list[Finding]:
@@ -167,7 +169,9 @@ class VerdictInputs:
         if verdict == "model_adequate":
             maybe = " or ".join(f.effect for f in self._all_doubtful)
             there = f" {maybe} may be there, and is too small to be sure." if maybe else ""
-            return f"Nothing is missing that these logs would show.{there}{self._as_before}"
+            apart = " Stretches unlike all the rest are left out." if self.disturbed else ""
+            shown = f"Nothing is missing that these logs would show.{apart}"
+            return f"{shown}{there}{self._as_before}"
         if verdict == "cannot_tell" and self._within_told:
             return (
                 "The model misses by no more than speeds may be wrong by that another log told; "

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is left over: errors that come again at their place, irregular motion, single wheels."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -225,6 +226,13 @@ def test_a_refit_is_not_enough_where_more_than_the_noise_is_left(last, verdict, 
     weighed = VerdictInputs(1.9, 1.9, last, last, found, Rest(0.2, False, []), [], [], [], 1.0)
     assert weighed.verdict == verdict
     assert words in weighed.sentence
+
+
+def test_where_stretches_are_judged_nowhere_the_sentence_says_so():
+    calm = VerdictInputs(1.0, 1.0, 1.0, 1.0, [], Rest(1.0, False, []), [], [], [], 1.0)
+    held = replace(calm, disturbed=("R01: at 4.0 to 9.0 s it moved unlike all the rest.",))
+    assert (calm.verdict, held.verdict) == ("model_adequate", "model_adequate")
+    assert "left out" in held.sentence and "left out" not in calm.sentence
 
 
 @pytest.mark.parametrize(("last", "verdict"), [(1.17, "cannot_tell"), (1.4, "outside_catalogue")])
