@@ -222,6 +222,25 @@ def test_poses_that_do_not_move_although_commands_do_are_named(robot, noise_m):
     _one([replace(robot, pose=still + noise)], "do not move although the robot is driven")
 
 
+@pytest.mark.parametrize("count", [2, 3])
+def test_robots_under_one_number_are_told(robot, count):
+    """Their poses come in turn, as a tracker sends them, or as the network mixed them."""
+    others = [_robot(seed=1 + k).pose + np.array([0.9 * k, 0, 0]) for k in range(count)]
+    in_turn = np.stack(others, axis=1).reshape(-1, 3)
+    t_s = np.interp(np.arange(len(in_turn)) / count, np.arange(len(robot.pose)), robot.pose_t_s)
+    some = np.random.default_rng(1).random(len(t_s)) < 0.8
+    for kept in (slice(None), some):
+        pose = in_turn[kept]
+        mixed = replace(
+            robot,
+            pose=pose,
+            pose_t_s=t_s[kept],
+            valid=np.ones(len(pose), bool),
+            z_m=np.zeros(len(pose)),
+        )
+        _one([mixed], "two robots or more under one number", "robot_id")
+
+
 def test_a_robot_that_stands_as_it_is_told_is_no_mistake(robot):
     noise = np.random.default_rng(1).normal(size=robot.pose.shape) * 0.0004
     assert check_poses(replace(robot, pose=noise, command=0.1 * robot.command), "log") == []

@@ -13,6 +13,7 @@ STRONG = {"duty": (0.3,) * 4, "wheel_speed": (2.0,) * 4, "twist": (0.05, 0.05, 0
 # Commands beyond these no robot on wheels follows: twenty times the fastest there are.
 ABSURD = {"duty": (20.0,) * 4, "wheel_speed": (1e4,) * 4, "twist": (500.0, 500.0, 1e3, np.inf)}
 NAMES = {"twist": ("vx_mps", "vy_mps", "omega_radps")}  # of the others: wheels by their number
+MOST_UNDER_ONE = 4  # robots under one number: after so many poses the first one is back
 # Nothing moves within this much, nor within five times the noise where that is as little as this.
 STANDS, STANDS_NOISY = np.array([0.005, 0.005, 0.035]), np.array([0.05, 0.05, 0.2])
 
@@ -62,6 +63,14 @@ def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
                 "the poses do not move although the robot is driven",
                 stands,
                 "check that the tracked body is this robot, and that its motors are on",
+            )
+        ]
+    if apart_m := _goes_to_and_fro(pose[:, :2]):
+        return [
+            finding(
+                "these poses are those of two robots or more under one number",
+                f"they go to and fro between places {apart_m:.2f} m apart",
+                "give each robot its own robot_id, in its poses and in its commands",
             )
         ]
     span_m = np.ptp(np.column_stack([pose[:, :2], z_m]), axis=0)
@@ -171,6 +180,21 @@ def _usual_top_speed(t_s: np.ndarray, pose: np.ndarray) -> float:
     step = pose[after[near], :2] - pose[start[near], :2]
     speed = np.hypot(step[:, 0], step[:, 1]) / (t_s[after[near]] - t_s[start[near]])
     return float(np.quantile(speed, 0.95))
+
+
+def _goes_to_and_fro(place: np.ndarray) -> float:
+    """How far apart the places are to which poses come back after a leap; 0 if few leap so.
+
+    Args:
+        place: (N, 2).
+    """
+    leap_m = np.hypot(*np.diff(place, axis=0).T)
+    back_m = np.full(len(leap_m), np.inf)
+    for n in range(2, MOST_UNDER_ONE + 1):
+        own_m = np.hypot(*(place[n:] - place[:-n]).T)
+        back_m[: len(own_m)] = np.minimum(back_m[: len(own_m)], own_m)
+    leaps = (leap_m > CHECKS.leap_m) & (back_m < leap_m / 5)
+    return float(np.median(leap_m[leaps])) if leaps.mean() > CHECKS.leaps else 0.0
 
 
 def _stands(robot: RobotLog, t_s: np.ndarray, pose: np.ndarray) -> str:
