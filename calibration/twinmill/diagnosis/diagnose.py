@@ -10,7 +10,13 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.cameras import with_detections
-from twinmill.diagnosis.doubts import beside_more, of_another_form, undone, within_the_table
+from twinmill.diagnosis.doubts import (
+    beside_more,
+    beside_stale,
+    of_another_form,
+    undone,
+    within_the_table,
+)
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.findings import (
     findings_of,
@@ -27,6 +33,7 @@ from twinmill.diagnosis.notes import (
     irregularity_notes,
     lag_notes,
     marker_notes,
+    scatters_of,
     time_base_notes,
 )
 from twinmill.diagnosis.outliers import (
@@ -52,6 +59,7 @@ from twinmill.fitting.fit import base_names
 from twinmill.fitting.opening import (
     Opened,
     judged,
+    of_few_commands,
     open_measurements,
     thinned,
     with_own_gains,
@@ -304,6 +312,8 @@ def _concluded(
     )
     if first.told_speeds:
         findings = within_the_table(findings, less, last)
+    if of_few_commands(known):
+        findings = beside_stale(findings)
     findings = without.doubted(undone(findings, last))
     doubted = _doubted(findings, less, known)
     whole = [_with_all_starts(o, opened) for o in known]
@@ -324,7 +334,8 @@ def _concluded(
     after = [fitted.get(id(o.measurement), o) for o in opened]
     modelled = [r.modelled.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
     disturbed = [] if rest.moments else disturbed_notes(after)
-    noise = irregularity_notes(opened, [s.noise for s in modelled], model_file.model)
+    scatters = scatters_of(opened, [s.noise for s in modelled], model_file.model)
+    noise = irregularity_notes(opened, scatters)
     named = {name for f in findings for name in (f.effect, *(f.group or ()))}
     faint = [(name, why) for name, why in done.faint if name not in named]
     faint_names = [name for name, _ in faint]
@@ -343,6 +354,7 @@ def _concluded(
         noise,
         usual,
         disturbed,
+        max(scatters),
     )
     drives = drives_for(faint_names, _shown(done, faint), first.model.wheel_kind)
     same_clock = all(o.same_clock for o in known if o.floor)

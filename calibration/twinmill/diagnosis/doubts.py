@@ -347,8 +347,25 @@ def undone(found: Sequence[Finding], last: Trial) -> list[Finding]:
         size = np.linalg.norm(does[one]) * np.linalg.norm(does[other])
         if does[one] @ does[other] < -SETTINGS.undone * size:
             why = f"{one} and {other} undo much of each other: both may be one other effect"
-            found = [doubted(f, why) if f.effect in (one, other) else f for f in found]
+            both = _acts_by(one) & _acts_by(other)
+            on = next((group for group, words in BY.items() if words & both), "")
+            found = [
+                doubted(f, why, wrong_form=True, depends_on=on) if f.effect in (one, other) else f
+                for f in found
+            ]
     return list(found)
+
+
+def beside_stale(found: Sequence[Finding]) -> list[Finding]:
+    """Findings of logs of few commands, doubtful where numbers of the base were stale as well.
+
+    Each command tells a few steady speeds, which other numbers and another effect make as well.
+    """
+    if REFIT not in [f.effect for f in found]:
+        return list(found)
+    steady = {name for name, card in catalogue().items() if card["needs"] == "steady_speed"}
+    why = "at the few commands of these logs other numbers and another effect may do the same"
+    return [doubted(f, why) if f.effect in steady else f for f in found]
 
 
 def _change_by(last: Trial, instance: str) -> np.ndarray:

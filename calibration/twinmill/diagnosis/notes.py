@@ -53,14 +53,10 @@ def geometry_notes(model: native.Model) -> list[str]:
     return notes
 
 
-def irregularity_notes(
+def scatters_of(
     opened: Sequence[Opened], noises: Sequence[Noise | None], model: native.Model
-) -> list[str]:
-    """A sentence for each log that is far less regular than the model's noise says.
-
-    The floor of a log is what no smooth response to its commands follows. Where it is far above the
-    disturbance that the model file states, something is there that such a response cannot follow
-    either: play, joints between tiles, drop-outs, or more noise.
+) -> list[float]:
+    """How many times less regular each log is than the model's noise says; 0 where none is known.
 
     Args:
         opened: logs over their floors; tables have no noise.
@@ -68,17 +64,27 @@ def irregularity_notes(
         model: what it states of the disturbance was told by another log.
     """
     if model.get("noise.drive_mps") <= 0:
-        return []
-    notes = []
-    for own, noise in zip(opened, noises, strict=True):
-        ratio = irregularity(own, noise, model) if noise and own.data else 0.0
-        if ratio > SETTINGS.irregular:
-            notes.append(
-                f"{own.measurement.label}: the unexplained scatter is {ratio:.1f} times "
-                "the noise in the model file (more random disturbance, slipping wheels, "
-                "play in the gears or a rough floor may be)."
-            )
-    return notes
+        return [0.0] * len(opened)
+    return [
+        irregularity(own, noise, model) if noise and own.data else 0.0
+        for own, noise in zip(opened, noises, strict=True)
+    ]
+
+
+def irregularity_notes(opened: Sequence[Opened], scatters: Sequence[float]) -> list[str]:
+    """A sentence for each log that is far less regular than the model's noise says.
+
+    The floor of a log is what no smooth response to its commands follows. Where it is far above the
+    disturbance that the model file states, something is there that such a response cannot follow
+    either: play, joints between tiles, drop-outs, or more noise.
+    """
+    return [
+        f"{own.measurement.label}: the unexplained scatter is {scatter:.1f} times the noise in "
+        "the model file (more random disturbance, slipping wheels, play in the gears or a rough "
+        "floor may be)."
+        for own, scatter in zip(opened, scatters, strict=True)
+        if scatter > SETTINGS.irregular
+    ]
 
 
 def disturbed_notes(opened: Sequence[Opened]) -> list[str]:
@@ -144,8 +150,9 @@ def marker_notes(logs: Sequence[ModelledLog]) -> list[str]:
 def irregularity(own: Opened, noise: Noise, model: native.Model) -> float:
     """Floor of a log over what the sensor's noise and the model's disturbance make.
 
-    The largest of the three channels, each the geometric mean over horizons. The sensor's noise is
-    the log's own. A turn by the disturbance moves the robot sideways, by a third of its square.
+    The largest of the three channels, each the geometric mean over horizons, or at the longest
+    one: beside a noisy sensor a disturbance shows there alone. The sensor's noise is the log's own.
+    A turn by the disturbance moves the robot sideways, by a third of its square.
     """
     position, heading = (
         ChannelNoise(sensor, max(model.get(f"noise.{drive}"), least), model.get(f"noise.{memory}"))
@@ -161,4 +168,7 @@ def irregularity(own: Opened, noise: Noise, model: native.Model) -> float:
     with np.errstate(invalid="ignore"):
         over = np.log(own.floor.rms / usual)
     known = np.isfinite(over).any(axis=0)
-    return float(np.exp(np.nanmean(over[:, known], axis=0).max())) if known.any() else 0.0
+    if not known.any():
+        return 0.0
+    mean, last = np.nanmean(over[:, known], axis=0), np.nan_to_num(over[-1, known], nan=-np.inf)
+    return float(np.exp(max(mean.max(), last.max())))

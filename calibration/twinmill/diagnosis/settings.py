@@ -140,7 +140,8 @@ class Settings(Numbers):
     drifted: float = number(0.85, "share of the score that drifting gains leave, if stale")
     much: float = number(0.1, "share of the squared error that is much")
     worse: float = number(1.5, "score over the usual one, beyond which it is a finding")
-    irregular: float = number(2.2, "noise floor over the model's noise, beyond which it is said")
+    irregular: float = number(2.2, "noise floor over the model's noise, which is said ...")
+    random: float = number(3.0, "... and from which something random is there that was not")
 
     def stricter(self, times: float) -> "Settings":
         """The same with so many times the evidence."""

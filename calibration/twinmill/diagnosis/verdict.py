@@ -26,6 +26,7 @@ class VerdictInputs:
         noises: what was said of unusual noise.
         known: score that is no news: that of the model on the logs that it was fitted to.
         disturbed: what was said of stretches that are judged nowhere.
+        scatter: of the least regular log, over the noise that the model says.
     """
 
     score: float
@@ -39,6 +40,7 @@ class VerdictInputs:
     noises: Sequence[str]
     known: float
     disturbed: Sequence[str] = ()
+    scatter: float = 0.0
 
     @property
     def effects(self) -> list[Finding]:
@@ -57,6 +59,8 @@ class VerdictInputs:
             top = self.effects[0]
             return "ambiguous" if top.group else "effect_missing"
         if self._outside or self.rest.moments or (self.effects and self.score > MISSING):
+            return "outside_catalogue"
+        if self.scatter > SETTINGS.random:
             return "outside_catalogue"
         if self.effects:
             return "cannot_tell"
@@ -266,7 +270,7 @@ class VerdictInputs:
     def _outside_sentence(self) -> str:
         events = moments.sentence(self.rest.moments) if self.rest.moments else ""
         if events and not self._outside:
-            return f"Nothing is missing that acts all the time. {events}"
+            return f"What is missing acts at single moments alone. {events}"
         named = [_plain(f) for f in self.effects]
         named += ["a refit of the base"] if len(self.effects) < len(self.findings) else []
         also = f" Part of it is explained by {' and '.join(named)}." if named else ""

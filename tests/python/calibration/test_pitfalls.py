@@ -12,7 +12,14 @@ from scipy.signal import lfilter
 
 from twinmill.diagnosis import doubts
 from twinmill.diagnosis.diagnose import diagnose, first_state
-from twinmill.diagnosis.doubts import _faster, _wanders, beside_more, of_another_form, undone
+from twinmill.diagnosis.doubts import (
+    _faster,
+    _wanders,
+    beside_more,
+    beside_stale,
+    of_another_form,
+    undone,
+)
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.moments import _events
@@ -834,6 +841,30 @@ def test_effects_that_undo_each_other_are_doubtful(degrees, certainty, monkeypat
     found = [Finding(n, None, [], 0.4, "sure") for n in does]
     last = SimpleNamespace(state=SimpleNamespace(model=None))
     assert {f.certainty for f in undone(found, last)} == {certainty}
+
+
+def test_what_undoes_each_other_is_one_of_another_form_by_what_both_act_by(monkeypatch):
+    """A wind on a fin turns the robot to one heading, which a compass and a slope imitate."""
+    does = {"compass_deviation": (3.0, 0.0), "floor_tilt": (-2.0, 1.0)}
+    monkeypatch.setattr(doubts, "newest_instance", lambda _, name: name)
+    monkeypatch.setattr(doubts, "_change_by", lambda _, name: np.array(does[name]))
+    found = [Finding(n, None, [], 0.4, "sure") for n in does]
+    judged = undone(found, SimpleNamespace(state=SimpleNamespace(model=None)))
+    assert all(f.wrong_form and f.depends_on == "heading" for f in judged)
+
+
+@pytest.mark.parametrize(
+    ("effect", "stale", "certainty"),
+    [
+        ("yaw_lever", True, "doubtful"),  # both change steady turns, which two arcs tell twice
+        ("yaw_lever", False, "sure"),
+        ("motor_lag", True, "sure"),  # changes tell it, however few commands there are
+    ],
+)
+def test_beside_stale_numbers_few_commands_tell_no_steady_effect(effect, stale, certainty):
+    found = [Finding(effect, None, [], 0.2, "sure")]
+    found += [Finding(REFIT, None, [], 0.8, "sure")] if stale else []
+    assert beside_stale(found)[0].certainty == certainty
 
 
 def _loss(effect: str, size: float, *when_s: float) -> Finding:

@@ -125,6 +125,35 @@ def test_a_floor_as_the_noise_makes_it_is_regular_and_one_three_times_as_high_is
         assert (found > SETTINGS.irregular) == (times > 1)
 
 
+def test_what_grows_beside_a_noisy_sensor_shows_at_the_longest_horizon():
+    """A sensor of 5 mm hides what is five times the disturbance, but for the last horizon."""
+    model = native.Model.load("turbopi.toml")
+    position, heading = (
+        ChannelNoise(s, model.get(f"noise.{d}"), model.get(f"noise.{m}"))
+        for s, d, m in ((5e-3, "drive_mps", "drive_s"), (2e-3, "drive_radps", "drive_turn_s"))
+    )
+    along, turn = (np.sqrt(c.displaced(np.array(HORIZONS_S))) for c in (position, heading))
+    more = replace(position, drive=5 * position.drive)
+    ahead = np.sqrt(more.displaced(np.array(HORIZONS_S)))
+    data = SimpleNamespace(measured=np.zeros((10, len(HORIZONS_S), 3)))
+    own = SimpleNamespace(
+        data=data, floor=SimpleNamespace(rms=np.column_stack([ahead, along, turn]))
+    )
+    found = irregularity(own, Noise(position, heading), model)
+    assert found == pytest.approx(ahead[-1] / along[-1])
+    assert np.exp(np.log(ahead / along).mean()) < SETTINGS.irregular < found
+
+
+@pytest.mark.parametrize(("scatter", "verdict"), [(2.5, "cannot_tell"), (4.0, "outside_catalogue")])
+def test_scatter_far_beyond_the_models_noise_is_something_random(scatter, verdict):
+    noise = ["the unexplained scatter is far above the noise"]
+    weighed = VerdictInputs(
+        1.1, 1.1, 1.1, 1.1, [], Rest(1.0, False, []), [], [], noise, 1.0, (), scatter
+    )
+    assert weighed.verdict == verdict
+    assert ("random" in weighed.sentence) == (scatter > 3)
+
+
 def test_a_round_wheel_is_not_named_for_what_an_oval_one_does():
     """The same formula of another wheel is another formula; errors follow the left one's."""
     left, right, noise = np.random.default_rng(4).normal(size=(3, 800))
