@@ -9,7 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-HORIZON = 1  # number of the windows' horizon that is short beside a period
+# Numbers of the windows' horizons: one is short beside a quick period, one far above the noise.
+HORIZONS = (1, 2)
 BIN_S = 0.05
 PADDED = 4  # times as many bins, so that a line between two is seen
 SHORTEST_S = 0.5  # period

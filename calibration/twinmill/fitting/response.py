@@ -23,7 +23,7 @@ from scipy.linalg import lapack
 
 from twinmill.filters import filtered
 from twinmill.fitting import wheel_angles
-from twinmill.fitting.beat import HORIZON as BEAT_HORIZON
+from twinmill.fitting.beat import HORIZONS as BEAT_HORIZONS
 from twinmill.fitting.beat import beat_radps
 from twinmill.fitting.boosting import Learner, Parts, boosted
 from twinmill.fitting.dependence import Features, Motion
@@ -352,20 +352,23 @@ class Response:
 
     def find_beat(self) -> None:
         """At what rate errors of its gains, pushes along its axes or along the room's swing."""
-        there = self.ends[:, BEAT_HORIZON] >= 0
-        errors = self.across[there, BEAT_HORIZON] / np.maximum(self.errors[BEAT_HORIZON], 1e-12)
-        made = (self.data.measured - self.across)[there, BEAT_HORIZON]
-        errors, made = np.nan_to_num(errors).T, np.nan_to_num(made).T
+        there = (self.ends[:, BEAT_HORIZONS] >= 0).all(axis=1)
         at = self.starts[there]
-        c, s = np.cos(self.heading_rad[at]), np.sin(self.heading_rad[at])
-        room = (c * errors[0] - s * errors[1], s * errors[0] + c * errors[1])
-        gains = errors * made / np.maximum(made.std(axis=1, keepdims=True), 1e-12)
+        swings, done = [], [*self.pose[at, :2].T]
+        for horizon in BEAT_HORIZONS:
+            errors, made = self._at_horizon(horizon, there)
+            swings += _swings(errors, made, self.heading_rad[at])
+            done += [*made, *np.abs(made)]
         moved = self.moved
-        rolled = [wave for w in self.wheels for wave in w.waves(moved)[at].T]
-        turned = [f(n * self.heading_rad[at]) for f in (np.cos, np.sin) for n in (1, 2, 4)]
-        done = [*made, *np.abs(made), *turned, *self.pose[at, :2].T, *rolled]
-        swings = [*errors, *room, *gains, gains.sum(axis=0)]
+        done += [wave for w in self.wheels for wave in w.waves(moved)[at].T]
+        done += [f(n * self.heading_rad[at]) for f in (np.cos, np.sin) for n in (1, 2, 4)]
         self.beat_radps = beat_radps(self.data.start_s[there], swings, done)
+
+    def _at_horizon(self, horizon: int, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(3, W) errors over their size, and displacements that were predicted, of some windows."""
+        errors = self.across[there, horizon] / np.maximum(self.errors[horizon], 1e-12)
+        made = (self.data.measured - self.across)[there, horizon]
+        return np.nan_to_num(errors).T, np.nan_to_num(made).T
 
     def boost(self, groups: Sequence[Features]) -> None:
         """Adds what is left and left-out blocks agree on, a group of features at a time."""
@@ -536,6 +539,20 @@ class Response:
             out[own] = np.where((self.ends[own] >= 0)[..., None], out[own], np.nan)
         out[~np.isfinite(self.data.measured)] = np.nan
         return out
+
+
+def _swings(errors: np.ndarray, made: np.ndarray, heading_rad: np.ndarray) -> list[np.ndarray]:
+    """(W,) each: errors along the robot's axes, along the room's, and of its gains.
+
+    Args:
+        errors: (3, W).
+        made: (3, W) displacements that were predicted.
+        heading_rad: (W,).
+    """
+    c, s = np.cos(heading_rad), np.sin(heading_rad)
+    room = (c * errors[0] - s * errors[1], s * errors[0] + c * errors[1])
+    gains = errors * made / np.maximum(made.std(axis=1, keepdims=True), 1e-12)
+    return [*errors, *room, *gains, gains.sum(axis=0)]
 
 
 def _only(part: int, group: Features) -> Features:

@@ -28,6 +28,23 @@ def test_a_regulator_that_hunts_is_told_with_its_rate(tanh_robot, measure, one_c
     assert opened.floor.response.beat_radps == pytest.approx(rate_radps, abs=2 * np.pi / 60 / 4)
 
 
+def test_a_slow_swing_beside_a_noisy_sensor_is_told(tanh_robot, measure, one_clock_base):
+    """All wheels are quicker and slower by 3 % with a period of 5.6 s; poses err by 3 mm."""
+    rate_radps, random = 2 * np.pi / 5.6, np.random.default_rng(7)
+
+    class Pulsing(tanh_robot):
+        def wheels_mps(self, duty):
+            swing = 0.03 * np.sin(rate_radps * np.arange(len(duty)) * STEP_S)
+            return super().wheels_mps(duty) * (1 + swing)[:, None]
+
+    def noisy(pose, valid):
+        return pose + random.normal(size=pose.shape) * [3e-3, 3e-3, 0.0], valid
+
+    run = measure(Pulsing(), 53, 100.0, spoil=noisy)
+    (opened,) = open_measurements([run], one_clock_base)
+    assert opened.floor.response.beat_radps == pytest.approx(rate_radps, abs=2 * np.pi / 100 / 4)
+
+
 def test_a_fan_that_swings_slowly_is_told(tanh_robot, measure, one_clock_base):
     """It pushes along the room by up to 20 mm/s, with a period of 17 s."""
     direction, rate_radps = 0.7, 2 * np.pi / 17
