@@ -30,6 +30,7 @@ from twinmill.model.parameters import (
     effect_names,
     lasts_for_a_while,
     late_part,
+    needing,
     newest_instance,
     with_role,
 )
@@ -434,6 +435,18 @@ def _heading_is_late(finding: Finding, found: Sequence[Finding], rest: Rest) -> 
     return doubted(finding, why, wrong_form=True, depends_on=CHANGE)
 
 
+def _is_of_an_uneven_wheel(
+    finding: Finding, found: Sequence[Finding], rest: Rest
+) -> Finding | None:
+    """A wheel is weak, and errors follow the angle of one: a flat place does both."""
+    uneven = any(group.startswith("angle of") for group in rest.depends_on)
+    uneven |= any(f.effect in needing("wheel_angle") for f in found)
+    if finding.effect != "wheel_gain" or not uneven:
+        return None
+    why = "errors follow the angle of a wheel, and one with a flat place rolls less far as well"
+    return doubted(finding, why, wrong_form=True)
+
+
 def _comes_and_goes(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
     """Losses come at several times, or as large ones at a place and at a moment."""
     losses = _alike_losses(found)
@@ -485,6 +498,7 @@ def _is_second(finding: Finding, found: Sequence[Finding], rest: Rest) -> Findin
 FORM_RULES = (
     _swings,
     _heading_is_late,
+    _is_of_an_uneven_wheel,
     _comes_and_goes,
     _is_some_moments,
     _leaves_its_own,

@@ -19,7 +19,8 @@ NEIGHBOURS = 24  # lines on either side, whose median tells the noise
 # Times the mean of a power that is noise: of noise one in 65 million is larger (exponential), and a
 # log has some thousand that are independent.
 BEYOND_CHANCE = 18.0
-IN_THE_DRIVE = 6.0  # the same of what the robot did
+IN_THE_DRIVE = 6.0  # the same of what the robot did ...
+FAR_BEYOND_THE_DRIVE = 10.0  # ... unless the errors' line is so many times as far above its noise
 
 
 def beat_radps(t_s: np.ndarray, errors: Sequence[np.ndarray], done: Sequence[np.ndarray]) -> float:
@@ -39,7 +40,7 @@ def beat_radps(t_s: np.ndarray, errors: Sequence[np.ndarray], done: Sequence[np.
     power, of_drive = (
         np.max([_over_noise(bins, signal) for signal in every], axis=0) for every in (errors, done)
     )
-    power *= asked & (of_drive < IN_THE_DRIVE)
+    power *= asked & (of_drive < np.maximum(IN_THE_DRIVE, power / FAR_BEYOND_THE_DRIVE))
     best = int(np.argmax(power))
     return float(2 * np.pi * rate_hz[best]) if power[best] > BEYOND_CHANCE else 0.0
 

@@ -72,3 +72,14 @@ def test_what_the_drive_makes_swing_is_no_beat():
     errors, drive = line + random.normal(size=len(t_s)), random.normal(size=len(t_s))
     assert beat_radps(t_s, [errors], [drive]) == pytest.approx(2 * np.pi * 0.8, abs=0.02)
     assert beat_radps(t_s, [errors], [drive, line + 0.5 * drive]) == 0.0
+
+
+def test_a_line_far_stronger_than_that_of_the_drive_is_no_work_of_the_drive():
+    """A camera sways by 20 times the noise, and the robot's steps have a faint line there."""
+    random, t_s = np.random.default_rng(8), np.arange(0, 90, 0.05)
+    line = np.sin(2 * np.pi * 0.4 * t_s)
+    drive = 0.3 * line + random.normal(size=len(t_s))
+    for strength, rate_hz in ((0.3, 0.0), (20.0, 0.4)):
+        errors = strength * line + random.normal(size=len(t_s))
+        found = beat_radps(t_s, [errors], [drive]) / (2 * np.pi)
+        assert found == pytest.approx(rate_hz, abs=0.01)

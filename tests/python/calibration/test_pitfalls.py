@@ -843,6 +843,22 @@ def test_effects_that_undo_each_other_are_doubtful(degrees, certainty, monkeypat
     assert {f.certainty for f in undone(found, last)} == {certainty}
 
 
+@pytest.mark.parametrize(
+    ("beside", "depends_on", "certainty"),
+    [
+        ([], [], "sure"),
+        ([], ["angle of the first wheel"], "doubtful"),
+        (["wheel_eccentricity"], [], "doubtful"),
+        (["marker_offset"], ["time"], "sure"),
+    ],
+)
+def test_a_wheel_with_a_flat_place_is_not_surely_weak(beside, depends_on, certainty):
+    """It rolls less far in all, and more so at some of its angles."""
+    found = [Finding(n, None, [], 0.4, "sure") for n in ("wheel_gain", *beside)]
+    weak, *_ = of_another_form(found, Rest(0.1, False, depends_on))
+    assert weak.certainty == certainty
+
+
 def test_what_undoes_each_other_is_one_of_another_form_by_what_both_act_by(monkeypatch):
     """A wind on a fin turns the robot to one heading, which a compass and a slope imitate."""
     does = {"compass_deviation": (3.0, 0.0), "floor_tilt": (-2.0, 1.0)}
