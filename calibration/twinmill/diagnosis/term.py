@@ -27,6 +27,8 @@ NO_NAMES = {
     "travel",
     "aside",
     "spot",
+    "lean",
+    "dv",
     "wheel_rad",
     "wheel_radps",
 } | {f"after_{event}" for event in ("reversal", "start", "rise")}

@@ -110,6 +110,7 @@ def dependences(motion: Motion) -> Iterator[Features]:
     for gain in (always, *motion.where):
         yield _crossed(motion, gain)
     yield from _curves(motion)
+    yield _leans(motion)
     yield from _events(motion)
 
 
@@ -221,6 +222,37 @@ def _curves(motion: Motion) -> Iterator[Features]:
     forward, left, turning = motion.velocity.T[..., None]
     yield spin * forward, spin * left, speed * turning
     yield spin, spin, np.hstack([speed, speed * np.sign(base[:, :1])])
+
+
+def _leans(motion: Motion) -> Features:
+    """A marker that stands off by the acceleration, as on a mast that bends."""
+    base, step_s = motion.base, motion.step_s
+    leans = (in_curves(base, step_s), while_speeding_up(base, step_s))
+    moved = np.stack([led_by(lean, base, step_s) for lean in leans], axis=-1)
+    return moved[:, 0], moved[:, 1], np.zeros((len(base), 0))
+
+
+def in_curves(velocity: np.ndarray, step_s: np.ndarray) -> np.ndarray:
+    """(N, 2) m/s^2 by which a body of (N, 3) velocity is led round, in its axes."""
+    ahead, left, turn = velocity.T
+    return np.column_stack([-turn * left, turn * ahead])
+
+
+def while_speeding_up(velocity: np.ndarray, step_s: np.ndarray) -> np.ndarray:
+    """(N, 2) m/s^2 by which the speeds of a body change, in its axes."""
+    return _rates(velocity[:, :2], step_s)
+
+
+def led_by(off: np.ndarray, velocity: np.ndarray, step_s: np.ndarray) -> np.ndarray:
+    """(N, 2) velocity of a point whose place in the body's axes, (N, 2) `off`, changes."""
+    turn = velocity[:, 2]
+    return _rates(off, step_s) + np.column_stack([-turn * off[:, 1], turn * off[:, 0]])
+
+
+def _rates(values: np.ndarray, step_s: np.ndarray) -> np.ndarray:
+    """(N, k) of (N, k) per second; 0 where a stretch begins."""
+    change = np.diff(values, axis=0, prepend=values[:1])
+    return np.where(step_s[:, None] > 0, change / np.maximum(step_s, 1e-9)[:, None], 0.0)
 
 
 def _events(motion: Motion) -> Iterator[Features]:

@@ -61,6 +61,15 @@ def led_aside(motion: np.ndarray) -> np.ndarray:
     return kept
 
 
+def leaning(motion: np.ndarray) -> np.ndarray:
+    """A marker on a soft mast stands off by 20 mm for each m/s^2 with which a curve pulls."""
+    kept, turn = motion.copy(), motion[:, 2]
+    off_m = 0.02 * np.column_stack([turn * motion[:, 1], -turn * motion[:, 0]])
+    kept[:, :2] += np.gradient(off_m, STEP_S, axis=0)
+    kept[:, :2] += np.column_stack([-turn * off_m[:, 1], turn * off_m[:, 0]])
+    return kept
+
+
 def shaking(motion: np.ndarray) -> np.ndarray:
     """Near 0.29 m/s, whatever the direction, the frame shakes, and it veers left by 0.12 rad/s."""
     kept, travel = motion.copy(), np.hypot(motion[:, 0], motion[:, 1])
@@ -77,6 +86,7 @@ def shaking(motion: np.ndarray) -> np.ndarray:
         (blown, "heading"),
         (led_aside, "heading"),
         (shaking, "speed"),
+        (leaning, "coupling of the axes"),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )

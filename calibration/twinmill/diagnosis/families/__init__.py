@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinmill.diagnosis.families.family import Family
+from twinmill.diagnosis.families.of_leaning import of_leaning
 from twinmill.diagnosis.families.of_past import of_past
 from twinmill.diagnosis.families.of_room import of_course, of_places, of_pushes
 from twinmill.diagnosis.families.of_speed import across_axes, of_speed
@@ -36,6 +37,7 @@ def families_of(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> l
         *(of_speed(k, np.abs(moving[:, k])) for k in axes),
         *across_axes(moving),
         *(of_past(k, max(float(np.std(moving[:, k])), STILL[k])) for k in axes),
+        *of_leaning(opened, velocities),
         *of_places(pose[:, :2]),
         *of_pushes(),
         *(of_course(n) for n in COURSES),

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A marker that leans with the body, or on its mast, out of curves and back as the robot speeds up.
+
+It stands off by a length in proportion to the acceleration: there is no velocity of its own, but as
+long as the acceleration changes.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from twinmill.diagnosis.families.family import MOST, Family
+from twinmill.diagnosis.term import CHANGE, CHANNELS, COUPLING, TYPICAL, Term
+from twinmill.fitting.dependence import in_curves, led_by, while_speeding_up
+from twinmill.fitting.opening import Opened
+
+
+def of_leaning(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> list[Family]:
+    """In curves, and while the speed changes.
+
+    Args:
+        opened: logs over their floors.
+        velocities: (N, 3) of the body in each, m/s and rad/s, at the points of its response.
+    """
+    kinds = ((COUPLING, "lean(omega*v)", in_curves), (CHANGE, "lean(dv)", while_speeding_up))
+    found = []
+    for group, text, lean in kinds:
+        moved = [
+            led_by(lean(v, o.floor.response.step_s), v, o.floor.response.step_s)
+            for o, v in zip(opened, velocities, strict=True)
+        ]
+        size = float(np.quantile(np.abs(np.concatenate(moved)), MOST))
+        if size > 1e-9:
+            found.append(_leaning(Term(group, CHANNELS[1], text, size, text), lean))
+    return found
+
+
+def _leaning(term: Term, lean: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Family:
+    def values(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
+        step_s = own.floor.response.step_s
+        moved = TYPICAL[term.adds_to] / term.size * led_by(lean(velocity, step_s), velocity, step_s)
+        return {0: moved[:, [0]], 1: moved[:, [1]]}
+
+    return Family([term], values)
