@@ -118,9 +118,9 @@ def _with_stale_lag(diagnosis: Diagnosis) -> Diagnosis:
     if stale is None or LAG not in {p.name for p in stale.parameters}:
         return diagnosis
     last, named = diagnosis.search.last, {f.effect for f in diagnosis.findings}
-    for name in diagnosis.search.found:
+    for name in [n for n in diagnosis.search.found if n not in named]:
         is_new = "#" not in newest_instance(last.state.model, name)
-        if name not in named and (is_new or late_part(name)):
+        if is_new or late_part(name):
             last = without_effect(last, name) or last
     model = last.state.model
     told = base_lag_is_identifiable(model)
