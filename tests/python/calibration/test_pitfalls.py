@@ -292,6 +292,25 @@ def test_a_stale_lag_is_written_as_a_lag(tanh_robot, measure, fitted, tmp_path):
     assert found.after.score < found.diagnosis.before.score
 
 
+def test_stale_gains_beside_a_stale_lag_are_written_as_both(tanh_robot, measure, fitted, tmp_path):
+    """A sheet of numbers that no log told: turning is 10 % off, and the lag 8 ms."""
+    robot = tanh_robot()
+    lines = Path(fitted.path).read_text().splitlines()
+    kept = "\n".join(lines[: lines.index("[base.std]")])
+    told = "\n".join(line for line in kept.splitlines() if not line.startswith("fitted_on"))
+    sheet = tmp_path / "sheet.toml"
+    sheet.write_text(f"{told}\n[clock]\nsame = true\n")
+    off = ModelFile.load(str(sheet))
+    off.model.set("base.yaw_gain", 0.9 * off.model.get("base.yaw_gain"))
+    run = measure(replace(robot, lag_s=robot.lag_s + 0.008), 12, 60.0)
+    found = explain([run], off, out=tmp_path / "explained.toml", command="test")
+    assert found.diagnosis.search.found[0] == REFIT and len(found.diagnosis.search.found) == 2
+    assert [f.effect for f in found.diagnosis.findings] == [REFIT]
+    model = ModelFile.load(str(found.path)).model
+    assert not model.effects
+    assert model.get("base.motor_lag_s") == pytest.approx(robot.lag_s + 0.008, abs=0.004)
+
+
 def test_a_heading_that_comes_late_is_no_slip(tanh_robot, measure, fitted):
     """A tracker that smooths the heading alone: 40 ms. Curves seem to drift to the inside."""
 
