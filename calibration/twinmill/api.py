@@ -594,7 +594,7 @@ class Model(Shown):
             effect: name from the catalogue; of one robot also `gains`.
             log: what it is fitted to.
             robot: number of the robot that alone has it; by default all have.
-            texts: of the effect `equation`: adds_to, formula and state_rate.
+            texts: of the effect `equation`: adds_to, formula, state_rate and second_rate.
 
         Returns:
             Scores without and with the effect, and the new model.

@@ -12,18 +12,19 @@ namespace
 
 const std::vector<double> kNeutral{0, 0, 0, 0};
 
-Alone Formula(const std::string &adds_to, const std::string &formula, const std::string &rate = "")
+Alone Formula(const std::string &adds_to, const std::string &formula, const std::string &rate = "",
+              const std::string &second_rate = "")
 {
-    const std::vector<std::string> texts{adds_to, formula, rate};
+    const std::vector<std::string> texts{adds_to, formula, rate, second_rate};
     return Alone(BoundEffect(*FindEffect("equation"), kNeutral, texts));
 }
 
 std::string Complaint(const std::string &adds_to, const std::string &formula,
-                      const std::string &rate = "")
+                      const std::string &rate = "", const std::string &second_rate = "")
 {
     try
     {
-        Formula(adds_to, formula, rate);
+        Formula(adds_to, formula, rate, second_rate);
     }
     catch (const std::invalid_argument &error)
     {
@@ -33,9 +34,13 @@ std::string Complaint(const std::string &adds_to, const std::string &formula,
 }
 
 Model WithFormula(const std::string &adds_to, const std::string &formula,
-                  const std::vector<double> &values, const std::string &rate = "", Model model = {})
+                  const std::vector<double> &values, const std::string &rate = "", Model model = {},
+                  const std::string &second_rate = "")
 {
-    model.AddEffect("equation", {{"adds_to", adds_to}, {"formula", formula}, {"state_rate", rate}});
+    model.AddEffect("equation", {{"adds_to", adds_to},
+                                 {"formula", formula},
+                                 {"state_rate", rate},
+                                 {"second_rate", second_rate}});
     for (size_t i = 0; i < values.size(); ++i)
         model.effects.back().parameters[i].value = values[i];
     return model;
@@ -105,6 +110,43 @@ TEST(Equation, IntegratesAStiffStateExactly)
     }
 }
 
+// A step answered by an underdamped oscillator of w = 8 rad/s and z = 0.2, by its textbook solution
+// (Franklin et al. 2010, sec. 3.3), at steps of the plant up to a third of its period.
+TEST(Equation, SwingsWithTwoStatesAsTheTextbookSays)
+{
+    constexpr double kW = 8, kZ = 0.2, kFor_s = 1.4;
+    const double wd = kW * std::sqrt(1 - kZ * kZ), fade = std::exp(-kZ * kW * kFor_s);
+    const double rate_mps2 = kFull_mps * kW * kW / wd * fade * std::sin(wd * kFor_s);
+    const double left_mps =
+        kFull_mps * fade * (std::cos(wd * kFor_s) + kZ * kW / wd * std::sin(wd * kFor_s));
+    // Of s'' = w^2 (v - s) - 2 z w s' integrated: the way that s lags behind.
+    const double behind_m = (2 * kZ * kW * (kFull_mps - left_mps) + rate_mps2) / (kW * kW);
+    for (const double step_s : {0.002, 0.02, 0.28})
+    {
+        Player player(WithFormula("vx_mps", "p0*(s - vx)", {1}, "r", {}, "64*(vx - s) - 3.2*r"),
+                      step_s);
+        player.Play(kForward, kFor_s);
+        EXPECT_NEAR(player.state.pose.x_m, kFull_mps * kFor_s - behind_m, 1e-8) << step_s;
+    }
+}
+
+// Two lags in a row are two states, too, and a stiff one among them.
+TEST(Equation, RelaxesWithTwoStatesAsTheEffectOfTwoLagsDoes)
+{
+    Model lagging;
+    lagging.base.motor_lag_s = 0.1;
+    Player two(WithFormula("rim_mps", "p0*(r - target)", {1}, "(target - s)/0.05", lagging,
+                           "(s - r)/0.0001"),
+               0.02);
+    lagging.AddEffect("second_order_lag", {});
+    lagging.effects.back().parameters[0].value = 0.05;
+    Player effect(lagging, 0.02);
+    PlayMedley(two);
+    PlayMedley(effect);
+    EXPECT_NEAR(two.state.pose.x_m, effect.state.pose.x_m, 2e-4);
+    EXPECT_NEAR(two.state.pose.theta_rad, effect.state.pose.theta_rad, 2e-3);
+}
+
 TEST(Equation, KeepsAStateWhoseRateHasNoValue)
 {
     Player player(WithFormula("vx_mps", "p0*(1 + s)", {0.1}, "1/vy"), 0.02);
@@ -146,6 +188,27 @@ TEST(Equation, PushesAlongTheRoomWhereverTheRobotLooks)
         EXPECT_NEAR(c * ahead - si * left, 0.05, 1e-12);
         EXPECT_NEAR(si * ahead + c * left, 0.6, 1e-12);
     }
+}
+
+// A marker that sways is driven by the robot's velocity in the room: along x and along y it does
+// what it does along one axis, whichever way the robot looks.
+TEST(Equation, KeepsStatesAlongEachAxisOfTheRoom)
+{
+    const std::string x = "(vx*cos(theta) - vy*sin(theta))", y = "(vx*sin(theta) + vy*cos(theta))";
+    const std::string swing = "49*(VX - s) - 1.4*r, 49*(VY - s) - 1.4*r";
+    const auto placed = [&](std::string text) {
+        text.replace(text.find("VX"), 2, x);
+        return text.replace(text.find("VY"), 2, y);
+    };
+    Player along(WithFormula("vx_mps", "p0*(s - vx)", {0.5}, "r", {}, "49*(vx - s) - 1.4*r"), 0.02);
+    Player room(WithFormula("room_mps", placed("p0*(s - VX), p1*(s - VY)"), {0.5, 0.5}, "r", {},
+                            placed(swing)),
+                0.02);
+    room.state.pose.theta_rad = 0.9;
+    for (Player *player : {&along, &room})
+        player->Play(kForward, 0.7);
+    EXPECT_NEAR(room.state.pose.x_m, along.state.pose.x_m * std::cos(0.9), 1e-12);
+    EXPECT_NEAR(room.state.pose.y_m, along.state.pose.x_m * std::sin(0.9), 1e-12);
 }
 
 TEST(Equation, MovesTheCapturedHeadingAndBack)
@@ -244,6 +307,10 @@ TEST(Equation, SaysWhatIsWrongWithAState)
     EXPECT_NE(Complaint("duty", "p0*s", "u - s").find("rim_mps"), std::string::npos);
     EXPECT_NE(Complaint("theta_rad", "p0*s", "x - s").find("no state"), std::string::npos);
     EXPECT_NE(Complaint("vx_mps", "p0*s").find("'s'"), std::string::npos);
+    EXPECT_NE(Complaint("vx_mps", "p0*r", "vx - s").find("'r'"), std::string::npos);
+    for (const char *word : {"equation.second_rate", "'omga'", "'omega'", "letter 3"})
+        EXPECT_NE(Complaint("vx_mps", "p0*s", "r", "s*omga").find(word), std::string::npos) << word;
+    EXPECT_NE(Complaint("vx_mps", "p0*vx", "", "vx - r").find("state_rate"), std::string::npos);
 }
 
 TEST(Equation, ComparesWithoutAssigning)

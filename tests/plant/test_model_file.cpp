@@ -248,7 +248,7 @@ TEST(ModelFile, ReadsFormulasAndNarrowerBounds)
     Model model = Parse(
         "[[effect]]\nname = \"equation\"\nadds_to = \"vy_mps\"\nformula = \"p0*vx\"\n"
         "p0 = 0.5\nbounds = { p0 = [-1, 1] }");
-    EXPECT_EQ(model.effects[0].texts, (std::vector<std::string>{"vy_mps", "p0*vx", ""}));
+    EXPECT_EQ(model.effects[0].texts, (std::vector<std::string>{"vy_mps", "p0*vx", "", ""}));
     model.Set("equation.p0", 1);
     EXPECT_THROW(model.Set("equation.p0", 1.1), std::invalid_argument);
     model.Set("equation.p1", 1.1);
@@ -263,7 +263,7 @@ TEST(ModelFile, AddsAnEffectWithTextsOrWithItsOwn)
 {
     Model model;
     model.AddEffect("equation", {{"formula", "p0*vy"}});
-    EXPECT_EQ(model.effects[0].texts, (std::vector<std::string>{"vx_mps", "p0*vy", ""}));
+    EXPECT_EQ(model.effects[0].texts, (std::vector<std::string>{"vx_mps", "p0*vy", "", ""}));
     EXPECT_THROW(model.AddEffect("equation", {{"formula", "p0*"}}), std::invalid_argument);
     EXPECT_THROW(model.AddEffect("equation", {{"formla", "p0"}}), std::invalid_argument);
     EXPECT_THROW(model.AddEffect("dead_zone", {{"formula", "p0"}}), std::invalid_argument);

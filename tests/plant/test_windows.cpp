@@ -181,6 +181,13 @@ TEST(Windows, BeginWithWhatTheGroundRemembers)
     ASSERT_TRUE(DriveChain(model).RemembersOnGround());
     ExpectNear(PredictWindows(model, run.track(), run.starts, run.ends), OneByOne(model, run),
                1e-4);
+    model.AddEffect("equation", {{"adds_to", "vx_mps"},
+                                 {"formula", "p0*(s - vx)"},
+                                 {"state_rate", "r"},
+                                 {"second_rate", "64*(vx - s) - 1.6*r"}});
+    model.effects.back().parameters[0].value = 0.5;
+    ExpectNear(PredictWindows(model, run.track(), run.starts, run.ends), OneByOne(model, run),
+               1e-4);
 }
 
 // Parameters of wheels, of the ground, of what is seen and of the clock.

@@ -21,6 +21,18 @@ EQUATIONS = {
         "formula": "p0*s*target",
         "state_rate": "(u*u - s)/60",
     },
+    "overshoot": {
+        "adds_to": "rim_mps",
+        "formula": "p0*(s - target) + p1*r",
+        "state_rate": "r",
+        "second_rate": "9.98*9.98*(target - s) - 2*0.101*9.98*r",
+    },
+    "springy_turn": {
+        "adds_to": "omega_radps",
+        "formula": "p0*(s - omega)",
+        "state_rate": "r",
+        "second_rate": "13.9*13.9*(omega - s) - 2*0.183*13.9*r",
+    },
     "tiles": {"adds_to": "travel", "formula": "p0*cos(9.9*x) + p1*sin(9.9*x)"},
     "grooves": {"adds_to": "aside", "formula": "p0*cos(2*course) + p1*sin(2*course)"},
     "slack_duty": {"adds_to": "duty", "formula": "left > 0 && u > 0 ? p0*u*abs(u) : 0"},
@@ -75,10 +87,11 @@ def test_what_is_written_compiles_and_is_listed(name, copy, model):
     assert f"TEST({title}, " in (copy / f"tests/effects/test_{name}.cpp").read_text()
 
 
-def test_the_written_test_compiles(copy, model):
-    words = ["effects", "new", "stored_turn", "--from", str(model(EQUATIONS["stored_turn"]))]
+@pytest.mark.parametrize("name", ["stored_turn", "overshoot"])
+def test_the_written_test_compiles(name, copy, model):
+    words = ["effects", "new", name, "--from", str(model(EQUATIONS[name]))]
     run([*words, "--into", str(copy)])
-    compiles(copy / "tests/effects/test_stored_turn.cpp", copy)
+    compiles(copy / f"tests/effects/test_{name}.cpp", copy)
 
 
 @pytest.mark.parametrize(

@@ -125,6 +125,10 @@ def _add(
         str | None,
         typer.Option("--state-rate", help="Of an equation: ds/dt of the state s that it names."),
     ] = None,
+    second_rate: Annotated[
+        str | None,
+        typer.Option("--second-rate", help="Of an equation: dr/dt of a second state r."),
+    ] = None,
     hold: Hold = None,
     robot: Annotated[
         int | None,
@@ -141,7 +145,8 @@ def _add(
     """
     gains = robot is not None and effect == OWN_GAINS
     known = {} if gains else {t["name"]: t["default"] for t in find_effect(effect)["texts"]}
-    texts = {"adds_to": adds_to, "formula": formula, "state_rate": state_rate}
+    rates = {"state_rate": state_rate, "second_rate": second_rate}
+    texts = {"adds_to": adds_to, "formula": formula, **rates}
     texts = {name: text for name, text in texts.items() if text is not None}
     if extra := [name for name in texts if name not in known]:
         raise ValueError(

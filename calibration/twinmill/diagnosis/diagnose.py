@@ -51,6 +51,7 @@ from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.search import search
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.stopped import Course
+from twinmill.diagnosis.taking import tuned
 from twinmill.diagnosis.ties import instead_of_drift
 from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, without_effect
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
@@ -325,6 +326,11 @@ def _concluded(
         whole=whole,
         without=doubted,
     )
+    if rest.proven and rest.proven.is_late:
+        late = [f.effect for f in findings if f.effect in needing("changes")]
+        instead = None if rest.proven.instead_of else _without(late, less, known)
+        better = (instead and instead.formula(last.fit)) or rest.proven
+        rest = replace(rest, proven=tuned(last.fit, better))
     findings = beside_more(of_another_form(findings, rest), rest)
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
@@ -406,7 +412,14 @@ def _doubted(
     findings: Sequence[Finding], less: dict[str, Trial], known: Sequence[Opened]
 ) -> Doubted | None:
     """The effects that are in doubt, and the fit without them."""
-    names = tuple(f.effect for f in findings if f.effect in less and f.certainty == "doubtful")
+    return _without([f.effect for f in findings if f.certainty == "doubtful"], less, known)
+
+
+def _without(
+    effects: Sequence[str], less: dict[str, Trial], known: Sequence[Opened]
+) -> Doubted | None:
+    """Those of some effects that were fitted, and the fit without them."""
+    names = tuple(name for name in effects if name in less)
     if not names:
         return None
     trial = less[names[0]]

@@ -2,18 +2,21 @@
 """Forms that a formula for what is left may have: where it acts, on what it depends, what it keeps.
 
 A form is linear in its numbers. It may have one constant besides (a time, a length, a wave number),
-and one state, which relaxes: ds/dt = rate (goal - s). How the rows of a fit change by it follows
-from the predicted motion, without a pass of the plant.
+and one state, which relaxes: ds/dt = rate (goal - s). Or its state swings, with its rate of change
+as a second one: ds/dt = r, dr/dt = w^2 (goal - s) - 2 z w r. How the rows of a fit change by it
+follows from the predicted motion, without a pass of the plant.
 """
 
 import re
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from itertools import cycle
 
 import numpy as np
 
 from twinmill.diagnosis.term import (
+    CHANGE,
     CHANNELS,
     SPEEDS,
     STILL,
@@ -25,7 +28,7 @@ from twinmill.diagnosis.term import (
     displaced,
     times,
 )
-from twinmill.filters import faded
+from twinmill.filters import faded, swung
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.response import Response
 from twinmill.model.parameters import words
@@ -35,6 +38,7 @@ STARTS = "starts"
 HEADING = "heading"
 RIM, TARGET = "rim_mps", "target"  # of each wheel: where a formula acts, and what it names
 ROOM = "room_mps"  # a push along x and along y of the room, of which each has a shape
+ALONG = ("(vx*cos(theta) - vy*sin(theta))", "(vx*sin(theta) + vy*cos(theta))")  # x and y
 ALL_AXES = {"travel": (0, 1), "motion": (0, 1, 2)}  # shares of these axes of the body
 HEADING_RAD = 0.02  # usual error of a captured heading
 USUAL = {**TYPICAL, "travel": SWELL, "motion": SWELL, "aside": SWELL, "theta_rad": HEADING_RAD}
@@ -53,7 +57,11 @@ WIDE = 0.4  # share of that speed, at which such a loss has ended
 STORED = {"vx": (0.003, 0.01, 0.03), "vy": (0.003, 0.01, 0.03), "omega": (0.02, 0.06, 0.2)}
 NAMED = ("vx", "vy", "omega", "x", "y", "theta", "course", "t")  # as formulas are told
 ANGLES = ("theta", "course")
-C, L = "{c}", "{l}"  # the constant and the lever in texts
+C, D, L = "{c}", "{d}", "{l}"  # the constant, the damping and the lever in texts
+SWINGS_HZ = (0.55, 0.75, 1.0, 1.35, 1.8, 2.4, 3.2, 4.3)
+DAMPINGS = (0.07, 0.3)
+DAMPED = 2.2  # times which a better damping may differ
+LEAST_DAMPED, MOST_DAMPED = 0.01, 0.8  # beyond it hardly anything overshoots
 FUNCTIONS = {"abs": np.abs, "sign": np.sign, "sqrt": np.sqrt, "cos": np.cos, "sin": np.sin}
 FUNCTIONS["max"] = np.maximum
 
@@ -62,16 +70,36 @@ FUNCTIONS["max"] = np.maximum
 class State:
     """What a form remembers: s goes to `goal` at `rate` per second, texts as the shapes are.
 
-    Without a goal it adds up `rate`.
+    Without a goal it adds up `rate`. Without a rate it swings around the goal, {c} per second, as
+    {d} damps it. With a second goal there is one of them along x and another along y of the room.
     """
 
     goal: str
     rate: str
+    goal_y: str = ""
+
+    @property
+    def swings(self) -> bool:
+        """Its rate of change r is a second state."""
+        return not self.rate
+
+    @property
+    def goals(self) -> tuple[str, ...]:
+        """One, or along x and along y."""
+        return (self.goal, self.goal_y) if self.goal_y else (self.goal,)
 
     @property
     def text(self) -> str:
         """The rate of change, as the effect `equation` takes it."""
+        if self.swings:
+            return "r"
         return f"({self.goal} - s)*{self.rate}" if self.goal else self.rate
+
+    @property
+    def second_text(self) -> str:
+        """The same of r; empty where there is none."""
+        swings = [f"{C}*{C}*({goal} - s) - 2*{D}*{C}*r" for goal in self.goals]
+        return ", ".join(swings) if self.swings else ""
 
 
 @dataclass(frozen=True)
@@ -89,6 +117,7 @@ class Form:
         column: number of the library's term whose column it has; -1: it is made here.
         sizes: of the shapes' values; empty until `sized`.
         command_unit: of the command u, where a shape names it.
+        damping: written {d} in a state that swings, 1 where it no longer would.
     """
 
     adds_to: str
@@ -101,6 +130,7 @@ class Form:
     column: int = -1
     sizes: tuple[float, ...] = ()
     command_unit: str = ""
+    damping: float = 0.0
 
     @property
     def texts(self) -> tuple[str, ...]:
@@ -120,17 +150,35 @@ class Form:
     @property
     def names_time(self) -> bool:
         """It holds of one run: no other shares its moments."""
-        return "t" in names_in([*self.texts, self.state_rate])
+        return "t" in names_in([*self.texts, *self.rates])
 
     @property
-    def state_rate(self) -> str:
-        """Of the state with its constant; empty if there is none."""
-        return self._with_constant(self.state.text) if self.state else ""
+    def rates(self) -> tuple[str, ...]:
+        """Of its states with its constants; none if it has no state."""
+        texts = (self.state.text, self.state.second_text) if self.state else ()
+        return tuple(self._with_constant(t) for t in texts if t)
+
+    @property
+    def is_late(self) -> bool:
+        """A speed follows late by it, or swings."""
+        state = self.state
+        return bool(state) and (state.swings or state.goal in (*SPEEDS, TARGET))
+
+    @property
+    def plainer(self) -> "Form | None":
+        """The same without the rate of change of what swings; None if it does not name it."""
+        plain = tuple(s for s in self.shapes if s != "r")
+        return replace(self, shapes=plain, sizes=()) if plain != self.shapes else None
+
+    @property
+    def searched(self) -> tuple[str, ...]:
+        """Names of the constants that it has."""
+        return tuple(name for name in ("constant", "damping") if getattr(self, name))
 
     @property
     def numbers(self) -> int:
-        """Fitted ones, the constant among them."""
-        return len(self.shapes) + bool(self.constant)
+        """Fitted ones, constants among them."""
+        return len(self.shapes) + len(self.searched)
 
     @property
     def strengths(self) -> np.ndarray:
@@ -141,8 +189,15 @@ class Form:
         """The same with another constant."""
         return replace(self, constant=float(f"{constant:.4g}"), sizes=())
 
+    def near(self, name: str, parts: Sequence[float]) -> list["Form"]:
+        """The same with a constant further off, by parts of what a better one may differ by."""
+        if name == "constant":
+            return [self.at(self.constant * (1 + self.spread * part)) for part in parts]
+        tried = np.clip(self.damping * DAMPED ** np.array(parts), LEAST_DAMPED, MOST_DAMPED)
+        return [replace(self, damping=float(f"{d:.3g}"), sizes=()) for d in np.unique(tried)]
+
     def _with_constant(self, text: str) -> str:
-        return text.replace(C, f"{self.constant:.4g}").replace(L, f"{LEVER_M:g}")
+        return _filled(text, f"{self.constant:.4g}", f"{self.damping:.3g}")
 
 
 GAINS = tuple(Form(to, (axis,), "") for to, axis in zip(CHANNELS, SPEEDS, strict=True))
@@ -191,7 +246,7 @@ class Motion:
 
     def _along(self, form: Form, axis: str) -> np.ndarray:
         """The same, with a speed of the body in the place of the wheels'."""
-        key = (form.adds_to, axis if not form.of_body else "", form.texts, form.state_rate)
+        key = (form.adds_to, axis if not form.of_body else "", form.texts, form.rates)
         if key not in self._known:
             self._known[key] = self._computed(form, {**self.names, TARGET: self.names[axis]})
         return self._known[key]
@@ -200,10 +255,33 @@ class Motion:
         if form.adds_to == "theta_rad":
             track = self.own.measurement.track
             names["theta"] = np.nan_to_num(track.heading_smooth[self.own.floor.response.points])
-        if form.state:
-            names["s"] = self._remembered(form, names)
-        found = [_value(text, names) for text in form.texts]
+        states = [{}]
+        if form.state and form.state.swings:
+            states = [self._swung(form, goal, names) for goal in form.state.goals]
+        elif form.state:
+            states = [{"s": self._remembered(form, names)}]
+        pairs = zip(form.texts, cycle(states), strict=False)
+        found = [_value(text, names | own) for text, own in pairs]
         return np.stack([np.broadcast_to(v, names["t"].shape) for v in found], axis=-1)
+
+    def _swung(
+        self, form: Form, goal: str, names: Mapping[str, np.ndarray]
+    ) -> dict[str, np.ndarray]:
+        """(N,) means over each step of s and r that swing around a goal."""
+        pushes = np.broadcast_to(_value(goal, names), names["t"].shape)
+        key = ("swing", pushes.tobytes(), form.constant, form.damping)
+        if key not in self._known:
+            step_s = self.own.floor.response.step_s
+            means = swung(self._in_the_middle(pushes), step_s, form.constant, form.damping)
+            self._known[key] = np.stack(means)
+        return dict(zip(("s", "r"), self._known[key], strict=True))
+
+    def _in_the_middle(self, values: np.ndarray) -> np.ndarray:
+        """(N,) of the middle of each step; a step of several poses has them from its last one."""
+        step_s = self.own.floor.response.step_s
+        last_s = self.own.measurement.track.timing.pose_period_s
+        sooner = np.clip(1 - last_s / np.where(step_s > 0, step_s, np.inf), 0, 1) / 2
+        return values - sooner * np.diff(values, prepend=values[:1]) * (step_s > 0)
 
     def _remembered(self, form: Form, names: Mapping[str, np.ndarray]) -> np.ndarray:
         """(N,) the state's mean over each step."""
@@ -326,6 +404,9 @@ def own_forms(
         *_around_a_speed(every),
         *(f for axis in SPEEDS if sideways or axis != "vy" for f in _late(axis)),
         *(_late_wheels() if wheels else ()),
+        *(f for axis in SPEEDS if sideways or axis != "vy" for f in _overshoots(axis)),
+        *(_overshoots(TARGET, "r") if wheels else ()),
+        *_sways(),
     ]
 
 
@@ -448,6 +529,31 @@ def _late(axis: str) -> list[Form]:
     return found
 
 
+def _overshoots(goal: str, *rate: str) -> list[Form]:
+    """A speed of the body or of all wheels swings around what it should be, a part of it or all.
+
+    A controller has a say in how a speed loop begins: then its rate of change counts, too.
+    """
+    to = {**dict(zip(SPEEDS, CHANNELS, strict=True)), TARGET: RIM}[goal]
+    shapes = [(f"(s - {goal})",), (f"(s - {goal})", *rate)]
+    return [f for own in dict.fromkeys(shapes) for f in _swings(to, own, State(goal, ""))]
+
+
+def _sways() -> list[Form]:
+    """The marker's mast is bent by the robot's acceleration, along x and along y of the room."""
+    shapes = tuple(f"(s + 2*{D}*r/{C} - {way})" for way in ALONG)
+    return _swings(ROOM, shapes, State(ALONG[0], "", ALONG[1]))
+
+
+def _swings(to: str, shapes: tuple[str, ...], state: State) -> list[Form]:
+    """One for each frequency and damping, between which the search then goes on."""
+    return [
+        Form(to, shapes, CHANGE, state, 2 * np.pi * hz, 0.16, "1/s", damping=damping)
+        for hz in SWINGS_HZ
+        for damping in DAMPINGS
+    ]
+
+
 def on_and_off(wave: Form, numbers: np.ndarray, levels: Sequence[float]) -> list[Form]:
     """A wave of time sharpened: there while the wave, or its opposite, is above a level.
 
@@ -465,22 +571,43 @@ def on_and_off(wave: Form, numbers: np.ndarray, levels: Sequence[float]) -> list
 
 
 def joined(forms: Sequence[Form]) -> dict[str, str]:
-    """Texts of the effect `equation` that has these terms, all of one place, one with a state."""
-    count = sum(len(form.shapes) for form in forms)
-    formula = summed(forms, [f"p{k}" for k in range(count)])
-    rate = next((f.state_rate for f in forms if f.state), "")
-    texts = {"adds_to": forms[0].adds_to, "formula": formula}
-    return texts | ({"state_rate": rate} if rate else {})
+    """Texts of the effect `equation` that has these terms, all of one place, one with states."""
+    texts = [text for form in forms for text in form.texts]
+    rates = next((f.rates for f in forms if f.state), ())
+    return _equation(forms[0].adds_to, texts, rates)
+
+
+def tunable(form: Form) -> dict[str, str]:
+    """The same of what swings, with its rate in tens per second and its damping as numbers, too."""
+    first = len(form.shapes)
+    constants = f"(10*p{first})", f"p{first + 1}"
+    texts = [_filled(text, *constants) for text in form.shapes]
+    rates = [_filled(text, *constants) for text in (form.state.text, form.state.second_text)]
+    return _equation(form.adds_to, texts, rates)
+
+
+def _equation(adds_to: str, texts: Sequence[str], rates: Sequence[str]) -> dict[str, str]:
+    numbers = [f"p{k}" for k in range(len(texts))]
+    found = {"adds_to": adds_to, "formula": _sum(adds_to, texts, numbers)}
+    return found | dict(zip(("state_rate", "second_rate"), rates, strict=False))
+
+
+def _filled(text: str, constant: str, damping: str) -> str:
+    """A text of a form with its constants."""
+    for name, number in ((C, constant), (D, damping), (L, f"{LEVER_M:g}")):
+        text = text.replace(name, number)
+    return text
 
 
 def summed(forms: Sequence[Form], numbers: Sequence[str]) -> str:
-    """The formula of terms, all of one place, with these texts in the place of their numbers.
+    """The formula of terms, all of one place, with these texts in the place of their numbers."""
+    return _sum(forms[0].adds_to, [text for form in forms for text in form.texts], numbers)
 
-    Of a push in the room two, along x and along y.
-    """
-    texts = [text for form in forms for text in form.texts]
+
+def _sum(adds_to: str, texts: Sequence[str], numbers: Sequence[str]) -> str:
+    """Of numbers times texts; of a push in the room two, along x and along y."""
     terms = [f"{number}*{text}" for number, text in zip(numbers, texts, strict=True)]
-    values = [terms[0::2], terms[1::2]] if forms[0].adds_to == ROOM else [terms]
+    values = [terms[0::2], terms[1::2]] if adds_to == ROOM else [terms]
     return ", ".join(" + ".join(own) for own in values).replace("+ -", "- ")
 
 

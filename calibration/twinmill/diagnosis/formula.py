@@ -92,11 +92,18 @@ class Formula:
         return any(f.names_time for f in self.forms)
 
     @property
+    def is_late(self) -> bool:
+        """It says how a speed follows what it should be."""
+        return any(f.is_late for f in self.forms)
+
+    @property
     def text(self) -> str:
         """With its numbers in place of their names."""
         text = summed(self.forms, [f"{n.value:.3g}" for n in self.numbers if n.name])
-        rate = self.equation.get("state_rate", "")
-        return text + (f" with ds/dt = {rate}" if rate else "")
+        equation = self.equation
+        keys = {"state_rate": "ds/dt", "second_rate": "dr/dt"}
+        rates = [f"{of} = {equation[key]}" for key, of in keys.items() if key in equation]
+        return text + (f" with {' and '.join(rates)}" if rates else "")
 
     @property
     def equals(self) -> str:

@@ -6,7 +6,8 @@ forms, the one of fewest numbers among those that predict left-out stretches of 
 well; then terms beside it, as long as they help. What was chosen is judged on the other half, which
 neither chose nor fitted it: by an F test, and by the chance of so large a fall under random signs
 of blocks (both exact for what they assume; the larger chance counts). So one formula is tested a
-half, however many were tried, and both halves together count twice (Bonferroni). Of two that are
+half, however many were tried, and both halves together count twice (Bonferroni), or four times
+where a second one is tested that was chosen at larger weights. Of two that are
 proven, the one that gains more on both halves is told.
 """
 
@@ -41,6 +42,7 @@ from twinmill.model.parameters import drives_sideways
 FEWEST = 4  # stretches
 SHORTLIST = 60  # forms that are weighed again once it is known what noise remains
 MOST_SCALED = 100.0  # of the square of a channel
+HEAVY = 4.0  # times the weight of rows, where nothing is proven at their own
 MOST_NUMBERS = 4  # the effect `equation` has p0 to p3
 MOST_TERMS = 3
 ALL_SIGNS = 12  # up to so many blocks all signs are tried ...
@@ -109,7 +111,7 @@ def _completed(rows: Evidence, pool: Pool, proof: Proof) -> Proof:
 
 
 def _has(form: Form, part: Form) -> bool:
-    where = [(f.adds_to, f.group, f.state_rate) for f in (form, part)]
+    where = [(f.adds_to, f.group, f.rates) for f in (form, part)]
     return where[0] == where[1] and {*form.texts} > {*part.texts}
 
 
@@ -127,24 +129,37 @@ def _net(rows: Evidence, proof: Proof) -> float:
 def _proven(rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | None) -> Proof | None:
     """Chooses on a half and judges on the other; None where that does not bear it out.
 
+    What the floor took for noise, as what sways after each start, weighs next to nothing. So where
+    nothing is proven, what swings and takes much is looked for at larger weights.
+
     Args:
         rows: are weighed anew.
         pool: to choose from.
         half: (S,) of the stretches.
         rival: (R, 1) raw column of what it must outdo.
     """
-    rows.weighed(np.ones(len(rows.stretch)))
-    sums = Sums.of(rows, pool, pool.raw[:, :0])
-    net = sums.held_out(half) - SETTINGS.each * np.array([f.numbers for f in pool.forms])
+    tries = (_proven_at(rows, pool, half, rival, weight=w) for w in (1.0, HEAVY))
+    return next((proof for proof in tries if proof), None)
+
+
+def _proven_at(
+    rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | None, *, weight: float
+) -> Proof | None:
+    """The same with rows that weigh so many times what they do; above 1 of what swings alone."""
+    rows.weighed(np.full(len(rows.stretch), weight))
+    some = pool.some([k for k, f in enumerate(pool.forms) if f.damping]) if weight > 1 else pool
+    sums = Sums.of(rows, some, pool.raw[:, :0])
+    net = sums.held_out(half) - SETTINGS.each * np.array([f.numbers for f in some.forms])
     best = np.argsort(-net)[:SHORTLIST]
-    if net[best[0]] <= 0:
+    left = rows.left[half[rows.stretch]]
+    if net[best[0]] <= (SETTINGS.formula_takes * left @ left if weight > 1 else 0):
         return None
-    first = pool.some(best[:1])
-    rows.weighed(_scales(rows, first.raw, half))
-    chosen = _chosen(rows, pool, pool.some(best), half)
+    first = some.some(best[:1])
+    rows.weighed(weight * _scales(rows, first.raw, half))
+    chosen = _chosen(rows, pool, some.some(best), half)
     if not chosen or (rival is not None and _outdone(rows, chosen, rival, half)):
         return None
-    proof = _proof(rows, chosen, half)
+    proof = _proof(rows, chosen, half, tests=2 if weight == 1 else 4)
     if proof.chance > SETTINGS.formula_chance or proof.takes < SETTINGS.formula_takes:
         return None
     return proof
@@ -219,6 +234,9 @@ def _best(rows: Evidence, pool: Pool, half: np.ndarray, found: Chosen) -> Chosen
     simplest = min(near, key=lambda k: (_complexity(pool.forms[k]), -net[k]))
     tops = dict.fromkeys([int(simplest), int(np.argmax(net))])
     polished = [_polished(rows, pool.some([k]), half, found) for k in tops]
+    plainer = [f for c in polished if (f := c.forms[-1].plainer)]
+    for form in sized(plainer, rows.motions):
+        polished.append(_polished(rows, Pool([form], rows.raw([form])), half, found))
     most = max(c.net for c in polished)
     close = [c for c in polished if c.net >= most - _alike(most)]
     return min(close, key=lambda c: (_complexity(c.forms[-1]), -c.gain))
@@ -231,23 +249,20 @@ def _alike(gain: float) -> float:
 
 def _complexity(form: Form) -> int:
     """Numbers; a state, and moments of one run, count as one more each."""
-    return form.numbers + bool(form.state) + form.names_time
+    return form.numbers + len(form.rates) + form.names_time
 
 
 def _polished(rows: Evidence, one: Pool, half: np.ndarray, found: Chosen) -> Chosen:
-    """With the best constant near the form's, and sharpened where that is simpler or better."""
+    """With the best constants near the form's, and sharpened where that is simpler or better."""
     best = best_of(rows, one, half, found)
-    if not best.forms[-1].constant:
-        return best
-    for part in (1.0, 0.25):
-        form = best.forms[-1]
-        tried = [form.at(form.constant * (1 + part * form.spread * f)) for f in TRIED]
+    for part, name in product((1.0, 0.25), best.forms[-1].searched):
+        tried = best.forms[-1].near(name, part * TRIED)
         best = max(best, made(rows, tried, half, found), key=lambda c: c.gain)
     form = best.forms[-1]
-    if form.group != TIME:
+    if form.group != TIME or not form.constant:
         return best
     numbers = fitted(rows, best, half)[-2:] * form.strengths
-    near = [form.at(form.constant * (1 + form.spread * f / 4)) for f in TRIED[::2]]
+    near = form.near("constant", TRIED[::2] / 4)
     sharp = [s for w in near for s in on_and_off(w, numbers, LEVELS)]
     other = made(rows, sharp, half, found)
     return other if other.net > best.net - _alike(best.net) else best
@@ -256,8 +271,8 @@ def _polished(rows: Evidence, one: Pool, half: np.ndarray, found: Chosen) -> Cho
 # -- proof -----------------------------------------------------------------------------------------
 
 
-def _proof(rows: Evidence, chosen: Chosen, half: np.ndarray) -> Proof:
-    """Judges on the half that did not choose."""
+def _proof(rows: Evidence, chosen: Chosen, half: np.ndarray, *, tests: int) -> Proof:
+    """Judges on the half that did not choose, as one of so many tests (Bonferroni)."""
     numbers = fitted(rows, chosen, half)
     judging = ~half[rows.stretch]
     x, left = rows.seen(chosen.raw)[judging], rows.left[judging]
@@ -268,7 +283,7 @@ def _proof(rows: Evidence, chosen: Chosen, half: np.ndarray) -> Proof:
     if gain > 0:
         errors = np.sum((left / rows.scale[judging]) ** 2)
         chance = max(_by_signs(np.bincount(block, (x @ numbers) * left)), _by_f(x, left, errors))
-    return Proof(chosen, min(1.0, 2 * chance), float(gain / max(total, 1e-9)), rows.scale)
+    return Proof(chosen, min(1.0, tests * chance), float(gain / max(total, 1e-9)), rows.scale)
 
 
 def _by_signs(pushes: np.ndarray) -> float:

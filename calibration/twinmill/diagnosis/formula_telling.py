@@ -30,11 +30,11 @@ def told(rows: Evidence, proof: Proof, tried: int, again: float) -> Formula:
     found = Chosen((), np.zeros((len(rows.stretch), 0)), 0.0)
     for form in proof.chosen.forms:
         best = best_of(rows, Pool([form], rows.raw([form])), every, found)
-        if form.constant:
-            near = [form.at(form.constant * (1 + form.spread / 4 * f)) for f in TRIED]
+        for name in form.searched:
+            near = best.forms[-1].near(name, TRIED / 4)
             best = max(best, made(rows, near, every, found), key=lambda c: c.gain)
         found = best
-    names = names_in([t for f in found.forms for t in (*f.texts, f.state_rate)])
+    names = names_in([t for f in found.forms for t in (*f.texts, *f.rates)])
     seen = {n: np.concatenate([m.names[n] for m in rows.motions]) for n in names}
     numbers = _numbers(rows, found)
     return Formula(
@@ -86,9 +86,9 @@ def _drawn(
 
 def _numbers(rows: Evidence, found: Chosen) -> tuple[Number, ...]:
     """Values and intervals: the jackknife over stretches, the constants' slopes beside."""
-    constants = [k for k, f in enumerate(found.forms) if f.constant]
+    constants = [(k, name) for k, f in enumerate(found.forms) for name in f.searched]
     plain = rows.seen(found.raw)
-    x = np.column_stack([plain, *(_slope(rows, found, k) for k in constants)])
+    x = np.column_stack([plain, *(_slope(rows, found, k, name) for k, name in constants)])
     grams = np.array([x[p].T @ x[p] for p in rows.parts])
     moments = np.array([x[p].T @ rows.left[p] for p in rows.parts])
     gram, moment = grams.sum(0), moments.sum(0)
@@ -109,9 +109,10 @@ def _numbers(rows: Evidence, found: Chosen) -> tuple[Number, ...]:
         Number(f"p{k}", float(v), float(v - h), float(v + h), unit)
         for k, (v, h, unit) in enumerate(zip(own, half[: len(own)] * strengths, units, strict=True))
     ]
-    for k, h in zip(constants, half[len(own) :], strict=True):
-        at, by = found.forms[k].constant, float(np.exp(min(h, LARGEST_LOG)))
-        told.append(Number("", at, at / by, at * by, found.forms[k].unit))
+    for (k, name), h in zip(constants, half[len(own) :], strict=True):
+        at, by = getattr(found.forms[k], name), float(np.exp(min(h, LARGEST_LOG)))
+        unit = found.forms[k].unit if name == "constant" else "1"
+        told.append(Number("", at, at / by, at * by, unit))
     return tuple(told)
 
 
@@ -120,12 +121,13 @@ def _of_all(rows: Evidence, found: Chosen) -> np.ndarray:
     return np.linalg.lstsq(x, rows.left, rcond=None)[0]
 
 
-def _slope(rows: Evidence, found: Chosen, k: int) -> np.ndarray:
-    """(R,) change of the rows by the logarithm of the k-th term's constant."""
+def _slope(rows: Evidence, found: Chosen, k: int, name: str) -> np.ndarray:
+    """(R,) change of the rows by the logarithm of one of the k-th term's constants."""
     form = found.forms[k]
     first = sum(len(f.shapes) for f in found.forms[:k])
     own = _of_all(rows, found)[first : first + len(form.shapes)] * form.strengths
-    up, down = (replace(form, constant=form.constant * b) for b in (1 + SLOPE, 1 - SLOPE))
+    at = getattr(form, name)
+    up, down = (replace(form, **{name: at * b}) for b in (1 + SLOPE, 1 - SLOPE))
     above, below = (rows.seen(rows.raw([f])) @ (own / f.strengths) for f in (up, down))
     return (above - below) / (2 * SLOPE)
 
@@ -140,5 +142,6 @@ def stability(rows: Evidence, pool: Pool, first: Form) -> float:
         push = np.tensordot(weight, sums.moments, 1)
         gain = np.einsum("tk,tk->t", sums.fitted(weight), push) - cost
         best = pool.forms[int(np.argmax(gain))]
-        same += (best.adds_to, best.group) == (first.adds_to, first.group)
+        alike = best.group == first.group or (best.is_late and first.is_late)
+        same += alike and best.adds_to == first.adds_to
     return same / DRAWS

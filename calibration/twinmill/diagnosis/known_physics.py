@@ -75,6 +75,14 @@ def _of_two_speeds(form: Form, own: Sequence[float]) -> str:
 def _of_past(form: Form, own: Sequence[float]) -> str:
     if not form.state:
         return ""
+    if form.state.swings:
+        swings = f"{form.constant / (2 * pi):.3g} Hz, damping {form.damping:.2g}"
+        if form.adds_to == ROOM:
+            return (
+                f"the robot or its marker sways after each change of speed, as on a mast: {swings}"
+            )
+        what = AXES[CHANNEL_OF[form.adds_to]] if form.of_body else "all wheels"
+        return f"an overshoot of the speed loop or a spring ({what}): {swings}"
     if form.group == WAY:
         changes = "lost" if own[0] < 0 else "gained"
         return f"speed is {changes} with the way driven: like tyres that wear, clog or warm up"

@@ -186,7 +186,7 @@ class Formulas:
 
 @dataclass(frozen=True)
 class Doubted:
-    """Findings that are in doubt, and what is there without them.
+    """Findings in the place of which a formula may be, and what is there without them.
 
     Attributes:
         names: of the findings.

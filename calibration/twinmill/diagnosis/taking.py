@@ -7,15 +7,18 @@ from math import log
 
 import twinmill_native as native
 
+from twinmill.diagnosis.forms import LEAST_DAMPED, MOST_DAMPED, tunable
 from twinmill.diagnosis.formula import Formula, Number
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.score_fit import NORMAL_95, ScoreFit
 from twinmill.model.parameters import Parameter, effect_names, effect_parameters, newest_instance
-from twinmill.predict.datasets import total_score
+from twinmill.predict.datasets import Trajectory, total_score
 
 EFFECT = "equation"
 SEVERAL = 2  # runs that tell of a moment that they share
 STEP = 0.05  # of finite differences, times the number at which a shape adds what is typical
+FINER = 4.0  # times which errors of what swings may be below the floor
+SWING_STEP, SWING_STD = 0.01, 0.5  # shares of the rate and the damping of what swings
 
 
 @dataclass(frozen=True)
@@ -106,11 +109,7 @@ def taken(
 
 def _added(fit: ScoreFit, formula: Formula, before: float, runs: int) -> Taken:
     """The fit with a formula, and without those in the place of which it is."""
-    models = [_without(m, formula.instead_of) for m in fit.models]
-    gone = {*effect_names(fit.models[0])} - {*effect_names(models[0])}
-    free = [p for p in fit.shared_values if p.name.split(".")[0] not in gone]
-    for model in models:
-        model.add_effect(EFFECT, formula.equation)
+    models, free = _with_equation(fit, formula.instead_of, formula.equation)
     fresh = _begun(models[0], formula)
     found = ScoreFit(fit.datasets, models, [*free, *fresh], fit.by_channel).fit()
     above = max(fit.held_square - 1, fit.held_square - found.held_square, 1e-9)
@@ -128,6 +127,60 @@ def _added(fit: ScoreFit, formula: Formula, before: float, runs: int) -> Taken:
     )
 
 
+def tuned(fit: ScoreFit, formula: Formula) -> Formula:
+    """With all numbers of what swings as the plant fits them, its rate and damping among them.
+
+    The forms that were tried take speeds at a few moments, which is crude for what swings fast. The
+    floor may have a sway in it, below which errors would tell nothing: they are told over less.
+
+    Args:
+        fit: of all that was found; stays as it is.
+        formula: proven on these data.
+    """
+    form = formula.forms[0]
+    if len(formula.forms) > 1 or not form.damping:
+        return formula
+    models, free = _with_equation(fit, formula.instead_of, tunable(form))
+    fresh = _begun(models[0], formula)
+    own = effect_parameters(models[0], newest_instance(models[0], EFFECT), fresh=True)
+    swing = [
+        replace(p, value=at, usual=at, std=SWING_STD * at, step=SWING_STEP * at, central=True)
+        for p, at in zip(own[len(fresh) :], (form.constant / 10, form.damping), strict=True)
+    ]
+    datasets = [d.over(d.floor / FINER) if isinstance(d, Trajectory) else d for d in fit.datasets]
+    found = ScoreFit(datasets, models, [*free, *fresh, *swing], fit.by_channel).fit()
+    estimates = {e.name: e for e in found.shared_estimates()}
+    rate, damping = (estimates[p.name] for p in swing)
+    if rate.value <= 0 or not LEAST_DAMPED <= damping.value < MOST_DAMPED:
+        return formula
+    form = replace(
+        form, constant=float(f"{10 * rate.value:.4g}"), damping=float(f"{damping.value:.3g}")
+    )
+    *shapes, first, second = _numbers(found, fresh, formula)
+    constants = (
+        _around(first, form.constant, 10 * rate.std),
+        _around(second, form.damping, damping.std),
+    )
+    return replace(formula, forms=(form,), numbers=(*shapes, *constants))
+
+
+def _around(number: Number, value: float, std: float) -> Number:
+    """With a 95 % interval."""
+    half = NORMAL_95 * std
+    return replace(number, value=value, low=value - half, high=value + half)
+
+
+def _with_equation(
+    fit: ScoreFit, gone: Sequence[str], texts: dict[str, str]
+) -> tuple[list[native.Model], list[Parameter]]:
+    """Models of a fit without some effects and with an equation, and what else was free."""
+    models = [_without(m, gone) for m in fit.models]
+    lost = {*effect_names(fit.models[0])} - {*effect_names(models[0])}
+    for model in models:
+        model.add_effect(EFFECT, texts)
+    return models, [p for p in fit.shared_values if p.name.split(".")[0] not in lost]
+
+
 def _without(model: native.Model, gone: Sequence[str]) -> native.Model:
     """A copy that lacks the last effect of each name."""
     less = model.copy()
@@ -143,7 +196,7 @@ def _begun(model: native.Model, formula: Formula) -> list[Parameter]:
     own = effect_parameters(model, newest_instance(model, EFFECT), fresh=True)
     return [
         replace(p, value=value, step=STEP * strength)
-        for p, value, strength in zip(own, values, strengths, strict=True)
+        for p, value, strength in zip(own[: len(values)], values, strengths, strict=True)
     ]
 
 
@@ -152,13 +205,5 @@ def _numbers(fit: ScoreFit, fresh: Sequence[Parameter], formula: Formula) -> tup
     estimates = {e.name: e for e in fit.shared_estimates()}
     own = iter(estimates[p.name] for p in fresh)
     return tuple(
-        replace(
-            n,
-            value=(e := next(own)).value,
-            low=e.value - NORMAL_95 * e.std,
-            high=e.value + NORMAL_95 * e.std,
-        )
-        if n.name
-        else n
-        for n in formula.numbers
+        _around(n, (e := next(own)).value, e.std) if n.name else n for n in formula.numbers
     )

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-from twinmill.diagnosis.forms import C, Form, L
+from twinmill.diagnosis.forms import C, D, Form, L
 
 
 @dataclass(frozen=True)
@@ -104,6 +104,12 @@ def units_of(form: Form) -> list[str]:
     }
     if form.state and not form.state.goal:
         names["s"] = _unit(form.state.rate, names) * NAMES["t"]
+    elif form.state and form.state.swings:
+        names["s"] = _unit(form.state.goal, names)
+        names["r"] = names["s"] / NAMES["t"]
+        for text in form.state.second_text.split(", "):
+            if (rate := _unit(text, names)) != names["r"] / NAMES["t"]:
+                raise ValueError(f"a second rate of change in {rate}: {text}")
     elif form.state:
         names["s"] = _unit(form.state.goal, names)
         if (rate := _unit(form.state.rate, names)) != NAMES["omega"]:
@@ -112,7 +118,7 @@ def units_of(form: Form) -> list[str]:
 
 
 def _unit(text: str, names: dict[str, Unit]) -> Unit:
-    plain = text.replace(C, "c").replace(L, "l")
+    plain = text.replace(C, "c").replace(D, "1.0").replace(L, "l")
     if "?" in plain:  # of one wheel, and 0 of the others
         plain = plain.partition("?")[2].rpartition(":")[0].strip()
     return eval(plain, {"__builtins__": {}, **FUNCTIONS}, names) * PLAIN

@@ -44,6 +44,7 @@ BODY = {
     "t": "in.t_s",
 }
 POSE = {"x": "in.x_m", "y": "in.y_m", "theta": "in.theta_rad"}
+RATES = {"state_rate": "s", "second_rate": "r"}
 FUNCTIONS = {
     **{n: f"std::{n}" for n in ("abs", "sqrt", "exp", "sin", "cos", "tan", "min", "max")},
     **{n: f"std::{n}" for n in ("asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh")},
@@ -175,13 +176,14 @@ def _check(name: str, root: Path, files: Sequence[Path]) -> None:
 
 
 def _source(name: str, texts: dict[str, str], values: dict[str, float], model: str) -> str:
-    place, rate = PLACES[texts["adds_to"]], texts.get("state_rate", "")
-    used = words(" ".join([texts["formula"], rate]))
-    state = {"s": "s"} if rate else {}
+    place = PLACES[texts["adds_to"]]
+    rates = {of: texts[key] for key, of in RATES.items() if texts.get(key)}
+    used = words(" ".join([texts["formula"], *rates.values()]))
+    state = {of: of for of in rates}
     formula = _function(texts["formula"], place.names, state)
     what = "adds" if texts["adds_to"] not in SHARES else "changes by a share"
     equation = f"{what} to {texts['adds_to']}: {texts['formula']}"
-    equation += f"; ds/dt = {rate}, s = 0 at the start" if rate else ""
+    equation += "".join(f"; d{of}/dt = {rate}, {of} = 0 at the start" for of, rate in rates.items())
     return (
         _environment()
         .get_template("effect.cpp.j2")
@@ -192,7 +194,7 @@ def _source(name: str, texts: dict[str, str], values: dict[str, float], model: s
             measure="drives that vary the quantities in the equation; what it resembles is its own",
             reference=f"found in data by twinmill diagnose; {model}",
             phrase="a formula that was found in data",
-            **_kind(used, bool(rate), place.stage),
+            **_kind(used, bool(rates), place.stage),
             parameters=[
                 {"name": p, "value": _plain(values[p] or 0.01), "min": -10, "max": 10}
                 for p in _numbers(texts)
@@ -200,7 +202,7 @@ def _source(name: str, texts: dict[str, str], values: dict[str, float], model: s
             neutral=" && ".join(f"v[{k}] == 0" for k in range(len(_numbers(texts)))),
             signs="sign" in used,
             formula=formula,
-            rate=_function(rate, place.names, state) if rate else None,
+            rates=[_function(rate, place.names, state) for rate in rates.values()],
             wheels=place.wheels,
             pad="    " if place.wheels else "",
             stage=place.stage,

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 import twinmill_native as native
 from scipy import signal, stats
+from scipy.integrate import solve_ivp
 
 from twinmill import chance
-from twinmill.filters import faded, filtered
+from twinmill.filters import faded, filtered, swung
 
 
 @pytest.mark.parametrize(
@@ -33,6 +34,34 @@ def test_what_fades_evenly_does_what_lfilter_does():
 def test_what_is_forgotten_at_once_leaves_the_last_push():
     keep, pushes = np.array([0.5, 1.0, 0.0, 1.0]), np.array([1.0, 2.0, 4.0, 8.0])
     assert faded(keep, pushes) == pytest.approx([1, 3, 4, 12])
+
+
+@pytest.mark.parametrize("damping", [0.05, 0.7])
+def test_what_swings_does_what_an_integrator_does(damping):
+    random, rate = np.random.default_rng(1), 9.0
+    step_s, pushes = random.uniform(0.005, 0.1, 50), random.normal(size=50)
+    step_s[20] = 0.0  # of no length: nothing changes
+    now, means = np.zeros(3), []
+    for step, push in zip(step_s, pushes, strict=True):
+        if step == 0:
+            means.append(now[:2])
+            continue
+        after = solve_ivp(
+            lambda _, s, push=push: [
+                s[1],
+                rate**2 * (push - s[0]) - 2 * damping * rate * s[1],
+                s[0],
+            ],
+            (0, step),
+            [*now[:2], 0.0],
+            rtol=1e-10,
+            atol=1e-12,
+        ).y[:, -1]
+        means.append([after[2] / step, (after[0] - now[0]) / step])
+        now = after
+    assert np.stack(swung(pushes, step_s, rate, damping), axis=1) == pytest.approx(
+        np.array(means), abs=1e-8
+    )
 
 
 @pytest.mark.parametrize("shape", [(0, 3), (1, 1), (5, 0), (7, 2), (100, 3)])

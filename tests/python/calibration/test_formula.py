@@ -21,6 +21,7 @@ from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.forms import PAST, Form, Motion, State, joined, own_forms, sized
 from twinmill.diagnosis.formula_search import _by_f, _by_signs
 from twinmill.diagnosis.known_physics import resembles
+from twinmill.diagnosis.term import CHANGE
 from twinmill.diagnosis.units import units_of
 from twinmill.fitting.compare import compare
 from twinmill.fitting.floor import body_velocity_at
@@ -169,6 +170,7 @@ LAG = State("omega", "(1/{c})")
 HEAT = State("(vx*vx + vy*vy)", "(1/{c})")
 REST = State("moves", "(1/{c})")
 WHEELS = State("target", "(1/{c})")
+SPRING, TURNS, SWAY = State("target", ""), State("omega", ""), State("vx", "", "vy")
 AROUND = "vx*max(0, 1 - abs(abs(vx)/{c} - 1)/0.4)"
 
 
@@ -189,6 +191,9 @@ AROUND = "vx*max(0, 1 - abs(abs(vx)/{c} - 1)/0.4)"
             "vx_mps", ("vx*max(0, 1 - abs(abs(vx)/{c} - 1)/0.4)",), "speed", None, 0.2, unit="m/s"
         ),
         Form("rim_mps", ("(target - s)",), PAST, WHEELS, 0.5, unit="s"),
+        Form("rim_mps", ("(s - target)", "r"), CHANGE, SPRING, 9.0, unit="1/s", damping=0.2),
+        Form("omega_radps", ("(s - omega)",), CHANGE, TURNS, 14.0, unit="1/s", damping=0.1),
+        Form("room_mps", ("(s - vx)", "(s - vy)"), CHANGE, SWAY, 6.0, unit="1/s", damping=0.1),
     ],
     ids=lambda f: f"{f.adds_to} {f.shapes[0]}",
 )
@@ -242,5 +247,7 @@ def test_known_physics_is_named_by_shape_and_sign():
     friction = Form("vx_mps", ("sign(vx)",), "speed")
     assert "dry friction" in resembles([friction], [-0.01])
     assert resembles([friction], [0.01]) == ""
+    spring = Form("rim_mps", ("(s - target)",), CHANGE, SPRING, 2 * np.pi, damping=0.1)
+    assert "a spring (all wheels): 1 Hz, damping 0.1" in resembles([spring], [0.5])
     heat = Form("motion", ("s",), PAST, HEAT, 15.0)
     assert "falls" in resembles([heat], [-1.0]) and "heat of the motors" in resembles([heat], [-1])

@@ -15,35 +15,41 @@
 namespace twin
 {
 
-// A parsed formula, the rate of its state if it has one, and the places where both look for the
-// values of their names. Evaluating writes them: one thread at a time, as for the state.
+// A parsed formula, the rates of its states if it has any, and the places where all look for the
+// values of their names. Evaluating writes them: one thread at a time, as for the states.
 class Formula
 {
 public:
-    // `rate`: of the state `s`; empty: there is none. `values`: that the text has, 1 or 2.
+    // `rates`: of the states `s` and `r`, as many as there are. `values`: that the text has, 1
+    // or 2.
     Formula(std::span<const char *const> names, std::span<const double> parameters,
-            const std::string &text, const std::string &rate, int values);
+            const std::string &text, std::span<const std::string> rates, int values);
 
     // Places in the list of names that the texts use.
     std::span<const size_t> used() const { return used_; }
     double &operator[](size_t name) { return values_[name]; }
-    bool remembers() const { return remembers_; }
-    // Takes the state through a step; the formula then has its mean over the step.
-    void Remember(double &state, double dt_s);
+    // States of each wheel, or of the body.
+    size_t states() const { return rates_.size(); }
+    // Takes the states of wheel k, or of axis k of the room, through a step, first all `s` and then
+    // all `r`; the formula then has their means over the step.
+    void Remember(double *states, int k, double dt_s);
     double Evaluate() const { return formula_.Eval(); }
-    std::array<double, 2> EvaluateBoth() const;
+    // Of a text with two values the one of axis k.
+    double EvaluateAlong(int k) const { return Along(formula_, k); }
 
 private:
+    static double Along(const mu::Parser &parser, int k);
     void Define(mu::Parser &parser, std::span<const char *const> names,
                 std::span<const double> parameters);
+    // `one`: a single value is enough, however many the formula has.
     void Parse(mu::Parser &parser, std::span<const char *const> names, const std::string &key,
-               const std::string &text, int values);
+               const std::string &text, bool one, int values);
 
     std::vector<double> values_;
     std::vector<size_t> used_;
-    double state_ = 0;
-    bool remembers_;
-    mu::Parser formula_, rate_;
+    TwoStates states_{};
+    mu::Parser formula_;
+    std::vector<mu::Parser> rates_;
 };
 
 namespace
@@ -54,16 +60,16 @@ constexpr Card kCard = {
     .drives = kAnyDrive,
     .summary = "A formula of one's own is added to a quantity of the drive.",
     .equation =
-        "adds_to' = adds_to + formula(p0, p1, p2, p3, ..., s), ds/dt = state_rate, s = 0 at the "
-        "start. Per wheel, duty: u (duty or command), "
+        "adds_to' = adds_to + formula(p0, p1, p2, p3, ..., s, r), ds/dt = state_rate, "
+        "dr/dt = second_rate, s = r = 0 at the start. Per wheel, duty: u (duty or command), "
         "V (battery), left and front (1 or -1), t (s); rim_mps, speed the wheel tends to: these, "
         "target and rim (m/s, now), angle (rad). Body: vx, vy (m/s), omega (rad/s), x, y (m), "
         "theta and course, the direction in which it drives (rad), moves (0 or 1), t (s); travel and "
-        "motion: the share of way that is more; room_mps: two values, along x, along y. Heading as captured, theta_rad: x, y, theta. Functions: abs sign min max sqrt exp ln sin "
+        "motion: the share of way that is more; room_mps: two values, along x, along y, each with states of its own, whose rates may have two values, too. Heading as captured, theta_rad: x, y, theta. Functions: abs sign min max sqrt exp ln sin "
         "cos tan asin acos atan atan2 sinh cosh tanh and more of muParser; a ? b : c; _pi",
     .leaves_out =
-        "more than one state; where the formula has no finite value, nothing is added, and where "
-        "the rate has none, s stays",
+        "more than two states; where the formula has no finite value, nothing is added, and where "
+        "a rate has none, s and r stay",
     .measure = "whatever drive varies the quantities in the formula; what it resembles is its own",
     .reference = "muParser (the parser); the formula is the user's",
     .family = Family::kFormula,
@@ -88,6 +94,8 @@ constexpr TextParameter kTexts[] = {
      "what is added, in the unit of adds_to; should be 0 where p0 to p3 are"},
     {"state_rate", "",
      "ds/dt, of the same names and s; then the formula may name s, at rim_mps of each wheel"},
+    {"second_rate", "",
+     "dr/dt of a second state r, where both rates may name s and r: what swings, with state_rate r"},
 };
 
 // A name in formulas, and its value for wheel k.
@@ -140,14 +148,14 @@ double Finite(double value)
     return std::isfinite(value) ? value : 0;
 }
 
-// Gives the formula what it names of wheel k, and its state the end of its step.
+// Gives the formula what it names of wheel k, and its states the end of their step.
 template <class S>
 void Tell(std::span<const Name<S>> names, const S &s, int k, Formula &formula, double *state)
 {
     for (const size_t i : formula.used())
         formula[i] = names[i].value(s, k);
-    if (formula.remembers())
-        formula.Remember(state[k], s.dt_s);
+    if (formula.states() > 0)
+        formula.Remember(state, k, s.dt_s);
 }
 
 // The formula's value for wheel k.
@@ -195,9 +203,13 @@ void LeadAside(GroundSignals &s, const Numbers &v, double *state)
 
 void PushInRoom(GroundSignals &s, const Numbers &v, double *state)
 {
-    Tell<GroundSignals>(kBodyNames, s, 0, *v.formula, state);
-    const auto [x, y] = v.formula->EvaluateBoth();
-    const double x_mps = Finite(x), y_mps = Finite(y);
+    std::array<double, 2> push_mps{};
+    for (int axis = 0; axis < 2; ++axis)
+    {
+        Tell<GroundSignals>(kBodyNames, s, axis, *v.formula, state);
+        push_mps[axis] = Finite(v.formula->EvaluateAlong(axis));
+    }
+    const auto [x_mps, y_mps] = push_mps;
     const double ahead = std::cos(s.theta_rad), left = std::sin(s.theta_rad);
     s.vx_mps += ahead * x_mps + left * y_mps;
     s.vy_mps += ahead * y_mps - left * x_mps;
@@ -232,7 +244,7 @@ void TakeFromHeading(ObservedPose &p, const Numbers &v)
 
 int StateSize(const Numbers &v)
 {
-    return v.formula && v.formula->remembers() ? kMaxWheels : 0;
+    return v.formula ? kMaxWheels * static_cast<int>(v.formula->states()) : 0;
 }
 
 template <class S, size_t n>
@@ -314,36 +326,39 @@ const Quantity &FindQuantity(const std::string &name)
 EffectSpec::Compiled Compile(std::span<const double> values, std::span<const std::string> texts)
 {
     const Quantity &quantity = FindQuantity(texts[0]);
-    const std::string &rate = texts[2];
+    const std::string &rate = texts[2], &second = texts[3];
+    if (rate.empty() && !second.empty())
+        Fail("second_rate", second, -1, "there is no first state; give state_rate, such as r, too");
     const bool duty = std::holds_alternative<OnDuty>(quantity.act);
     if (!rate.empty() && (duty || std::holds_alternative<OnObservation>(quantity.act)))
         Fail("state_rate", rate, -1,
              "what is added to " + texts[0] + " has no state; leave it empty, or add to " +
                  (duty ? "rim_mps" : "omega_radps"));
+    const auto rates = texts.subspan(2, rate.empty() ? 0 : second.empty() ? 1 : 2);
     return {quantity.act,
-            std::make_shared<Formula>(quantity.names, values, texts[1], rate, quantity.values)};
+            std::make_shared<Formula>(quantity.names, values, texts[1], rates, quantity.values)};
 }
 
 }  // namespace
 
 Formula::Formula(std::span<const char *const> names, std::span<const double> parameters,
-                 const std::string &text, const std::string &rate, int values)
-    : values_(names.size()), remembers_(!rate.empty())
+                 const std::string &text, std::span<const std::string> rates, int values)
+    : values_(names.size()), rates_(rates.size())
 {
     Define(formula_, names, parameters);
-    Parse(formula_, names, "formula", text, values);
-    if (remembers_)
+    Parse(formula_, names, "formula", text, values == 1, values);
+    for (size_t i = 0; i < rates.size(); ++i)
     {
-        Define(rate_, names, parameters);
-        Parse(rate_, names, "state_rate", rate, 1);
+        Define(rates_[i], names, parameters);
+        Parse(rates_[i], names, kTexts[2 + i].name, rates[i], true, values);
     }
 }
 
-std::array<double, 2> Formula::EvaluateBoth() const
+double Formula::Along(const mu::Parser &parser, int k)
 {
     int count = 0;
-    const double *both = formula_.Eval(count);
-    return {both[0], both[1]};
+    const double *values = parser.Eval(count);
+    return values[count > 1 ? k : 0];
 }
 
 void Formula::Define(mu::Parser &parser, std::span<const char *const> names,
@@ -353,12 +368,13 @@ void Formula::Define(mu::Parser &parser, std::span<const char *const> names,
         parser.DefineConst(kParameters[i].name, parameters[i]);
     for (size_t i = 0; i < names.size(); ++i)
         parser.DefineVar(names[i], &values_[i]);
-    if (remembers_)
-        parser.DefineVar("s", &state_);
+    constexpr const char *kStates[] = {"s", "r"};
+    for (size_t i = 0; i < states(); ++i)
+        parser.DefineVar(kStates[i], &states_[i]);
 }
 
 void Formula::Parse(mu::Parser &parser, std::span<const char *const> names, const std::string &key,
-                    const std::string &text, int values)
+                    const std::string &text, bool one, int values)
 {
     // The parser would take these for assignments and texts.
     for (size_t i = 0; i < text.size(); ++i)
@@ -373,7 +389,7 @@ void Formula::Parse(mu::Parser &parser, std::span<const char *const> names, cons
         parser.SetExpr(text);
         int results = 0;
         parser.Eval(results);
-        if (results != values)
+        if (results != values && !(one && results == 1))
             Fail(key, text, -1,
                  values == 1 ? "it must be one value, not a list of them"
                              : "it must be two values, along x and along y, with a comma between");
@@ -388,12 +404,25 @@ void Formula::Parse(mu::Parser &parser, std::span<const char *const> names, cons
     }
 }
 
-void Formula::Remember(double &state, double dt_s)
+void Formula::Remember(double *states, int k, double dt_s)
 {
-    state_ = twin::Remember(state, dt_s, [this](double at) {
-        state_ = at;
-        return rate_.Eval();
+    double &own = states[k];
+    if (rates_.size() == 1)
+    {
+        states_[0] = twin::Remember(own, dt_s, [this, k](double at) {
+            states_[0] = at;
+            return Along(rates_[0], k);
+        });
+        return;
+    }
+    double &second = states[kMaxWheels + k];
+    TwoStates both{own, second};
+    states_ = twin::Remember(both, dt_s, [this, k](const TwoStates &at) {
+        states_ = at;
+        return TwoStates{Along(rates_[0], k), Along(rates_[1], k)};
     });
+    own = both[0];
+    second = both[1];
 }
 
 EFFECT(equation) = {
