@@ -252,47 +252,59 @@ private:
 double Wrapped(double rad)
 {
     constexpr double kHalf = std::numbers::pi, kTurn = 2 * kHalf;
+    if (std::abs(rad) < kHalf)
+        return rad;
     const double part_rad = std::fmod(rad + kHalf, kTurn);
     return (part_rad < 0 ? part_rad + kTurn : part_rad) - kHalf;
 }
 
-// Makes weighted errors of poses (W, H, 3) that were predicted.
-void MakeErrors(const Displaced &displaced, double *poses)
+// Makes weighted errors of poses (B, W, H, 3) that were predicted.
+void MakeErrors(const Displaced &displaced, std::vector<double> &poses)
 {
-    const size_t windows = displaced.start.size() / 3;
-    const size_t width = windows > 0 ? displaced.measured.size() / windows : 0;
+    const size_t size = displaced.measured.size(), windows = displaced.start.size() / 3;
+    const size_t width = windows > 0 ? size / windows : 0;
     for (size_t w = 0; w < windows; ++w)
     {
         const double *start = &displaced.start[3 * w];
         const double c = std::cos(start[2]), s = std::sin(start[2]);
-        for (size_t at = w * width; at < (w + 1) * width; at += 3)
-        {
-            const double *measured = &displaced.measured[at], *weight = &displaced.weight[at];
-            const double x_m = poses[at] - start[0], y_m = poses[at + 1] - start[1];
-            const double error[3] = {measured[0] - (c * x_m + s * y_m),
-                                     measured[1] - (c * y_m - s * x_m),
-                                     Wrapped(measured[2] - (poses[at + 2] - start[2]))};
-            for (size_t k = 0; k < 3; ++k)
-                poses[at + k] = std::isnan(error[k]) ? 0 : error[k] * weight[k];
-        }
+        for (size_t first = w * width; first < poses.size(); first += size)
+            for (size_t at = w * width, h = first; at < (w + 1) * width; at += 3, h += 3)
+            {
+                const double *measured = &displaced.measured[at], *weight = &displaced.weight[at];
+                const double x_m = poses[h] - start[0], y_m = poses[h + 1] - start[1];
+                const double error[3] = {measured[0] - (c * x_m + s * y_m),
+                                         measured[1] - (c * y_m - s * x_m),
+                                         Wrapped(measured[2] - (poses[h + 2] - start[2]))};
+                for (size_t k = 0; k < 3; ++k)
+                    poses[h + k] = std::isnan(error[k]) ? 0 : error[k] * weight[k];
+            }
     }
 }
 
-// By row of values: whether they leave the wheels' motion as it is, but for the times of poses.
-std::vector<char> OnGroundAlone(const Model &model, const std::vector<std::string> &names,
+// By row of values (B, P): the first row with which the wheels move alike, but for the times of
+// poses: numbers of the ground and of what is observed leave that as it is.
+std::vector<size_t> FirstsAlike(const Model &model, const std::vector<std::string> &names,
                                 std::span<const double> values)
 {
-    std::vector<char> alone(names.empty() ? 0 : values.size() / names.size(), true);
+    std::vector<size_t> driving;
     for (size_t p = 0; p < names.size(); ++p)
     {
-        const Parameter own = model.Find(names[p]);
-        const std::string_view stage = own.stage;
-        if (stage == "ground" || stage == "observe")
-            continue;
-        for (size_t b = 0; b < alone.size(); ++b)
-            alone[b] = alone[b] && values[b * names.size() + p] == own.value;
+        const std::string_view stage = model.Find(names[p]).stage;
+        if (stage != "ground" && stage != "observe")
+            driving.push_back(p);
     }
-    return alone;
+    std::vector<size_t> firsts(names.empty() ? 0 : values.size() / names.size());
+    for (size_t b = 0; b < firsts.size(); ++b)
+    {
+        const auto alike = [&](size_t a) {
+            return std::ranges::all_of(driving, [&](size_t p) {
+                return values[a * names.size() + p] == values[b * names.size() + p];
+            });
+        };
+        while (!alike(firsts[b]))
+            ++firsts[b];
+    }
+    return firsts;
 }
 
 }  // namespace
@@ -319,27 +331,34 @@ std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
     const Windows windows{track, starts, ends};
     const Events events(windows);
     const std::vector<Model> models = ModelsOf(model, names, values);
-    const std::vector<char> grounded = OnGroundAlone(model, names, values);
-    Recording shared;
-    if (std::ranges::count(grounded, true) > 0)
+    const std::vector<size_t> firsts = FirstsAlike(model, names, values);
+    std::vector<size_t> own, others;
+    std::vector<char> awaited(models.size(), false);
+    for (size_t b = 0; b < models.size(); ++b)
     {
-        const DriveChain own(model);
-        shared = Record(own, track, MeasuredAt(own, track, events));
+        (firsts[b] == b ? own : others).push_back(b);
+        awaited[firsts[b]] |= firsts[b] != b;
     }
+    std::vector<Recording> recordings(models.size());
     std::vector<double> predicted(models.size() * 3 * ends.size(), kNaN);
-    InParallel(models.size(), [&](size_t b) {
+    const auto predict = [&](size_t b) {
         const DriveChain chain(models[b]);
         const auto measured = MeasuredAt(chain, track, events);
-        const bool same = grounded[b] && shared.IsAt(measured);
-        const Recording own = same ? Recording{} : Record(chain, track, measured);
+        const Recording &first = recordings[firsts[b]];
+        const bool shared = first.IsAt(measured);
+        Recording recording = shared ? Recording{} : Record(chain, track, measured);
         Prediction{chain,
                    windows,
                    events,
                    measured,
-                   same ? shared : own,
+                   shared ? first : recording,
                    predicted.data() + b * 3 * ends.size()}
             .Write();
-    });
+        if (awaited[b])
+            recordings[b] = std::move(recording);
+    };
+    for (const auto &rows : {own, others})
+        InParallel(rows.size(), [&](size_t i) { predict(rows[i]); });
     return predicted;
 }
 
@@ -350,8 +369,7 @@ std::vector<double> WindowErrorsBatch(const Model &model, const Track &track,
                                       std::span<const double> values, const Displaced &displaced)
 {
     auto rows = PredictWindowsBatch(model, track, starts, ends, names, values);
-    for (size_t at = 0; at < rows.size(); at += 3 * ends.size())
-        MakeErrors(displaced, &rows[at]);
+    MakeErrors(displaced, rows);
     return rows;
 }
 
