@@ -17,9 +17,9 @@ constexpr double kStandstill_mps = 1e-3;
 double RimSpeed(const Base &base, double duty)
 {
     const double pct = std::min(100 * std::abs(duty), base.duty_pct.back());
-    size_t i = 1;
-    while (pct > base.duty_pct[i])
-        ++i;
+    size_t i = 1;  // counted without a branch: duties come in no order that could be foreseen
+    for (size_t k = 1; k + 1 < base.duty_pct.size(); ++k)
+        i += pct > base.duty_pct[k];
     const double part = (pct - base.duty_pct[i - 1]) / (base.duty_pct[i] - base.duty_pct[i - 1]);
     const double low = base.wheel_speed_mps[i - 1], high = base.wheel_speed_mps[i];
     const double rim_mps = low + part * (high - low);
@@ -63,8 +63,10 @@ Relaxed Approach(double v, double target, double tau_s, double dt_s, Decay &deca
 Relaxed Relax(double v, double target, double tau_s, double max_decel_mps2, double dt_s,
               Decay &decays)
 {
+    if (max_decel_mps2 == kNoLimit)
+        return Approach(v, target, tau_s, dt_s, decays);
     const bool slows = std::abs(target) < std::abs(v) || target * v < 0;
-    if (!slows || max_decel_mps2 == kNoLimit)
+    if (!slows)
         return Approach(v, target, tau_s, dt_s, decays);
     const double distance = std::abs(v - target) - max_decel_mps2 * tau_s;
     const double linear_s = std::clamp(distance / max_decel_mps2, 0.0, dt_s);

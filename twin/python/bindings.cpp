@@ -5,6 +5,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <functional>
 #include "arrays.h"
 
 #include "fw/mixing.h"
@@ -356,6 +357,42 @@ Array RunningSums(Matrix values, Vector weights)
     return ToNumpy(std::move(sums), {count, width});
 }
 
+// What is added from each start to each of its ends, from running sums at these places alone.
+Array SumsBetween(Matrix values, Vector weights, Indices starts, IndexMatrix ends)
+{
+    const size_t count = values.shape(0), width = values.shape(1), horizons = ends.shape(1);
+    if (weights.size() != count || ends.shape(0) != starts.size())
+        throw std::invalid_argument(
+            "weights must be as many as rows of values, ends must have one row per start");
+    constexpr size_t kNoPlace = SIZE_MAX;
+    std::vector<size_t> place(count, kNoPlace);
+    for (const auto &list : {Span(starts), Span(ends)})
+        for (const int64_t n : list)
+            if (n < 0 || static_cast<size_t>(n) >= count)
+                throw std::invalid_argument("starts and ends must be rows of values");
+            else
+                place[static_cast<size_t>(n)] = 0;
+    std::vector<double> sums, row(width);
+    for (size_t n = 0; n < count; ++n)
+    {
+        const double weight = weights.data()[n], *value = values.data() + n * width;
+        for (size_t f = 0; f < width; ++f)
+            row[f] += weight * value[f];
+        if (place[n] == kNoPlace)
+            continue;
+        place[n] = sums.size();
+        sums.insert(sums.end(), row.begin(), row.end());
+    }
+    std::vector<double> between(ends.size() * width);
+    for (size_t i = 0; i < ends.size(); ++i)
+    {
+        const double *from = sums.data() + place[static_cast<size_t>(starts.data()[i / horizons])];
+        const double *to = sums.data() + place[static_cast<size_t>(ends.data()[i])];
+        std::transform(to, to + width, from, between.data() + i * width, std::minus{});
+    }
+    return ToNumpy(std::move(between), {starts.size(), horizons, width});
+}
+
 }  // namespace
 
 NB_MODULE(twinmill_native, m)
@@ -455,6 +492,9 @@ NB_MODULE(twinmill_native, m)
 
     m.def("running_sums", &RunningSums, "values"_a, "weights"_a,
           "(N, F) sums of rows of values (N, F), each times its weight (N,), up to each.");
+    m.def("sums_between", &SumsBetween, "values"_a, "weights"_a, "starts"_a, "ends"_a,
+          "(W, H, F) sums of rows of values (N, F), each times its weight (N,), from after row "
+          "`starts` (W,) up to row `ends` (W, H).");
 
     BindSwarms(m);
     BindThreshold(m);

@@ -76,7 +76,7 @@ def _repeats(
             signs = np.vstack([np.ones(stretches), flips])
             for k, (length_m, axes) in enumerate(kernels):
                 pairs, full = _products(ways, ways.errors[of], length_m, axes)
-                total[k] += np.einsum("fi,ij,fj->f", signs, pairs, signs)
+                total[k] += np.sum(signs @ pairs * signs, axis=1)
                 weight[k] += full
     spread = total[:, 1:].std(axis=1, keepdims=True)
     if not spread.all():

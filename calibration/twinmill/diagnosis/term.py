@@ -88,23 +88,22 @@ def displaced(
 ) -> np.ndarray:
     """(W, H, 3, T) change of windows' displacements by (N, T) velocities in a body axis, linear."""
     step, c, s = response.step_s, np.cos(response.heading_rad), np.sin(response.heading_rad)
-    start, ends = response.starts, np.maximum(response.ends, 0)
+    places = response.starts, np.maximum(response.ends, 0)
     if axis < 2:
         along = (c, s) if axis == 0 else (-s, c)
-        x, y = (native.running_sums(values, a * step) for a in along)
-        dx, dy = x[ends] - x[start][:, None], y[ends] - y[start][:, None]
+        dx, dy = (native.sums_between(values, a * step, *places) for a in along)
         turn = np.zeros_like(dx)
     else:
         angle = native.running_sums(values, step)
         middle = angle - step[:, None] * values / 2
-        wx = -(s * velocity[:, 0] + c * velocity[:, 1]) * step
-        wy = (c * velocity[:, 0] - s * velocity[:, 1]) * step
-        x, y = native.running_sums(middle, wx), native.running_sums(middle, wy)
-        ox, oy = np.cumsum(wx)[:, None], np.cumsum(wy)[:, None]
-        first = angle[start][:, None]
-        dx = x[ends] - x[start][:, None] - first * (ox[ends] - ox[start][:, None])
-        dy = y[ends] - y[start][:, None] - first * (oy[ends] - oy[start][:, None])
-        turn = angle[ends] - first
+        sideways = np.column_stack([-(s * velocity[:, 0] + c * velocity[:, 1]),
+                                    c * velocity[:, 0] - s * velocity[:, 1]])  # fmt: skip
+        first, moved = angle[response.starts][:, None], native.sums_between(sideways, step, *places)
+        dx, dy = (
+            native.sums_between(middle, step * way, *places) - first * moved[..., k, None]
+            for k, way in enumerate(sideways.T)
+        )
+        turn = angle[places[1]] - first
     track = response.data.measurement.track
     at = np.nan_to_num(track.heading_smooth[response.data.windows.starts])
     ch, sh = np.cos(at)[:, None, None], np.sin(at)[:, None, None]

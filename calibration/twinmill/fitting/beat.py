@@ -37,12 +37,16 @@ def beat_radps(t_s: np.ndarray, errors: Sequence[np.ndarray], done: Sequence[np.
     asked = (rate_hz > LEAST_PERIODS / (t_s[-1] - t_s[0])) & (rate_hz < 1 / SHORTEST_S)
     if bins[-1] < 4 * NEIGHBOURS or not asked.any():
         return 0.0
-    power, of_drive = (
-        np.max([_over_noise(bins, signal) for signal in every], axis=0) for every in (errors, done)
-    )
-    power *= asked & (of_drive < np.maximum(IN_THE_DRIVE, power / FAR_BEYOND_THE_DRIVE))
+    power = asked * _highest(bins, errors)
+    if power.max() > BEYOND_CHANCE:  # else what the robot did need not be looked at
+        power *= _highest(bins, done) < np.maximum(IN_THE_DRIVE, power / FAR_BEYOND_THE_DRIVE)
     best = int(np.argmax(power))
     return float(2 * np.pi * rate_hz[best]) if power[best] > BEYOND_CHANCE else 0.0
+
+
+def _highest(bins: np.ndarray, signals: Sequence[np.ndarray]) -> np.ndarray:
+    """(K,) highest power over noise that one of some signals has in each line."""
+    return np.max([_over_noise(bins, signal) for signal in signals], axis=0)
 
 
 def _over_noise(bins: np.ndarray, signal: np.ndarray) -> np.ndarray:

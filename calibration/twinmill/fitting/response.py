@@ -282,17 +282,19 @@ class Response:
         """Of every Nth horizon."""
         data = self.data
         c, s = np.cos(self.heading_rad) * self.step_s, np.sin(self.heading_rad) * self.step_s
+        horizons = range(0, self.ends.shape[1], every)
+        ends = np.ascontiguousarray(np.maximum(self.ends[:, horizons], 0))
         forward, left, turn = features
         sums = [
-            native.running_sums(f, weight)
+            native.sums_between(f, weight, self.starts, ends)
             for weight, f in ((c, forward), (s, forward), (c, left), (s, left), (self.step_s, turn))
         ]
         track = data.measurement.track
         heading = np.nan_to_num(track.heading_smooth[data.windows.starts])
         rows = []
-        for h in range(0, self.ends.shape[1], every):
+        for k, h in enumerate(horizons):
             ok = (self.ends[:, h] >= 0) & np.isfinite(data.measured[:, h, :2]).all(axis=1)
-            cx, sx, cy, sy, w = (q[self.ends[ok, h]] - q[self.starts[ok]] for q in sums)
+            cx, sx, cy, sy, w = (q[ok, k] for q in sums)
             ch, sh = np.cos(heading[ok])[:, None], np.sin(heading[ok])[:, None]
             along = np.concatenate([ch * cx + sh * sx, -ch * sy + sh * cy], axis=1)
             across = np.concatenate([ch * sx - sh * cx, ch * cy + sh * sy], axis=1)

@@ -8,8 +8,6 @@ namespace twin
 namespace
 {
 
-constexpr double kSteepness = 24;  // 1 % of the speed at 0.83 of the edge, 99 % at 1.21 times it
-
 constexpr Card kCard = {
     .name = "stiction",
     .drives = kDutyOnly,
@@ -33,13 +31,21 @@ constexpr ParameterSpec kParameters[] = {
      "does not move at small duties", "moves at smaller duties", 0.3, Role::kLimit},
 };
 
+// x^24: 1 % of the speed is there at 0.83 of the edge, 99 % at 1.21 times it. Five products are
+// quicker than std::pow.
+double Steep(double x)
+{
+    const double x2 = x * x, x4 = x2 * x2, x8 = x4 * x4;
+    return x8 * x8 * x8;
+}
+
 void Step(DutySignals &s, const Numbers &v, double *)
 {
     if (v[0] == 0)
         return;
     for (double &u : s.duty)
         if (u != 0)
-            u /= 1 + std::pow(v[0] / std::abs(u), kSteepness);
+            u /= 1 + Steep(v[0] / std::abs(u));
 }
 
 }  // namespace

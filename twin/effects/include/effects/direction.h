@@ -9,8 +9,8 @@
 namespace twin
 {
 
-// Below this square of an angle the series are exact: their next terms are under 1e-15. Their shares
-// are multiplied: a division takes the time of many products.
+// Below this square of an angle the series are exact: their next terms are under 1e-15. Their
+// shares are multiplied: a division takes the time of many products.
 constexpr double kSmallSquare = 0.0025;
 
 // sin(a) / a
