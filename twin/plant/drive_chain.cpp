@@ -118,6 +118,13 @@ bool IsSameEverywhere(const BoundEffect &effect)
     return card.needs != Needs::kRoom && card.family != Family::kFormula && effect.StateSize() == 0;
 }
 
+GroundSignals SignalsOf(const RobotFacts &robot, const Twist &twist, bool moves, const Pose2 &pose,
+                        const Direction &ahead, double t_s, double dt_s)
+{
+    return {robot,          t_s,   dt_s,         moves,        pose.x_m,         pose.y_m,
+            pose.theta_rad, ahead, twist.vx_mps, twist.vy_mps, twist.omega_radps};
+}
+
 }  // namespace
 
 DriveChain::DriveChain(const Model &model)
@@ -287,8 +294,8 @@ Rolling DriveChain::Roll(const WheelMotion &motion) const
                         [](double v) { return std::abs(v) > kStandstill_mps; })};
 }
 
-Twist DriveChain::OnFloor(const Rolling &rolling, const Direction &ahead, double t_s, double dt_s,
-                          RobotState &state, Random *random) const
+// With the base's gains.
+Twist DriveChain::Geared(const Rolling &rolling) const
 {
     Twist twist = rolling.twist;
     twist.vx_mps *= base_.forward_gain * theta_a1_;
@@ -296,33 +303,31 @@ Twist DriveChain::OnFloor(const Rolling &rolling, const Direction &ahead, double
     twist.omega_radps *= base_.yaw_gain * theta_a2_;
     if (kinematics_.steers())
         twist.vy_mps += kinematics_.SidewaysOfTurning(twist.omega_radps);
+    return twist;
+}
 
+Twist DriveChain::OnFloor(const Rolling &rolling, const Direction &ahead, double t_s, double dt_s,
+                          RobotState &state, Random *random) const
+{
+    Twist twist = Geared(rolling);
     if (random && rolling.moves)
         Disturb(twist, dt_s, state, *random);
     if (!ground_.empty())
-        ActOnGround(twist, rolling.moves, ahead, t_s, dt_s, state);
+    {
+        GroundSignals s = SignalsOf(robot_, twist, rolling.moves, state.pose, ahead, t_s, dt_s);
+        Run(ground_, s, state);
+        twist = {s.vx_mps, s.vy_mps, s.omega_radps};
+    }
     state.vx_mps = twist.vx_mps;
     state.vy_mps = twist.vy_mps;
     state.omega_radps = twist.omega_radps;
     return twist;
 }
 
-void DriveChain::ActOnGround(Twist &twist, bool moves, const Direction &ahead, double t_s,
-                             double dt_s, RobotState &state) const
+GroundSignals DriveChain::BeforeGround(const Rolling &rolling, const Pose2 &pose,
+                                       const Direction &ahead, double t_s, double dt_s) const
 {
-    GroundSignals s{robot_,
-                    t_s,
-                    dt_s,
-                    moves,
-                    state.pose.x_m,
-                    state.pose.y_m,
-                    state.pose.theta_rad,
-                    ahead,
-                    twist.vx_mps,
-                    twist.vy_mps,
-                    twist.omega_radps};
-    Run(ground_, s, state);
-    twist = {s.vx_mps, s.vy_mps, s.omega_radps};
+    return SignalsOf(robot_, Geared(rolling), rolling.moves, pose, ahead, t_s, dt_s);
 }
 
 void DriveChain::Observe(Pose2 &pose, double &t_s) const

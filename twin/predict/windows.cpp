@@ -205,7 +205,7 @@ private:
     struct Walker
     {
         Course course;
-        RobotState state;
+        std::vector<double> memory;
         size_t next, last;
     };
 
@@ -215,24 +215,35 @@ private:
     {
         const auto remembered = Remembered(chain, measured, recording);
         const size_t horizons = windows.Horizons();
+        const std::vector<double> nothing = chain.Start({}).effect_state;
         std::vector<Walker> walkers;
+        std::vector<GroundSignals> signals;
         size_t window = 0, step = 0;
         for (size_t event = 0; event < measured.size(); ++event)
         {
             for (; step < recording.reached[event]; ++step)
-                for (Walker &walker : walkers)
-                    Move(chain, recording.steps[step], walker.course, walker.state);
+                MoveAll(recording.steps[step], walkers, signals);
             for (; window < windows.starts.size() && events.At(windows.starts[window]) == event;
                  ++window)
-            {
-                RobotState state = chain.Start({});
-                if (!remembered.empty())
-                    state.effect_state = remembered[event];
-                walkers.push_back({Course(measured[event].pose), std::move(state),
+                walkers.push_back({Course(measured[event].pose),
+                                   remembered.empty() ? nothing : remembered[event],
                                    window * horizons, (window + 1) * horizons});
-            }
             std::erase_if(walkers, [&](Walker &walker) { return IsThrough(walker, event); });
         }
+    }
+
+    // `signals` is room for those of the walkers.
+    void MoveAll(const WheelStep &step, std::vector<Walker> &walkers,
+                 std::vector<GroundSignals> &signals) const
+    {
+        signals.clear();
+        for (const Walker &walker : walkers)
+            signals.push_back(chain.BeforeGround(step.rolling, walker.course.pose(),
+                                                 walker.course.ahead(), step.t_s, step.dt_s));
+        chain.ActOnGround(std::span(signals), [&](size_t i) { return walkers[i].memory.data(); });
+        for (size_t i = 0; i < walkers.size(); ++i)
+            walkers[i].course.Follow({signals[i].vx_mps, signals[i].vy_mps, signals[i].omega_radps},
+                                     step.dt_s);
     }
 
     // Writes what is seen at those of a window's ends that are at an event; true if no other comes.

@@ -5,6 +5,7 @@
 #define PLANT_DRIVE_CHAIN_H
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "model_file/model.h"
@@ -42,6 +43,20 @@ public:
     Rolling Roll(const WheelMotion &motion) const;
     Twist OnFloor(const Rolling &rolling, const Direction &ahead, double t_s, double dt_s,
                   RobotState &state, Random *random) const;
+    // The second without noise, of several robots whose wheels move alike: their signals before the
+    // effects of the ground, and these. memory(i) is what effects remember of robot i.
+    GroundSignals BeforeGround(const Rolling &rolling, const Pose2 &pose, const Direction &ahead,
+                               double t_s, double dt_s) const;
+    template <class Memory>
+    void ActOnGround(std::span<GroundSignals> robots, Memory memory) const
+    {
+        for (const Bound<OnGround> &bound : ground_)
+            if (bound.act.steps)
+                bound.act.steps(robots, bound.numbers);
+            else
+                for (size_t i = 0; i < robots.size(); ++i)
+                    bound.act.step(robots[i], bound.numbers, memory(i) + bound.state_offset);
+    }
 
     // Observe stage: the pose and time stamp that motion capture reports, and the way back.
     void Observe(Pose2 &pose, double &t_s) const;
@@ -70,8 +85,7 @@ private:
     WheelMotion Target(const Wheels &command) const;
     void DrivePart(const DutySignals &duty, double whole_s, RobotState &state,
                    WheelMotion &mean) const;
-    void ActOnGround(Twist &twist, bool moves, const Direction &ahead, double t_s, double dt_s,
-                     RobotState &state) const;
+    Twist Geared(const Rolling &rolling) const;
     void Disturb(Twist &twist, double dt_s, RobotState &state, Random &random) const;
 
     Base base_;
