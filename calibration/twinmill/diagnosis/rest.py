@@ -525,14 +525,13 @@ class Products:
         """
         grams, moments = grams or self.grams(own), self.moments[:, own]
         whole = grams.folds.sum(0) + ridge * np.eye(own.sum())  # columns are in typical strengths
-        scatter = moments - grams.blocks @ np.linalg.solve(whole, moments.sum(0))
-        signs = _signs(flips, len(moments))
-        judged = np.array(  # (FOLDS, 1 + F, k)
-            [
-                np.vstack([moments[test].sum(0), signs[:, test] @ scatter[test]])
-                for test in (self.fold == k for k in range(FOLDS))
-            ]
-        )
+        tests = [self.fold == k for k in range(FOLDS)]
+        judged = np.array([moments[test].sum(0, keepdims=True) for test in tests])
+        if flips:
+            scatter = moments - grams.blocks @ np.linalg.solve(whole, moments.sum(0))
+            signs = _signs(flips, len(moments))
+            by_chance = np.array([signs[:, test] @ scatter[test] for test in tests])
+            judged = np.concatenate([judged, by_chance], axis=1)  # (FOLDS, 1 + F, k)
         fitted = (judged.sum(0) - judged) @ np.linalg.inv(whole - grams.folds)
         gain = np.sum(fitted * (2 * judged - fitted @ grams.folds), axis=(0, 2))
         return float(gain[0]), gain[1:]

@@ -45,10 +45,6 @@ class Parts:
         """Of these rows alone."""
         return Parts(self.inside[rows], self.ends[rows], self.begins[rows], self.count)
 
-    def within(self, k: int) -> np.ndarray:
-        """(R,) bool: rows of part k."""
-        return self.inside == k
-
     @cached_property
     def slices(self) -> list[slice]:
         """Of each part, where rows are in the order of their parts."""

@@ -12,7 +12,7 @@ way, drift, a curve, what follows an event (see dependence.py). All together wou
 features, so they are added by componentwise boosting (see boosting.py).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -403,13 +403,11 @@ class Response:
         learners, wanted = [], np.zeros(0)
         for some in _batches(groups):
             features = [np.hstack([group[axis] for group in some]) for axis in range(3)]
-            pieces = list(self._weighted(part, scale, self._rows(features, CHOICE_EVERY), left))
-            if not pieces:
+            pieces = self._weighted(part, scale, self._rows(features, CHOICE_EVERY), left)
+            found = _in_order(pieces)
+            if found is None:
                 return [], wanted
-            xs, ys, every = zip(*pieces, strict=True)
-            parts = Parts.joined(every)
-            order = np.argsort(parts.inside, kind="stable")
-            x, wanted, parts = np.concatenate(xs)[order], np.concatenate(ys)[order], parts.at(order)
+            x, wanted, parts = found
             learners += [Learner(x[:, own], parts) for own in _columns(part, some)]
         return learners, wanted
 
@@ -467,27 +465,18 @@ class Response:
         self, part: int, scale: np.ndarray, rows: list[Rows], wanted: np.ndarray
     ) -> tuple[tuple[np.ndarray, np.ndarray], list[Fold]] | None:
         """Normal matrices of all rows of the plane (0) or of turning (1), and of each fold."""
-        total, folds = None, []
-        for x, y, parts in self._weighted(part, scale, rows, wanted):
-            if total is None:
-                total = [np.zeros((x.shape[1],) * 2), np.zeros(x.shape[1])]
-                folds = [[np.zeros_like(total[0]), np.zeros_like(total[1]),
-                          np.zeros_like(total[0]), np.zeros_like(total[1]), 0.0]
-                         for _ in range(self.folds)]  # fmt: skip
-            for k, sums in enumerate(folds):
-                inside, beside = parts.within(k), parts.beside(k)
-                own, push, near = x[inside], y[inside], x[beside]
-                a, b = own.T @ own, own.T @ push
-                sums[2] += a
-                sums[3] += b
-                sums[4] += push @ push
-                sums[0] += a + near.T @ near
-                sums[1] += b + near.T @ y[beside]
-                total[0] += a
-                total[1] += b
-        if total is None:
+        found = _in_order(self._weighted(part, scale, rows, wanted))
+        if found is None:
             return None
-        return (total[0], total[1]), [Fold((s[0], s[1]), (s[2], s[3], s[4])) for s in folds]
+        x, y, parts = found
+        folds = []
+        for own, beside in zip(parts.slices, parts.neighbours, strict=True):
+            inside, push, near = x[own], y[own], x[beside]
+            gram, moment = inside.T @ inside, inside.T @ push
+            touching = gram + near.T @ near, moment + near.T @ y[beside]
+            folds.append(Fold(touching, (gram, moment, float(push @ push))))
+        total = (sum(fold.inside[k] for fold in folds) for k in (0, 1))
+        return tuple(total), folds
 
     def _weighted(
         self, part: int, scale: np.ndarray, rows: list[Rows], wanted: np.ndarray
@@ -570,6 +559,19 @@ def _batches(groups: Sequence[Features]) -> Iterator[Sequence[Features]]:
     for number in np.unique(ends):
         own = np.flatnonzero(ends == number)
         yield groups[own[0] : own[-1] + 1]
+
+
+def _in_order(
+    pieces: Iterable[tuple[np.ndarray, np.ndarray, Parts]],
+) -> tuple[np.ndarray, np.ndarray, Parts] | None:
+    """Rows, wanted values and parts of all pieces, in order of the parts; None of no pieces."""
+    pieces = list(pieces)
+    if not pieces:
+        return None
+    xs, ys, every = zip(*pieces, strict=True)
+    parts = Parts.joined(every)
+    order = np.argsort(parts.inside, kind="stable")
+    return np.concatenate(xs)[order], np.concatenate(ys)[order], parts.at(order)
 
 
 def _columns(part: int, groups: Sequence[Features]) -> Iterator[np.ndarray]:
