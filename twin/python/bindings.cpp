@@ -357,13 +357,21 @@ Array RunningSums(Matrix values, Vector weights)
     return ToNumpy(std::move(sums), {count, width});
 }
 
-// What is added from each start to each of its ends, from running sums at these places alone.
-Array SumsBetween(Matrix values, Vector weights, Indices starts, IndexMatrix ends)
+// What is added from each start to each of its ends, from running sums at these places alone. The
+// columns of several arrays stand side by side.
+Array SumsBetween(const std::vector<Matrix> &arrays, Vector weights, Indices starts,
+                  IndexMatrix ends)
 {
-    const size_t count = values.shape(0), width = values.shape(1), horizons = ends.shape(1);
-    if (weights.size() != count || ends.shape(0) != starts.size())
-        throw std::invalid_argument(
-            "weights must be as many as rows of values, ends must have one row per start");
+    const size_t count = weights.size(), horizons = ends.shape(1);
+    size_t width = 0;
+    for (const Matrix &values : arrays)
+    {
+        if (values.shape(0) != count)
+            throw std::invalid_argument("weights must be as many as rows of values");
+        width += values.shape(1);
+    }
+    if (ends.shape(0) != starts.size())
+        throw std::invalid_argument("ends must have one row per start");
     constexpr size_t kNoPlace = SIZE_MAX;
     std::vector<size_t> place(count, kNoPlace);
     for (const auto &list : {Span(starts), Span(ends)})
@@ -375,9 +383,14 @@ Array SumsBetween(Matrix values, Vector weights, Indices starts, IndexMatrix end
     std::vector<double> sums, row(width);
     for (size_t n = 0; n < count; ++n)
     {
-        const double weight = weights.data()[n], *value = values.data() + n * width;
-        for (size_t f = 0; f < width; ++f)
-            row[f] += weight * value[f];
+        const double weight = weights.data()[n];
+        double *sum = row.data();
+        for (const Matrix &values : arrays)
+        {
+            const double *value = values.data() + n * values.shape(1);
+            for (size_t f = 0; f < values.shape(1); ++f)
+                *sum++ += weight * value[f];
+        }
         if (place[n] == kNoPlace)
             continue;
         place[n] = sums.size();
@@ -493,8 +506,8 @@ NB_MODULE(twinmill_native, m)
     m.def("running_sums", &RunningSums, "values"_a, "weights"_a,
           "(N, F) sums of rows of values (N, F), each times its weight (N,), up to each.");
     m.def("sums_between", &SumsBetween, "values"_a, "weights"_a, "starts"_a, "ends"_a,
-          "(W, H, F) sums of rows of values (N, F), each times its weight (N,), from after row "
-          "`starts` (W,) up to row `ends` (W, H).");
+          "(W, H, F) sums of rows of all values (N, f) side by side, each times its weight (N,), "
+          "from after row `starts` (W,) up to row `ends` (W, H).");
 
     BindSwarms(m);
     BindThreshold(m);

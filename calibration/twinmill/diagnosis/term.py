@@ -91,16 +91,19 @@ def displaced(
     places = response.starts, np.maximum(response.ends, 0)
     if axis < 2:
         along = (c, s) if axis == 0 else (-s, c)
-        dx, dy = (native.sums_between(values, a * step, *places) for a in along)
+        dx, dy = (native.sums_between([values], a * step, *places) for a in along)
         turn = np.zeros_like(dx)
     else:
         angle = native.running_sums(values, step)
         middle = angle - step[:, None] * values / 2
         sideways = np.column_stack([-(s * velocity[:, 0] + c * velocity[:, 1]),
                                     c * velocity[:, 0] - s * velocity[:, 1]])  # fmt: skip
-        first, moved = angle[response.starts][:, None], native.sums_between(sideways, step, *places)
+        first, moved = (
+            angle[response.starts][:, None],
+            native.sums_between([sideways], step, *places),
+        )
         dx, dy = (
-            native.sums_between(middle, step * way, *places) - first * moved[..., k, None]
+            native.sums_between([middle], step * way, *places) - first * moved[..., k, None]
             for k, way in enumerate(sideways.T)
         )
         turn = angle[places[1]] - first

@@ -276,10 +276,10 @@ class Response:
         self.fold = self._part(start_s)
         self.end_fold = self._part(end_s)
         self.tail_fold = self._part(start_s - 2.0)
-        self.rows = self._rows(self.features)
+        self.rows = self._rows([[f] for f in self.features])
 
-    def _rows(self, features: Sequence[np.ndarray], every: int = 1) -> list[Rows]:
-        """Of every Nth horizon."""
+    def _rows(self, features: Sequence[Sequence[np.ndarray]], every: int = 1) -> list[Rows]:
+        """Of every Nth horizon; features of each axis stand side by side."""
         data = self.data
         c, s = np.cos(self.heading_rad) * self.step_s, np.sin(self.heading_rad) * self.step_s
         horizons = range(0, self.ends.shape[1], every)
@@ -393,7 +393,7 @@ class Response:
         self.features = [np.hstack([self.features[axis], *added[axis]]) for axis in axes]
         self.groups = [np.concatenate([self.groups[axis], *numbers[axis]]) for axis in axes]
         fresh = [ridge for _, ridge in chosen]
-        self.rows = self._rows(self.features)
+        self.rows = self._rows([[f] for f in self.features])
         self._fit(scale, [np.concatenate([own, fresh]) for own in self.ridges])
 
     def _learners(
@@ -402,7 +402,7 @@ class Response:
         """One of each group for the plane (0) or turning (1), and the (R,) values wanted."""
         learners, wanted = [], np.zeros(0)
         for some in _batches(groups):
-            features = [np.hstack([group[axis] for group in some]) for axis in range(3)]
+            features = [[group[axis] for group in some] for axis in range(3)]
             pieces = self._weighted(part, scale, self._rows(features, CHOICE_EVERY), left)
             found = _in_order(pieces)
             if found is None:

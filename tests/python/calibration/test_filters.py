@@ -78,14 +78,14 @@ def test_sums_between_are_differences_of_cumsum():
     values, weights = random.normal(size=(50, 3)), random.normal(size=50)
     starts, ends = np.array([0, 7, 7]), np.array([[0, 4], [8, 49], [3, 7]])
     up_to = np.cumsum(weights[:, None] * values, axis=0)
-    assert native.sums_between(values, weights, starts, ends) == pytest.approx(
-        up_to[ends] - up_to[starts][:, None], abs=1e-12
-    )
+    assert native.sums_between(
+        [values[:, :1].copy(), values[:, 1:].copy()], weights, starts, ends
+    ) == pytest.approx(up_to[ends] - up_to[starts][:, None], abs=1e-12)
 
 
 def test_sums_between_refuse_rows_that_are_not_there():
     with pytest.raises(ValueError, match="rows of values"):
-        native.sums_between(np.ones((5, 1)), np.ones(5), np.array([0]), np.array([[5]]))
+        native.sums_between([np.ones((5, 1))], np.ones(5), np.array([0]), np.array([[5]]))
 
 
 @pytest.mark.parametrize("free", [1, 4, 30])
