@@ -642,29 +642,26 @@ class _LeftOut:
         """Squared error at the ridge (G,) of each group, from which `trials` go on."""
         self.ridge = ridge
         self.inverse = _inverses(self.grams + np.diag(self.mean * ridge[self.groups]))
-        self.beta = (self.inverse @ self.moments[..., None])[..., 0]
-        return self._error(self.beta)
+        self.beta = self.inverse @ self.moments[..., None]
+        (error,) = self._errors(self.beta)
+        return float(error)
 
-    def _error(self, beta: np.ndarray) -> float:
-        """Squared error of (K, F) coefficients on the folds that they left out."""
-        curved = (self.inner @ beta[..., None])[..., 0]
-        return float(self.square + np.sum(beta * (curved - 2 * self.push)))
+    def _errors(self, beta: np.ndarray) -> np.ndarray:
+        """(V,) squared error of (K, F, V) coefficients on the folds that they left out."""
+        curved = self.inner @ beta
+        return self.square + np.sum(beta * (curved - 2 * self.push[..., None]), axis=(0, 1))
 
-    def trials(self, group: int, values: Sequence[float]) -> list[float]:
-        """Squared error with each of these ridges of one group: Woodbury's identity.
+    def trials(self, group: int, values: Sequence[float]) -> np.ndarray:
+        """(V,) squared error with each of these ridges of one group: Woodbury's identity.
 
         A ridge that rises by s on the group's diagonal changes the coefficients b to
         b - B (I/s + B_g)^-1 b_g, with B the inverse's columns of the group.
         """
         own = np.flatnonzero(self.groups == group)
         columns, block = self.inverse[:, :, own], self.inverse[:, own[:, None], own]
-        begun = self.beta[:, own, None]
-        errors = []
-        for value in values:
-            rise = self.mean[own[0]] * (value - self.ridge[group])
-            less = np.linalg.solve(np.eye(len(own)) + rise * block, rise * begun)
-            errors.append(self._error(self.beta - (columns @ less)[..., 0]))
-        return errors
+        rise = self.mean[own[0]] * (np.array(values) - self.ridge[group])[:, None, None, None]
+        less = np.linalg.solve(np.eye(len(own)) + rise * block, rise * self.beta[:, own])
+        return self._errors(self.beta - columns @ less[..., 0].transpose(1, 2, 0))
 
 
 def _inverses(matrices: np.ndarray) -> np.ndarray:
@@ -705,6 +702,6 @@ def _ridge(
                 best, moved = left_out.at(ridge), True
         if not moved:
             break
-    each = left_out.beta
+    each = left_out.beta[..., 0]
     every = np.linalg.solve(total[0] + np.diag(mean * ridge[groups]), total[1])
     return ridge, every, each
