@@ -6,7 +6,7 @@ lowers the error on the parts left out most is taken (Buhlmann and Yu 2003; grou
 Binder 2006). It ends where none lowers that error by what is worth it.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -67,21 +67,28 @@ class Learner:
     Args:
         x: (R, F) rows.
         parts: of the rows, which are in order of the part that they are inside.
+        inside, beside: (K, F, F) products of the rows inside each part, and beside it.
     """
 
-    def __init__(self, x: np.ndarray, parts: Parts) -> None:
+    def __init__(self, x: np.ndarray, parts: Parts, inside: np.ndarray, beside: np.ndarray) -> None:
         self.x = x.astype(np.float32)
         self.within, self.beside = parts.slices, parts.neighbours
         self.x_beside = [self.x[k] for k in self.beside]
-        inside, beside = (
-            np.array([own.T @ own for own in (x[k] for k in rows)])
-            for rows in (self.within, self.beside)
-        )
         self.total = inside.sum(axis=0)
         self.mean = max(float(np.diag(self.total).mean()), 1e-30)
         values, self.vectors = np.linalg.eigh(self.total - inside - beside)
         self.values = np.maximum(values, 0.0)
         self.inside = self.vectors.transpose(0, 2, 1) @ inside @ self.vectors
+
+    @classmethod
+    def each(cls, x: np.ndarray, parts: Parts, groups: Iterable[np.ndarray]) -> Iterator["Learner"]:
+        """One of each group of columns of (R, F) rows: products of all are quicker at once."""
+        inside, beside = (
+            np.array([own.T @ own for own in (x[k] for k in rows)])
+            for rows in (parts.slices, parts.neighbours)
+        )
+        for own in groups:
+            yield cls(x[:, own], parts, *(gram[:, own[:, None], own] for gram in (inside, beside)))
 
     def gain(self, wanted: np.ndarray) -> tuple[float, float]:
         """By how much the squared error on left-out parts falls at the best ridge; that ridge."""

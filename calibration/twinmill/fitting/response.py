@@ -408,7 +408,7 @@ class Response:
             if found is None:
                 return [], wanted
             x, wanted, parts = found
-            learners += [Learner(x[:, own], parts) for own in _columns(part, some)]
+            learners += Learner.each(x, parts, _columns(part, some))
         return learners, wanted
 
     def _solved(

@@ -12,7 +12,8 @@ ROWS, PARTS, NOISE = 800, 8, 0.5
 def learners(random):
     inside = np.repeat(np.arange(PARTS), ROWS // PARTS)
     parts = Parts(inside, inside, inside, PARTS)
-    return [Learner(random.normal(size=(ROWS, width)), parts) for width in (3, 10, 30, 4)]
+    groups = np.split(np.arange(47), np.cumsum((3, 10, 30)))
+    return list(Learner.each(random.normal(size=(ROWS, 47)), parts, groups))
 
 
 @pytest.mark.parametrize("seed", range(5))
