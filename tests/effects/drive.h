@@ -26,6 +26,14 @@ struct Signals
     double observed_t_s = 0;
 };
 
+// Those of the ground among them, which go on reading the facts of the robot there.
+inline GroundSignals GroundOf(const Signals &s)
+{
+    return {s.robot,  s.t_s,    s.dt_s,       s.moves,
+            s.x_m,    s.y_m,    s.theta_rad,  Direction::Of(s.theta_rad),
+            s.vx_mps, s.vy_mps, s.omega_radps};
+}
+
 // One effect by itself.
 class Alone
 {
@@ -66,9 +74,7 @@ public:
         }
         if (const auto *on = std::get_if<OnGround>(&effect_.act()))
         {
-            GroundSignals ground{s.robot,  s.t_s,    s.dt_s,       s.moves,
-                                 s.x_m,    s.y_m,    s.theta_rad,  Direction::Of(s.theta_rad),
-                                 s.vx_mps, s.vy_mps, s.omega_radps};
+            GroundSignals ground = GroundOf(s);
             on->step(ground, numbers, state);
             s.vx_mps = ground.vx_mps;
             s.vy_mps = ground.vy_mps;

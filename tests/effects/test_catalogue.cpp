@@ -297,6 +297,32 @@ TEST_P(EveryEffect, DependsOnPlaceAndHeadingOnlyIfItNeedsTheRoom)
     }
 }
 
+// Windows that are under way at once are passed together.
+TEST_P(EveryEffect, TakesSeveralRobotsAsEachAlone)
+{
+    const auto *on = std::get_if<OnGround>(&GetParam()->act);
+    if (!on || !on->steps)
+        return;
+    const auto effect = DefaultsOf(*GetParam());
+    EXPECT_EQ(effect.StateSize(), 0);
+    const std::vector<double> values = Defaults(*GetParam());
+    std::mt19937_64 engine(10);
+    std::vector<Signals> alone;
+    std::vector<GroundSignals> together;
+    for (int robot = 0; robot < 19; ++robot)
+        alone.push_back(RandomSignals(engine, 0));
+    for (const Signals &s : alone)
+        together.push_back(GroundOf(s));
+    on->steps(together, {values});
+    for (size_t robot = 0; robot < alone.size(); ++robot)
+    {
+        effect.Step(alone[robot], nullptr);
+        EXPECT_EQ(together[robot].vx_mps, alone[robot].vx_mps);
+        EXPECT_EQ(together[robot].vy_mps, alone[robot].vy_mps);
+        EXPECT_EQ(together[robot].omega_radps, alone[robot].omega_radps);
+    }
+}
+
 TEST_P(EveryEffect, InvertsWhatItDoesToThePoseSeenAndNothingElse)
 {
     const bool observes = std::holds_alternative<OnObservation>(GetParam()->act);
