@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from twinmill.data.measurement import load_measurements
+from twinmill.diagnosis import ties
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.first_sight import at_first_sight
@@ -170,8 +171,31 @@ def test_what_can_do_all_that_another_does_stands_in_one_group_with_it(behind, t
     screened = [
         Screened(name, columns, 50.0, 20.0) for name, columns in (("line", line), ("plane", plane))
     ]
-    this = Round(None, screened, trials, accepted=trials[0])
+    before = SimpleNamespace(state=SimpleNamespace(told_speeds=False))
+    this = Round(before, screened, trials, accepted=trials[0])
     assert [t.names[0] for t in ties_of(this, SETTINGS)] == (["plane"] if tied else [])
+
+
+@pytest.mark.parametrize(
+    ("apart", "told", "tied"),
+    [(0.006, True, True), (0.006, False, False), (0.012, True, False), (0.02, True, False)],
+)
+def test_bends_that_differ_by_an_error_of_the_told_speeds_are_one(apart, told, tied, monkeypatch):
+    """The better one changes the way by 8 %, and speeds of another log are known to 1.5 %."""
+    fit = SimpleNamespace(against=lambda _: (40.0, 20.0, 5.0), x=np.zeros(3))
+    before = SimpleNamespace(state=SimpleNamespace(told_speeds=told))
+    curve, zone = (
+        SimpleNamespace(names=(name,), fit=fit, held_score=1.0)
+        for name in ("speed_curve", "dead_zone")
+    )
+    screened = [
+        Screened(name, np.eye(6)[:, [k]], 50.0, 20.0)
+        for k, name in enumerate(("speed_curve", "dead_zone"))
+    ]
+    monkeypatch.setattr(ties, "way_apart", lambda one, _: 0.08 if one is before else apart)
+    monkeypatch.setattr(ties, "in_common", lambda *_: 1.0)
+    this = Round(before, screened, [curve, zone], accepted=curve)
+    assert [t.names[0] for t in ties_of(this, SETTINGS)] == (["dead_zone"] if tied else [])
 
 
 def stopping_at(words: str):
