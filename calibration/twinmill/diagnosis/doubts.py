@@ -18,7 +18,7 @@ from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.search import PAUSE_S
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import CHANGE, TIME
+from twinmill.diagnosis.term import CHANGE, PLACE, TIME
 from twinmill.diagnosis.ties import bends_speed, in_common, way_apart
 from twinmill.diagnosis.trials import REFIT, Trial, estimates_of
 from twinmill.fitting.compare import GOOD
@@ -38,7 +38,7 @@ from twinmill.predict.datasets import Trajectory, errors_of
 
 # Groups of a rest, and what the cards of effects that act by them need or are shown by.
 BY = {
-    "place": {"places", "place"},
+    PLACE: {"places", "place"},
     "heading": {"headings", "heading"},
     TIME: {"history", "battery"},
     CHANGE: {"changes"},
@@ -467,11 +467,14 @@ def _is_some_moments(finding: Finding, found: Sequence[Finding], rest: Rest) -> 
 def _leaves_its_own(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
     """What is left still depends on what the finding acts by.
 
-    A robot comes to other places as time goes by, so that a place may stand for the time.
+    A robot comes to other places as time goes by, so that a place may stand for the time, and a
+    while for a place.
     """
     acts_by = _acts_by(finding.effect)
     if _is_placed(finding.effect):
         acts_by |= BY[TIME]
+    if lasts_for_a_while(finding.effect):
+        acts_by |= BY[PLACE]
     for group in rest.depends_on:
         if BY.get(group, set()) & acts_by and _much_left_by(rest, group):
             why = f"what is left still depends on {group}, so that it may have another form"

@@ -22,6 +22,7 @@ LEAST_S = 1.0  # between the first and the last window of a stretch that is wort
 SEEN = 2  # windows overlap, so that more than one sees what lasts
 HORIZON = HORIZONS_S.index(0.5)
 LESS, MORE = 0.9, 1.1  # of the predicted way
+HARDLY = 0.05  # share of the way: events that all change it by less must be twice as many
 
 
 @dataclass(frozen=True)
@@ -68,16 +69,15 @@ def _of_log(own: Opened, model: native.Model) -> list[Moment]:
     events = _events(missed, data.start_s)
     if len(events) < SETTINGS.several:
         return []
-    way = _ways(own, model)
-    track = data.measurement.track
+    every = _ways(own, model)
+    ways = [float(np.nanmedian(every[event])) for event in events]
+    faint = all(abs(way - 1) < HARDLY for way in ways)
+    if faint and len(events) < 2 * SETTINGS.several:
+        return []
+    name, robot_id = data.measurement.log_name, data.measurement.track.robot_id
     return [
-        Moment(
-            data.measurement.log_name,
-            track.robot_id,
-            float(data.start_s[event[-1]]),
-            float(np.nanmedian(way[event])),
-        )
-        for event in events
+        Moment(name, robot_id, float(data.start_s[event[-1]]), way)
+        for event, way in zip(events, ways, strict=True)
     ]
 
 

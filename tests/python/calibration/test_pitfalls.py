@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from twinmill.diagnosis import doubts
+from twinmill.diagnosis import doubts, moments
 from twinmill.diagnosis.diagnose import diagnose, first_state
 from twinmill.diagnosis.doubts import (
     _faster,
@@ -471,6 +471,24 @@ def test_moments_without_power_are_told_one_by_one(tanh_robot, measure, fitted):
     assert "4 moments" in found.sentence
 
 
+@pytest.mark.parametrize(
+    ("count", "way", "told"), [(4, 0.8, 4), (4, 1.01, 0), (8, 1.01, 8), (3, 0.5, 0)]
+)
+def test_moments_that_hardly_change_the_way_must_be_many(count, way, told, monkeypatch):
+    """Events of the size of the noise's tails come by chance; those that stop a robot do not."""
+    far = np.zeros(400, bool)
+    far[np.arange(count)[:, None] * 40 + [20, 21, 22]] = True
+    monkeypatch.setattr(moments, "is_far", lambda *_: far)
+    monkeypatch.setattr(moments, "_ways", lambda *_: np.full(400, way))
+    measurement = SimpleNamespace(log_name="run", track=SimpleNamespace(robot_id=1))
+    data = SimpleNamespace(
+        measurement=measurement, start_s=0.25 * np.arange(400), floor=None, errors=lambda _: None
+    )
+    floor = SimpleNamespace(across=None, keep=np.ones(400, bool))
+    found = moments.moments_of([SimpleNamespace(data=data, floor=floor)], [None])
+    assert len(found) == told
+
+
 def _weak_left_from(robot, from_s: float):
     """The robot with left wheels that lose 12 % from a time of its log on."""
 
@@ -768,6 +786,15 @@ def test_what_leaves_a_rest_of_its_own_kind_has_another_form(effect, depends_on,
         assert judged.certainty == certainty
         assert bool(judged.why) == (certainty == "doubtful")
         assert judged.wrong_form == outside
+
+
+@pytest.mark.parametrize(("until_s", "certainty"), [(12.0, "doubtful"), (None, "sure")])
+def test_a_loss_for_a_while_that_leaves_a_place_may_be_of_the_place(until_s, certainty):
+    """A robot is somewhere for a while; one that is weak from a moment on goes everywhere so."""
+    name = "transient_loss" if until_s else "abrupt_loss"
+    found = _loss(name, 0.2, *(t for t in (5.0, until_s) if t))
+    (judged,) = of_another_form([found], Rest(0.1, False, ["place"]))
+    assert judged.certainty == certainty
 
 
 @pytest.mark.parametrize(("taken", "certainty"), [(0.05, "sure"), (0.5, "doubtful")])
