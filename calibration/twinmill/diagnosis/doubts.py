@@ -131,13 +131,15 @@ def _is_even(last: Trial, name: str) -> bool:
 def _in_a_place_of_its_own(last: Trial, name: str) -> bool:
     """Whether the robot, while an effect of a moment is there, drives where it drives at no other.
 
-    Then the floor there may be as it is, and no log of this drive tells.
+    Then the floor there may be as it is, and no log of this drive tells. When it begins and ends is
+    known to a part of its while, so that the middle of it decides.
     """
     begin_s, *end_s = when_s(last, name)
     (data,) = (d for d in last.fit.datasets if isinstance(d, Trajectory))
     place, away_s = data.measurement.track.pose[data.windows.starts, :2], SETTINGS.away_s
-    until_s = min(end_s, default=np.inf)
-    there = (data.start_s >= begin_s) & (data.start_s < until_s)
+    until_s = min(*end_s, data.start_s[-1])
+    rim_s = SETTINGS.rim * (until_s - begin_s)
+    there = (data.start_s >= begin_s + rim_s) & (data.start_s < until_s - rim_s)
     elsewhen = (data.start_s < begin_s - away_s) | (data.start_s > until_s + away_s)
     if not (there.any() and elsewhen.any()):
         return False

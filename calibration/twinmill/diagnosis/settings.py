@@ -74,6 +74,7 @@ class Settings(Numbers):
     away_s: float = number(2.0, "s between two visits of a place")
     again_m: float = number(0.1, "from a place that it comes by again ...")
     comes_by: float = number(0.25, "... on less of its way a loss may be of that place")
+    rim: float = number(0.15, "... of its middle: so much of its while on either side may be off")
     other_commands: float = number(0.3, "of the time, that commands beyond 95 % of the others last")
     undone: float = number(0.35, "cosine against each other of what two effects do")
     of_a_kind: int = number(3, "effects of one kind, which are one of another form")

@@ -788,6 +788,25 @@ def test_what_leaves_a_rest_of_its_own_kind_has_another_form(effect, depends_on,
         assert judged.wrong_form == outside
 
 
+@pytest.mark.parametrize(("near_m", "own"), [(0.25, True), (0.7, False)])
+def test_a_place_is_its_own_though_other_ways_cross_its_ends(near_m, own, monkeypatch):
+    """From 10 to 14 s along 1.6 m, to whose ends the robot comes at other times as well."""
+    t_s = np.arange(0, 30, 0.25)
+    there = (t_s >= 10) & (t_s < 14)
+    x_m = np.where(t_s < 10, near_m * np.abs(np.sin(t_s)), 1.6 - near_m * np.abs(np.sin(t_s)))
+    x_m[there] = 0.4 * (t_s[there] - 10)
+    pose = np.column_stack([x_m, np.zeros((len(t_s), 2))])
+    data = SimpleNamespace(
+        measurement=SimpleNamespace(track=SimpleNamespace(pose=pose)),
+        windows=SimpleNamespace(starts=np.arange(len(t_s))),
+        start_s=t_s,
+    )
+    monkeypatch.setattr(doubts, "Trajectory", SimpleNamespace)
+    monkeypatch.setattr(doubts, "when_s", lambda *_: [10.0, 14.0])
+    last = SimpleNamespace(fit=SimpleNamespace(datasets=[data]))
+    assert doubts._in_a_place_of_its_own(last, "transient_loss") is own
+
+
 @pytest.mark.parametrize(("until_s", "certainty"), [(12.0, "doubtful"), (None, "sure")])
 def test_a_loss_for_a_while_that_leaves_a_place_may_be_of_the_place(until_s, certainty):
     """A robot is somewhere for a while; one that is weak from a moment on goes everywhere so."""
