@@ -66,6 +66,8 @@ def of_one(
         return doubt
     if with_role(name, "moment") and (doubt := _at_other_commands(done.last, name)):
         return doubt
+    if lasts_for_a_while(name) and when_s(done.last, name)[0] < PAUSE_S:
+        return "it is there from the start: what runs in, or warms up, fades so by itself"
     if not _stands_alone(done, name) and (doubt := _unusual(card, own)):
         return doubt
     if change:

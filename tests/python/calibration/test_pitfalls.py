@@ -788,6 +788,19 @@ def test_what_leaves_a_rest_of_its_own_kind_has_another_form(effect, depends_on,
         assert judged.wrong_form == outside
 
 
+def test_a_loss_that_fades_from_the_start_is_no_sure_while(tanh_robot, measure, fitted):
+    """Gears that run in: 25 % less at first, gone with a time constant of 8 s."""
+
+    class RunsIn(tanh_robot):
+        def wheels_mps(self, duty):
+            left = 0.25 * np.exp(-np.arange(len(duty)) * EULER_S / 8)
+            return super().wheels_mps(duty) * (1 - left)[:, None]
+
+    found = diagnose([measure(RunsIn(), 23, 80.0)], fitted)
+    assert found.verdict in ("effect_missing", "ambiguous", "outside_catalogue")
+    assert not [f.effect for f in found.findings if f.certainty == "sure"]
+
+
 @pytest.mark.parametrize(("near_m", "own"), [(0.25, True), (0.7, False)])
 def test_a_place_is_its_own_though_other_ways_cross_its_ends(near_m, own, monkeypatch):
     """From 10 to 14 s along 1.6 m, to whose ends the robot comes at other times as well."""
