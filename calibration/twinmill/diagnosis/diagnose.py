@@ -328,7 +328,7 @@ def _concluded(
     )
     if rest.proven and rest.proven.is_late:
         late = [f.effect for f in findings if f.effect in needing("changes")]
-        instead = None if rest.proven.instead_of else _without(late, less, known)
+        instead = None if rest.proven.instead_of else _lacking(late, less, known)
         better = (instead and instead.formula(last.fit)) or rest.proven
         rest = replace(rest, proven=tuned(last.fit, better))
     findings = beside_more(of_another_form(findings, rest), rest)
@@ -412,10 +412,10 @@ def _doubted(
     findings: Sequence[Finding], less: dict[str, Trial], known: Sequence[Opened]
 ) -> Doubted | None:
     """The effects that are in doubt, and the fit without them."""
-    return _without([f.effect for f in findings if f.certainty == "doubtful"], less, known)
+    return _lacking([f.effect for f in findings if f.certainty == "doubtful"], less, known)
 
 
-def _without(
+def _lacking(
     effects: Sequence[str], less: dict[str, Trial], known: Sequence[Opened]
 ) -> Doubted | None:
     """Those of some effects that were fitted, and the fit without them."""

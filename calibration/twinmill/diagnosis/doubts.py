@@ -139,7 +139,7 @@ def _in_a_place_of_its_own(last: Trial, name: str) -> bool:
     begin_s, *end_s = when_s(last, name)
     (data,) = (d for d in last.fit.datasets if isinstance(d, Trajectory))
     place, away_s = data.measurement.track.pose[data.windows.starts, :2], SETTINGS.away_s
-    until_s = min(*end_s, data.start_s[-1])
+    until_s = min([*end_s, data.start_s[-1]])
     rim_s = SETTINGS.rim * (until_s - begin_s)
     there = (data.start_s >= begin_s + rim_s) & (data.start_s < until_s - rim_s)
     elsewhen = (data.start_s < begin_s - away_s) | (data.start_s > until_s + away_s)

@@ -818,6 +818,8 @@ def test_a_place_is_its_own_though_other_ways_cross_its_ends(near_m, own, monkey
     monkeypatch.setattr(doubts, "when_s", lambda *_: [10.0, 14.0])
     last = SimpleNamespace(fit=SimpleNamespace(datasets=[data]))
     assert doubts._in_a_place_of_its_own(last, "transient_loss") is own
+    monkeypatch.setattr(doubts, "when_s", lambda *_: [26.0])  # it has no end: at one of the ends
+    assert not doubts._in_a_place_of_its_own(last, "abrupt_loss")
 
 
 @pytest.mark.parametrize(("until_s", "certainty"), [(12.0, "doubtful"), (None, "sure")])
