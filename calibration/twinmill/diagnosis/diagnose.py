@@ -60,7 +60,6 @@ from twinmill.fitting.fit import base_names
 from twinmill.fitting.opening import (
     Opened,
     judged,
-    of_few_commands,
     open_measurements,
     thinned,
     with_own_gains,
@@ -313,7 +312,8 @@ def _concluded(
     )
     if first.told_speeds:
         findings = within_the_table(findings, less, last)
-    if of_few_commands(known):
+    few = few_commands_notes(known)
+    if few:
         findings = beside_stale(findings)
     findings = without.doubted(undone(findings, last))
     doubted = _doubted(findings, less, known)
@@ -386,7 +386,7 @@ def _concluded(
             *disturbed,
             *lag_notes(lags_s),
             *marker_notes(modelled),
-            *few_commands_notes(known),
+            *few,
             *weighed.notes,
         ],
         next_experiment=_next(findings, drives, faint, weighed.verdict, same_clock=same_clock),

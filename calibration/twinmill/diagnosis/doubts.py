@@ -368,7 +368,7 @@ def beside_stale(found: Sequence[Finding]) -> list[Finding]:
     """
     if REFIT not in [f.effect for f in found]:
         return list(found)
-    steady = {name for name, card in catalogue().items() if card["needs"] == "steady_speed"}
+    steady = needing("steady_speed")
     why = "at the few commands of these logs other numbers and another effect may do the same"
     return [doubted(f, why) if f.effect in steady else f for f in found]
 
@@ -615,7 +615,7 @@ def _is_timed(effect: str) -> bool:
 KINDS = (
     (bends_speed, "speed", "bends the speed over the command", "curve"),
     (_is_late, CHANGE, "is late at changes of the command", "lag"),
-    (_is_placed, "place", "changes with the place", "floor"),
+    (_is_placed, PLACE, "changes with the place", "floor"),
     (_is_timed, TIME, "changes with time", "loss"),
 )
 

@@ -32,6 +32,7 @@ from twinmill.diagnosis.term import (
     times,
 )
 from twinmill.filters import filtered
+from twinmill.fitting.dependence import rates
 from twinmill.fitting.floor import body_velocity_at
 from twinmill.fitting.opening import Opened
 from twinmill.model.parameters import effect_names
@@ -278,7 +279,7 @@ def _named_terms(
     x, y = response.pose[:, 0], response.pose[:, 1]
     voltage = command_at(t_s, track.command_t_s, np.nan_to_num(track.battery_V)[:, None])[:, 0]
     moving = moves(velocity) * 1.0
-    change = [_rate(v, response.step_s) for v in (vx, vy, turn)]
+    change = rates(np.column_stack([vx, vy, turn]), response.step_s).T
     terms = {
         ("direction of rotation", "abs(vx)"): np.abs(vx),
         ("direction of rotation", "abs(vy)"): np.abs(vy),
@@ -344,12 +345,6 @@ def _named_terms(
         for carrier, speed in speeds:
             terms[TIME, f"sign(t - {at_s:g})*{carrier}"] = np.sign(t_s - at_s) * speed
     return terms
-
-
-def _rate(values: np.ndarray, step_s: np.ndarray) -> np.ndarray:
-    """Rate of change; zero where a stretch begins."""
-    rate = np.diff(values, prepend=values[0]) / np.where(step_s > 0, step_s, np.inf)
-    return rate
 
 
 def _after_rise(speed: np.ndarray, step_s: np.ndarray) -> np.ndarray:

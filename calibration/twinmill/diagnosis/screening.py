@@ -190,11 +190,9 @@ def _stronger(
     for dataset, given, row, weight in zip(
         state.datasets, state.models, rows, weights, strict=True
     ):
-        model = given.copy()
-        model.add_effect(name)
-        (p,) = effect_parameters(model, effect_names(model)[-1], fresh=True)
+        (p,), own, points = _points(name, state, given, {})
         values = p.usual + np.array(STRONGER)[:, None] * _reach(name, [p], {})
-        changed = dataset.rows(model, [p.name], np.clip(values, p.min, p.max))
+        changed = dataset.rows(points.model, own, np.clip(values, p.min, p.max))
         columns.append(weight[:, None] * (row - changed).T)
     return np.concatenate(columns)
 

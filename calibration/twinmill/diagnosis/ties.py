@@ -11,7 +11,7 @@ from twinmill.diagnosis.rounds import Round
 from twinmill.diagnosis.screening import candidates
 from twinmill.diagnosis.settings import Settings
 from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, fitted
-from twinmill.model.parameters import catalogue
+from twinmill.model.parameters import catalogue, needing
 from twinmill.predict.datasets import Trajectory
 
 
@@ -94,8 +94,7 @@ def way_apart(one: Trial, other: Trial) -> float:
 
 def bends_speed(effect: str) -> bool:
     """Whether it bends the steady speed over the command."""
-    card = catalogue().get(effect, {"identify": (), "needs": "", "family": ""})
-    return effect in of_levels() and "steady_speed" in {*card["identify"], card["needs"]}
+    return effect in of_levels() and effect in needing("steady_speed")
 
 
 def of_levels() -> list[str]:

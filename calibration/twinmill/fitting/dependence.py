@@ -234,25 +234,28 @@ def _leans(motion: Motion) -> Features:
 
 def in_curves(velocity: np.ndarray, step_s: np.ndarray) -> np.ndarray:
     """(N, 2) m/s^2 by which a body of (N, 3) velocity is led round, in its axes."""
-    ahead, left, turn = velocity.T
-    return np.column_stack([-turn * left, turn * ahead])
+    return _turning(velocity[:, :2], velocity)
 
 
 def while_speeding_up(velocity: np.ndarray, step_s: np.ndarray) -> np.ndarray:
     """(N, 2) m/s^2 by which the speeds of a body change, in its axes."""
-    return _rates(velocity[:, :2], step_s)
+    return rates(velocity[:, :2], step_s)
 
 
 def led_by(off: np.ndarray, velocity: np.ndarray, step_s: np.ndarray) -> np.ndarray:
     """(N, 2) velocity of a point whose place in the body's axes, (N, 2) `off`, changes."""
-    turn = velocity[:, 2]
-    return _rates(off, step_s) + np.column_stack([-turn * off[:, 1], turn * off[:, 0]])
+    return rates(off, step_s) + _turning(off, velocity)
 
 
-def _rates(values: np.ndarray, step_s: np.ndarray) -> np.ndarray:
+def _turning(vectors: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """(N, 2) how fast vectors that are fixed in the body turn with it."""
+    return velocity[:, [2]] * np.column_stack([-vectors[:, 1], vectors[:, 0]])
+
+
+def rates(values: np.ndarray, step_s: np.ndarray) -> np.ndarray:
     """(N, k) of (N, k) per second; 0 where a stretch begins."""
     change = np.diff(values, axis=0, prepend=values[:1])
-    return np.where(step_s[:, None] > 0, change / np.maximum(step_s, 1e-9)[:, None], 0.0)
+    return change / np.where(step_s > 0, step_s, np.inf)[:, None]
 
 
 def _events(motion: Motion) -> Iterator[Features]:

@@ -14,6 +14,11 @@ import numpy as np
 import pytest
 import turbopi
 
+from twinmill.challenge.cases import calibration
+from twinmill.challenge.drives import drive
+from twinmill.challenge.physics import catalogue_forms
+from twinmill.challenge.robots import Robot, draw_robot
+from twinmill.challenge.run import Plan, play, write_log
 from twinmill.data.measurement import Measurement, load_measurements
 from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
@@ -214,3 +219,35 @@ def one_clock_base(tanh_robot, measure, model_file, tmp_path_factory) -> ModelFi
     path = tmp_path_factory.mktemp("one_clock") / "base.toml"
     fit([measure(tanh_robot(), 1, 60.0)], model_file(extra="[clock]\nsame = true\n"), path, "")
     return ModelFile.load(str(path))
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory) -> Callable[..., tuple[Robot, Measurement, ModelFile]]:
+    """A robot of the exam, a run of it with one thing hidden, and a base from another log.
+
+    Args of what is given:
+        kind: of the robot.
+        seed: of all that is drawn.
+        style: of the run, 80 s long.
+        hidden: name and kind of what is hidden, and by which of its values it is told how much.
+        much: that value.
+        forces: whether a robot made of forces is, in the log of the base; see `play`.
+    """
+
+    def make(kind, seed, style, hidden, much, *, forces=False):
+        folder, random = tmp_path_factory.mktemp(hidden[0]), np.random.default_rng(seed)
+        robot = draw_robot(kind, random)
+        usual = calibration(robot, seed, 60.0)
+        write_log(usual, play(usual, forces=forces), folder / "usual.lcmlog")
+        (folder / "sheet.toml").write_text(robot.sheet(random))
+        plan = Plan(robot, drive(style, 80.0, True, random), seed)
+        forms = catalogue_forms(robot, random)
+        form = next(f for f in forms if (f.name, f.kind) == hidden[:2])
+        form = form.scaled(much / form.values[hidden[2]])
+        write_log(plan, play(plan, [form]), folder / "run.lcmlog")
+        sheet, base = ModelFile.load(str(folder / "sheet.toml")), folder / "base.toml"
+        fit(load_measurements([folder / "usual.lcmlog"]), sheet, base, "")
+        (run,) = load_measurements([folder / "run.lcmlog"])
+        return robot, run, ModelFile.load(str(base))
+
+    return make

@@ -14,6 +14,9 @@ from twinmill.diagnosis.term import CHANGE, CHANNELS, COUPLING, TYPICAL, Term
 from twinmill.fitting.dependence import in_curves, led_by, while_speeding_up
 from twinmill.fitting.opening import Opened
 
+# From (N, 3) velocities and (N,) lengths of steps to (N, 2) m/s^2.
+Lean = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
 
 def of_leaning(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> list[Family]:
     """In curves, and while the speed changes.
@@ -25,20 +28,22 @@ def of_leaning(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> li
     kinds = ((COUPLING, "lean(omega*v)", in_curves), (CHANGE, "lean(dv)", while_speeding_up))
     found = []
     for group, text, lean in kinds:
-        moved = [
-            led_by(lean(v, o.floor.response.step_s), v, o.floor.response.step_s)
-            for o, v in zip(opened, velocities, strict=True)
-        ]
+        moved = [_moved(lean, o, v) for o, v in zip(opened, velocities, strict=True)]
         size = float(np.quantile(np.abs(np.concatenate(moved)), MOST))
         if size > 1e-9:
             found.append(_leaning(Term(group, CHANNELS[1], text, size, text), lean))
     return found
 
 
-def _leaning(term: Term, lean: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Family:
+def _moved(lean: Lean, own: Opened, velocity: np.ndarray) -> np.ndarray:
+    """(N, 2) velocity of a marker that leans by a metre for each m/s^2."""
+    step_s = own.floor.response.step_s
+    return led_by(lean(velocity, step_s), velocity, step_s)
+
+
+def _leaning(term: Term, lean: Lean) -> Family:
     def values(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        step_s = own.floor.response.step_s
-        moved = TYPICAL[term.adds_to] / term.size * led_by(lean(velocity, step_s), velocity, step_s)
+        moved = TYPICAL[term.adds_to] / term.size * _moved(lean, own, velocity)
         return {0: moved[:, [0]], 1: moved[:, [1]]}
 
     return Family([term], values)
