@@ -10,7 +10,7 @@ from twinmill.model.parameters import (
     GAINS,
     NO_SIZE,
     catalogue_of,
-    lasts_for_a_while,
+    is_local,
     newest_instance,
     with_role,
 )
@@ -112,7 +112,7 @@ def proven(trial: Trial, score: float, settings: Settings) -> bool:
     """Enough evidence, and blocks that agree; near the noise agreement alone is not enough."""
     count = len(trial.names)
     enough, less = settings.evidence * count, settings.less_evidence * count
-    if count == 1 and lasts_for_a_while(trial.names[0]):
+    if count == 1 and is_local(trial.names[0]):
         enough = less = settings.passing
     loud = trial.evidence >= enough
     somewhere = count == 1 and bool(with_role(trial.names[0], "place"))

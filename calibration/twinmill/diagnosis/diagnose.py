@@ -14,6 +14,7 @@ from twinmill.diagnosis.doubts import (
     beside_more,
     beside_stale,
     of_another_form,
+    of_many,
     undone,
     within_the_table,
 )
@@ -318,12 +319,18 @@ def _concluded(
     findings = without.doubted(undone(findings, last))
     doubted = _doubted(findings, less, known)
     whole = [_with_all_starts(o, opened) for o in known]
+    models = zip(whole, last.state.models, strict=True)
+    fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
+    after = [fitted.get(id(o.measurement), o) for o in opened]
+    modelled = [r.modelled.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
+    scatters = scatters_of(opened, [s.noise for s in modelled], model_file.model)
     rest = rest_of(
         formulas,
         last.fit,
         start.fit,
         known=model_file.left_over(hashes),
         whole=whole,
+        random=max(scatters) > SETTINGS.random,
         without=doubted,
     )
     if rest.proven and rest.proven.is_late:
@@ -331,16 +338,11 @@ def _concluded(
         instead = None if rest.proven.instead_of else _lacking(late, less, known)
         better = (instead and instead.formula(last.fit)) or rest.proven
         rest = replace(rest, proven=tuned(last.fit, better))
-    findings = beside_more(of_another_form(findings, rest), rest)
+    findings = of_many(beside_more(of_another_form(findings, rest), rest))
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
     rest = rest.with_findings(findings)
-    models = zip(whole, last.state.models, strict=True)
-    fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
-    after = [fitted.get(id(o.measurement), o) for o in opened]
-    modelled = [r.modelled.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
     disturbed = [] if rest.moments else disturbed_notes(after)
-    scatters = scatters_of(opened, [s.noise for s in modelled], model_file.model)
     noise = irregularity_notes(opened, scatters)
     named = {name for f in findings for name in (f.effect, *(f.group or ()))}
     faint = [(name, why) for name, why in done.faint if name not in named]

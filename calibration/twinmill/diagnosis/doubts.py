@@ -18,7 +18,7 @@ from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.search import PAUSE_S
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import CHANGE, PLACE, TIME
+from twinmill.diagnosis.term import CHANGE, COUPLING, PLACE, TIME
 from twinmill.diagnosis.ties import bends_speed, in_common, way_apart
 from twinmill.diagnosis.trials import REFIT, Trial, estimates_of
 from twinmill.fitting.compare import GOOD
@@ -43,6 +43,18 @@ BY = {
     TIME: {"history", "battery"},
     CHANGE: {"changes"},
 }
+
+# On what the motion depends if an effect is there whose card has such words: the first that fits.
+ACTS_ON = (
+    ({"places"}, PLACE),
+    ({"headings"}, "heading"),
+    ({"history"}, TIME),
+    ({"battery"}, TIME),
+    ({"changes"}, CHANGE),
+    ({"reversals"}, "direction of rotation"),
+    ({"arcs"}, COUPLING),
+    ({"levels"}, "speed"),
+)
 
 
 def of_one(
@@ -491,7 +503,7 @@ def _is_second(finding: Finding, found: Sequence[Finding], rest: Rest) -> Findin
 
     Where a kind needs three, not even the best of them is sure.
     """
-    for of_kind, _, does, what in KINDS:
+    for of_kind, does, what in KINDS:
         alike = [f for f in found if of_kind(f.effect)]
         if finding in alike[1:]:
             first = alike[0].effect
@@ -566,22 +578,47 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
     taken = sum(f.share for f in found if f.effect != REFIT)
 
     def judged(finding: Finding) -> Finding:
+        on = _depends_on(finding.effect)
         if finding.effect == REFIT:
             no_noise = rest.share > SETTINGS.nothing_left and (rest.firm or rest.depends_on)
             why = "something else is left, a part of which these numbers may stand for"
             return doubted(finding, why) if alone and no_noise else finding
         if rest.share > taken and (rest.firm or rest.depends_on):
             why = "more is left than it takes, so that it may be a part of something else"
-            on = next((on for of_kind, on, *_ in KINDS if of_kind(finding.effect)), "")
             return doubted(finding, why, depends_on=on)
         if rest.firm and rest.share > SETTINGS.lag_leaves and _is_late(finding.effect):
             why = "much is left: something else at changes of the command may be late"
             return doubted(finding, why, wrong_form=not rest.moments)
         if rest.share > SETTINGS.much_left:
-            return doubted(finding, "much is left, so that it may be a part of something else")
+            why = "much is left, so that it may be a part of something else"
+            return doubted(finding, why, depends_on=on)
         return finding
 
     return [judged(f) for f in found]
+
+
+def of_many(found: Sequence[Finding]) -> list[Finding]:
+    """Findings, as of another form where they are many of which not one is sure.
+
+    So many faults at once are rarer than one that the catalogue does not have, and of which each
+    takes a part.
+    """
+    effects = [f for f in found if f.effect != REFIT]
+    doubtful = all(f.certainty == "doubtful" for f in effects)
+    if len(effects) < SETTINGS.of_a_kind or not doubtful:
+        return list(found)
+    why = "so many doubtful effects together may be one that is none of them"
+    return [
+        f
+        if f.effect == REFIT
+        else doubted(f, why, wrong_form=True, depends_on=_depends_on(f.effect))
+        for f in found
+    ]
+
+
+def _depends_on(effect: str) -> str:
+    """On what the motion depends if an effect is there; empty where its card does not say."""
+    return next((on for words, on in ACTS_ON if words <= _acts_by(effect)), "")
 
 
 def _acts_by(effect: str) -> set[str]:
@@ -613,10 +650,10 @@ def _is_timed(effect: str) -> bool:
 
 # Effects of which a second one may be the rest of the first in another form: what they act by.
 KINDS = (
-    (bends_speed, "speed", "bends the speed over the command", "curve"),
-    (_is_late, CHANGE, "is late at changes of the command", "lag"),
-    (_is_placed, PLACE, "changes with the place", "floor"),
-    (_is_timed, TIME, "changes with time", "loss"),
+    (bends_speed, "bends the speed over the command", "curve"),
+    (_is_late, "is late at changes of the command", "lag"),
+    (_is_placed, "changes with the place", "floor"),
+    (_is_timed, "changes with time", "loss"),
 )
 
 

@@ -70,7 +70,7 @@ class Rest:
         firm: the smooth response predicts left-out parts better, beyond doubt.
         far: what is left is too large to be noise, in however few stretches it is.
         depends_on: groups, the strongest first.
-        likely: no group is beyond chance; something is left, and this one stands out.
+        likely: no group is beyond chance; something is left, and these stand out.
         term, coefficient: the best single formula, in its unit; None if no group helps.
         takes: share of what is left that the formula takes on left-out parts.
         family_takes: the same of all that was tested of the first group together.
@@ -114,15 +114,17 @@ class Rest:
     def on(self) -> str:
         """On what it depends all the time, as `on X and Y`; empty if that is not known."""
         names = [name for name in self.depends_on if name != MOMENTS]
-        most = "most likely " if self.likely else ""
-        return f"{most}on {' and '.join(names)}" if names else ""
+        if self.likely:
+            return f"most likely on {' or '.join(names)}"
+        return f"on {' and '.join(names)}" if names else ""
 
     @property
     def certainty(self) -> str:
         """In words: FIRM, FEW, NOISE or NOT_LOOKED_AT."""
         if not self.looked_at:
             return NOT_LOOKED_AT
-        if self.depends_on or (self.firm and not self.little):
+        known = self.depends_on and not self.likely
+        if known or (self.firm and not self.little):
             return FIRM
         return FEW if self.far else NOISE
 
@@ -222,6 +224,7 @@ def rest_of(
     *,
     known: Mapping[str, float],
     whole: Sequence[Opened],
+    random: bool,
     without: Doubted | None = None,
 ) -> Rest:
     """Tests whether the residuals of a fit are noise, and on what they depend.
@@ -232,6 +235,7 @@ def rest_of(
         first: of the model as given.
         known: what the model left in other logs already, as `left_over`.
         whole: the data sets, with all starts of predictions.
+        random: the floor itself is far above the model's noise.
         without: the findings that are in doubt, and the fit and formulas without them.
     """
     left = max(fit.held_square - 1, 0.0)
@@ -240,27 +244,27 @@ def rest_of(
         return Rest(share, False, [])
     logs = formulas.logs
     firm = _firm(logs, fit)
-    there = firm and fit.held_square > GOOD**2
+    there = random or (firm and fit.held_square > GOOD**2)
     found = _dependences(formulas, fit, known, there=there)
     own_logs, models = [whole[i] for i, _ in logs], [fit.models[i] for i, _ in logs]
     moments = moments_of(own_logs, models)
-    depends_on = [*found.depends_on, *([MOMENTS] if moments else [])]
     again = comes_again(own_logs, models)
-    if again and PLACE not in depends_on:
-        depends_on.append(PLACE)
+    something = bool(found.depends_on or moments or again)
     proven = None
     if without:
         proven = without.formula(fit)
-    if not proven and (depends_on or firm or fit.held_square > GOOD**2):
+    if not proven and (something or firm or fit.held_square > GOOD**2):
         proven = formula_of(fit, **vars(formulas))
+    if found.likely and (again or proven):  # which are surer
+        found = replace(found, depends_on=[], likely=False)
+    others = [*([MOMENTS] if moments else []), *([PLACE] if again else [])]
     return replace(
         found,
         share=share,
         firm=firm,
         far=fit.held_square > SETTINGS.no_noise**2,
         little=fit.held_square <= GOOD**2,
-        depends_on=_in_order(proven, found, depends_on),
-        likely=found.likely and depends_on == found.depends_on and not proven,
+        depends_on=_in_order(proven, found, others),
         moments=tuple(moments),
         again=again,
         proven=proven,
@@ -291,11 +295,11 @@ def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:
 # -- what it depends on ----------------------------------------------------------------------------
 
 
-def _in_order(proven: Formula | None, found: Rest, depends_on: Sequence[str]) -> list[str]:
+def _in_order(proven: Formula | None, found: Rest, others: Sequence[str]) -> list[str]:
     """What the rest depends on; a formula's own comes first if it takes no less than the groups."""
     own = proven.depends_on if proven else []
     first = own if not found.depends_on or (proven and proven.takes >= found.family_takes) else []
-    return list(dict.fromkeys([*first, *depends_on, *own]))
+    return list(dict.fromkeys([*first, *found.depends_on, *others, *own]))
 
 
 def _dependences(
@@ -314,14 +318,14 @@ def _verdict(
     *,
     there: bool,
 ) -> Rest:
-    """The groups beyond chance; where something is there, else the one that stands out."""
+    """The groups beyond chance; where something is there, else those that stand out."""
     every = _tested(terms, products)
     left_over = {d.group: d.gain / total for d in every if d.gain > 0}
     news = [d for d in every if d.gain / total > SETTINGS.again * known.get(d.group, 0.0)]
     sure = [d for d in news if d.sure]
     old = tuple(d.group for d in every if d.sure and d not in news)
-    likely = there and not sure and not old and _stands_out(news)
-    groups = news[:1] if likely else _without_redundant(sure, terms, products)
+    likely = _standing_out(news) if there and not sure and not old else []
+    groups = likely or _without_redundant(sure, terms, products)
     if not groups:
         return Rest(0.0, False, [], left_over=left_over, old=old)
     best, coefficient = _best_term(terms, products, groups[0].group)
@@ -337,14 +341,15 @@ def _verdict(
         left_over,
         old,
         family_takes=groups[0].gain / max(total, 1e-9),
-        likely=likely,
+        likely=bool(likely),
     )
 
 
-def _stands_out(groups: Sequence[Dependence]) -> bool:
-    """Whether the first of them brings so much more than the next that the data prefer it."""
-    first, second = ([g.gain for g in groups] + [0.0, 0.0])[:2]
-    return first > SETTINGS.likely and first > max(second, 0.0) + SETTINGS.tie
+def _standing_out(groups: Sequence[Dependence]) -> list[Dependence]:
+    """Those that bring so much more than the others that the data prefer them; none if many do."""
+    best = max((g.gain for g in groups), default=0.0)
+    near = [g for g in groups if g.gain > max(best - SETTINGS.tie, 0.0)]
+    return near if best > SETTINGS.likely and len(near) <= SETTINGS.likely_ones else []
 
 
 def _tested(terms: list[Term], products: "Products") -> list[Dependence]:

@@ -77,7 +77,7 @@ class Settings(Numbers):
     rim: float = number(0.15, "... of its middle: so much of its while on either side may be off")
     other_commands: float = number(0.3, "of the time, that commands beyond 95 % of the others last")
     undone: float = number(0.35, "cosine against each other of what two effects do")
-    of_a_kind: int = number(3, "effects of one kind, which are one of another form")
+    of_a_kind: int = number(3, "effects of a kind, or all doubtful, which are one of another form")
     slight: float = number(0.3, "share of what is left that a second finding must take")
     much_left: float = number(0.3, "share left, beyond which no name is sure")
     lag_leaves: float = number(0.25, "share left, beyond which no lag is sure")
@@ -99,9 +99,10 @@ class Settings(Numbers):
     beside: float = number(0.1, "by which a dependence must raise what better ones take ...")
     as_much: float = number(0.9, "... unless it takes this share of what the best one takes")
     likely: float = number(
-        9.0, "fall of the cost from which the best dependence is likely, if something is left"
+        9.0, "fall of the cost from which the best dependences are likely, if something is left"
     )
     again: float = number(2.0, "times what the model left in other logs: less is no news")
+    likely_ones: int = number(3, "dependences that are named where none is beyond chance, at most")
     formula_chance: float = number(0.02, "that a formula is offered where nothing is left ...")
     formula_takes: float = number(0.1, "... and its least share of that on the other half")
     formula_again: float = number(0.5, "share of resamplings in which its dependence must win")

@@ -18,7 +18,7 @@ from twinmill.model.parameters import (
     base_parameters,
     effect_names,
     effect_parameters,
-    lasts_for_a_while,
+    is_local,
     needing,
     newest_instance,
 )
@@ -102,7 +102,7 @@ class Trial:
         state: with the fitted models.
         evidence: fall of the held-out cost against the state it started from.
         without_best: the same without the block with the most evidence for it; of what lasts for a
-            while without the 3 s with the most, if enough is left.
+            while or is at a place without the 3 s with the most, if enough is left.
         blocks_t: t of the relative fall over blocks.
         less: the same refitted without an effect, by its name, as far as that was asked for.
     """
@@ -180,11 +180,11 @@ def cross_validate(
 def _without_best_seconds(
     names: Sequence[str], state: State, fit: ScoreFit | DetectionFit, before: Trial
 ) -> float:
-    """Evidence for what lasts for a while, without the SECONDS with the most; 0 for all else.
+    """Evidence for what is local, without the SECONDS with the most; 0 for all else.
 
-    A while may lie within one block. What happened in a moment is seen for two seconds.
+    A while or a visit may lie within one block. What happened in a moment is seen for two seconds.
     """
-    if len(names) > 1 or not lasts_for_a_while(names[0]):
+    if len(names) > 1 or not is_local(names[0]):
         return 0.0
     logs = [d for d in state.datasets if isinstance(d, Trajectory)]
     least = []

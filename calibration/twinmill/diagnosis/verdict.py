@@ -191,6 +191,7 @@ class VerdictInputs:
             return (
                 f"The model misses by more than the noise (score {self.last:.2f}), and these logs "
                 "do not tell why: no effect and no formula that was tried takes it."
+                f"{self._most_likely}"
             )
         if verdict == "cannot_tell" and self.noises:
             return (
@@ -241,6 +242,11 @@ class VerdictInputs:
         )
 
     @property
+    def _most_likely(self) -> str:
+        """On what something depends of which nothing else is known."""
+        return f" It depends {self.rest.on}." if self.rest.likely else ""
+
+    @property
     def _left(self) -> str:
         """What is left, where it is more than the noise."""
         events = f" {moments.sentence(self.rest.moments)}" if self.rest.moments else ""
@@ -263,8 +269,9 @@ class VerdictInputs:
 
     @property
     def _continuous(self) -> list[str]:
-        """What the rest depends on all the time."""
-        return [name for name in self.rest.depends_on if name != MOMENTS]
+        """What the rest depends on all the time; nothing where several may be it."""
+        names = [name for name in self.rest.depends_on if name != MOMENTS]
+        return [] if self.rest.likely and len(names) > 1 else names
 
     @property
     def _outside_sentence(self) -> str:
@@ -274,9 +281,10 @@ class VerdictInputs:
         named = [_plain(f) for f in self.effects]
         named += ["a refit of the base"] if len(self.effects) < len(self.findings) else []
         also = f" Part of it is explained by {' and '.join(named)}." if named else ""
-        if self.noises and not (self.rest.depends_on or self.rest.firm):
+        depends = self.rest.depends_on and not self.rest.likely
+        if self.noises and not (depends or self.rest.firm):
             what = "Something random disturbs the motion that no effect of the catalogue describes."
-            return f"{what}{also}"
+            return f"{what}{self._most_likely}{also}"
         on = self.rest.on
         depends = f"it depends {on}" if on else "no formula that was tried describes it"
         return f"Something outside the catalogue is there; {depends}.{also} {events}".rstrip()

@@ -8,7 +8,7 @@ set has a scale of its own: what the model lacks in one must not drown what the 
 Levenberg and Marquardt, bounded; weights n_i / S_i^2 are renewed in each step.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -25,6 +25,7 @@ from twinmill.model.parameters import (
     Parameter,
     ParameterEstimate,
     acting_by_wheel_angle,
+    is_local,
     lasts_for_a_while,
     stated_names,
 )
@@ -399,18 +400,17 @@ class ScoreFit:
 
     # -- held out -------------------------------------------------------------------------------
 
-    @cached_property
-    def _passing(self) -> np.ndarray:
-        """(P,) bool: of an effect that lasts for a while."""
+    def _own_to(self, kind: Callable[[str], bool]) -> np.ndarray:
+        """(P,) bool: of an effect of this kind."""
         instances = [u.parameter.name.split(".")[0] for u in self.unknowns]
-        return np.array([lasts_for_a_while(i.split("#")[0]) for i in instances], bool)
+        return np.array([kind(i.split("#")[0]) for i in instances], bool)
 
     @cached_property
     def held_out(self) -> list[np.ndarray]:
         """(R,) rows of each data set, each part predicted by a fit to the other five parts.
 
-        One Newton step from the joint fit, with its slopes. An effect that lasts for a while keeps
-        its numbers: one part may hold all of it.
+        One Newton step from the joint fit, with its slopes. An effect that lasts for a while, or is
+        at a place, keeps its numbers: one part may hold all of it.
         """
         rows, slopes = self.state
         if not len(self.x):
@@ -424,7 +424,7 @@ class ScoreFit:
                 weighted, own = j[out] * self.weight(i, r)[out, None], self.columns[i]
                 g[np.ix_(own, own)] -= weighted.T @ j[out]
                 p[own] -= weighted.T @ r[out]
-            points.append(self._stepped(g, p, self.x, self._passing))
+            points.append(self._stepped(g, p, self.x, self._own_to(is_local)))
         if sum(len(r) for r in rows) < FEW_ROWS:
             points = [self._without_part(k, x) for k, x in enumerate(points)]
         held = []
@@ -541,7 +541,7 @@ class ScoreFit:
 
         Of an effect that lasts for a while by shorter blocks: one whole block may hold all of it.
         """
-        spread, passing = self._jackknife(None), self._passing
+        spread, passing = self._jackknife(None), self._own_to(lasts_for_a_while)
         if passing.any():
             own = np.ix_(passing, passing)
             short = self._jackknife(PASSING_S)[own]

@@ -197,6 +197,11 @@ def lasts_for_a_while(effect: str) -> bool:
     return len(with_role(effect, "moment")) > 1
 
 
+def is_local(effect: str) -> bool:
+    """Whether one part of a log may hold all of an effect: of one for a while, or of a place."""
+    return lasts_for_a_while(effect) or bool(with_role(effect, "place"))
+
+
 def late_part(effect: str) -> tuple[str, str] | None:
     """What an effect makes late and by which of its parameters; None if it makes nothing late.
 

@@ -11,6 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from twinmill.diagnosis import doubts, moments
+from twinmill.diagnosis.acceptance import proven
 from twinmill.diagnosis.diagnose import diagnose, first_state
 from twinmill.diagnosis.doubts import (
     _faster,
@@ -18,12 +19,14 @@ from twinmill.diagnosis.doubts import (
     beside_more,
     beside_stale,
     of_another_form,
+    of_many,
     undone,
 )
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.moments import _events
 from twinmill.diagnosis.rest import Rest
+from twinmill.diagnosis.screening import screen
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import REFIT, cross_validate
 from twinmill.diagnosis.trials import fitted as fitted_state
@@ -229,11 +232,8 @@ def test_a_patch_of_the_floor_wins_on_fit_and_is_no_evidence(tanh_robot, measure
 ORIGIN_M = np.array([-40.0, 25.0])
 
 
-def test_a_patch_is_found_however_far_away_the_origin_is(tanh_robot, measure, fitted):
-    """A hall's corner is the origin; on a square of 0.6 m the robot is 40 % slower.
-
-    A round patch with a soft edge is not a square: its strength is not quite that.
-    """
+def slowed_on(tanh_robot, square_m: float, at_m: tuple[float, float], origin_m=(0.0, 0.0)):
+    """A robot that is 40 % slower on a square of this side, about a place from where it starts."""
 
     class Slowed(tanh_robot):
         def poses(self, duty, seed):
@@ -241,21 +241,46 @@ def test_a_patch_is_found_however_far_away_the_origin_is(tanh_robot, measure, fi
             free = tanh_robot.poses(replace(self, sensor_m=0, sensor_rad=0), duty, seed)
             random = np.random.default_rng(seed + 1)
             pose = np.zeros_like(free)
-            pose[0] = (*ORIGIN_M, 0)
+            pose[0] = (*origin_m, 0)
             for k, step in enumerate(np.diff(free, axis=0)):
                 c, s = np.cos(pose[k, 2] - free[k, 2]), np.sin(pose[k, 2] - free[k, 2])
                 turned = np.array([c * step[0] - s * step[1], s * step[0] + c * step[1], step[2]])
-                on = np.all(np.abs(pose[k, :2] - ORIGIN_M - (-0.9, -0.3)) < 0.3)
+                on = np.all(np.abs(pose[k, :2] - origin_m - at_m) < square_m / 2)
                 pose[k + 1] = pose[k] + (0.6 if on else 1.0) * turned
             sensor = np.array([self.sensor_m, self.sensor_m, self.sensor_rad])
             return pose + random.normal(size=pose.shape) * sensor
 
-    found = diagnose([measure(Slowed(), 320, 150.0)], fitted)
+    return Slowed()
+
+
+def test_a_patch_is_found_however_far_away_the_origin_is(tanh_robot, measure, fitted):
+    """A hall's corner is the origin; on a square of 0.6 m the robot is 40 % slower.
+
+    A round patch with a soft edge is not a square: its strength is not quite that.
+    """
+    robot = slowed_on(tanh_robot, 0.6, (-0.9, -0.3), ORIGIN_M)
+    found = diagnose([measure(robot, 320, 150.0)], fitted)
     assert found.found[:1] == ["floor_patch"]
     values = {e.name.partition(".")[2]: e.value for e in found.findings[0].parameters}
     assert values["strength"] == pytest.approx(0.4, abs=0.15)
     assert values["x_m"] == pytest.approx(ORIGIN_M[0] - 0.9, abs=0.1)
     assert values["y_m"] == pytest.approx(ORIGIN_M[1] - 0.3, abs=0.1)
+
+
+def test_a_patch_that_is_crossed_once_is_proven_by_that_time(tanh_robot, measure, fitted):
+    """For 7 of 40 s it drives over 1.2 m where it is slower: parts of a log hold all of it or none.
+
+    A loss of that time would do the same.
+    """
+    robot = slowed_on(tanh_robot, 1.2, (3.0, 0.0))
+    levels = np.random.default_rng(5).choice((50, 75), 40)
+    script_pct = np.repeat(levels, round(1.0 / 0.0208))[:, None].repeat(4, axis=1)
+    opened = open_measurements([measure(robot, 322, script_pct=script_pct)], fitted)
+    before = fitted_state(first_state(opened, fitted, ()))
+    promised = {s.name: s for s in screen(before, names=("floor_patch", "transient_loss"))}
+    patch, loss = (cross_validate(before, (n,), s.start) for n, s in sorted(promised.items()))
+    assert proven(patch, before.held_score, SETTINGS)
+    assert patch.evidence > 0.5 * loss.evidence
 
 
 RAMP_S, PLAY_S = 0.1, 0.05
@@ -1024,6 +1049,24 @@ def test_three_effects_of_one_kind_are_one_of_another_form():
     names = ("lag_by_duty", "slew_limit", "motor_lag", "wheel_gain")
     judged = of_another_form([Finding(n, None, [], 0.3, "sure") for n in names], NOTHING_LEFT)
     assert [f.certainty for f in judged] == ["doubtful", "doubtful", "doubtful", "sure"]
+
+
+@pytest.mark.parametrize(
+    ("certainties", "outside"),
+    [
+        (["doubtful"] * 3, True),
+        (["doubtful"] * 2, False),
+        (["doubtful", "sure", "doubtful"], False),
+    ],
+)
+def test_many_effects_of_which_none_is_sure_are_none_of_them(certainties, outside):
+    """So many faults at once are rarer than one that nobody wrote down."""
+    names = ("compass_deviation", "gain_slope", "yaw_lever")
+    pairs = zip(names, certainties, strict=False)
+    judged = of_many([Finding(n, None, [], 0.3, c) for n, c in pairs])
+    told = ["heading", "place", "coupling of the axes"]
+    assert all(f.wrong_form == outside for f in judged)
+    assert [f.depends_on for f in judged] == (told if outside else [""] * len(judged))
 
 
 def test_two_curves_of_the_speed_over_the_command_may_be_one():

@@ -13,7 +13,7 @@ from twinmill.diagnosis.findings import with_stale_numbers
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
 from twinmill.diagnosis.notes import irregularity
 from twinmill.diagnosis.place import HORIZON, comes_again
-from twinmill.diagnosis.rest import Products, Rest, _tested
+from twinmill.diagnosis.rest import FIRM, Dependence, Products, Rest, _standing_out, _tested
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import Term
 from twinmill.diagnosis.trials import REFIT
@@ -269,6 +269,38 @@ def test_a_little_that_follows_from_something_unknown_is_not_told_why(last, verd
     weighed = VerdictInputs(last, last, last, last, [], Rest(1.0, True, []), [], [], [], 1.0)
     assert weighed.verdict == verdict
     assert "Nothing is missing" not in weighed.sentence
+
+
+@pytest.mark.parametrize(
+    ("falls", "named"),
+    [
+        ([20.0, 10.0, 2.0], 1),
+        ([13.4, 11.6, 10.5, 6.4], 3),
+        ([13.0, 12.0, 11.0, 10.0], 0),  # so many may be it that no one is told anything
+        ([8.0, 1.0], 0),
+        ([], 0),
+    ],
+)
+def test_of_what_chance_could_make_the_data_prefer_some(falls, named):
+    groups = [Dependence(str(k), fall, False, np.ones(1, bool)) for k, fall in enumerate(falls)]
+    assert [g.group for g in _standing_out(groups)] == [str(k) for k in range(named)]
+
+
+@pytest.mark.parametrize(
+    ("last", "scatter", "verdict", "words"),
+    [
+        (1.17, 1.0, "cannot_tell", "do not tell why"),
+        (1.05, 4.0, "outside_catalogue", "random"),
+    ],
+)
+def test_what_is_likely_is_told_as_such_and_makes_no_verdict(last, scatter, verdict, words):
+    rest = Rest(1.0, last > 1.1, ["starts", "time"], likely=True, little=last < 1.1)
+    noise = ["far less regular"] if scatter > 3 else []
+    weighed = VerdictInputs(last, last, last, last, [], rest, [], [], noise, 1.0, (), scatter)
+    assert weighed.verdict == verdict
+    assert words in weighed.sentence
+    assert "depends most likely on starts or time" in weighed.sentence
+    assert (rest.certainty == FIRM) == (last > 1.1)
 
 
 @pytest.mark.parametrize(("score", "verdict"), [(1.2, "cannot_tell"), (1.6, "outside_catalogue")])
