@@ -591,7 +591,7 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
             return doubted(finding, why, wrong_form=not rest.moments)
         if rest.share > SETTINGS.much_left:
             why = "much is left, so that it may be a part of something else"
-            return doubted(finding, why, depends_on=on)
+            return doubted(finding, why, depends_on="" if _is_event(finding.effect) else on)
         return finding
 
     return [judged(f) for f in found]
@@ -601,19 +601,24 @@ def of_many(found: Sequence[Finding]) -> list[Finding]:
     """Findings, as of another form where they are many of which not one is sure.
 
     So many faults at once are rarer than one that the catalogue does not have, and of which each
-    takes a part.
+    takes a part. A robot comes to other places as time goes by: beside what is of a place, what is
+    of a moment tells no dependence.
     """
     effects = [f for f in found if f.effect != REFIT]
     doubtful = all(f.certainty == "doubtful" for f in effects)
     if len(effects) < SETTINGS.of_a_kind or not doubtful:
         return list(found)
     why = "so many doubtful effects together may be one that is none of them"
-    return [
-        f
-        if f.effect == REFIT
-        else doubted(f, why, wrong_form=True, depends_on=_depends_on(f.effect))
-        for f in found
-    ]
+    placed = any(_is_placed(f.effect) for f in effects)
+
+    def judged(finding: Finding) -> Finding:
+        if finding.effect == REFIT:
+            return finding
+        silent = placed and with_role(finding.effect, "moment")
+        on = "" if silent else _depends_on(finding.effect)
+        return doubted(finding, why, wrong_form=True, depends_on=on)
+
+    return [judged(f) for f in found]
 
 
 def _depends_on(effect: str) -> str:

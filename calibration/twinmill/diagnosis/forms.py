@@ -18,6 +18,7 @@ import numpy as np
 from twinmill.diagnosis.term import (
     CHANGE,
     CHANNELS,
+    PAST,
     SPEEDS,
     STILL,
     SWELL,
@@ -33,7 +34,6 @@ from twinmill.fitting.opening import Opened
 from twinmill.fitting.response import Response
 from twinmill.model.parameters import words
 
-PAST = "past motion"
 STARTS = "starts"
 HEADING = "heading"
 RIM, TARGET = "rim_mps", "target"  # of each wheel: where a formula acts, and what it names

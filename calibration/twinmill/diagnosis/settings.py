@@ -53,6 +53,7 @@ class Settings(Numbers):
     alike: float = number(0.95, "canonical correlation of signatures from which two are one")
     unlike: float = number(0.3, "cosine of what two take, up to which they explain other things")
     tie: float = number(6.0, "difference of the held-out cost that decides nothing")
+    as_good: float = number(0.7, "share of its evidence that another brings that leaves nothing")
     each: float = number(2.0, "what a fitted number costs where candidates are compared")
     imitates: float = number(0.95, "share of what the base takes, that another answer takes")
     group: int = number(4, "most members of a group")

@@ -28,6 +28,9 @@ NO_NAMES = {
     "aside",
     "spot",
     "lean",
+    "held",
+    "unwound",
+    "swings",
     "dv",
     "wheel_rad",
     "wheel_radps",
@@ -35,6 +38,7 @@ NO_NAMES = {
 SWELL = 0.05  # share of all speeds: a usual loss
 COUPLING = "coupling of the axes"
 CHANGE = "change of the command"
+PAST = "past motion"
 TIME = "time"
 WAY = "way driven"
 PLACE = "place"

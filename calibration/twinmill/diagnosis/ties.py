@@ -11,6 +11,7 @@ from twinmill.diagnosis.rounds import Round
 from twinmill.diagnosis.screening import candidates
 from twinmill.diagnosis.settings import Settings
 from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, fitted
+from twinmill.fitting.compare import GOOD
 from twinmill.model.parameters import catalogue, needing
 from twinmill.predict.datasets import Trajectory
 
@@ -35,6 +36,9 @@ def ties_of(this: Round, settings: Settings) -> list[Trial]:
         same = canonical_correlation(columns[accepted.names[0]], columns[trial.names[0]])
         below = max(accepted.held_score, trial.held_score) < 1.0  # differences there are no news
         close = apart < settings.tie and (blocks_t < 2.0 or below)
+        # Where both leave nothing, a rival that does most of it may be right on another robot.
+        passes = trial.held_score <= GOOD
+        close |= passes and trial.evidence > settings.as_good * accepted.evidence
         rivals = close and in_common(this.before, accepted, trial) > settings.unlike
         told = _is_within_the_table(this.before, accepted, trial, settings)
         if rivals or told or (same > settings.alike and apart < settings.evidence):

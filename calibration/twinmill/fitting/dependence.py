@@ -36,6 +36,9 @@ TURNED = 8  # nodes over the angle turned
 FADES_S = (0.05, 0.15, 0.4, 1.0)  # how long an event is felt
 STILL = 0.03  # share of the largest speed
 MOVES = 0.1  # the same: from here on something drifts as much as it will
+WOUND = ((0.01, 0.03, 0.1), (0.01, 0.03, 0.1), (0.03, 0.1, 0.3))  # m, m, rad: until it is whole
+HELD = (0.1, 0.2, 0.35, 0.55, 0.8, 1.2)  # least change that is taken, over the usual speed
+INSTANT_S = 1e-3
 STRENGTHS = (1.0, 0.35)  # of a known effect, times its usual one
 
 
@@ -111,6 +114,7 @@ def dependences(motion: Motion) -> Iterator[Features]:
         yield _crossed(motion, gain)
     yield from _curves(motion)
     yield _leans(motion)
+    yield from _unwinding(motion)
     yield from _events(motion)
 
 
@@ -256,6 +260,74 @@ def rates(values: np.ndarray, step_s: np.ndarray) -> np.ndarray:
     """(N, k) of (N, k) per second; 0 where a stretch begins."""
     change = np.diff(values, axis=0, prepend=values[:1])
     return change / np.where(step_s > 0, step_s, np.inf)[:, None]
+
+
+def _unwinding(motion: Motion) -> Iterator[Features]:
+    """Less is driven while something gives way in a new direction, or swings round on it."""
+    ways = (motion.base * motion.step_s[:, None]).T
+    turned = [
+        np.column_stack([wound(way, most) for most in widths])
+        for way, widths in zip(ways, WOUND, strict=True)
+    ]
+    gives = zip(motion.velocity.T, ways, turned, strict=True)
+    forward, left, turning = (v[:, None] * (1 - np.sign(w)[:, None] * t) for v, w, t in gives)
+    yield forward, left, turning
+    none = np.zeros((len(motion.t_s), 0))
+    pairs = zip(ways[:2], turned[:2], strict=True)
+    yield none, none, np.hstack([(w != 0)[:, None] * (1 - t**2) for w, t in pairs])
+
+
+def small_changes(
+    told: np.ndarray, lag_s: float, motion: Motion, wheels: Sequence[Wheel]
+) -> Iterator[Features]:
+    """Changes of a command below a least one are not taken: of each wheel alike, or of each axis.
+
+    Args:
+        told: (N, 3) velocity of the body as it is told, m/s and rad/s, without the motors' lag.
+        lag_s: of the motors.
+        motion: of the robot.
+        wheels: that are told their speeds; none if the body is.
+    """
+    axes = np.eye(3)
+    parts = [(w.rate, w.body) for w in wheels] or [(axis, axis) for axis in axes]
+    rims = [told @ rate for rate, _ in parts]
+    usual = [np.std(rim) for rim in rims] if not wheels else [np.std(rims)] * len(rims)
+    missed = [
+        lagged(missing(rim, size), lag_s, motion.step_s)
+        for rim, size in zip(rims, usual, strict=True)
+    ]
+    added = [[body[k] * m for k in range(3)] for (_, body), m in zip(parts, missed, strict=True)]
+    yield from [np.sum(added, axis=0)] if wheels else added
+
+
+def missing(told: np.ndarray, usual: float) -> np.ndarray:
+    """(N, k) by which (N,) told values are missed where changes below some HELD are not taken."""
+    return np.column_stack([held(told, share * usual) - told for share in HELD])
+
+
+def lagged(values: np.ndarray, lag_s: float, step_s: np.ndarray) -> np.ndarray:
+    """(N, k) values behind a lag, on steps that are taken to be even."""
+    keep = np.exp(-float(np.median(step_s[step_s > 0])) / max(lag_s, INSTANT_S))
+    return filtered([1 - keep], [1.0, -keep], values)
+
+
+def held(values: np.ndarray, least: float) -> np.ndarray:
+    """(N,) values of which changes below a least one are not taken."""
+    taken, now = [], 0.0
+    for value in values.tolist():
+        if abs(value - now) > least:
+            now = value
+        taken.append(now)
+    return np.array(taken)
+
+
+def wound(way: np.ndarray, most: float) -> np.ndarray:
+    """(N,) how far something is wound up by (N,) steps of way, -1..1: by `most` it is wholly."""
+    turned, now = [], 0.0
+    for step in (way / most).tolist():
+        now = min(max(now + step, -1.0), 1.0)
+        turned.append(now)
+    return np.array(turned)
 
 
 def _events(motion: Motion) -> Iterator[Features]:

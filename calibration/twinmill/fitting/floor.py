@@ -11,10 +11,12 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.fitting.dependence import (
+    INSTANT_S,
     beat,
     dependences,
     known_physics,
     place_gains,
+    small_changes,
     wheel_angles,
 )
 from twinmill.fitting.response import Response
@@ -96,8 +98,10 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     response.find_wheels(base)
     response.find_beat()
     motion = response.motion
+    told, own = told_velocity_at(data, base, points), base.drive != "twist"
+    small = small_changes(told, base.get(LAG), motion, response.wheels if own else ())
     angles, beats = wheel_angles(motion, response.wheels), beat(motion, response.beat_radps)
-    response.boost([*dependences(motion), *angles, *beats, *known])
+    response.boost([*dependences(motion), *small, *angles, *beats, *known])
     within, across = (
         np.where(calm[:, None, None], e, np.nan) for e in (response.within, response.across)
     )
@@ -182,6 +186,15 @@ def body_velocity_at(
     rates = np.zeros((len(place), 3))
     rates[there] = np.nan_to_num(body / step_s[:, None])
     return rates
+
+
+def told_velocity_at(
+    data: Trajectory, model: native.Model, points: np.ndarray | slice
+) -> np.ndarray:
+    """(N, 3) as `body_velocity_at`, of a robot whose motors do not lag: as it is told."""
+    instant = model.copy()
+    instant.set(LAG, INSTANT_S)
+    return body_velocity_at(data, instant, points)
 
 
 def coarse_offset_s(data: Trajectory, base: native.Model) -> float:

@@ -9,6 +9,7 @@ import pytest
 
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.families.family import Humps
+from twinmill.fitting.opening import open_measurements
 
 STEP_S = 1 / 480  # of the robot
 
@@ -77,6 +78,25 @@ def shaking(motion: np.ndarray) -> np.ndarray:
     return kept
 
 
+def wound_up(motion: np.ndarray) -> np.ndarray:
+    """Tyres give back most of the first 8 degrees that it turns the other way."""
+    kept, twist = motion.copy(), 0.0
+    for k, turn in enumerate(motion[:, 2] * STEP_S / np.radians(8)):
+        against = max(-np.sign(turn) * twist, 0.0)
+        kept[k, 2] *= 1 - 0.7 * against
+        twist = min(max(twist + turn, -1.0), 1.0)
+    return kept
+
+
+def swung_round(motion: np.ndarray) -> np.ndarray:
+    """A castor swings round over the first 60 mm that it drives the other way, and turns it."""
+    kept, place = motion.copy(), 1.0
+    for k, way in enumerate(motion[:, 0] * STEP_S / 0.03):
+        place = min(max(place + way, -1.0), 1.0)
+        kept[k, 2] += 0.25 * (1 - place**2) * (way != 0)
+    return kept
+
+
 @pytest.mark.parametrize(
     ("hindrance", "depends_on"),
     [
@@ -87,6 +107,8 @@ def shaking(motion: np.ndarray) -> np.ndarray:
         (led_aside, "heading"),
         (shaking, "speed"),
         (leaning, "coupling of the axes"),
+        (wound_up, "past motion"),
+        (swung_round, "past motion"),
     ],
     ids=lambda value: getattr(value, "__name__", ""),
 )
@@ -100,6 +122,36 @@ def test_dependence_is_told_where_no_form_is_known(
     found = diagnose([measure(Hindered(), 101, 80.0)], one_clock_base)
     assert found.rest.depends_on[0] == depends_on
     assert all(f.certainty == "doubtful" for f in found.findings)
+
+
+def test_a_driver_that_takes_no_small_change_depends_on_past_motion(
+    tanh_robot, measure, one_clock_base
+):
+    """A wheel holds its duty until the one that it is told is more than 30 % away from it."""
+
+    class Holding(tanh_robot):
+        def wheels_mps(self, duty):
+            taken, now = np.empty_like(duty), np.zeros(4)
+            for k, told in enumerate(duty):
+                now = np.where(np.abs(told - now) > 0.3, told, now)
+                taken[k] = now
+            return super().wheels_mps(taken)
+
+    found = diagnose([measure(Holding(), 62, 80.0)], one_clock_base)
+    assert found.verdict == "outside_catalogue"
+    assert "past motion" in found.rest.depends_on[:2]
+
+
+def test_the_floor_follows_a_castor_that_swings_round(tanh_robot, measure, one_clock_base):
+    """What turns the robot then is no noise: its floor is nearly that of the robot without it."""
+
+    class Hindered(tanh_robot):
+        def hindered(self, motion):
+            return swung_round(motion)
+
+    logs = [measure(robot, 101, 80.0) for robot in (tanh_robot(), Hindered())]
+    plain, swung = (open_measurements([log], one_clock_base)[0].floor.rms for log in logs)
+    assert np.all(swung[:, 2] < 1.4 * plain[:, 2])  # 1.7 where it counts as noise
 
 
 def test_heading_that_the_capture_lets_drift_depends_on_time(measure, one_clock_base):

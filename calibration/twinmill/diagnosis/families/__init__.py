@@ -12,6 +12,7 @@ import numpy as np
 
 from twinmill.diagnosis.families.family import Family
 from twinmill.diagnosis.families.of_leaning import of_leaning
+from twinmill.diagnosis.families.of_memory import of_memory
 from twinmill.diagnosis.families.of_past import of_past
 from twinmill.diagnosis.families.of_room import of_course, of_places, of_pushes
 from twinmill.diagnosis.families.of_speed import across_axes, of_speed
@@ -37,6 +38,7 @@ def families_of(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> l
         *(of_speed(k, np.abs(moving[:, k])) for k in axes),
         *across_axes(moving),
         *(of_past(k, max(float(np.std(moving[:, k])), STILL[k])) for k in axes),
+        *of_memory(opened, velocities),
         *of_leaning(opened, velocities),
         *of_places(pose[:, :2]),
         *of_pushes(),
