@@ -219,8 +219,10 @@ def _unusual(card: dict, own: Sequence[ParameterEstimate]) -> str:
 
 def _faster(name: str, own: Sequence[ParameterEstimate]) -> str:
     """A doubt where a loss at a place or a moment makes the robot faster; else empty."""
+    if not (own and _is_event(name)):
+        return ""
     loss, *_ = own
-    if _is_event(name) and loss.value < -SETTINGS.within * loss.std:
+    if loss.value < -SETTINGS.within * loss.std:
         return (
             f"{loss.name} = {loss.value:.3g} makes the robot faster, which few floors or faults do"
         )
@@ -472,6 +474,17 @@ def _comes_and_goes(finding: Finding, found: Sequence[Finding], rest: Rest) -> F
     return doubted(finding, why, wrong_form=True, depends_on=TIME)
 
 
+def _is_of_a_place_that_changes(
+    finding: Finding, found: Sequence[Finding], rest: Rest
+) -> Finding | None:
+    """A place slows the robot, and at some time another finding makes it faster."""
+    faster = [f.effect for f in found if f is not finding and _faster(f.effect, f.parameters)]
+    if not (faster and with_role(finding.effect, "place")):
+        return None
+    why = f"{faster[0]} makes the robot faster at some time, so that its place may change"
+    return doubted(finding, why, wrong_form=True, depends_on=PLACE)
+
+
 def _is_some_moments(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
     """A loss at a place or a moment is doubtful already, and single moments are left."""
     if not rest.moments or finding.certainty != "doubtful" or not _is_event(finding.effect):
@@ -519,6 +532,7 @@ FORM_RULES = (
     _heading_is_late,
     _is_of_an_uneven_wheel,
     _comes_and_goes,
+    _is_of_a_place_that_changes,
     _is_some_moments,
     _leaves_its_own,
     _is_second,

@@ -1001,6 +1001,8 @@ def _loss(effect: str, size: float, *when_s: float) -> Finding:
         # As large here and then: the place may be where the robot was at another time.
         ([("floor_patch", 0.15), ("abrupt_loss", 0.13, 80.0)], ["doubtful", "doubtful"]),
         ([("floor_patch", 0.4), ("abrupt_loss", 0.13, 80.0)], ["sure", "sure"]),
+        # Dust that is driven away: no place that is as it is takes what is less later.
+        ([("floor_patch", 0.1), ("abrupt_loss", -0.14, 137.0)], ["doubtful", "sure"]),
         ([("transient_loss", 0.2, 10.0, 20.0), ("abrupt_loss", 0.2, 40.0)], ["doubtful"] * 2),
         # One that begins slowly: the second is the first one's rest.
         ([("abrupt_loss", 0.15, 33.2), ("transient_loss", 0.1, 29.4, 34.4)], ["sure", "doubtful"]),
