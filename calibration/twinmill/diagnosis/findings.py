@@ -26,6 +26,7 @@ from twinmill.model.parameters import (
     effect_names,
     late_part,
     making_late,
+    needing,
     newest_instance,
 )
 from twinmill.predict.datasets import Trajectory
@@ -214,7 +215,8 @@ def _stale_numbers(
     """What a finding changes, if the model may well have all of it by its own error; else none."""
     lag_s = model.get(LAG)
     known_s = lag_std_s or SETTINGS.stated_lag * lag_s
-    if finding.effect == LAG_EFFECT and not finding.group and known_s > 0:
+    alike = set(finding.group or ()) <= {*needing("changes")}
+    if finding.effect == LAG_EFFECT and alike and known_s > 0:
         extra = finding.parameters[0]
         if abs(extra.value) <= SETTINGS.within * np.hypot(extra.std, known_s):
             return [replace(extra, name=LAG, value=lag_s + extra.value)]

@@ -560,7 +560,7 @@ def test_a_weakness_for_a_while_is_named_with_its_times(tanh_robot, measure, fit
             tired = (at_s > 15) & (at_s < 22)
             return super().wheels_mps(duty) * np.where(tired, 0.67, 1.0)[:, None]
 
-    found = diagnose([measure(Tired(), 22, 40.0)], fitted)
+    found = diagnose([measure(Tired(), 23, 60.0)], fitted)
     (finding,) = found.findings
     assert finding.effect == "transient_loss"
     assert set(finding.group) == {"transient_loss", "floor_patch"}  # it was nowhere there before
