@@ -11,6 +11,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.cameras import with_detections
 from twinmill.diagnosis.doubts import (
+    acted_on,
     beside_more,
     beside_stale,
     of_another_form,
@@ -364,6 +365,9 @@ def _concluded(
         disturbed,
         max(scatters),
     )
+    if weighed.verdict == "outside_catalogue":
+        rest = rest.with_first(acted_on(findings, rest.least))
+        weighed = replace(weighed, rest=rest)
     drives = drives_for(faint_names, _shown(done, faint), first.model.wheel_kind)
     same_clock = all(o.same_clock for o in known if o.floor)
     late = lateness(done, findings, same_clock)

@@ -592,20 +592,18 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
     taken = sum(f.share for f in found if f.effect != REFIT)
 
     def judged(finding: Finding) -> Finding:
-        on = _depends_on(finding.effect)
         if finding.effect == REFIT:
             no_noise = rest.share > SETTINGS.nothing_left and (rest.firm or rest.depends_on)
             why = "something else is left, a part of which these numbers may stand for"
             return doubted(finding, why) if alone and no_noise else finding
         if rest.share > taken and (rest.firm or rest.depends_on):
             why = "more is left than it takes, so that it may be a part of something else"
-            return doubted(finding, why, depends_on=on)
+            return doubted(finding, why, depends_on=_depends_on(finding.effect))
         if rest.firm and rest.share > SETTINGS.lag_leaves and _is_late(finding.effect):
             why = "much is left: something else at changes of the command may be late"
             return doubted(finding, why, wrong_form=not rest.moments)
         if rest.share > SETTINGS.much_left:
-            why = "much is left, so that it may be a part of something else"
-            return doubted(finding, why, depends_on="" if _is_event(finding.effect) else on)
+            return doubted(finding, "much is left, so that it may be a part of something else")
         return finding
 
     return [judged(f) for f in found]
@@ -615,24 +613,27 @@ def of_many(found: Sequence[Finding]) -> list[Finding]:
     """Findings, as of another form where they are many of which not one is sure.
 
     So many faults at once are rarer than one that the catalogue does not have, and of which each
-    takes a part. A robot comes to other places as time goes by: beside what is of a place, what is
-    of a moment tells no dependence.
+    takes a part.
     """
     effects = [f for f in found if f.effect != REFIT]
     doubtful = all(f.certainty == "doubtful" for f in effects)
     if len(effects) < SETTINGS.of_a_kind or not doubtful:
         return list(found)
     why = "so many doubtful effects together may be one that is none of them"
-    placed = any(_is_placed(f.effect) for f in effects)
+    return [f if f.effect == REFIT else doubted(f, why, wrong_form=True) for f in found]
 
-    def judged(finding: Finding) -> Finding:
-        if finding.effect == REFIT:
-            return finding
-        silent = placed and with_role(finding.effect, "moment")
-        on = "" if silent else _depends_on(finding.effect)
-        return doubted(finding, why, wrong_form=True, depends_on=on)
 
-    return [judged(f) for f in found]
+def acted_on(found: Sequence[Finding], least: float) -> list[str]:
+    """What the first of the doubtful findings that take so much depends on; none if that is none.
+
+    A robot comes to other places as time goes by: beside what is of a place, what is of a moment
+    tells nothing.
+    """
+    taking = [f for f in found if f.certainty == "doubtful" and f.share >= least]
+    placed = any(_is_placed(f.effect) for f in taking)
+    telling = [f for f in taking if not (placed and with_role(f.effect, "moment"))]
+    names = (f.depends_on or _depends_on(f.effect) for f in telling)
+    return [n for n in names if n][:1]
 
 
 def _depends_on(effect: str) -> str:

@@ -106,9 +106,18 @@ class Rest:
 
         Where they take less, and what is left tells by itself on what it depends, that stands.
         """
-        least = self.share if self.depends_on else 0.0
-        told = [f.depends_on for f in findings if f.depends_on and f.share >= least]
-        return replace(self, depends_on=list(dict.fromkeys([*told, *self.depends_on])))
+        return self.with_first(
+            [f.depends_on for f in findings if f.depends_on and f.share >= self.least]
+        )
+
+    def with_first(self, names: Sequence[str]) -> "Rest":
+        """With these before all else that it depends on."""
+        return replace(self, depends_on=list(dict.fromkeys([*names, *self.depends_on])))
+
+    @property
+    def least(self) -> float:
+        """Share that a finding must take so that what it depends on is told first."""
+        return self.share if self.depends_on else 0.0
 
     @property
     def on(self) -> str:

@@ -16,6 +16,7 @@ from twinmill.diagnosis.diagnose import diagnose, first_state
 from twinmill.diagnosis.doubts import (
     _faster,
     _wanders,
+    acted_on,
     beside_more,
     beside_stale,
     of_another_form,
@@ -1066,9 +1067,22 @@ def test_many_effects_of_which_none_is_sure_are_none_of_them(certainties, outsid
     names = ("compass_deviation", "gain_slope", "yaw_lever")
     pairs = zip(names, certainties, strict=False)
     judged = of_many([Finding(n, None, [], 0.3, c) for n, c in pairs])
-    told = ["heading", "place", "coupling of the axes"]
     assert all(f.wrong_form == outside for f in judged)
-    assert [f.depends_on for f in judged] == (told if outside else [""] * len(judged))
+
+
+@pytest.mark.parametrize(
+    ("names", "depends_on"),
+    [
+        (("compass_deviation", "yaw_lever"), ["heading"]),
+        (("abrupt_loss",), ["time"]),
+        (("abrupt_loss", "gain_slope"), ["place"]),  # as time goes by it comes to other places
+        (("marker_offset",), []),
+    ],
+)
+def test_what_doubtful_findings_act_on_is_what_something_else_depends_on(names, depends_on):
+    found = [Finding(n, None, [], 0.3, "doubtful") for n in names]
+    found += [Finding("speed_curve", None, [], 0.3, "sure"), Finding("stiction", None, [], 0.1, "")]
+    assert acted_on(found, 0.2) == depends_on
 
 
 def test_two_curves_of_the_speed_over_the_command_may_be_one():
