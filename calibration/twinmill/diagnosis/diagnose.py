@@ -324,7 +324,7 @@ def _concluded(
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]
     modelled = [r.modelled.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
-    scatters = scatters_of(opened, [s.noise for s in modelled], model_file.model)
+    scatters = scatters_of(opened, [s.noise_at_speed for s in modelled], model_file)
     rest = rest_of(
         formulas,
         last.fit,
@@ -339,6 +339,7 @@ def _concluded(
         instead = None if rest.proven.instead_of else _lacking(late, less, known)
         better = (instead and instead.formula(last.fit)) or rest.proven
         rest = replace(rest, proven=tuned(last.fit, better))
+    rest = rest.at_few_commands() if few else rest
     findings = of_many(beside_more(of_another_form(findings, rest), rest))
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]

@@ -18,7 +18,7 @@ from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.search import PAUSE_S
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import CHANGE, COUPLING, PLACE, TIME
+from twinmill.diagnosis.term import CHANGE, COUPLING, PAST, PLACE, TIME
 from twinmill.diagnosis.ties import bends_speed, in_common, way_apart
 from twinmill.diagnosis.trials import REFIT, Trial, estimates_of
 from twinmill.fitting.compare import GOOD
@@ -42,6 +42,7 @@ BY = {
     "heading": {"headings", "heading"},
     TIME: {"history", "battery"},
     CHANGE: {"changes"},
+    PAST: {"changes"},
 }
 
 # On what the motion depends if an effect is there whose card has such words: the first that fits.
@@ -486,8 +487,9 @@ def _is_of_a_place_that_changes(
 
 
 def _is_some_moments(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
-    """A loss at a place or a moment is doubtful already, and single moments are left."""
-    if not rest.moments or finding.certainty != "doubtful" or not _is_event(finding.effect):
+    """A loss at a place, or one at a moment that is doubtful already; single moments are left."""
+    doubtful = _is_event(finding.effect) and finding.certainty == "doubtful"
+    if not rest.moments or not (doubtful or with_role(finding.effect, "place")):
         return None
     why = "single moments are left, of which this may be some"
     return doubted(finding, why, wrong_form=True)
@@ -589,16 +591,22 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
     too. Numbers of the base are where they alone were found: they take a part of most that is left.
     """
     alone = all(f.effect == REFIT for f in found)
-    taken = sum(f.share for f in found if f.effect != REFIT)
+    effects = [f for f in found if f.effect != REFIT]
+    taken = sum(f.share for f in effects)
+    unsure = sum(f.share for f in effects if f.certainty == "doubtful")
+    sure = taken - unsure
+    no_noise = bool(rest.firm or rest.depends_on)
 
     def judged(finding: Finding) -> Finding:
         if finding.effect == REFIT:
-            no_noise = rest.share > SETTINGS.nothing_left and (rest.firm or rest.depends_on)
+            something = no_noise and rest.share > SETTINGS.nothing_left
             why = "something else is left, a part of which these numbers may stand for"
-            return doubted(finding, why) if alone and no_noise else finding
-        if rest.share > taken and (rest.firm or rest.depends_on):
+            return doubted(finding, why) if alone and something else finding
+        if rest.share > taken and no_noise:
             why = "more is left than it takes, so that it may be a part of something else"
             return doubted(finding, why, depends_on=_depends_on(finding.effect))
+        if no_noise and rest.share > SETTINGS.much and rest.share + unsure > sure:
+            return doubted(finding, "more is left or doubtful than is sure, and it is no noise")
         if rest.firm and rest.share > SETTINGS.lag_leaves and _is_late(finding.effect):
             why = "much is left: something else at changes of the command may be late"
             return doubted(finding, why, wrong_form=not rest.moments)

@@ -155,7 +155,7 @@ def _written(
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
     logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
-    noise = next((s.noise for s in diagnosis.modelled if s.noise), None)
+    noise = next((s.noise_at_speed for s in diagnosis.modelled if s.noise), None)
     told = Fitted(
         model=model,
         estimates=[e for e in estimates if e.seen],

@@ -9,6 +9,7 @@ import twinmill_native as native
 from twinmill.diagnosis.moments import left_out
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened, of_few_commands
+from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import drives_sideways
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import ChannelNoise, Noise
@@ -54,19 +55,20 @@ def geometry_notes(model: native.Model) -> list[str]:
 
 
 def scatters_of(
-    opened: Sequence[Opened], noises: Sequence[Noise | None], model: native.Model
+    opened: Sequence[Opened], noises: Sequence[Noise | None], model_file: ModelFile
 ) -> list[float]:
     """How many times less regular each log is than the model's noise says; 0 where none is known.
 
     Args:
         opened: logs over their floors; tables have no noise.
         noises: that each shows.
-        model: what it states of the disturbance was told by another log.
+        model_file: what it states of the disturbance was told by another log.
     """
+    model, known_mps = model_file.model, model_file.noise_speed_mps
     if model.get("noise.drive_mps") <= 0:
         return [0.0] * len(opened)
     return [
-        irregularity(own, noise, model) if noise and own.data else 0.0
+        irregularity(own, noise, model, known_mps) if noise and own.data else 0.0
         for own, noise in zip(opened, noises, strict=True)
     ]
 
@@ -147,15 +149,22 @@ def marker_notes(logs: Sequence[ModelledLog]) -> list[str]:
     return notes
 
 
-def irregularity(own: Opened, noise: Noise, model: native.Model) -> float:
+def irregularity(own: Opened, noise: Noise, model: native.Model, known_mps: float = 0.0) -> float:
     """Floor of a log over what the sensor's noise and the model's disturbance make.
 
     The largest of the three channels, each the geometric mean over horizons, or at the longest
     one: beside a noisy sensor a disturbance shows there alone. The sensor's noise is the log's own.
-    A turn by the disturbance moves the robot sideways, by a third of its square.
+    A turn by the disturbance moves the robot sideways, by a third of its square. Wheels slip by a
+    share of their way: where the robot drives faster than at `known_mps`, at which the model's
+    disturbance was told, more of it is usual.
     """
+    faster = max(noise.speed_mps / known_mps, 1.0) if known_mps else 1.0
     position, heading = (
-        ChannelNoise(sensor, max(model.get(f"noise.{drive}"), least), model.get(f"noise.{memory}"))
+        ChannelNoise(
+            sensor,
+            faster * max(model.get(f"noise.{drive}"), least),
+            model.get(f"noise.{memory}"),
+        )
         for sensor, drive, memory, least in (
             (noise.position.sensor, "drive_mps", "drive_s", LEAST_DRIVE[0]),
             (noise.heading.sensor, "drive_radps", "drive_turn_s", LEAST_DRIVE[1]),

@@ -22,7 +22,7 @@ from twinmill.diagnosis.library import LEFT_OVER, library, norms
 from twinmill.diagnosis.moments import Moment, moments_of
 from twinmill.diagnosis.place import comes_again
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import PLACE, Term
+from twinmill.diagnosis.term import COUPLING, PLACE, Term
 from twinmill.fitting.compare import GOOD
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
@@ -34,6 +34,7 @@ HOLDS = 0.9  # share of a square
 RIDGES = (1.0, 0.03)  # of what is of usual strength, and of what is far stronger
 FLIPS = 499  # random signs of blocks that make the null distribution
 MOMENTS = "single moments"
+STEADY = ("speed", "turning rate", COUPLING, "direction of rotation")
 FIRM, FEW, NOISE = "firm", "in too few stretches", "may be noise"
 NOT_LOOKED_AT = "not looked at"
 
@@ -113,6 +114,13 @@ class Rest:
     def with_first(self, names: Sequence[str]) -> "Rest":
         """With these before all else that it depends on."""
         return replace(self, depends_on=list(dict.fromkeys([*names, *self.depends_on])))
+
+    def at_few_commands(self) -> "Rest":
+        """Without steady speeds, where little is left: at few commands the base may make them."""
+        if not self.little:
+            return self
+        kept = [g for g in self.depends_on if g not in STEADY and not g.startswith("command of")]
+        return replace(self, depends_on=kept, likely=self.likely and bool(kept))
 
     @property
     def least(self) -> float:

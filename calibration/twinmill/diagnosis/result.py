@@ -20,6 +20,8 @@ from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.detection_errors import DetectionComparison
 
+PASSES = ("model_adequate", "refit_enough")  # verdicts that let pass what is left
+
 
 @dataclass(frozen=True)
 class Diagnosis:
@@ -108,6 +110,8 @@ class Diagnosis:
     @property
     def is_left(self) -> bool:
         """Whether the rest is worth telling: more than nothing is left, or doubtful names are."""
+        if self.verdict in PASSES:
+            return False
         return self.rest.share >= SETTINGS.nothing_left or self.verdict == "outside_catalogue"
 
     def to_json(self) -> dict:
@@ -124,7 +128,7 @@ class Diagnosis:
             "findings": [f.to_json() for f in self.findings],
             "rest": {
                 "share": rest.share,
-                "firm": rest.firm and rest.certainty == FIRM,
+                "firm": rest.firm and rest.certainty == FIRM and self.verdict not in PASSES,
                 "certainty": rest.certainty,
                 "told": self.is_left,
                 "depends_on": rest.depends_on,

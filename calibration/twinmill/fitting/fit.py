@@ -183,9 +183,8 @@ def fit(
 
 def noise_of(after: Comparison):
     """Of the first log that has a score; None of tables."""
-    return next(
-        (r.modelled.noise for r in after.robots if r.modelled.noise and np.isfinite(r.score)), None
-    )
+    logs = (r.modelled for r in after.robots if r.modelled.noise and np.isfinite(r.score))
+    return next((log.noise_at_speed for log in logs), None)
 
 
 def with_estimates(model: native.Model, estimates: Sequence[ParameterEstimate]) -> native.Model:

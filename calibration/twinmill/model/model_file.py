@@ -143,6 +143,11 @@ class ModelFile:
         return {str(g): float(v) for g, v in table.items() if g != "fitted_on"}
 
     @property
+    def noise_speed_mps(self) -> float:
+        """RMS speed of the log that told the noise, while it drove; 0 where that is not known."""
+        return float(self._document.get("fit", {}).get("noise_speed_mps", 0.0))
+
+    @property
     def covariance(self) -> Covariance:
         """Of what fits told; empty if there was none, or an older version wrote the file.
 
@@ -177,6 +182,8 @@ def _names(model: native.Model) -> set[str]:
 
 class NoiseTable(Protocol):
     """Noise of a log, as far as a model file records it."""
+
+    speed_mps: float
 
     def to_json(self) -> dict[str, float]:
         """Keys and values of the table `[noise]`."""
@@ -246,6 +253,9 @@ def child_of(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> Mod
         "score_before": _short(fitted.score_before),
         "score_after": _short(fitted.score_after),
     }
+    speed_mps = fitted.noise.speed_mps if fitted.noise else parent.noise_speed_mps
+    if speed_mps:
+        document["fit"]["noise_speed_mps"] = _short(speed_mps)
     if fitted.left_over is not None:
         left = {group: _short(value) for group, value in fitted.left_over.items()}
         old = {**left, "fitted_on": list(fitted.logs.values())} if left else {}

@@ -13,6 +13,8 @@ from twinmill.predict.flexible import unexplained
 from twinmill.predict.noise import Noise, fit_noise
 from twinmill.predict.residual import StepGrid
 
+LEAST_SPEED_MPS = 1e-3  # below it a robot stands
+
 
 @dataclass
 class ModelledLog:
@@ -75,6 +77,18 @@ class ModelledLog:
         left = fit_noise([self.errors()], self._moving(), self.grid)
         if left.loudness(self.grid.period_s) < self.noise.loudness(self.grid.period_s):
             self.noise = left
+
+    @property
+    def noise_at_speed(self) -> Noise | None:
+        """The noise, with the RMS speed at which it was seen while the robot drove."""
+        if self.noise is None:
+            return None
+        pose, grid = self.measurement.track.pose, self.grid
+        ends = native.one_step(self.model, self.measurement.played)[grid.source]
+        way_m = np.linalg.norm(ends[:, :2] - pose[grid.origin, :2], axis=1) * grid.share
+        speed_mps = way_m[way_m > LEAST_SPEED_MPS * grid.period_s] / grid.period_s
+        rms_mps = np.sqrt(np.mean(speed_mps**2)) if len(speed_mps) else 0.0
+        return replace(self.noise, speed_mps=float(rms_mps))
 
     def _moving(self) -> np.ndarray:
         """(S,) bool: some command is not zero."""

@@ -84,10 +84,15 @@ class ChannelNoise:
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of a log: position and heading."""
+    """Noise of a log: position and heading.
+
+    Attributes:
+        speed_mps: RMS speed of the log while it drives; 0 where that is not known.
+    """
 
     position: ChannelNoise
     heading: ChannelNoise
+    speed_mps: float = 0.0
 
     def to_json(self) -> dict:
         """The interface's field names."""

@@ -1071,6 +1071,43 @@ def test_many_effects_of_which_none_is_sure_are_none_of_them(certainties, outsid
 
 
 @pytest.mark.parametrize(
+    ("doubtful", "left", "certainty"),
+    [(0.25, 0.22, "doubtful"), (0.25, 0.05, "sure"), (0.1, 0.22, "sure")],
+)
+def test_an_effect_that_takes_less_than_is_left_or_doubtful_is_not_sure(doubtful, left, certainty):
+    found = [Finding("yaw_lever", None, [], 0.45, "sure")]
+    found += [Finding("yaw_lag", None, [], doubtful, "doubtful")]
+    first, _ = beside_more(found, Rest(left, False, ["past motion"]))
+    assert first.certainty == certainty
+
+
+@pytest.mark.parametrize(
+    ("effect", "group", "certainty"),
+    [
+        ("second_order_lag", "past motion", "doubtful"),  # a ramp of the duty is late, too
+        ("second_order_lag", "change of the command", "doubtful"),
+        ("second_order_lag", "heading", "sure"),
+        ("speed_curve", "past motion", "sure"),
+    ],
+)
+def test_a_lag_that_leaves_what_depends_on_the_past_has_another_form(effect, group, certainty):
+    (judged,) = of_another_form([Finding(effect, None, [], 0.9, "sure")], Rest(0.1, True, [group]))
+    assert judged.certainty == certainty
+
+
+@pytest.mark.parametrize(
+    ("effect", "moments", "certainty"),
+    [("floor_patch", 4, "doubtful"), ("floor_patch", 0, "sure"), ("floor_tilt", 4, "sure")],
+)
+def test_a_small_place_beside_single_moments_may_be_some_of_them(effect, moments, certainty):
+    """Ridges of a floor stop it here and there."""
+    loss = ParameterEstimate(f"{effect}.strength", 0.6, 0.05, "", False, True)
+    rest = Rest(0.05, False, [], moments=(None,) * moments)
+    (judged,) = of_another_form([Finding(effect, None, [loss], 0.9, "sure")], rest)
+    assert judged.certainty == certainty
+
+
+@pytest.mark.parametrize(
     ("names", "depends_on"),
     [
         (("compass_deviation", "yaw_lever"), ["heading"]),

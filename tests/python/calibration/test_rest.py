@@ -125,6 +125,33 @@ def test_a_floor_as_the_noise_makes_it_is_regular_and_one_three_times_as_high_is
         assert (found > SETTINGS.irregular) == (times > 1)
 
 
+@pytest.mark.parametrize(
+    ("speed_mps", "told_mps", "usual"), [(0.4, 0.2, 2), (0.1, 0.2, 1), (0.4, 0, 1)]
+)
+def test_a_robot_that_drives_faster_than_the_model_was_told_slips_more(speed_mps, told_mps, usual):
+    """Wheels slip by a share of their way; of one that drives slower, no less is taken as usual."""
+    model = native.Model.load("turbopi.toml")
+    channels = [
+        ChannelNoise(0.0, usual * model.get(f"noise.{d}"), model.get(f"noise.{m}"))
+        for d, m in (("drive_mps", "drive_s"), ("drive_radps", "drive_turn_s"))
+    ]
+    along, turn = (np.sqrt(c.displaced(np.array(HORIZONS_S))) for c in channels)
+    data = SimpleNamespace(measured=np.zeros((10, len(HORIZONS_S), 3)))
+    own = SimpleNamespace(
+        data=data, floor=SimpleNamespace(rms=np.column_stack([along, along, turn]))
+    )
+    silent = ChannelNoise(0.0, 0.0, 0.1)
+    found = irregularity(own, Noise(silent, silent, speed_mps), model, told_mps)
+    assert found == pytest.approx(1.0)
+
+
+def test_at_few_commands_little_that_depends_on_speed_is_the_base():
+    """A mill has two commands; its wheels' speeds there are as well known as a base is."""
+    rest = Rest(1.0, False, ["speed", "command of the left wheels", "heading"], little=True)
+    assert rest.at_few_commands().depends_on == ["heading"]
+    assert replace(rest, little=False).at_few_commands().depends_on == rest.depends_on
+
+
 def test_what_grows_beside_a_noisy_sensor_shows_at_the_longest_horizon():
     """A sensor of 5 mm hides what is five times the disturbance, but for the last horizon."""
     model = native.Model.load("turbopi.toml")
