@@ -44,6 +44,17 @@ def test_fit_finds_speeds_gains_and_lag(fitted, tanh_robot):
         assert e.seen and not e.at_bound
 
 
+def test_a_fit_keeps_the_speed_at_which_the_noise_was_seen(fitted, tanh_robot, measure):
+    """RMS of the robot's own speeds while it drives, without noise, at the log's commands."""
+    still = tanh_robot(sensor_m=0, sensor_rad=0, drive_mps=0, drive_radps=0)
+    command = measure(tanh_robot(offset_s=OFFSET_S), 1, 60.0).track.command
+    duty = np.repeat(command / np.abs(command).max(), 10, axis=0)  # each for ten of its steps
+    way_m = np.linalg.norm(np.diff(still.poses(duty, 0)[:, :2], axis=0), axis=1)
+    speed_mps = way_m[way_m > 1e-3 * EULER_S] / EULER_S
+    told_mps = ModelFile.load(str(fitted.path)).noise_speed_mps
+    assert told_mps == pytest.approx(np.sqrt(np.mean(speed_mps**2)), rel=0.05)
+
+
 def test_fit_finds_the_clock_offset(fitted):
     assert fitted.clock.value == pytest.approx(OFFSET_S, abs=3 * fitted.clock.std + EULER_S / 2)
     assert fitted.clock.std < 5e-3  # beside a free lag, by errors from 0.1 to 2 s ahead
