@@ -67,12 +67,13 @@ def _of_log(own: Opened, model: native.Model) -> list[Moment]:
         & (is_far(own.floor.across, data.floor, SETTINGS.far) | ~own.floor.keep)
     )
     events = _events(missed, data.start_s)
-    if len(events) < SETTINGS.several:
+    enough = _weight(events, data.start_s)
+    if enough < SETTINGS.several:
         return []
     every = _ways(own, model)
     ways = [float(np.nanmedian(every[event])) for event in events]
     faint = all(abs(way - 1) < HARDLY for way in ways)
-    if faint and len(events) < 2 * SETTINGS.several:
+    if faint and enough < 2 * SETTINGS.several:
         return []
     name, robot_id = data.measurement.log_name, data.measurement.track.robot_id
     return [
@@ -92,6 +93,15 @@ def _events(missed: np.ndarray, start_s: np.ndarray) -> list[np.ndarray]:
     return [c for c in clusters if len(c) >= SEEN]
 
 
+def _weight(events: Sequence[np.ndarray], start_s: np.ndarray) -> int:
+    """How many events these are worth: one that lasts is as little an accident as two."""
+    return sum(2 if _lasts(event, start_s) else 1 for event in events)
+
+
+def _lasts(event: np.ndarray, start_s: np.ndarray) -> bool:
+    return bool(start_s[event[-1]] - start_s[event[0]] >= LEAST_S)
+
+
 def left_out(own: Opened) -> list[tuple[float, float, float]]:
     """Stretches that the floor left out as disturbed: starts of the first and the last window, s.
 
@@ -101,7 +111,7 @@ def left_out(own: Opened) -> list[tuple[float, float, float]]:
     if not len(gone):
         return []
     start_s, way = own.data.start_s, _ways(own, own.model)
-    parts = [p for p in _events(gone, start_s) if start_s[p[-1]] - start_s[p[0]] >= LEAST_S]
+    parts = [p for p in _events(gone, start_s) if _lasts(p, start_s)]
     return [
         (float(start_s[p[0]]), float(start_s[p[-1]]), float(np.nanmedian(way[p]))) for p in parts
     ]

@@ -498,12 +498,20 @@ def test_moments_without_power_are_told_one_by_one(tanh_robot, measure, fitted):
 
 
 @pytest.mark.parametrize(
-    ("count", "way", "told"), [(4, 0.8, 4), (4, 1.01, 0), (8, 1.01, 8), (3, 0.5, 0)]
+    ("count", "way", "windows", "told"),
+    [
+        (4, 0.8, 3, 4),
+        (4, 1.01, 3, 0),
+        (8, 1.01, 3, 8),
+        (3, 0.5, 3, 0),
+        (2, 0.5, 5, 2),  # each lasts for a second
+        (1, 0.5, 9, 0),  # somebody pushed it
+    ],
 )
-def test_moments_that_hardly_change_the_way_must_be_many(count, way, told, monkeypatch):
+def test_moments_that_hardly_change_the_way_must_be_many(count, way, windows, told, monkeypatch):
     """Events of the size of the noise's tails come by chance; those that stop a robot do not."""
     far = np.zeros(400, bool)
-    far[np.arange(count)[:, None] * 40 + [20, 21, 22]] = True
+    far[np.arange(count)[:, None] * 40 + 20 + np.arange(windows)] = True
     monkeypatch.setattr(moments, "is_far", lambda *_: far)
     monkeypatch.setattr(moments, "_ways", lambda *_: np.full(400, way))
     measurement = SimpleNamespace(log_name="run", track=SimpleNamespace(robot_id=1))
