@@ -36,15 +36,25 @@ def ties_of(this: Round, settings: Settings) -> list[Trial]:
         same = canonical_correlation(columns[accepted.names[0]], columns[trial.names[0]])
         below = max(accepted.held_score, trial.held_score) < 1.0  # differences there are no news
         close = apart < settings.tie and (blocks_t < 2.0 or below)
-        # Where both leave nothing, a rival that does most of it may be right on another robot.
-        passes = trial.held_score <= GOOD
-        close |= passes and trial.evidence > settings.as_good * accepted.evidence
+        close |= _is_as_good(accepted, trial, settings)
         rivals = close and in_common(this.before, accepted, trial) > settings.unlike
         told = _is_within_the_table(this.before, accepted, trial, settings)
         if rivals or told or (same > settings.alike and apart < settings.evidence):
             tied.append((same, trial))
     nearest = sorted(tied, key=lambda pair: -pair[0])[: settings.group - 1]
     return [trial for _, trial in nearest]
+
+
+def _is_as_good(accepted: Trial, trial: Trial, settings: Settings) -> bool:
+    """Whether of a wheel's and a floor's effect the poorer leaves nothing either, and does most.
+
+    How the push of wheels becomes motion over the floor no plant has quite right, so that on the
+    robot it may be the better one.
+    """
+    cards = catalogue()
+    stages = {cards[t.names[0]]["stage"] for t in (accepted, trial)}
+    passes = stages == {"wheel", "ground"} and trial.held_score <= GOOD
+    return passes and trial.evidence > settings.as_good * accepted.evidence
 
 
 def _is_within_the_table(before: Trial, one: Trial, other: Trial, settings: Settings) -> bool:

@@ -177,6 +177,31 @@ def test_what_can_do_all_that_another_does_stands_in_one_group_with_it(behind, t
 
 
 @pytest.mark.parametrize(
+    ("rival", "left", "evidence", "tied"),
+    [
+        ("wheel_gain", 1.1, 80.0, True),  # on free rollers such gains were a mass offset, surely
+        ("wheel_gain", 1.1, 60.0, False),
+        ("wheel_gain", 1.2, 80.0, False),
+        ("yaw_lever", 1.1, 80.0, False),  # of the floor as well
+    ],
+)
+def test_a_wheel_that_does_most_of_what_a_floor_does_stands_beside_it(
+    rival, left, evidence, tied, monkeypatch
+):
+    fit = SimpleNamespace(against=lambda _: (40.0, 20.0, 5.0), x=np.zeros(3))
+    names = ("mass_offset", rival)
+    trials = [
+        SimpleNamespace(names=(name,), fit=fit, held_score=score, evidence=own)
+        for name, score, own in zip(names, (1.05, left), (100.0, evidence), strict=True)
+    ]
+    screened = [Screened(n, np.eye(6)[:, [k]], 50.0, 20.0) for k, n in enumerate(names)]
+    monkeypatch.setattr(ties, "in_common", lambda *_: 1.0)
+    before = SimpleNamespace(state=SimpleNamespace(told_speeds=False))
+    this = Round(before, screened, trials, accepted=trials[0])
+    assert [t.names[0] for t in ties_of(this, SETTINGS)] == ([rival] if tied else [])
+
+
+@pytest.mark.parametrize(
     ("apart", "told", "tied"),
     [(0.006, True, True), (0.006, False, False), (0.012, True, False), (0.02, True, False)],
 )
