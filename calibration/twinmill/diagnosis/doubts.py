@@ -475,6 +475,14 @@ def _comes_and_goes(finding: Finding, found: Sequence[Finding], rest: Rest) -> F
     return doubted(finding, why, wrong_form=True, depends_on=TIME)
 
 
+def _is_no_loss(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
+    """A loss of a moment that is none: what runs in or warms up makes a robot faster."""
+    why = _faster(finding.effect, finding.parameters)
+    if not (why and with_role(finding.effect, "moment")):
+        return None
+    return doubted(finding, why, wrong_form=True, depends_on=TIME)
+
+
 def _is_of_a_place_that_changes(
     finding: Finding, found: Sequence[Finding], rest: Rest
 ) -> Finding | None:
@@ -534,6 +542,7 @@ FORM_RULES = (
     _heading_is_late,
     _is_of_an_uneven_wheel,
     _comes_and_goes,
+    _is_no_loss,
     _is_of_a_place_that_changes,
     _is_some_moments,
     _leaves_its_own,
@@ -605,8 +614,11 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
         if rest.share > taken and no_noise:
             why = "more is left than it takes, so that it may be a part of something else"
             return doubted(finding, why, depends_on=_depends_on(finding.effect))
-        if no_noise and rest.share > SETTINGS.much and rest.share + unsure > sure:
+        much = no_noise and rest.share > SETTINGS.much
+        if much and rest.share + unsure > sure:
             return doubted(finding, "more is left or doubtful than is sure, and it is no noise")
+        if much and (why := _unusual(catalogue()[finding.effect], finding.parameters)):
+            return doubted(finding, why)
         if rest.firm and rest.share > SETTINGS.lag_leaves and _is_late(finding.effect):
             why = "much is left: something else at changes of the command may be late"
             return doubted(finding, why, wrong_form=not rest.moments)

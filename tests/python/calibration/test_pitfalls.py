@@ -1011,7 +1011,7 @@ def _loss(effect: str, size: float, *when_s: float) -> Finding:
         ([("floor_patch", 0.15), ("abrupt_loss", 0.13, 80.0)], ["doubtful", "doubtful"]),
         ([("floor_patch", 0.4), ("abrupt_loss", 0.13, 80.0)], ["sure", "sure"]),
         # Dust that is driven away: no place that is as it is takes what is less later.
-        ([("floor_patch", 0.1), ("abrupt_loss", -0.14, 137.0)], ["doubtful", "sure"]),
+        ([("floor_patch", 0.1), ("abrupt_loss", -0.14, 137.0)], ["doubtful", "doubtful"]),
         ([("transient_loss", 0.2, 10.0, 20.0), ("abrupt_loss", 0.2, 40.0)], ["doubtful"] * 2),
         # One that begins slowly: the second is the first one's rest.
         ([("abrupt_loss", 0.15, 33.2), ("transient_loss", 0.1, 29.4, 34.4)], ["sure", "doubtful"]),
@@ -1087,6 +1087,24 @@ def test_an_effect_that_takes_less_than_is_left_or_doubtful_is_not_sure(doubtful
     found += [Finding("yaw_lag", None, [], doubtful, "doubtful")]
     first, _ = beside_more(found, Rest(left, False, ["past motion"]))
     assert first.certainty == certainty
+
+
+@pytest.mark.parametrize(
+    ("gain", "left", "certainty"),
+    [(-0.26, 0.18, "doubtful"), (-0.26, 0.05, "sure"), (-0.06, 0.18, "sure")],
+)
+def test_a_size_beyond_what_is_usual_is_not_sure_beside_a_rest(gain, left, certainty):
+    """A duty that leaks to the next motor had been a wheel weak by 26 %, surely."""
+    weak = ParameterEstimate("wheel_gain.rr", gain, 0.01, "", False, True)
+    found = [Finding("wheel_gain", None, [weak], 0.8, "sure")]
+    (judged,) = beside_more(found, Rest(left, True, ["coupling of the axes"]))
+    assert judged.certainty == certainty
+
+
+@pytest.mark.parametrize(("loss", "outside"), [(-0.07, True), (0.07, False)])
+def test_a_loss_that_makes_it_faster_stands_for_what_runs_in_or_warms_up(loss, outside):
+    (judged,) = of_another_form([_loss("abrupt_loss", loss, 34.0)], NOTHING_LEFT)
+    assert (judged.wrong_form, judged.depends_on) == ((True, "time") if outside else (False, ""))
 
 
 @pytest.mark.parametrize(
