@@ -324,7 +324,7 @@ def _concluded(
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]
     modelled = [r.modelled.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
-    scatters = scatters_of(opened, [s.noise_at_speed for s in modelled], model_file)
+    scatters = scatters_of(opened, [s.noise and s.noise_at_speed for s in modelled], model_file)
     rest = rest_of(
         formulas,
         last.fit,
