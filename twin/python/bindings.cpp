@@ -453,7 +453,7 @@ NB_MODULE(twinmill_native, m)
         "model"_a, "track"_a, "seed"_a,
         "(N, 3) poses had this model, with its noise, been driven.");
 
-    BindSums(m);
+    BindSeries(m);
     BindSwarms(m);
     BindThreshold(m);
 }
