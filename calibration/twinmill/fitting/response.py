@@ -19,7 +19,6 @@ from functools import cached_property
 
 import numpy as np
 import twinmill_native as native
-from scipy.linalg import lapack
 
 from twinmill.filters import filtered
 from twinmill.fitting import wheel_angles
@@ -635,10 +634,17 @@ class _LeftOut:
         self.square = equations.square
 
     def at(self, ridge: np.ndarray) -> float:
-        """Squared error at the ridge (G,) of each group, from which `trials` go on."""
+        """Squared error at the ridge (G,) of each group, from which `trials` go on.
+
+        Of a group that is out nothing is left, so that it is left out of the equations.
+        """
         self.ridge = ridge
-        self.inverse = _inverses(self.grams + np.diag(self.mean * ridge[self.groups]))
-        self.beta = self.inverse @ self.moments[..., None]
+        self.used = np.flatnonzero(ridge[self.groups] < OUT)
+        used = np.ix_(range(len(self.grams)), self.used, self.used)
+        rise = np.diag((self.mean * ridge[self.groups])[self.used])
+        self.inverse = np.linalg.inv(self.grams[used] + rise)
+        self.beta = np.zeros((*self.moments.shape, 1))
+        self.beta[:, self.used] = self.inverse @ self.moments[:, self.used, None]
         (error,) = self._errors(self.beta)
         return float(error)
 
@@ -648,26 +654,39 @@ class _LeftOut:
         return self.square + np.sum(beta * (curved - 2 * self.push[..., None]), axis=(0, 1))
 
     def trials(self, group: int, values: Sequence[float]) -> np.ndarray:
-        """(V,) squared error with each of these ridges of one group: Woodbury's identity.
+        """(V,) squared error with each of these ridges of one group."""
+        own = np.flatnonzero(self.groups == group)
+        beta = np.repeat(self.beta, len(values), axis=2)
+        if self.ridge[group] < OUT:
+            beta[:, self.used] -= self._raised(own, values)
+        else:
+            moved, beta[:, own] = self._let_in(own, values)
+            beta[:, self.used] -= moved
+        return self._errors(beta)
+
+    def _raised(self, own: np.ndarray, values: Sequence[float]) -> np.ndarray:
+        """(K, U, V) fall of the coefficients used at other ridges of one group: Woodbury.
 
         A ridge that rises by s on the group's diagonal changes the coefficients b to
         b - B (I/s + B_g)^-1 b_g, with B the inverse's columns of the group.
         """
-        own = np.flatnonzero(self.groups == group)
-        columns, block = self.inverse[:, :, own], self.inverse[:, own[:, None], own]
-        rise = self.mean[own[0]] * (np.array(values) - self.ridge[group])[:, None, None, None]
+        at = np.searchsorted(self.used, own)
+        columns, block = self.inverse[:, :, at], self.inverse[:, at[:, None], at]
+        more = np.array(values) - self.ridge[self.groups[own[0]]]
+        rise = self.mean[own[0]] * more[:, None, None, None]
         less = np.linalg.solve(np.eye(len(own)) + rise * block, rise * self.beta[:, own])
-        return self._errors(self.beta - columns @ less[..., 0].transpose(1, 2, 0))
+        return columns @ less[..., 0].transpose(1, 2, 0)
 
-
-def _inverses(matrices: np.ndarray) -> np.ndarray:
-    """(K, F, F) of symmetric positive ones, by Cholesky's factors: half the work of any others."""
-    found = np.empty_like(matrices)
-    for inverse, matrix in zip(found, matrices, strict=True):
-        factor, _ = lapack.dpotrf(matrix, clean=False)
-        upper = np.triu(lapack.dpotri(factor, overwrite_c=True)[0])
-        inverse[:] = upper + np.triu(upper, 1).T
-    return found
+    def _let_in(self, own: np.ndarray, values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+        """The same where a group that is out comes in, and its (K, g, V) coefficients."""
+        across = self.grams[np.ix_(range(len(self.grams)), self.used, own)]
+        made = self.inverse @ across
+        within = self.grams[:, own[:, None], own] - across.swapaxes(1, 2) @ made
+        left = self.moments[:, own, None] - across.swapaxes(1, 2) @ self.beta[:, self.used]
+        rise = self.mean[own[0]] * np.array(values)[:, None, None, None] * np.eye(len(own))
+        found = np.linalg.solve(within + rise, np.broadcast_to(left, (len(values), *left.shape)))
+        found = found[..., 0].transpose(1, 2, 0)
+        return made @ found, found
 
 
 def _ridge(
@@ -698,5 +717,7 @@ def _ridge(
                 best, moved = left_out.at(ridge), True
         if not moved:
             break
-    every = np.linalg.solve(equations.gram + np.diag(mean * ridge[groups]), equations.moment)
+    used, every = left_out.used, np.zeros(len(groups))
+    gram = equations.gram[np.ix_(used, used)] + np.diag((mean * ridge[groups])[used])
+    every[used] = np.linalg.solve(gram, equations.moment[used])
     return ridge, every, left_out.beta[..., 0]
