@@ -4,6 +4,10 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include <algorithm>
 #include <functional>
 #include "arrays.h"
@@ -353,6 +357,16 @@ Array Steady(const Model &model, Matrix commands, const std::vector<std::string>
     return ToNumpy(std::move(steady), {rows, commands.shape(0), kSteadyValues});
 }
 
+// For a process that ends soon.
+void KeepMemory()
+{
+#ifdef __GLIBC__
+    constexpr int kAllOfIt = 1 << 30;
+    mallopt(M_MMAP_THRESHOLD, kAllOfIt);
+    mallopt(M_TRIM_THRESHOLD, kAllOfIt);
+#endif
+}
+
 }  // namespace
 
 NB_MODULE(twinmill_native, m)
@@ -453,6 +467,11 @@ NB_MODULE(twinmill_native, m)
         "model"_a, "track"_a, "seed"_a,
         "(N, 3) poses had this model, with its noise, been driven.");
 
+    m.def("keep_memory", &KeepMemory,
+          "From now on memory that was freed is used again and not given back to the system, which "
+          "would hand it out anew, page by page.");
+    BindChance(m);
+    BindEvents(m);
     BindSeries(m);
     BindSwarms(m);
     BindThreshold(m);

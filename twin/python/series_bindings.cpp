@@ -87,6 +87,7 @@ Array LedBetween(const std::vector<Matrix> &forward, const std::vector<Matrix> &
     const size_t width = WidthOf(forward, count) + WidthOf(left, count);
     std::vector<size_t> place = Wanted(count, {Span(starts), Span(ends)});
     std::vector<double> sums, row(2 * width);
+    sums.reserve(row.size() * static_cast<size_t>(std::ranges::count(place, 0U)));
     for (size_t n = 0; n < count; ++n)
     {
         const double c = steps.data()[2 * n], s = steps.data()[2 * n + 1];
@@ -121,8 +122,10 @@ struct Seen
 class Places
 {
 public:
-    explicit Places(const Seen &seen) : place_(Wanted(seen.step_s.size(), {seen.starts, seen.ends}))
+    Places(const Seen &seen, size_t width)
+        : place_(Wanted(seen.step_s.size(), {seen.starts, seen.ends}))
     {
+        kept_.reserve(width * static_cast<size_t>(std::ranges::count(place_, 0U)));
     }
 
     void Keep(size_t n, const std::vector<double> &sums)
@@ -159,8 +162,8 @@ std::vector<double> ForEachWindow(const Seen &seen, const Places &places, size_t
 std::vector<double> DisplacedByDriving(Matrix values, const Seen &seen, bool left)
 {
     const size_t count = values.shape(0), width = values.shape(1);
-    Places places(seen);
     std::vector<double> sums(2 * width);
+    Places places(seen, sums.size());
     for (size_t n = 0; n < count; ++n)
     {
         const double c = seen.step_s[n] * std::cos(seen.heading_rad[n]);
@@ -190,8 +193,8 @@ std::vector<double> DisplacedByDriving(Matrix values, const Seen &seen, bool lef
 std::vector<double> DisplacedByTurning(Matrix values, Matrix velocity, const Seen &seen)
 {
     const size_t count = values.shape(0), width = values.shape(1);
-    Places places(seen);
     std::vector<double> sums(3 * width + 2);  // angle, x, y; x and y of the robot turned left
+    Places places(seen, sums.size());
     for (size_t n = 0; n < count; ++n)
     {
         const double *v = velocity.data() + 3 * n, *value = values.data() + n * width;

@@ -147,10 +147,12 @@ class _Regression:
 
 
 def _smoothed(signal: np.ndarray) -> np.ndarray:
-    """(K, n) on the grid, averaged over SMOOTH_S."""
-    from scipy.ndimage import uniform_filter1d  # most logs do not get here
-
-    return uniform_filter1d(signal, max(1, round(SMOOTH_S / GRID_S)), axis=0)
+    """(K, n) on the grid, averaged over SMOOTH_S; beyond its ends it is mirrored."""
+    count = max(1, round(SMOOTH_S / GRID_S))
+    around = ((count // 2, (count - 1) // 2), (0, 0))
+    total = np.cumsum(np.pad(signal, around, mode="symmetric"), axis=0)
+    before = np.vstack([np.zeros_like(total[:1]), total[:-count]])
+    return (total[count - 1 :] - before) / count
 
 
 def _velocity(robot: RobotLog) -> tuple[np.ndarray, np.ndarray]:

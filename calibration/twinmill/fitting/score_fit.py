@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 import twinmill_native as native
-from scipy.linalg import eigh
 
 from twinmill.chance import f_above, t_quantile
 from twinmill.model.covariance import Covariance
@@ -690,6 +689,8 @@ def _no_less(wide: np.ndarray, least: np.ndarray) -> np.ndarray:
     """(P, P) a covariance `wide`, raised to `least` in each direction in which that is wider."""
     scale = np.sqrt(np.diag(least))
     over = np.outer(scale, scale)
-    ratio, ways = eigh(wide / over, least / over)
-    half = (least / over) @ ways * np.sqrt(np.maximum(ratio, 1.0))
+    root = np.linalg.cholesky(least / over)
+    turned = np.linalg.solve(root, np.linalg.solve(root, wide / over).T)
+    ratio, ways = np.linalg.eigh(turned)
+    half = root @ ways * np.sqrt(np.maximum(ratio, 1.0))
     return half @ half.T * over
