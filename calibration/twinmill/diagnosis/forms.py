@@ -368,10 +368,20 @@ def sized(forms: Sequence[Form], motions: Sequence[Motion]) -> list[Form]:
     every = 1 + sum(len(m.velocity) for m in motions) // MOST_POINTS
     for form in forms:
         values = np.abs(np.concatenate([m.values(form)[::every] for m in motions]))
-        sizes = np.maximum(np.percentile(values, 95, axis=0), np.sqrt(np.mean(values**2, axis=0)))
+        rms = np.sqrt(np.einsum("nk,nk->k", values, values) / len(values))
+        sizes = np.maximum(large(values), rms)
         if np.isfinite(sizes).all() and (sizes > 1e-9).all():
             found.append(replace(form, sizes=tuple(float(s) for s in sizes)))
     return found
+
+
+def large(values: np.ndarray) -> np.ndarray:
+    """(k,) what 95 % of (N, k) values are below: NumPy's percentile takes five times as long."""
+    last = len(values) - 1
+    place = 0.95 * last
+    below, above = int(place), min(int(place) + 1, last)
+    ordered = np.partition(values, [below, above], axis=0)
+    return ordered[below] + (place - below) * (ordered[above] - ordered[below])
 
 
 def from_library(terms: Sequence[Term], command_unit: str) -> list[Form]:

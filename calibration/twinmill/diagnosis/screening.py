@@ -8,7 +8,6 @@ from itertools import combinations
 
 import numpy as np
 import twinmill_native as native
-from scipy.linalg import block_diag
 
 from twinmill.diagnosis.settings import SETTINGS, Settings
 from twinmill.diagnosis.starts import Left, Starts, starts_of
@@ -33,6 +32,7 @@ STRONGER = (3.0, 6.0)  # usual strengths, where a stronger effect is not the sam
 BENT = 0.9  # ... as it is below this cosine of a small part of it and of the usual strength
 SURELY_FAINT = 0.25  # of the evidence asked for: what promises less as it was is not looked at anew
 NEARLY = 1.5  # times the size that could be seen: which side of it, is told by a fresh look
+NOTHING = 1e-3  # a size below which it may not act at all
 LIKELIEST = 10  # candidates that may be pairs
 MOST_APART = 8  # data sets with columns of their own: those of more would fill the memory
 STALE = 0.3  # of the prior's width: a usual error of the base's numbers
@@ -148,8 +148,8 @@ def screen(
 def _is_surely_faint(screened: Screened, foremost: float) -> bool:
     """Whether a fresh look would neither make it promising nor tell another size of it."""
     near = SETTINGS.faint / SETTINGS.traced**2
-    told = not near / NEARLY < screened.size < near * NEARLY
-    return told and screened.gain < min(SURELY_FAINT * SETTINGS.evidence, foremost)
+    plain = screened.size > near * NEARLY or NOTHING < screened.size < near / NEARLY
+    return plain and screened.gain < min(SURELY_FAINT * SETTINGS.evidence, foremost)
 
 
 def _screened_bits(name: str, before: Trial) -> Screened:
@@ -251,8 +251,11 @@ class _Look:
             [weight[:, None] * own for weight, own in zip(self.weights, parts, strict=True)]
             for parts in (signature.small, signature.whole)
         )
-        apart = name in needing("wheel_angle") and len(small) <= MOST_APART
-        return block_diag(*small) if apart else np.concatenate(small), np.concatenate(whole)
+        if name in needing("wheel_angle") and 1 < len(small) <= MOST_APART:
+            from scipy.linalg import block_diag  # few diagnoses get here
+
+            return block_diag(*small), np.concatenate(whole)
+        return np.concatenate(small), np.concatenate(whole)
 
     def screened(self, name: str, signature: Signature) -> Screened:
         """Slopes at neutral, or the way to the usual strength where these say nothing of it.
