@@ -50,11 +50,12 @@ double *AddRow(const std::vector<Matrix> &arrays, size_t n, double c, double s, 
         const size_t width = values.shape(1);
         const double *value = values.data() + n * width;
         for (size_t f = 0; f < width; ++f)
-            sum[f] += c * value[f];
-        sum += width;
-        for (size_t f = 0; f < width; ++f)
-            sum[f] += s * value[f];
-        sum += width;
+        {
+            const double v = value[f];
+            sum[f] += c * v;
+            sum[width + f] += s * v;
+        }
+        sum += 2 * width;
     }
     return sum;
 }
