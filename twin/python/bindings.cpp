@@ -361,9 +361,8 @@ Array Steady(const Model &model, Matrix commands, const std::vector<std::string>
 void KeepMemory()
 {
 #ifdef __GLIBC__
-    constexpr int kAllOfIt = 1 << 30;
-    mallopt(M_MMAP_THRESHOLD, kAllOfIt);
-    mallopt(M_TRIM_THRESHOLD, kAllOfIt);
+    mallopt(M_MMAP_THRESHOLD, 32 << 20);  // glibc takes no more
+    mallopt(M_TRIM_THRESHOLD, 1 << 30);
 #endif
 }
 
