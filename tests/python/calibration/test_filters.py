@@ -135,11 +135,13 @@ def test_sums_refuse_rows_that_are_not_there():
         )
 
 
-@pytest.mark.parametrize("free", [1, 4, 30])
-@pytest.mark.parametrize("value", [0.0, 0.7, 12.0])
+@pytest.mark.parametrize("free", [1, 4, 30, 400])
+@pytest.mark.parametrize("value", [-1.3, 0.0, 0.7, 12.0])
 def test_chances_are_those_of_the_distributions(free, value):
     assert chance.t_above(value, free) == pytest.approx(stats.t.sf(value, free))
     assert chance.f_above(value, free, 9) == pytest.approx(stats.f.sf(value, free, 9))
     assert chance.chi2_above(value, free) == pytest.approx(stats.chi2.sf(value, free))
-    assert chance.t_quantile(0.975, free) == pytest.approx(stats.t.ppf(0.975, free))
+    for share in (0.2, 0.5, 0.975):
+        expected = stats.t.ppf(share, free)
+        assert chance.t_quantile(share, free) == pytest.approx(expected, abs=1e-12)
     assert chance.chi2_median(free) == pytest.approx(stats.chi2.median(free))
