@@ -3,7 +3,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -30,10 +29,6 @@ from twinmill.model.parameters import (
 SMALL = 0.05
 STRONGER = (3.0, 6.0)  # usual strengths, where a stronger effect is not the same made larger ...
 BENT = 0.9  # ... as it is below this cosine of a small part of it and of the usual strength
-SURELY_FAINT = 0.25  # of the evidence asked for: what promises less as it was is not looked at anew
-NEARLY = 1.5  # times the size that could be seen: which side of it, is told by a fresh look
-NOTHING = 1e-3  # a size below which it may not act at all
-LIKELIEST = 10  # candidates that may be pairs
 MOST_APART = 8  # data sets with columns of their own: those of more would fill the memory
 STALE = 0.3  # of the prior's width: a usual error of the base's numbers
 
@@ -54,37 +49,6 @@ class Screened:
     gain: float
     size: float
     start: dict[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Signature:
-    """How the rows of each data set change with a candidate.
-
-    Attributes:
-        start: with which it was found.
-        parameters: of the candidate.
-        small: (R, k) change by a small part of each one's usual strength, scaled up to it.
-        whole: (R, 1) change by the usual strength of all.
-    """
-
-    start: dict[str, float]
-    parameters: list[Parameter]
-    small: list[np.ndarray]
-    whole: list[np.ndarray]
-
-
-@dataclass(frozen=True)
-class Remembered:
-    """What earlier rounds of a search told of its candidates.
-
-    Attributes:
-        starts: of effects whose start is searched. What was accepted since changes little of how a
-            patch of the floor changes the rows, but much of which limit is the right one.
-        signatures: of all that were screened.
-    """
-
-    starts: dict[str, Starts] = field(default_factory=dict)
-    signatures: dict[str, Signature] = field(default_factory=dict)
 
 
 def candidates(state: State) -> list[str]:
@@ -108,48 +72,41 @@ def candidates(state: State) -> list[str]:
 
 
 def screen(
-    before: Trial, known: Remembered | None = None, names: Sequence[str] | None = None
+    before: Trial, starts: dict[str, Starts] | None = None, names: Sequence[str] | None = None
 ) -> list[Screened]:
     """Every candidate's expected worth, by its signature over what is free.
 
-    What was accepted since a signature was found changes little of it: those that promise next to
-    nothing by it are not found anew.
-
     Args:
         before: what is free in it is projected out.
-        known: from earlier rounds; new finds are added.
+        starts: of effects whose start is searched, found in earlier rounds; new ones are added.
+            What was accepted since changes little of how a patch of the floor changes the rows, but
+            much of which limit is the right one.
         names: of the candidates, where not all that the state can have are meant.
     """
-    state = before.state
+    fit, state = before.fit, before.state
     if state.of_cameras:
         return [_screened_bits(name, before) for name in candidates(state)]
-    known = Remembered() if known is None else known
-    look = _Look.at(before)
-    starts = {
-        name: look.start_of(name, known.starts)
-        for name in (candidates(state) if names is None else names)
-    }
-    old = {
-        name: look.screened(name, known.signatures[name])
-        for name, start in starts.items()
-        if name in known.signatures and known.signatures[name].start == start
-    }
-    foremost = sorted((s.gain for s in old.values()), reverse=True)[:LIKELIEST][-1:]
+    starts = {} if starts is None else starts
+    rows, _ = fit.state
+    weights = [np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)]
+    left, columns, _ = fit.whitened(range(len(rows)))
+    free = np.vstack([columns, np.diag(1 / fit.std)]) if len(fit.x) else np.zeros((len(left), 0))
+    padded = np.concatenate([left, (fit.usual - fit.x) / fit.std * -1]) if len(fit.x) else left
+    basis = np.linalg.qr(free)[0] if len(fit.x) else free
+    rest = padded - basis @ (basis.T @ padded)
+    ends = np.cumsum([len(r) for r in rows])[:-1]
+    parts = (np.split(whole[: len(left)], ends) for whole in (rest, basis))
+    what_is_left = Left(weights, *parts)
     found = []
-    for name, start in starts.items():
-        if name in old and _is_surely_faint(old[name], foremost[0]):
-            found.append(old[name])
-            continue
-        known.signatures[name] = look.signature(name, start)
-        found.append(look.screened(name, known.signatures[name]))
+    for name in candidates(state) if names is None else names:
+        if name not in starts or with_role(name, "limit"):
+            of = starts_of(name, state.models, state.datasets, rows)
+            starts |= {name: of} if of else {}
+        start = starts[name].best(what_is_left) if name in starts else {}
+        found.append(
+            _screened(name, state, rows=rows, weights=weights, basis=basis, rest=rest, start=start)
+        )
     return found
-
-
-def _is_surely_faint(screened: Screened, foremost: float) -> bool:
-    """Whether a fresh look would neither make it promising nor tell another size of it."""
-    near = SETTINGS.faint / SETTINGS.traced**2
-    plain = screened.size > near * NEARLY or NOTHING < screened.size < near / NEARLY
-    return plain and screened.gain < min(SURELY_FAINT * SETTINGS.evidence, foremost)
 
 
 def _screened_bits(name: str, before: Trial) -> Screened:
@@ -179,125 +136,96 @@ def _widths(name: str, parameters: Sequence[Parameter], start: dict[str, float])
     return np.maximum(std / np.maximum(reach, 1e-12), 1.0)
 
 
-@dataclass(frozen=True)
-class _Look:
-    """What a fit leaves, weighted, and what is free in it.
+def _screened(
+    name: str,
+    state: State,
+    *,
+    rows: list[np.ndarray],
+    weights: list[np.ndarray],
+    basis: np.ndarray,
+    rest: np.ndarray,
+    start: dict[str, float],
+) -> Screened:
+    """Slopes at neutral, or the way to the usual strength where these say nothing of it.
 
-    Attributes:
-        state: of the fit.
-        rows, weights: (R,) of each data set.
-        basis: (R + P, P) of what is free, its prior below.
-        rest: (R + P,) of all, what is free projected out.
+    Where a stronger effect is no multiple of a weak one, as of play in a gear, it is the way to the
+    strength that takes most.
     """
+    parameters, small, whole = _signatures(name, state, rows=rows, weights=weights, start=start)
 
-    state: State
-    rows: list[np.ndarray]
-    weights: list[np.ndarray]
-    basis: np.ndarray
-    rest: np.ndarray
+    def projected(columns: np.ndarray) -> np.ndarray:
+        padded = np.vstack([columns, np.zeros((len(rest) - len(columns), columns.shape[1]))])
+        return padded - basis @ (basis.T @ padded)
 
-    @classmethod
-    def at(cls, before: Trial) -> "_Look":
-        """Of a trial."""
-        fit = before.fit
-        rows, _ = fit.state
-        weights = [np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)]
-        left, columns, _ = fit.whitened(range(len(rows)))
-        free, padded = np.zeros((len(left), 0)), left
-        if len(fit.x):
-            free = np.vstack([columns, np.diag(1 / fit.std)])
-            padded = np.concatenate([left, (fit.usual - fit.x) / fit.std * -1])
-        basis = np.linalg.qr(free)[0] if len(fit.x) else free
-        return cls(before.state, rows, weights, basis, padded - basis @ (basis.T @ padded))
+    small, whole = projected(small), projected(whole)
+    linear = small.sum(axis=1)
+    size, reached = np.linalg.norm(linear), np.linalg.norm(whole)
+    agree = linear @ whole[:, 0] / max(size * reached, 1e-12)
+    used = small if agree > 0.5 and 1 / 3 < size / max(reached, 1e-12) < 3 else whole
+    # Columns are in default strengths, and the prior's width in these.
+    times = used.shape[1] // len(parameters)
+    widths = np.ones(1) if used is whole else np.tile(_widths(name, parameters, start), times)
+    gram = used.T @ used + np.diag(1 / widths**2)
+    moment = used.T @ rest
+    gain = float(moment @ np.linalg.solve(gram, moment))
+    if times > 1:  # so many more columns take so much more of the noise
+        gain -= (1 - 1 / times) * float(np.trace(np.linalg.solve(gram, used.T @ used)))
+    size = float((whole**2).sum())
+    if used is small:  # half of the prior's width is a usual strength
+        size = float(np.max((small**2).sum(axis=0) * widths**2)) / 4
+    if agree < BENT and len(parameters) == 1 and parameters[0].role == "size":
+        for column in projected(_stronger(name, state, rows, weights)).T:
+            taken = max(float(column @ rest), 0.0) ** 2 / (float(column @ column) + 1)
+            if taken > gain:
+                used, gain = column[:, None], taken
+    return Screened(name, used, gain, size, start)
 
-    def start_of(self, name: str, known: dict[str, Starts]) -> dict[str, float]:
-        """Values that a fit of a candidate begins at."""
-        if name not in known or with_role(name, "limit"):
-            of = starts_of(name, self.state.models, self.state.datasets, self.rows)
-            known |= {name: of} if of else {}
-        return known[name].best(self._left) if name in known else {}
 
-    @cached_property
-    def _left(self) -> Left:
-        ends = np.cumsum([len(r) for r in self.rows])
-        parts = (np.split(whole[: ends[-1]], ends[:-1]) for whole in (self.rest, self.basis))
-        return Left(self.weights, *parts)
+def _stronger(
+    name: str, state: State, rows: list[np.ndarray], weights: list[np.ndarray]
+) -> np.ndarray:
+    """(R, 2) change of the rows by an effect of one number at STRONGER strengths."""
+    columns = []
+    for dataset, given, row, weight in zip(
+        state.datasets, state.models, rows, weights, strict=True
+    ):
+        (p,), own, points = _points(name, state, given, {})
+        values = p.usual + np.array(STRONGER)[:, None] * _reach(name, [p], {})
+        changed = dataset.rows(points.model, own, np.clip(values, p.min, p.max))
+        columns.append(weight[:, None] * (row - changed).T)
+    return np.concatenate(columns)
 
-    def projected(self, columns: np.ndarray) -> np.ndarray:
-        """(R + P, k) of (R, k) columns, without what is free."""
-        more = np.zeros((len(self.rest) - len(columns), columns.shape[1]))
-        padded = np.vstack([columns, more])
-        return padded - self.basis @ (self.basis.T @ padded)
 
-    def signature(self, name: str, start: dict[str, float]) -> Signature:
-        """Of a candidate, by the plant."""
-        small, whole, parameters = [], [], []
-        for dataset, model, row in zip(
-            self.state.datasets, self.state.models, self.rows, strict=True
-        ):
-            parameters, names, points = _points(name, self.state, model, start)
-            values = dataset.rows(points.model, names, points.values)
-            small.append((row - values[:-1]).T / points.share)
-            whole.append((row - values[-1:]).T)
-        return Signature(start, parameters, small, whole)
+def _signatures(
+    name: str,
+    state: State,
+    *,
+    rows: list[np.ndarray],
+    weights: list[np.ndarray],
+    start: dict[str, float],
+) -> tuple[list[Parameter], np.ndarray, np.ndarray]:
+    """How the rows change with what is new.
 
-    def _weighted(self, name: str, signature: Signature) -> tuple[np.ndarray, np.ndarray]:
-        """(R, k) small and (R, 1) whole changes of all data sets.
+    Returns:
+        Its parameters; (R, k) change by a small part of each one's usual strength, scaled up to it;
+        (R, 1) change by the usual strength of all. Where it acts by the angles at which wheels
+        begin, which are not the same in all logs, the k columns of each of some data sets stand
+        beside each other.
+    """
+    small, whole, parameters = [], [], []
+    for dataset, model, row, weight in zip(
+        state.datasets, state.models, rows, weights, strict=True
+    ):
+        parameters, names, points = _points(name, state, model, start)
+        values = dataset.rows(points.model, names, points.values)
+        steps = points.share
+        small.append(weight[:, None] * (row - values[:-1]).T / steps)
+        whole.append(weight[:, None] * (row - values[-1:]).T)
+    if name in needing("wheel_angle") and 1 < len(small) <= MOST_APART:
+        from scipy.linalg import block_diag  # few diagnoses get here
 
-        Where it acts by the angles at which wheels begin, which are not the same in all logs, the k
-        columns of each of some data sets stand beside each other.
-        """
-        small, whole = (
-            [weight[:, None] * own for weight, own in zip(self.weights, parts, strict=True)]
-            for parts in (signature.small, signature.whole)
-        )
-        if name in needing("wheel_angle") and 1 < len(small) <= MOST_APART:
-            from scipy.linalg import block_diag  # few diagnoses get here
-
-            return block_diag(*small), np.concatenate(whole)
-        return np.concatenate(small), np.concatenate(whole)
-
-    def screened(self, name: str, signature: Signature) -> Screened:
-        """Slopes at neutral, or the way to the usual strength where these say nothing of it.
-
-        Where a stronger effect is no multiple of a weak one, as of play in a gear, it is the way to
-        the strength that takes most.
-        """
-        start, parameters = signature.start, signature.parameters
-        small, whole = map(self.projected, self._weighted(name, signature))
-        linear = small.sum(axis=1)
-        size, reached = np.linalg.norm(linear), np.linalg.norm(whole)
-        agree = linear @ whole[:, 0] / max(size * reached, 1e-12)
-        used = small if agree > 0.5 and 1 / 3 < size / max(reached, 1e-12) < 3 else whole
-        # Columns are in default strengths, and the prior's width in these.
-        times = used.shape[1] // len(parameters)
-        widths = np.ones(1) if used is whole else np.tile(_widths(name, parameters, start), times)
-        gram = used.T @ used + np.diag(1 / widths**2)
-        moment = used.T @ self.rest
-        gain = float(moment @ np.linalg.solve(gram, moment))
-        if times > 1:  # so many more columns take so much more of the noise
-            gain -= (1 - 1 / times) * float(np.trace(np.linalg.solve(gram, used.T @ used)))
-        size = float((whole**2).sum())
-        if used is small:  # half of the prior's width is a usual strength
-            size = float(np.max((small**2).sum(axis=0) * widths**2)) / 4
-        if agree < BENT and len(parameters) == 1 and parameters[0].role == "size":
-            for column in self.projected(self._stronger(name)).T:
-                taken = max(float(column @ self.rest), 0.0) ** 2 / (float(column @ column) + 1)
-                if taken > gain:
-                    used, gain = column[:, None], taken
-        return Screened(name, used, gain, size, start)
-
-    def _stronger(self, name: str) -> np.ndarray:
-        """(R, 2) change of the rows by an effect of one number at STRONGER strengths."""
-        columns = []
-        for dataset, given, row, weight in zip(
-            self.state.datasets, self.state.models, self.rows, self.weights, strict=True
-        ):
-            (p,), own, points = _points(name, self.state, given, {})
-            values = p.usual + np.array(STRONGER)[:, None] * _reach(name, [p], {})
-            changed = dataset.rows(points.model, own, np.clip(values, p.min, p.max))
-            columns.append(weight[:, None] * (row - changed).T)
-        return np.concatenate(columns)
+        return parameters, block_diag(*small), np.concatenate(whole)
+    return parameters, np.concatenate(small), np.concatenate(whole)
 
 
 @dataclass(frozen=True)
@@ -343,7 +271,7 @@ def likely_pairs(
 ) -> list[tuple[str, str]]:
     """Pairs by what they explain together beyond the better one alone."""
     fit = before.fit
-    top = sorted(screened, key=lambda s: -s.gain)[:LIKELIEST]
+    top = sorted(screened, key=lambda s: -s.gain)[:10]
     if before.held_score < 1.0 or before.state.of_cameras:
         return []
     left, *_ = fit.whitened(range(len(fit.datasets)))

@@ -11,15 +11,9 @@ from dataclasses import replace
 
 from twinmill.diagnosis.acceptance import began_before, best_of, cost, proven, when_s
 from twinmill.diagnosis.rounds import Round, Search
-from twinmill.diagnosis.screening import (
-    Remembered,
-    Screened,
-    candidates,
-    likely_pairs,
-    promising,
-    screen,
-)
+from twinmill.diagnosis.screening import Screened, candidates, likely_pairs, promising, screen
 from twinmill.diagnosis.settings import SETTINGS, Settings
+from twinmill.diagnosis.starts import Starts
 from twinmill.diagnosis.ties import ties_of
 from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, fitted, without_effect
 from twinmill.model.parameters import lasts_for_a_while, with_role
@@ -50,20 +44,20 @@ def search(
     if first.held_score < settings.news * known:
         settings = settings.stricter(settings.usual * known)
     done = Search([], first, [], settings)
-    looked_at = Remembered()
+    starts: dict[str, Starts] = {}
     begun(done)
-    _forward(done, looked_at, progress)
+    _forward(done, starts, progress)
     progress(f"{_told(done)}exchanging what was found for other effects")
-    return _exchanged(done, looked_at)
+    return _exchanged(done, starts)
 
 
-def _forward(done: Search, looked_at: Remembered, progress: Callable[[str], None]) -> None:
+def _forward(done: Search, starts: dict[str, Starts], progress: Callable[[str], None]) -> None:
     """Round after round, until one accepts nothing."""
     settings, first_excess = done.settings, max(done.last.held_score**2 - 1, 0.0)
     for number in range(settings.most):
         before, words = done.last, f"{_told(done)}round {number + 1}: "
         progress(f"{words}screening the catalogue")
-        screened = screen(before, looked_at)
+        screened = screen(before, starts)
         this = Round(before, screened, [])
         done.rounds.append(this)
         for candidate in promising(screened, settings)[: settings.fitted]:
@@ -103,7 +97,7 @@ def comes_again(done: Search, name: str) -> tuple[float, float] | None:
     return (again_s, over_s) if fresh and apart_s > PAUSE_S else None
 
 
-def _exchanged(done: Search, looked_at: Remembered) -> Search:
+def _exchanged(done: Search, starts: dict[str, Starts]) -> Search:
     """With each effect exchanged for another one, if that is better; an exchange is one more round.
 
     An effect was accepted beside what was known in its round; what came later may do a part of it,
@@ -118,7 +112,7 @@ def _exchanged(done: Search, looked_at: Remembered) -> Search:
         base = without_effect(last, name)
         if base is None:
             continue
-        others = _rivals(base, name, beside=len(kept) > 1, known=looked_at, settings=settings)
+        others = _rivals(base, name, beside=len(kept) > 1, starts=starts, settings=settings)
         trials = [cross_validate(base, (s.name,), s.start) for s in others]
         close = [t for t in trials if cost(t, settings) < cost(last, settings) + settings.tie]
         if not close:
@@ -143,22 +137,22 @@ def _exchanged(done: Search, looked_at: Remembered) -> Search:
 
 
 def _rivals(
-    base: Trial, name: str, *, beside: bool, known: Remembered, settings: Settings
+    base: Trial, name: str, *, beside: bool, starts: dict[str, Starts], settings: Settings
 ) -> list[Screened]:
     """Candidates in the place of an effect, once all else that was found is there.
 
     Args:
         base: the last state without the effect.
         name: of the effect.
-        known: of candidates, from earlier rounds.
+        starts: of effects whose start is searched.
         settings: numbers that decide.
         beside: whether something else was found; if not, the first round has compared them.
     """
     late = [n for n in candidates(base.state) if with_role(n, "lateness")]
     late = [n for n in late if n != name] if with_role(name, "lateness") else []
     if not beside:
-        return screen(base, known, late) if late else []
-    screened = screen(base, known)
+        return screen(base, starts, late) if late else []
+    screened = screen(base, starts)
     own = next((s.gain for s in screened if s.name == name), 0.0)
     likely = [s for s in promising(screened, settings) if s.gain > settings.rival * own]
     likely = [s for s in likely if s.name != name][: settings.exchanged]

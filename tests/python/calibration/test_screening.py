@@ -4,8 +4,7 @@
 import pytest
 
 from twinmill.diagnosis.diagnose import first_state
-from twinmill.diagnosis.screening import Remembered, promising, screen
-from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.screening import screen
 from twinmill.diagnosis.trials import cross_validate, fitted
 from twinmill.fitting.opening import judged, open_measurements, with_own_gains
 
@@ -26,18 +25,3 @@ def test_much_play_promises_what_it_takes(worn_gears):
     (promised,) = screen(worn_gears, names=["backlash"])
     takes = cross_validate(worn_gears, ("backlash",)).evidence
     assert promised.gain > takes / 4
-
-
-def test_what_an_earlier_round_told_hides_nothing_that_is_promising(worn_gears):
-    """Once the play is there, all that a fresh look at each candidate promises is promised."""
-    known = Remembered()
-    screen(worn_gears, known)
-    after = cross_validate(worn_gears, ("backlash",))
-    told, fresh = screen(after, known), screen(after)
-    assert [s.name for s in promising(told, SETTINGS)] == [
-        s.name for s in promising(fresh, SETTINGS)
-    ]
-    anew = [a.name for a, b in zip(told, fresh, strict=True) if a.gain == b.gain]
-    assert 0 < len(anew) < len(fresh)
-    for a, b in zip(told, fresh, strict=True):
-        assert max(a.gain, b.gain) < SETTINGS.evidence / 2 or a.gain == pytest.approx(b.gain)
