@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gc
 import shlex
 import sys
 from collections.abc import Iterator
@@ -20,6 +21,8 @@ from twinmill_cli.options import Force, Logs, Model, NewModel, Out
 from twinmill_cli.output import STOPPED, AsJson, deliver, telling
 
 if working():  # not for --help
+    import twinmill_native as native
+
     from twinmill.data.log import read_log
     from twinmill.data.measurement import Measurements
     from twinmill.data.steady_table import is_steady_table
@@ -64,6 +67,7 @@ def _diagnose(
 
     Example: twinmill diagnose run.lcmlog --model fitted.toml
     """
+    _make_ready()
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with _told_if_stopped(source, as_json), telling(f"diagnosing with {model}") as progress:
         measurements = load(logs, model_file, as_json)
@@ -81,6 +85,12 @@ def _diagnose(
     section = partial(present.section, result, then)
     finish(data, present.terminal(result, then), source, section=section, as_json=as_json, out=out)
     return result
+
+
+def _make_ready() -> None:
+    """Nothing of what is loaded will be freed, and memory that the work frees it wants again."""
+    gc.freeze()
+    native.keep_memory()
 
 
 @contextmanager
@@ -225,6 +235,7 @@ def _explain(
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
     """
     verb = "explain" if formula else "explain --no-formula"
+    _make_ready()
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )

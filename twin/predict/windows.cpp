@@ -7,7 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "playback.h"
+#include "recording.h"
 #include "samples.h"
 
 namespace twin
@@ -59,58 +59,6 @@ std::vector<Sample> MeasuredAt(const DriveChain &chain, const Track &track, cons
     for (const size_t pose : events.Poses())
         samples.push_back(Measured(chain, track, pose));
     return samples;
-}
-
-struct WheelStep
-{
-    double t_s, dt_s;
-    Rolling rolling;
-};
-
-struct Recording
-{
-    std::vector<double> event_t_s;
-    std::vector<WheelStep> steps;
-    std::vector<size_t> reached;  // by event: steps made when its time is reached
-
-    bool IsAt(const std::vector<Sample> &measured) const
-    {
-        return std::ranges::equal(event_t_s, measured, {}, {}, &Sample::t_s);
-    }
-};
-
-Recording Record(const DriveChain &chain, const Track &track, const std::vector<Sample> &measured)
-{
-    Recording recording;
-    recording.steps.reserve(track.command_t_s.size() + 2 * measured.size());
-    RobotState state = chain.Start({});
-    Playback playback(track);
-    for (const Sample &sample : measured)
-    {
-        playback.Advance(sample.t_s, [&](const Command &command, double t_s, double dt_s) {
-            const WheelMotion motion = chain.DriveWheels(command, t_s, dt_s, state);
-            recording.steps.push_back({t_s, dt_s, chain.Roll(motion)});
-        });
-        recording.event_t_s.push_back(sample.t_s);
-        recording.reached.push_back(recording.steps.size());
-    }
-    return recording;
-}
-
-// The robot moved along its course by a step.
-void Move(const DriveChain &chain, const WheelStep &step, Course &course, RobotState &state)
-{
-    state.pose = course.pose();
-    course.Follow(chain.OnFloor(step.rolling, course.ahead(), step.t_s, step.dt_s, state, nullptr),
-                  step.dt_s);
-}
-
-// The same over steps [from, to) of the recording.
-void Move(const DriveChain &chain, const Recording &recording, size_t from, size_t to,
-          Course &course, RobotState &state)
-{
-    for (size_t i = from; i < to; ++i)
-        Move(chain, recording.steps[i], course, state);
 }
 
 // Where a robot that starts at `start` gets to while another that starts at `from` goes its way.

@@ -36,6 +36,15 @@ inline Array ToNumpy(std::vector<double> &&values, std::initializer_list<size_t>
     return Array(owned->data(), shape, owner);
 }
 
+// Adds the container of logs.
+void BindEvents(nb::module_ &m);
+
+// Adds sums and filters over time.
+void BindSeries(nb::module_ &m);
+
+// Adds tails of distributions.
+void BindChance(nb::module_ &m);
+
 // Adds what the module knows of swarms.
 void BindSwarms(nb::module_ &m);
 

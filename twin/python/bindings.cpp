@@ -4,6 +4,10 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include <algorithm>
 #include <functional>
 #include "arrays.h"
@@ -300,6 +304,19 @@ Array OneStep(const Model &model, const PyTrack &track)
     return ToNumpy(PredictOneStep(model, track.View()), {track.pose_t_s.size(), 3});
 }
 
+Array Velocities(const std::vector<Model> &models, const PyTrack &track, Indices poses)
+{
+    for (const int64_t pose : Span(poses))
+        if (pose < 0 || static_cast<size_t>(pose) >= track.pose_t_s.size())
+            throw std::invalid_argument("poses must be rows of the track's poses");
+    std::vector<double> velocities;
+    {
+        nb::gil_scoped_release unlocked;
+        velocities = PredictVelocities(models, track.View(), Span(poses));
+    }
+    return ToNumpy(std::move(velocities), {models.size(), poses.size(), 3});
+}
+
 Array OneStepBatch(const Model &model, const PyTrack &track, const std::vector<std::string> &names,
                    Matrix values)
 {
@@ -340,70 +357,13 @@ Array Steady(const Model &model, Matrix commands, const std::vector<std::string>
     return ToNumpy(std::move(steady), {rows, commands.shape(0), kSteadyValues});
 }
 
-// What numpy.cumsum does of weighted rows, row by row and not value by value.
-Array RunningSums(Matrix values, Vector weights)
+// For a process that ends soon.
+void KeepMemory()
 {
-    const size_t count = values.shape(0), width = values.shape(1);
-    if (weights.size() != count)
-        throw std::invalid_argument("weights must be as many as rows of values");
-    std::vector<double> sums(count * width), row(width);
-    for (size_t n = 0; n < count; ++n)
-    {
-        const double weight = weights.data()[n], *value = values.data() + n * width;
-        for (size_t f = 0; f < width; ++f)
-            row[f] += weight * value[f];
-        std::ranges::copy(row, sums.begin() + static_cast<std::ptrdiff_t>(n * width));
-    }
-    return ToNumpy(std::move(sums), {count, width});
-}
-
-// What is added from each start to each of its ends, from running sums at these places alone. The
-// columns of several arrays stand side by side.
-Array SumsBetween(const std::vector<Matrix> &arrays, Vector weights, Indices starts,
-                  IndexMatrix ends)
-{
-    const size_t count = weights.size(), horizons = ends.shape(1);
-    size_t width = 0;
-    for (const Matrix &values : arrays)
-    {
-        if (values.shape(0) != count)
-            throw std::invalid_argument("weights must be as many as rows of values");
-        width += values.shape(1);
-    }
-    if (ends.shape(0) != starts.size())
-        throw std::invalid_argument("ends must have one row per start");
-    constexpr size_t kNoPlace = SIZE_MAX;
-    std::vector<size_t> place(count, kNoPlace);
-    for (const auto &list : {Span(starts), Span(ends)})
-        for (const int64_t n : list)
-            if (n < 0 || static_cast<size_t>(n) >= count)
-                throw std::invalid_argument("starts and ends must be rows of values");
-            else
-                place[static_cast<size_t>(n)] = 0;
-    std::vector<double> sums, row(width);
-    for (size_t n = 0; n < count; ++n)
-    {
-        const double weight = weights.data()[n];
-        double *sum = row.data();
-        for (const Matrix &values : arrays)
-        {
-            const double *value = values.data() + n * values.shape(1);
-            for (size_t f = 0; f < values.shape(1); ++f)
-                *sum++ += weight * value[f];
-        }
-        if (place[n] == kNoPlace)
-            continue;
-        place[n] = sums.size();
-        sums.insert(sums.end(), row.begin(), row.end());
-    }
-    std::vector<double> between(ends.size() * width);
-    for (size_t i = 0; i < ends.size(); ++i)
-    {
-        const double *from = sums.data() + place[static_cast<size_t>(starts.data()[i / horizons])];
-        const double *to = sums.data() + place[static_cast<size_t>(ends.data()[i])];
-        std::transform(to, to + width, from, between.data() + i * width, std::minus{});
-    }
-    return ToNumpy(std::move(between), {starts.size(), horizons, width});
+#ifdef __GLIBC__
+    mallopt(M_MMAP_THRESHOLD, 32 << 20);  // glibc takes no more
+    mallopt(M_TRIM_THRESHOLD, 1 << 30);
+#endif
 }
 
 }  // namespace
@@ -479,6 +439,9 @@ NB_MODULE(twinmill_native, m)
 
     m.def("one_step", &OneStep, "model"_a, "track"_a,
           "(N, 3) poses predicted from the pose before each.");
+    m.def("velocities", &Velocities, "models"_a, "track"_a, "poses"_a,
+          "(B, K, 3) mean velocities in the body's axes, m/s and rad/s, in the steps that end at "
+          "`poses` (K,), ascending, of B models; 0 where a segment starts.");
     m.def("one_step_batch", &OneStepBatch, "model"_a, "track"_a, "names"_a, "values"_a,
           "(B, N, 3) one-step predictions for B rows of values.");
     m.def("steady", &Steady, "model"_a, "commands"_a, "names"_a, "values"_a,
@@ -503,12 +466,12 @@ NB_MODULE(twinmill_native, m)
         "model"_a, "track"_a, "seed"_a,
         "(N, 3) poses had this model, with its noise, been driven.");
 
-    m.def("running_sums", &RunningSums, "values"_a, "weights"_a,
-          "(N, F) sums of rows of values (N, F), each times its weight (N,), up to each.");
-    m.def("sums_between", &SumsBetween, "values"_a, "weights"_a, "starts"_a, "ends"_a,
-          "(W, H, F) sums of rows of all values (N, f) side by side, each times its weight (N,), "
-          "from after row `starts` (W,) up to row `ends` (W, H).");
-
+    m.def("keep_memory", &KeepMemory,
+          "From now on memory that was freed is used again and not given back to the system, which "
+          "would hand it out anew, page by page.");
+    BindChance(m);
+    BindEvents(m);
+    BindSeries(m);
     BindSwarms(m);
     BindThreshold(m);
 }

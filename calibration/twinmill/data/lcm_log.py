@@ -2,14 +2,12 @@
 """LCM log files: their events, the fixed-size messages in them as numpy arrays, and a writer.
 
 Own reader of the container: LCM's drops a good event before a broken one, writes on stderr itself
-and does not say where the file breaks. Format: sync word, event number, stamp, two lengths (all
-big-endian), channel, data (LCM 1.5, lcm/eventlog.c).
+and does not say where the file breaks.
 """
 
 import errno
 import os
 import re
-import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -20,10 +18,7 @@ from pathlib import Path
 import lcm
 import numpy as np
 import turbopi
-
-SYNC = b"\xed\xa1\xda\x01"
-HEADER = struct.Struct(">4sqqii")
-MAX_CHANNEL = 63  # LCM_MAX_CHANNEL_NAME_LENGTH
+import twinmill_native as native
 
 # Fixed-size types of the LCM language, as they are on the wire.
 NUMBERS = {
@@ -68,48 +63,29 @@ def split_events(data: bytes, name: str) -> Events:
     Raises:
         LogError: if the file holds no complete event.
     """
-    events, position = Events(), 0
-    while position < len(data):
-        event = _event_at(data, position)
-        if event is None:
-            following = data.find(SYNC, position + 1)
-            if following < 0:
-                events.warnings.append(
-                    f"{name}: breaks off inside an event at byte {position} of {len(data)}; "
-                    "read up to there."
-                )
-                break
-            if events.by_channel:
-                events.warnings.append(
-                    f"{name}: bytes {position} to {following} are no event; skipped."
-                )
-            position = following
-            continue
-        stamp_us, start, end = event
-        channel = data[position + HEADER.size : start].decode("utf-8", "replace")
-        events.by_channel.setdefault(channel, []).append(data[start:end])
-        events.stamps_us.setdefault(channel, []).append(stamp_us)
-        position = end
+    events = Events()
+    channels, gaps = native.events_of(data)
+    for position, following, after_an_event in gaps:
+        if following < 0:
+            events.warnings.append(
+                f"{name}: breaks off inside an event at byte {position} of {len(data)}; "
+                "read up to there."
+            )
+        elif after_an_event:
+            events.warnings.append(
+                f"{name}: bytes {position} to {following} are no event; skipped."
+            )
+    for channel_bytes, stamps_us, starts, ends in channels:
+        channel = channel_bytes.decode("utf-8", "replace")
+        payloads = [data[a:b] for a, b in zip(starts, ends, strict=True)]
+        events.by_channel.setdefault(channel, []).extend(payloads)
+        events.stamps_us.setdefault(channel, []).extend(stamps_us)
     if not events.by_channel:
         raise LogError(
             f"{name}: holds no complete LCM event in {len(data)} bytes, so it is no LCM "
             "log; record one with lcm-logger, or make one with `twinmill import`."
         )
     return events
-
-
-def _event_at(data: bytes, position: int) -> tuple[int, int, int] | None:
-    """Stamp of the event at `position`, where its payload begins, and where it ends.
-
-    None if no complete event is there.
-    """
-    if position + HEADER.size > len(data):
-        return None
-    sync, _, stamp_us, channel_size, data_size = HEADER.unpack_from(data, position)
-    if sync != SYNC or not 0 < channel_size <= MAX_CHANNEL or data_size < 0:
-        return None
-    start = position + HEADER.size + channel_size
-    return (stamp_us, start, start + data_size) if start + data_size <= len(data) else None
 
 
 @cache

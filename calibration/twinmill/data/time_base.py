@@ -9,6 +9,7 @@ regressed on the commands, so that neither the wheels nor their geometry need be
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +22,7 @@ OFFSETS_S = 0.25  # step of the coarse search
 LEVER_M = 0.1  # weighs turning (rad/s) against moving (m/s), as in clock.py
 CREEP_MPS = 0.005
 CRYSTAL = 0.002  # no clock that counts time is off by so much
+SINGULAR = 1e-6  # of commands that always come together
 WORTH = 0.7  # times what stays unexplained otherwise: less is not worth a new time base
 LEAST_EXPLAINED = 0.8
 
@@ -125,12 +127,20 @@ class _Regression:
     def loss(self, base: tuple[float, float, float]) -> float:
         """Share of the motion that stays unexplained."""
         measured = self._measured(base)
-        weight = np.maximum(self._rate(base), 0)[:, None]  # each instant of capture counts alike
-        weighted = self.command * weight
-        gram, moment = weighted.T @ self.command, weighted.T @ measured
-        explained = np.sum(moment * (np.linalg.pinv(gram, rcond=1e-6) @ moment))
+        rate = np.maximum(self._rate(base), 0)  # each instant of capture counts alike
+        if np.ptp(rate) == 0:  # of one rate in all: thousands are tried
+            moment = self.command.T @ measured
+            explained = rate[0] * np.sum(moment * (self._inverse @ moment))
+        else:
+            weighted = self.command * rate[:, None]
+            gram, moment = weighted.T @ self.command, weighted.T @ measured
+            explained = np.sum(moment * (np.linalg.pinv(gram, rcond=SINGULAR) @ moment))
         share = explained * self.step_s / GRID_S / max(np.sum(self.velocity**2), 1e-12)
         return float(1 - share)
+
+    @cached_property
+    def _inverse(self) -> np.ndarray:
+        return np.linalg.pinv(self.command.T @ self.command, rcond=SINGULAR)
 
     def settle(self, base: tuple[float, float, float]) -> None:
         """Takes what part of the motion is turning from the regression at this time base."""
@@ -147,10 +157,12 @@ class _Regression:
 
 
 def _smoothed(signal: np.ndarray) -> np.ndarray:
-    """(K, n) on the grid, averaged over SMOOTH_S."""
-    from scipy.ndimage import uniform_filter1d  # most logs do not get here
-
-    return uniform_filter1d(signal, max(1, round(SMOOTH_S / GRID_S)), axis=0)
+    """(K, n) on the grid, averaged over SMOOTH_S; beyond its ends it is mirrored."""
+    count = max(1, round(SMOOTH_S / GRID_S))
+    around = ((count // 2, (count - 1) // 2), (0, 0))
+    total = np.cumsum(np.pad(signal, around, mode="symmetric"), axis=0)
+    before = np.vstack([np.zeros_like(total[:1]), total[:-count]])
+    return (total[count - 1 :] - before) / count
 
 
 def _velocity(robot: RobotLog) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from twinmill.diagnosis.forms import GAINS, Form, Motion, sized
-from twinmill.diagnosis.library import LEFT_OVER
+from twinmill.diagnosis.library import LEFT_OVER, norms
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
@@ -114,11 +114,18 @@ class Evidence:
         return (self.weight * np.concatenate(list(changes))[self.kept])[:, None]
 
     def seen(self, raw: np.ndarray) -> np.ndarray:
-        """The same of (R, K) raw columns."""
-        before = np.linalg.norm(self.scale[:, None] * raw, axis=0)
-        columns = self.beside(raw)
-        seen = np.linalg.norm(columns, axis=0) > LEFT_OVER * np.maximum(before, 1e-9)
-        return columns if seen.all() else np.where(seen, columns, 0.0)
+        """The same of (R, K) raw columns; zero where next to nothing is left."""
+        return self._seen(raw)[0]
+
+    def _seen(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same, and (K,) lengths with what is free and without."""
+        columns = self.scale[:, None] * raw
+        before = norms(columns)
+        columns -= self.basis @ (self.basis.T @ columns)
+        after = norms(columns)
+        lost = after <= LEFT_OVER * np.maximum(before, 1e-9)
+        columns[:, lost] = after[lost] = 0.0
+        return columns, before, after
 
     def lifted(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The same, each as long as it is with what is free, and (K,) how many times longer.
@@ -126,11 +133,10 @@ class Evidence:
         A number is unlikely if what is seen of it is large. Of a form that is nearly free little
         is seen, so that by its own size its number would be pulled to nothing.
         """
-        before = np.linalg.norm(self.scale[:, None] * raw, axis=0)
-        columns = self.seen(raw)
-        after = np.linalg.norm(columns, axis=0)
+        columns, before, after = self._seen(raw)
         times = np.where(after > 0, before / np.maximum(after, 1e-12), 0.0)
-        return columns * times, times
+        columns *= times
+        return columns, times
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,9 @@ import re
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import cycle
+from types import CodeType
 
 import numpy as np
 
@@ -62,6 +64,7 @@ SWINGS_HZ = (0.55, 0.75, 1.0, 1.35, 1.8, 2.4, 3.2, 4.3)
 DAMPINGS = (0.07, 0.3)
 DAMPED = 2.2  # times which a better damping may differ
 LEAST_DAMPED, MOST_DAMPED = 0.01, 0.8  # beyond it hardly anything overshoots
+MOST_POINTS = 10_000  # of all logs, about, by which the size of a form is told
 FUNCTIONS = {"abs": np.abs, "sign": np.sign, "sqrt": np.sqrt, "cos": np.cos, "sin": np.sin}
 FUNCTIONS["max"] = np.maximum
 
@@ -350,18 +353,35 @@ class Motion:
 
 def _value(text: str, names: Mapping[str, np.ndarray]) -> np.ndarray:
     """Of a formula of this file or of the library, which Python and the plant read alike."""
-    return eval(text, {"__builtins__": {}, **FUNCTIONS}, dict(names)) * 1.0
+    return eval(_compiled(text), {"__builtins__": {}, **FUNCTIONS}, dict(names)) * 1.0
+
+
+@cache
+def _compiled(text: str) -> CodeType:
+    """Of each robot the same formula is asked for."""
+    return compile(text, text, "eval")
 
 
 def sized(forms: Sequence[Form], motions: Sequence[Motion]) -> list[Form]:
     """Forms with the sizes of their values over all logs; without those that are always zero."""
     found = []
+    every = 1 + sum(len(m.velocity) for m in motions) // MOST_POINTS
     for form in forms:
-        values = np.abs(np.concatenate([m.values(form) for m in motions]))
-        sizes = np.maximum(np.percentile(values, 95, axis=0), np.sqrt(np.mean(values**2, axis=0)))
+        values = np.abs(np.concatenate([m.values(form)[::every] for m in motions]))
+        rms = np.sqrt(np.einsum("nk,nk->k", values, values) / len(values))
+        sizes = np.maximum(large(values), rms)
         if np.isfinite(sizes).all() and (sizes > 1e-9).all():
             found.append(replace(form, sizes=tuple(float(s) for s in sizes)))
     return found
+
+
+def large(values: np.ndarray) -> np.ndarray:
+    """(k,) what 95 % of (N, k) values are below: NumPy's percentile takes five times as long."""
+    last = len(values) - 1
+    place = 0.95 * last
+    below, above = int(place), min(int(place) + 1, last)
+    ordered = np.partition(values, [below, above], axis=0)
+    return ordered[below] + (place - below) * (ordered[above] - ordered[below])
 
 
 def from_library(terms: Sequence[Term], command_unit: str) -> list[Form]:

@@ -15,6 +15,7 @@ from twinmill.data.track import command_at
 from twinmill.diagnosis.families import families_of
 from twinmill.diagnosis.families.family import Humps
 from twinmill.diagnosis.families.of_time import PARTS
+from twinmill.diagnosis.forms import MOST_POINTS, large
 from twinmill.diagnosis.term import (
     CHANGE,
     CHANNELS,
@@ -172,11 +173,12 @@ def _way_m(own: Opened, velocity: np.ndarray) -> np.ndarray:
 def _sizes(values: list[dict]) -> dict[tuple[str, str], float]:
     """One size of each term for all logs."""
     sizes = {}
+    step = 1 + sum(len(next(iter(v.values()))) for v in values) // MOST_POINTS
     for key in [k for k in values[0] if all(k in v for v in values)]:
-        every = np.concatenate([v[key] for v in values])
+        every = np.concatenate([v[key][::step] for v in values])
         # What all but the largest are below; of rare ones, which that would call nothing, the RMS.
-        large = float(np.percentile(np.abs(every), 95))
-        sizes[key] = max(large, float(np.sqrt(np.mean(every**2))), 1e-9)
+        high = float(large(np.abs(every)[:, None])[0])
+        sizes[key] = max(high, float(np.sqrt(np.mean(every**2))), 1e-9)
     return sizes
 
 

@@ -13,6 +13,7 @@ since what is added to that may know places, too.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -104,6 +105,12 @@ class _Ways:
     block: np.ndarray
     stretch: np.ndarray
 
+    @cached_property
+    def far(self) -> np.ndarray:
+        """(n, n) bool: of pairs that count."""
+        apart_s = np.abs(self.t_s[:, None] - self.t_s)
+        return (apart_s > STRETCH_S) & (self.block[:, None] != self.block)
+
     @staticmethod
     def of(own: Opened, errors: np.ndarray) -> "_Ways":
         """Of a log, with the (W, H, 3) errors of a model."""
@@ -148,12 +155,10 @@ def _products(
     Places are near each other by these axes of the room, whatever the others are. Pairs of one
     block, or less than a stretch apart, count for nothing.
     """
-    at_m = ways.middle_m[:, axes]
-    apart_m2 = np.sum((at_m[:, None] - at_m[None]) ** 2, axis=-1)
-    far = np.abs(ways.t_s[:, None] - ways.t_s[None]) > STRETCH_S
-    far &= ways.block[:, None] != ways.block[None]
-    near = np.exp(-apart_m2 / (2 * length_m**2)) * far
-    strength = error * ways.length
+    at = ways.middle_m[:, axes] - ways.middle_m[:, axes].mean(axis=0)
+    at /= np.sqrt(2) * length_m
+    square = np.sum(at**2, axis=1)
+    near = np.exp(2 * at @ at.T - square[:, None] - square) * ways.far
     member = (ways.stretch[:, None] == np.arange(ways.stretch.max() + 1)).astype(float)
-    pairs = member.T @ (near * np.outer(strength, strength)) @ member
-    return pairs, float(ways.length**2 @ near @ ways.length**2)
+    own = member * (error * ways.length)[:, None]
+    return own.T @ near @ own, float(ways.length**2 @ near @ ways.length**2)

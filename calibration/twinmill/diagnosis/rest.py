@@ -414,14 +414,19 @@ def _gains(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(K, N) of N tests at K ridges, and (K, N, F) what chance brings."""
     gains, nulls = np.zeros((len(RIDGES), len(tested))), np.zeros((len(RIDGES), len(tested), flips))
+    widths = np.array([test.own.sum() for test in tested])
     for k, ridge in enumerate(RIDGES):
         alone, of_alone = products.each_held_out(flips, ridge)
-        for n, test in enumerate(tested):
-            if test.own.sum() == 1:
-                (one,) = np.flatnonzero(test.own)
-                gains[k, n], nulls[k, n] = alone[one], of_alone[:, one]
+        for width in np.unique(widths):
+            own = np.flatnonzero(widths == width)
+            places = np.array([np.flatnonzero(tested[n].own) for n in own])
+            if width == 1:
+                gains[k, own], nulls[k, own] = alone[places[:, 0]], of_alone[:, places[:, 0]].T
             else:
-                gains[k, n], nulls[k, n] = products.held_out(test.own, flips, ridge, test.grams)
+                grams = [tested[n].grams for n in own]
+                gains[k, own], nulls[k, own] = products.together_held_out(
+                    places, grams, flips, ridge
+                )
     return gains, nulls
 
 
@@ -535,28 +540,35 @@ class Products:
         return gain[0], gain[1:]
 
     def held_out(
-        self,
-        own: np.ndarray,
-        flips: int = FLIPS,
-        ridge: float = 1.0,
-        grams: Grams | None = None,
+        self, own: np.ndarray, flips: int = 0, ridge: float = 1.0
     ) -> tuple[float, np.ndarray]:
         """Fall of the cost by these columns on blocks not fitted to, and (F,) what chance brings.
 
         Chance: random signs of what each block still scatters after the columns are fitted to all.
         """
-        grams, moments = grams or self.grams(own), self.moments[:, own]
-        whole = grams.folds.sum(0) + ridge * np.eye(own.sum())  # columns are in typical strengths
+        places = np.flatnonzero(own)[None]
+        gains, nulls = self.together_held_out(places, [self.grams(own)], flips, ridge)
+        return float(gains[0]), nulls[0]
+
+    def together_held_out(
+        self, places: np.ndarray, grams: Sequence[Grams], flips: int, ridge: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(N,) and (N, F) the same of N sets of columns, (N, k) `places`, with their products."""
+        moments = np.moveaxis(self.moments[:, places], 1, 0)  # (N, B, k)
+        folds = np.array([g.folds for g in grams])  # (N, FOLDS, k, k)
+        whole = folds.sum(1) + ridge * np.eye(places.shape[1])  # columns are in typical strengths
         tests = [self.fold == k for k in range(FOLDS)]
-        judged = np.array([moments[test].sum(0, keepdims=True) for test in tests])
+        judged = np.stack([moments[:, test].sum(1) for test in tests], axis=1)[:, :, None]
         if flips:
-            scatter = moments - grams.blocks @ np.linalg.solve(whole, moments.sum(0))
-            signs = _signs(flips, len(moments))
-            by_chance = np.array([signs[:, test] @ scatter[test] for test in tests])
-            judged = np.concatenate([judged, by_chance], axis=1)  # (FOLDS, 1 + F, k)
-        fitted = (judged.sum(0) - judged) @ np.linalg.inv(whole - grams.folds)
-        gain = np.sum(fitted * (2 * judged - fitted @ grams.folds), axis=(0, 2))
-        return float(gain[0]), gain[1:]
+            numbers = np.linalg.solve(whole, moments.sum(1)[..., None])
+            blocks = np.array([g.blocks for g in grams])
+            scatter = moments - (blocks @ numbers[:, None])[..., 0]
+            signs = _signs(flips, len(self.fold))
+            by_chance = np.stack([signs[:, test] @ scatter[:, test] for test in tests], axis=1)
+            judged = np.concatenate([judged, by_chance], axis=2)  # (N, FOLDS, 1 + F, k)
+        fitted = (judged.sum(1, keepdims=True) - judged) @ np.linalg.inv(whole[:, None] - folds)
+        gain = np.sum(fitted * (2 * judged - fitted @ folds), axis=(1, 3))
+        return gain[:, 0], gain[:, 1:]
 
 
 @cache

@@ -7,7 +7,6 @@ from itertools import combinations
 
 import numpy as np
 import twinmill_native as native
-from scipy.linalg import block_diag
 
 from twinmill.diagnosis.settings import SETTINGS, Settings
 from twinmill.diagnosis.starts import Left, Starts, starts_of
@@ -222,9 +221,11 @@ def _signatures(
         steps = points.share
         small.append(weight[:, None] * (row - values[:-1]).T / steps)
         whole.append(weight[:, None] * (row - values[-1:]).T)
-    apart = name in needing("wheel_angle") and len(small) <= MOST_APART
-    joined = block_diag(*small) if apart else np.concatenate(small)
-    return parameters, joined, np.concatenate(whole)
+    if name in needing("wheel_angle") and 1 < len(small) <= MOST_APART:
+        from scipy.linalg import block_diag  # few diagnoses get here
+
+        return parameters, block_diag(*small), np.concatenate(whole)
+    return parameters, np.concatenate(small), np.concatenate(whole)
 
 
 @dataclass(frozen=True)

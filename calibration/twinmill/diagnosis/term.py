@@ -91,27 +91,14 @@ def displaced(
     response: Response, velocity: np.ndarray, values: np.ndarray, axis: int
 ) -> np.ndarray:
     """(W, H, 3, T) change of windows' displacements by (N, T) velocities in a body axis, linear."""
-    step, c, s = response.step_s, np.cos(response.heading_rad), np.sin(response.heading_rad)
-    places = response.starts, np.maximum(response.ends, 0)
-    if axis < 2:
-        along = (c, s) if axis == 0 else (-s, c)
-        dx, dy = (native.sums_between([values], a * step, *places) for a in along)
-        turn = np.zeros_like(dx)
-    else:
-        angle = native.running_sums(values, step)
-        middle = angle - step[:, None] * values / 2
-        sideways = np.column_stack([-(s * velocity[:, 0] + c * velocity[:, 1]),
-                                    c * velocity[:, 0] - s * velocity[:, 1]])  # fmt: skip
-        first, moved = (
-            angle[response.starts][:, None],
-            native.sums_between([sideways], step, *places),
-        )
-        dx, dy = (
-            native.sums_between([middle], step * way, *places) - first * moved[..., k, None]
-            for k, way in enumerate(sideways.T)
-        )
-        turn = angle[places[1]] - first
-    track = response.data.measurement.track
-    at = np.nan_to_num(track.heading_smooth[response.data.windows.starts])
-    ch, sh = np.cos(at)[:, None, None], np.sin(at)[:, None, None]
-    return np.stack([ch * dx + sh * dy, -sh * dx + ch * dy, turn], axis=2)
+    heading = np.nan_to_num(response.data.measurement.track.heading_smooth)
+    return native.displaced_by(
+        np.ascontiguousarray(values),
+        np.ascontiguousarray(velocity),
+        axis,
+        response.step_s,
+        response.heading_rad,
+        response.starts,
+        np.ascontiguousarray(np.maximum(response.ends, 0)),
+        heading[response.data.windows.starts],
+    )

@@ -15,12 +15,15 @@ import numpy as np
 
 from twinmill.fitting.settings import FLOOR_SETTINGS
 
-LADDER = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # ridges over a group's mean square
+LADDER = np.array([1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0])  # ridges over a group's mean square
 
 
 @dataclass(frozen=True)
 class Parts:
-    """Which of R rows lie in each of K parts.
+    """Which of R rows lie in each of K parts, and which touch it from another.
+
+    Rows that are inside one part and touch the same others are a cell: what is summed over the rows
+    of each cell gives the sums over all rows inside a part, and over all that touch it.
 
     Attributes:
         inside: (R,) part of each row.
@@ -33,13 +36,10 @@ class Parts:
     begins: np.ndarray
     count: int
 
-    @staticmethod
-    def joined(parts: Sequence["Parts"]) -> "Parts":
-        """Of rows one after the other."""
-        inside, ends, begins = (
-            np.concatenate([getattr(p, key) for p in parts]) for key in ("inside", "ends", "begins")
-        )
-        return Parts(inside, ends, begins, parts[0].count)
+    @property
+    def order(self) -> np.ndarray:
+        """(R,) rows cell by cell, and part by part."""
+        return np.lexsort((self.begins, self.ends, self.inside))
 
     def at(self, rows: np.ndarray) -> "Parts":
         """Of these rows alone."""
@@ -47,98 +47,147 @@ class Parts:
 
     @cached_property
     def slices(self) -> list[slice]:
-        """Of each part, where rows are in the order of their parts."""
+        """Of each part, where rows are in order."""
         edges = np.searchsorted(self.inside, np.arange(self.count + 1))
         return [slice(a, b) for a, b in pairwise(edges)]
 
     @cached_property
-    def neighbours(self) -> list[np.ndarray]:
-        """Numbers of the rows beside each part."""
-        return [np.flatnonzero(self.beside(k)) for k in range(self.count)]
+    def cells(self) -> list[slice]:
+        """Of each of S cells, where rows are in order."""
+        same = np.column_stack([self.inside, self.ends, self.begins])
+        changes = np.flatnonzero((same[1:] != same[:-1]).any(axis=1)) + 1
+        return [slice(a, b) for a, b in pairwise([0, *changes, len(same)])]
 
-    def beside(self, k: int) -> np.ndarray:
-        """(R,) bool: rows of other parts that touch part k."""
-        return ((self.begins == k) | (self.ends == k)) & (self.inside != k)
+    @cached_property
+    def _owners(self) -> np.ndarray:
+        """(2 K, S): 1 where a cell is inside a part, and where it touches one or is inside it."""
+        first = np.array([cell.start for cell in self.cells])
+        own = [of[first] == np.arange(self.count)[:, None] for of in self._names]
+        return np.vstack([own[0], own[0] | own[1] | own[2]]).astype(float)
+
+    @property
+    def _names(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.inside, self.ends, self.begins
+
+    def summed(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(K, ...) of (S, ...) sums over cells: inside each part, and of all that touch it."""
+        both = np.tensordot(self._owners, cells, 1)
+        return both[: self.count], both[self.count :]
 
 
-class Learner:
-    """One group of features, ready to be fitted to any wanted values.
+class _Alike:
+    """Groups of as many features each, ready to be fitted to any wanted values.
 
     Args:
-        x: (R, F) rows.
-        parts: of the rows, which are in order of the part that they are inside.
-        inside, beside: (K, F, F) products of the rows inside each part, and beside it.
+        numbers: (L,) of the groups.
+        columns: (L, F) of each among all features.
+        inside, touching: (L, K, F, F) products of the rows inside each part, and touching it.
     """
 
-    def __init__(self, x: np.ndarray, parts: Parts, inside: np.ndarray, beside: np.ndarray) -> None:
-        self.x = x.astype(np.float32)
-        self.within, self.beside = parts.slices, parts.neighbours
-        self.x_beside = [self.x[k] for k in self.beside]
-        self.total = inside.sum(axis=0)
-        self.mean = max(float(np.diag(self.total).mean()), 1e-30)
-        values, self.vectors = np.linalg.eigh(self.total - inside - beside)
+    def __init__(
+        self, numbers: np.ndarray, columns: np.ndarray, inside: np.ndarray, touching: np.ndarray
+    ) -> None:
+        self.numbers, self.columns = numbers, columns
+        total = inside.sum(axis=1)
+        self.mean = np.maximum(np.trace(total, axis1=1, axis2=2) / columns.shape[1], 1e-30)
+        values, self.vectors = np.linalg.eigh(total[:, None] - touching)
         self.values = np.maximum(values, 0.0)
-        self.inside = self.vectors.transpose(0, 2, 1) @ inside @ self.vectors
+        self.inside = self.vectors.swapaxes(-1, -2) @ inside @ self.vectors
 
-    @classmethod
-    def each(cls, x: np.ndarray, parts: Parts, groups: Iterable[np.ndarray]) -> Iterator["Learner"]:
-        """One of each group of columns of (R, F) rows: products of all are quicker at once."""
-        inside, beside = (
-            np.array([own.T @ own for own in (x[k] for k in rows)])
-            for rows in (parts.slices, parts.neighbours)
-        )
-        for own in groups:
-            yield cls(x[:, own], parts, *(gram[:, own[:, None], own] for gram in (inside, beside)))
+    def gains(self, push: np.ndarray, pull: np.ndarray) -> np.ndarray:
+        """(L, ridges) by how much each lowers the squared error on left-out parts.
 
-    def gain(self, wanted: np.ndarray) -> tuple[float, float]:
-        """By how much the squared error on left-out parts falls at the best ridge; that ridge."""
+        Args:
+            push: (K, all features) moments of the rows inside each part.
+            pull: of those that do not touch it.
+        """
+        push, pull = (self._turned(m)[:, :, None] for m in (push, pull))
+        rise = (self.mean[:, None] * LADDER)[:, None, :, None]
+        beta = pull / (self.values[:, :, None] + rise)  # (L, K, ridges, F)
+        return np.einsum("lkrf,lkrf->lr", beta, 2 * push - beta @ self.inside)
+
+    def fitted(self, k: int, pull: np.ndarray, ridge: float) -> np.ndarray:
+        """(K, F) coefficients of the k-th without each part."""
+        values = self.values[k] + self.mean[k] * ridge
+        return np.einsum("kfg,kg->kf", self.vectors[k], self._turned(pull)[k] / values)
+
+    def _turned(self, moments: np.ndarray) -> np.ndarray:
+        """(L, K, F) by eigenvectors."""
+        own = moments[:, self.columns].swapaxes(0, 1)
+        return (own[:, :, None] @ self.vectors)[:, :, 0]
+
+
+class Learners:
+    """Groups of features of the same rows.
+
+    Args:
+        batches: (R, f) rows of some features, in order of the parts, and the columns of each group
+            among them.
+        parts: of the rows.
+    """
+
+    def __init__(
+        self, batches: Iterable[tuple[np.ndarray, Sequence[np.ndarray]]], parts: Parts
+    ) -> None:
+        self.parts, self.columns = parts, []
+        found: dict[int, list[tuple]] = {}
+        rows, first = [np.zeros((len(parts.inside), 0), np.float32)], 0
+        for x, groups in batches:
+            grams = parts.summed(np.array([own.T @ own for own in (x[k] for k in parts.cells)]))
+            for own in groups:
+                products = [gram[:, own[:, None], own] for gram in grams]
+                found.setdefault(len(own), []).append((len(self.columns), first + own, *products))
+                self.columns.append(first + own)
+            rows.append(x.astype(np.float32))
+            first += x.shape[1]
+        self.x = np.hstack(rows)
+        self._alike = [_Alike(*map(np.array, zip(*own, strict=True))) for own in found.values()]
+
+    def best(self, wanted: np.ndarray) -> tuple[float, int, float, np.ndarray]:
+        """Of the group that lowers the squared error on left-out parts most.
+
+        Returns:
+            By how much, its number, its best ridge, and its (K, F) coefficients without each part.
+        """
         push, pull = self._moments(wanted)
-        rise = self.mean * np.array(LADDER)[:, None, None]
-        beta = (pull / (self.values + rise)).transpose(1, 0, 2)  # (K, ridges, F)
-        falls = np.sum(beta * (2 * push[:, None] - beta @ self.inside), axis=(0, 2))
-        best = int(np.argmax(falls))
-        return float(falls[best]), LADDER[best]
+        gains = [own.gains(push, pull) for own in self._alike]
+        own, falls = max(zip(self._alike, gains, strict=True), key=lambda pair: pair[1].max())
+        k, ridge = np.unravel_index(int(np.argmax(falls)), falls.shape)
+        each = own.fitted(k, pull, LADDER[ridge])
+        return float(falls[k, ridge]), int(own.numbers[k]), float(LADDER[ridge]), each
 
-    def fitted(self, wanted: np.ndarray, ridge: float) -> np.ndarray:
-        """(K, F) coefficients without each part."""
-        _, pull = self._moments(wanted)
-        return np.einsum("kfg,kg->kf", self.vectors, pull / (self.values + self.mean * ridge))
-
-    def left(self, wanted: np.ndarray, each: np.ndarray) -> np.ndarray:
-        """(R,) what the fits without each part leave of its rows."""
-        made = [self.x[own] @ one for own, one in zip(self.within, each, strict=True)]
+    def left(self, wanted: np.ndarray, number: int, each: np.ndarray) -> np.ndarray:
+        """(R,) what a group's fits without each part leave of its rows."""
+        x = self.x[:, self.columns[number]]
+        made = [x[own] @ one for own, one in zip(self.parts.slices, each, strict=True)]
         return wanted - np.concatenate(made)
 
     def _moments(self, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(K, F) of the rows of each part, and of those that do not touch it, by eigenvectors."""
-        inside = np.array([wanted[k] @ self.x[k] for k in self.within])
-        beside = np.array([wanted[k] @ x for k, x in zip(self.beside, self.x_beside, strict=True)])
-        both = np.stack([inside, inside.sum(axis=0) - inside - beside], axis=1)
-        push, pull = (both @ self.vectors).transpose(1, 0, 2)
-        return push, pull
+        """(K, all features) of the rows of each part, and of those that do not touch it."""
+        cells = np.array([wanted[k] @ self.x[k] for k in self.parts.cells], float)
+        inside, touching = self.parts.summed(cells)
+        return inside, inside.sum(axis=0) - touching
 
 
 def boosted(
-    learners: Sequence[Learner], wanted: np.ndarray, independent: float
+    learners: Learners, wanted: np.ndarray, independent: float
 ) -> Iterator[tuple[int, float]]:
     """Number and ridge of each group taken, in order.
 
     Args:
-        learners: of the same rows.
-        wanted: (R,) values.
+        learners: of rows.
+        wanted: (R,) values of these.
         independent: how many of the values are. The best of so many groups takes about
             2 ln(groups) / independent of an error that is noise: below twice that nothing is taken.
     """
-    by_chance = np.log(max(len(learners), 1)) / independent
+    if not learners.columns:
+        return
+    by_chance = np.log(len(learners.columns)) / independent
     least = max(FLOOR_SETTINGS.group_worth, FLOOR_SETTINGS.group_chance * by_chance)
     wanted = wanted.astype(np.float32)
-    if not learners:
-        return
     for _ in range(FLOOR_SETTINGS.most_groups):
-        gains = [learner.gain(wanted) for learner in learners]
-        best = int(np.argmax([fall for fall, _ in gains]))
-        if gains[best][0] < least * float(wanted @ wanted):
+        fall, number, ridge, each = learners.best(wanted)
+        if fall < least * float(wanted @ wanted):
             return
-        each = learners[best].fitted(wanted, gains[best][1])
-        wanted = learners[best].left(wanted, each).astype(np.float32)
-        yield best, gains[best][1]
+        wanted = learners.left(wanted, number, each).astype(np.float32)
+        yield number, ridge

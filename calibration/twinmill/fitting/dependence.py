@@ -82,7 +82,7 @@ class Motion:
         x, y = bells
         return (x[:, :, None] * y[:, None, :]).reshape(len(axis), -1), np.hstack(strips)
 
-    @property
+    @cached_property
     def moves(self) -> np.ndarray:
         """(N,) 0 at rest, 1 in motion."""
         relative = np.abs(self.base) / np.maximum(np.abs(self.base).max(axis=0), 1e-9)
@@ -90,26 +90,31 @@ class Motion:
 
 
 Features = Sequence[np.ndarray]  # (N, f) forward, left, turning
+Group = Sequence[Features]  # fitted together; groups may share features
 
 
-def dependences(motion: Motion) -> Iterator[Features]:
+def dependences(motion: Motion) -> Iterator[Group]:
     """Groups of features, one of each dependence that is tried."""
+    yield from ([features] for features in _single(motion))
+    way = _way_m(motion)
+    for along, shortest in ((motion.t_s - motion.t_s.min(), SHORTEST_S), (way, SHORTEST_M)):
+        yield from pairwise([_scaled(motion, wave) for wave in _waves(along, shortest)])
+    waves = _waves(motion.t_s - motion.t_s.min(), SLOW_S)
+    yield from pairwise([_pushes(motion, wave) for wave in waves])
+
+
+def _single(motion: Motion) -> Iterator[Features]:
+    """Those of them that share no features."""
     head = _harmonics(motion.heading_rad)
     always = np.hstack([np.ones((len(head), 1)), head])
     turned = np.cumsum(motion.base[:, 2] * motion.step_s)
     hours = _hats(motion.t_s, motion.t_s.min(), motion.t_s.max(), _count(motion.t_s, 6.0, 24))
-    yield from place_gains(motion)
+    yield from _by_place(motion)
     yield from _courses(motion)
     for gain in (head, hours, _hats(turned, turned.min(), turned.max(), TURNED)):
         yield _scaled(motion, gain)
-    way = _way_m(motion)
-    for along, shortest in ((motion.t_s - motion.t_s.min(), SHORTEST_S), (way, SHORTEST_M)):
-        for wave in _waves(along, shortest):
-            yield _scaled(motion, wave)
     for gain in (always, *motion.where, hours):
         yield from _drifts(motion, gain)
-    for wave in _waves(motion.t_s - motion.t_s.min(), SLOW_S):
-        yield _pushes(motion, wave)
     for gain in (always, *motion.where):
         yield _crossed(motion, gain)
     yield from _curves(motion)
@@ -118,39 +123,55 @@ def dependences(motion: Motion) -> Iterator[Features]:
     yield from _events(motion)
 
 
-def place_gains(motion: Motion) -> Iterator[Features]:
+def place_gains(motion: Motion) -> Iterator[Group]:
     """Those of `dependences` that scale the velocities, as fitted so far, by the place."""
+    yield from ([features] for features in _by_place(motion))
+
+
+def _by_place(motion: Motion) -> Iterator[Features]:
     for gain in motion.where:
         yield _scaled(motion, gain)
 
 
 def known_physics(
-    base: native.Model, velocity: np.ndarray, predict: Callable[[native.Model], np.ndarray]
-) -> Iterator[Features]:
+    base: native.Model,
+    velocity: np.ndarray,
+    predict: Callable[[Sequence[native.Model]], np.ndarray],
+) -> Iterator[Group]:
     """What each effect of the catalogue would change, but those that are somewhere or sometimes.
 
     Args:
         base: a model without effects.
         velocity: (N, 3) that it predicts.
-        predict: the same of another model.
+        predict: (B, N, 3) the same of other models.
     """
-    for card in native.catalogue():
-        parameters = {p["name"]: p["role"] for p in card["parameters"]}
-        if set(parameters.values()) & set(WHERE_OR_WHEN) or card["stage"] not in MOTION_STAGES:
-            continue
-        changes = []
-        for strength in STRENGTHS:
-            model = base.copy()
-            try:
-                model.add_effect(card["name"])
-            except ValueError:  # not of such a robot
-                break
-            for p in effect_parameters(model, effect_names(model)[-1], fresh=True):
-                model.set(p.name, p.usual + strength * (p.value - p.usual))
-            changes.append(predict(model) - velocity)
-        if changes and np.abs(changes[0]).max() > 1e-9:
-            forward, left, turning = np.stack(changes, axis=-1).transpose(1, 0, 2)
-            yield forward, left, turning
+    names = [card["name"] for card in native.catalogue() if _is_everywhere(card)]
+    models = [m for name in names for m in _with_strengths(base, name)]
+    changes = predict([base, *models])[1:] - velocity
+    for own in changes.reshape(-1, len(STRENGTHS), *velocity.shape):
+        if np.abs(own[0]).max() > 1e-9:
+            forward, left, turning = np.ascontiguousarray(own.transpose(2, 1, 0))
+            yield [(forward, left, turning)]
+
+
+def _is_everywhere(card: dict) -> bool:
+    roles = {p["role"] for p in card["parameters"]}
+    return not roles & set(WHERE_OR_WHEN) and card["stage"] in MOTION_STAGES
+
+
+def _with_strengths(base: native.Model, name: str) -> list[native.Model]:
+    """The model with an effect at STRENGTHS; none if such a robot cannot have it."""
+    models = []
+    for strength in STRENGTHS:
+        model = base.copy()
+        try:
+            model.add_effect(name)
+        except ValueError:
+            return []
+        for p in effect_parameters(model, effect_names(model)[-1], fresh=True):
+            model.set(p.name, p.usual + strength * (p.value - p.usual))
+        models.append(model)
+    return models
 
 
 def _way_m(motion: Motion) -> np.ndarray:
@@ -185,21 +206,20 @@ def _courses(motion: Motion) -> Iterator[Features]:
         yield np.hstack([along, -aside]), np.hstack([aside, along]), np.zeros((len(waves), 0))
 
 
-def wheel_angles(motion: Motion, wheels: Sequence[Wheel]) -> Iterator[Features]:
+def wheel_angles(motion: Motion, wheels: Sequence[Wheel]) -> Iterator[Group]:
     """Each wheel's rolling made quicker and slower by its own angle."""
     for wheel in wheels:
         waves = wheel.waves(motion.moved) * (motion.velocity @ wheel.rate)[:, None]
         forward, left, turning = (part * waves for part in wheel.body)
-        yield forward, left, turning
+        yield [(forward, left, turning)]
 
 
-def beat(motion: Motion, rate_radps: float) -> Iterator[Features]:
+def beat(motion: Motion, rate_radps: float) -> Iterator[Group]:
     """Gains and drifts that swing in time at a rate; nothing where it is 0."""
     if rate_radps:
         angle = rate_radps * motion.t_s[:, None]
         wave = np.hstack([np.cos(angle), np.sin(angle)])
-        yield _scaled(motion, wave)
-        yield from _drifts(motion, wave)
+        yield from ([features] for features in (_scaled(motion, wave), *_drifts(motion, wave)))
 
 
 def _drifts(motion: Motion, gain: np.ndarray) -> Iterator[Features]:
@@ -379,11 +399,12 @@ def _count(along: np.ndarray, shortest: float, most: int) -> int:
 
 
 def _waves(along: np.ndarray, shortest: float) -> Iterator[np.ndarray]:
-    """(N, 4) two neighbouring frequencies at a time, so that one between them is matched."""
-    angle = np.pi * along / max(1.1 * np.ptp(along), 1e-9)
-    last = 2 * _count(along, shortest, MOST_WAVES)
-    waves = [np.column_stack([np.cos(k * angle), np.sin(k * angle)]) for k in range(2, last + 1)]
-    yield from (np.hstack(two) for two in pairwise(waves))
+    """(N, 2) of each frequency; two neighbours together match one between them."""
+    slowest = np.exp(1j * np.pi * along / max(1.1 * np.ptp(along), 1e-9))
+    wave = slowest
+    for _ in range(2, 2 * _count(along, shortest, MOST_WAVES) + 1):
+        wave = wave * slowest  # quicker than a cosine and a sine of each
+        yield np.column_stack([wave.real, wave.imag])
 
 
 def _levels(size: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ It is a property of the log. Of the model file only the robot's form is used (dr
 geometry), with numbers refitted to this very log. So better predictions never get a worse score.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,7 +95,7 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     if not calm.all():
         response = response.of_windows(calm)
     points = response.points
-    known = known_physics(base, velocity[points], lambda m: body_velocity_at(data, m, points))
+    known = known_physics(base, velocity[points], lambda m: body_velocities_at(data, m, points))
     response.find_wheels(base)
     response.find_beat()
     motion = response.motion
@@ -170,22 +171,21 @@ def body_velocity_at(
 
     At a frame that was lost it is that of the step over the loss. Zero where there is none.
     """
+    return body_velocities_at(data, [model], points)[0]
+
+
+def body_velocities_at(
+    data: Trajectory, models: Sequence[native.Model], points: np.ndarray | slice
+) -> np.ndarray:
+    """(B, N, 3) the same of several models."""
     track = data.measurement.track
     seen = np.flatnonzero(track.segment >= 0)
     place = np.searchsorted(seen, np.arange(len(track.pose_t_s))[points])
     there = place < len(seen)
-    before, at = seen[place[there] - 1], seen[place[there]]
-    heading_rad = track.heading_rad[before]
-    predicted = native.one_step(model, data.measurement.played)[at]
-    along, across = (predicted[:, :2] - track.pose[before, :2]).T
-    turn = predicted[:, 2] - heading_rad
-    middle = heading_rad + turn / 2
-    c, s = np.cos(middle), np.sin(middle)
-    body = np.column_stack([c * along + s * across, c * across - s * along, turn])
-    step_s = track.pose_t_s[at] - track.pose_t_s[before]
-    rates = np.zeros((len(place), 3))
-    rates[there] = np.nan_to_num(body / step_s[:, None])
-    return rates
+    at, again = np.unique(seen[place[there]], return_inverse=True)
+    found = np.zeros((len(models), len(place), 3))
+    found[:, there] = native.velocities(list(models), data.measurement.played, at)[:, again]
+    return found
 
 
 def told_velocity_at(

@@ -12,21 +12,20 @@ way, drift, a curve, what follows an event (see dependence.py). All together wou
 features, so they are added by componentwise boosting (see boosting.py).
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import twinmill_native as native
-from scipy.linalg import lapack
 
 from twinmill.filters import filtered
 from twinmill.fitting import wheel_angles
 from twinmill.fitting.beat import HORIZONS as BEAT_HORIZONS
 from twinmill.fitting.beat import beat_radps
-from twinmill.fitting.boosting import Learner, Parts, boosted
-from twinmill.fitting.dependence import Features, Motion
+from twinmill.fitting.boosting import Learners, Parts, boosted
+from twinmill.fitting.dependence import Features, Group, Motion
 from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import EVERY_S, difference, rms
@@ -47,6 +46,7 @@ FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
 GRID_S = 0.01
 WIDE = 64  # features whose rows are made at once
+AXES = ((0, 1), (2,))  # of the plane and of turning
 CHOICE_EVERY = 2  # horizons: those between would choose the same groups
 MEMORY_S = 0.3  # between errors that are independent
 PLACE_SCALE_M = 2.0
@@ -55,17 +55,55 @@ MIXING = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # of four
 
 # (F,) coefficients of all rows and (K, F) without each fold.
 Coefficients = tuple[np.ndarray, np.ndarray]
-# Number of a horizon, (W,) bool: windows that have it, and their (w, F) rows forward, left and of
-# turning.
-Rows = tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Fold:
-    """Normal matrices of one left-out part: rows that touch it, and rows inside it."""
+class Rows:
+    """R errors of windows, of the plane or of turning, in order of their parts.
 
+    Attributes:
+        at: (3, R) window, horizon and channel of each.
+        starts, ends: (R,) points.
+        direction: (R, 2) in the room along which it is measured, times its weight.
+        weight: (R,) one over its error.
+        wanted: (R,) value, weighted.
+        parts: which rows lie in each left-out part.
+    """
+
+    at: np.ndarray
+    starts: np.ndarray
+    ends: np.ndarray
+    direction: np.ndarray
+    weight: np.ndarray
+    wanted: np.ndarray
+    parts: Parts
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Normal equations of all rows, and of the rows that touch each of K parts or lie inside it.
+
+    Attributes:
+        gram, moment: (F, F) and (F,) of all.
+        touching, inside: (K, F, F) and (K, F) of each part.
+        square: of the wanted values of all.
+    """
+
+    gram: np.ndarray
+    moment: np.ndarray
     touching: tuple[np.ndarray, np.ndarray]
-    inside: tuple[np.ndarray, np.ndarray, float]
+    inside: tuple[np.ndarray, np.ndarray]
+    square: float
+
+    @classmethod
+    def of(cls, x: np.ndarray, rows: Rows) -> "Equations":
+        """Of (R, F) features."""
+        cells = [(x[k], rows.wanted[k]) for k in rows.parts.cells]
+        grams, moments = np.array([own.T @ own for own, _ in cells]), [y @ own for own, y in cells]
+        sums = (rows.parts.summed(np.array(m)) for m in (grams, moments))
+        inside, touching = zip(*sums, strict=True)
+        square = float(rows.wanted @ rows.wanted)
+        return cls(*(m.sum(axis=0) for m in inside), touching, inside, square)
 
 
 class Response:
@@ -265,7 +303,7 @@ class Response:
     # -- windows --------------------------------------------------------------------------------
 
     def _index_windows(self) -> None:
-        """Blocks and parts of windows, and the features' rows."""
+        """Blocks and parts of windows."""
         data = self.data
         start_s = data.start_s - data.start_s[0]
         length_s = float(start_s[-1])
@@ -276,30 +314,60 @@ class Response:
         self.fold = self._part(start_s)
         self.end_fold = self._part(end_s)
         self.tail_fold = self._part(start_s - 2.0)
-        self.rows = self._rows([[f] for f in self.features])
 
-    def _rows(self, features: Sequence[Sequence[np.ndarray]], every: int = 1) -> list[Rows]:
-        """Of every Nth horizon; features of each axis stand side by side."""
-        data = self.data
-        c, s = np.cos(self.heading_rad) * self.step_s, np.sin(self.heading_rad) * self.step_s
-        horizons = range(0, self.ends.shape[1], every)
-        ends = np.ascontiguousarray(np.maximum(self.ends[:, horizons], 0))
-        forward, left, turn = features
-        sums = [
-            native.sums_between(f, weight, self.starts, ends)
-            for weight, f in ((c, forward), (s, forward), (c, left), (s, left), (self.step_s, turn))
-        ]
-        track = data.measurement.track
-        heading = np.nan_to_num(track.heading_smooth[data.windows.starts])
-        rows = []
-        for k, h in enumerate(horizons):
-            ok = (self.ends[:, h] >= 0) & np.isfinite(data.measured[:, h, :2]).all(axis=1)
-            cx, sx, cy, sy, w = (q[ok, k] for q in sums)
-            ch, sh = np.cos(heading[ok])[:, None], np.sin(heading[ok])[:, None]
-            along = np.concatenate([ch * cx + sh * sx, -ch * sy + sh * cy], axis=1)
-            across = np.concatenate([ch * sx - sh * cx, ch * cy + sh * sy], axis=1)
-            rows.append((h, ok, along, across, w))
-        return rows
+    def _rows(
+        self, part: int, scale: np.ndarray, wanted: np.ndarray, every: int = 1
+    ) -> Rows | None:
+        """Of the plane (0) or of turning (1), at every Nth horizon; None where there is none.
+
+        Args:
+            part: which.
+            scale: (H, 3) errors that count as one.
+            wanted: (W, H, 3) what features are to make.
+            every: so many horizons are one.
+        """
+        scale = _isotropic(scale)
+        measured = np.isfinite(self.data.measured[..., :2]).all(axis=-1) & (self.ends >= 0)
+        places, weights = [], []
+        for h in range(0, self.ends.shape[1], every):
+            for channel in (0, 1) if part == 0 else (2,):
+                own = np.flatnonzero(measured[:, h] & np.isfinite(wanted[:, h, channel]))
+                if scale[h, channel] > 1e-9 and len(own):
+                    places.append((own, np.full(len(own), h), np.full(len(own), channel)))
+                    weight = 1 / (scale[h, channel] * np.sqrt(len(own)))
+                    weights.append(np.full(len(own), weight))
+        if not places:
+            return None
+        at, weight = np.concatenate(places, axis=1), np.concatenate(weights)
+        parts = Parts(
+            self.fold[at[0]], self.end_fold[at[0], at[1]], self.tail_fold[at[0]], self.folds
+        )
+        order = parts.order
+        window, horizon, channel = at = at[:, order]
+        weight = weight[order]
+        heading = np.nan_to_num(self.data.measurement.track.heading_smooth)
+        along = heading[self.data.windows.starts[window]] + np.where(channel == 1, np.pi / 2, 0.0)
+        direction = np.stack([np.cos(along), np.sin(along)], axis=-1) if part == 0 else (1.0, 0.0)
+        return Rows(
+            at=at,
+            starts=self.starts[window],
+            ends=self.ends[window, horizon],
+            direction=direction * weight[:, None],
+            weight=weight,
+            wanted=wanted[window, horizon, channel] * weight,
+            parts=parts.at(order),
+        )
+
+    def _led(self, part: int, rows: Rows, features: Sequence[Features]) -> np.ndarray:
+        """(R, F) of features side by side, forward ones before left; or of turning."""
+        none = np.zeros_like(self.step_s)
+        if part == 0:
+            heading = (np.cos(self.heading_rad), np.sin(self.heading_rad))
+            columns, steps = [[f[axis] for f in features] for axis in (0, 1)], heading
+        else:
+            columns, steps = [[f[2] for f in features], []], (none + 1.0, none)
+        steps = np.stack(steps, axis=-1) * self.step_s[:, None]
+        return native.led_between(*columns, steps, rows.starts, rows.ends, rows.direction)
 
     def _part(self, t_s: np.ndarray) -> np.ndarray:
         return np.floor(t_s / self.block_s).astype(int) % self.folds
@@ -307,18 +375,20 @@ class Response:
     # -- regression -----------------------------------------------------------------------------
 
     def _fit(self, scale: np.ndarray, ridges: list[np.ndarray | None]) -> None:
-        """Coefficients with the errors (H, 3) of another fit as weights."""
+        """Coefficients with the errors (H, 3) of another fit as weights.
+
+        They are of the plane and of turning, None where nothing tells them.
+        """
         first = np.array([FIRST_RIDGE.get(g, OUT) for g in GROUPS])
-        begun = [first if ridge is None else ridge for ridge in ridges]
-        groups = [np.concatenate(self.groups[:2]), self.groups[2]]
-        self.coefficients, self.ridges = self._solved(
-            self.rows,
-            self.data.measured,
-            scale,
-            groups=groups,
-            begun=begun,
-            worth=FLOOR_SETTINGS.ridge_worth,
-        )
+        self.ridges = [first if ridge is None else ridge for ridge in ridges]
+        self.coefficients: list[Coefficients | None] = [None, None]
+        for part, axes in enumerate(AXES):
+            rows = self._rows(part, scale, self.data.measured)
+            if rows is not None:
+                equations = Equations.of(self._led(part, rows, [self.features]), rows)
+                groups = np.concatenate([self.groups[axis] for axis in axes])
+                self.ridges[part], *found = _ridge(equations, groups, self.ridges[part])
+                self.coefficients[part] = found
         self._judge()
 
     @property
@@ -372,16 +442,22 @@ class Response:
         made = (self.data.measured - self.across)[there, horizon]
         return np.nan_to_num(errors).T, np.nan_to_num(made).T
 
-    def boost(self, groups: Sequence[Features]) -> None:
+    def boost(self, groups: Sequence[Group]) -> None:
         """Adds what is left and left-out blocks agree on, a group of features at a time."""
         scale = self.errors
-        left, chosen = self._left(), []
+        left, chosen = self._left(scale), []
         independent = len(self.starts) * EVERY_S / MEMORY_S
-        for part in (0, 1):
-            used = [_only(part, g) for g in groups]
-            used = [g for g in used if sum(f.shape[1] for f in g)]
-            learners, wanted = self._learners(part, used, _isotropic(scale), left)
-            chosen += [(used[n], ridge) for n, ridge in boosted(learners, wanted, independent)]
+        for part, axes in enumerate(AXES):
+            used = [g for g in groups if any(f[axis].shape[1] for f in g for axis in axes)]
+            rows = self._rows(part, scale, left, CHOICE_EVERY)
+            if rows is None:
+                continue
+            batches = (_beside(some, axes) for some in _batches(used, axes))
+            learners = Learners(
+                ((self._led(part, rows, pieces), own) for pieces, own in batches), rows.parts
+            )
+            for number, ridge in boosted(learners, rows.wanted, independent):
+                chosen.append((_only(axes, used[number]), ridge))
         if chosen:
             self._fit_with(chosen, scale)
 
@@ -393,62 +469,22 @@ class Response:
         self.features = [np.hstack([self.features[axis], *added[axis]]) for axis in axes]
         self.groups = [np.concatenate([self.groups[axis], *numbers[axis]]) for axis in axes]
         fresh = [ridge for _, ridge in chosen]
-        self.rows = self._rows([[f] for f in self.features])
         self._fit(scale, [np.concatenate([own, fresh]) for own in self.ridges])
 
-    def _learners(
-        self, part: int, groups: Sequence[Features], scale: np.ndarray, left: np.ndarray
-    ) -> tuple[list[Learner], np.ndarray]:
-        """One of each group for the plane (0) or turning (1), and the (R,) values wanted."""
-        learners, wanted = [], np.zeros(0)
-        for some in _batches(groups):
-            features = [[group[axis] for group in some] for axis in range(3)]
-            pieces = self._weighted(part, scale, self._rows(features, CHOICE_EVERY), left)
-            found = _in_order(pieces)
-            if found is None:
-                return [], wanted
-            x, wanted, parts = found
-            learners += Learner.each(x, parts, _columns(part, some))
-        return learners, wanted
-
-    def _solved(
-        self,
-        rows: list[Rows],
-        wanted: np.ndarray,
-        scale: np.ndarray,
-        *,
-        groups: Sequence[np.ndarray],
-        begun: Sequence[np.ndarray],
-        worth: float,
-    ) -> tuple[list, list[np.ndarray]]:
-        """Coefficients of the plane and of turning, None where nothing tells them; their ridges.
+    def _left(self, scale: np.ndarray) -> np.ndarray:
+        """(W, H, 3) what the features so far, fitted to other blocks, leave of the rows.
 
         Args:
-            rows: of the features.
-            wanted: (W, H, 3) what they are to make.
             scale: (H, 3) errors that count as one.
-            groups: of the plane and of turning, (F,) number of each feature's group.
-            begun: of both, the ridge of each group that the search begins at.
-            worth: a ridge is taken if it lowers the left-out error to this share.
         """
-        scale, coefficients, ridges = _isotropic(scale), [], list(begun)
-        for part in (0, 1):
-            equations = self._equations(part, scale, rows, wanted)
-            if equations is None:
-                coefficients.append(None)
-                continue
-            ridges[part], *found = _ridge(*equations, groups[part], ridge=begun[part], worth=worth)
-            coefficients.append(found)
-        return coefficients, ridges
-
-    def _left(self) -> np.ndarray:
-        """(W, H, 3) what the features so far, fitted to other blocks, leave of the rows."""
         left = self.data.measured.copy()
-        plane, turn = self.coefficients
-        for h, ok, along, across, w in self.rows:
-            for channel, x, found in ((0, along, plane), (1, across, plane), (2, w, turn)):
-                if found is not None:
-                    left[ok, h, channel] -= np.sum(x * found[1][self.fold[ok]], axis=1)
+        for part, found in enumerate(self.coefficients):
+            rows = self._rows(part, scale, left)
+            if found is None or rows is None:
+                continue
+            x = self._led(part, rows, [self.features])
+            made = [x[own] @ one for own, one in zip(rows.parts.slices, found[1], strict=True)]
+            left[tuple(rows.at)] -= np.concatenate(made) / rows.weight
         return left
 
     def _judge(self) -> None:
@@ -461,56 +497,18 @@ class Response:
         """(H, 3) between those of the fit to all, too small, and those on left-out parts."""
         return np.sqrt((rms(self.within) ** 2 + rms(self.across) ** 2) / 2)
 
-    def _equations(
-        self, part: int, scale: np.ndarray, rows: list[Rows], wanted: np.ndarray
-    ) -> tuple[tuple[np.ndarray, np.ndarray], list[Fold]] | None:
-        """Normal matrices of all rows of the plane (0) or of turning (1), and of each fold."""
-        found = _in_order(self._weighted(part, scale, rows, wanted))
-        if found is None:
-            return None
-        x, y, parts = found
-        folds = []
-        for own, beside in zip(parts.slices, parts.neighbours, strict=True):
-            inside, push, near = x[own], y[own], x[beside]
-            gram, moment = inside.T @ inside, inside.T @ push
-            touching = gram + near.T @ near, moment + near.T @ y[beside]
-            folds.append(Fold(touching, (gram, moment, float(push @ push))))
-        total = (sum(fold.inside[k] for fold in folds) for k in (0, 1))
-        return tuple(total), folds
-
-    def _weighted(
-        self, part: int, scale: np.ndarray, rows: list[Rows], wanted: np.ndarray
-    ) -> Iterator[tuple[np.ndarray, np.ndarray, Parts]]:
-        """Rows over their errors, wanted values and parts, of each horizon and channel of a part.
-
-        Args:
-            part: the plane (0) or turning (1).
-            scale: (H, 3) errors that count as one.
-            rows: of the features.
-            wanted: (W, H, 3) what they are to make.
-        """
-        for h, ok, along, across, w in rows:
-            chosen = ((0, along), (1, across)) if part == 0 else ((2, w),)
-            for channel, x in chosen:
-                size, y = scale[h, channel], wanted[ok, h, channel]
-                known = np.isfinite(y)
-                if not size > 1e-9 or not known.any():
-                    continue
-                weight = 1 / (size * np.sqrt(known.sum()))
-                folds = (f[ok][known] for f in (self.fold, self.end_fold[:, h], self.tail_fold))
-                yield x[known] * weight, y[known] * weight, Parts(*folds, self.folds)
-
-    def velocity(self, fold: int | None) -> np.ndarray:
-        """(N, 3) forward, left, turning at each point; of the fit without a fold."""
-        found = np.zeros((len(self.points), 3))
+    def velocity(self, fold: int | None, points: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """(N, 3) forward, left, turning at points; of the fit without a fold."""
+        features = [f[points] for f in self.features]
+        found = np.zeros((len(features[0]), 3))
         plane, turn = self.coefficients
         if plane is not None:
             beta = plane[0] if fold is None else plane[1][fold]
-            width = self.features[0].shape[1]
-            found[:, 0] = self.features[0] @ beta[:width]
-            found[:, 1] = self.features[1] @ beta[width:]
+            width = features[0].shape[1]
+            found[:, 0] = features[0] @ beta[:width]
+            found[:, 1] = features[1] @ beta[width:]
         if turn is not None:
-            found[:, 2] = self.features[2] @ (turn[0] if fold is None else turn[1][fold])
+            found[:, 2] = features[2] @ (turn[0] if fold is None else turn[1][fold])
         return found
 
     def predict(self, fold: np.ndarray | None) -> np.ndarray:
@@ -524,12 +522,19 @@ class Response:
             own = np.flatnonzero(fold == k) if fold is not None else np.arange(len(self.starts))
             if not len(own):
                 continue
-            run = _integrate(self.velocity(k), self.step_s)
-            start, ends = run[self.starts[own]], run[np.maximum(self.ends[own], 0)]
-            out[own] = _seen_from(start, ends)
-            out[own] = np.where((self.ends[own] >= 0)[..., None], out[own], np.nan)
+            starts, ends = self.starts[own], np.maximum(self.ends[own], self.starts[own, None])
+            points = _within(starts, ends.max(axis=1), len(self.points))
+            run = _integrate(self.velocity(k, points), self.step_s[points])
+            start, end = (run[np.searchsorted(points, at)] for at in (starts, ends))
+            out[own] = np.where((self.ends[own] >= 0)[..., None], _seen_from(start, end), np.nan)
         out[~np.isfinite(self.data.measured)] = np.nan
         return out
+
+
+def _within(starts: np.ndarray, ends: np.ndarray, count: int) -> np.ndarray:
+    """Of so many points those of windows, from each start (W,) to its end."""
+    opened, closed = (np.bincount(at, minlength=count + 1) for at in (starts, ends + 1))
+    return np.flatnonzero(np.cumsum(opened - closed)[:count])
 
 
 def _swings(errors: np.ndarray, made: np.ndarray, heading_rad: np.ndarray) -> list[np.ndarray]:
@@ -546,40 +551,34 @@ def _swings(errors: np.ndarray, made: np.ndarray, heading_rad: np.ndarray) -> li
     return [*errors, *room, *gains, gains.sum(axis=0)]
 
 
-def _only(part: int, group: Features) -> Features:
-    """What of a group moves the plane (0) or turns (1)."""
-    forward, left, turning = group
-    none = np.zeros((len(turning), 0))
-    return (forward, left, none) if part == 0 else (none, none, turning)
+def _only(axes: Sequence[int], group: Group) -> Features:
+    """A group's features of some axes, side by side."""
+    none = [np.zeros((len(group[0][0]), 0))]
+    return tuple(np.hstack([f[k] for f in group] if k in axes else none) for k in range(3))
 
 
-def _batches(groups: Sequence[Features]) -> Iterator[Sequence[Features]]:
+def _batches(groups: Sequence[Group], axes: Sequence[int]) -> Iterator[Sequence[Group]]:
     """Groups that together have about WIDE features: sums over time are quicker side by side."""
-    ends = np.cumsum([sum(f.shape[1] for f in group) for group in groups]) // WIDE
-    for number in np.unique(ends):
-        own = np.flatnonzero(ends == number)
-        yield groups[own[0] : own[-1] + 1]
+    some, width = [], 0
+    for group in groups:
+        known = {id(f) for other in some for f in other}
+        width += sum(f[axis].shape[1] for f in group if id(f) not in known for axis in axes)
+        some.append(group)
+        if width >= WIDE:
+            yield some
+            some, width = [], 0
+    if some:
+        yield some
 
 
-def _in_order(
-    pieces: Iterable[tuple[np.ndarray, np.ndarray, Parts]],
-) -> tuple[np.ndarray, np.ndarray, Parts] | None:
-    """Rows, wanted values and parts of all pieces, in order of the parts; None of no pieces."""
-    pieces = list(pieces)
-    if not pieces:
-        return None
-    xs, ys, every = zip(*pieces, strict=True)
-    parts = Parts.joined(every)
-    order = np.argsort(parts.inside, kind="stable")
-    return np.concatenate(xs)[order], np.concatenate(ys)[order], parts.at(order)
-
-
-def _columns(part: int, groups: Sequence[Features]) -> Iterator[np.ndarray]:
-    """Of each group its columns among the rows of all: forward ones before left, or turning."""
-    axes = (0, 1) if part == 0 else (2,)
-    number = [np.full(group[axis].shape[1], k) for axis in axes for k, group in enumerate(groups)]
-    owner = np.concatenate(number)
-    return (np.flatnonzero(owner == k) for k in range(len(groups)))
+def _beside(
+    groups: Sequence[Group], axes: Sequence[int]
+) -> tuple[list[Features], list[np.ndarray]]:
+    """Features of some groups, each once, and the columns of each group where all are in a row."""
+    every = {id(f): f for group in groups for f in group}
+    owner = np.concatenate([np.full(f[a].shape[1], k) for a in axes for k, f in every.items()])
+    columns = [np.flatnonzero(np.isin(owner, [id(f) for f in group])) for group in groups]
+    return list(every.values()), columns
 
 
 def _isotropic(scale: np.ndarray) -> np.ndarray:
@@ -618,31 +617,34 @@ class _LeftOut:
     """Fits without each of K folds, and what they would be if the ridge of one group changed.
 
     Args:
-        total: normal matrix (F, F) and moments (F,) of all rows.
-        folds: the parts that are left out.
+        equations: of all rows and of each fold.
         mean: (F,) mean square of each feature's group.
         groups: (F,) number of each feature's group.
     """
 
-    def __init__(
-        self,
-        total: tuple[np.ndarray, np.ndarray],
-        folds: list[Fold],
-        mean: np.ndarray,
-        groups: np.ndarray,
-    ) -> None:
+    def __init__(self, equations: Equations, mean: np.ndarray, groups: np.ndarray) -> None:
         self.mean, self.groups = mean, groups
-        self.grams = np.array([total[0] - f.touching[0] for f in folds])
-        self.moments = np.array([total[1] - f.touching[1] for f in folds])
-        self.inner = np.array([f.inside[0] for f in folds])
-        self.push = np.array([f.inside[1] for f in folds])
-        self.square = sum(f.inside[2] for f in folds)
+        self.grams, self.moments = (
+            whole - part
+            for whole, part in zip(
+                (equations.gram, equations.moment), equations.touching, strict=True
+            )
+        )
+        self.inner, self.push = equations.inside
+        self.square = equations.square
 
     def at(self, ridge: np.ndarray) -> float:
-        """Squared error at the ridge (G,) of each group, from which `trials` go on."""
+        """Squared error at the ridge (G,) of each group, from which `trials` go on.
+
+        Of a group that is out nothing is left, so that it is left out of the equations.
+        """
         self.ridge = ridge
-        self.inverse = _inverses(self.grams + np.diag(self.mean * ridge[self.groups]))
-        self.beta = self.inverse @ self.moments[..., None]
+        self.used = np.flatnonzero(ridge[self.groups] < OUT)
+        used = np.ix_(range(len(self.grams)), self.used, self.used)
+        rise = np.diag((self.mean * ridge[self.groups])[self.used])
+        self.inverse = np.linalg.inv(self.grams[used] + rise)
+        self.beta = np.zeros((*self.moments.shape, 1))
+        self.beta[:, self.used] = self.inverse @ self.moments[:, self.used, None]
         (error,) = self._errors(self.beta)
         return float(error)
 
@@ -652,56 +654,70 @@ class _LeftOut:
         return self.square + np.sum(beta * (curved - 2 * self.push[..., None]), axis=(0, 1))
 
     def trials(self, group: int, values: Sequence[float]) -> np.ndarray:
-        """(V,) squared error with each of these ridges of one group: Woodbury's identity.
+        """(V,) squared error with each of these ridges of one group."""
+        own = np.flatnonzero(self.groups == group)
+        beta = np.repeat(self.beta, len(values), axis=2)
+        if self.ridge[group] < OUT:
+            beta[:, self.used] -= self._raised(own, values)
+        else:
+            moved, beta[:, own] = self._let_in(own, values)
+            beta[:, self.used] -= moved
+        return self._errors(beta)
+
+    def _raised(self, own: np.ndarray, values: Sequence[float]) -> np.ndarray:
+        """(K, U, V) fall of the coefficients used at other ridges of one group: Woodbury.
 
         A ridge that rises by s on the group's diagonal changes the coefficients b to
         b - B (I/s + B_g)^-1 b_g, with B the inverse's columns of the group.
         """
-        own = np.flatnonzero(self.groups == group)
-        columns, block = self.inverse[:, :, own], self.inverse[:, own[:, None], own]
-        rise = self.mean[own[0]] * (np.array(values) - self.ridge[group])[:, None, None, None]
+        at = np.searchsorted(self.used, own)
+        columns, block = self.inverse[:, :, at], self.inverse[:, at[:, None], at]
+        more = np.array(values) - self.ridge[self.groups[own[0]]]
+        rise = self.mean[own[0]] * more[:, None, None, None]
         less = np.linalg.solve(np.eye(len(own)) + rise * block, rise * self.beta[:, own])
-        return self._errors(self.beta - columns @ less[..., 0].transpose(1, 2, 0))
+        return columns @ less[..., 0].transpose(1, 2, 0)
 
-
-def _inverses(matrices: np.ndarray) -> np.ndarray:
-    """(K, F, F) of symmetric positive ones, by Cholesky's factors: half the work of any others."""
-    found = np.empty_like(matrices)
-    for inverse, matrix in zip(found, matrices, strict=True):
-        factor, _ = lapack.dpotrf(matrix, clean=False)
-        upper = np.triu(lapack.dpotri(factor, overwrite_c=True)[0])
-        inverse[:] = upper + np.triu(upper, 1).T
-    return found
+    def _let_in(self, own: np.ndarray, values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+        """The same where a group that is out comes in, and its (K, g, V) coefficients."""
+        across = self.grams[np.ix_(range(len(self.grams)), self.used, own)]
+        made = self.inverse @ across
+        within = self.grams[:, own[:, None], own] - across.swapaxes(1, 2) @ made
+        left = self.moments[:, own, None] - across.swapaxes(1, 2) @ self.beta[:, self.used]
+        rise = self.mean[own[0]] * np.array(values)[:, None, None, None] * np.eye(len(own))
+        found = np.linalg.solve(within + rise, np.broadcast_to(left, (len(values), *left.shape)))
+        found = found[..., 0].transpose(1, 2, 0)
+        return made @ found, found
 
 
 def _ridge(
-    total: tuple[np.ndarray, np.ndarray],
-    folds: list[Fold],
-    groups: np.ndarray,
-    *,
-    ridge: np.ndarray,
-    worth: float,
+    equations: Equations, groups: np.ndarray, ridge: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Ridge of each group, coefficients (F,) of all rows, and (K, F) without each fold.
 
     Groups are searched one after the other, twice.
+
+    Args:
+        equations: of the features.
+        groups: (F,) number of each feature's group.
+        ridge: of each group, where the search begins.
     """
-    mean = np.diag(total[0]).copy()
+    mean = np.diag(equations.gram).copy()
     for g in np.unique(groups):
         mean[groups == g] = mean[groups == g].mean()
     mean += 1e-9 * mean.max() + 1e-30
-    left_out = _LeftOut(total, folds, mean, groups)
+    left_out = _LeftOut(equations, mean, groups)
     best = left_out.at(ridge)
     for _ in range(2):
         moved = False
         for g in np.unique(groups):
             trials = left_out.trials(g, LADDER)
             k = int(np.argmin(trials))
-            if trials[k] < best * worth:
+            if trials[k] < best * FLOOR_SETTINGS.ridge_worth:
                 ridge = np.where(np.arange(len(ridge)) == g, LADDER[k], ridge)
                 best, moved = left_out.at(ridge), True
         if not moved:
             break
-    each = left_out.beta[..., 0]
-    every = np.linalg.solve(total[0] + np.diag(mean * ridge[groups]), total[1])
-    return ridge, every, each
+    used, every = left_out.used, np.zeros(len(groups))
+    gram = equations.gram[np.ix_(used, used)] + np.diag((mean * ridge[groups])[used])
+    every[used] = np.linalg.solve(gram, equations.moment[used])
+    return ridge, every, left_out.beta[..., 0]

@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 import twinmill_native as native
-from scipy.linalg import eigh
 
 from twinmill.chance import f_above, t_quantile
 from twinmill.model.covariance import Covariance
@@ -560,22 +559,25 @@ class ScoreFit:
             divisions = _divisions(data, block_s)
             count += len(np.unique(divisions[0]))
             for block in divisions:
-                for b in np.unique(block):
-                    moved = self._moved_without(i, block == b)
-                    spread += np.outer(moved, moved) / len(divisions)
+                moved = self._moved_without_each(i, block)
+                spread += moved.T @ moved / len(divisions)
         return spread * (count - 1) / max(count, 1)
 
-    def _moved_without(self, i: int, out: np.ndarray) -> np.ndarray:
-        """(P,) Newton's step without the rows `out` (R,) of data set i."""
+    def _moved_without_each(self, i: int, block: np.ndarray) -> np.ndarray:
+        """(B, P) Newton's steps without each block, (R,) of the rows of data set i."""
         rows, slopes, own = self.state[0][i], self.state[1][i], self.columns[i]
-        weighted = slopes[out] * self.weight(i, rows)[out, None]
-        less, push = self._curvature.copy(), np.zeros(len(self.x))
-        less[np.ix_(own, own)] -= weighted.T @ slopes[out]
-        push[own] = weighted.T @ rows[out]
+        order = np.argsort(block, kind="stable")
+        parts = np.split(order, 1 + np.flatnonzero(np.diff(block[order])))
+        weighted = slopes * self.weight(i, rows)[:, None]
+        less = np.repeat(self._curvature[None], len(parts), axis=0)
+        push = np.zeros((len(parts), len(self.x)))
+        for k, out in enumerate(parts):
+            less[k][np.ix_(own, own)] -= weighted[out].T @ slopes[out]
+            push[k, own] = weighted[out].T @ rows[out]
         try:
-            moved = np.linalg.solve(less, push)
+            moved = np.linalg.solve(less, push[..., None])[..., 0]
         except np.linalg.LinAlgError:
-            moved = np.linalg.pinv(self._curvature) @ push
+            moved = push @ np.linalg.pinv(self._curvature)
         # Without the block around a moment, only the prior says where in it the moment was.
         parameters = [u.parameter for u in self.unknowns]
         reach = np.array([p.std if p.role == "moment" else np.inf for p in parameters])
@@ -687,6 +689,8 @@ def _no_less(wide: np.ndarray, least: np.ndarray) -> np.ndarray:
     """(P, P) a covariance `wide`, raised to `least` in each direction in which that is wider."""
     scale = np.sqrt(np.diag(least))
     over = np.outer(scale, scale)
-    ratio, ways = eigh(wide / over, least / over)
-    half = (least / over) @ ways * np.sqrt(np.maximum(ratio, 1.0))
+    root = np.linalg.cholesky(least / over)
+    turned = np.linalg.solve(root, np.linalg.solve(root, wide / over).T)
+    ratio, ways = np.linalg.eigh(turned)
+    half = root @ ways * np.sqrt(np.maximum(ratio, 1.0))
     return half @ half.T * over

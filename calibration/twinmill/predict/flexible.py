@@ -6,6 +6,8 @@ through a few first-order lags, with terms for stopping, for coupling between th
 room. It is never shown as a model; it only tells noise from what some model could explain.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from twinmill.data.measurement import Measurement
@@ -45,15 +47,17 @@ def unexplained(measurement: Measurement, grid: StepGrid, offset_s: float) -> li
 
 def _fitted(x: np.ndarray, y: np.ndarray, fold: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(S, P) terms and (S,) values to (S,) values by a fit to all, and by fits to other folds."""
-    masks = [fold == k for k in range(FOLDS)]
-    grams = np.array([x[m].T @ x[m] for m in masks])
-    moments = np.array([x[m].T @ y[m] for m in masks])
+    edges = [0, *(1 + np.flatnonzero(np.diff(fold))), len(fold)]
+    parts = [(slice(i, j), fold[i]) for i, j in pairwise(edges)]
+    grams, moments = np.zeros((FOLDS, x.shape[1], x.shape[1])), np.zeros((FOLDS, x.shape[1]))
+    for own, k in parts:
+        grams[k] += x[own].T @ x[own]
+        moments[k] += x[own].T @ y[own]
     gram, moment = grams.sum(axis=0), moments.sum(axis=0)
     # Of the whole log, so that a term which some folds hardly see is held at zero there.
     ridge = RIDGE * np.diag(np.diag(gram)) + (1e-12 * gram.max() + 1e-30) * np.eye(len(gram))
-    across = np.empty_like(y)
-    for k, mask in enumerate(masks):
-        across[mask] = x[mask] @ np.linalg.solve(gram - grams[k] + ridge, moment - moments[k])
+    without = np.linalg.solve(gram - grams + ridge, (moment - moments)[..., None])[..., 0]
+    across = np.concatenate([x[own] @ without[k] for own, k in parts])
     return x @ np.linalg.solve(gram + ridge, moment), across
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from twinmill.model.model_file import write_whole
@@ -109,6 +108,8 @@ def coded(text: str) -> Markup:
 
 def render_page(title: str, source: Provenance, sections: list[Section], note: str) -> str:
     """The HTML text; the same input gives the same."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # most answers are no page
+
     environment = Environment(
         loader=PackageLoader("twinmill.report", "."),
         autoescape=True,

@@ -64,35 +64,84 @@ def test_what_swings_does_what_an_integrator_does(damping):
     )
 
 
-@pytest.mark.parametrize("shape", [(0, 3), (1, 1), (5, 0), (7, 2), (100, 3)])
-def test_running_sums_are_cumsum(shape):
+def integrated(velocity, heading_rad, step_s, start, end, at_rad):
+    """Where a robot gets after row `start` until row `end`, as seen from a heading."""
+    x_m = y_m = turned_rad = 0.0
+    for n in range(start + 1, end + 1):
+        forward, left, turn = velocity[n] * step_s[n]
+        c, s = np.cos(heading_rad[n]), np.sin(heading_rad[n])
+        x_m, y_m = x_m + c * forward - s * left, y_m + s * forward + c * left
+        turned_rad += turn
+    c, s = np.cos(at_rad), np.sin(at_rad)
+    return np.array([c * x_m + s * y_m, c * y_m - s * x_m, turned_rad])
+
+
+@pytest.fixture(name="drive")
+def _drive():
     random = np.random.default_rng(1)
-    values, weights = random.normal(size=shape), random.normal(size=shape[0])
-    assert native.running_sums(values, weights) == pytest.approx(
-        np.cumsum(weights[:, None] * values, axis=0), abs=1e-12
+    step_s, turns = random.uniform(0.01, 0.1, 50), random.normal(size=50)
+    velocity = np.column_stack([random.normal(size=(50, 2)), turns])
+    heading_rad = np.cumsum(turns * step_s) - turns * step_s / 2
+    return velocity, heading_rad, step_s
+
+
+STARTS, ENDS, AT_RAD = np.array([0, 7, 7]), np.array([[0, 4], [8, 49], [9, 7]]), np.array([0, 1, 2])
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_other_speeds_lead_where_the_steps_add_up_to(drive, axis):
+    velocity, heading_rad, step_s = drive
+    values = 1e-6 * np.random.default_rng(2).normal(size=(50, 3))
+    found = native.displaced_by(
+        values, velocity, axis, step_s, heading_rad, STARTS, ENDS, 1.0 * AT_RAD
+    )
+    for w, (start, at_rad) in enumerate(zip(STARTS, AT_RAD, strict=True)):
+        for h, end in enumerate(ENDS[w]):
+            for t, value in enumerate(values.T):
+                other, turned_rad = velocity.copy(), np.zeros(50)
+                other[:, axis] += value
+                if axis == 2:
+                    angle = np.cumsum(value * step_s) - value * step_s / 2
+                    turned_rad = angle - (np.cumsum(value * step_s))[start]
+                before, after = (
+                    integrated(v, heading_rad + r, step_s, start, end, at_rad)
+                    for v, r in ((velocity, 0.0), (other, turned_rad))
+                )
+                assert found[w, h, :, t] == pytest.approx(after - before, abs=1e-11)
+
+
+def test_velocities_lead_along_a_direction_as_far_as_the_steps_add_up_to(drive):
+    velocity, heading_rad, step_s = drive
+    steps = np.column_stack([np.cos(heading_rad), np.sin(heading_rad)]) * step_s[:, None]
+    direction = np.array([[1.0, 0.0], [0.0, 2.0], [0.6, 0.8]])
+    found = native.led_between(
+        [velocity[:, :1].copy()], [velocity[:, 1:2].copy()], steps, STARTS, ENDS[:, 1], direction
+    )
+    none = np.zeros(50)
+    for column, kept in enumerate(([1, 0, 0], [0, 1, 0])):
+        for row, (start, end) in enumerate(zip(STARTS, ENDS[:, 1], strict=True)):
+            way = integrated(velocity * kept, heading_rad, step_s, start, end, 0.0)[:2]
+            assert found[row, column] == pytest.approx(direction[row] @ way, abs=1e-12)
+    assert native.led_between([none[:, None]], [], steps, STARTS, ENDS[:, 1], direction).shape == (
+        3,
+        1,
     )
 
 
-def test_sums_between_are_differences_of_cumsum():
-    random = np.random.default_rng(1)
-    values, weights = random.normal(size=(50, 3)), random.normal(size=50)
-    starts, ends = np.array([0, 7, 7]), np.array([[0, 4], [8, 49], [3, 7]])
-    up_to = np.cumsum(weights[:, None] * values, axis=0)
-    assert native.sums_between(
-        [values[:, :1].copy(), values[:, 1:].copy()], weights, starts, ends
-    ) == pytest.approx(up_to[ends] - up_to[starts][:, None], abs=1e-12)
-
-
-def test_sums_between_refuse_rows_that_are_not_there():
+def test_sums_refuse_rows_that_are_not_there():
     with pytest.raises(ValueError, match="rows of values"):
-        native.sums_between([np.ones((5, 1))], np.ones(5), np.array([0]), np.array([[5]]))
+        native.led_between(
+            [np.ones((5, 1))], [], np.ones((5, 2)), np.array([0]), np.array([5]), np.ones((1, 2))
+        )
 
 
-@pytest.mark.parametrize("free", [1, 4, 30])
-@pytest.mark.parametrize("value", [0.0, 0.7, 12.0])
+@pytest.mark.parametrize("free", [1, 4, 30, 400])
+@pytest.mark.parametrize("value", [-1.3, 0.0, 0.7, 12.0])
 def test_chances_are_those_of_the_distributions(free, value):
     assert chance.t_above(value, free) == pytest.approx(stats.t.sf(value, free))
     assert chance.f_above(value, free, 9) == pytest.approx(stats.f.sf(value, free, 9))
     assert chance.chi2_above(value, free) == pytest.approx(stats.chi2.sf(value, free))
-    assert chance.t_quantile(0.975, free) == pytest.approx(stats.t.ppf(0.975, free))
+    for share in (0.2, 0.5, 0.975):
+        expected = stats.t.ppf(share, free)
+        assert chance.t_quantile(share, free) == pytest.approx(expected, abs=1e-12)
     assert chance.chi2_median(free) == pytest.approx(stats.chi2.median(free))

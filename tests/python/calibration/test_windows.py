@@ -9,7 +9,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import make_track
-from twinmill.fitting.floor import body_velocity_at
+from twinmill.fitting.floor import body_velocities_at, body_velocity_at
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.residual import StepGrid
 from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms, score
@@ -170,3 +170,14 @@ def test_a_lost_frame_takes_no_speed_away(driven, modelled_of):
     velocity = body_velocity_at(own, own.model, slice(1, None))
     expected = np.tile([0.4 * 0.65, 0, 0.4 * 0.15 / LEVER_M], (len(velocity), 1))
     np.testing.assert_allclose(velocity, expected, atol=1e-4)
+
+
+def test_models_side_by_side_drive_as_each_alone(driven, modelled_of):
+    """Of the floor alone, or of the wheels: duties 0.5 and 0.8 of what each one's wheels do."""
+    given = [(1.0, 0.4), (0.7, 0.4), (1.0, 0.2), (0.7, 0.2)]
+    each = [modelled_of(driven(), yaw_gain, top_mps) for yaw_gain, top_mps in given]
+    models = [own.model for own in each]
+    velocities = body_velocities_at(each[0], models, slice(1, None))
+    for (yaw_gain, top_mps), found in zip(given, velocities, strict=True):
+        expected = [0.65 * top_mps, 0, yaw_gain * 0.15 * top_mps / LEVER_M]
+        np.testing.assert_allclose(found, np.tile(expected, (len(found), 1)), atol=1e-4)

@@ -1,0 +1,329 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sums and filters over time of many columns at once, row by row and not value by value.
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "arrays.h"
+
+using namespace nanobind::literals;
+
+namespace twin
+{
+namespace
+{
+
+constexpr size_t kNoPlace = SIZE_MAX;
+
+// By row of values: 0 where a list has its number, else kNoPlace.
+std::vector<size_t> Wanted(size_t count, std::initializer_list<std::span<const int64_t>> lists)
+{
+    std::vector<size_t> place(count, kNoPlace);
+    for (const auto &list : lists)
+        for (const int64_t n : list)
+            if (n < 0 || static_cast<size_t>(n) >= count)
+                throw std::invalid_argument("starts and ends must be rows of values");
+            else
+                place[static_cast<size_t>(n)] = 0;
+    return place;
+}
+
+// Of all columns side by side.
+size_t WidthOf(const std::vector<Matrix> &arrays, size_t count)
+{
+    size_t width = 0;
+    for (const Matrix &values : arrays)
+    {
+        if (values.shape(0) != count)
+            throw std::invalid_argument("weights must be as many as rows of values");
+        width += values.shape(1);
+    }
+    return width;
+}
+
+// Adds a row of several arrays to sums with the weight c, and to those behind them with s.
+double *AddRow(const std::vector<Matrix> &arrays, size_t n, double c, double s, double *sum)
+{
+    for (const Matrix &values : arrays)
+    {
+        const size_t width = values.shape(1);
+        const double *value = values.data() + n * width;
+        for (size_t f = 0; f < width; ++f)
+        {
+            const double v = value[f];
+            sum[f] += c * v;
+            sum[width + f] += s * v;
+        }
+        sum += 2 * width;
+    }
+    return sum;
+}
+
+// Writes along * (sum of c v) + aside * (sum of s v) of what lies between two sums.
+double *WriteBetween(const std::vector<Matrix> &arrays, const double *&from, const double *&to,
+                     double along, double aside, double *out)
+{
+    for (const Matrix &values : arrays)
+    {
+        const size_t width = values.shape(1);
+        for (size_t f = 0; f < width; ++f)
+            out[f] = along * (to[f] - from[f]) + aside * (to[width + f] - from[width + f]);
+        from += 2 * width;
+        to += 2 * width;
+        out += width;
+    }
+    return out;
+}
+
+// How far velocities lead a robot along a direction of the plane, from each start to its end.
+Array LedBetween(const std::vector<Matrix> &forward, const std::vector<Matrix> &left, Matrix steps,
+                 Indices starts, Indices ends, Matrix direction)
+{
+    const size_t count = steps.shape(0), rows = starts.size();
+    if (steps.shape(1) != 2 || direction.shape(1) != 2)
+        throw std::invalid_argument("steps and directions must have two columns");
+    if (ends.size() != rows || direction.shape(0) != rows)
+        throw std::invalid_argument("ends and directions must be as many as starts");
+    const size_t width = WidthOf(forward, count) + WidthOf(left, count);
+    std::vector<size_t> place = Wanted(count, {Span(starts), Span(ends)});
+    std::vector<double> sums, row(2 * width);
+    sums.reserve(row.size() * static_cast<size_t>(std::ranges::count(place, 0U)));
+    for (size_t n = 0; n < count; ++n)
+    {
+        const double c = steps.data()[2 * n], s = steps.data()[2 * n + 1];
+        AddRow(left, n, -s, c, AddRow(forward, n, c, s, row.data()));
+        if (place[n] == kNoPlace)
+            continue;
+        place[n] = sums.size();
+        sums.insert(sums.end(), row.begin(), row.end());
+    }
+    std::vector<double> led(rows * width);
+    for (size_t r = 0; r < rows; ++r)
+    {
+        const double *from = sums.data() + place[static_cast<size_t>(starts.data()[r])];
+        const double *to = sums.data() + place[static_cast<size_t>(ends.data()[r])];
+        const double along = direction.data()[2 * r], aside = direction.data()[2 * r + 1];
+        WriteBetween(left, from, to, along, aside,
+                     WriteBetween(forward, from, to, along, aside, led.data() + r * width));
+    }
+    return ToNumpy(std::move(led), {rows, width});
+}
+
+// A motion over N steps, and the windows (W, H) in which it is seen.
+struct Seen
+{
+    std::span<const double> step_s, heading_rad, at_rad;  // (N), (N), (W)
+    std::span<const int64_t> starts, ends;
+
+    size_t Horizons() const { return starts.empty() ? 0 : ends.size() / starts.size(); }
+};
+
+// Sums at the places where windows start or end.
+class Places
+{
+public:
+    Places(const Seen &seen, size_t width)
+        : place_(Wanted(seen.step_s.size(), {seen.starts, seen.ends}))
+    {
+        kept_.reserve(width * static_cast<size_t>(std::ranges::count(place_, 0U)));
+    }
+
+    void Keep(size_t n, const std::vector<double> &sums)
+    {
+        if (place_[n] == kNoPlace)
+            return;
+        place_[n] = kept_.size();
+        kept_.insert(kept_.end(), sums.begin(), sums.end());
+    }
+
+    const double *At(int64_t n) const { return kept_.data() + place_[static_cast<size_t>(n)]; }
+
+private:
+    std::vector<size_t> place_;
+    std::vector<double> kept_;
+};
+
+// Calls write(from, to, cos, sin, out) for each window: sums at its start and end, its first
+// direction, and room for (3, T) displacements.
+template <class Write>
+std::vector<double> ForEachWindow(const Seen &seen, const Places &places, size_t width, Write write)
+{
+    std::vector<double> displaced(3 * seen.ends.size() * width);
+    for (size_t i = 0; i < seen.ends.size(); ++i)
+    {
+        const size_t w = i / seen.Horizons();
+        write(places.At(seen.starts[w]), places.At(seen.ends[i]), std::cos(seen.at_rad[w]),
+              std::sin(seen.at_rad[w]), displaced.data() + 3 * i * width);
+    }
+    return displaced;
+}
+
+// By speeds (N, T) forward, or to the left.
+std::vector<double> DisplacedByDriving(Matrix values, const Seen &seen, bool left)
+{
+    const size_t count = values.shape(0), width = values.shape(1);
+    std::vector<double> sums(2 * width);
+    Places places(seen, sums.size());
+    for (size_t n = 0; n < count; ++n)
+    {
+        const double c = seen.step_s[n] * std::cos(seen.heading_rad[n]);
+        const double s = seen.step_s[n] * std::sin(seen.heading_rad[n]);
+        const double along = left ? -s : c, aside = left ? c : s;
+        const double *value = values.data() + n * width;
+        for (size_t t = 0; t < width; ++t)
+            sums[t] += along * value[t];
+        for (size_t t = 0; t < width; ++t)
+            sums[width + t] += aside * value[t];
+        places.Keep(n, sums);
+    }
+    return ForEachWindow(
+        seen, places, width,
+        [&](const double *from, const double *to, double c, double s, double *out) {
+            for (size_t t = 0; t < width; ++t)
+            {
+                const double x = to[t] - from[t];
+                const double y = to[width + t] - from[width + t];
+                out[t] = c * x + s * y;
+                out[width + t] = c * y - s * x;
+            }
+        });
+}
+
+// By turning rates (N, T), to first order, of a robot that moves at `velocity` (N, 3).
+std::vector<double> DisplacedByTurning(Matrix values, Matrix velocity, const Seen &seen)
+{
+    const size_t count = values.shape(0), width = values.shape(1);
+    std::vector<double> sums(3 * width + 2);  // angle, x, y; x and y of the robot turned left
+    Places places(seen, sums.size());
+    for (size_t n = 0; n < count; ++n)
+    {
+        const double *v = velocity.data() + 3 * n, *value = values.data() + n * width;
+        const double c = std::cos(seen.heading_rad[n]), s = std::sin(seen.heading_rad[n]);
+        const double step = seen.step_s[n];
+        const double x = -step * (s * v[0] + c * v[1]), y = step * (c * v[0] - s * v[1]);
+        for (size_t t = 0; t < width; ++t)
+        {
+            const double turned = step * value[t], middle = sums[t] + turned / 2;
+            sums[t] += turned;
+            sums[width + t] += x * middle;
+            sums[2 * width + t] += y * middle;
+        }
+        sums[3 * width] += x;
+        sums[3 * width + 1] += y;
+        places.Keep(n, sums);
+    }
+    return ForEachWindow(
+        seen, places, width,
+        [&](const double *from, const double *to, double c, double s, double *out) {
+            const double x_m = to[3 * width] - from[3 * width];
+            const double y_m = to[3 * width + 1] - from[3 * width + 1];
+            for (size_t t = 0; t < width; ++t)
+            {
+                const double x = to[width + t] - from[width + t] - from[t] * x_m;
+                const double y = to[2 * width + t] - from[2 * width + t] - from[t] * y_m;
+                out[t] = c * x + s * y;
+                out[width + t] = c * y - s * x;
+                out[2 * width + t] = to[t] - from[t];
+            }
+        });
+}
+
+Array DisplacedBy(Matrix values, Matrix velocity, int axis, Vector step_s, Vector heading_rad,
+                  Indices starts, IndexMatrix ends, Vector at_rad)
+{
+    const size_t count = values.shape(0);
+    if (step_s.size() != count || heading_rad.size() != count || velocity.shape(0) != count ||
+        velocity.shape(1) != 3)
+        throw std::invalid_argument(
+            "velocity must be (N, 3), steps and headings (N), as many as rows of values");
+    if (ends.shape(0) != starts.size() || at_rad.size() != starts.size())
+        throw std::invalid_argument("ends and first headings must have one row per start");
+    const Seen seen{Span(step_s), Span(heading_rad), Span(at_rad), Span(starts), Span(ends)};
+    auto displaced = axis < 2 ? DisplacedByDriving(values, seen, axis == 1)
+                              : DisplacedByTurning(values, velocity, seen);
+    return ToNumpy(std::move(displaced), {starts.size(), ends.shape(1), 3, values.shape(1)});
+}
+
+Array Filtered(Vector numerator, Vector denominator, Matrix signal)
+{
+    const size_t count = signal.shape(0), width = signal.shape(1);
+    std::vector<double> out(count * width);
+    for (size_t n = 0; n < count; ++n)
+    {
+        double *now = out.data() + n * width;
+        const auto add = [&](double share, const double *values) {
+            for (size_t f = 0; f < width; ++f)
+                now[f] += share * values[f];
+        };
+        for (size_t k = 0; k < std::min(numerator.size(), n + 1); ++k)
+            add(numerator.data()[k], signal.data() + (n - k) * width);
+        for (size_t k = 1; k < std::min(denominator.size(), n + 1); ++k)
+            add(-denominator.data()[k], now - k * width);
+    }
+    return ToNumpy(std::move(out), {count, width});
+}
+
+Array Faded(Vector keep, Vector pushes)
+{
+    if (keep.size() != pushes.size())
+        throw std::invalid_argument("there must be as many shares as pushes");
+    std::vector<double> out(pushes.size());
+    double last = 0;
+    for (size_t n = 0; n < out.size(); ++n)
+        out[n] = last = keep.data()[n] * last + pushes.data()[n];
+    return ToNumpy(std::move(out), {pushes.size()});
+}
+
+// s and r = ds/dt at the end of each step, from rest: dr/dt = w^2 (push - s) - 2 z w r.
+Array Swung(Vector pushes, Vector step_s, double rate, double damping)
+{
+    if (step_s.size() != pushes.size())
+        throw std::invalid_argument("there must be as many steps as pushes");
+    const double fast = rate * std::sqrt(1 - damping * damping), fading = damping * rate;
+    std::vector<double> out(2 * pushes.size());
+    double s = 0, r = 0, last_s = -1, cos = 0, sin = 0;
+    for (size_t n = 0; n < pushes.size(); ++n)
+    {
+        const double dt_s = step_s.data()[n], push = pushes.data()[n];
+        if (dt_s != last_s)
+        {
+            const double fade = std::exp(-fading * dt_s);
+            cos = fade * std::cos(fast * dt_s);
+            sin = fade * std::sin(fast * dt_s) / fast;
+            last_s = dt_s;
+        }
+        const double away = s - push;
+        s = push + (cos + fading * sin) * away + sin * r;
+        r = (cos - fading * sin) * r - rate * rate * sin * away;
+        out[2 * n] = s;
+        out[2 * n + 1] = r;
+    }
+    return ToNumpy(std::move(out), {pushes.size(), 2});
+}
+
+}  // namespace
+
+void BindSeries(nb::module_ &m)
+{
+    m.def("displaced_by", &DisplacedBy, "values"_a, "velocity"_a, "axis"_a, "step_s"_a,
+          "heading_rad"_a, "starts"_a, "ends"_a, "at_rad"_a,
+          "(W, H, 3, T) how far a robot that moves at `velocity` (N, 3) gets elsewhere, forward, "
+          "left and turned as seen from headings `at_rad` (W,), from after row `starts` (W,) up to "
+          "row `ends` (W, H), by other speeds (N, T) in a body axis: 0, 1, or 2 for turning, of "
+          "first order.");
+    m.def("filtered", &Filtered, "numerator"_a, "denominator"_a, "signal"_a,
+          "(N, F) of a recursive filter that begins at rest.");
+    m.def("faded", &Faded, "keep"_a, "pushes"_a,
+          "(N,) y[n] = keep[n] y[n - 1] + pushes[n], from rest.");
+    m.def("swung", &Swung, "pushes"_a, "step_s"_a, "rate"_a, "damping"_a,
+          "(N, 2) s and ds/dt at the end of each step, from rest, of what swings around each "
+          "push.");
+    m.def("led_between", &LedBetween, "forward"_a, "left"_a, "steps"_a, "starts"_a, "ends"_a,
+          "direction"_a,
+          "(R, F) how far each forward and left velocity, (N, f) side by side, leads along a "
+          "`direction` (R, 2) from after row `starts` (R,) up to row `ends` (R,): `steps` (N, 2) "
+          "are the length of each step times the direction in which the robot heads.");
+}
+
+}  // namespace twin
