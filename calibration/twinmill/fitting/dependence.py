@@ -299,7 +299,7 @@ def _unwinding(motion: Motion) -> Iterator[Features]:
 
 def small_changes(
     told: np.ndarray, lag_s: float, motion: Motion, wheels: Sequence[Wheel]
-) -> Iterator[Features]:
+) -> Iterator[Group]:
     """Changes of a command below a least one are not taken: of each wheel alike, or of each axis.
 
     Args:
@@ -317,7 +317,8 @@ def small_changes(
         for rim, size in zip(rims, usual, strict=True)
     ]
     added = [[body[k] * m for k in range(3)] for (_, body), m in zip(parts, missed, strict=True)]
-    yield from [np.sum(added, axis=0)] if wheels else added
+    for features in [np.sum(added, axis=0)] if wheels else added:
+        yield [tuple(f if f.any() else f[:, :0] for f in features)]
 
 
 def missing(told: np.ndarray, usual: float) -> np.ndarray:
