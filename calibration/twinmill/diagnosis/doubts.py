@@ -475,6 +475,23 @@ def _comes_and_goes(finding: Finding, found: Sequence[Finding], rest: Rest) -> F
     return doubted(finding, why, wrong_form=True, depends_on=TIME)
 
 
+def _is_beside_doubtful_of_its_kind(
+    finding: Finding, found: Sequence[Finding], rest: Rest
+) -> Finding | None:
+    """Another finding acts on the same, is doubtful and takes much."""
+    on = _depends_on(finding.effect)
+    alike = [
+        f.effect
+        for f in found
+        if f is not finding and f.certainty == "doubtful" and f.share > SETTINGS.much_left
+    ]
+    alike = [name for name in alike if on and _depends_on(name) == on]
+    if not alike:
+        return None
+    why = f"{alike[0]} acts on {on} as well, and is doubtful: both may be one other effect"
+    return doubted(finding, why)
+
+
 def _is_no_loss(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
     """A loss of a moment that is none: what runs in or warms up makes a robot faster."""
     why = _faster(finding.effect, finding.parameters)
@@ -545,6 +562,7 @@ FORM_RULES = (
     _is_no_loss,
     _is_of_a_place_that_changes,
     _is_some_moments,
+    _is_beside_doubtful_of_its_kind,
     _leaves_its_own,
     _is_second,
 )

@@ -1101,6 +1101,22 @@ def test_a_size_beyond_what_is_usual_is_not_sure_beside_a_rest(gain, left, certa
     assert judged.certainty == certainty
 
 
+@pytest.mark.parametrize(
+    ("beside", "share", "certainty"),
+    [
+        ("motor_lag", 0.46, "doubtful"),
+        ("motor_lag", 0.1, "sure"),
+        ("floor_tilt", 0.46, "sure"),
+    ],
+)
+def test_beside_a_doubtful_effect_that_acts_on_the_same_none_is_sure(beside, share, certainty):
+    """Wheels that start stiffly had been motors that coast, surely, and a lag at its bound."""
+    found = [Finding("coasting", None, [], 0.54, "sure")]
+    found += [Finding(beside, None, [], share, "doubtful")]
+    first, _ = of_another_form(found, NOTHING_LEFT)
+    assert first.certainty == certainty
+
+
 @pytest.mark.parametrize(("loss", "outside"), [(-0.07, True), (0.07, False)])
 def test_a_loss_that_makes_it_faster_stands_for_what_runs_in_or_warms_up(loss, outside):
     (judged,) = of_another_form([_loss("abrupt_loss", loss, 34.0)], NOTHING_LEFT)
