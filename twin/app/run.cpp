@@ -12,6 +12,7 @@
 #include "behaviors.h"
 #include "commands.h"
 #include "key.h"
+#include "outputs.h"
 #include "plant_mujoco/mujoco_plant.h"
 #include "publisher.h"
 #include "sensors.h"
@@ -233,6 +234,7 @@ void RequestStop()
 
 void Run(const Options &options)
 {
+    CheckOutputs(options);
     const Setup setup = Prepare(options);
     std::shared_ptr<const Script> script;
     if (!options.script.empty())
