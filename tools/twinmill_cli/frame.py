@@ -12,7 +12,7 @@ import typer
 from rich.console import RenderableType
 
 from twinmill.data.measurement import BadInputError, Measurements, load_measurements
-from twinmill.files import check_new_folder
+from twinmill.files import check_report
 from twinmill.model.model_file import ModelFile
 from twinmill.report import Provenance, Section, write_report
 from twinmill.report.html import SCORE_NOTE
@@ -38,7 +38,7 @@ def of_robot(robot: int | None) -> list[str]:
 def open_model(model: str, out: Path | None) -> ModelFile:
     """Reads the model, once it is clear that the report's folder can be written."""
     if out:
-        check_new_folder(out)
+        check_report(out)
     return ModelFile.load(model)
 
 

@@ -28,7 +28,7 @@ if working():  # not for --help
 
     from twinmill.data.log import read_bytes
     from twinmill.diagnosis.diagnose import diagnose
-    from twinmill.files import check_new_folder
+    from twinmill.files import check_report
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import matters as present
     from twinmill.report import write_report
@@ -107,7 +107,7 @@ def _matters(
     Example: twinmill matters run.lcmlog --model explained.toml --out matters
     """
     if out:
-        check_new_folder(out)
+        check_report(out)
     request = make_request(
         behavior,
         model,
