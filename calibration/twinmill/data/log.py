@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 import turbopi
 
-from twinmill.data.lcm_log import Events, LogError, decode, split_events
+from twinmill.data.lcm_log import Events, LogError, broken, decode, split_events
 
 __all__ = ["Log", "LogError", "RobotLog", "read_log"]
 
@@ -143,7 +143,7 @@ def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = ""
     )
     robots = {}
     for robot_id, (commands, poses) in messages.items():
-        run = _last_run(channels[robot_id].get("RUN", []), robot_id)
+        run = _last_run(channels[robot_id].get("RUN", []), robot_id, warnings)
         robots[robot_id] = RobotLog(
             robot_id=robot_id,
             source=run.source,
@@ -230,7 +230,7 @@ def _decode_robot(
         message = getattr(turbopi, f"{source.lower()}_t")
         series.append(
             _in_order(
-                decode(kinds[source], message, f"{name}_{source}"),
+                decode(kinds[source], message, f"{name}_{source}", warnings),
                 f"{name}_{source}",
                 robot_id,
                 warnings,
@@ -260,17 +260,23 @@ def _in_order(messages: np.ndarray, channel: str, robot_id: int, warnings: list[
     return messages[order[last]]
 
 
-def _last_run(payloads: list[bytes], robot_id: int) -> turbopi.run_t:
-    """What the robot said of itself last; empty if it said nothing."""
+def _last_run(payloads: list[bytes], robot_id: int, warnings: list[str]) -> turbopi.run_t:
+    """What the robot said of itself last, of what can be read; empty if it said nothing."""
     if not payloads:
         return turbopi.run_t()
-    try:
-        return turbopi.run_t.decode(payloads[-1])
-    except Exception as error:  # the generated decoder raises what its steps happen to raise
-        raise LogError(
-            f"R{robot_id:02d}_RUN: a message is not of type turbopi.run_t ({error}): "
-            "the log was made with other message types."
-        ) from error
+    for count, payload in enumerate(reversed(payloads)):
+        try:
+            run = turbopi.run_t.decode(payload)
+        except Exception as error:  # the generated decoder raises what its steps happen to raise
+            failed = error
+            continue
+        if count:
+            warnings.append(broken(f"R{robot_id:02d}_RUN", count, len(payloads)))
+        return run
+    raise LogError(
+        f"R{robot_id:02d}_RUN: a message is not of type turbopi.run_t ({failed}): "
+        "the log was made with other message types."
+    ) from failed
 
 
 def _says_same_clock(config_toml: str) -> bool:
@@ -330,7 +336,7 @@ def _detection_series(
     if not payloads:
         return {}
     channel = f"R{robot_id:02d}_DETECTION"
-    messages = decode(payloads, turbopi.detection_t, channel)
+    messages = decode(payloads, turbopi.detection_t, channel, warnings)
     messages = _in_order(messages, channel, robot_id, warnings)
     return {"seen_t_s": _seconds(messages, t0_us), "seen": messages["seen"] != 0}
 
