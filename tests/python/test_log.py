@@ -132,6 +132,30 @@ def test_a_message_with_a_flipped_bit_in_its_type_is_left_out_and_counted(hundre
     assert len(damaged.stamps_us) == 99
 
 
+@pytest.mark.parametrize(
+    ("channel", "place"), [("R07_POSE", 9), ("R07_DRIVE", 9), ("R07_DRIVE", 20)]
+)
+def test_a_flipped_bit_in_a_stamp_or_a_kind_is_damage(hundred, channel, place):
+    """Years away, one stamp had asked for arrays of 400 TB; of a byte of the wire see drive_t."""
+    log = read_log(_damaged(hundred, channel, {40}, place))
+    assert log.warnings == [f"{channel}: 1 of 100 messages are damaged; left out."]
+    robot = log.robots[7]
+    assert robot.pose_t_s.max() < 1 and robot.command_t_s.max() < 1
+    assert len(robot.pose) + len(robot.command) == 199
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_that_no_pose_has_are_lost_poses(write_log, message):
+    poses = [
+        message("pose", utime_us=0, robot_id=7, valid=True, position_m=[1e300, 0.0, 0.0]),
+        message("pose", utime_us=1, robot_id=7, valid=True, orientation_wxyz=[1e200, 0, 0, 0]),
+        message("pose", utime_us=2, robot_id=7, valid=True, orientation_wxyz=[1.0, 0, 0, 0]),
+    ]
+    log = read_log(write_log(*[("R07_POSE", pose) for pose in poses]))
+    assert log.robots[7].valid.tolist() == [False, False, True]
+    assert any("2 poses are marked valid but hold no position" in w for w in log.warnings)
+
+
 def test_many_messages_of_another_type_are_no_damage(hundred):
     _damaged(hundred, "R07_POSE", set(range(0, 100, 10)), 3)
     with pytest.raises(LogError, match=r"R07_POSE.*other message types"):

@@ -12,12 +12,23 @@ from typing import Literal
 import numpy as np
 import turbopi
 
-from twinmill.data.lcm_log import Events, LogError, broken, decode, split_events
+from twinmill.data.lcm_log import (
+    FEW_BROKEN,
+    Events,
+    LogError,
+    broken,
+    decode,
+    few_broken,
+    split_events,
+)
 
 __all__ = ["Log", "LogError", "RobotLog", "read_log"]
 
 CommandKind = Literal["duty", "wheel_speed", "twist", "none"]
 KINDS: tuple[CommandKind, ...] = ("duty", "wheel_speed", "twist")  # by drive_t.kind
+
+FAR_S = 60.0  # beside its span: no channel has single stamps so far away
+FARTHEST_M = 1e9  # no room is as large: such a place is damage
 
 _READ = ("TELEMETRY", "POSE", "DRIVE", "RUN", "DETECTION")
 _KNOWN_ELSEWHERE = re.compile(
@@ -228,15 +239,27 @@ def _decode_robot(
             series.append(None)
             continue
         message = getattr(turbopi, f"{source.lower()}_t")
-        series.append(
-            _in_order(
-                decode(kinds[source], message, f"{name}_{source}", warnings),
-                f"{name}_{source}",
-                robot_id,
-                warnings,
-            )
-        )
+        channel = f"{name}_{source}"
+        messages = decode(kinds[source], message, channel, warnings)
+        messages = _undamaged(messages, channel, warnings)
+        series.append(_in_order(messages, channel, robot_id, warnings))
     return series[0], series[1]
+
+
+def _undamaged(messages: np.ndarray, channel: str, warnings: list[str]) -> np.ndarray:
+    """Without the few whose stamp or kind is none that its channel has, as after a flipped bit."""
+    t_s = messages["utime_us"].astype(float) / 1e6
+    first_s, last_s = np.quantile(t_s, (FEW_BROKEN, 1 - FEW_BROKEN))
+    far_s = last_s - first_s + FAR_S
+    strange = (t_s < first_s - far_s) | (t_s > last_s + far_s)
+    if "kind" in messages.dtype.names:
+        kinds, counts = np.unique(messages["kind"], return_counts=True)
+        strange |= messages["kind"] != kinds[counts.argmax()]
+    count = int(np.count_nonzero(strange))
+    if not count or not few_broken(count, len(messages)):
+        return messages
+    warnings.append(broken(channel, count, len(messages)))
+    return messages[~strange]
 
 
 def _in_order(messages: np.ndarray, channel: str, robot_id: int, warnings: list[str]) -> np.ndarray:
@@ -375,8 +398,8 @@ def _pose_series(
     position_m = messages["position_m"].astype(float)
     quaternion = messages["orientation_wxyz"].astype(float)
     stated = messages["valid"] != 0
-    placed = np.isfinite(position_m).all(axis=1)
-    turned = np.abs(np.linalg.norm(quaternion, axis=1) - 1) < 0.1  # NaN compares false
+    placed = (np.abs(position_m) < FARTHEST_M).all(axis=1)  # NaN compares false
+    turned = np.abs(np.linalg.norm(np.clip(quaternion, -2, 2), axis=1) - 1) < 0.1
     seen = stated & placed
     has_heading = not seen.any() or not np.isnan(quaternion[seen]).all()
     valid = seen & turned if has_heading else seen
