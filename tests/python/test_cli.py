@@ -177,6 +177,36 @@ def test_bad_input_gets_one_sentence_and_leaves_nothing(
     assert (tmp_path / "odd.toml").read_text() == odd
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("effects coasting more", "takes no 'more'"),
+        ("effects coasting --from m.toml", "takes no --from m.toml"),
+        ("set base.motor_lag_s=0.1 base.motor_lag_s=0.2 -o x.toml", "motor_lag_s: is given twice"),
+        ("set base.motorlag_s=0.1 -o x.toml", "nearest known is 'base.motor_lag_s'"),
+    ],
+)
+def test_what_is_too_much_is_refused(twinmill, monkeypatch, tmp_path, words, said):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = twinmill(*words.split())
+    assert (code, out) == (1, "") and said in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_name_that_is_like_no_other_gets_no_suggestion(twinmill, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = twinmill("set", "zzzzzz=1", "-o", "x.toml")
+    assert code == 1 and "zzzzzz: is no quantity" in err and "nearest" not in err
+
+
+def test_a_sentence_quotes_the_beginning_of_what_is_long(twinmill, coasting_robot, tmp_path):
+    formula = "p0*(" + "vx+" * 9000 + "nothing)"
+    words = ("add", "equation", coasting_robot.log, "--model", coasting_robot.model)
+    out = ("--adds-to", "vx_mps", "--formula", formula, "-o", tmp_path / "x.toml")
+    code, _, err = twinmill(*words, *out)
+    assert code == 1 and "p0*(vx+vx+" in err and "too long" in err and len(err) < 200
+
+
 JUDGING = {
     "compare": "compare {log} --model {model}",
     "diagnose": "diagnose {log} --model {model}",

@@ -238,6 +238,29 @@ def test_a_device_is_not_replaced_by_a_log(tmp_path):
     assert device.is_fifo()
 
 
+EQUATION = '[[effect]]\nname = "equation"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[base]\nforward_gian = 1\n", "the nearest known is 'forward_gain'"),
+        ("[base]\nfoo = 1\n", "unknown key 'foo' in [base]; known are "),
+        (EQUATION + "formula = 3\n", "equation.formula must be a text"),
+        (EQUATION + f'formula = "p0*(1{"+vx" * 8000})"\n', "vx...': "),
+    ],
+    ids=["near", "far", "kind", "long"],
+)
+def test_a_model_that_is_wrong_is_told_in_one_sentence_that_can_be_read(tmp_path, text, said):
+    model = tmp_path / "m.toml"
+    model.write_text(text)
+    refused = run(*RUN_S, "--log", tmp_path / "a.lcmlog", model=model)
+    assert refused.returncode == 1 and said in refused.stderr
+    assert refused.stderr.count("m.toml") == 1 and refused.stderr.count("\n") == 1
+    assert len(refused.stderr) < 600
+    assert ("nearest" in refused.stderr) == ("gian" in text)
+
+
 RUN_S = ("--n", 2, "--duration-s", 1)
 
 

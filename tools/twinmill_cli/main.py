@@ -4,6 +4,7 @@
 import errno
 import io
 import os
+import re
 import sys
 from typing import Annotated, Any
 
@@ -12,6 +13,7 @@ import typer
 from twinmill_cli.lazy import CommandGroup, LazyCommand
 from twinmill_cli.output import STOPPED, deliver
 
+QUOTED = 80  # letters of what a sentence quotes
 OF_TABLES = ("import", "track", "track-calibrate", "track-check", "characterise")  # judge no log
 
 # Name, module and what it does, in the order of the help. The modules are imported when called.
@@ -286,7 +288,9 @@ def main() -> None:
 
 
 def _complain(sentence: str) -> None:
-    print(f"twinmill: {' '.join(sentence.split())}", file=sys.stderr)
+    long = rf"(?<=[\s(=])'([^\s'][^']{{{QUOTED}}})[^']+'"  # an apostrophe stands behind a letter
+    short = re.sub(long, r"'\1...'", " ".join(sentence.split()))
+    print(f"twinmill: {short}", file=sys.stderr)
 
 
 if __name__ == "__main__":
