@@ -261,6 +261,18 @@ def test_a_model_that_is_wrong_is_told_in_one_sentence_that_can_be_read(tmp_path
     assert ("nearest" in refused.stderr) == ("gian" in text)
 
 
+def test_a_model_that_grows_without_bound_ends_in_one_sentence_and_no_file(tmp_path):
+    """ds/dt = 5 s + 1: after 20 s s is e^100 / 5, by calculus."""
+    model = tmp_path / "m.toml"
+    paper = Path(__file__).parents[2] / "twin/models/paper.toml"
+    rates = 'adds_to = "vx_mps"\nformula = "p0*s"\nstate_rate = "p1*s + 1"\np0 = 1\np1 = 5\n'
+    model.write_text(paper.read_text() + "\n" + EQUATION + rates)
+    log = tmp_path / "a.lcmlog"
+    refused = run("--n", 2, "--duration-s", 20, "--log", log, model=model)
+    assert refused.returncode == 1 and "grows without bound" in refused.stderr
+    assert refused.stderr.count("\n") == 1 and not log.exists()
+
+
 RUN_S = ("--n", 2, "--duration-s", 1)
 
 
