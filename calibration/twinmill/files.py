@@ -5,7 +5,7 @@ import math
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -71,26 +71,38 @@ def replacing(
 
 @contextmanager
 def replacing_folder(
-    out: Path, force: bool, *, inputs: Iterable[Path | None] = ()
+    out: Path, force: bool, *, inputs: Iterable[Path | None] = (), holds: Collection[str] = ()
 ) -> Iterator[Path]:
     """The path of a new folder that takes the place of `out` if the block succeeds.
 
     Args:
         out: the folder.
-        force: replace one that is there, with all that is in it.
+        force: replace one that is there.
         inputs: see `check_new_file`.
+        holds: patterns of names; a folder in which there is anything else is not replaced.
 
     Raises:
-        ValueError: it exists, has an input in it, or a folder cannot be made there.
+        ValueError: it exists, has an input or other things in it, or a folder cannot be made there.
     """
     _check_no_input(out, inputs)
     if out.exists() and not (force and out.is_dir()):
         raise ValueError(f"{out}: exists; choose another name, or replace it with --force.")
+    check_holds(out, holds)
     with folder_beside(out) as folder:
         yield folder / out.name
         if out.exists():
             shutil.rmtree(out)
         (folder / out.name).rename(out)
+
+
+def check_holds(folder: Path, patterns: Collection[str]) -> None:
+    """Raises ValueError if there is a folder with anything in it that has no such name."""
+    for path in sorted(folder.iterdir()) if folder.is_dir() else []:
+        if not any(path.match(pattern) for pattern in patterns):
+            raise ValueError(
+                f"{folder}: holds {path.name}, which this command does not write, and is left as "
+                "it is; choose another folder."
+            )
 
 
 @contextmanager
@@ -111,6 +123,17 @@ def folder_beside(out: Path) -> Iterator[Path]:
         for above in missing:
             with suppress(OSError):  # it holds what was made
                 above.rmdir()
+
+
+REPORT = '<meta name="generator" content="twinmill">'  # in every report
+
+
+def check_report(folder: Path) -> None:
+    """Raises ValueError if no report can be written here, or another page would be lost."""
+    check_new_folder(folder)
+    page = folder / "index.html"
+    if page.exists() and REPORT not in page.read_text(errors="replace"):
+        raise ValueError(f"{page}: exists and is no report of twinmill; choose another folder.")
 
 
 def check_new_folder(path: Path) -> None:

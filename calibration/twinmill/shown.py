@@ -16,7 +16,7 @@ from rich.console import Console, RenderableType
 
 from twinmill import report
 from twinmill.arguments import checked, in_python
-from twinmill.files import check_new_folder, plain, replacing
+from twinmill.files import check_report, plain, replacing
 
 WIDEST_COLUMNS = 100  # of a printed result; text in longer lines is hard to read
 A_PATH = "the path of a file"
@@ -101,7 +101,7 @@ class Reported(Shown):
             'index.html'
         """
         place = path_of("folder", folder, "the path of a folder")
-        check_new_folder(place)
+        check_report(place)
         section, call = self._page()
         source = report.Provenance(call, f"twinmill {version('twinmill')}", "")
         return report.write_report(place, section.title, source, [section])

@@ -372,6 +372,92 @@ def test_a_robot_that_was_told_to_stand_and_stands_is_used_to_the_end(robot):
     assert used_s > 59.9 and "no commands" not in notes
 
 
+def _without_commands(robot, kept):
+    """The robot without telemetry, and without the commands that are not kept: (M,) bool."""
+    return _told(
+        replace(
+            robot,
+            command_t_s=robot.command_t_s[kept],
+            command=robot.command[kept],
+            battery_V=robot.battery_V[kept],
+        ),
+        np.inf,
+    )
+
+
+def test_a_hole_in_the_beat_of_the_commands_is_told_and_cut(robot):
+    """The recorder of the commands is out of order for six seconds, or for one of every two."""
+    t_s = robot.command_t_s
+    log = _without_commands(robot, (t_s < 20) | (t_s >= 26))
+    track = make_track(log)
+    used_s = track.pose_t_s[track.segment >= 0]
+    assert not ((used_s > 20.01) & (used_s < 26.3)).any()
+    assert used_s[0] < 0.1 and used_s[-1] > 59.9
+    assert any("no commands from 19.98 to 26.00 s" in n and "every 25 ms" in n for n in track.notes)
+    assert _findings([log]) == []
+    halves = _without_commands(robot, t_s % 2 < 1)
+    track = make_track(halves)
+    used_s = track.pose_t_s[track.segment >= 0]
+    assert len(used_s) > 500 and (used_s[used_s < 59] % 2 < 1.01).all()
+    (found,) = [f for f in _findings([halves]) if "commands are lost" in f.what]
+    assert "in 29 holes" in found.evidence and not found.fatal
+
+
+def test_a_hole_in_the_telemetry_keeps_its_own_words(robot):
+    kept = (robot.command_t_s < 20) | (robot.command_t_s >= 26)
+    alike = ("command_t_s", "command", "battery_V", "mode")
+    track = make_track(replace(robot, **{name: getattr(robot, name)[kept] for name in alike}))
+    assert "taken while no commands are in the log" in " ".join(track.notes)
+
+
+def test_commands_that_are_written_when_they_change_have_no_holes(robot):
+    """A stick that is moved and held: a beat, and long steps that are no loss."""
+    changes = (np.diff(robot.command, axis=0, prepend=9.0) != 0).any(axis=1)
+    ramps = np.sin(robot.command_t_s)[:, None] * robot.command
+    held = np.sin(0.5 * robot.command_t_s) > 0
+    stick = replace(robot, command=np.where(held[:, None], robot.command[0], ramps))
+    moved = (np.diff(stick.command, axis=0, prepend=9.0) != 0).any(axis=1)
+    for log, kept in ((robot, changes), (stick, moved)):
+        log = _without_commands(log, kept)
+        assert np.diff(log.command_t_s).max() > 0.5
+        assert "no commands" not in " ".join(make_track(log).notes)
+
+
+@pytest.mark.parametrize("stands", [True, False])
+def test_silence_after_a_stop_is_no_loss_while_the_robot_stands(robot, stands):
+    """A deadman's switch: nothing is sent while the stick is let go, after one zero."""
+    t_s = robot.command_t_s
+    silent = (t_s >= 20) & (t_s < 26)
+    command = np.where(((t_s >= 19.5) & silent | (t_s > 19.5) & (t_s < 26))[:, None], 0.0, 1.0)
+    pose, pose_t_s = robot.pose.copy(), robot.pose_t_s
+    if stands:
+        still = (pose_t_s > 19.6) & (pose_t_s < 26)
+        pose[still] = pose[still][0]
+    log = replace(robot, command=command * robot.command, pose=pose)
+    notes = " ".join(make_track(_without_commands(log, ~silent)).notes)
+    assert ("no commands from 19.98 to 26.00 s" in notes) is not stands
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_commands_of_robots_under_one_number_are_told(robot, count):
+    others = [_robot(seed=1 + k).command for k in range(count)]
+    in_turn = np.stack(others, axis=1).reshape(-1, 4)
+    t_s = np.interp(np.arange(len(in_turn)) / count, np.arange(len(others[0])), robot.command_t_s)
+    mixed = {"command": in_turn, "command_t_s": t_s, "battery_V": np.full(len(t_s), np.nan)}
+    mixed["mode"] = np.empty(0, np.int8)
+    _one([replace(robot, **mixed)], "commands are those of two robots or more", "robot_id")
+
+
+def test_a_robot_that_switches_between_two_commands_is_one(robot):
+    """By a bit that flickers at each control step, and by a script that drives and stops."""
+    bit = np.random.default_rng(1).random(len(robot.command)) < 0.5
+    table = np.array([[1, 0.4, 1, 0.4], [0.4, 1, 0.4, 1]])[bit.astype(int)]
+    assert check_commanded(replace(robot, command=table), "log") == []
+    steps = np.arange(60) % 2 * np.ones((4, 1))
+    script = replace(robot, command=steps.T, command_t_s=np.arange(60.0))
+    assert check_commanded(script, "log") == []
+
+
 @pytest.mark.parametrize("wrong", [1e20, -1e4, np.inf])
 def test_a_command_that_no_robot_follows_is_named_by_its_row(robot, wrong):
     command = robot.command.copy()

@@ -178,6 +178,87 @@ def test_bad_input_gets_one_sentence_and_leaves_nothing(
 
 
 @pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("effects coasting more", "takes no 'more'"),
+        ("effects coasting --from m.toml", "takes no --from m.toml"),
+        ("set base.motor_lag_s=0.1 base.motor_lag_s=0.2 -o x.toml", "motor_lag_s: is given twice"),
+        ("set base.motorlag_s=0.1 -o x.toml", "nearest known is 'base.motor_lag_s'"),
+    ],
+)
+def test_what_is_too_much_is_refused(twinmill, monkeypatch, tmp_path, words, said):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = twinmill(*words.split())
+    assert (code, out) == (1, "") and said in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_name_that_is_like_no_other_gets_no_suggestion(twinmill, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = twinmill("set", "zzzzzz=1", "-o", "x.toml")
+    assert code == 1 and "zzzzzz: is no quantity" in err and "nearest" not in err
+
+
+def test_a_sentence_quotes_the_beginning_of_what_is_long(twinmill, coasting_robot, tmp_path):
+    formula = "p0*(" + "vx+" * 9000 + "nothing)"
+    words = ("add", "equation", coasting_robot.log, "--model", coasting_robot.model)
+    out = ("--adds-to", "vx_mps", "--formula", formula, "-o", tmp_path / "x.toml")
+    code, _, err = twinmill(*words, *out)
+    assert code == 1 and "p0*(vx+vx+" in err and "too long" in err and len(err) < 200
+
+
+JUDGING = {
+    "compare": "compare {log} --model {model}",
+    "diagnose": "diagnose {log} --model {model}",
+    "explain": "explain {log} --model {model} -o x.toml",
+    "fit": "fit {log} --model {model} -o x.toml",
+    "add": "add coasting {log} --model {model} -o x.toml",
+    "next": "next {log} --model {model} -o x.csv",
+    "metrics": "metrics {log} --model {model}",
+    "compare-swarm": "compare-swarm {log} --model {model}",
+    "wheels": "wheels {log} --model {model}",
+    "plot": "plot {log} -o x.png",
+    "export": "export {log} --to mcap -o x.mcap",
+}
+
+
+@pytest.fixture(scope="session")
+def brief_log(tmp_path_factory):
+    """Three seconds, which are too little to judge a model by; whole in all other ways."""
+    folder = tmp_path_factory.mktemp("brief")
+    t_s = [k / 20 for k in range(60)]
+    poses = "".join(f"{t},1,{t / 10},0,0\n" for t in t_s)
+    commands = "".join(f"{t},1,0.1,0,0\n" for t in t_s)
+    (folder / "p.csv").write_text("t_s,robot_id,x_m,y_m,theta_rad\n" + poses)
+    (folder / "c.csv").write_text("t_s,robot_id,vx_mps,vy_mps,omega_radps\n" + commands)
+    tables = ["--poses", str(folder / "p.csv"), "--commands", str(folder / "c.csv")]
+    cli.run(["import", *tables, "-o", str(folder / "brief.lcmlog")])
+    return folder / "brief.lcmlog"
+
+
+@pytest.mark.parametrize("verb", JUDGING)
+@pytest.mark.parametrize("kind", ["brief", "empty", "junk", "absent"])
+def test_a_log_that_cannot_be_judged_is_told_as_an_object(
+    twinmill, coasting_robot, brief_log, tmp_path, monkeypatch, verb, kind
+):
+    """As docs/files.md promises to those who read JSON."""
+    if kind == "brief" and verb in ("plot", "export", "wheels"):
+        pytest.skip("needs no length")
+    monkeypatch.chdir(tmp_path)
+    log = tmp_path / "x.lcmlog"
+    known = {"brief": brief_log.read_bytes(), "empty": b"", "junk": b"\x17junk" * 900}
+    if kind in known:
+        log.write_bytes(known[kind])
+    words = JUDGING[verb].format(log=log, model=coasting_robot.model).split()
+    code, out, err = twinmill(*words, "--json")
+    told = json.loads(out)
+    assert code == 1 and told["verdict"] == "bad_input" and err.count("\n") == 1
+    (found,) = told["input"]
+    assert found["fatal"] and " ".join(found["evidence"].split()) in err
+    assert [path.name for path in tmp_path.iterdir()] == [log.name] * (kind in known)
+
+
+@pytest.mark.parametrize(
     ("arguments", "nearest"),
     [
         (("add", "coastin", "x.lcmlog", "-o", "y.toml"), "coasting"),

@@ -7,13 +7,17 @@ What a command reads it never replaces: a recording cannot be made again.
 import errno
 import os
 
+import numpy as np
 import pytest
 
+from twinmill.export.script import TwistScript, write_bag
 from twinmill.files import replacing, replacing_folder
+from twinmill.report import Provenance, write_report
 from twinmill_cli import main
 
 POSES = "t_s,robot_id,x_m,y_m,theta_rad\n0.0,1,0.0,0.0,0.0\n0.1,1,0.0,0.0,0.0\n"
 COMMANDS = "t_s,robot_id,vx_mps,vy_mps,omega_radps\n0.0,1,0.0,0.0,0.0\n"
+TWIST_MODEL = '[base]\ndrive = "twist"\n'
 FULL = OSError(errno.ENOSPC, "No space left on device")
 
 
@@ -114,3 +118,71 @@ def test_a_folder_that_holds_an_input_is_not_replaced(tmp_path):
     ):
         pass
     assert log.read_text() == "a log"
+
+
+USERS = "what somebody has written"
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["compare {0.log} --model {0.model}", "challenge --n 1", "challenge --intervals 1"],
+)
+def test_a_page_that_is_no_report_is_not_replaced_by_one(twinmill, coasting_robot, tmp_path, words):
+    (tmp_path / "index.html").write_text(USERS)
+    code, out, err = twinmill(*words.format(coasting_robot).split(), "--out", tmp_path)
+    assert (code, out) == (1, "") and "index.html: exists and is no report" in err
+    assert [path.read_text() for path in tmp_path.iterdir()] == [USERS]
+
+
+def test_a_report_is_replaced_by_the_next_one(tmp_path):
+    source = Provenance("twinmill", "twinmill 0", "")
+    first = write_report(tmp_path, "first", source, [])
+    assert write_report(tmp_path, "second", source, []) == first
+    assert "second" in first.read_text()
+
+
+def test_a_challenge_leaves_a_folder_of_other_things_alone(twinmill, tmp_path):
+    (tmp_path / "done").mkdir()
+    for name in ("mine.txt", "done/week.csv"):
+        (tmp_path / name).write_text(USERS)
+    code, _, err = twinmill("challenge", "--n", "1", "--out", tmp_path)
+    assert code == 1 and "holds mine.txt" in err
+    assert (tmp_path / "done/week.csv").read_text() == USERS
+
+
+def test_a_bag_replaces_a_bag_and_no_other_folder(tmp_path):
+    script = TwistScript(np.array([0.0]), np.array([[0.1, 0.0, 0.0]]), 1.0)
+    write_bag(script, tmp_path / "bag", force=False)
+    write_bag(script, tmp_path / "bag", force=True)
+    (tmp_path / "bag" / "notes.txt").write_text(USERS)
+    with pytest.raises(ValueError, match=r"holds notes\.txt"):
+        write_bag(script, tmp_path / "bag", force=True)
+    assert (tmp_path / "bag" / "notes.txt").read_text() == USERS
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "wheels --model m.toml -o m.toml --force",
+        "wheels --model m.toml --script-as publisher -o m.toml --force",
+        "characterise --robot 3 --script s.csv --script-as publisher --out s.csv --force",
+    ],
+)
+def test_a_script_is_not_written_over_what_it_is_made_of(monkeypatch, twinmill, tmp_path, words):
+    monkeypatch.chdir(tmp_path)
+    texts = {"m.toml": TWIST_MODEL, "s.csv": "t_s,vx_mps,vy_mps,omega_radps\n0,0.1,0,0\n1,0,0,0\n"}
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    code, _, err = twinmill(*words.split())
+    assert code == 1 and "never replaced" in err
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == texts
+
+
+def test_what_is_left_of_a_killed_recording_is_kept(monkeypatch, twinmill, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.csv").write_text("t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,30,30,30,30\n1,0,0,0,0\n")
+    (tmp_path / "run.lcmlog.partial").write_text(USERS)
+    words = "characterise --robot 3 --script s.csv --out run.lcmlog"
+    code, _, err = twinmill(*words.split())
+    assert code == 1 and "run.lcmlog.partial: exists" in err
+    assert (tmp_path / "run.lcmlog.partial").read_text() == USERS

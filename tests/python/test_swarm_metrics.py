@@ -5,6 +5,7 @@ import json
 import math
 import os
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import twinmill_native as native
 
 from twinmill.data.log import LogError, read_log
+from twinmill.report.swarm_metrics import section
 from twinmill.swarm.metrics import swarm_metrics
 from twinmill_cli import main as cli
 
@@ -83,6 +85,17 @@ def test_of_two_equal_halves_the_first_robots_make_the_ring(write_log, message):
 def test_one_robot_is_no_swarm(write_log, message):
     with pytest.raises(LogError, match="a swarm needs two"):
         swarm_metrics(read_log(write_log(*ring(message, 1, 0.6, 0.5, seconds=1.0))), 1.1, 0.1)
+
+
+@pytest.mark.filterwarnings("error")
+def test_robots_with_nothing_to_show_on_a_logarithmic_axis_are_drawn(write_log, message):
+    """Side by side and still: no circle, so no circliness above zero."""
+    for radius_m in (2.0, 1e-9):
+        events = ring(message, 3, radius_m, 1e-12)
+        series = swarm_metrics(read_log(write_log(*events)), 1.0, 0.1)
+        none = replace(series, values=np.where(np.isfinite(series.values), 0.0, series.values))
+        for shown in (series, none):
+            assert all(figure.svg for figure in section(shown).figures)
 
 
 @pytest.mark.parametrize(("words", "model"), [

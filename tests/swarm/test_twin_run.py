@@ -238,6 +238,101 @@ def test_a_device_is_not_replaced_by_a_log(tmp_path):
     assert device.is_fifo()
 
 
+EQUATION = '[[effect]]\nname = "equation"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[base]\nforward_gian = 1\n", "the nearest known is 'forward_gain'"),
+        ("[base]\nfoo = 1\n", "unknown key 'foo' in [base]; known are "),
+        (EQUATION + "formula = 3\n", "equation.formula must be a text"),
+        (EQUATION + f'formula = "p0*(1{"+vx" * 8000})"\n', "vx...': "),
+    ],
+    ids=["near", "far", "kind", "long"],
+)
+def test_a_model_that_is_wrong_is_told_in_one_sentence_that_can_be_read(tmp_path, text, said):
+    model = tmp_path / "m.toml"
+    model.write_text(text)
+    refused = run(*RUN_S, "--log", tmp_path / "a.lcmlog", model=model)
+    assert refused.returncode == 1 and said in refused.stderr
+    assert refused.stderr.count("m.toml") == 1 and refused.stderr.count("\n") == 1
+    assert len(refused.stderr) < 600
+    assert ("nearest" in refused.stderr) == ("gian" in text)
+
+
+def test_a_model_that_grows_without_bound_ends_in_one_sentence_and_no_file(tmp_path):
+    """ds/dt = 5 s + 1: after 20 s s is e^100 / 5, by calculus."""
+    model = tmp_path / "m.toml"
+    paper = Path(__file__).parents[2] / "twin/models/paper.toml"
+    rates = 'adds_to = "vx_mps"\nformula = "p0*s"\nstate_rate = "p1*s + 1"\np0 = 1\np1 = 5\n'
+    model.write_text(paper.read_text() + "\n" + EQUATION + rates)
+    log = tmp_path / "a.lcmlog"
+    refused = run("--n", 2, "--duration-s", 20, "--log", log, model=model)
+    assert refused.returncode == 1 and "grows without bound" in refused.stderr
+    assert refused.stderr.count("\n") == 1 and not log.exists()
+
+
+RUN_S = ("--n", 2, "--duration-s", 1)
+
+
+@pytest.mark.parametrize(
+    "where",
+    [("--log", "{}"), ("--lcm-url", "file://{}?mode=w"), ("--picture", "{}"), ("--video", "{}")],
+    ids=lambda where: where[0],
+)
+def test_what_is_there_is_replaced_with_force_alone(tmp_path, where):
+    kept, other = tmp_path / "kept", tmp_path / "other.lcmlog"
+    kept.write_text("work of a week")
+    words = (where[0], where[1].format(kept))
+    words += () if where[0] == "--log" else ("--log", other)
+    refused = run(*RUN_S, *words)
+    assert refused.returncode == 1 and refused.stderr.count("\n") == 1
+    assert "exists" in refused.stderr and "--force" in refused.stderr
+    assert kept.read_text() == "work of a week" and os.listdir(tmp_path) == ["kept"]
+    if where[0] in ("--log", "--lcm-url"):
+        assert run(*RUN_S, *words, "--force").returncode == 0
+        assert len(read(kept)[0]["R01_POSE"]) > 100
+
+
+@pytest.mark.parametrize("link", [False, True])
+@pytest.mark.parametrize("option", ["--model", "--script", "--behaviors"])
+def test_what_is_read_is_never_replaced(tmp_path, option, link):
+    texts = {
+        "--model": Path(__file__).parents[2].joinpath("twin/models/paper.toml").read_text(),
+        "--script": "t_s,speed_input,turn_input\n0,50,0\n1,0,0\n",
+        "--behaviors": 'mine = "0,0,0,0"\n',
+    }
+    model, log = tmp_path / "m.toml", tmp_path / "log"
+    read_file = model if option == "--model" else tmp_path / "read"
+    model.write_text(texts["--model"])
+    read_file.write_text(texts[option])
+    if link:
+        log.symlink_to(read_file)
+    words = () if option == "--model" else (option, read_file)
+    refused = run(*RUN_S, *words, "--log", log if link else read_file, "--force", model=model)
+    assert refused.returncode == 1 and "is read by this command" in refused.stderr
+    assert refused.stderr.count("\n") == 1
+    assert read_file.read_text() == texts[option]
+
+
+def test_two_outputs_are_not_one_file(tmp_path):
+    log = tmp_path / "a"
+    refused = run(*RUN_S, "--log", log, "--picture", tmp_path / "." / "a")
+    assert refused.returncode == 1 and "what --log writes" in refused.stderr
+    assert not log.exists()
+
+
+def test_what_a_killed_run_left_is_replaced_with_force_alone(tmp_path):
+    log, left = tmp_path / "a.lcmlog", tmp_path / "a.lcmlog.partial"
+    left.write_text("half a run")
+    refused = run(*RUN_S, "--log", log)
+    assert refused.returncode == 1 and str(left) in refused.stderr
+    assert left.read_text() == "half a run"
+    assert run(*RUN_S, "--log", log, "--force").returncode == 0
+    assert os.listdir(tmp_path) == ["a.lcmlog"]
+
+
 def test_camera_draws_frames_and_decides_by_them(tmp_path):
     logs = []
     for seed in (1, 1, 2):
@@ -275,7 +370,9 @@ def test_effects_of_the_model_act_in_drawn_frames(tmp_path, plant):
         model.write_text(installed.read_text() + effect)
         words = "--sensor camera --n 10 --spread-m 1.5 --seed 2 --duration-s 1 --behavior stand"
         done = run(
-            *(*words.split(), "--behaviors", nobody_moves, "--log", log), plant=plant, model=model
+            *(*words.split(), "--behaviors", nobody_moves, "--log", log, "--force"),
+            plant=plant,
+            model=model,
         )
         assert done.returncode == 0, done.stderr
         said = [read(log)[0][f"R{i:02d}_TELEMETRY"] for i in range(10)]

@@ -54,7 +54,7 @@ def test_robots_that_drive_apart_stay_in_view(tmp_path):
     for seed in (1, 2, 3):
         run(
             *("--n", 8, "--behavior", "diffusing", "--duration-s", 30, "--seed", seed),
-            *("--log", tmp_path / "a.lcmlog", "--picture", picture),
+            *("--log", tmp_path / "a.lcmlog", "--picture", picture, "--force"),
         )
         assert len(balls_px(picture)) == 8, seed
 

@@ -1,26 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Command lines: logs, import, calibration, the swarm."""
 
-import os
-import signal
-import threading
+import _signal  # the part of `signal` that takes no time to import
+
+HEARD = _signal.getsignal(_signal.SIGINT)
+if HEARD is _signal.default_int_handler:
+    try:
+        _signal.signal(_signal.SIGINT, _signal.SIG_DFL)  # ends what follows without a traceback
+    except ValueError:  # not in the main thread
+        HEARD = None
+
+import os  # noqa: E402
 
 # The threads of OpenBLAS wait in loops: on matrices as narrow as ours, two take twice the processor
 # time of one and are no sooner done. It reads this when numpy is first imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import twinmill_cli.lazy  # noqa: E402, F401 what all need, Typer above all
 
-def _read_quietly() -> None:
-    """Reads the large module that all need; Ctrl-C meanwhile ends it without a traceback."""
-    heard = signal.getsignal(signal.SIGINT)
-    if (
-        heard is signal.default_int_handler
-        and threading.current_thread() is threading.main_thread()
-    ):
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-        import typer  # noqa: F401
-
-        signal.signal(signal.SIGINT, heard)
-
-
-_read_quietly()
+if HEARD is _signal.default_int_handler:
+    _signal.signal(_signal.SIGINT, HEARD)

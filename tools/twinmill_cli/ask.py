@@ -18,7 +18,7 @@ if working():  # not for --help
 
     from rich.console import Group
 
-    from twinmill.files import check_new_folder
+    from twinmill.files import check_report
     from twinmill.model.model_file import ModelFile
     from twinmill.report import Provenance, Section, write_report
     from twinmill.report.questions import curve_figure
@@ -71,7 +71,7 @@ def _ask(
     Example: twinmill ask how-many --behavior milling --model turbopi.toml --out answer
     """
     if out:
-        check_new_folder(out)
+        check_report(out)
     drive = ModelFile.load(model).model.drive
     rest = {"n": None if question is Question.HOW_MANY else n, "seeds": seeds, "start": start}
     rest |= {"duration_s": duration_s, "target_radius_m": target_radius_m}

@@ -63,7 +63,7 @@ def _compare(
     """
     source = provenance(command_line("compare", logs, model), model_file := open_model(model, out))
     with busy(f"comparing with {model}"):
-        measurements = load(logs, model_file, as_json)
+        measurements = load(logs, model_file)
         result = compare(measurements, model_file)
     section = partial(comparison_section, result)
     data = {**result.to_json(), **told(measurements)}
@@ -92,7 +92,7 @@ def _fit(
     )
     check_new_file(output, force, [model_file.path, *logs])
     with busy(f"fitting {model}"):
-        measurements = load(logs, model_file, as_json)
+        measurements = load(logs, model_file)
         result = fit(measurements, model_file, output, source.command, held=held)
     section = partial(fit_section, result)
     data = {**result.to_json(), **told(measurements)}
@@ -163,7 +163,7 @@ def _add(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
     check_new_file(output, force, [model_file.path, *logs])
-    measurements = load(logs, model_file, as_json)
+    measurements = load(logs, model_file)
     with busy(f"adding {effect} to {model}"):
         result = add(
             effect=effect,

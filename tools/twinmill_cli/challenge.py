@@ -34,13 +34,17 @@ if working():  # not for --help
     from twinmill.challenge.robots import Robot
     from twinmill.challenge.run import play, write_log
     from twinmill.challenge.scoring import scored, summary
-    from twinmill.files import check_new_folder
+    from twinmill.files import check_holds, check_report
     from twinmill.model.model_file import write_whole
     from twinmill.report import challenge as page
     from twinmill.terminal import progress_bar
     from twinmill_cli.main import run
 
 DONE = "done"  # folder of the cases that are done, while others are not
+WRITTEN = (  # in the folder of a challenge, whole or stopped half way
+    *(DONE, "index.html", "answers.json", "results.json", "times.json", "intervals.json"),
+    *("base_*.toml", "sheet_*.toml", "calibration_*.lcmlog", "case*.lcmlog", ".*"),
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -84,7 +88,8 @@ def _challenge(
 
     Example: twinmill challenge --n 20 --out challenge
     """
-    check_new_folder(out)
+    check_report(out)
+    check_holds(out, WRITTEN)
     (out / DONE).mkdir(parents=True, exist_ok=True)
     workers = workers or os.cpu_count() or 1
     command = f"twinmill challenge --n {count} --seed {seed} --duration-s {duration_s:g}"

@@ -34,7 +34,7 @@ if working():  # not for --help
 
     from twinmill.data.log import LogError
     from twinmill.data.measurement_table import read_header, read_table
-    from twinmill.data.recorder import Recorder
+    from twinmill.data.recorder import Recorder, partial_of
     from twinmill.experiment.played import Rows
     from twinmill.export.script import TwistScript
     from twinmill.files import check_new_file
@@ -117,7 +117,8 @@ def _characterise(
             force=force,
             as_json=as_json,
         )
-    check_new_file(out, force, [Path(script)])
+    for path in (out, partial_of(out)):  # of a recording that was killed
+        check_new_file(path, force, [Path(script)])
     end_s = check_script(Path(script), cap_pct)
     name = Path(script).name
     if host:
@@ -156,7 +157,8 @@ def _for_ros(
         t_s, duties_pct = read_script(script)
         twists = TwistScript.of(ModelFile.load(model).model, Rows(t_s, duties_pct / 100, end_s))
     words = ["twinmill", "characterise", "--script", str(script), "--script-as", form]
-    write_script(twists, form, out, force, command=shlex.join([*words, "--model", model]))
+    command = shlex.join([*words, "--model", model])
+    write_script(twists, form, out, force, command=command, inputs=[script])
     deliver({"script_as": str(out), "duration_s": end_s}, f"Written: {out}", as_json)
     return 0
 

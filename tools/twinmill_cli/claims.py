@@ -31,7 +31,7 @@ if working():  # not for --help
     from twinmill.claims.rows import Claim, Row
     from twinmill.claims.swarms import run_kept
     from twinmill.data.steady_table import read_steady_tables
-    from twinmill.files import check_new_folder, plain
+    from twinmill.files import check_report, plain
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import Provenance, Section, show, write_report
     from twinmill.report.tables import Cell, Table, number
@@ -102,7 +102,7 @@ def _claims(
     if mujoco_seeds and not out:
         raise ValueError("--mujoco-seeds needs --out DIR, where its runs are kept.")
     if out:
-        check_new_folder(out)
+        check_report(out)
     found = []
     with telling("checking claims") as progress:
         for name in names:

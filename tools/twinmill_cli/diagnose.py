@@ -70,7 +70,7 @@ def _diagnose(
     _make_ready()
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with _told_if_stopped(source, as_json), telling(f"diagnosing with {model}") as progress:
-        measurements = load(logs, model_file, as_json)
+        measurements = load(logs, model_file)
         _hint(measurements, model_file)
         result = diagnose(measurements, model_file, progress, stoppable=True)
     swarm = None
@@ -241,7 +241,7 @@ def _explain(
     )
     check_new_file(output, force, [model_file.path, *logs])
     with _told_if_stopped(source, as_json), telling(f"explaining with {model}") as progress:
-        measurements = load(logs, model_file, as_json)
+        measurements = load(logs, model_file)
         _hint(measurements, model_file)
         result = explain(
             measurements,

@@ -20,7 +20,7 @@ if working():  # not for --help
 
     from rich.console import Group
 
-    from twinmill.files import check_new_folder
+    from twinmill.files import check_report
     from twinmill.report import Provenance, write_report
     from twinmill.report.discover import section
     from twinmill.swarm.discover.entries import (
@@ -92,7 +92,7 @@ def _discover(
     request = make_request(
         "milling", model, change or [], n=n, seeds=seeds, duration_s=duration_s, start=start
     )
-    check_new_folder(out)
+    check_report(out)
     hunt = Hunt(without_axes(request), n, seed)
     with _progress(generations) as tell:
         elites = search(hunt, out, generations, tell)

@@ -57,6 +57,9 @@ def _effects(
 
     Example: twinmill effects coasting
     """
+    if name != NEW and (called or from_model):
+        surplus = f"'{called}'" if called else f"--from {from_model}"
+        raise ValueError(f"effects {name or ''}: takes no {surplus}; that is for `effects new`.")
     if name == NEW:
         _write(called, from_model, equation, into, as_json=as_json)
     elif name is None:

@@ -11,8 +11,8 @@ from pathlib import Path
 import typer
 from rich.console import RenderableType
 
-from twinmill.data.measurement import BadInputError, Measurements, load_measurements
-from twinmill.files import check_new_folder
+from twinmill.data.measurement import Measurements, load_measurements
+from twinmill.files import check_report
 from twinmill.model.model_file import ModelFile
 from twinmill.report import Provenance, Section, write_report
 from twinmill.report.html import SCORE_NOTE
@@ -38,7 +38,7 @@ def of_robot(robot: int | None) -> list[str]:
 def open_model(model: str, out: Path | None) -> ModelFile:
     """Reads the model, once it is clear that the report's folder can be written."""
     if out:
-        check_new_folder(out)
+        check_report(out)
     return ModelFile.load(model)
 
 
@@ -47,20 +47,13 @@ def provenance(command: str, model: ModelFile) -> Provenance:
     return Provenance(command, f"twinmill {version('twinmill')}", model.hash)
 
 
-def load(logs: list[Path], model_file: ModelFile, as_json: bool) -> Measurements:
+def load(logs: list[Path], model_file: ModelFile) -> Measurements:
     """Reads logs and says on stderr what is wrong with them.
 
     Raises:
-        BadInputError: nothing is left to judge; with --json the verdict is printed first.
-        LogError: nothing could be read.
+        LogError: nothing is left to judge, or nothing could be read.
     """
-    try:
-        measurements = load_measurements(logs, model_file.model)
-    except BadInputError as error:
-        if as_json:
-            found = [finding.to_json() for finding in error.findings]
-            deliver({"verdict": "bad_input", "input": found}, "", as_json)
-        raise
+    measurements = load_measurements(logs, model_file.model)
     mild = [str(finding) for finding in measurements.findings if not finding.fatal]
     for sentence in [*measurements.excluded, *mild]:
         typer.echo(f"twinmill: {sentence}", err=True)

@@ -273,7 +273,9 @@ def _play(names: list[str], rows: np.ndarray, path: Path) -> float:
     """Writes a script, as a table or as a publisher; returns how long it takes, s."""
     if path.suffix == ".py":
         command = f"twinmill guide, {path.name}"
-        write_publisher(TwistScript(rows[:-1, 0], rows[:-1, 1:], rows[-1, 0]), path, False, command)
+        write_publisher(
+            TwistScript(rows[:-1, 0], rows[:-1, 1:], rows[-1, 0]), path, False, command=command
+        )
     else:
         path.write_text(csv_text(names, rows))
     return float(rows[-1, 0])

@@ -4,12 +4,17 @@
 import errno
 import io
 import os
+import re
 import sys
 from typing import Annotated, Any
 
 import typer
 
 from twinmill_cli.lazy import CommandGroup, LazyCommand
+from twinmill_cli.output import STOPPED, deliver
+
+QUOTED = 80  # letters of what a sentence quotes
+OF_TABLES = ("import", "track", "track-calibrate", "track-check", "characterise")  # judge no log
 
 # Name, module and what it does, in the order of the help. The modules are imported when called.
 COMMANDS = (
@@ -235,7 +240,20 @@ def run(arguments: list[str]) -> Any:
     Raises:
         ValueError, OSError: it failed, in one sentence.
     """
-    return app(arguments, prog_name="twinmill", standalone_mode=False)
+    try:
+        return app(arguments, prog_name="twinmill", standalone_mode=False)
+    except ValueError as error:
+        if "--json" in arguments and arguments[0] not in OF_TABLES:
+            _tell_bad_input(error)
+        raise
+
+
+def _tell_bad_input(error: ValueError) -> None:
+    """Prints the object of a log that cannot be judged; nothing of other errors."""
+    reading = sys.modules.get("twinmill.data.measurement")
+    if reading and isinstance(error, reading.LogError):
+        found = [finding.to_json() for finding in reading.findings_of(error)]
+        deliver({"verdict": "bad_input", "input": found}, "", as_json=True)
 
 
 def main() -> None:
@@ -256,6 +274,8 @@ def main() -> None:
             raise
         code = 1
         _complain(f"the Python package of '{error.name}' is not installed; `make build` does that.")
+    except KeyboardInterrupt:  # before the command, or after it
+        code = STOPPED
     except OSError as error:
         code = 1
         full = "no space is left where the output goes; make room, then do it again."
@@ -268,7 +288,9 @@ def main() -> None:
 
 
 def _complain(sentence: str) -> None:
-    print(f"twinmill: {' '.join(sentence.split())}", file=sys.stderr)
+    long = rf"(?<=[\s(=])'([^\s'][^']{{{QUOTED}}})[^']+'"  # an apostrophe stands behind a letter
+    short = re.sub(long, r"'\1...'", " ".join(sentence.split()))
+    print(f"twinmill: {short}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ if working():  # not for --help
 
     from twinmill.data.log import read_bytes
     from twinmill.diagnosis.diagnose import diagnose
-    from twinmill.files import check_new_folder
+    from twinmill.files import check_report
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import matters as present
     from twinmill.report import write_report
@@ -107,7 +107,7 @@ def _matters(
     Example: twinmill matters run.lcmlog --model explained.toml --out matters
     """
     if out:
-        check_new_folder(out)
+        check_report(out)
     request = make_request(
         behavior,
         model,
@@ -126,7 +126,7 @@ def _matters(
     source = provenance(_command_line(locals()), model_file)
     with TemporaryDirectory(prefix="twinmill.") as scratch, _stoppable(out):
         folder = out or Path(scratch)
-        hidden = _hidden(logs or [], model_file, folder, as_json)
+        hidden = _hidden(logs or [], model_file, folder)
         with busy("writing the changed models"):
             asked, left = factors(model_file, hidden, drawn=draws, seed=first_seed, only=only or [])
         with progress_bar() as progress:
@@ -167,7 +167,7 @@ def _stoppable(out: Path | None) -> Iterator[None]:
         raise
 
 
-def _hidden(logs: list[Path], model_file: ModelFile, folder: Path, as_json: bool) -> list[Hidden]:
+def _hidden(logs: list[Path], model_file: ModelFile, folder: Path) -> list[Hidden]:
     """What the logs do not exclude, kept in the folder: the diagnosis takes a minute."""
     if not logs:
         return unseen_effects(model_file.model)
@@ -177,7 +177,7 @@ def _hidden(logs: list[Path], model_file: ModelFile, folder: Path, as_json: bool
     if kept.exists() and (known := json.loads(kept.read_text()))["of"] == key:
         return [Hidden(**one) for one in known["hidden"]]
     with telling("looking for what the logs do not exclude") as progress:
-        diagnosis = diagnose(load(logs, model_file, as_json), model_file, progress)
+        diagnosis = diagnose(load(logs, model_file), model_file, progress)
     if diagnosis.found:
         typer.echo(
             f"twinmill: these logs show that {model_file.path} lacks {', '.join(diagnosis.found)}; "

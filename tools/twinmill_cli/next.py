@@ -103,9 +103,7 @@ def _next(
         from twinmill.swarm.sweep import make_request  # needs more packages than `make demo` has
 
         swarm = make_request(behavior, model, [], n=n, seeds=seeds, duration_s=swarm_s, full=True)
-        narrowing = _narrowing(
-            load(logs, model_file, as_json), model_file, limits, swarm, draws=draws
-        )
+        narrowing = _narrowing(load(logs, model_file), model_file, limits, swarm, draws=draws)
         write_whole(output, csv_text(narrowing.rows))
         how = _how(narrowing, logs, model, output, form=script_as)
         data = {"script": str(output), **narrowing.to_json(), **source.to_json()}
@@ -117,7 +115,7 @@ def _next(
         deliver(data, present.narrowing_terminal(narrowing, how), as_json)
         return narrowing
     with telling(f"designing a run with {model}") as progress:
-        plan = plan_run(load(logs, model_file, as_json), model_file, limits, progress)
+        plan = plan_run(load(logs, model_file), model_file, limits, progress)
     write_whole(output, csv_text(plan.rows))
     how = _how(plan, logs, model, output, form=script_as)
     data = {"script": str(output), **plan.to_json()}

@@ -15,7 +15,7 @@ from twinmill_cli.output import AsJson, busy, deliver
 if working():  # not for --help
     import hashlib
 
-    from twinmill.files import check_new_folder
+    from twinmill.files import check_report
     from twinmill.report import Provenance, Section, write_report
     from twinmill.report.phase_figures import (
         map_figure,
@@ -82,7 +82,7 @@ def _phase(
     worth = next_cells(phase, other, {run.cell for run in runs if run.cell is not None})
     match = agreement(runs) if runs else None
     target = out or folder / "phase"
-    check_new_folder(target)
+    check_report(target)
     words = ["twinmill", "phase", str(folder), "--goal", phase.goal]
     words += [word for text in at or [] for word in ("--at", text)]
     words += ["--experiments", str(experiments)] if experiments else []

@@ -12,7 +12,7 @@ from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
-    from twinmill.files import check_new_folder
+    from twinmill.files import check_holds, check_new_folder
     from twinmill.swarm.forecast.choose import choose
     from twinmill.swarm.forecast.draws import forecast, knows_errors, out_of_bounds
     from twinmill.swarm.forecast.plan import PLAN, SEALED, Plan, in_random_order, write_plan
@@ -61,6 +61,7 @@ def _predict_floor(
         raise ValueError(
             f"{output}: holds a plan that is sealed, and none is replaced; choose another -o."
         )
+    check_holds(output, [RUNS])
     with progress_bar() as progress:
         task = progress.add_task("runs of models drawn", total=None)
         expected = forecast(

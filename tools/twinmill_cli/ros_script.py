@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scripts of drives for robots on ROS, as `next` and `characterise` write them."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from twinmill.export.script import TwistScript, write_bag, write_publisher
@@ -14,10 +15,12 @@ def ros_path(form: ScriptForm, script: Path) -> Path:
     return script.with_name(f"{script.stem}_{form}{suffix}")
 
 
-def check_new_script(form: ScriptForm, path: Path, force: bool) -> None:
+def check_new_script(
+    form: ScriptForm | None, path: Path, force: bool, inputs: Iterable[Path] = ()
+) -> None:
     """Raises ValueError if it could not be written, before the long work."""
-    if form is ScriptForm.PUBLISHER:
-        check_new_file(path, force)
+    if form is not ScriptForm.BAG:
+        check_new_file(path, force, inputs)
         return
     if path.exists() and not force:
         raise ValueError(f"{path}: exists; choose another name, or replace it with --force.")
@@ -25,10 +28,16 @@ def check_new_script(form: ScriptForm, path: Path, force: bool) -> None:
 
 
 def write_script(
-    script: TwistScript, form: ScriptForm, path: Path, force: bool, *, command: str
+    script: TwistScript,
+    form: ScriptForm,
+    path: Path,
+    force: bool,
+    *,
+    command: str,
+    inputs: Iterable[Path] = (),
 ) -> None:
-    """Whole or not at all."""
+    """Whole or not at all, and never over the `inputs`."""
     if form is ScriptForm.BAG:
         write_bag(script, path, force)
     else:
-        write_publisher(script, path, force, command)
+        write_publisher(script, path, force, command=command, inputs=inputs)

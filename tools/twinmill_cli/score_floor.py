@@ -17,7 +17,7 @@ from twinmill_cli.output import AsJson, deliver
 if working():  # not for --help
     import hashlib
 
-    from twinmill.files import check_new_folder
+    from twinmill.files import check_report
     from twinmill.report import Provenance, write_report
     from twinmill.report.floor_score import NOTE, section, sentences
     from twinmill.swarm.forecast.plan import read_outcomes, read_plan
@@ -53,7 +53,7 @@ def _score_floor(
     Example: twinmill score-floor plan plan/outcomes.csv --out score
     """
     if out:
-        check_new_folder(out)
+        check_report(out)
     plan, digest = read_plan(folder, sha256)
     cell, seen, missing = read_outcomes(outcomes, plan)
     found = score(plan.expected, cell, seen, axes=plan.names, seed=plan.seed)

@@ -43,7 +43,11 @@ def _set(
 
     Example: twinmill set base.motor_lag_s=0.06 --model turbopi.toml -o slower.toml
     """
-    wanted = dict(map(_parsed, values))
+    wanted: dict[str, float] = {}
+    for name, value in map(_parsed, values):
+        if name in wanted:
+            raise ValueError(f"{name}: is given twice; give it one value.")
+        wanted[name] = value
     model_file = open_model(model, None)
     check_new_file(output, force, [model_file.path])
     command = command_line(shlex.join(["set", *values]), [], model, output)

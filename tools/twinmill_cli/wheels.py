@@ -34,7 +34,7 @@ if working():  # not for --help
     from twinmill.report import show
     from twinmill.report.tables import Cell, Table
     from twinmill_cli.frame import open_model
-    from twinmill_cli.ros_script import write_script
+    from twinmill_cli.ros_script import check_new_script, write_script
 
 SCRIPT = Path("wheels.csv")
 
@@ -68,8 +68,10 @@ def _wheels(
 
     Example: twinmill wheels -o wheels.csv; twinmill wheels wheels.lcmlog
     """
-    robot_model = open_model(model, None).model
+    model_file = open_model(model, None)
+    robot_model = model_file.model
     if log is None:
+        check_new_script(script_as, output, force, [model_file.path])
         return _write(robot_model, output, duty_pct, script_as, force=force, as_json=as_json)
     found = [read_signs(robot, robot_model, log.name) for robot in read_log(log).robots.values()]
     right = all(signs.right for signs in found)

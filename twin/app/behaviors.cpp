@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr const char *kFileName = "behaviors.toml";
 
-std::string FindFile()
+std::string DefaultFile()
 {
     const char *config = std::getenv("XDG_CONFIG_HOME"), *home = std::getenv("HOME");
     fs::path user = config && *config ? fs::path(config) : fs::path(home ? home : "") / ".config";
@@ -42,9 +42,14 @@ toml::table Parse(const std::string &path)
 
 }  // namespace
 
+std::string FindBehaviors(const std::string &path)
+{
+    return path.empty() ? DefaultFile() : path;
+}
+
 OwnBehaviors::OwnBehaviors(const std::string &path)
 {
-    const std::string file = path.empty() ? FindFile() : path;
+    const std::string file = FindBehaviors(path);
     if (file.empty())
         return;
     for (const auto &[key, value] : Parse(file))

@@ -13,14 +13,18 @@
 namespace twin
 {
 
+// A given path; else behaviors.toml in the working directory, else in twinmill/ of the user's
+// configuration, else empty.
+std::string FindBehaviors(const std::string &path);
+
 // Moved, not copied: the behaviours point at their names.
 class OwnBehaviors
 {
 public:
     OwnBehaviors() = default;
-    // Lines `name = "100,-0.5,100,0.5"` of a TOML file: see fw_table_parse(). Without a path:
-    // behaviors.toml in the working directory, else in twinmill/ of the user's configuration, else
-    // none. Throws std::invalid_argument in one sentence if the file holds anything else.
+    // Lines `name = "100,-0.5,100,0.5"` of a TOML file: see fw_table_parse(), of the file that
+    // FindBehaviors() finds. Throws std::invalid_argument in one sentence if it holds anything
+    // else.
     explicit OwnBehaviors(const std::string &path);
     OwnBehaviors(OwnBehaviors &&) = default;
     OwnBehaviors &operator=(OwnBehaviors &&) = default;

@@ -22,9 +22,14 @@ std::filesystem::path DefaultPath()
 
 }  // namespace
 
+std::string KeyPath(const std::string &path)
+{
+    return path.empty() ? DefaultPath().string() : path;
+}
+
 seal_key LoadKey(const std::string &path)
 {
-    const std::filesystem::path file = path.empty() ? DefaultPath() : std::filesystem::path(path);
+    const std::filesystem::path file = KeyPath(path);
     std::error_code ignored;
     std::filesystem::create_directories(file.parent_path(), ignored);
     if (!seal_make(file.c_str()))

@@ -10,7 +10,10 @@
 namespace twin
 {
 
-// `path`: of the key; empty: swarm.key in the user's own folder. A key that is not there is made.
+// A given path; where it is empty, swarm.key in the user's own folder.
+std::string KeyPath(const std::string &path);
+
+// The key of KeyPath(). One that is not there is made.
 // Throws std::runtime_error in one sentence.
 seal_key LoadKey(const std::string &path);
 

@@ -9,22 +9,15 @@
 
 namespace twin
 {
-namespace
-{
 
-// The finished log is renamed over `path`: a device or a folder must not be replaced by it.
-const std::string &Replaceable(const std::string &path)
+std::string PartialPath(const std::string &path)
 {
-    if (std::filesystem::exists(path) && !std::filesystem::is_regular_file(path))
-        throw std::runtime_error("log " + path + ": is no ordinary file; choose another name");
-    return path;
+    return path + ".partial";
 }
 
-}  // namespace
-
-LogWriter::LogWriter(const std::string &path) : path_(Replaceable(path))
+LogWriter::LogWriter(const std::string &path) : path_(path)
 {
-    log_.reset(lcm_eventlog_create(PartialPath().c_str(), "w"));
+    log_.reset(lcm_eventlog_create(PartialPath(path_).c_str(), "w"));
     if (!log_)
         Fail("cannot be written");
 }
@@ -33,7 +26,7 @@ LogWriter::~LogWriter()
 {
     log_.reset();
     std::error_code ignored;
-    std::filesystem::remove(PartialPath(), ignored);
+    std::filesystem::remove(PartialPath(path_), ignored);
 }
 
 void LogWriter::Fail(const char *what) const
@@ -59,7 +52,7 @@ void LogWriter::Finish()
     if (std::fflush(log_->f) != 0)
         Fail("writing failed");
     log_.reset();
-    std::filesystem::rename(PartialPath(), path_);
+    std::filesystem::rename(PartialPath(path_), path_);
 }
 
 }  // namespace twin

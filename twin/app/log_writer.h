@@ -13,6 +13,9 @@
 namespace twin
 {
 
+// What is not finished is written here.
+std::string PartialPath(const std::string &path);
+
 class LogWriter
 {
 public:
@@ -32,7 +35,6 @@ private:
     {
         void operator()(lcm_eventlog_t *log) const { lcm_eventlog_destroy(log); }
     };
-    std::string PartialPath() const { return path_ + ".partial"; }
     [[noreturn]] void Fail(const char *what) const;
 
     std::string path_;

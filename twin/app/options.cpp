@@ -87,6 +87,7 @@ void AddOutput(CLI::App &app, Options &o)
                    "given time")
         ->check(CLI::Range(0.0, 1e6));
     app.add_option("--log", o.log, "write an LCM log; alone, nothing goes to the bus");
+    app.add_flag("--force", o.force, "replace files that exist");
     app.add_option("--lcm-url", o.lcm_url,
                    "bus; default udpm://239.255.76.67:7667?ttl=0, memq:// for none");
     app.add_option("--channel-prefix", o.channel_prefix,

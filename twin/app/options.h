@@ -29,7 +29,7 @@ struct Options
     std::optional<double> duration_s, dt_s, realtime_factor;
     double pose_rate_hz = 120;
     std::string script, behaviors, log, channel_prefix, script_dir = ".", key;
-    bool wait = false;
+    bool force = false, wait = false;
     std::optional<std::string> lcm_url;
     std::optional<int64_t> epoch_us;
     bool view = false;

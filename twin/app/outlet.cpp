@@ -13,11 +13,21 @@ constexpr std::string_view kFile = "file://", kModeWrite = "?mode=w";
 
 }  // namespace
 
+std::string RecordingPath(const std::string &url)
+{
+    if (!url.starts_with(kFile))
+        return "";
+    if (!url.ends_with(kModeWrite))
+        throw std::runtime_error("--lcm-url " + url + ": a log is file://PATH?mode=w");
+    return url.substr(kFile.size(), url.size() - kFile.size() - kModeWrite.size());
+}
+
 void Outlet::OpenBus(const std::string &url)
 {
-    if (url.starts_with(kFile))
+    if (const std::string path = RecordingPath(url); !path.empty())
     {
-        OpenRecording(url);
+        recording_ =
+            std::make_unique<LogWriter>(path);  // liblcm's is silent where the disk is full
         return;
     }
     constexpr const char *kOwnMachine = "udpm://239.255.76.67:7667?ttl=0";
@@ -27,15 +37,6 @@ void Outlet::OpenBus(const std::string &url)
         throw std::runtime_error("LCM cannot send to " + where);
     bus_ = std::move(bus);
     bus_url_ = where;
-}
-
-// liblcm's own writer is silent where the disk is full.
-void Outlet::OpenRecording(const std::string &url)
-{
-    if (!url.ends_with(kModeWrite))
-        throw std::runtime_error("--lcm-url " + url + ": a log is file://PATH?mode=w");
-    const size_t length = url.size() - kFile.size() - kModeWrite.size();
-    recording_ = std::make_unique<LogWriter>(url.substr(kFile.size(), length));
 }
 
 void Outlet::SendBytes(int64_t utime_us, const std::string &channel)

@@ -14,6 +14,10 @@
 namespace twin
 {
 
+// Of a bus that is a log, file://PATH?mode=w; empty of all others. Throws std::runtime_error in one
+// sentence if the mode is another.
+std::string RecordingPath(const std::string &url);
+
 class Outlet
 {
 public:
@@ -47,7 +51,6 @@ public:
     }
 
 private:
-    void OpenRecording(const std::string &url);
     void SendBytes(int64_t utime_us, const std::string &channel);
 
     std::unique_ptr<lcm::LCM> bus_;  // only sends: its receiver believes what packets claim

@@ -12,6 +12,7 @@
 #include "behaviors.h"
 #include "commands.h"
 #include "key.h"
+#include "outputs.h"
 #include "plant_mujoco/mujoco_plant.h"
 #include "publisher.h"
 #include "sensors.h"
@@ -33,6 +34,8 @@ using Clock = std::chrono::steady_clock;
 constexpr double kMaxStep_s = 0.0055;
 // Distractors lie this many spreads of the start away.
 constexpr double kRing = 1.5;
+// Further than any robot drives in the longest run: the model's numbers make it run away.
+constexpr double kFarthest_m = 1e9;
 // A fixed date, so that a log depends on nothing but its options: 2023-11-14 22:13:20 UTC.
 constexpr int64_t kLogEpoch_us = 1'700'000'000'000'000;
 
@@ -176,6 +179,7 @@ public:
                 KeepPace(swarm.TimeS());
                 publisher.PublishPoses(swarm);
             }
+            CheckNear(swarm);
             Observe(swarm);
             begin_ += ToClock(views.Show(swarm));
             if (views.Closed())
@@ -192,6 +196,20 @@ public:
     }
 
 private:
+    // Throws std::runtime_error in one sentence if a robot is nowhere; NaN compares false.
+    static void CheckNear(const Swarm &swarm)
+    {
+        for (int robot = 0; robot < swarm.Size(); ++robot)
+        {
+            const Pose2 &pose = swarm.State(robot).pose;
+            if (!(std::hypot(pose.x_m, pose.y_m) < kFarthest_m))
+                throw std::runtime_error(
+                    "robot " + std::to_string(robot) + " is out of any room after " +
+                    std::to_string(swarm.TimeS()) +
+                    " s: the model grows without bound; correct its formulas and numbers");
+        }
+    }
+
     void Observe(const Swarm &swarm)
     {
         if (!show_ || !progress_.IsDue(WallS()))
@@ -233,6 +251,7 @@ void RequestStop()
 
 void Run(const Options &options)
 {
+    CheckOutputs(options);
     const Setup setup = Prepare(options);
     std::shared_ptr<const Script> script;
     if (!options.script.empty())

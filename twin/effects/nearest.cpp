@@ -31,11 +31,27 @@ size_t EditDistance(std::string_view a, std::string_view b)
 
 }  // namespace
 
-std::string Nearest(std::string_view name, const std::set<std::string> &known)
+std::string NearestKnown(std::string_view name, const std::set<std::string> &known)
 {
-    return *std::min_element(known.begin(), known.end(), [name](const auto &a, const auto &b) {
-        return EditDistance(name, a) < EditDistance(name, b);
-    });
+    const auto &near =
+        *std::min_element(known.begin(), known.end(), [name](const auto &a, const auto &b) {
+            return EditDistance(name, a) < EditDistance(name, b);
+        });
+    if (5 * EditDistance(name, near) <= 2 * std::max(name.size(), near.size()))
+        return "the nearest known is '" + near + "'";
+    std::string list;
+    for (const std::string &one : known)
+        list.append(list.empty() ? "" : ", ").append(one);
+    return "known are " + list;
+}
+
+std::string Quoted(std::string_view text)
+{
+    constexpr size_t kMost = 80;
+    std::string quoted(1, '\'');
+    quoted.append(text.substr(0, kMost));
+    quoted.append(text.size() > kMost ? "...'" : "'");
+    return quoted;
 }
 
 }  // namespace twin

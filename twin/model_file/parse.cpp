@@ -30,8 +30,8 @@ namespace
                               std::string_view name, const std::string &where,
                               const std::set<std::string> &known)
 {
-    Fail(origin, "unknown " + what + " '" + std::string(name) + "' in " + where +
-                     "; the nearest known is '" + Nearest(name, known) + "'");
+    Fail(origin, "unknown " + what + " " + Quoted(name) + " in " + where + "; " +
+                     NearestKnown(name, known));
 }
 
 double Number(const std::string &origin, const std::string &name, const toml::node &node,
@@ -293,9 +293,10 @@ private:
                     known.insert(other->card.name);
                 FailUnknown(origin_, "effect", name, "[[effect]]", known);
             }
+            const std::map<std::string, std::string> texts = ReadTexts(*table, *spec);
             try
             {
-                model_.AddEffect(name, ReadTexts(*table, *spec));
+                model_.AddEffect(name, texts);
             }
             catch (const std::invalid_argument &error)
             {

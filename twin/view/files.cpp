@@ -18,22 +18,10 @@ extern char **environ;
 
 namespace twin
 {
-namespace
-{
-
-std::string Partial(const char *option, const std::string &path)
-{
-    if (std::filesystem::exists(path) && !std::filesystem::is_regular_file(path))
-        throw std::runtime_error(std::string(option) + " " + path +
-                                 ": is no ordinary file; choose another name");
-    return path + ".partial";
-}
-
-}  // namespace
 
 void WritePng(const std::string &path, const std::vector<uint8_t> &rgb, int width_px, int height_px)
 {
-    const std::string partial = Partial("--picture", path);
+    const std::string partial = path + ".partial";
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
     image.width = static_cast<png_uint_32>(width_px);
@@ -46,7 +34,7 @@ void WritePng(const std::string &path, const std::vector<uint8_t> &rgb, int widt
 }
 
 VideoWriter::VideoWriter(const std::string &path, int width_px, int height_px, int rate_Hz)
-    : path_(path), partial_path_(Partial("--video", path))
+    : path_(path), partial_path_(path + ".partial")
 {
     std::signal(SIGPIPE, SIG_IGN);  // a writer that ended is seen by write()
     const std::string size = std::to_string(width_px) + "x" + std::to_string(height_px);

@@ -20,6 +20,8 @@ import numpy as np
 import turbopi
 import twinmill_native as native
 
+FEW_BROKEN = 0.02  # of a channel: damage; more are messages of another type
+
 # Fixed-size types of the LCM language, as they are on the wire.
 NUMBERS = {
     "int8_t": "i1",
@@ -103,26 +105,44 @@ def layout_of(message: type) -> np.dtype:
     return np.dtype([("hash", "S8"), *fields])
 
 
-def decode(payloads: list[bytes], message: type, channel: str) -> np.ndarray:
+def decode(
+    payloads: list[bytes], message: type, channel: str, warnings: list[str] | None = None
+) -> np.ndarray:
     """Messages of one fixed-size type as a structured array, fields as in the .lcm file.
 
     Args:
         payloads: (K,) encoded messages.
         message: class generated from the .lcm file, of fixed size.
         channel: for the message of the error.
+        warnings: gets a sentence where a few messages are broken; they are left out.
 
     Raises:
-        LogError: if one payload is of another type.
+        LogError: if more payloads are of another type.
     """
     layout, fingerprint = layout_of(message), message._get_packed_fingerprint()
-    for payload in payloads:
-        if len(payload) != layout.itemsize or payload[:8] != fingerprint:
+    whole = [p for p in payloads if len(p) == layout.itemsize and p[:8] == fingerprint]
+    if len(whole) < len(payloads):
+        if warnings is None or not few_broken(len(payloads) - len(whole), len(payloads)):
+            (strange, *_) = (
+                p for p in payloads if len(p) != layout.itemsize or p[:8] != fingerprint
+            )
             raise LogError(
                 f"{channel}: a message is not of type turbopi.{message.__name__} (fingerprint "
-                f"{payload[:8].hex()}, expected {fingerprint.hex()}): the log was made with other "
+                f"{strange[:8].hex()}, expected {fingerprint.hex()}): the log was made with other "
                 "message types; convert it with the programs that wrote it."
             )
-    return np.frombuffer(b"".join(payloads), layout)
+        warnings.append(broken(channel, len(payloads) - len(whole), len(payloads)))
+    return np.frombuffer(b"".join(whole), layout)
+
+
+def few_broken(count: int, of: int) -> bool:
+    """Whether so many messages that cannot be read are damage, and no other type of message."""
+    return count <= FEW_BROKEN * of
+
+
+def broken(channel: str, count: int, of: int) -> str:
+    """The sentence on them."""
+    return f"{channel}: {count} of {of} messages are damaged; left out."
 
 
 @contextmanager

@@ -12,12 +12,23 @@ from typing import Literal
 import numpy as np
 import turbopi
 
-from twinmill.data.lcm_log import Events, LogError, decode, split_events
+from twinmill.data.lcm_log import (
+    FEW_BROKEN,
+    Events,
+    LogError,
+    broken,
+    decode,
+    few_broken,
+    split_events,
+)
 
 __all__ = ["Log", "LogError", "RobotLog", "read_log"]
 
 CommandKind = Literal["duty", "wheel_speed", "twist", "none"]
 KINDS: tuple[CommandKind, ...] = ("duty", "wheel_speed", "twist")  # by drive_t.kind
+
+FAR_S = 60.0  # beside its span: no channel has single stamps so far away
+FARTHEST_M = 1e9  # no room is as large: such a place is damage
 
 _READ = ("TELEMETRY", "POSE", "DRIVE", "RUN", "DETECTION")
 _KNOWN_ELSEWHERE = re.compile(
@@ -143,7 +154,7 @@ def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = ""
     )
     robots = {}
     for robot_id, (commands, poses) in messages.items():
-        run = _last_run(channels[robot_id].get("RUN", []), robot_id)
+        run = _last_run(channels[robot_id].get("RUN", []), robot_id, warnings)
         robots[robot_id] = RobotLog(
             robot_id=robot_id,
             source=run.source,
@@ -228,15 +239,27 @@ def _decode_robot(
             series.append(None)
             continue
         message = getattr(turbopi, f"{source.lower()}_t")
-        series.append(
-            _in_order(
-                decode(kinds[source], message, f"{name}_{source}"),
-                f"{name}_{source}",
-                robot_id,
-                warnings,
-            )
-        )
+        channel = f"{name}_{source}"
+        messages = decode(kinds[source], message, channel, warnings)
+        messages = _undamaged(messages, channel, warnings)
+        series.append(_in_order(messages, channel, robot_id, warnings))
     return series[0], series[1]
+
+
+def _undamaged(messages: np.ndarray, channel: str, warnings: list[str]) -> np.ndarray:
+    """Without the few whose stamp or kind is none that its channel has, as after a flipped bit."""
+    t_s = messages["utime_us"].astype(float) / 1e6
+    first_s, last_s = np.quantile(t_s, (FEW_BROKEN, 1 - FEW_BROKEN))
+    far_s = last_s - first_s + FAR_S
+    strange = (t_s < first_s - far_s) | (t_s > last_s + far_s)
+    if "kind" in messages.dtype.names:
+        kinds, counts = np.unique(messages["kind"], return_counts=True)
+        strange |= messages["kind"] != kinds[counts.argmax()]
+    count = int(np.count_nonzero(strange))
+    if not count or not few_broken(count, len(messages)):
+        return messages
+    warnings.append(broken(channel, count, len(messages)))
+    return messages[~strange]
 
 
 def _in_order(messages: np.ndarray, channel: str, robot_id: int, warnings: list[str]) -> np.ndarray:
@@ -260,17 +283,23 @@ def _in_order(messages: np.ndarray, channel: str, robot_id: int, warnings: list[
     return messages[order[last]]
 
 
-def _last_run(payloads: list[bytes], robot_id: int) -> turbopi.run_t:
-    """What the robot said of itself last; empty if it said nothing."""
+def _last_run(payloads: list[bytes], robot_id: int, warnings: list[str]) -> turbopi.run_t:
+    """What the robot said of itself last, of what can be read; empty if it said nothing."""
     if not payloads:
         return turbopi.run_t()
-    try:
-        return turbopi.run_t.decode(payloads[-1])
-    except Exception as error:  # the generated decoder raises what its steps happen to raise
-        raise LogError(
-            f"R{robot_id:02d}_RUN: a message is not of type turbopi.run_t ({error}): "
-            "the log was made with other message types."
-        ) from error
+    for count, payload in enumerate(reversed(payloads)):
+        try:
+            run = turbopi.run_t.decode(payload)
+        except Exception as error:  # the generated decoder raises what its steps happen to raise
+            failed = error
+            continue
+        if count:
+            warnings.append(broken(f"R{robot_id:02d}_RUN", count, len(payloads)))
+        return run
+    raise LogError(
+        f"R{robot_id:02d}_RUN: a message is not of type turbopi.run_t ({failed}): "
+        "the log was made with other message types."
+    ) from failed
 
 
 def _says_same_clock(config_toml: str) -> bool:
@@ -330,7 +359,7 @@ def _detection_series(
     if not payloads:
         return {}
     channel = f"R{robot_id:02d}_DETECTION"
-    messages = decode(payloads, turbopi.detection_t, channel)
+    messages = decode(payloads, turbopi.detection_t, channel, warnings)
     messages = _in_order(messages, channel, robot_id, warnings)
     return {"seen_t_s": _seconds(messages, t0_us), "seen": messages["seen"] != 0}
 
@@ -369,8 +398,8 @@ def _pose_series(
     position_m = messages["position_m"].astype(float)
     quaternion = messages["orientation_wxyz"].astype(float)
     stated = messages["valid"] != 0
-    placed = np.isfinite(position_m).all(axis=1)
-    turned = np.abs(np.linalg.norm(quaternion, axis=1) - 1) < 0.1  # NaN compares false
+    placed = (np.abs(position_m) < FARTHEST_M).all(axis=1)  # NaN compares false
+    turned = np.abs(np.linalg.norm(np.clip(quaternion, -2, 2), axis=1) - 1) < 0.1
     seen = stated & placed
     has_heading = not seen.any() or not np.isnan(quaternion[seen]).all()
     valid = seen & turned if has_heading else seen

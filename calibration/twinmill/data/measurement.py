@@ -159,6 +159,18 @@ class BadInputError(LogError):
         self.findings = findings
 
 
+def findings_of(error: LogError) -> list[InputFinding]:
+    """What an error says of the input, whatever it was that could not be judged."""
+    if isinstance(error, BadInputError):
+        return error.findings
+    said = " ".join(str(error).split()).removesuffix(".")
+    return [
+        InputFinding(
+            "nothing in the log can be judged", said, "correct it, or give another log", True
+        )
+    ]
+
+
 def load_measurements(
     paths: Sequence[Path | Log], model: native.Model | None = None
 ) -> Measurements:

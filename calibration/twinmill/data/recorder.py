@@ -11,6 +11,11 @@ from types import TracebackType
 import lcm
 
 
+def partial_of(path: Path) -> Path:
+    """Where a log is kept while it is not closed."""
+    return path.with_name(path.name + ".partial")
+
+
 class Recorder:
     """A log that stands under its name only once it is closed: written beside it, then renamed.
 
@@ -22,10 +27,10 @@ class Recorder:
         """Opens the log.
 
         Args:
-            path: replaced if it exists.
+            path: replaced if it exists, as what is there of one that was not closed.
         """
         self._path = path
-        self._partial = path.with_name(path.name + ".partial")
+        self._partial = partial_of(path)
         self._log = lcm.EventLog(str(self._partial), "w", overwrite=True)
         self._ends_bytes = [0]  # of whole events
         self.failed = ""

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cleans a robot's series for prediction: what is usable, where it rests, how regular it is."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from twinmill.data.cuts import find_segments
 from twinmill.data.log import CommandKind, LogError, RobotLog
+from twinmill.data.lost_commands import lost_commands, words
 
 LIFT_M = 0.05  # height above the median that no driving robot has
 SILENCE_S = 0.25  # telemetry comes every 22 ms: after this the duties are not known any more
 HELD_S, HELDS = 2.0, 3  # a last command holds for this, or so many times the longest before it
 STANDING_M = 0.05  # within which a robot that stands is seen
+AFTER_S = 0.3  # for which a lag remembers commands that were lost
 CLOCK_S = 0.3  # more than any offset between the clocks
 FROZEN_S = 0.5  # a pose that keeps its very bits for longer while driven is no measurement
 REST_S = 1.5  # coasting ends within 0.5 s; the rest is for lag and clocks
@@ -60,6 +62,8 @@ class Track:
         same_clock: the log says that one clock stamped commands and poses.
         telemetry: the robot told its commands at each control step: where it falls silent its
             watchdog stops it. Other commands are held for as long as it takes.
+        lost_s: (K, 2) s, stretches without commands where the beat says that some were lost; with
+            telemetry (0, 2), since silence has its own rule there.
         astray_rad: by which a robot that is driven straight moves to the left of its heading, where
             that is no bias; else 0.
     """
@@ -80,6 +84,7 @@ class Track:
     same_clock: bool = False
     telemetry: bool = False
     astray_rad: float = 0.0
+    lost_s: np.ndarray = field(default_factory=lambda: np.empty((0, 2)))
 
     @property
     def heading_rad(self) -> np.ndarray:
@@ -108,10 +113,11 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
             "motion capture together."
         )
     notes: list[str] = []
-    usable = _trackable(robot, notes)
+    lost_s = np.empty((0, 2)) if len(robot.mode) else lost_commands(robot)
+    usable = _trackable(robot, lost_s, notes)
     segment = find_segments(robot, usable, (usual_mps, usual_radps), notes)
     pose = _continuous(robot.pose, segment)
-    rest, astray_rad = _rest(robot), 0.0
+    rest, astray_rad = _rest(robot, lost_s), 0.0
     _note_frozen(robot, notes)
     if robot.has_heading:
         heading_smooth, _ = local_line(robot.pose_t_s, pose[:, 2], segment, SMOOTH_S)
@@ -142,6 +148,7 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
         same_clock=robot.same_clock,
         telemetry=len(robot.mode) > 0,
         astray_rad=astray_rad,
+        lost_s=lost_s,
     )
 
 
@@ -154,7 +161,7 @@ def command_at(t_s: np.ndarray, command_t_s: np.ndarray, command: np.ndarray) ->
     return np.where((k >= 0)[:, None], command[np.maximum(k, 0)], 0.0)
 
 
-def _trackable(robot: RobotLog, notes: list[str]) -> np.ndarray:
+def _trackable(robot: RobotLog, lost_s: np.ndarray, notes: list[str]) -> np.ndarray:
     """(N,) bool: poses that are valid, on the floor, and taken while commands are known."""
     lifted = np.abs(robot.z_m - np.nanmedian(robot.z_m)) > LIFT_M  # NaN compares false
     if lifted.any():
@@ -163,6 +170,12 @@ def _trackable(robot: RobotLog, notes: list[str]) -> np.ndarray:
             "are off the floor; left out."
         )
     silent = _silent(robot)
+    lost = np.zeros(len(silent), bool)
+    for begin_s, end_s in lost_s:
+        lost |= (robot.pose_t_s > begin_s) & (robot.pose_t_s < end_s + AFTER_S)
+    if (lost & robot.valid).any():
+        count = np.count_nonzero(lost & robot.valid)
+        notes.append(f"{words(robot, lost_s)}; {count} poses left out.")
     if (silent & robot.valid).any():
         first = robot.pose_t_s[silent & robot.valid][0]
         ended = f"; the last is at {robot.command_t_s[-1]:.3f} s" if silent[-1] else ""
@@ -170,7 +183,7 @@ def _trackable(robot: RobotLog, notes: list[str]) -> np.ndarray:
             f"{np.count_nonzero(silent & robot.valid)} poses from {first:.3f} s on were "
             f"taken while no commands are in the log{ended}; left out."
         )
-    return robot.valid & ~lifted & ~silent
+    return robot.valid & ~lifted & ~silent & ~lost
 
 
 def _silent(robot: RobotLog) -> np.ndarray:
@@ -252,12 +265,13 @@ def local_line(
     return np.where(segment < 0, np.nan, value), np.where(segment < 0, np.nan, slope)
 
 
-def _rest(robot: RobotLog) -> np.ndarray:
+def _rest(robot: RobotLog, lost_s: np.ndarray) -> np.ndarray:
     """(K, 2) s as described in Track."""
     t = robot.command_t_s
     moving = (robot.command != 0).any(axis=1)
     if len(robot.mode):  # a stretch without telemetry is no rest
         moving[:-1] |= np.diff(t) > SILENCE_S
+    moving |= np.isin(t, lost_s[:, 0])
     edge = np.flatnonzero(np.diff(np.concatenate([[1], moving, [1]])))
     starts, ends = t[edge[::2]], np.append(t, t[-1] + CLOCK_S)[edge[1::2]]
     rest = np.column_stack([starts + REST_S, ends - CLOCK_S])

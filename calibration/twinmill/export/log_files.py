@@ -14,6 +14,7 @@ from twinmill.defaults import LogFormat
 from twinmill.export.mcap_file import write_mcap
 from twinmill.export.recording import Recording, read_recording
 from twinmill.export.rosbag2_file import left_out, write_rosbag2
+from twinmill.export.script import BAG_FILES
 from twinmill.export.tables import tables_of, write_csv, write_parquet
 from twinmill.files import folder_beside, replacing, replacing_folder
 from twinmill.model.outlines import Body
@@ -83,7 +84,7 @@ def export_log(
         with replacing(out, force, inputs=[log]) as temporary:
             write_mcap(recording, temporary, provenance, Body.of(model))
     elif to is LogFormat.ROSBAG2:
-        with replacing_folder(out, force, inputs=[log]) as temporary:
+        with replacing_folder(out, force, inputs=[log], holds=BAG_FILES) as temporary:
             write_rosbag2(recording, temporary)
         if strange := left_out(recording):
             warnings.append(f"ROS has no messages for {', '.join(strange)}: left out.")

@@ -3,13 +3,14 @@
 
 import hashlib
 import re
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import turbopi
 
-from twinmill.data.lcm_log import split_events
+from twinmill.data.lcm_log import broken, few_broken, split_events
 from twinmill.data.log import LogError, read_bytes
 
 # Those of the package that are sent by themselves, by what a message starts with.
@@ -72,11 +73,13 @@ def read_recording(path: Path) -> Recording:
     events = split_events(data, path.name)
     channels, warnings, strange = [], list(events.warnings), []
     for name, payloads in sorted(events.by_channel.items()):
-        kind = TYPES.get(payloads[0][:8])
+        ((fingerprint, _),) = Counter(payload[:8] for payload in payloads).most_common(1)
+        kind = TYPES.get(fingerprint)
+        stamps_us = events.stamps_us[name]
         if kind is None:
             strange.append(f"{name} ({len(payloads)})")
             continue
-        channels.append(Channel(name, _decode(kind, payloads, name), events.stamps_us[name]))
+        channels.append(_decoded(kind, payloads, name, stamps_us=stamps_us, warnings=warnings))
     if strange:
         warnings.append(f"messages of other programs were left out: {', '.join(strange)}.")
     if not channels:
@@ -87,11 +90,23 @@ def read_recording(path: Path) -> Recording:
     return Recording(path, hashlib.sha256(data).hexdigest(), channels, warnings)
 
 
-def _decode(kind: type, payloads: list[bytes], channel: str) -> list[Any]:
-    try:
-        return [kind.decode(payload) for payload in payloads]
-    except Exception as error:  # the generated decoder raises what its steps happen to raise
+def _decoded(
+    kind: type, payloads: list[bytes], channel: str, *, stamps_us: list[int], warnings: list[str]
+) -> Channel:
+    """The channel without a few messages that are broken, on which there is then a sentence."""
+    messages, kept_us, failed = [], [], []
+    for payload, stamp_us in zip(payloads, stamps_us, strict=True):
+        try:
+            messages.append(kind.decode(payload))
+        except Exception as error:  # the generated decoder raises what its steps happen to raise
+            failed.append(error)
+            continue
+        kept_us.append(stamp_us)
+    if not few_broken(len(failed), len(payloads)):
         raise LogError(
-            f"{channel}: a message is not of type turbopi.{kind.__name__} as the first one is "
-            f"({error}): two programs speak on this channel, or the log is damaged."
-        ) from error
+            f"{channel}: a message is not of type turbopi.{kind.__name__} as others are "
+            f"({failed[0]}): two programs speak on this channel, or the log is damaged."
+        ) from failed[0]
+    if failed:
+        warnings.append(broken(channel, len(failed), len(payloads)))
+    return Channel(channel, messages, kept_us)

@@ -5,6 +5,7 @@ Duties become the body velocities that the model reaches at them. Robots stop wh
 for a while, so each is said again every PERIOD_S.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from string import Template
@@ -20,6 +21,7 @@ TOPIC = "/cmd_vel"
 PERIOD_S = 0.05
 TWIST = "geometry_msgs/msg/Twist"
 BAG_VERSION = 9  # of rosbag2's metadata: Iron and later
+BAG_FILES = ("metadata.yaml", "*.db3", "*.mcap")  # of a bag that was written here
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,8 @@ def write_bag(script: TwistScript, out: Path, force: bool) -> None:
 
     store = get_typestore(Stores.ROS2_HUMBLE)
     vector, twist = store.types["geometry_msgs/msg/Vector3"], store.types[TWIST]
-    with replacing_folder(out, force) as bag, Writer(bag, version=BAG_VERSION) as writer:
+    folder = replacing_folder(out, force, holds=BAG_FILES)
+    with folder as bag, Writer(bag, version=BAG_VERSION) as writer:
         topic = writer.add_connection(TOPIC, TWIST, typestore=store)
         for t_s, (vx, vy, omega) in zip(*script.repeated(), strict=True):
             message = twist(vector(x=vx, y=vy, z=0.0), vector(x=0.0, y=0.0, z=omega))
@@ -81,13 +84,20 @@ def write_bag(script: TwistScript, out: Path, force: bool) -> None:
             writer.write(topic, round(t_s * 1e9), raw)
 
 
-def write_publisher(script: TwistScript, out: Path, force: bool, command: str) -> None:
-    """A Python program that needs ROS 2 alone.
+def write_publisher(
+    script: TwistScript,
+    out: Path,
+    force: bool,
+    *,
+    command: str,
+    inputs: Iterable[Path] = (),
+) -> None:
+    """A Python program that needs ROS 2 alone; `inputs` as of `check_new_file`.
 
     Raises:
         ValueError: it exists, or cannot be written.
     """
-    check_new_file(out, force)
+    check_new_file(out, force, inputs)
     rows = [
         f"    ({t_s:.6g}, {vx:.6g}, {vy:.6g}, {omega:.6g}),"
         for t_s, (vx, vy, omega) in zip(script.t_s, script.twist, strict=True)

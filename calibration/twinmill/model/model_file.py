@@ -162,10 +162,10 @@ class ModelFile:
         known = _names(self.model)
         for name in found.names:
             if name not in known:
-                (near,) = difflib.get_close_matches(name, sorted(known), n=1, cutoff=0)
+                near = difflib.get_close_matches(name, sorted(known), n=1)
+                hint = f"; the nearest known is '{near[0]}'" if near else ""
                 raise ModelError(
-                    f"{self.path}: [fit.covariance] '{name}' is no quantity of this model; the "
-                    f"nearest known is '{near}'."
+                    f"{self.path}: [fit.covariance] '{name}' is no quantity of this model{hint}."
                 )
         return found
 

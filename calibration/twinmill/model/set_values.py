@@ -39,10 +39,11 @@ def with_values(parent: ModelFile, values: Mapping[str, float], command: str) ->
 def _check(name: str, value: float, bounds: Mapping[str, dict]) -> None:
     known = [own for own in bounds if not own.startswith("theta_")]
     if name not in known:
-        (near,) = difflib.get_close_matches(name, known, n=1, cutoff=0)
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"; the nearest known is '{near[0]}'" if near else ""
         raise ModelError(
-            f"{name}: is no quantity of this model; the nearest known is '{near}' "
-            "(`twinmill open` shows all with their bounds)."
+            f"{name}: is no quantity of this model{hint} (`twinmill open` shows all with their "
+            "bounds)."
         )
     low, high = bounds[name]["min"], bounds[name]["max"]
     if not low <= value <= high:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from markupsafe import Markup, escape
 
+from twinmill.files import REPORT, check_report
 from twinmill.model.model_file import write_whole
 from twinmill.report.tables import Table, Tone
 
@@ -93,8 +94,9 @@ def write_report(
         Path of the file.
 
     Raises:
-        ModelError: it cannot be written.
+        ValueError: it cannot be written, or what is there is no report.
     """
+    check_report(Path(folder))
     Path(folder).mkdir(parents=True, exist_ok=True)
     path = Path(folder) / "index.html"
     write_whole(path, render_page(title, source, sections, note))
@@ -120,5 +122,10 @@ def render_page(title: str, source: Provenance, sections: list[Section], note: s
     environment.filters["coded"] = coded
     charted = next((s for s in reversed(sections) if s.charts), None)
     return environment.get_template("report.html.j2").render(
-        title=title, source=source, sections=sections, note=note, charted=charted
+        generator=Markup(REPORT),
+        title=title,
+        source=source,
+        sections=sections,
+        note=note,
+        charted=charted,
     )

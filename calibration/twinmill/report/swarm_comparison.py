@@ -51,8 +51,9 @@ def bands(result: SwarmComparison) -> Figure:
             axes.plot(result.t_s, result.floor[:, k], color=MEASURED, lw=1.8)
             axes.set_ylabel(name)
             shown = np.concatenate([result.twins[:, :, k].ravel(), result.floor[:, k]])
-            if COMPARED[name][0]:
-                axes.set(yscale="log", ylim=(shown.min() / 1.3, shown.max() * 1.3))
+            if COMPARED[name][0] and (shown > 0).any():
+                above = shown[shown > 0]
+                axes.set(yscale="log", ylim=(above.min() / 1.3, above.max() * 1.3))
                 plain_ticks(axes.yaxis)
             else:
                 margin = 0.1 * (np.ptp(shown) or 1)

@@ -60,8 +60,10 @@ def _over_time(series: SwarmSeries) -> Figure:
                 series.t_s, series.values[:, native.METRICS.index(name)], color=MEASURED, lw=1
             )
             axes.set_ylabel(label)
-        rest[0].set(yscale="log", ylim=(0.02, None))
-        plain_ticks(rest[0].yaxis)
+        shown = series.values[:, native.METRICS.index(next(iter(PANELS)))]
+        if (shown > 0).any():  # of robots that stand none is
+            rest[0].set(yscale="log", ylim=(0.02, None))
+            plain_ticks(rest[0].yaxis)
         for level in (0.2, 1):
             rest[0].axhline(level, color=PREDICTED, lw=0.8)
         rest[3].axhline(1, color=PREDICTED, lw=0.8)

@@ -33,7 +33,15 @@ def drive(tmp_path_factory, model_text):
         (folder / "true.toml").write_text(given + robots)
         command = [os.environ.get("TWIN_RUN", "twin_run"), "--plant", "planar", "--n", ROBOTS]
         command += ["--model", folder / "true.toml", "--script", folder / "script.csv"]
-        command += ["--spread-m", 12, "--pose-rate-hz", 20, "--log", folder / "run.lcmlog"]
+        command += [
+            "--spread-m",
+            12,
+            "--pose-rate-hz",
+            20,
+            "--log",
+            folder / "run.lcmlog",
+            "--force",
+        ]
         subprocess.run([str(word) for word in command], check=True, capture_output=True)
         model_file = ModelFile.load(str(folder / "given.toml"))
         return load_measurements([folder / "run.lcmlog"], model_file.model), model_file

@@ -51,6 +51,7 @@ def logged(tmp_path, model_text):
         plain.write_text(plain_text)
         command = [TWIN_RUN, "--plant", "planar", "--model", model, "--n", ROBOTS, "--seed", seed]
         command += ["--script", script, "--spread-m", 6, "--duration-s", DURATION_S, "--log", log]
+        command.append("--force")
         subprocess.run([str(c) for c in command], check=True, capture_output=True)
         return load_measurements([log]), ModelFile.load(str(plain))
 

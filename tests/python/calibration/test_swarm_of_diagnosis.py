@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(
 def record(folder: Path, model: str, *options: str) -> Path:
     (folder / "model.toml").write_text(model)
     command = [os.environ["TWIN_RUN"], "--plant", "planar", "--n", "6", "--seed", "77"]
-    command += ["--model", "model.toml", "--log", "run.lcmlog", *options]
+    command += ["--model", "model.toml", "--log", "run.lcmlog", "--force", *options]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     return folder / "run.lcmlog"
 

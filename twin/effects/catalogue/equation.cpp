@@ -286,9 +286,8 @@ const Quantity &FindQuantity(const std::string &name)
             return quantity;
         known.insert(quantity.name);
     }
-    throw std::invalid_argument("equation.adds_to = '" + name +
-                                "' is unknown; the nearest known is '" + Nearest(name, known) +
-                                "'");
+    throw std::invalid_argument("equation.adds_to = " + Quoted(name) + " is unknown; " +
+                                NearestKnown(name, known));
 }
 
 // The parser's complaint as one sentence, positions counted from 1.
@@ -298,7 +297,7 @@ const Quantity &FindQuantity(const std::string &name)
     const int end = static_cast<int>(text.size());
     const std::string where =
         position < 0 ? "" : " at letter " + std::to_string(std::min(position, end) + 1);
-    throw std::invalid_argument("equation." + key + " = '" + text + "': " + what + where);
+    throw std::invalid_argument("equation." + key + " = " + Quoted(text) + ": " + what + where);
 }
 
 // The same for one that the parser found.
@@ -320,7 +319,7 @@ const Quantity &FindQuantity(const std::string &name)
     for (const auto &[name, function] : parser.GetFunDef())
         known.insert(name);
     Fail(key, text, error.GetPos(),
-         "unknown name '" + token + "', the nearest known is '" + Nearest(token, known) + "',");
+         "unknown name " + Quoted(token) + ", " + NearestKnown(token, known) + ",");
 }
 
 EffectSpec::Compiled Compile(std::span<const double> values, std::span<const std::string> texts)

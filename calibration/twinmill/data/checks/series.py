@@ -13,12 +13,43 @@ STRONG = {"duty": (0.3,) * 4, "wheel_speed": (2.0,) * 4, "twist": (0.05, 0.05, 0
 # Commands beyond these no robot on wheels follows: twenty times the fastest there are.
 ABSURD = {"duty": (20.0,) * 4, "wheel_speed": (1e4,) * 4, "twist": (500.0, 500.0, 1e3, np.inf)}
 NAMES = {"twist": ("vx_mps", "vy_mps", "omega_radps")}  # of the others: wheels by their number
+UNDER_ONE = "give each robot its own robot_id, in its poses and in its commands"
 MOST_UNDER_ONE = 4  # robots under one number: after so many poses the first one is back
 # Nothing moves within this much, nor within five times the noise where that is as little as this.
 STANDS, STANDS_NOISY = np.array([0.005, 0.005, 0.035]), np.array([0.05, 0.05, 0.2])
 
 
 def check_commanded(robot: RobotLog, label: str) -> list[InputFinding]:
+    """A finding of a robot's commands as they were recorded."""
+    return _absurd(robot, label) or _under_one_number(robot, label)
+
+
+def _under_one_number(robot: RobotLog, label: str) -> list[InputFinding]:
+    """A finding where commands go to and fro faster than any robot follows.
+
+    Detections that flicker switch between two commands as fast, but not with most commands.
+    """
+    command, t_s = robot.command, robot.command_t_s
+    if len(t_s) < CHECKS.fewest_poses:
+        return []
+    leap, back = _to_and_fro(command)
+    fast = t_s[2:] - t_s[:-2] < CHECKS.back_s
+    share = float(np.mean(((leap > 0) & (back < leap / 5))[:-1] & fast))
+    if share < CHECKS.back:
+        return []
+    return [
+        InputFinding(
+            "these commands are those of two robots or more under one number",
+            f"{share:.0%} of them leap away, and the next ones are back",
+            UNDER_ONE,
+            True,
+            label,
+            robot.robot_id,
+        )
+    ]
+
+
+def _absurd(robot: RobotLog, label: str) -> list[InputFinding]:
     """A finding where a command is beyond what any robot follows, and far beyond most others.
 
     Units that are wrong make most of those large that are not zero, and are told by the motion.
@@ -70,7 +101,7 @@ def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
             finding(
                 "these poses are those of two robots or more under one number",
                 f"they go to and fro between places {apart_m:.2f} m apart",
-                "give each robot its own robot_id, in its poses and in its commands",
+                UNDER_ONE,
             )
         ]
     span_m = np.ptp(np.column_stack([pose[:, :2], z_m]), axis=0)
@@ -122,6 +153,13 @@ def check_track(track: Track, label: str) -> list[InputFinding]:
             "many poses are lost",
             f"{timing.pose_lost_share:.0%} of the frames while the robot is tracked",
             "look for hidden markers or a full network, since fewer poses show quick changes worse",
+        )
+    lost_s, told_s = np.diff(track.lost_s, axis=1).sum(), np.ptp(track.command_t_s)
+    if lost_s > CHECKS.lost * told_s:
+        add(
+            "many commands are lost",
+            f"{lost_s / told_s:.0%} of the time passes in {len(track.lost_s)} holes of their beat",
+            "look for a full network or disk, since poses without their commands tell nothing",
         )
     closed_loop = abs(timing.command_period_s / timing.pose_period_s - 1) < 0.2
     if timing.pose_period_s > CHECKS.slow_s and not closed_loop:
@@ -188,13 +226,19 @@ def _goes_to_and_fro(place: np.ndarray) -> float:
     Args:
         place: (N, 2).
     """
-    leap_m = np.hypot(*np.diff(place, axis=0).T)
-    back_m = np.full(len(leap_m), np.inf)
-    for n in range(2, MOST_UNDER_ONE + 1):
-        own_m = np.hypot(*(place[n:] - place[:-n]).T)
-        back_m[: len(own_m)] = np.minimum(back_m[: len(own_m)], own_m)
+    leap_m, back_m = _to_and_fro(place)
     leaps = (leap_m > CHECKS.leap_m) & (back_m < leap_m / 5)
     return float(np.median(leap_m[leaps])) if leaps.mean() > CHECKS.leaps else 0.0
+
+
+def _to_and_fro(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(N - 1,) steps of (N, C) values, and how near one of the next ones is to where they began."""
+    step = np.linalg.norm(np.diff(values, axis=0), axis=1)
+    back = np.full(len(step), np.inf)
+    for n in range(2, MOST_UNDER_ONE + 1):
+        own = np.linalg.norm(values[n:] - values[:-n], axis=1)
+        back[: len(own)] = np.minimum(back[: len(own)], own)
+    return step, back
 
 
 def _stands(robot: RobotLog, t_s: np.ndarray, pose: np.ndarray) -> str:

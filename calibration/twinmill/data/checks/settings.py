@@ -43,6 +43,8 @@ class CheckSettings(Numbers):
     # Poses alone: axes, units, headings that are none, how much there is.
     leap_m: float = number(0.1, "from pose to pose, and soon back to a fifth of it ...")
     leaps: float = number(0.2, "... in so many of all: two robots under one number")
+    back: float = number(0.6, "share of commands that leap and are soon back: those of two robots")
+    back_s: float = number(0.3, "for two of them: slower ones are driven to and fro")
     fastest_mps: float = number(25.0, "usual top speed over half a second: units are wrong ...")
     mm_mps: float = number(100.0, "... and from here they are mm: cm would make it 1 m/s")
     flat_m: float = number(0.05, "range of a height over a floor")
