@@ -29,7 +29,9 @@ from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child
 from twinmill.model.parameters import (
     CAMERA_STAGES,
+    EFFECT_STEP,
     GAINS,
+    UNKNOWN,
     Parameter,
     ParameterEstimate,
     all_effect_parameters,
@@ -148,6 +150,8 @@ def add(
     base = base_parameters(model_file.model, base_names(model_file.model, judged(opened), told))
     old = without_held([*base, *all_effect_parameters(model_file.model)], held)
     enlarged = [o.with_model(richer) for o in opened]
+    if texts:
+        fresh = _sized(fresh, enlarged)
     if robot_id is None:
         moved, found = fitted(enlarged, [*old, *fresh], fresh)
     else:
@@ -235,6 +239,29 @@ def with_effect(
             f"before it, as in 'p0*({text})'."
         )
     return richer, name, fresh
+
+
+def _sized(fresh: Sequence[Parameter], opened: Sequence[Opened]) -> list[Parameter]:
+    """Numbers of a formula with priors and steps by what changes predictions as much as they err.
+
+    In what unit a formula has them, and how large they are, nobody but it knows.
+    """
+    known = judged(opened)
+    rows, slopes = ScoreFit([o.data for o in known], [o.model for o in known], fresh).state
+    errors = np.linalg.norm(np.concatenate(rows))
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        reaches = errors / np.linalg.norm(np.concatenate(slopes), axis=0)
+    return [
+        replace(
+            p,
+            value=min(p.value, reach),
+            std=max(p.std, UNKNOWN * reach),
+            step=min(p.step, EFFECT_STEP * reach),
+        )
+        if 0 < reach < np.inf
+        else p
+        for p, reach in zip(fresh, reaches, strict=True)
+    ]
 
 
 def _check_acts(found: ScoreFit, fresh: Sequence[Parameter], texts: dict[str, str]) -> None:
