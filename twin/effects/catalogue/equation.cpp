@@ -77,7 +77,7 @@ constexpr Card kCard = {
     .phrase = "a formula of its own",
 };
 
-// Of any number of a formula, whose unit and size are the formula's: s^2/m^2 of a slow robot's heat.
+// Of any number of a formula, in the formula's unit: a slow robot's heat has hundreds of s^2/m^2.
 constexpr double kFar = 1e6;
 
 constexpr ParameterSpec kParameters[] = {
