@@ -282,10 +282,11 @@ def _sized(fresh: Sequence[Parameter], opened: Sequence[Opened]) -> list[Paramet
     In what unit a formula has them, and how large they are, nobody but it knows.
     """
     known = judged(opened)
-    rows, slopes = ScoreFit([o.data for o in known], [o.model for o in known], fresh).state
+    fit = ScoreFit([o.data for o in known], [o.model for o in known], fresh)
+    rows, slopes = fit.state
     errors = np.linalg.norm(np.concatenate(rows))
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        reaches = errors / np.linalg.norm(np.concatenate(slopes), axis=0)
+        reaches = [errors / np.linalg.norm(_slopes_by(fit, slopes, p.name)) for p in fresh]
     return [
         replace(
             p,
@@ -297,6 +298,14 @@ def _sized(fresh: Sequence[Parameter], opened: Sequence[Opened]) -> list[Paramet
         else p
         for p, reach in zip(fresh, reaches, strict=True)
     ]
+
+
+def _slopes_by(fit: ScoreFit, slopes: Sequence[np.ndarray], name: str) -> np.ndarray:
+    """(R,) slopes of all data sets by a parameter; those that lack it are left out."""
+    own = [
+        s[:, names.index(name)] for s, names in zip(slopes, fit.names, strict=True) if name in names
+    ]
+    return np.concatenate([np.zeros(0), *own])
 
 
 def _check_acts(found: ScoreFit, fresh: Sequence[Parameter], texts: dict[str, str]) -> None:
