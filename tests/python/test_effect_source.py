@@ -36,6 +36,10 @@ EQUATIONS = {
     "tiles": {"adds_to": "travel", "formula": "p0*cos(9.9*x) + p1*sin(9.9*x)"},
     "grooves": {"adds_to": "aside", "formula": "p0*cos(2*course) + p1*sin(2*course)"},
     "slack_duty": {"adds_to": "duty", "formula": "left > 0 && u > 0 ? p0*u*abs(u) : 0"},
+    "least_of_three": {
+        "adds_to": "vx_mps",
+        "formula": "p0*max(vx, vy, 0) + p1*min(abs(vx), _e)*abs(vx > 0.1)",
+    },
     "compass": {"adds_to": "theta_rad", "formula": "p0*cos(1*theta) + p1*sin(1*theta)"},
 }
 
@@ -99,6 +103,9 @@ def test_the_written_test_compiles(name, copy, model):
     [
         (["coasting"], "has it already"),
         (["Play"], "is no name"),
+        (["gains"], "mean something else"),
+        (["refit"], "mean something else"),
+        (["new"], "mean something else"),
         (["play", "--equation", "equation#2"], "its equations are equation"),
         (["play", "--into", "nowhere"], "holds no twin/effects/catalogue"),
     ],
@@ -121,6 +128,13 @@ def test_a_part_of_the_source_is_told_what_it_lacks(tmp_path, model):
 def test_a_power_that_c_has_not_is_refused(copy, model):
     path = model({"adds_to": "vx_mps", "formula": "p0*vx^2"})
     with pytest.raises(ValueError, match="has no power"):
+        run(["effects", "new", "play", "--from", str(path), "--into", str(copy)])
+
+
+@pytest.mark.parametrize("function", ["sum", "avg"])
+def test_a_function_that_c_has_not_is_refused(function, copy, model):
+    path = model({"adds_to": "vx_mps", "formula": f"p0*{function}(vx, vy)"})
+    with pytest.raises(ValueError, match=f"{function} is not written in C"):
         run(["effects", "new", "play", "--from", str(path), "--into", str(copy)])
 
 

@@ -13,13 +13,10 @@ from twinmill_cli.options import effects_beginning
 from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
-    from twinmill.export.effect_source import write_effect
+    from twinmill.export.effect_source import NEW, write_effect
     from twinmill.model.model_file import ModelFile
     from twinmill.model.parameters import catalogue, find_effect
     from twinmill.report import show, tables
-
-
-NEW = "new"  # in the place of an effect's name
 
 
 def register(app: typer.Typer) -> None:

@@ -19,7 +19,7 @@ from twinmill.diagnosis.doubts import (
     undone,
     within_the_table,
 )
-from twinmill.diagnosis.finding import Finding
+from twinmill.diagnosis.finding import Finding, doubted
 from twinmill.diagnosis.findings import (
     findings_of,
     lateness,
@@ -46,14 +46,14 @@ from twinmill.diagnosis.outliers import (
     spread_of_lags_s,
 )
 from twinmill.diagnosis.resolution import resolutions
-from twinmill.diagnosis.rest import Doubted, formulas_of, rest_of
+from twinmill.diagnosis.rest import Doubted, Rest, formulas_of, rest_of
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.rivals import less_each
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.search import search
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.stopped import Course
-from twinmill.diagnosis.taking import tuned
+from twinmill.diagnosis.taking import needless, tuned
 from twinmill.diagnosis.ties import instead_of_drift
 from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, without_effect
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
@@ -75,6 +75,7 @@ from twinmill.model.parameters import (
     base_parameters,
     beginning_at_a_moment,
     catalogue,
+    is_local,
     making_late,
     needing,
 )
@@ -318,7 +319,7 @@ def _concluded(
     if few:
         findings = beside_stale(findings)
     findings = without.doubted(undone(findings, last))
-    doubted = _doubted(findings, less, known)
+    in_doubt = _doubted(findings, less, known)
     whole = [_with_all_starts(o, opened) for o in known]
     models = zip(whole, last.state.models, strict=True)
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
@@ -332,7 +333,7 @@ def _concluded(
         known=model_file.left_over(hashes),
         whole=whole,
         random=max(scatters) > SETTINGS.random,
-        without=doubted,
+        without=in_doubt,
     )
     if rest.proven and rest.proven.is_late:
         late = [f.effect for f in findings if f.effect in needing("changes")]
@@ -340,6 +341,7 @@ def _concluded(
         better = (instead and instead.formula(last.fit)) or rest.proven
         rest = replace(rest, proven=tuned(last.fit, better))
     rest = rest.at_few_commands() if few else rest
+    findings = _beside_formula(findings, last, rest, len(set(hashes)))
     findings = of_many(beside_more(of_another_form(findings, rest), rest))
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
@@ -413,6 +415,16 @@ def _with_all_starts(own: Opened, opened: Sequence[Opened]) -> Opened:
     if own.floor is None:
         return own
     return replace(own, data=replace(whole.data, own=own.data.own), floor=whole.floor)
+
+
+def _beside_formula(
+    findings: Sequence[Finding], last: Trial, rest: Rest, runs: int
+) -> list[Finding]:
+    """Findings, those doubtful that are at a place or for a while and bring nothing beside it."""
+    local = [f.effect for f in findings if f.certainty != "doubtful" and is_local(f.effect)]
+    gone = needless(last.fit, rest.proven, local, runs) if rest.proven else []
+    why = "the formula that was proven for the rest, fitted in its place, leaves no more than it"
+    return [doubted(f, why) if f.effect in gone else f for f in findings]
 
 
 def _doubted(

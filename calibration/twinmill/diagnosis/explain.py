@@ -27,8 +27,10 @@ from twinmill.model.parameters import (
     base_lag_is_identifiable,
     base_parameters,
     effect_parameters,
+    is_local,
     late_part,
     newest_instance,
+    with_role,
 )
 from twinmill.predict.datasets import total_score
 
@@ -151,7 +153,9 @@ def _written(
 ) -> Explanation:
     """Writes the model last of all: Ctrl-C before leaves no file of which nothing is said."""
     model = _with_found(diagnosis, model_file, beyond)
-    estimates = [*fit.shared_estimates(), *diagnosis.detection_estimates]
+    kept = beyond if beyond and beyond.kept else None
+    shared = kept.estimates if kept else fit.shared_estimates()
+    estimates = [*shared, *diagnosis.detection_estimates]
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
     logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
@@ -167,7 +171,7 @@ def _written(
         base_told=bool(model_file.known_from_other_logs(logs.values())),
         left_over=_left_over(diagnosis, beyond),
         robots=_own_values(diagnosis, fit),
-        covariance=fit.shared_covariance(),
+        covariance=kept.covariance if kept else fit.shared_covariance(),
     )
     child = child_of(model_file, told, Path(out), command)
     after = comparison(child, [o.with_model(child.model) for o in diagnosis.opened])
@@ -178,12 +182,17 @@ def _written(
 def _beyond(diagnosis: Diagnosis, fit: ScoreFit, proven: Formula, runs: int) -> Taken:
     """The formula in the model, beside what was found and is not in its place."""
     *_, (_, before) = diagnosis.steps
-    doubtful = [
-        f.effect
-        for f in diagnosis.findings
-        if f.certainty == "doubtful" and f.effect not in (REFIT, *proven.instead_of)
-    ]
-    return taken(fit, proven, before=before, doubtful=doubtful, runs=runs)
+    own = [f for f in diagnosis.findings if f.effect not in (REFIT, *proven.instead_of)]
+    doubtful = [f.effect for f in own if f.certainty == "doubtful"]
+    return taken(
+        fit,
+        proven,
+        before=before,
+        beside=[f.effect for f in own if f.effect in doubtful or is_local(f.effect)],
+        runs=runs,
+        passing=[name for name in doubtful if with_role(name, "moment")],
+        given=diagnosis.search.rounds[0].before.fit.held_square,
+    )
 
 
 def _with_found(diagnosis: Diagnosis, model_file: ModelFile, beyond: Taken | None) -> native.Model:

@@ -59,6 +59,7 @@ WIDE = 0.4  # share of that speed, at which such a loss has ended
 STORED = {"vx": (0.003, 0.01, 0.03), "vy": (0.003, 0.01, 0.03), "omega": (0.02, 0.06, 0.2)}
 NAMED = ("vx", "vy", "omega", "x", "y", "theta", "course", "t")  # as formulas are told
 ANGLES = ("theta", "course")
+MOST_NUMBERS = 4  # the effect `equation` has p0 to p3
 C, D, L = "{c}", "{d}", "{l}"  # the constant, the damping and the lever in texts
 SWINGS_HZ = (0.55, 0.75, 1.0, 1.35, 1.8, 2.4, 3.2, 4.3)
 DAMPINGS = (0.07, 0.3)
@@ -597,13 +598,18 @@ def joined(forms: Sequence[Form]) -> dict[str, str]:
     return _equation(forms[0].adds_to, texts, rates)
 
 
-def tunable(form: Form) -> dict[str, str]:
-    """The same of what swings, with its rate in tens per second and its damping as numbers, too."""
-    first = len(form.shapes)
-    constants = f"(10*p{first})", f"p{first + 1}"
-    texts = [_filled(text, *constants) for text in form.shapes]
-    rates = [_filled(text, *constants) for text in (form.state.text, form.state.second_text)]
-    return _equation(form.adds_to, texts, rates)
+def tunable(forms: Sequence[Form]) -> dict[str, str]:
+    """The same with all constants as numbers, too: of each form in turn, behind all shapes'."""
+    number = sum(len(form.shapes) for form in forms)
+    texts, rates = [], []
+    for form in forms:
+        own = {name: f"p{number + k}" for k, name in enumerate(form.searched)}
+        number += len(own)
+        constants = own.get("constant", ""), own.get("damping", "")
+        texts += [_filled(text, *constants) for text in form.shapes]
+        state = (form.state.text, form.state.second_text) if form.state else ()
+        rates += [_filled(text, *constants) for text in state if text]
+    return _equation(forms[0].adds_to, texts, rates)
 
 
 def _equation(adds_to: str, texts: Sequence[str], rates: Sequence[str]) -> dict[str, str]:

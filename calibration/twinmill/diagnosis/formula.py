@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A formula for what is left that was proven, for reports and JSON."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -90,6 +90,26 @@ class Formula:
     def names_time(self) -> bool:
         """It has moments of the run."""
         return any(f.names_time for f in self.forms)
+
+    @property
+    def lasting(self) -> "Formula":
+        """Without the terms that have moments of the run, if there are others."""
+        kept = [form for form in self.forms if not form.names_time]
+        if len(kept) in (0, len(self.forms)):
+            return self
+        shapes = [n for n in self.numbers if n.name]
+        constants = [n for n in self.numbers if not n.name]
+        own: list[Number] = []
+        others: list[Number] = []
+        for form in self.forms:
+            first, last = len(form.shapes), len(form.searched)
+            if form in kept:
+                own += shapes[:first]
+                others += constants[:last]
+            shapes, constants = shapes[first:], constants[last:]
+        own = [replace(n, name=f"p{k}") for k, n in enumerate(own)]
+        holds = {name: span for name, span in self.holds.items() if name != "t"}
+        return replace(self, forms=tuple(kept), numbers=(*own, *others), holds=holds)
 
     @property
     def is_late(self) -> bool:

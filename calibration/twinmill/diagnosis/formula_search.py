@@ -30,7 +30,15 @@ from twinmill.diagnosis.evidence import (
     made,
 )
 from twinmill.diagnosis.families.of_time import beat_of
-from twinmill.diagnosis.forms import Form, Motion, from_library, on_and_off, own_forms, sized
+from twinmill.diagnosis.forms import (
+    MOST_NUMBERS,
+    Form,
+    Motion,
+    from_library,
+    on_and_off,
+    own_forms,
+    sized,
+)
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.formula_telling import TRIED, stability, told
 from twinmill.diagnosis.settings import SETTINGS
@@ -43,7 +51,6 @@ FEWEST = 4  # stretches
 SHORTLIST = 60  # forms that are weighed again once it is known what noise remains
 MOST_SCALED = 100.0  # of the square of a channel
 HEAVY = 4.0  # times the weight of rows, where nothing is proven at their own
-MOST_NUMBERS = 4  # the effect `equation` has p0 to p3
 MOST_TERMS = 3
 ALL_SIGNS = 12  # up to so many blocks all signs are tried ...
 DRAWN = 4095  # ... of more so many

@@ -1,24 +1,42 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Takes a proven formula into the fitted model, if left-out data are then better predicted."""
+"""Takes a proven formula into the fitted model, if left-out data are then better predicted.
+
+Its constants are fitted with all the rest: numbers fitted beside constants that stand still would
+be told too narrowly.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import log
 
+import numpy as np
 import twinmill_native as native
 
-from twinmill.diagnosis.forms import LEAST_DAMPED, MOST_DAMPED, tunable
+from twinmill.diagnosis.forms import LEAST_DAMPED, MOST_DAMPED, MOST_NUMBERS, Form, tunable
 from twinmill.diagnosis.formula import Formula, Number
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.score_fit import NORMAL_95, ScoreFit
-from twinmill.model.parameters import Parameter, effect_names, effect_parameters, newest_instance
-from twinmill.predict.datasets import Trajectory, total_score
+from twinmill.model.covariance import Covariance
+from twinmill.model.parameters import (
+    UNKNOWN,
+    Parameter,
+    ParameterEstimate,
+    effect_names,
+    effect_parameters,
+    is_local,
+    newest_instance,
+)
+from twinmill.predict.datasets import ErrorDataset, Trajectory, total_score
 
 EFFECT = "equation"
 SEVERAL = 2  # runs that tell of a moment that they share
 STEP = 0.05  # of finite differences, times the number at which a shape adds what is typical
 FINER = 4.0  # times which errors of what swings may be below the floor
-SWING_STEP, SWING_STD = 0.01, 0.5  # shares of the rate and the damping of what swings
+
+CONSTANT_STEP, CONSTANT_STD = 0.01, 0.5  # shares of a constant
+STEP_OF_SPREAD = 1 / 16  # of the share of a constant within which a better one may lie
+FAR_OFF = 3.0  # times which a constant may differ from the one that was proven
+DIGITS = {"constant": ".4g", "damping": ".3g"}
 
 
 @dataclass(frozen=True)
@@ -29,6 +47,8 @@ class Taken:
         formula: as it was proven.
         fit: with it, and without the findings that it stands for.
         numbers: as they are in this fit.
+        estimates: of what all data sets share, but for the formula's constants.
+        covariance: of these, whatever the constants are.
         before: held-out score without it.
         after: with it.
         share: of the squared held-out error above the floor that it takes away.
@@ -39,6 +59,8 @@ class Taken:
     formula: Formula
     fit: ScoreFit
     numbers: tuple[Number, ...]
+    estimates: tuple[ParameterEstimate, ...]
+    covariance: Covariance
     before: float
     after: float
     share: float
@@ -87,44 +109,93 @@ class Taken:
 
 
 def taken(
-    fit: ScoreFit, formula: Formula, *, before: float, doubtful: Sequence[str], runs: int
+    fit: ScoreFit,
+    formula: Formula,
+    *,
+    before: float,
+    beside: Sequence[str],
+    runs: int,
+    passing: Sequence[str] = (),
+    given: float = 1.0,
 ) -> Taken:
     """The fit with a formula added, and without the findings that it stands for.
+
+    Of terms with moments of the run the model of other runs has none, where others are left.
 
     Args:
         fit: of all that was found; stays as it is.
         formula: proven on these data.
         before: held-out score without it, as it is told.
-        doubtful: findings beside it; those that bring nothing any more go.
+        beside: findings beside it; those that bring nothing any more go. What is at a place or for
+            a while was fitted to all of it, and has to bring more.
         runs: logs that these are.
+        passing: of these the doubtful ones of a moment of one run, which no other shares; they go
+            where the formula takes nearly as much without them.
+        given: squared error over the floor of the model as given.
     """
+    formula = formula.lasting if runs < SEVERAL else formula
     found = _added(fit, formula, before, runs)
-    for name in doubtful if found.kept else ():
+    lost = SETTINGS.formula_alike * (given - 1)
+
+    def without_passing(names: Sequence[str]) -> Taken:
+        gone = (*found.formula.instead_of, *names)
+        less = _added_to_less(fit, replace(formula, instead_of=gone), runs)
+        least = min(found.fit.held_square, fit.held_square)
+        return less if less.kept and less.fit.held_square <= least + lost else found
+
+    if passing and not found.kept:
+        found = without_passing(passing)
+    for name in beside if found.kept else ():
+        if name in found.formula.instead_of:
+            continue
+        if name in passing:
+            found = without_passing([name])
+            continue
         gone = (*found.formula.instead_of, name)
         less = _added(fit, replace(formula, instead_of=gone), before, runs)
-        if less.kept and found.fit.against(less.fit)[0] <= SETTINGS.tie:
+        enough = SETTINGS.passing if is_local(name) else SETTINGS.tie
+        if less.kept and found.fit.against(less.fit)[0] <= enough:
             found = less
     return found
 
 
+def needless(fit: ScoreFit, formula: Formula, local: Sequence[str], runs: int) -> list[str]:
+    """Of sure findings at a place or for a while those that bring nothing beside a formula."""
+    if not local:
+        return []
+    before = total_score(fit.held_scores)
+    found = taken(fit, formula, before=before, beside=local, runs=runs)
+    return [name for name in local if found.kept and name in found.formula.instead_of]
+
+
 def _added(fit: ScoreFit, formula: Formula, before: float, runs: int) -> Taken:
     """The fit with a formula, and without those in the place of which it is."""
-    models, free = _with_equation(fit, formula.instead_of, formula.equation)
-    fresh = _begun(models[0], formula)
-    found = ScoreFit(fit.datasets, models, [*free, *fresh], fit.by_channel).fit()
+    found, told = _refitted(fit, formula, fit.datasets)
     above = max(fit.held_square - 1, fit.held_square - found.held_square, 1e-9)
     share = (fit.held_square - found.held_square) / above
     fall, without_best, _ = found.against(fit)
+    estimates, covariance = _told_by(found, told)
     return Taken(
-        formula=formula,
+        formula=told,
         fit=found,
-        numbers=_numbers(found, fresh, formula),
+        numbers=told.numbers,
+        estimates=estimates,
+        covariance=covariance,
         before=before,
         after=total_score(found.held_scores),
         share=share,
         evidence=(fall, without_best),
         runs=runs,
     )
+
+
+def _added_to_less(fit: ScoreFit, formula: Formula, runs: int) -> Taken:
+    """The same, judged against a fit that has neither: what went says nothing of other runs."""
+    models = [_without(m, formula.instead_of) for m in fit.models]
+    free = _still_free(fit, models[0])
+    bare = ScoreFit(fit.datasets, models, free, fit.by_channel).fit()
+    alone = _added(bare, replace(formula, instead_of=()), total_score(bare.held_scores), runs)
+    return replace(alone, formula=replace(alone.formula, instead_of=formula.instead_of))
 
 
 def tuned(fit: ScoreFit, formula: Formula) -> Formula:
@@ -137,31 +208,80 @@ def tuned(fit: ScoreFit, formula: Formula) -> Formula:
         fit: of all that was found; stays as it is.
         formula: proven on these data.
     """
-    form = formula.forms[0]
-    if len(formula.forms) > 1 or not form.damping:
+    if len(formula.forms) > 1 or not formula.forms[0].damping:
         return formula
-    models, free = _with_equation(fit, formula.instead_of, tunable(form))
-    fresh = _begun(models[0], formula)
-    own = effect_parameters(models[0], newest_instance(models[0], EFFECT), fresh=True)
-    swing = [
-        replace(p, value=at, usual=at, std=SWING_STD * at, step=SWING_STEP * at, central=True)
-        for p, at in zip(own[len(fresh) :], (form.constant / 10, form.damping), strict=True)
-    ]
     datasets = [d.over(d.floor / FINER) if isinstance(d, Trajectory) else d for d in fit.datasets]
-    found = ScoreFit(datasets, models, [*free, *fresh, *swing], fit.by_channel).fit()
+    return _refitted(fit, formula, datasets)[1]
+
+
+def _refitted(
+    fit: ScoreFit, formula: Formula, datasets: Sequence[ErrorDataset]
+) -> tuple[ScoreFit, Formula]:
+    """A fit with a formula in it, and the formula as it came out.
+
+    Its constants stand still where the equation has no numbers left for them, or where these data
+    drive them far off.
+    """
+    if any(f.searched for f in formula.forms) and _count(formula.forms) <= MOST_NUMBERS:
+        models, free = _with_equation(fit, formula.instead_of, tunable(formula.forms))
+        fresh = _begun(models[0], formula)
+        constants = _constants(models[0], formula.forms)
+        found = ScoreFit(datasets, models, [*free, *fresh, *constants], fit.by_channel).fit()
+        estimates = {e.name: e for e in found.shared_estimates()}
+        own = [estimates[p.name] for p in constants]
+        if all(p.min < e.value < p.max for p, e in zip(constants, own, strict=True)):
+            return found, _as_fitted(formula, [estimates[p.name] for p in fresh], own)
+    models, free = _with_equation(fit, formula.instead_of, formula.equation)
+    fresh = _begun(models[0], formula)
+    found = ScoreFit(datasets, models, [*free, *fresh], fit.by_channel).fit()
     estimates = {e.name: e for e in found.shared_estimates()}
-    rate, damping = (estimates[p.name] for p in swing)
-    if rate.value <= 0 or not LEAST_DAMPED <= damping.value < MOST_DAMPED:
-        return formula
-    form = replace(
-        form, constant=float(f"{10 * rate.value:.4g}"), damping=float(f"{damping.value:.3g}")
-    )
-    *shapes, first, second = _numbers(found, fresh, formula)
-    constants = (
-        _around(first, form.constant, 10 * rate.std),
-        _around(second, form.damping, damping.std),
-    )
-    return replace(formula, forms=(form,), numbers=(*shapes, *constants))
+    return found, _as_fitted(formula, [estimates[p.name] for p in fresh], None)
+
+
+def _count(forms: Sequence[Form]) -> int:
+    return sum(form.numbers for form in forms)
+
+
+def _as_fitted(
+    formula: Formula,
+    shapes: Sequence[ParameterEstimate],
+    constants: Sequence[ParameterEstimate] | None,
+) -> Formula:
+    """With numbers and 95 % intervals of a fit; None: constants stand as they were proven.
+
+    Beside those nothing is narrower than where all was told together.
+    """
+    own, others = formula.numbers[: len(shapes)], formula.numbers[len(shapes) :]
+    stds = [e.std for e in shapes]
+    if constants is None and others:
+        stds = [max(s, (n.high - n.low) / 2 / NORMAL_95) for s, n in zip(stds, own, strict=True)]
+    numbers = [_around(n, e.value, s) for n, e, s in zip(own, shapes, stds, strict=True)]
+    if constants is None:
+        return replace(formula, numbers=(*numbers, *others))
+    values, forms = iter(constants), []
+    for form in formula.forms:
+        new = {name: float(f"{next(values).value:{DIGITS[name]}}") for name in form.searched}
+        forms.append(replace(form, **new))
+    exact = [getattr(form, name) for form in forms for name in form.searched]
+    for number, value, e in zip(others, exact, constants, strict=True):
+        numbers.append(_around(number, value, e.std))
+    return replace(formula, forms=tuple(forms), numbers=tuple(numbers))
+
+
+def _told_by(fit: ScoreFit, formula: Formula) -> tuple[tuple[ParameterEstimate, ...], Covariance]:
+    """Of what a model with a formula has, as wide as the formula's numbers are told."""
+    own = newest_instance(fit.models[0], EFFECT)
+    stds = {f"{own}.{n.name}": (n.high - n.low) / 2 / NORMAL_95 for n in formula.numbers if n.name}
+    estimates = [
+        replace(e, std=stds.get(e.name, e.std))
+        for e in fit.shared_estimates()
+        if e.name in stds or not e.name.startswith(f"{own}.")
+    ]
+    covariance = fit.shared_covariance().of([e.name for e in estimates])
+    before = np.sqrt(np.diag(covariance.values))
+    wider = [stds.get(n, s) / s for n, s in zip(covariance.names, before, strict=True)]
+    values = covariance.values * np.outer(wider, wider)
+    return tuple(estimates), Covariance(covariance.names, values)
 
 
 def _around(number: Number, value: float, std: float) -> Number:
@@ -175,10 +295,16 @@ def _with_equation(
 ) -> tuple[list[native.Model], list[Parameter]]:
     """Models of a fit without some effects and with an equation, and what else was free."""
     models = [_without(m, gone) for m in fit.models]
-    lost = {*effect_names(fit.models[0])} - {*effect_names(models[0])}
+    free = _still_free(fit, models[0])
     for model in models:
         model.add_effect(EFFECT, texts)
-    return models, [p for p in fit.shared_values if p.name.split(".")[0] not in lost]
+    return models, free
+
+
+def _still_free(fit: ScoreFit, less: native.Model) -> list[Parameter]:
+    """What is free in a fit and in a model that lacks some of its effects."""
+    lost = {*effect_names(fit.models[0])} - {*effect_names(less)}
+    return [p for p in fit.shared_values if p.name.split(".")[0] not in lost]
 
 
 def _without(model: native.Model, gone: Sequence[str]) -> native.Model:
@@ -195,15 +321,34 @@ def _begun(model: native.Model, formula: Formula) -> list[Parameter]:
     values = [n.value for n in formula.numbers if n.name]
     own = effect_parameters(model, newest_instance(model, EFFECT), fresh=True)
     return [
-        replace(p, value=value, step=STEP * strength)
+        replace(
+            p,
+            value=value,
+            step=STEP * strength,
+            std=max(p.std, UNKNOWN * max(strength, abs(value))),
+        )
         for p, value, strength in zip(own[: len(values)], values, strengths, strict=True)
     ]
 
 
-def _numbers(fit: ScoreFit, fresh: Sequence[Parameter], formula: Formula) -> tuple[Number, ...]:
-    """As they came out, with 95 % intervals; constants stand as they were proven."""
-    estimates = {e.name: e for e in fit.shared_estimates()}
-    own = iter(estimates[p.name] for p in fresh)
-    return tuple(
-        _around(n, (e := next(own)).value, e.std) if n.name else n for n in formula.numbers
+def _constants(model: native.Model, forms: Sequence[Form]) -> list[Parameter]:
+    """The forms' constants as numbers of the equation, begun where they were proven."""
+    own = effect_parameters(model, newest_instance(model, EFFECT), fresh=True)
+    own = iter(own[sum(len(f.shapes) for f in forms) :])
+    return [_constant(next(own), form, name) for form in forms for name in form.searched]
+
+
+def _constant(p: Parameter, form: Form, name: str) -> Parameter:
+    at = getattr(form, name)
+    damping = name == "damping"
+    step = CONSTANT_STEP if damping else min(CONSTANT_STEP, STEP_OF_SPREAD * form.spread)
+    return replace(
+        p,
+        value=at,
+        usual=at,
+        std=CONSTANT_STD * at,
+        step=step * at,
+        central=True,
+        min=LEAST_DAMPED if damping else at / FAR_OFF,
+        max=MOST_DAMPED if damping else at * FAR_OFF,
     )

@@ -2,13 +2,15 @@
 """Source, card and test of an effect for the catalogue, from the equation of a model."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import wrap
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from twinmill.diagnosis.trials import REFIT
+from twinmill.fitting.add import OWN_GAINS
 from twinmill.model.model_file import ModelError, ModelFile, write_whole
 from twinmill.model.parameters import catalogue, effect_names, words
 
@@ -17,7 +19,10 @@ LISTED = "add_executable(test_effects\n"  # in the tests' CMakeLists.txt; the ne
 NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 TOKEN = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[A-Za-z_]\w*|\s+|.")
 PARAMETERS = ("p0", "p1", "p2", "p3")
+FAR = 1e6  # of any number: its size is the formula's
 LONGEST = 78  # of a text in the card
+NEW = "new"  # in the place of an effect's name
+RESERVED = {OWN_GAINS, REFIT, NEW}  # which commands take for something else
 
 WHEEL = {
     "u": "in.duty[k]",
@@ -48,9 +53,12 @@ RATES = {"state_rate": "s", "second_rate": "r"}
 FUNCTIONS = {
     **{n: f"std::{n}" for n in ("abs", "sqrt", "exp", "sin", "cos", "tan", "min", "max")},
     **{n: f"std::{n}" for n in ("asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh")},
+    **{n: f"std::{n}" for n in ("asinh", "acosh", "atanh", "log2", "log10", "rint")},
     "ln": "std::log",
     "sign": "Sign",
 }
+OF_ANY_COUNT = ("min", "max")  # of arguments
+FIGURES = {"_pi": "M_PI", "_e": "M_E"}
 
 
 @dataclass(frozen=True)
@@ -163,6 +171,8 @@ def _check(name: str, root: Path, files: Sequence[Path]) -> None:
         raise ValueError(
             f"effect '{name}': is no name; use small letters, figures and single underscores."
         )
+    if name in RESERVED:
+        raise ValueError(f"effect '{name}': commands mean something else by it; take another name.")
     if name in catalogue():
         raise ValueError(f"effect '{name}': the catalogue has it already; take another name.")
     needed = (CATALOGUE, TESTS / "CMakeLists.txt")
@@ -196,11 +206,12 @@ def _source(name: str, texts: dict[str, str], values: dict[str, float], model: s
             phrase="a formula that was found in data",
             **_kind(used, bool(rates), place.stage),
             parameters=[
-                {"name": p, "value": _plain(values[p] or 0.01), "min": -10, "max": 10}
+                {"name": p, "value": _plain(values[p] or 0.01), "far": f"{FAR:g}"}
                 for p in _numbers(texts)
             ],
             neutral=" && ".join(f"v[{k}] == 0" for k in range(len(_numbers(texts)))),
             signs="sign" in used,
+            ordered=bool(used & {*OF_ANY_COUNT}),
             formula=formula,
             rates=[_function(rate, place.names, state) for rate in rates.values()],
             wheels=place.wheels,
@@ -243,28 +254,76 @@ def _function(text: str, names: dict[str, str], state: dict[str, str]) -> Functi
     own = [n for n in (*names, *state) if n in used]
     numbers = [p for p in PARAMETERS if p in used]
     return Function(
-        _in_cpp(text),
+        _in_cpp(text, {*names, *state, *PARAMETERS}),
         ", ".join(["const Numbers &v"] * bool(numbers) + [f"double {n}" for n in own]),
         ", ".join(["v"] * bool(numbers) + own),
         numbers,
     )
 
 
-def _in_cpp(text: str) -> str:
-    """A formula as C++ reads it: figures with a point, functions of the standard library."""
-    parts = []
-    for token in TOKEN.findall(text):
-        if token == "^":
-            raise ValueError(f"'{text}': C++ has no power by ^; write x*x or exp(2*ln(x)).")
-        if re.match(r"[\d.]", token):
-            token = token if re.search(r"[.eE]", token) else f"{token}.0"
-        elif token == "_pi":
-            token = "M_PI"
-        elif re.match(r"[A-Za-z_]", token) and token in FUNCTIONS:
-            token = FUNCTIONS[token]
-        parts.append(token)
-    spaced = re.sub(r"(?<=[\w)]) *([*/]) *", r" \1 ", "".join(parts))
+def _in_cpp(text: str, names: Collection[str]) -> str:
+    """A formula of some names as C++ reads it: figures with a point, functions of its library.
+
+    Raises:
+        ValueError: C++ has no such function or sign.
+    """
+    spaced = re.sub(
+        r"(?<=[\w)}]) *([*/]) *", r" \1 ", _terms(iter(TOKEN.findall(text)), text, names)
+    )
     return re.sub(r"\s+", " ", spaced)
+
+
+def _terms(tokens: Iterator[str], text: str, names: Collection[str]) -> str:
+    """Of a formula's tokens up to the end of the bracket that they stand in."""
+    parts = []
+    for token in tokens:
+        if token == ")":
+            break
+        if token == "(":
+            parts.append(f"({_terms(tokens, text, names)})")
+        elif token in FUNCTIONS:
+            while next(tokens) != "(":
+                pass
+            parts.append(_called(token, _terms(tokens, text, names)))
+        else:
+            parts.append(_plain_token(token, text, names))
+    return "".join(parts)
+
+
+def _called(function: str, arguments: str) -> str:
+    """A call; what compares is a number to the formula, and a truth to C++."""
+    own = [
+        f"static_cast<double>({a.strip()})" if re.search(r"[<>=&|]", a) and "?" not in a else a
+        for a in _arguments(arguments)
+    ]
+    inside = ",".join(own)
+    return f"{FUNCTIONS[function]}({f'{{{inside}}}' if function in OF_ANY_COUNT else inside})"
+
+
+def _arguments(text: str) -> list[str]:
+    """Parts between the commas that stand in no bracket."""
+    found, depth = [""], 0
+    for letter in text:
+        depth += (letter in "({") - (letter in ")}")
+        if letter == "," and not depth:
+            found.append("")
+        else:
+            found[-1] += letter
+    return found
+
+
+def _plain_token(token: str, text: str, names: Collection[str]) -> str:
+    """A figure, a name or a sign."""
+    if token == "^":
+        raise ValueError(f"'{text}': C++ has no power by ^; write x*x or exp(2*ln(x)).")
+    if re.match(r"[\d.]", token):
+        return token if re.search(r"[.eE]", token) else f"{token}.0"
+    if re.match(r"[A-Za-z_]", token) and token not in names and token not in FIGURES:
+        raise ValueError(
+            f"'{text}': {token} is not written in C++; say it by other functions, such as a + b "
+            "for sum(a, b), or keep the equation in the model."
+        )
+    return FIGURES.get(token, token)
 
 
 def _test(name: str, texts: dict[str, str], values: dict[str, float]) -> str:

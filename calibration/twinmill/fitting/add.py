@@ -15,6 +15,7 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.detection_fit import DetectionFit
+from twinmill.fitting.equations import check_states
 from twinmill.fitting.fit import (
     base_names,
     common_clock,
@@ -29,7 +30,9 @@ from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child
 from twinmill.model.parameters import (
     CAMERA_STAGES,
+    EFFECT_STEP,
     GAINS,
+    UNKNOWN,
     Parameter,
     ParameterEstimate,
     all_effect_parameters,
@@ -42,6 +45,7 @@ from twinmill.model.parameters import (
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import all_detections
 
+WORSE = 1.02  # times the held-out score; less is chance
 OWN_GAINS = "gains"  # of one robot: its speed and its rate of turn
 
 
@@ -84,6 +88,18 @@ class AddResult:
         return self.effect if self.robot_id is None else f"{self.effect} of R{self.robot_id:02d}"
 
     @property
+    def notes(self) -> list[str]:
+        """A sentence where left-out data are worse predicted with it; none otherwise."""
+        without, after = self.heldout_refit.score, self.heldout_after.score
+        if not after > WORSE * without:
+            return []
+        return [
+            f"Held-out predictions are worse with it ({without:.3g} to {after:.3g}): leave it out; "
+            "or, if its fit began too far off, put better values into the new model with "
+            "`twinmill set` and fit that again with `twinmill fit`."
+        ]
+
+    @property
     def added(self) -> list[ParameterEstimate]:
         """Of the parameters, those that are new."""
         gains = GAINS if self.effect == OWN_GAINS else ()
@@ -101,6 +117,7 @@ class AddResult:
             "heldout_refit": self.heldout_refit.score,
             "heldout_after": self.heldout_after.score,
             "parameters": [e.to_json() for e in self.parameters],
+            "notes": self.notes,
             "heldout_errors_before": self.heldout_before.rows(),
             "heldout_errors_after": self.heldout_after.rows(),
             **({"bits": self.after.to_json()} if self.of_camera else {}),
@@ -146,8 +163,13 @@ def add(
     logs = {m.log_name: m.log_sha256 for m in measurements}
     told = model_file.known_from_other_logs(logs.values())
     base = base_parameters(model_file.model, base_names(model_file.model, judged(opened), told))
+    _check_not_new(held, fresh)
     old = without_held([*base, *all_effect_parameters(model_file.model)], held)
     enlarged = [o.with_model(richer) for o in opened]
+    if texts:
+        for own in judged(enlarged):
+            check_states(own.data, _begun(own.model, fresh))
+        fresh = _sized(fresh, enlarged)
     if robot_id is None:
         moved, found = fitted(enlarged, [*old, *fresh], fresh)
     else:
@@ -235,6 +257,55 @@ def with_effect(
             f"before it, as in 'p0*({text})'."
         )
     return richer, name, fresh
+
+
+def _begun(model: native.Model, fresh: Sequence[Parameter]) -> native.Model:
+    """A copy with what is new where its fit begins."""
+    begun = model.copy()
+    for p in fresh:
+        begun.set(p.name, p.value)
+    return begun
+
+
+def _check_not_new(held: Collection[str], fresh: Sequence[Parameter]) -> None:
+    """Raises ModelError where a number of what is added is to be held."""
+    if name := next((p.name for p in fresh if p.name in held), None):
+        raise ModelError(
+            f"{name}: is of what is added, and has no value yet that could be held; add it, put a "
+            "value in with `twinmill set`, and hold that with `twinmill fit --hold`."
+        )
+
+
+def _sized(fresh: Sequence[Parameter], opened: Sequence[Opened]) -> list[Parameter]:
+    """Numbers of a formula with priors and steps by what changes predictions as much as they err.
+
+    In what unit a formula has them, and how large they are, nobody but it knows.
+    """
+    known = judged(opened)
+    fit = ScoreFit([o.data for o in known], [o.model for o in known], fresh)
+    rows, slopes = fit.state
+    errors = np.linalg.norm(np.concatenate(rows))
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        reaches = [errors / np.linalg.norm(_slopes_by(fit, slopes, p.name)) for p in fresh]
+    return [
+        replace(
+            p,
+            value=min(p.value, reach),
+            std=max(p.std, UNKNOWN * reach),
+            step=min(p.step, EFFECT_STEP * reach),
+        )
+        if 0 < reach < np.inf
+        else p
+        for p, reach in zip(fresh, reaches, strict=True)
+    ]
+
+
+def _slopes_by(fit: ScoreFit, slopes: Sequence[np.ndarray], name: str) -> np.ndarray:
+    """(R,) slopes of all data sets by a parameter; those that lack it are left out."""
+    own = [
+        s[:, names.index(name)] for s, names in zip(slopes, fit.names, strict=True) if name in names
+    ]
+    return np.concatenate([np.zeros(0), *own])
 
 
 def _check_acts(found: ScoreFit, fresh: Sequence[Parameter], texts: dict[str, str]) -> None:

@@ -10,6 +10,7 @@ import twinmill_native as native
 from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
+from twinmill.fitting.equations import check_states
 from twinmill.fitting.floor import NoiseFloor, coarse_offset_s, no_floor, noise_floor, too_poor
 from twinmill.fitting.score_fit import ROUNDS, ScoreFit
 from twinmill.model.model_file import ModelFile
@@ -147,6 +148,7 @@ def _open(measurement: Measurement | SteadyTable, model_file: ModelFile, number:
         return Opened(measurement, table, table.model, None, True)
     model, same_clock = _on_its_clock(measurement, model_file)
     data = Trajectory.of(measurement)
+    check_states(data, model)
     floor = noise_floor(data, model, same_clock)
     if floor.kind is None:
         return Opened(measurement, None, model, floor, same_clock)

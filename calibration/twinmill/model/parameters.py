@@ -44,6 +44,7 @@ LATE_PARTS = {"duty": "delay", "observe": "clock"}
 WHERE_OR_WHEN = ("place", "moment")  # roles of what says where an effect is, or from when on
 NO_SIZE = (*WHERE_OR_WHEN, "radius")  # roles of what says nothing of how strong an effect is
 EFFECT_STEP = 0.05  # times the distance of an effect's default from its neutral value
+UNKNOWN = 20.0  # so many times what is known of the size of a formula's number it may be
 
 
 @dataclass(frozen=True)
@@ -276,7 +277,8 @@ def base_parameters(model: native.Model, names: Iterable[str]) -> list[Parameter
 def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -> list[Parameter]:
     """Free quantities of one effect of a model; a fresh one begins at its defaults.
 
-    Of a formula only those parameters that it names are free, and nothing is known of their size.
+    Of a formula only those parameters that it names are free, and nothing is known of their size
+    but that they are no larger by far than 1, or than they are in the model.
     """
     place = effect_names(model).index(instance)
     texts, name = model.texts[place], instance.split("#")[0]
@@ -288,15 +290,16 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
         full = f"{instance}.{p['name']}"
         low, high = bounds[full]
         strength = p["default"] - p["neutral"]
+        value = p["default"] if fresh else model.get(full)
         found.append(
             Parameter(
                 name=full,
                 unit=p["unit"],
-                value=p["default"] if fresh else model.get(full),
+                value=value,
                 min=low,
                 max=high,
                 usual=p["neutral"],
-                std=high - low if texts else p["usual_size"],
+                std=UNKNOWN * max(1.0, abs(value)) if texts else p["usual_size"],
                 step=EFFECT_STEP * abs(strength),
                 central=p["unit"] == "s",
                 role=p["role"],

@@ -213,9 +213,9 @@ def parameters(estimates: list[ParameterEstimate]) -> Table:
     rows = []
     for e in estimates:
         told = e.seen or e.together
-        doubt = "not determined by this log"
-        if told:
-            doubt = "at its bound" if e.at_bound else "" if e.seen else "known only in combination"
+        doubt = "" if e.seen else "known only in combination"
+        if e.at_bound or not told:
+            doubt = "at its bound" if e.at_bound else "not determined by this log"
         remark = "; ".join(words for words in (e.words, doubt) if words)
         value, std = (
             (rounded(e.value, e.std), f"± {number(e.std)}") if told else (number(e.value), "-")

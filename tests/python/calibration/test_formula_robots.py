@@ -143,8 +143,8 @@ def test_a_doubtful_effect_that_says_nothing_beside_the_formula_goes(explained):
     tilt = effect_parameters(models[0], "floor_tilt", fresh=True)
     fit = ScoreFit(state.datasets, models, [*state.begun(), *tilt]).fit()
     formula, before = result.formula.formula, result.formula.before
-    whole = taken(fit, formula, before=before, doubtful=(), runs=1)
-    less = taken(fit, formula, before=before, doubtful=("floor_tilt",), runs=1)
+    whole = taken(fit, formula, before=before, beside=(), runs=1)
+    less = taken(fit, formula, before=before, beside=("floor_tilt",), runs=1)
     assert "floor_tilt" in effect_names(whole.fit.models[0])
     assert "floor_tilt" not in effect_names(less.fit.models[0])
     assert less.formula.instead_of == (*formula.instead_of, "floor_tilt") and less.kept

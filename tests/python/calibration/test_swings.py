@@ -8,6 +8,7 @@ import io
 import json
 import subprocess
 from contextlib import redirect_stdout
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -68,10 +69,15 @@ def said_by(words: list[str]) -> dict:
 
 
 @pytest.fixture(scope="module")
-def explained(overshooting, run_log, one_clock_base, tmp_path_factory) -> dict:
-    """What `explain` says of a log of the robot that overshoots."""
+def log(overshooting, run_log) -> Path:
+    """Of the robot that overshoots."""
+    return run_log(overshooting(), 101, 60.0)
+
+
+@pytest.fixture(scope="module")
+def explained(log, one_clock_base, tmp_path_factory) -> dict:
+    """What `explain` says of it."""
     out = tmp_path_factory.mktemp("explained") / "swings.toml"
-    log = run_log(overshooting(), 101, 60.0)
     return said_by(["explain", str(log), "--model", str(one_clock_base.path), "-o", str(out)])
 
 
@@ -97,6 +103,16 @@ def test_explain_tunes_it_by_the_plant(explained):
     assert rate["value"] == pytest.approx(2 * np.pi * HZ, rel=0.01)
     assert damping["value"] == pytest.approx(DAMPING, rel=0.1)
     assert all(n["low"] < n["value"] < n["high"] for n in (part, rate, damping))
+
+
+def test_its_part_is_known_no_better_than_with_its_constants(explained, log, tmp_path):
+    """Among variances the marginal one is the larger; in the model file the constants are text."""
+    words = ["fit", str(log), "--model", explained["model"], "-o", str(tmp_path / "again.toml")]
+    beside_text = {p["name"]: p["std"] for p in said_by(words)["parameters"]}["equation.p0"]
+    written = ModelFile.load(explained["model"]).effect_stds["equation.p0"]
+    told = explained["formula"]["numbers"][0]
+    assert told["high"] - told["value"] == pytest.approx(1.96 * written, rel=0.01)
+    assert written > 1.4 * beside_text
 
 
 def test_its_model_predicts_another_drive(explained, overshooting, run_log, one_clock_base):

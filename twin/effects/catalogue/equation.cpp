@@ -77,11 +77,14 @@ constexpr Card kCard = {
     .phrase = "a formula of its own",
 };
 
+// Of any number of a formula, in the formula's unit: a slow robot's heat has hundreds of s^2/m^2.
+constexpr double kFar = 1e6;
+
 constexpr ParameterSpec kParameters[] = {
-    {"p0", "1", 0, 0.01, -10, 10, "p0 of the formula, in the unit that it gives it"},
-    {"p1", "1", 0, 0.01, -10, 10, "p1 of the formula"},
-    {"p2", "1", 0, 0.01, -10, 10, "p2 of the formula"},
-    {"p3", "1", 0, 0.01, -10, 10, "p3 of the formula"},
+    {"p0", "1", 0, 0.01, -kFar, kFar, "p0 of the formula, in the unit that it gives it"},
+    {"p1", "1", 0, 0.01, -kFar, kFar, "p1 of the formula"},
+    {"p2", "1", 0, 0.01, -kFar, kFar, "p2 of the formula"},
+    {"p3", "1", 0, 0.01, -kFar, kFar, "p3 of the formula"},
 };
 
 constexpr TextParameter kTexts[] = {
@@ -311,6 +314,11 @@ const Quantity &FindQuantity(const std::string &name)
         what = what.substr(0, what.find_last_not_of(".!") + 1);
         Fail(key, text, error.GetPos(), what);
     }
+    if (token == "s" || token == "r")
+        Fail(key, text, error.GetPos(),
+             "the state '" + token + "' has no rate of change; give " +
+                 (token == "s" ? "state_rate (--state-rate), its ds/dt,"
+                               : "second_rate (--second-rate), its dr/dt,"));
     std::set<std::string> known;
     for (const auto &[name, address] : parser.GetVar())
         known.insert(name);

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is wrong with a model's formulas over logs: states that grow, and values that never are."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.model.model_file import ModelError
+from twinmill.model.parameters import effect_names, words
+from twinmill.predict.datasets import ErrorDataset, errors_of
+
+EQUATION = "equation"
+GROWN = 1e9  # errors, in what is usual of them: nothing that drives is so far off
+NOTHING = 1e-9  # of errors: what is rounded off
+
+
+def check_states(data: ErrorDataset, model: native.Model) -> None:
+    """Raises ModelError, naming the state, where one of a formula grows beyond all bounds."""
+    remembering = {name: t for name, t in _equations(model).items() if t.get("state_rate")}
+    if not remembering:
+        return
+    with np.errstate(all="ignore"):
+        rows = errors_of(data, model)
+    if np.isfinite(rows).all() and np.abs(rows).max(initial=0.0) < GROWN:
+        return
+    for name, texts in remembering.items():
+        second = texts.get("second_rate")
+        states = "states s and r grow" if second else "state s grows"
+        rates = f"ds/dt = {texts['state_rate']}" + (f", dr/dt = {second}" if second else "")
+        raise ModelError(
+            f"{name}: its {states} beyond all bounds in these logs ({rates}); write rates that "
+            "bring it back, such as (vx - s)/0.5."
+        )
+
+
+def idle(data: Sequence[ErrorDataset], models: Sequence[native.Model]) -> list[str]:
+    """A sentence for each formula that changes no prediction, though its numbers are not zero.
+
+    Args:
+        data: that can be judged.
+        models: one for each.
+    """
+    found = []
+    for name, texts in _equations(models[0]).items() if data else ():
+        named = [p for p in ("p0", "p1", "p2", "p3") if p in words(" ".join(texts.values()))]
+        if named and not any(m.get(f"{name}.{p}") for m in models for p in named):
+            continue
+        if not any(_acts(d, m, name) for d, m in zip(data, models, strict=True)):
+            found.append(
+                f"{name}: formula '{texts['formula']}' changes no prediction of these logs, since "
+                "it has no finite value in them, or is always zero."
+            )
+    return found
+
+
+def _acts(data: ErrorDataset, model: native.Model, name: str) -> bool:
+    less = model.copy()
+    less.remove_effect(effect_names(model).index(name))
+    return not np.allclose(errors_of(data, model), errors_of(data, less), rtol=0, atol=NOTHING)
+
+
+def _equations(model: native.Model) -> dict[str, dict[str, str]]:
+    """Texts of a model's formulas by name."""
+    pairs = zip(effect_names(model), model.texts, strict=True)
+    return {name: texts for name, texts in pairs if name.split("#")[0] == EQUATION}

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Formulas of one's own that make no sense: each is said in a sentence."""
+
+import pytest
+
+from twinmill.fitting.add import add
+from twinmill.fitting.compare import compare
+from twinmill.model.model_file import ModelError, ModelFile
+from twinmill.model.parameters import ParameterEstimate
+from twinmill.report import tables
+
+
+@pytest.fixture(scope="module")
+def log(measure):
+    """Of the robot as it is."""
+    return measure(seed=5)
+
+
+@pytest.fixture
+def adding(log, one_clock_base, tmp_path):
+    """Adds a formula to the base."""
+
+    def make(formula, *, held=(), **others):
+        texts = {"adds_to": "vx_mps", "formula": formula, **others}
+        out = tmp_path / "added.toml"
+        return add("equation", [log], one_clock_base, out=out, command="", texts=texts, held=held)
+
+    return make
+
+
+@pytest.fixture
+def written(one_clock_base, tmp_path):
+    """The base with a formula that was put in by hand."""
+
+    def make(formula, **rates) -> ModelFile:
+        path = tmp_path / "by_hand.toml"
+        texts = {"name": "equation", "adds_to": "vx_mps", "formula": formula, **rates}
+        lines = [f'{key} = "{text}"' for key, text in texts.items()]
+        path.write_text("\n".join([one_clock_base.text, "[[effect]]", *lines, "p0 = 1.0", ""]))
+        return ModelFile.load(str(path))
+
+    return make
+
+
+# The solutions are e^(100 t), and e^(10 t) and e^(-10 t): within ten seconds beyond all bounds.
+@pytest.mark.parametrize(
+    ("rates", "says"),
+    [
+        ({"state_rate": "100*s + 1"}, r"its state s grows .*ds/dt = 100\*s \+ 1"),
+        ({"state_rate": "r", "second_rate": "100*s + vx"}, r"its states s and r grow"),
+    ],
+)
+def test_a_state_that_grows_is_named(rates, says, adding, written, log):
+    with pytest.raises(ModelError, match=says):
+        adding("p0*s", **rates)
+    with pytest.raises(ModelError, match=says):
+        compare([log], written("p0*s", **rates))
+
+
+def test_a_state_that_comes_back_is_taken(written, log):
+    assert not compare([log], written("p0*(s - vx)", state_rate="(vx - s)/0.001")).warnings
+
+
+def test_a_formula_that_has_no_value_anywhere_is_told(written, log, one_clock_base):
+    """There is none of 1/0: the model predicts as if it had no formula."""
+    found = compare([log], written("p0/(vx - vx)"))
+    assert any("has no finite value" in words for words in found.warnings)
+    assert found.score == pytest.approx(compare([log], one_clock_base).score)
+
+
+def test_a_state_without_a_rate_is_told_where_to_give_it(adding):
+    with pytest.raises(ValueError, match=r"the state 's' has no rate of change.*--state-rate"):
+        adding("p0*s")
+
+
+def test_a_number_that_is_not_there_yet_cannot_be_held(adding):
+    with pytest.raises(ModelError, match=r"equation\.p0: is of what is added.*twinmill set"):
+        adding("p0*vx", held=["equation.p0"])
+
+
+def test_what_spoils_left_out_predictions_is_told(adding):
+    """Only the product of the two numbers is told: from near zero a fit may land anywhere."""
+    result = adding("p0*vx*p1", adds_to="omega_radps")
+    assert result.heldout_after.score > result.heldout_refit.score
+    (note,) = result.notes
+    assert "worse with it" in note and "twinmill set" in note
+
+
+def test_what_left_out_predictions_do_not_mind_is_not(adding):
+    assert adding("p0*vx*vx").notes == []
+
+
+def test_a_number_at_its_bound_is_told_as_such():
+    cut = ParameterEstimate("equation.p0", -10.0, 20.0, "1", at_bound=True, seen=False)
+    (row,) = tables.parameters([cut]).rows
+    assert row[-1].text == "at its bound"
