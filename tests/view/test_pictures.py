@@ -145,6 +145,7 @@ class Screen:
         with os.fdopen(read) as pipe:
             number = pipe.readline().strip()
         self.env = {**NO_DISPLAY, "DISPLAY": f":{number}"}
+        wait_until(self.answers)
         self.run = subprocess.Popen(
             [TWIN_RUN, "--plant", "planar", "--view", "--json", *map(str, arguments)],
             env=self.env,
@@ -165,6 +166,10 @@ class Screen:
             if process.poll() is None:
                 process.send_signal(signal.SIGKILL)
             process.wait()
+
+    def answers(self):
+        size = ["xdotool", "getdisplaygeometry"]
+        return subprocess.run(size, env=self.env, capture_output=True).returncode == 0
 
     def window(self):
         search = ["xdotool", "search", "--name", "^twin_run$"]
