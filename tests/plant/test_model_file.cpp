@@ -148,7 +148,7 @@ const Bad kBad[] = {
      {"'wheel_gain'", "[robots.R03]", "[[effect]]"}},
     {"UnknownOverrideOfAnEffect",
      "[[effect]]\nname = 'wheel_gain'\n[robots.R03]\nwheel_gain.fx = 0.1",
-     {"'fx'", "wheel_gain", "'fl'"}},
+     {"'fx'", "wheel_gain", "fl, fr, rl, rr"}},
     {"OverrideOfAnEffectOutOfBounds",
      "[[effect]]\nname = 'wheel_gain'\n[robots.R03]\nwheel_gain.fl = 0.6",
      {"robots.R03.wheel_gain.fl = 0.6", "-0.5 to 0.5"}},

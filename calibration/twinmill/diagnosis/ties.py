@@ -51,10 +51,13 @@ def _is_as_good(accepted: Trial, trial: Trial, settings: Settings) -> bool:
     How the push of wheels becomes motion over the floor no plant has quite right, so that on the
     robot it may be the better one.
     """
+    if trial.held_score > GOOD:
+        return False
     cards = catalogue()
     stages = {cards[t.names[0]]["stage"] for t in (accepted, trial)}
-    passes = stages == {"wheel", "ground"} and trial.held_score <= GOOD
-    return passes and trial.evidence > settings.as_good * accepted.evidence
+    if stages != {"wheel", "ground"}:
+        return False
+    return trial.evidence > settings.as_good * accepted.evidence
 
 
 def _is_within_the_table(before: Trial, one: Trial, other: Trial, settings: Settings) -> bool:

@@ -12,7 +12,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.equations import idle
 from twinmill.fitting.floor import NoiseFloor
-from twinmill.fitting.opening import Opened, judged, open_measurements
+from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import CLOCK, HEADING, starting_angles, unevenness
 from twinmill.predict.datasets import total_score
@@ -248,7 +248,7 @@ def comparison(
     """Of measurements as they stand; of a model that was fitted to them, by its new name."""
     warnings = _warnings([o.measurement for o in opened])
     warnings += [f"{o.floor.reason}." for o in opened if o.floor and o.floor.reason]
-    known = judged(opened)
+    known = [o for o in opened if o.data is not None]
     warnings += idle([o.data for o in known], [o.model for o in known])
     name = fitted_name or model_file.path.name
     return Comparison(name, [compare_robot(o) for o in opened], warnings)
