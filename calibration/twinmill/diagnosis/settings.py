@@ -96,6 +96,7 @@ class Settings(Numbers):
 
     # What is left.
     nothing_left: float = number(0.02, "share of the first excess: where less is left, nothing is")
+    level: float = number(1.03, "score up to which nothing is left that could depend on anything")
     dependence_chance: float = number(0.01, "that a dependence is named where nothing is left")
     beside: float = number(0.1, "by which a dependence must raise what better ones take ...")
     as_much: float = number(0.9, "... unless it takes this share of what the best one takes")
