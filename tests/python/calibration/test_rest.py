@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import twinmill_native as native
 
+from twinmill.diagnosis import rest
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.findings import with_stale_numbers
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
@@ -143,6 +144,22 @@ def test_a_robot_that_drives_faster_than_the_model_was_told_slips_more(speed_mps
     silent = ChannelNoise(0.0, 0.0, 0.1)
     found = irregularity(own, Noise(silent, silent, speed_mps), model, told_mps)
     assert found == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("score", "random", "told"),
+    [(1.02, False, []), (1.06, False, ["heading"]), (1.02, True, ["heading"])],
+)
+def test_what_is_no_more_than_the_noise_depends_on_nothing(score, random, told, monkeypatch):
+    found = Rest(0.0, False, ["heading"])
+    monkeypatch.setattr(rest, "_dependences", lambda *_, there: found)
+    monkeypatch.setattr(rest, "_firm", lambda *_: False)
+    for name, nothing in (("moments_of", ()), ("comes_again", 0.0), ("formula_of", None)):
+        monkeypatch.setattr(rest, name, lambda *_, nothing=nothing, **__: nothing)
+    fit, first = SimpleNamespace(held_square=score**2, models=[]), SimpleNamespace(held_square=1.1)
+    formulas = SimpleNamespace(logs=[])
+    of = rest.rest_of(formulas, fit, first, known={}, whole=[], random=random)
+    assert of.depends_on == told
 
 
 def test_at_few_commands_little_that_depends_on_speed_is_the_base():
