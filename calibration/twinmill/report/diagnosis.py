@@ -59,8 +59,8 @@ def findings(diagnosis: Diagnosis) -> Table:
         )
     if rows:
         rest = diagnosis.rest
-        most = "most likely " if rest.likely else ""
-        on = f"depends {most}on {', '.join(rest.depends_on)}" if rest.depends_on else ""
+        most, other = ("most likely ", " or ") if rest.likely else ("", ", ")
+        on = f"depends {most}on {other.join(rest.depends_on)}" if rest.depends_on else ""
         rows.append(
             [
                 Cell("left over", "dim"),

@@ -143,9 +143,9 @@ class MissingPanel:
     def _rest(self, found: dict) -> None:
         rest = found["rest"]
         if found["findings"]:
-            on = ", ".join(rest["depends_on"])
+            most, other = ("most likely ", " or ") if rest.get("likely") else ("", ", ")
+            on = other.join(rest["depends_on"])
             words = f"Left over: {100 * rest['share']:.0f} %"
-            most = "most likely " if rest.get("likely") else ""
             words += f", depends {most}on {on}" if on and rest.get("told", True) else ""
             certainty = rest["certainty"] if rest.get("told", True) else "no more than noise"
             ui.label(f"{words}: {certainty}.").classes("soft")
