@@ -637,9 +637,6 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
             return doubted(finding, "more is left or doubtful than is sure, and it is no noise")
         if much and (why := _unusual(catalogue()[finding.effect], finding.parameters)):
             return doubted(finding, why)
-        if rest.misses and rest.depends_on and not rest.likely:
-            why = f"what is left is far above the noise, and depends {rest.on}"
-            return doubted(finding, why)
         if rest.firm and rest.share > SETTINGS.lag_leaves and _is_late(finding.effect):
             why = "much is left: something else at changes of the command may be late"
             return doubted(finding, why, wrong_form=not rest.moments)

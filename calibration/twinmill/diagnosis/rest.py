@@ -23,7 +23,7 @@ from twinmill.diagnosis.moments import Moment, moments_of
 from twinmill.diagnosis.place import comes_again
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import COUPLING, PLACE, Term
-from twinmill.fitting.compare import GOOD, MISSING
+from twinmill.fitting.compare import GOOD
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
 
@@ -76,7 +76,6 @@ class Rest:
         takes: share of what is left that the formula takes on left-out parts.
         family_takes: the same of all that was tested of the first group together.
         little: no more than what is called good, however sure it is.
-        misses: more than what is called a model that misses nothing.
         left_over: fall of the cost per independent error by every group that brings any.
         old: groups that help no more than they did on other logs.
         moments: events that neither commands nor findings explain.
@@ -101,7 +100,6 @@ class Rest:
     likely: bool = False
     family_takes: float = 0.0
     little: bool = False
-    misses: bool = False
     looked_at: bool = True
 
     def with_findings(self, findings: Sequence[Finding]) -> "Rest":
@@ -285,7 +283,6 @@ def rest_of(
         firm=firm,
         far=fit.held_square > SETTINGS.no_noise**2,
         little=fit.held_square <= GOOD**2,
-        misses=fit.held_square > MISSING**2,
         depends_on=_in_order(proven, found, others),
         moments=tuple(moments),
         again=again,

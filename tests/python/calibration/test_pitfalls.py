@@ -1090,19 +1090,6 @@ def test_an_effect_that_takes_less_than_is_left_or_doubtful_is_not_sure(doubtful
 
 
 @pytest.mark.parametrize(
-    ("misses", "depends_on", "certainty"),
-    [(True, ["place"], "doubtful"), (False, ["place"], "sure"), (True, [], "sure")],
-)
-def test_beside_what_is_far_above_the_noise_and_depends_on_something_no_name_is_sure(
-    misses, depends_on, certainty
-):
-    """Iron near a spot had been a heading that is off, surely, with a score of 1.5 left."""
-    found = [Finding("heading_bias", None, [], 0.92, "sure")]
-    (judged,) = beside_more(found, Rest(0.09, True, depends_on, misses=misses))
-    assert judged.certainty == certainty
-
-
-@pytest.mark.parametrize(
     ("gain", "left", "certainty"),
     [(-0.26, 0.18, "doubtful"), (-0.26, 0.05, "sure"), (-0.06, 0.18, "sure")],
 )
