@@ -32,8 +32,7 @@ from twinmill.diagnosis.term import (
     moves,
     times,
 )
-from twinmill.filters import filtered
-from twinmill.fitting.dependence import rates
+from twinmill.fitting.dependence import fading, rates
 from twinmill.fitting.floor import body_velocity_at
 from twinmill.fitting.opening import Opened
 from twinmill.model.parameters import effect_names
@@ -352,8 +351,7 @@ def _named_terms(
 def _after_rise(speed: np.ndarray, step_s: np.ndarray) -> np.ndarray:
     """By how much a speed rose lately, fading with the time since; its sign is the speed's."""
     rise = np.maximum(np.diff(np.abs(speed), prepend=np.abs(speed[0])), 0.0) * np.sign(speed)
-    period_s = float(np.median(step_s[step_s > 0]))
-    return filtered([1.0], [1.0, -np.exp(-period_s / START_S)], rise)
+    return fading(rise, START_S, step_s)
 
 
 def _since_start(moving: np.ndarray, t_s: np.ndarray) -> np.ndarray:

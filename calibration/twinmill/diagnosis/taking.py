@@ -32,7 +32,6 @@ EFFECT = "equation"
 SEVERAL = 2  # runs that tell of a moment that they share
 STEP = 0.05  # of finite differences, times the number at which a shape adds what is typical
 FINER = 4.0  # times which errors of what swings may be below the floor
-
 CONSTANT_STEP, CONSTANT_STD = 0.01, 0.5  # shares of a constant
 STEP_OF_SPREAD = 1 / 16  # of the share of a constant within which a better one may lie
 FAR_OFF = 3.0  # times which a constant may differ from the one that was proven

@@ -328,7 +328,7 @@ def missing(told: np.ndarray, usual: float) -> np.ndarray:
 
 def lagged(values: np.ndarray, lag_s: float, step_s: np.ndarray) -> np.ndarray:
     """(N, k) values behind a lag, on steps that are taken to be even."""
-    keep = np.exp(-float(np.median(step_s[step_s > 0])) / max(lag_s, INSTANT_S))
+    keep = np.exp(-even_step_s(step_s) / max(lag_s, INSTANT_S))
     return filtered([1 - keep], [1.0, -keep], values)
 
 
@@ -361,8 +361,8 @@ def _events(motion: Motion) -> Iterator[Features]:
     ways = np.where(np.abs(base) > MOVES * largest, np.sign(base), 0.0)
     reversals = np.column_stack([_reversals(way) for way in ways.T])
     for event in (rises, falls, reversals):
-        fading = np.hstack([_fading(event, fade_s, step_s) for fade_s in FADES_S])
-        yield fading, fading, fading
+        felt = np.hstack([fading(event, fade_s, step_s) for fade_s in FADES_S])
+        yield felt, felt, felt
     still = (np.abs(base) < STILL * largest).all(axis=1)
     starts = np.flatnonzero(~still & np.r_[True, still[:-1]])
     last = np.searchsorted(starts, np.arange(len(base)), side="right") - 1
@@ -384,10 +384,14 @@ def _reversals(way: np.ndarray) -> np.ndarray:
     return out
 
 
-def _fading(events: np.ndarray, fade_s: float, step_s: np.ndarray) -> np.ndarray:
-    """(N, n) events that each fade, on steps that are taken to be even."""
-    period_s = float(np.median(step_s[step_s > 0]))
-    return filtered([1.0], [1.0, -np.exp(-period_s / fade_s)], events, axis=0)
+def fading(events: np.ndarray, fade_s: float, step_s: np.ndarray) -> np.ndarray:
+    """(N,) or (N, n) events that each fade, on steps that are taken to be even."""
+    return filtered([1.0], [1.0, -np.exp(-even_step_s(step_s) / fade_s)], events, axis=0)
+
+
+def even_step_s(step_s: np.ndarray) -> float:
+    """Length of (N,) steps that are taken to be even; of those of no length stretches begin."""
+    return float(np.median(step_s[step_s > 0]))
 
 
 def _harmonics(angle: np.ndarray) -> np.ndarray:

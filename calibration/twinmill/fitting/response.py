@@ -25,7 +25,7 @@ from twinmill.fitting import wheel_angles
 from twinmill.fitting.beat import HORIZONS as BEAT_HORIZONS
 from twinmill.fitting.beat import beat_radps
 from twinmill.fitting.boosting import Learners, Parts, boosted
-from twinmill.fitting.dependence import Features, Group, Motion
+from twinmill.fitting.dependence import Features, Group, Motion, even_step_s
 from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import EVERY_S, difference, rms
@@ -277,7 +277,7 @@ class Response:
 
     def _lagged_base(self, base_mps: np.ndarray) -> np.ndarray:
         """(N, 3 lags) of each axis: the base's velocity, and late."""
-        period_s = float(np.median(self.step_s[self.step_s > 0]))
+        period_s = even_step_s(self.step_s)
         parts = [base_mps]
         for lag_s in BASE_LAGS_S[1:]:
             gain = 1 - np.exp(-period_s / lag_s)

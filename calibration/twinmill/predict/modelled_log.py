@@ -79,10 +79,8 @@ class ModelledLog:
             self.noise = left
 
     @property
-    def noise_at_speed(self) -> Noise | None:
+    def noise_at_speed(self) -> Noise:
         """The noise, with the RMS speed at which it was seen while the robot drove."""
-        if self.noise is None:
-            return None
         pose, grid = self.measurement.track.pose, self.grid
         ends = native.one_step(self.model, self.measurement.played)[grid.source]
         way_m = np.linalg.norm(ends[:, :2] - pose[grid.origin, :2], axis=1) * grid.share
