@@ -12,7 +12,7 @@ import numpy as np
 
 from twinmill.data.track import command_at
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import TIME
+from twinmill.diagnosis.term import PLACE, TIME
 from twinmill.diagnosis.trials import Trial
 from twinmill.model.parameters import Parameter, effect_names, needing
 from twinmill.predict.datasets import Trajectory
@@ -40,7 +40,8 @@ class Change:
     @property
     def why(self) -> str:
         """What the change means, as a clause for reports."""
-        way = "changes" if self.on == "heading" else "grows" if self.relative > 0 else "falls"
+        way = "grows" if self.relative > 0 else "falls"
+        way = "changes" if self.on in ("heading", PLACE) else way
         return (
             f"{self.parameter} {way} with {self.on} (by {100 * abs(self.relative):.0f} % for a "
             "usual difference): the same physics in another form, or another effect"
@@ -65,11 +66,10 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
     fit = trial.fit
     logs = [i for i, d in enumerate(fit.datasets) if isinstance(d, Trajectory)]
     instances = set(effect_names(trial.state.model))
-    sizes = [
-        c
-        for c, u in enumerate(fit.unknowns)
-        if u.parameter.name.split(".")[0] in instances and u.parameter.role == "size"
-    ]
+    named = [(u.parameter.name.split(".")[0], u.parameter.role) for u in fit.unknowns]
+    sizes = {
+        c: name for c, (name, role) in enumerate(named) if name in instances and role == "size"
+    }
     if not logs or not sizes:
         return {}
     left, columns, blocks = fit.whitened(logs)
@@ -85,15 +85,17 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
     # Of turns alone, a turn that hangs on the heading looks the same.
     of_way = np.concatenate([fit.datasets[i].channel < 2 for i in logs])
     heading = done(("heading", "cos")) + 1j * done(("heading", "sin"))
-    for c in sizes:
-        instance = fit.unknowns[c].parameter.name.split(".")[0]
+    for c, instance in sizes.items():
         own = columns[:, c] ** 2 * of_way
         of_heading = instance.split("#")[0] in needing("heading")
         if of_heading and abs(own @ heading) > SETTINGS.one_heading * own.sum():
             found[instance] = OneHeading()
     for on, way in [key for key in doing[0] if all(key in d for d in doing)]:
         values = done((on, way))
-        for c in sizes:
+        of_places = needing("places") if on == PLACE else ()
+        for c, instance in sizes.items():
+            if instance.split("#")[0] in of_places:
+                continue
             change = _change(
                 trial=trial,
                 c=c,
@@ -104,7 +106,6 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
                 blocks=blocks,
                 basis=basis,
             )
-            instance = fit.unknowns[c].parameter.name.split(".")[0]
             if change and change.evidence > getattr(found.get(instance), "evidence", 0.0):
                 found[instance] = change
     return found
@@ -122,6 +123,10 @@ def _doing(data: Trajectory) -> dict[tuple[str, str], np.ndarray]:
         ("heading", "cos"): np.cos(heading_rad),
         ("heading", "sin"): np.sin(heading_rad),
     }
+    place_m = track.pose[data.windows.starts, :2]
+    place_m = place_m - place_m.mean(axis=0)
+    found[PLACE, "x"], found[PLACE, "y"] = place_m.T
+    found[PLACE, "away"] = np.sum(place_m**2, axis=1)
     if track.command_kind == "duty":
         middle_s = data.start_s + HORIZONS_S[HORIZON] / 2
         found["duty", ""] = np.abs(command_at(middle_s, track.command_t_s, track.command)).max(

@@ -6,6 +6,7 @@ import pytest
 
 from twinmill.diagnosis.constancy import OneHeading, changes_of
 from twinmill.diagnosis.diagnose import first_state
+from twinmill.diagnosis.term import PLACE
 from twinmill.diagnosis.trials import fitted, with_effects
 from twinmill.fitting.opening import judged, open_measurements
 
@@ -48,3 +49,19 @@ def test_an_error_of_the_compass_that_turns_alone_tell_may_be_of_the_turns(
     state = first_state(judged(open_measurements([run], guess)), guess, ())
     told = changes_of(fitted(with_effects(state, ["compass_deviation"])))
     assert isinstance(told.get("compass_deviation"), OneHeading) != turn
+
+
+@pytest.mark.parametrize("iron", [False, True])
+def test_a_heading_bias_that_is_of_one_side_of_the_room_is_not_one_number(
+    iron, tanh_robot, measure, true_model
+):
+    """Iron under the floor leads the compass astray near it; a bias is the same everywhere."""
+    run = measure(tanh_robot(), 6, 120.0)
+    place_m = run.track.pose[:, :2]
+    apart_m = np.hypot(*(place_m - np.quantile(place_m, 0.75, axis=0)).T)
+    share = np.exp(-((apart_m / (np.ptp(place_m, axis=0).max() / 3)) ** 2)) if iron else 1.0
+    error_rad = np.broadcast_to(0.1 * share, len(place_m))
+    run = run.with_pose(run.track.pose + error_rad[:, None] * np.array([0, 0, 1]))
+    state = first_state(judged(open_measurements([run], true_model)), true_model, ())
+    told = changes_of(fitted(with_effects(state, ["heading_bias"]))).get("heading_bias")
+    assert (told.on if told else None) == (PLACE if iron else None)
