@@ -520,6 +520,18 @@ def _is_some_moments(finding: Finding, found: Sequence[Finding], rest: Rest) -> 
     return doubted(finding, why, wrong_form=True)
 
 
+def _is_beside_larger_group(
+    finding: Finding, found: Sequence[Finding], rest: Rest
+) -> Finding | None:
+    """A larger one is this or that, of another kind each: which decides what is left for this."""
+    larger = [f for f in found if f.group and f.share > finding.share]
+    larger = [f for f in larger if not any(all(map(of, f.group)) for of, *_ in KINDS)]
+    if finding.certainty != "sure" or finding.effect == REFIT or not larger:
+        return None
+    names = " or ".join(larger[0].group)
+    return doubted(finding, f"what it takes hangs on which is there, {names}")
+
+
 def _leaves_its_own(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
     """What is left still depends on what the finding acts by.
 
@@ -563,6 +575,7 @@ FORM_RULES = (
     _is_of_a_place_that_changes,
     _is_some_moments,
     _is_beside_doubtful_of_its_kind,
+    _is_beside_larger_group,
     _leaves_its_own,
     _is_second,
 )

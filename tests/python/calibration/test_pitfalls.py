@@ -906,6 +906,19 @@ def test_a_lag_that_hangs_on_the_duty_is_not_parted_from_another(second, certain
 
 
 @pytest.mark.parametrize(
+    ("group", "certainty"),
+    [(("wheel_gain", "abrupt_loss"), "doubtful"), (("input_delay", "clock_offset"), "sure")],
+)
+def test_what_is_found_beside_one_of_two_hangs_on_which_it_is(group, certainty):
+    """A weak wheel turns the robot, a loss from a moment on does not; all that is late is alike."""
+    found = [
+        Finding(group[0], group, [], 0.6, "group"),
+        Finding("yaw_lever", None, [], 0.3, "sure"),
+    ]
+    assert of_another_form(found, NOTHING_LEFT)[1].certainty == certainty
+
+
+@pytest.mark.parametrize(
     ("effect", "left", "firm", "certainty"),
     [
         ("input_delay", 0.1, True, "sure"),
