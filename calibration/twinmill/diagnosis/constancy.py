@@ -19,6 +19,7 @@ from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
 HORIZON = HORIZONS_S.index(0.5)
+GROUPS = {"turning": "turning rate", "duty": "speed"}  # of a rest, by what a number changes with
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,16 @@ class Change:
     on: str
     relative: float
     evidence: float
+
+    @property
+    def is_of_another_form(self) -> bool:
+        """It is large, and not of the heading, over which a compass may err in many ways."""
+        return self.on != "heading" and abs(self.relative) > SETTINGS.other_form
+
+    @property
+    def depends_on(self) -> str:
+        """The group of what it changes with."""
+        return GROUPS.get(self.on, self.on)
 
     @property
     def why(self) -> str:

@@ -33,6 +33,7 @@ from twinmill.diagnosis.notes import (
     few_commands_notes,
     geometry_notes,
     irregularity_notes,
+    is_random,
     lag_notes,
     marker_notes,
     scatters_of,
@@ -326,13 +327,14 @@ def _concluded(
     after = [fitted.get(id(o.measurement), o) for o in opened]
     modelled = [r.modelled.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
     scatters = scatters_of(opened, [s.noise and s.noise_at_speed for s in modelled], model_file)
+    random = is_random(scatters, last.held_score)
     rest = rest_of(
         formulas,
         last.fit,
         start.fit,
         known=model_file.left_over(hashes),
         whole=whole,
-        random=max(scatters) > SETTINGS.random,
+        random=random,
         without=in_doubt,
     )
     if rest.proven and rest.proven.is_late:
@@ -346,6 +348,8 @@ def _concluded(
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
     rest = rest.with_findings(findings)
+    if rest.firm and not rest.depends_on and all(f.certainty == "doubtful" for f in findings):
+        rest = rest.most_likely(acted_on(findings, 0.0))
     disturbed = [] if rest.moments else disturbed_notes(after)
     noise = irregularity_notes(opened, scatters)
     named = {name for f in findings for name in (f.effect, *(f.group or ()))}
@@ -366,7 +370,7 @@ def _concluded(
         noise,
         usual,
         disturbed,
-        max(scatters),
+        random,
     )
     if weighed.verdict == "outside_catalogue":
         rest = rest.with_first(acted_on(findings, rest.least))

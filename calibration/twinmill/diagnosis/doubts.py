@@ -51,6 +51,7 @@ ACTS_ON = (
     ({"headings"}, "heading"),
     ({"history"}, TIME),
     ({"battery"}, TIME),
+    ({"clock", "long"}, TIME),
     ({"changes"}, CHANGE),
     ({"reversals"}, "direction of rotation"),
     ({"arcs"}, COUPLING),
@@ -85,6 +86,8 @@ def of_one(
         return doubt
     if change:
         return change.why
+    if _is_as_good_as_stale_numbers(done, name):
+        return "other numbers of the base take nearly as much, and the errors left are no noise"
     if (
         done.last.fit.chance_of_none(newest_instance(done.last.state.model, name))
         > SETTINGS.nothing
@@ -219,8 +222,8 @@ def _unusual(card: dict, own: Sequence[ParameterEstimate]) -> str:
 
 
 def _faster(name: str, own: Sequence[ParameterEstimate]) -> str:
-    """A doubt where a loss at a place or a moment makes the robot faster; else empty."""
-    if not (own and _is_event(name)):
+    """A doubt where a loss makes the robot faster; else empty."""
+    if not (own and (_is_event(name) or _rubs(name))):
         return ""
     loss, *_ = own
     if loss.value < -SETTINGS.within * loss.std:
@@ -300,6 +303,16 @@ def _beats(done: Search, one: Trial, other: Trial) -> bool:
     evidence, without_best, _ = one.fit.against(other.fit)
     least = done.settings
     return evidence > least.evidence and without_best > least.without_best
+
+
+def _is_as_good_as_stale_numbers(done: Search, name: str) -> bool:
+    """Whether the base's numbers alone took as much, and even the final model misses by far."""
+    this = done.round_of(name)
+    if done.last.held_score <= SETTINGS.misses or name == REFIT:
+        return False
+    before = this.before.held_score**2
+    least = before - SETTINGS.imitates * (before - this.accepted.held_score**2)
+    return any(t.names == (REFIT,) and t.held_score**2 < least for t in this.trials)
 
 
 def _same(
@@ -712,6 +725,11 @@ def _is_placed(effect: str) -> bool:
 def _is_event(effect: str) -> bool:
     """Whether it is at a place or from a moment on."""
     return any(with_role(effect, role) for role in WHERE_OR_WHEN)
+
+
+def _rubs(effect: str) -> bool:
+    """Whether it is friction that a drive straight ahead shows at several speeds."""
+    return {"friction", "straight", "levels"} <= _acts_by(effect)
 
 
 def _is_timed(effect: str) -> bool:

@@ -360,7 +360,11 @@ def _finding(
     if not doubt and instead == []:
         doubt = f"one visit of its place speaks for {name}: it may be that time and not the place"
     certainty = "doubtful" if doubt else "group" if group else "sure"
-    return Finding(name, group, own, share, certainty, doubt, "#" in instance)
+    found = Finding(name, group, own, share, certainty, doubt, "#" in instance)
+    change = changes.get(instance)
+    if isinstance(change, Change) and change.is_of_another_form:
+        return doubted(found, change.why, wrong_form=True, depends_on=change.depends_on)
+    return found
 
 
 def not_weighed(done: Search) -> list[Finding]:

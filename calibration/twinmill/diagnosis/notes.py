@@ -73,6 +73,17 @@ def scatters_of(
     ]
 
 
+def is_random(scatters: Sequence[float], score: float) -> bool:
+    """Whether something random is there that was not when the model's noise was told.
+
+    Args:
+        scatters: of each log, as `scatters_of` has them.
+        score: of the model with what was found; where it leaves nothing, more must scatter.
+    """
+    alone = score <= SETTINGS.level
+    return max(scatters) > (SETTINGS.random_alone if alone else SETTINGS.random)
+
+
 def irregularity_notes(opened: Sequence[Opened], scatters: Sequence[float]) -> list[str]:
     """A sentence for each log that is far less regular than the model's noise says.
 

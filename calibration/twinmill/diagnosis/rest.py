@@ -115,6 +115,10 @@ class Rest:
         """With these before all else that it depends on."""
         return replace(self, depends_on=list(dict.fromkeys([*names, *self.depends_on])))
 
+    def most_likely(self, names: Sequence[str]) -> "Rest":
+        """With what it may depend on, if nothing is known of that."""
+        return replace(self, depends_on=list(names), likely=bool(names))
+
     def at_few_commands(self) -> "Rest":
         """Without steady speeds, where little is left: at few commands the base may make them."""
         if not self.little:

@@ -92,6 +92,9 @@ class Settings(Numbers):
     companion_evidence: float = number(9.0, "fall of the cost if a size changed with the drive")
     companion_t: float = number(3.0, "the same over blocks: standard errors from zero")
     companion_change: float = number(0.15, "least change of the size per standard deviation")
+    other_form: float = number(
+        0.25, "the same change, from which there is something of another form"
+    )
     one_heading: float = number(0.9, "mean direction of headings, beyond which they are one")
 
     # What is left.
@@ -145,7 +148,8 @@ class Settings(Numbers):
     much: float = number(0.1, "share of the squared error that is much")
     worse: float = number(1.5, "score over the usual one, beyond which it is a finding")
     irregular: float = number(2.2, "noise floor over the model's noise, which is said ...")
-    random: float = number(3.5, "... and from which something random is there that was not")
+    random: float = number(3.5, "... and from which something random is there that was not ...")
+    random_alone: float = number(4.5, "... and the same at a score at which nothing is left")
 
     def stricter(self, times: float) -> "Settings":
         """The same with so many times the evidence."""

@@ -26,7 +26,7 @@ class VerdictInputs:
         noises: what was said of unusual noise.
         known: score that is no news: that of the model on the logs that it was fitted to.
         disturbed: what was said of stretches that are judged nowhere.
-        scatter: of the least regular log, over the noise that the model says.
+        random: the motion is so much less regular than the model says that something is there.
     """
 
     score: float
@@ -40,7 +40,7 @@ class VerdictInputs:
     noises: Sequence[str]
     known: float
     disturbed: Sequence[str] = ()
-    scatter: float = 0.0
+    random: bool = False
 
     @property
     def effects(self) -> list[Finding]:
@@ -60,7 +60,7 @@ class VerdictInputs:
             return "ambiguous" if top.group else "effect_missing"
         if self._outside or self.rest.moments or (self.effects and self.score > MISSING):
             return "outside_catalogue"
-        if self.scatter > SETTINGS.random:
+        if self.random:
             return "outside_catalogue"
         if self.effects:
             return "cannot_tell"

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from twinmill.diagnosis.constancy import OneHeading, changes_of
-from twinmill.diagnosis.diagnose import first_state
+from twinmill.diagnosis.diagnose import diagnose, first_state
 from twinmill.diagnosis.term import PLACE
 from twinmill.diagnosis.trials import fitted, with_effects
 from twinmill.fitting.opening import judged, open_measurements
@@ -65,3 +65,23 @@ def test_a_heading_bias_that_is_of_one_side_of_the_room_is_not_one_number(
     state = first_state(judged(open_measurements([run], true_model)), true_model, ())
     told = changes_of(fitted(with_effects(state, ["heading_bias"]))).get("heading_bias")
     assert (told.on if told else None) == (PLACE if iron else None)
+
+
+@pytest.mark.parametrize("warms", [False, True])
+def test_a_wheel_that_gets_weaker_as_its_motor_warms_is_no_weak_wheel(
+    warms, tanh_robot, measure, true_model
+):
+    """The same loss on the mean: from begin to end, or more and more."""
+
+    class Weak(tanh_robot):
+        def wheels_mps(self, duty):
+            t_s = np.arange(len(duty)) / 480
+            lost = 0.08 * (1 - np.exp(-t_s / 25)) if warms else np.full(len(duty), 0.04)
+            speeds = super().wheels_mps(duty)
+            speeds[:, 1] *= 1 - lost
+            return speeds
+
+    found = diagnose([measure(Weak(), 6, 80.0)], true_model)
+    assert [f.effect for f in found.findings] == ["wheel_gain"]
+    assert ("time" in found.rest.depends_on) == warms
+    assert found.verdict == ("outside_catalogue" if warms else "effect_missing")

@@ -1043,6 +1043,8 @@ def test_losses_here_and_then_may_be_one_that_comes_and_goes(losses, certainty):
         ("transient_loss", -0.2, True),
         ("transient_loss", -0.03, False),  # within its error of 0.02
         ("turn_asymmetry", -0.2, False),  # has no sign that is usual
+        ("speed_slip", -0.2, True),
+        ("strafe_loss", -0.2, False),  # the base's own loss may be too large
     ],
 )
 def test_a_fault_that_makes_a_robot_faster_is_doubtful(effect, size, doubted):

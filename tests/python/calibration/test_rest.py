@@ -12,7 +12,7 @@ from twinmill.diagnosis import rest
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.findings import with_stale_numbers
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
-from twinmill.diagnosis.notes import irregularity
+from twinmill.diagnosis.notes import irregularity, is_random
 from twinmill.diagnosis.place import HORIZON, comes_again
 from twinmill.diagnosis.rest import FIRM, Dependence, Products, Rest, _standing_out, _tested
 from twinmill.diagnosis.settings import SETTINGS
@@ -188,14 +188,15 @@ def test_what_grows_beside_a_noisy_sensor_shows_at_the_longest_horizon():
     assert np.exp(np.log(ahead / along).mean()) < SETTINGS.irregular < found
 
 
-@pytest.mark.parametrize(("scatter", "verdict"), [(2.5, "cannot_tell"), (4.0, "outside_catalogue")])
-def test_scatter_far_beyond_the_models_noise_is_something_random(scatter, verdict):
+@pytest.mark.parametrize(
+    ("score", "scatter", "random"), [(1.1, 2.5, False), (1.1, 4.0, True), (1.0, 4.0, False)]
+)
+def test_scatter_far_beyond_the_models_noise_is_something_random(score, scatter, random):
     noise = ["the unexplained scatter is far above the noise"]
-    weighed = VerdictInputs(
-        1.1, 1.1, 1.1, 1.1, [], Rest(1.0, False, []), [], [], noise, 1.0, (), scatter
-    )
-    assert weighed.verdict == verdict
-    assert ("random" in weighed.sentence) == (scatter > 3)
+    assert is_random([1.0, scatter], score) == random
+    weighed = VerdictInputs(*[score] * 4, [], Rest(1.0, False, []), [], [], noise, 1.0, (), random)
+    assert weighed.verdict == ("outside_catalogue" if random else "cannot_tell")
+    assert ("random" in weighed.sentence) == random
 
 
 def test_a_round_wheel_is_not_named_for_what_an_oval_one_does():
@@ -331,16 +332,16 @@ def test_of_what_chance_could_make_the_data_prefer_some(falls, named):
 
 
 @pytest.mark.parametrize(
-    ("last", "scatter", "verdict", "words"),
+    ("last", "random", "verdict", "words"),
     [
-        (1.17, 1.0, "cannot_tell", "do not tell why"),
-        (1.05, 4.0, "outside_catalogue", "random"),
+        (1.17, False, "cannot_tell", "do not tell why"),
+        (1.05, True, "outside_catalogue", "random"),
     ],
 )
-def test_what_is_likely_is_told_as_such_and_makes_no_verdict(last, scatter, verdict, words):
+def test_what_is_likely_is_told_as_such_and_makes_no_verdict(last, random, verdict, words):
     rest = Rest(1.0, last > 1.1, ["starts", "time"], likely=True, little=last < 1.1)
-    noise = ["far less regular"] if scatter > 3 else []
-    weighed = VerdictInputs(last, last, last, last, [], rest, [], [], noise, 1.0, (), scatter)
+    noise = ["far less regular"] if random else []
+    weighed = VerdictInputs(last, last, last, last, [], rest, [], [], noise, 1.0, (), random)
     assert weighed.verdict == verdict
     assert words in weighed.sentence
     assert "depends most likely on starts or time" in weighed.sentence
