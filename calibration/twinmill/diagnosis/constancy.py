@@ -72,14 +72,19 @@ class OneHeading:
 def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
     """The strongest change of each effect's instance that is not one number; logs alone tell.
 
+    How late a robot is changes with its speed and load, on real robots always: of that, a change
+    with the time alone is asked for.
     An error of the heading may change with it unseen where the robot drove along one.
     """
     fit = trial.fit
     logs = [i for i, d in enumerate(fit.datasets) if isinstance(d, Trajectory)]
     instances = set(effect_names(trial.state.model))
     named = [(u.parameter.name.split(".")[0], u.parameter.role) for u in fit.unknowns]
+    late = {c for c, (_, role) in enumerate(named) if role == "lateness"}
     sizes = {
-        c: name for c, (name, role) in enumerate(named) if name in instances and role == "size"
+        c: name
+        for c, (name, role) in enumerate(named)
+        if name in instances and role in ("size", "lateness")
     }
     if not logs or not sizes:
         return {}
@@ -105,7 +110,7 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
         values = done((on, way))
         of_places = needing("places") if on == PLACE else ()
         for c, instance in sizes.items():
-            if instance.split("#")[0] in of_places:
+            if instance.split("#")[0] in of_places or (c in late and on != TIME):
                 continue
             change = _change(
                 trial=trial,
@@ -186,6 +191,9 @@ def _size(trial: Trial, parameter: Parameter) -> float:
     instance, away = parameter.name.split(".")[0], []
     for u, value in zip(trial.fit.unknowns, trial.fit.x, strict=True):
         p = u.parameter
-        if p.name.split(".")[0] == instance and (p.role, p.unit) == ("size", parameter.unit):
+        if p.name.split(".")[0] == instance and (p.role, p.unit) == (
+            parameter.role,
+            parameter.unit,
+        ):
             away.append(abs(value - p.usual))
     return max(away)

@@ -348,6 +348,9 @@ def _concluded(
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
     rest = rest.with_findings(findings)
+    usual = model_file.usual_score(hashes)
+    news = findings or rest.moments or rest.proven or SETTINGS.common * last.held_score > usual
+    rest = rest if news else rest.as_before()
     if rest.firm and not rest.depends_on and all(f.certainty == "doubtful" for f in findings):
         rest = rest.most_likely(acted_on(findings, 0.0))
     disturbed = [] if rest.moments else disturbed_notes(after)
@@ -357,7 +360,6 @@ def _concluded(
     faint_names = [name for name, _ in faint]
     hidden = [*faint, *unseen.items()]
     refit = _refit(done, findings)
-    usual = model_file.usual_score(hashes)
     weighed = VerdictInputs(
         given,
         start.held_score,

@@ -119,6 +119,10 @@ class Rest:
         """With what it may depend on, if nothing is known of that."""
         return replace(self, depends_on=list(names), likely=bool(names))
 
+    def as_before(self) -> "Rest":
+        """As no news: what it depends on, the model missed on the logs that it was fitted to."""
+        return replace(self, firm=False, depends_on=[], old=(*self.old, *self.depends_on))
+
     def at_few_commands(self) -> "Rest":
         """Without steady speeds, where little is left: at few commands the base may make them."""
         if not self.little:

@@ -81,7 +81,7 @@ class Settings(Numbers):
     of_a_kind: int = number(3, "effects of a kind, or all doubtful, which are one of another form")
     slight: float = number(0.3, "share of what is left that a second finding must take")
     much_left: float = number(0.3, "share left, beyond which no name is sure")
-    lag_leaves: float = number(0.25, "share left, beyond which no lag is sure")
+    lag_leaves: float = number(0.12, "share left, beyond which no lag is sure")
     form_takes: float = number(0.15, "share of what is left, by which a finding has another form")
     nearly_all: float = number(0.85, "... beyond which share it is still the same physics")
     same: float = number(0.8, "cosine of what two take, from which they take the same errors ...")

@@ -85,3 +85,20 @@ def test_a_wheel_that_gets_weaker_as_its_motor_warms_is_no_weak_wheel(
     assert [f.effect for f in found.findings] == ["wheel_gain"]
     assert ("time" in found.rest.depends_on) == warms
     assert found.verdict == ("outside_catalogue" if warms else "effect_missing")
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+def test_a_robot_that_answers_later_from_one_moment_on_has_no_bad_clock(
+    loaded, tanh_robot, measure, true_model
+):
+    """Later and later looks like a clock that runs slow; no crystal is off by so much."""
+
+    class Loaded(tanh_robot):
+        def wheels_mps(self, duty):
+            half = len(duty) // 2 if loaded else len(duty)
+            late = tanh_robot(lag_s=0.15).wheels_mps(duty)
+            return np.vstack([super().wheels_mps(duty)[:half], late[half:]])
+
+    found = diagnose([measure(Loaded(), 6, 80.0)], true_model)
+    assert bool(found.findings) == loaded
+    assert all(f.certainty == "doubtful" for f in found.findings)

@@ -348,6 +348,17 @@ def test_what_is_likely_is_told_as_such_and_makes_no_verdict(last, random, verdi
     assert (rest.certainty == FIRM) == (last > 1.1)
 
 
+def test_what_a_model_missed_before_is_no_news_where_it_misses_less():
+    """Fitted at 1.6, here 1.3: what depends on the place did so there."""
+    rest = Rest(1.0, True, ["place"])
+    known, last = 1.6, [1.3] * 4
+    news = VerdictInputs(*last, [], rest, [], [], [], known)
+    before = replace(news, rest=rest.as_before())
+    assert (news.verdict, before.verdict) == ("outside_catalogue", "cannot_tell")
+    assert "as it did on the logs that it was fitted to" in before.sentence
+    assert before.rest.old == ("place",)
+
+
 @pytest.mark.parametrize(("score", "verdict"), [(1.2, "cannot_tell"), (1.6, "outside_catalogue")])
 def test_a_little_that_a_doubtful_effect_half_takes_is_not_called_outside(score, verdict):
     why = "more is left than it takes"
