@@ -349,9 +349,9 @@ def test_what_is_likely_is_told_as_such_and_makes_no_verdict(last, random, verdi
 
 
 def test_what_a_model_missed_before_is_no_news_where_it_misses_less():
-    """Fitted at 1.6, here 1.3: what depends on the place did so there."""
+    """Fitted at 1.6, here 1.4: what depends on the place did so there."""
     rest = Rest(1.0, True, ["place"])
-    known, last = 1.6, [1.3] * 4
+    known, last = 1.6, [1.4] * 4
     news = VerdictInputs(*last, [], rest, [], [], [], known)
     before = replace(news, rest=rest.as_before())
     assert (news.verdict, before.verdict) == ("outside_catalogue", "cannot_tell")
