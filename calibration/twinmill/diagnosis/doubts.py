@@ -675,14 +675,15 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
 
 
 def of_many(found: Sequence[Finding]) -> list[Finding]:
-    """Findings, as of another form where they are many of which not one is sure.
+    """Findings, as of another form where they are many, or two of a kind, and not one is sure.
 
     So many faults at once are rarer than one that the catalogue does not have, and of which each
     takes a part.
     """
     effects = [f for f in found if f.effect != REFIT]
     doubtful = all(f.certainty == "doubtful" for f in effects)
-    if len(effects) < SETTINGS.of_a_kind or not doubtful:
+    alike = any(sum(of(f.effect) for f in effects) > 1 for of, *_ in KINDS)
+    if not doubtful or not (alike or len(effects) >= SETTINGS.of_a_kind):
         return list(found)
     why = "so many doubtful effects together may be one that is none of them"
     return [f if f.effect == REFIT else doubted(f, why, wrong_form=True) for f in found]

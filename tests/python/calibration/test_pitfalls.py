@@ -1093,6 +1093,13 @@ def test_many_effects_of_which_none_is_sure_are_none_of_them(certainties, outsid
     assert all(f.wrong_form == outside for f in judged)
 
 
+@pytest.mark.parametrize(("second", "outside"), [("floor_patch", True), ("yaw_lever", False)])
+def test_two_doubtful_effects_of_one_kind_are_none_of_them(second, outside):
+    """A floor that slopes and has a patch, neither surely, has something else at some place."""
+    judged = of_many([Finding(n, None, [], 0.3, "doubtful") for n in ("gain_slope", second)])
+    assert all(f.wrong_form == outside for f in judged)
+
+
 @pytest.mark.parametrize(
     ("doubtful", "left", "certainty"),
     [(0.25, 0.22, "doubtful"), (0.25, 0.05, "sure"), (0.1, 0.22, "sure")],
