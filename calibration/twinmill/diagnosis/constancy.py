@@ -9,6 +9,7 @@ asks whether that companion is zero (parameter constancy: Nyblom 1989; Zeileis a
 from dataclasses import dataclass
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.data.track import command_at
 from twinmill.diagnosis.settings import SETTINGS
@@ -19,7 +20,10 @@ from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
 HORIZON = HORIZONS_S.index(0.5)
-GROUPS = {"turning": "turning rate", "duty": "speed"}  # of a rest, by what a number changes with
+WHEELS = "wheel_gain"  # has a number of each wheel
+RIM = "the speed of the wheel"
+# Groups of a rest, by what a number changes with.
+GROUPS = {"turning": "turning rate", "duty": "speed", RIM: "speed"}
 
 
 @dataclass(frozen=True)
@@ -90,7 +94,7 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
         return {}
     left, columns, blocks = fit.whitened(logs)
     basis = np.linalg.qr(np.vstack([columns, np.diag(1 / fit.std)]))[0]
-    doing = [_doing(fit.datasets[i]) for i in logs]
+    doing = [_doing(fit.datasets[i]) | _rims(fit.datasets[i], fit.models[i]) for i in logs]
     found: dict[str, Change | OneHeading] = {}
     rows = [fit.datasets[i].measured[0].size for i in logs]
 
@@ -111,6 +115,8 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
         of_places = needing("places") if on == PLACE else ()
         for c, instance in sizes.items():
             if instance.split("#")[0] in of_places or (c in late and on != TIME):
+                continue
+            if on == RIM and not fit.unknowns[c].parameter.name.endswith(f"{WHEELS}.{way}"):
                 continue
             change = _change(
                 trial=trial,
@@ -149,6 +155,14 @@ def _doing(data: Trajectory) -> dict[tuple[str, str], np.ndarray]:
             axis=1
         )
     return found
+
+
+def _rims(data: Trajectory, model: native.Model) -> dict[tuple[str, str], np.ndarray]:
+    """(W,) of each wheel: how fast it turned, as the captured motion rolls it, rad/s."""
+    moved = np.nan_to_num(data.measured[:, HORIZON]) / HORIZONS_S[HORIZON]
+    rates = np.array([model.wheel_speeds(*axis) for axis in np.eye(3)])
+    rims = np.abs(moved @ rates).T
+    return {(RIM, w["name"]): rim for w, rim in zip(model.wheels(), rims, strict=True)}
 
 
 def _change(

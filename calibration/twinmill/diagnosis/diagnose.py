@@ -76,6 +76,7 @@ from twinmill.model.parameters import (
     base_parameters,
     beginning_at_a_moment,
     catalogue,
+    catalogue_of,
     is_local,
     making_late,
     needing,
@@ -344,7 +345,8 @@ def _concluded(
         rest = replace(rest, proven=tuned(last.fit, better))
     rest = rest.at_few_commands() if few else rest
     findings = _beside_formula(findings, last, rest, len(set(hashes)))
-    findings = of_many(beside_more(of_another_form(findings, rest), rest))
+    cards = catalogue_of(last.state.model)
+    findings = of_many(beside_more(of_another_form(findings, rest), rest, cards))
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
     rest = rest.with_findings(findings)

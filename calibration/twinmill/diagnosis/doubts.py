@@ -638,11 +638,16 @@ def _when_s(finding: Finding) -> list[float]:
     return [e.value for e in finding.parameters if e.name.split(".", 1)[1] in keys]
 
 
-def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
+def beside_more(found: Sequence[Finding], rest: Rest, cards: Mapping[str, dict]) -> list[Finding]:
     """Findings, doubtful where much is left, or more than all of them take, and it is no noise.
 
     A lag is doubtful where much is left at all: something else at changes of the command is late,
     too. Numbers of the base are where they alone were found: they take a part of most that is left.
+
+    Args:
+        found: in the order of worth.
+        rest: what is left.
+        cards: of effects, with the parameters that this robot's wheels have.
     """
     alone = all(f.effect == REFIT for f in found)
     effects = [f for f in found if f.effect != REFIT]
@@ -662,7 +667,7 @@ def beside_more(found: Sequence[Finding], rest: Rest) -> list[Finding]:
         much = no_noise and rest.share > SETTINGS.much
         if much and rest.share + unsure > sure:
             return doubted(finding, "more is left or doubtful than is sure, and it is no noise")
-        if much and (why := _unusual(catalogue()[finding.effect], finding.parameters)):
+        if much and (why := _unusual(cards[finding.effect], finding.parameters)):
             return doubted(finding, why)
         if rest.firm and rest.share > SETTINGS.lag_leaves and _is_late(finding.effect):
             why = "much is left: something else at changes of the command may be late"

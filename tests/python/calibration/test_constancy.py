@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from twinmill.diagnosis.constancy import OneHeading, changes_of
+from twinmill.diagnosis.constancy import RIM, OneHeading, changes_of
 from twinmill.diagnosis.diagnose import diagnose, first_state
 from twinmill.diagnosis.term import PLACE
 from twinmill.diagnosis.trials import fitted, with_effects
@@ -102,3 +102,22 @@ def test_a_robot_that_answers_later_from_one_moment_on_has_no_bad_clock(
     found = diagnose([measure(Loaded(), 6, 80.0)], true_model)
     assert bool(found.findings) == loaded
     assert all(f.certainty == "doubtful" for f in found.findings)
+
+
+@pytest.mark.parametrize("tight", [False, True])
+def test_a_wheel_with_a_tight_bearing_is_no_weak_wheel(tight, tanh_robot, measure, true_model):
+    """It loses the same speed at all speeds; a weak wheel the same share."""
+
+    class Rubbed(tanh_robot):
+        def wheels_mps(self, duty):
+            speeds = super().wheels_mps(duty)
+            share = 0.06 * speeds[:, 1]
+            speeds[:, 1] -= 0.02 * np.tanh(speeds[:, 1] / 0.005) if tight else share
+            return speeds
+
+    levels = np.random.default_rng(3).choice((-100, -20, 20, 100), (160, 2))
+    legs = [[(left, right) * 2] * 50 for left, right in levels]
+    run = measure(Rubbed(), 6, script_pct=np.concatenate(legs))
+    state = first_state(judged(open_measurements([run], true_model)), true_model, ())
+    told = changes_of(fitted(with_effects(state, ["wheel_gain"]))).get("wheel_gain")
+    assert (told.on if told else None) == (RIM if tight else None)

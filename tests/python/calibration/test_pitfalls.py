@@ -40,6 +40,7 @@ from twinmill.model.parameters import (
     ParameterEstimate,
     base_parameters,
     catalogue,
+    catalogue_of,
     effect_parameters,
 )
 from twinmill.predict.datasets import Trajectory
@@ -931,12 +932,14 @@ def test_what_is_found_beside_one_of_two_hangs_on_which_it_is(group, certainty):
 )
 def test_beside_a_rest_that_is_no_noise_a_name_is_doubtful(effect, left, firm, certainty):
     found = [Finding(effect, None, [], 0.6, "sure")]
-    assert [f.certainty for f in beside_more(found, Rest(left, firm, []))] == [certainty]
+    assert [f.certainty for f in beside_more(found, Rest(left, firm, []), catalogue())] == [
+        certainty
+    ]
 
 
 def test_beside_much_that_depends_on_something_a_name_is_doubtful():
     found = [Finding("turn_asymmetry", None, [], 0.1, "sure")]
-    (judged,) = beside_more(found, Rest(0.3, False, ["time"]))
+    (judged,) = beside_more(found, Rest(0.3, False, ["time"]), catalogue())
     assert judged.certainty == "doubtful"
 
 
@@ -953,7 +956,7 @@ def test_numbers_that_alone_were_stale_may_stand_for_what_is_left(effects, rest,
     """Friction of turning takes a share of most turns, and gains that are free take that."""
     found = [Finding(REFIT, None, [], 0.8, "sure")]
     found += [Finding(e, None, [], 0.1, "sure") for e in effects]
-    assert beside_more(found, rest)[0].certainty == certainty
+    assert beside_more(found, rest, catalogue())[0].certainty == certainty
 
 
 @pytest.mark.parametrize(
@@ -1107,7 +1110,7 @@ def test_two_doubtful_effects_of_one_kind_are_none_of_them(second, outside):
 def test_an_effect_that_takes_less_than_is_left_or_doubtful_is_not_sure(doubtful, left, certainty):
     found = [Finding("yaw_lever", None, [], 0.45, "sure")]
     found += [Finding("yaw_lag", None, [], doubtful, "doubtful")]
-    first, _ = beside_more(found, Rest(left, False, ["past motion"]))
+    first, _ = beside_more(found, Rest(left, False, ["past motion"]), catalogue())
     assert first.certainty == certainty
 
 
@@ -1115,11 +1118,20 @@ def test_an_effect_that_takes_less_than_is_left_or_doubtful_is_not_sure(doubtful
     ("gain", "left", "certainty"),
     [(-0.26, 0.18, "doubtful"), (-0.26, 0.05, "sure"), (-0.06, 0.18, "sure")],
 )
-def test_a_size_beyond_what_is_usual_is_not_sure_beside_a_rest(gain, left, certainty):
+@pytest.mark.parametrize(("wheel", "wheels"), [("rr", "mecanum"), ("w1", "omni3")])
+def test_a_size_beyond_what_is_usual_is_not_sure_beside_a_rest(
+    gain, left, certainty, wheel, wheels, tmp_path
+):
     """A duty that leaks to the next motor had been a wheel weak by 26 %, surely."""
-    weak = ParameterEstimate("wheel_gain.rr", gain, 0.01, "", False, True)
+    path = tmp_path / "robot.toml"
+    path.write_text(
+        f'name = "r"\n[robot]\nwheel_radius_m = 0.03\nhalf_wheelbase_m = 0.1\nhalf_track_m = 0.1\n'
+        f'[base]\ndrive = "twist"\nwheels = "{wheels}"\n'
+    )
+    weak = ParameterEstimate(f"wheel_gain.{wheel}", gain, 0.01, "", False, True)
     found = [Finding("wheel_gain", None, [weak], 0.8, "sure")]
-    (judged,) = beside_more(found, Rest(left, True, ["coupling of the axes"]))
+    rest = Rest(left, True, ["coupling of the axes"])
+    (judged,) = beside_more(found, rest, catalogue_of(ModelFile.load(str(path)).model))
     assert judged.certainty == certainty
 
 
