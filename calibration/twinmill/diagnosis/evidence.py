@@ -31,7 +31,7 @@ class Evidence:
         logs: place among the fit's data sets, and the log.
         motions: one for each log.
         fit: of the final model.
-        changes: (R, T) of the library's terms, for each log.
+        changes: (R, T) of the library's terms, of all logs.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class Evidence:
         logs: Sequence[tuple[int, Opened]],
         motions: Sequence[Motion],
         fit: ScoreFit,
-        changes: Sequence[np.ndarray],
+        changes: np.ndarray,
     ) -> None:
         self.logs, self.motions = logs, motions
         self._divide()
@@ -50,7 +50,7 @@ class Evidence:
         self.more = np.sqrt(len(HORIZONS_S) / len(HORIZONS))
         self.weight = self.more * weight[self.kept]
         self._left, self._free = self.more * left[self.kept], self.more * free[self.kept]
-        self._changes = np.concatenate(list(changes))[self.kept]
+        self._changes = changes[self.kept]
         self._free = np.hstack([self._free, self.raw(sized(GAINS, motions))])
         self.weighed(np.ones(len(self._left)))
 

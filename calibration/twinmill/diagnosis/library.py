@@ -5,8 +5,9 @@ Of the body: terms in its velocity, its changes, heading, place, time and voltag
 in its command. Each comes with how the rows of a fit change by it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 import twinmill_native as native
@@ -48,8 +49,8 @@ SHAPES = ("u*abs(u)", "abs(u)", "sign(u)", "sign(u)*max(0, abs(u) - h)")
 
 def library(
     opened: Sequence[Opened], models: Sequence[native.Model]
-) -> tuple[list[Term], list[np.ndarray], list[np.ndarray]]:
-    """Terms, (R, T) change of the rows of each log by each at its strength, (N, 3) velocities.
+) -> tuple[list[Term], np.ndarray, list[np.ndarray]]:
+    """Terms, (R, T) change of the rows of all logs by each at its strength, (N, 3) velocities.
 
     Args:
         opened: logs over their floors.
@@ -71,19 +72,29 @@ def library(
     ways_m = [_way_m(own, v) for own, v in zip(opened, velocities, strict=True)]
     waves = [Waves.along(times_s, TIME, "t", WAVE_S), Waves.along(ways_m, WAY, "way", WAVE_M)]
     families = families_of(opened, velocities)
-    columns = []
-    for k, (own, model) in enumerate(pairs):
-        body = _body_columns(own, velocities[k], values[k], sizes)
-        swells = [
-            w.columns(own, velocities[k], a[k])
-            for w, a in zip(waves, (times_s, ways_m), strict=True)
-        ]
-        narrow = [f.columns(own, velocities[k]) for f in families]
-        of_wheel = _wheel_columns(own, model, of_wheels)
-        columns.append(np.hstack([body, body @ parts, *swells, *narrow, of_wheel]))
     of_families = [t for f in families for t in f.terms]
     every = [*terms, *of_all, *waves[0].terms, *waves[1].terms, *of_families, *of_wheels]
+    edges = np.cumsum([0, *(own.data.measured.size for own in opened)])
+    columns = np.empty((edges[-1], len(every)))  # filled in place: they are hundreds of megabytes
+    for k, (own, model) in enumerate(pairs):
+        body = _body_columns(own, velocities[k], values[k], sizes)
+        swells = (
+            w.columns(own, velocities[k], a[k])
+            for w, a in zip(waves, (times_s, ways_m), strict=True)
+        )
+        narrow = (f.columns(own, velocities[k]) for f in families)
+        of_wheel = _wheel_columns(own, model, of_wheels)
+        pieces = chain([body, body @ parts], swells, narrow, [of_wheel])
+        _fill(columns[edges[k] : edges[k + 1]], pieces)
     return every, columns, velocities
+
+
+def _fill(columns: np.ndarray, pieces: Iterable[np.ndarray]) -> None:
+    """Writes (R, t) pieces side by side."""
+    first = 0
+    for piece in pieces:
+        columns[:, first : first + piece.shape[1]] = piece
+        first += piece.shape[1]
 
 
 def _across(group: str, formula: str, to: str) -> str:

@@ -207,7 +207,8 @@ def test_a_round_wheel_is_not_named_for_what_an_oval_one_does():
     ]
     blocks = np.repeat(np.arange(16), 50)
     columns = np.column_stack([left, right])
-    products = Products(columns, left + 0.3 * noise, blocks, np.ones(2, bool))
+    alike = {"weight": np.ones(len(left)), "free": np.zeros((len(left), 0))}
+    products = Products([columns], left + 0.3 * noise, blocks, **alike)
     assert {d.group: d.sure for d in _tested(terms, products)} == {
         "angle of the left wheels": True,
         "angle of the right wheels": False,
