@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.forms import GAINS, Form, Motion, sized
 from twinmill.diagnosis.library import LEFT_OVER, norms
 from twinmill.diagnosis.settings import SETTINGS
@@ -31,7 +32,7 @@ class Evidence:
         logs: place among the fit's data sets, and the log.
         motions: one for each log.
         fit: of the final model.
-        changes: (R, T) of the library's terms, of all logs.
+        changes: of all logs' rows by each of the library's terms.
     """
 
     def __init__(
@@ -39,7 +40,7 @@ class Evidence:
         logs: Sequence[tuple[int, Opened]],
         motions: Sequence[Motion],
         fit: ScoreFit,
-        changes: np.ndarray,
+        changes: Columns,
     ) -> None:
         self.logs, self.motions = logs, motions
         self._divide()
@@ -50,7 +51,7 @@ class Evidence:
         self.more = np.sqrt(len(HORIZONS_S) / len(HORIZONS))
         self.weight = self.more * weight[self.kept]
         self._left, self._free = self.more * left[self.kept], self.more * free[self.kept]
-        self._changes = changes[self.kept]
+        self._changes = changes
         self._free = np.hstack([self._free, self.raw(sized(GAINS, motions))])
         self.weighed(np.ones(len(self._left)))
 
@@ -97,7 +98,7 @@ class Evidence:
         made = [f for f in forms if f.column < 0]
         own = np.array([f.column < 0 for f in forms for _ in f.shapes], bool)
         columns = np.empty((len(self._left), len(own)))
-        columns[:, ~own] = self._changes[:, [f.column for f in forms if f.column >= 0]]
+        columns[:, ~own] = self._changes.some([f.column for f in forms if f.column >= 0], self.kept)
         if made:
             parts = [np.zeros((0, own.sum()))]
             for motion in self.motions:

@@ -5,14 +5,14 @@ Of the body: terms in its velocity, its changes, heading, place, time and voltag
 in its command. Each comes with how the rows of a fit change by it.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 import twinmill_native as native
 
 from twinmill.data.track import command_at
+from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.families import families_of
 from twinmill.diagnosis.families.family import Humps
 from twinmill.diagnosis.families.of_time import PARTS
@@ -49,7 +49,7 @@ SHAPES = ("u*abs(u)", "abs(u)", "sign(u)", "sign(u)*max(0, abs(u) - h)")
 
 def library(
     opened: Sequence[Opened], models: Sequence[native.Model]
-) -> tuple[list[Term], np.ndarray, list[np.ndarray]]:
+) -> tuple[list[Term], Columns, list[np.ndarray]]:
     """Terms, (R, T) change of the rows of all logs by each at its strength, (N, 3) velocities.
 
     Args:
@@ -72,29 +72,19 @@ def library(
     ways_m = [_way_m(own, v) for own, v in zip(opened, velocities, strict=True)]
     waves = [Waves.along(times_s, TIME, "t", WAVE_S), Waves.along(ways_m, WAY, "way", WAVE_M)]
     families = families_of(opened, velocities)
-    of_families = [t for f in families for t in f.terms]
-    every = [*terms, *of_all, *waves[0].terms, *waves[1].terms, *of_families, *of_wheels]
-    edges = np.cumsum([0, *(own.data.measured.size for own in opened)])
-    columns = np.empty((edges[-1], len(every)))  # filled in place: they are hundreds of megabytes
+    pieces = []
     for k, (own, model) in enumerate(pairs):
         body = _body_columns(own, velocities[k], values[k], sizes)
-        swells = (
+        swells = [
             w.columns(own, velocities[k], a[k])
             for w, a in zip(waves, (times_s, ways_m), strict=True)
-        )
-        narrow = (f.columns(own, velocities[k]) for f in families)
+        ]
+        narrow = [f.columns(own, velocities[k]) for f in families]
         of_wheel = _wheel_columns(own, model, of_wheels)
-        pieces = chain([body, body @ parts], swells, narrow, [of_wheel])
-        _fill(columns[edges[k] : edges[k + 1]], pieces)
-    return every, columns, velocities
-
-
-def _fill(columns: np.ndarray, pieces: Iterable[np.ndarray]) -> None:
-    """Writes (R, t) pieces side by side."""
-    first = 0
-    for piece in pieces:
-        columns[:, first : first + piece.shape[1]] = piece
-        first += piece.shape[1]
+        pieces.append([body, body @ parts, *swells, *narrow, of_wheel])
+    of_families = [t for f in families for t in f.terms]
+    every = [*terms, *of_all, *waves[0].terms, *waves[1].terms, *of_families, *of_wheels]
+    return every, Columns.beside(pieces), velocities
 
 
 def _across(group: str, formula: str, to: str) -> str:

@@ -15,6 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.formula_search import formula_of
@@ -164,13 +165,13 @@ class Formulas:
     Attributes:
         logs: place among the fit's data sets, and the log.
         terms: T formulas.
-        changes: (R, T) of all logs, one after the other.
+        changes: T of the rows of all logs by each.
         velocities: (N, 3) of the body in each, m/s and rad/s, at the points of its response.
     """
 
     logs: list[tuple[int, Opened]]
     terms: list[Term]
-    changes: np.ndarray
+    changes: Columns
     velocities: list[np.ndarray]
 
     def products(self, fit: ScoreFit, beside: Sequence[np.ndarray] = ()) -> "Products":
@@ -184,7 +185,8 @@ class Formulas:
         left, free, blocks = fit.whitened([i for i, _ in self.logs])
         weight = np.concatenate([np.sqrt(fit.weight(i, rows[i])) for i, _ in self.logs])
         other = [np.concatenate(beside)[:, None]] if beside else []
-        return Products([*other, self.changes], left, blocks, weight=weight, free=free)
+        columns = Columns([*other, *self.changes.pieces])
+        return Products(columns, left, blocks, weight=weight, free=free)
 
 
 @dataclass(frozen=True)
@@ -462,11 +464,11 @@ class Grams:
 class Products:
     """Products of columns with each other and with the errors, block by block.
 
-    Columns are weighted as the errors are, and what is free is projected out of them. All of them
-    together are hundreds of megabytes: sums over their rows as they are tell of what is left.
+    Columns are weighted as the errors are, and what is free is projected out of them. Sums over
+    their rows as they are tell of what is left.
 
     Args:
-        columns: (R, t) some after the other, T in all.
+        columns: T.
         left: (R,) errors.
         blocks: (R,) of errors that belong together; they ascend.
         weight: (R,) of the columns' rows.
@@ -479,7 +481,7 @@ class Products:
 
     def __init__(
         self,
-        columns: Sequence[np.ndarray],
+        columns: Columns,
         left: np.ndarray,
         blocks: np.ndarray,
         *,
@@ -492,12 +494,12 @@ class Products:
         edges = np.searchsorted(blocks, np.arange(blocks.max() + 2))
         self.parts = [slice(a, b) for a, b in pairwise(edges)]
         self.fold = np.arange(len(self.parts)) % FOLDS
-        self.columns, self.own = columns, np.arange(sum(c.shape[1] for c in columns))
+        self.columns, self.own = columns, np.arange(len(columns))
         self.weight, self.basis = weight[:, None], np.linalg.qr(free)[0]
         self.total = float(left @ left)
         known = self.weight * np.column_stack([left, self.basis])
         square, across = (
-            np.array([np.hstack([f(p, c[p]) for c in columns]) for p in self.parts])
+            np.concatenate([[f(p, c[p]) for p in self.parts] for c in columns.pieces], axis=-1)
             for f in (lambda p, own: weight[p] ** 2 @ own**2, lambda p, own: known[p].T @ own)
         )
         self.along = across[:, 1:].sum(0)
@@ -510,20 +512,13 @@ class Products:
         self.seen = (after > LEFT_OVER**2 * np.maximum(before, 1e-24)) & (before > 1e-18)
         self.moments[:, ~self.seen] = self.energy[:, ~self.seen] = 0.0
 
-    def _rows(self, part: slice, own: np.ndarray) -> np.ndarray:
-        """(r, k) of the (k,) columns `own`, weighted, what is free projected out."""
-        pieces, first = [], 0
-        for columns in self.columns:
-            here = own[(own >= first) & (own < first + columns.shape[1])] - first
-            pieces.append(columns[part][:, here])
-            first += columns.shape[1]
-        rows = self.weight[part] * np.hstack(pieces)
-        return rows - self.basis[part] @ self.along[:, own]
-
     def grams(self, own: np.ndarray) -> Grams:
         """Of some (T,) columns with each other."""
-        some = (self._rows(p, self.own[own]) * self.seen[own] for p in self.parts)
-        blocks = np.array([x.T @ x for x in some])
+        some = self.own[own]
+        rows = self.weight * self.columns.some(some)
+        rows -= self.basis @ self.along[:, some]
+        rows *= self.seen[own]
+        blocks = np.array([rows[p].T @ rows[p] for p in self.parts])
         return Grams(blocks, np.array([blocks[self.fold == k].sum(0) for k in range(FOLDS)]))
 
     def only(self, own: np.ndarray) -> "Products":

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from twinmill.diagnosis import diagnose
+from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.rest import Products
 from twinmill.diagnosis.rivals import Rival, rival_of
 
@@ -19,7 +20,7 @@ def outdoing(effect: np.ndarray, formula: np.ndarray, errors: np.ndarray) -> Riv
     blocks = np.repeat(np.arange(BLOCKS), LONG)
     columns = np.column_stack([effect, formula])
     alike = {"weight": np.ones(len(errors)), "free": np.zeros((len(errors), 0))}
-    products = Products([columns], errors, blocks, **alike)
+    products = Products(Columns([columns]), errors, blocks, **alike)
     formulas = SimpleNamespace(logs=[(0, None)], terms=[NAME], products=lambda *_: products)
     less, whole = (
         SimpleNamespace(fit=SimpleNamespace(state=([rows], None)))

@@ -9,6 +9,7 @@ import pytest
 import twinmill_native as native
 
 from twinmill.diagnosis import rest
+from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.findings import with_stale_numbers
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
@@ -208,7 +209,7 @@ def test_a_round_wheel_is_not_named_for_what_an_oval_one_does():
     blocks = np.repeat(np.arange(16), 50)
     columns = np.column_stack([left, right])
     alike = {"weight": np.ones(len(left)), "free": np.zeros((len(left), 0))}
-    products = Products([columns], left + 0.3 * noise, blocks, **alike)
+    products = Products(Columns([columns]), left + 0.3 * noise, blocks, **alike)
     assert {d.group: d.sure for d in _tested(terms, products)} == {
         "angle of the left wheels": True,
         "angle of the right wheels": False,
