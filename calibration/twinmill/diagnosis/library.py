@@ -217,12 +217,12 @@ def _body_columns(own: Opened, velocity: np.ndarray, terms: dict, sizes: dict) -
     """(R, 3 T) change of the rows by each term in each body axis, at (N, 3) `velocity`."""
     response = own.floor.response
     values = np.stack([terms[key] / sizes[key] for key in sizes], axis=-1)
-    parts = [
-        displaced(response, velocity, TYPICAL[channel] * values, axis)
-        for axis, channel in enumerate(CHANNELS)
-    ]  # each (W, H, 3, T)
-    columns = np.stack(parts, axis=-1) * np.nan_to_num(own.data.weight)[..., None, None]
-    return columns.reshape(-1, values.shape[1] * 3)
+    weight = np.nan_to_num(own.data.weight)
+    columns = np.empty((*weight.shape, len(sizes), 3))
+    for axis, channel in enumerate(CHANNELS):
+        change = displaced(response, velocity, TYPICAL[channel] * values, axis)  # (W, H, 3, T)
+        np.multiply(change, weight[..., None], out=columns[..., axis])
+    return columns.reshape(weight.size, -1)
 
 
 def _wheel_terms(opened: Sequence[Opened], model: native.Model) -> list[Term]:

@@ -439,6 +439,11 @@ class ScoreFit:
             np.bincount(d.block, h**2) for d, h in zip(self.datasets, self.held_out, strict=True)
         ]
 
+    @cached_property
+    def own_block_costs(self) -> np.ndarray:
+        """(B,) the same as this fit weighs them."""
+        return self.block_costs(self)
+
     def block_costs(self, like: "ScoreFit") -> np.ndarray:
         """(B,) held-out squares of all blocks, weighted as another fit weighs them."""
         parts = []
@@ -446,14 +451,18 @@ class ScoreFit:
             parts.append(np.bincount(d.block, like.weight(i, like.held_out[i]) * held**2))
         return np.concatenate(parts)
 
-    def without_blocks(self, blocks: Sequence[np.ndarray] | None = None) -> np.ndarray:
+    @cached_property
+    def without_own_blocks(self) -> np.ndarray:
+        """(B,) held-out cost without each block of the data sets."""
+        return self.without_blocks([d.block for d in self.datasets])
+
+    def without_blocks(self, blocks: Sequence[np.ndarray]) -> np.ndarray:
         """(B,) held-out cost of the data without each block, the prior left aside.
 
         Args:
-            blocks: (R,) of each data set, from 0; its own if left out.
+            blocks: (R,) of each data set, from 0.
         """
         costs = []
-        blocks = [d.block for d in self.datasets] if blocks is None else blocks
         whole = [self._misfit(i, r) for i, r in enumerate(self.held_out)]
         parts = zip(self.datasets, self.held_out, self.scales, blocks, strict=True)
         for i, (d, held, scale, block) in enumerate(parts):
@@ -498,7 +507,7 @@ class ScoreFit:
             Fall of the held-out cost, the same without the block with the most evidence, and how
             well blocks agree: t of the relative fall.
         """
-        a, b = less.block_costs(less), self.block_costs(less)
+        a, b = less.own_block_costs, self.block_costs(less)
         falls = (a - b) / np.maximum(a + b, 1e-300)
         spread = np.std(falls, ddof=1) / np.sqrt(len(falls)) if len(falls) > 1 else np.inf
         least = self.least_against(less)
@@ -506,6 +515,8 @@ class ScoreFit:
 
     def least_against(self, less: "ScoreFit", blocks: Sequence[np.ndarray] | None = None) -> float:
         """Evidence against a poorer model's fit without the block with the most; see above."""
+        if blocks is None:
+            return float(np.min(less.without_own_blocks - self.without_own_blocks))
         return float(np.min(less.without_blocks(blocks) - self.without_blocks(blocks)))
 
     # -- uncertainty ----------------------------------------------------------------------------
