@@ -41,8 +41,11 @@ class Columns:
     def some(self, wanted: np.ndarray, rows: np.ndarray | slice = slice(None)) -> np.ndarray:
         """(r, k) of some rows, the columns of these (k,) numbers."""
         piece, place = self._place[:, wanted]
+        numbers = np.unique(piece)
+        if len(numbers) == 1:
+            return self.pieces[numbers[0]][rows][:, place]
         found = np.empty((len(self.pieces[0][rows]), len(piece)))
-        for n in np.unique(piece):
+        for n in numbers:
             own = piece == n
             found[:, own] = self.pieces[n][rows][:, place[own]]
         return found

@@ -58,6 +58,7 @@ class Evidence:
     def _divide(self) -> None:
         """Of rows that are kept: stretches, blocks that have one sign, and channels."""
         kept, stretch, block = [], [], []
+        self._inside = []  # (W, HORIZONS, 3) of each log: rows that are kept, of these horizons
         first_stretch = first_block = 0
         for _, own in self.logs:
             data = own.data
@@ -70,6 +71,7 @@ class Evidence:
             counted = np.zeros(shape[1], bool)
             counted[list(HORIZONS)] = True
             kept.append(np.broadcast_to((inside & counted)[..., None], shape).ravel())
+            self._inside.append(np.repeat(inside[:, list(HORIZONS), None], shape[2], axis=2))
             stretch.append(np.broadcast_to((first_stretch + at)[:, None, None], shape).ravel())
             block.append(np.broadcast_to((first_block + fine)[:, None, None], shape).ravel())
             first_stretch, first_block = stretch[-1].max() + 1, block[-1].max() + 1
@@ -100,13 +102,11 @@ class Evidence:
         columns = np.empty((len(self._left), len(own)))
         columns[:, ~own] = self._changes.some([f.column for f in forms if f.column >= 0], self.kept)
         if made:
-            parts = [np.zeros((0, own.sum()))]
-            for motion in self.motions:
-                some = motion.columns(made)
-                every = np.zeros((*motion.own.data.measured.shape, some.shape[-1]))
-                every[:, list(HORIZONS)] = some
-                parts.append(every.reshape(-1, some.shape[-1]))
-            columns[:, own] = np.concatenate(parts)[self.kept]
+            first = 0
+            for motion, inside in zip(self.motions, self._inside, strict=True):
+                some = motion.columns(made)[inside]
+                columns[first : first + len(some), own] = some
+                first += len(some)
         columns *= self.weight[:, None]
         return columns
 
