@@ -122,7 +122,9 @@ class Evidence:
         """The same, and (K,) lengths with what is free and without."""
         columns = self.scale[:, None] * raw
         before = norms(columns)
-        columns -= self.basis @ (self.basis.T @ columns)
+        along = self.basis.T @ columns
+        for part in self.parts:  # which stays near the processor
+            columns[part] -= self.basis[part] @ along
         after = norms(columns)
         lost = after <= LEFT_OVER * np.maximum(before, 1e-9)
         columns[:, lost] = after[lost] = 0.0

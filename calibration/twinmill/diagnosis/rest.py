@@ -495,18 +495,18 @@ class Products:
         self.parts = [slice(a, b) for a, b in pairwise(edges)]
         self.fold = np.arange(len(self.parts)) % FOLDS
         self.columns, self.own = columns, np.arange(len(columns))
-        self.weight, self.basis = weight[:, None], np.linalg.qr(free)[0]
-        self.total = float(left @ left)
-        known = self.weight * np.column_stack([left, self.basis])
+        self.weight, self.total = weight[:, None], float(left @ left)
+        basis = np.linalg.qr(free)[0]
+        known = self.weight * np.column_stack([left, basis])
         square, across = (
             np.concatenate([[f(p, c[p]) for p in self.parts] for c in columns.pieces], axis=-1)
             for f in (lambda p, own: weight[p] ** 2 @ own**2, lambda p, own: known[p].T @ own)
         )
-        self.along = across[:, 1:].sum(0)
-        push = np.array([left[p] @ self.basis[p] for p in self.parts])
-        inside = np.array([self.basis[p].T @ self.basis[p] for p in self.parts])
-        self.moments = across[:, 0] - push @ self.along
-        more = self.along * (inside @ self.along - 2 * across[:, 1:])
+        self.moments, self.across = across[:, 0], across[:, 1:]
+        self.along = self.across.sum(0)
+        self.inside = np.array([basis[p].T @ basis[p] for p in self.parts])
+        self.moments -= np.array([left[p] @ basis[p] for p in self.parts]) @ self.along
+        more = self.along * (self.inside @ self.along - 2 * self.across)
         self.energy = square + more.sum(1)
         before, after = square.sum(0), self.energy.sum(0)
         self.seen = (after > LEFT_OVER**2 * np.maximum(before, 1e-24)) & (before > 1e-18)
@@ -516,9 +516,11 @@ class Products:
         """Of some (T,) columns with each other."""
         some = self.own[own]
         rows = self.weight * self.columns.some(some)
-        rows -= self.basis @ self.along[:, some]
-        rows *= self.seen[own]
         blocks = np.array([rows[p].T @ rows[p] for p in self.parts])
+        along = self.along[:, some]
+        crossed = along.T @ (self.across[:, :, some] - self.inside @ along / 2)
+        blocks -= crossed + crossed.swapaxes(1, 2)
+        blocks *= self.seen[own] * self.seen[own][:, None]
         return Grams(blocks, np.array([blocks[self.fold == k].sum(0) for k in range(FOLDS)]))
 
     def only(self, own: np.ndarray) -> "Products":
