@@ -105,6 +105,7 @@ class ScoreFit:
         ]
         self.names = [[parts[c].name for c in own] for own in self.columns]
         self.passes = 0
+        self._begun: list[np.ndarray] = []  # rows of each data set at x, where they are known
 
     def _unknowns(self) -> list[Unknown]:
         stated = [
@@ -326,14 +327,16 @@ class ScoreFit:
         within = np.clip(np.array(points), self.low, self.high)
         rows = [self.batch(i, within) for i in range(len(self.datasets))]
         cost = [sum(self._misfit(i, r[k]) for i, r in enumerate(rows)) for k in range(len(within))]
-        self.x = within[int(np.argmin(cost))]
+        best = int(np.argmin(cost))
+        self.x, self._begun = within[best], [r[best] for r in rows]
 
     def fit(self, rounds: int = ROUNDS) -> "ScoreFit":
         """Minimises the cost and leaves the values in the models."""
         x, damping = self.x, 1e-3
         self.__dict__.pop("state", None)
         if len(x):
-            rows, slopes = self._slopes(x)
+            rows, slopes = self._slopes(x, self._begun)
+            self._begun = []
             cost = self.cost(rows, x)
             for done in range(1, rounds + 1):
                 gram, pull = self._normal(rows, slopes, x)
