@@ -420,12 +420,13 @@ class ScoreFit:
         if not len(self.x):
             return rows
         gram, pull = self._normal(rows, slopes, self.x)
+        weights = [self.weight(i, r) for i, r in enumerate(rows)]
         points = []
         for k in range(PARTS):
             g, p = gram.copy(), pull.copy()
             for i, (r, j) in enumerate(zip(rows, slopes, strict=True)):
                 out = self.datasets[i].part == k
-                weighted, own = j[out] * self.weight(i, r)[out, None], self.columns[i]
+                weighted, own = j[out] * weights[i][out, None], self.columns[i]
                 g[np.ix_(own, own)] -= weighted.T @ j[out]
                 p[own] -= weighted.T @ r[out]
             points.append(self._stepped(g, p, self.x, self._own_to(is_local)))
