@@ -31,27 +31,8 @@ struct Relaxed
     double end, mean;
 };
 
-// exp(-dt / tau), kept for the next wheel: most often all four ask for the same.
-class Decay
-{
-public:
-    double Over(double dt_s, double tau_s)
-    {
-        if (dt_s != dt_s_ || tau_s != tau_s_)
-        {
-            dt_s_ = dt_s;
-            tau_s_ = tau_s;
-            value_ = std::exp(-dt_s / tau_s);
-        }
-        return value_;
-    }
-
-private:
-    double dt_s_ = 0, tau_s_ = 0, value_ = 1;
-};
-
 // First-order approach of `target` over `dt_s`, exact: v' = (target - v) / tau.
-Relaxed Approach(double v, double target, double tau_s, double dt_s, Decay &decays)
+Relaxed Approach(double v, double target, double tau_s, double dt_s, Decays &decays)
 {
     if (tau_s <= 0)
         return {target, target};
@@ -61,7 +42,7 @@ Relaxed Approach(double v, double target, double tau_s, double dt_s, Decay &deca
 
 // The same while slowing down no faster than `max_decel_mps2`: linear first, then first-order.
 Relaxed Relax(double v, double target, double tau_s, double max_decel_mps2, double dt_s,
-              Decay &decays)
+              Decays &decays)
 {
     if (max_decel_mps2 == kNoLimit)
         return Approach(v, target, tau_s, dt_s, decays);
@@ -78,6 +59,27 @@ Relaxed Relax(double v, double target, double tau_s, double max_decel_mps2, doub
         return {turned, linear_mean};
     const Relaxed rest = Approach(turned, target, tau_s, rest_s, decays);
     return {rest.end, (linear_mean * linear_s + rest.mean * rest_s) / dt_s};
+}
+
+// Nothing limits how fast wheels slow down, and all lag alike.
+bool RelaxAlike(const WheelSignals &s)
+{
+    bool alike = s.tau_s[0] > 0;
+    for (size_t k = 0; k < kMaxWheels; ++k)
+        alike &= (s.tau_s[k] == s.tau_s[0]) & (s.max_decel_mps2[k] == kNoLimit);
+    return alike;
+}
+
+// As Approach(), of all wheels at once; those that a robot has not stand and are told to.
+void ApproachAlike(const WheelSignals &s, Decays &decays, Wheels &mean_mps, Wheels &end_mps)
+{
+    const double tau_s = s.tau_s[0], dt_s = s.dt_s, decay = decays.Over(dt_s, tau_s);
+    for (size_t k = 0; k < kMaxWheels; ++k)
+    {
+        const double target = s.target_mps[k], away = s.rim_mps[k] - target;
+        end_mps[k] = target + away * decay;
+        mean_mps[k] = target + away * (1 - decay) * tau_s / dt_s;
+    }
 }
 
 double SignOf(double place_m)
@@ -240,15 +242,17 @@ void DriveChain::DrivePart(const DutySignals &duty, double whole_s, RobotState &
     s.tau_s.fill(base_.motor_lag_s);
     Run(wheel_, s, state);
 
-    Decay decays;
     Wheels mean_mps{}, end_mps{};
-    for (int k = 0; k < robot_.wheels; ++k)
-    {
-        const Relaxed rim = Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k],
-                                  s.max_decel_mps2[k], s.dt_s, decays);
-        mean_mps[k] = rim.mean;
-        end_mps[k] = rim.end;
-    }
+    if (RelaxAlike(s))
+        ApproachAlike(s, state.decays, mean_mps, end_mps);
+    else
+        for (int k = 0; k < robot_.wheels; ++k)
+        {
+            const Relaxed rim = Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k],
+                                      s.max_decel_mps2[k], s.dt_s, state.decays);
+            mean_mps[k] = rim.mean;
+            end_mps[k] = rim.end;
+        }
     const double part = duty.dt_s / whole_s, rad_per_mps = duty.dt_s / robot_.wheel_radius_m;
     RollSignals roll{robot_, duty.t_s, duty.dt_s, duty.duty, mean_mps, end_mps, state.wheel_rad};
     Run(rolling_, roll, state);
@@ -259,7 +263,7 @@ void DriveChain::DrivePart(const DutySignals &duty, double whole_s, RobotState &
         mean.rim_mps[k] += mean_mps[k] * roll.radius_ratio[k] * part;
     }
     const Relaxed steering = Approach(state.steering_rad, state.asked_steering_rad,
-                                      base_.steering_lag_s, duty.dt_s, decays);
+                                      base_.steering_lag_s, duty.dt_s, state.decays);
     state.steering_rad = steering.end;
     mean.steering_rad += steering.mean * part;
 }

@@ -275,6 +275,28 @@ Array Faded(Vector keep, Vector pushes)
     return ToNumpy(std::move(out), {pushes.size()});
 }
 
+Array Held(Vector values, double least)
+{
+    std::vector<double> taken(values.size());
+    double now = 0;
+    for (size_t n = 0; n < taken.size(); ++n)
+    {
+        if (std::abs(values.data()[n] - now) > least)
+            now = values.data()[n];
+        taken[n] = now;
+    }
+    return ToNumpy(std::move(taken), {values.size()});
+}
+
+Array Wound(Vector way, double most)
+{
+    std::vector<double> wound(way.size());
+    double now = 0;
+    for (size_t n = 0; n < wound.size(); ++n)
+        wound[n] = now = std::clamp(now + way.data()[n] / most, -1.0, 1.0);
+    return ToNumpy(std::move(wound), {way.size()});
+}
+
 // s and r = ds/dt at the end of each step, from rest: dr/dt = w^2 (push - s) - 2 z w r.
 Array Swung(Vector pushes, Vector step_s, double rate, double damping)
 {
@@ -316,6 +338,10 @@ void BindSeries(nb::module_ &m)
           "(N, F) of a recursive filter that begins at rest.");
     m.def("faded", &Faded, "keep"_a, "pushes"_a,
           "(N,) y[n] = keep[n] y[n - 1] + pushes[n], from rest.");
+    m.def("held", &Held, "values"_a, "least"_a,
+          "(N,) values of which changes below a least one are not taken, from 0.");
+    m.def("wound", &Wound, "way"_a, "most"_a,
+          "(N,) how far something is wound up by steps of way, -1 to 1: by `most` it is wholly.");
     m.def("swung", &Swung, "pushes"_a, "step_s"_a, "rate"_a, "damping"_a,
           "(N, 2) s and ds/dt at the end of each step, from rest, of what swings around each "
           "push.");

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.forms import GAINS, Form, Motion, sized
 from twinmill.diagnosis.library import LEFT_OVER, norms
 from twinmill.diagnosis.settings import SETTINGS
@@ -31,7 +32,7 @@ class Evidence:
         logs: place among the fit's data sets, and the log.
         motions: one for each log.
         fit: of the final model.
-        changes: (R, T) of the library's terms, for each log.
+        changes: of all logs' rows by each of the library's terms.
     """
 
     def __init__(
@@ -39,7 +40,7 @@ class Evidence:
         logs: Sequence[tuple[int, Opened]],
         motions: Sequence[Motion],
         fit: ScoreFit,
-        changes: Sequence[np.ndarray],
+        changes: Columns,
     ) -> None:
         self.logs, self.motions = logs, motions
         self._divide()
@@ -50,13 +51,14 @@ class Evidence:
         self.more = np.sqrt(len(HORIZONS_S) / len(HORIZONS))
         self.weight = self.more * weight[self.kept]
         self._left, self._free = self.more * left[self.kept], self.more * free[self.kept]
-        self._changes = np.concatenate(list(changes))[self.kept]
+        self._changes = changes
         self._free = np.hstack([self._free, self.raw(sized(GAINS, motions))])
         self.weighed(np.ones(len(self._left)))
 
     def _divide(self) -> None:
         """Of rows that are kept: stretches, blocks that have one sign, and channels."""
         kept, stretch, block = [], [], []
+        self._inside = []  # (W, HORIZONS, 3) of each log: rows that are kept, of these horizons
         first_stretch = first_block = 0
         for _, own in self.logs:
             data = own.data
@@ -69,6 +71,7 @@ class Evidence:
             counted = np.zeros(shape[1], bool)
             counted[list(HORIZONS)] = True
             kept.append(np.broadcast_to((inside & counted)[..., None], shape).ravel())
+            self._inside.append(np.repeat(inside[:, list(HORIZONS), None], shape[2], axis=2))
             stretch.append(np.broadcast_to((first_stretch + at)[:, None, None], shape).ravel())
             block.append(np.broadcast_to((first_block + fine)[:, None, None], shape).ravel())
             first_stretch, first_block = stretch[-1].max() + 1, block[-1].max() + 1
@@ -97,15 +100,13 @@ class Evidence:
         made = [f for f in forms if f.column < 0]
         own = np.array([f.column < 0 for f in forms for _ in f.shapes], bool)
         columns = np.empty((len(self._left), len(own)))
-        columns[:, ~own] = self._changes[:, [f.column for f in forms if f.column >= 0]]
+        columns[:, ~own] = self._changes.some([f.column for f in forms if f.column >= 0], self.kept)
         if made:
-            parts = [np.zeros((0, own.sum()))]
-            for motion in self.motions:
-                some = motion.columns(made)
-                every = np.zeros((*motion.own.data.measured.shape, some.shape[-1]))
-                every[:, list(HORIZONS)] = some
-                parts.append(every.reshape(-1, some.shape[-1]))
-            columns[:, own] = np.concatenate(parts)[self.kept]
+            first = 0
+            for motion, inside in zip(self.motions, self._inside, strict=True):
+                some = motion.columns(made)[inside]
+                columns[first : first + len(some), own] = some
+                first += len(some)
         columns *= self.weight[:, None]
         return columns
 
@@ -121,7 +122,9 @@ class Evidence:
         """The same, and (K,) lengths with what is free and without."""
         columns = self.scale[:, None] * raw
         before = norms(columns)
-        columns -= self.basis @ (self.basis.T @ columns)
+        along = self.basis.T @ columns
+        for part in self.parts:  # which stays near the processor
+            columns[part] -= self.basis[part] @ along
         after = norms(columns)
         lost = after <= LEFT_OVER * np.maximum(before, 1e-9)
         columns[:, lost] = after[lost] = 0.0

@@ -18,6 +18,7 @@ from itertools import product
 import numpy as np
 
 from twinmill.chance import f_above
+from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.evidence import (
     HORIZONS,
     Chosen,
@@ -63,7 +64,7 @@ def formula_of(
     logs: Sequence[tuple[int, Opened]],
     velocities: Sequence[np.ndarray],
     terms: Sequence[Term],
-    changes: Sequence[np.ndarray],
+    changes: Columns,
     rival: Sequence[np.ndarray] = (),
 ) -> Formula | None:
     """The formula for what a fit leaves; None if none is proven.
@@ -73,7 +74,7 @@ def formula_of(
         logs: place among the fit's data sets, and the log.
         velocities: (N, 3) of the body in each, as the final model moves.
         terms: of the library.
-        changes: (R, T) of each log's rows by each.
+        changes: of all logs' rows by each.
         rival: (R,) of each log's rows by what the formula must outdo; empty if nothing.
     """
     pairs = zip(logs, velocities, strict=True)

@@ -12,6 +12,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.track import command_at
+from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.families import families_of
 from twinmill.diagnosis.families.family import Humps
 from twinmill.diagnosis.families.of_time import PARTS
@@ -48,8 +49,8 @@ SHAPES = ("u*abs(u)", "abs(u)", "sign(u)", "sign(u)*max(0, abs(u) - h)")
 
 def library(
     opened: Sequence[Opened], models: Sequence[native.Model]
-) -> tuple[list[Term], list[np.ndarray], list[np.ndarray]]:
-    """Terms, (R, T) change of the rows of each log by each at its strength, (N, 3) velocities.
+) -> tuple[list[Term], Columns, list[np.ndarray]]:
+    """Terms, (R, T) change of the rows of all logs by each at its strength, (N, 3) velocities.
 
     Args:
         opened: logs over their floors.
@@ -71,7 +72,7 @@ def library(
     ways_m = [_way_m(own, v) for own, v in zip(opened, velocities, strict=True)]
     waves = [Waves.along(times_s, TIME, "t", WAVE_S), Waves.along(ways_m, WAY, "way", WAVE_M)]
     families = families_of(opened, velocities)
-    columns = []
+    pieces = []
     for k, (own, model) in enumerate(pairs):
         body = _body_columns(own, velocities[k], values[k], sizes)
         swells = [
@@ -80,10 +81,10 @@ def library(
         ]
         narrow = [f.columns(own, velocities[k]) for f in families]
         of_wheel = _wheel_columns(own, model, of_wheels)
-        columns.append(np.hstack([body, body @ parts, *swells, *narrow, of_wheel]))
+        pieces.append([body, body @ parts, *swells, *narrow, of_wheel])
     of_families = [t for f in families for t in f.terms]
     every = [*terms, *of_all, *waves[0].terms, *waves[1].terms, *of_families, *of_wheels]
-    return every, columns, velocities
+    return every, Columns.beside(pieces), velocities
 
 
 def _across(group: str, formula: str, to: str) -> str:
@@ -216,12 +217,12 @@ def _body_columns(own: Opened, velocity: np.ndarray, terms: dict, sizes: dict) -
     """(R, 3 T) change of the rows by each term in each body axis, at (N, 3) `velocity`."""
     response = own.floor.response
     values = np.stack([terms[key] / sizes[key] for key in sizes], axis=-1)
-    parts = [
-        displaced(response, velocity, TYPICAL[channel] * values, axis)
-        for axis, channel in enumerate(CHANNELS)
-    ]  # each (W, H, 3, T)
-    columns = np.stack(parts, axis=-1) * np.nan_to_num(own.data.weight)[..., None, None]
-    return columns.reshape(-1, values.shape[1] * 3)
+    weight = np.nan_to_num(own.data.weight)
+    columns = np.empty((*weight.shape, len(sizes), 3))
+    for axis, channel in enumerate(CHANNELS):
+        change = displaced(response, velocity, TYPICAL[channel] * values, axis)  # (W, H, 3, T)
+        np.multiply(change, weight[..., None], out=columns[..., axis])
+    return columns.reshape(weight.size, -1)
 
 
 def _wheel_terms(opened: Sequence[Opened], model: native.Model) -> list[Term]:

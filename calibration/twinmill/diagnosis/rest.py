@@ -15,10 +15,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.formula_search import formula_of
-from twinmill.diagnosis.library import LEFT_OVER, library, norms
+from twinmill.diagnosis.library import LEFT_OVER, library
 from twinmill.diagnosis.moments import Moment, moments_of
 from twinmill.diagnosis.place import comes_again
 from twinmill.diagnosis.settings import SETTINGS
@@ -28,7 +29,6 @@ from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
 
 MOST_BLOCKS = 200
-MOST_ROWS = 1000  # at a time, where each has hundreds of columns: they stay near the processor
 FOLDS = 5
 HOLDS = 0.9  # share of a square
 RIDGES = (1.0, 0.03)  # of what is of usual strength, and of what is far stronger
@@ -173,13 +173,13 @@ class Formulas:
     Attributes:
         logs: place among the fit's data sets, and the log.
         terms: T formulas.
-        changes: (R, T) of each log.
+        changes: T of the rows of all logs by each.
         velocities: (N, 3) of the body in each, m/s and rad/s, at the points of its response.
     """
 
     logs: list[tuple[int, Opened]]
     terms: list[Term]
-    changes: list[np.ndarray]
+    changes: Columns
     velocities: list[np.ndarray]
 
     def products(self, fit: ScoreFit, beside: Sequence[np.ndarray] = ()) -> "Products":
@@ -191,24 +191,10 @@ class Formulas:
         """
         rows, _ = fit.state
         left, free, blocks = fit.whitened([i for i, _ in self.logs])
-        changes = self.changes
-        if beside:
-            changes = [np.column_stack(pair) for pair in zip(beside, changes, strict=True)]
         weight = np.concatenate([np.sqrt(fit.weight(i, rows[i])) for i, _ in self.logs])
-        columns = np.concatenate(changes)
-        columns *= weight[:, None]
-        before = norms(columns)
-        if free.shape[1]:
-            basis = np.linalg.qr(free)[0]
-            along, parts = basis.T @ columns, 1 + len(columns) // MOST_ROWS
-            for some, own in zip(
-                np.array_split(columns, parts), np.array_split(basis, parts), strict=True
-            ):
-                some -= own @ along
-        seen = norms(columns) > LEFT_OVER * np.maximum(before, 1e-12)
-        seen &= before > 1e-9
-        columns[:, ~seen] = 0.0
-        return Products(columns, left, blocks, seen)
+        other = [np.concatenate(beside)[:, None]] if beside else []
+        columns = Columns([*other, *self.changes.pieces])
+        return Products(columns, left, blocks, weight=weight, free=free)
 
 
 @dataclass(frozen=True)
@@ -486,35 +472,63 @@ class Grams:
 class Products:
     """Products of columns with each other and with the errors, block by block.
 
+    Columns are weighted as the errors are, and what is free is projected out of them. Sums over
+    their rows as they are tell of what is left.
+
     Args:
-        columns: (R, T).
+        columns: T.
         left: (R,) errors.
         blocks: (R,) of errors that belong together; they ascend.
-        seen: see below.
+        weight: (R,) of the columns' rows.
+        free: (R, P) what is free, weighted.
 
     Attributes:
-        seen: (T,) columns of which enough is left beside what is free.
+        seen: (T,) columns of which enough is left beside what is free; the others count as 0.
         total: squared errors of all.
     """
 
     def __init__(
-        self, columns: np.ndarray, left: np.ndarray, blocks: np.ndarray, seen: np.ndarray
+        self,
+        columns: Columns,
+        left: np.ndarray,
+        blocks: np.ndarray,
+        *,
+        weight: np.ndarray,
+        free: np.ndarray,
     ) -> None:
         count = blocks.max() + 1
         if count > MOST_BLOCKS:  # each has a sign: of many, neighbours are one
             blocks = blocks * MOST_BLOCKS // count
         edges = np.searchsorted(blocks, np.arange(blocks.max() + 2))
         self.parts = [slice(a, b) for a, b in pairwise(edges)]
-        self.moments = np.array([columns[p].T @ left[p] for p in self.parts])
-        self.energy = np.array([np.einsum("rt,rt->t", columns[p], columns[p]) for p in self.parts])
         self.fold = np.arange(len(self.parts)) % FOLDS
-        self.columns, self.own = columns, np.arange(columns.shape[1])
-        self.seen, self.total = seen, float(left @ left)
+        self.columns, self.own = columns, np.arange(len(columns))
+        self.weight, self.total = weight[:, None], float(left @ left)
+        basis = np.linalg.qr(free)[0]
+        known = self.weight * np.column_stack([left, basis])
+        square, across = (
+            np.concatenate([[f(p, c[p]) for p in self.parts] for c in columns.pieces], axis=-1)
+            for f in (lambda p, own: weight[p] ** 2 @ own**2, lambda p, own: known[p].T @ own)
+        )
+        self.moments, self.across = across[:, 0], across[:, 1:]
+        self.along = self.across.sum(0)
+        self.inside = np.array([basis[p].T @ basis[p] for p in self.parts])
+        self.moments -= np.array([left[p] @ basis[p] for p in self.parts]) @ self.along
+        more = self.along * (self.inside @ self.along - 2 * self.across)
+        self.energy = square + more.sum(1)
+        before, after = square.sum(0), self.energy.sum(0)
+        self.seen = (after > LEFT_OVER**2 * np.maximum(before, 1e-24)) & (before > 1e-18)
+        self.moments[:, ~self.seen] = self.energy[:, ~self.seen] = 0.0
 
     def grams(self, own: np.ndarray) -> Grams:
         """Of some (T,) columns with each other."""
-        columns = self.columns[:, self.own[own]]
-        blocks = np.array([x.T @ x for x in (columns[p] for p in self.parts)])
+        some = self.own[own]
+        rows = self.weight * self.columns.some(some)
+        blocks = np.array([rows[p].T @ rows[p] for p in self.parts])
+        along = self.along[:, some]
+        crossed = along.T @ (self.across[:, :, some] - self.inside @ along / 2)
+        blocks -= crossed + crossed.swapaxes(1, 2)
+        blocks *= self.seen[own] * self.seen[own][:, None]
         return Grams(blocks, np.array([blocks[self.fold == k].sum(0) for k in range(FOLDS)]))
 
     def only(self, own: np.ndarray) -> "Products":

@@ -222,10 +222,17 @@ def _signatures(
         small.append(weight[:, None] * (row - values[:-1]).T / steps)
         whole.append(weight[:, None] * (row - values[-1:]).T)
     if name in needing("wheel_angle") and 1 < len(small) <= MOST_APART:
-        from scipy.linalg import block_diag  # few diagnoses get here
-
-        return parameters, block_diag(*small), np.concatenate(whole)
+        return parameters, _each_alone(small), np.concatenate(whole)
     return parameters, np.concatenate(small), np.concatenate(whole)
+
+
+def _each_alone(columns: Sequence[np.ndarray]) -> np.ndarray:
+    """(R, K) of (r, k) columns, each 0 on the rows of others: to import SciPy's takes 0.2 s."""
+    rows, width = np.cumsum([[0, 0], *(c.shape for c in columns)], axis=0).T
+    apart = np.zeros((rows[-1], width[-1]))
+    for k, own in enumerate(columns):
+        apart[rows[k] : rows[k + 1], width[k] : width[k + 1]] = own
+    return apart
 
 
 @dataclass(frozen=True)

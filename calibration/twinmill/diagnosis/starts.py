@@ -315,13 +315,15 @@ def _places(candidate: Candidate, rows: Sequence[np.ndarray]) -> Switched:
 def _inside(dataset: Dataset, circles: np.ndarray) -> np.ndarray:
     """(S, W, H) share of each prediction's poses that are inside each of (S, 3) circles."""
     assert isinstance(dataset, Trajectory)
-    pose, windows = dataset.measurement.track.pose, dataset.windows
-    x_m, y_m, radius_m = circles.T[:, :, None]
-    inside = np.hypot(pose[:, 0] - x_m, pose[:, 1] - y_m) < radius_m
-    count = np.cumsum(inside, axis=1, dtype=np.int32)
-    first, last = windows.starts[:, None], np.maximum(windows.ends, windows.starts[:, None])
-    share = (count[:, last] - count[:, first]) / np.maximum(last - first, 1)
-    return share.astype(np.float32)
+    x_m, y_m = np.ascontiguousarray(dataset.measurement.track.pose[:, :2].T)
+    first = dataset.windows.starts[:, None]
+    last = np.maximum(dataset.windows.ends, first)
+    steps = np.maximum(last - first, 1)
+    shares = np.empty((len(circles), *last.shape), np.float32)
+    for share, (x, y, radius_m) in zip(shares, circles, strict=True):  # all at once fill the memory
+        count = np.cumsum((x_m - x) ** 2 + (y_m - y) ** 2 < radius_m**2, dtype=np.int32)
+        share[:] = (count[last] - count[first]) / steps
+    return shares
 
 
 def _of_rows(shares: np.ndarray) -> np.ndarray:

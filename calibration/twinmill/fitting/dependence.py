@@ -334,21 +334,12 @@ def lagged(values: np.ndarray, lag_s: float, step_s: np.ndarray) -> np.ndarray:
 
 def held(values: np.ndarray, least: float) -> np.ndarray:
     """(N,) values of which changes below a least one are not taken."""
-    taken, now = [], 0.0
-    for value in values.tolist():
-        if abs(value - now) > least:
-            now = value
-        taken.append(now)
-    return np.array(taken)
+    return native.held(np.ascontiguousarray(values), least)
 
 
 def wound(way: np.ndarray, most: float) -> np.ndarray:
     """(N,) how far something is wound up by (N,) steps of way, -1..1: by `most` it is wholly."""
-    turned, now = [], 0.0
-    for step in (way / most).tolist():
-        now = min(max(now + step, -1.0), 1.0)
-        turned.append(now)
-    return np.array(turned)
+    return native.wound(np.ascontiguousarray(way), most)
 
 
 def _events(motion: Motion) -> Iterator[Features]:

@@ -105,6 +105,7 @@ class ScoreFit:
         ]
         self.names = [[parts[c].name for c in own] for own in self.columns]
         self.passes = 0
+        self._begun: list[np.ndarray] = []  # rows of each data set at x, where they are known
 
     def _unknowns(self) -> list[Unknown]:
         stated = [
@@ -161,10 +162,12 @@ class ScoreFit:
         if not own.shape[1]:
             self.passes += 1
             return np.repeat(errors_of(self.datasets[i], self.models[i])[None], len(x), axis=0)
-        distinct, place = np.unique(own, axis=0, return_inverse=True)
+        numbers: dict[bytes, int] = {}  # of distinct values: np.unique takes as long as a pass
+        place = [numbers.setdefault(values.tobytes(), len(numbers)) for values in own]
+        distinct = np.array([np.frombuffer(values) for values in numbers])
         self.passes += len(distinct)
-        rows = self.datasets[i].rows(self.models[i], self.names[i], np.ascontiguousarray(distinct))
-        return rows[place.ravel()]
+        rows = self.datasets[i].rows(self.models[i], self.names[i], distinct)
+        return rows if len(distinct) == len(own) else rows[place]
 
     def rows(self, x: np.ndarray) -> list[np.ndarray]:
         """(R,) rows of each data set at (P,) values."""
@@ -324,14 +327,16 @@ class ScoreFit:
         within = np.clip(np.array(points), self.low, self.high)
         rows = [self.batch(i, within) for i in range(len(self.datasets))]
         cost = [sum(self._misfit(i, r[k]) for i, r in enumerate(rows)) for k in range(len(within))]
-        self.x = within[int(np.argmin(cost))]
+        best = int(np.argmin(cost))
+        self.x, self._begun = within[best], [r[best] for r in rows]
 
     def fit(self, rounds: int = ROUNDS) -> "ScoreFit":
         """Minimises the cost and leaves the values in the models."""
         x, damping = self.x, 1e-3
         self.__dict__.pop("state", None)
         if len(x):
-            rows, slopes = self._slopes(x)
+            rows, slopes = self._slopes(x, self._begun)
+            self._begun = []
             cost = self.cost(rows, x)
             for done in range(1, rounds + 1):
                 gram, pull = self._normal(rows, slopes, x)
@@ -415,12 +420,13 @@ class ScoreFit:
         if not len(self.x):
             return rows
         gram, pull = self._normal(rows, slopes, self.x)
+        weights = [self.weight(i, r) for i, r in enumerate(rows)]
         points = []
         for k in range(PARTS):
             g, p = gram.copy(), pull.copy()
             for i, (r, j) in enumerate(zip(rows, slopes, strict=True)):
                 out = self.datasets[i].part == k
-                weighted, own = j[out] * self.weight(i, r)[out, None], self.columns[i]
+                weighted, own = j[out] * weights[i][out, None], self.columns[i]
                 g[np.ix_(own, own)] -= weighted.T @ j[out]
                 p[own] -= weighted.T @ r[out]
             points.append(self._stepped(g, p, self.x, self._own_to(is_local)))
@@ -439,6 +445,11 @@ class ScoreFit:
             np.bincount(d.block, h**2) for d, h in zip(self.datasets, self.held_out, strict=True)
         ]
 
+    @cached_property
+    def own_block_costs(self) -> np.ndarray:
+        """(B,) the same as this fit weighs them."""
+        return self.block_costs(self)
+
     def block_costs(self, like: "ScoreFit") -> np.ndarray:
         """(B,) held-out squares of all blocks, weighted as another fit weighs them."""
         parts = []
@@ -446,14 +457,18 @@ class ScoreFit:
             parts.append(np.bincount(d.block, like.weight(i, like.held_out[i]) * held**2))
         return np.concatenate(parts)
 
-    def without_blocks(self, blocks: Sequence[np.ndarray] | None = None) -> np.ndarray:
+    @cached_property
+    def without_own_blocks(self) -> np.ndarray:
+        """(B,) held-out cost without each block of the data sets."""
+        return self.without_blocks([d.block for d in self.datasets])
+
+    def without_blocks(self, blocks: Sequence[np.ndarray]) -> np.ndarray:
         """(B,) held-out cost of the data without each block, the prior left aside.
 
         Args:
-            blocks: (R,) of each data set, from 0; its own if left out.
+            blocks: (R,) of each data set, from 0.
         """
         costs = []
-        blocks = [d.block for d in self.datasets] if blocks is None else blocks
         whole = [self._misfit(i, r) for i, r in enumerate(self.held_out)]
         parts = zip(self.datasets, self.held_out, self.scales, blocks, strict=True)
         for i, (d, held, scale, block) in enumerate(parts):
@@ -498,7 +513,7 @@ class ScoreFit:
             Fall of the held-out cost, the same without the block with the most evidence, and how
             well blocks agree: t of the relative fall.
         """
-        a, b = less.block_costs(less), self.block_costs(less)
+        a, b = less.own_block_costs, self.block_costs(less)
         falls = (a - b) / np.maximum(a + b, 1e-300)
         spread = np.std(falls, ddof=1) / np.sqrt(len(falls)) if len(falls) > 1 else np.inf
         least = self.least_against(less)
@@ -506,6 +521,8 @@ class ScoreFit:
 
     def least_against(self, less: "ScoreFit", blocks: Sequence[np.ndarray] | None = None) -> float:
         """Evidence against a poorer model's fit without the block with the most; see above."""
+        if blocks is None:
+            return float(np.min(less.without_own_blocks - self.without_own_blocks))
         return float(np.min(less.without_blocks(blocks) - self.without_blocks(blocks)))
 
     # -- uncertainty ----------------------------------------------------------------------------

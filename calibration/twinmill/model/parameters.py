@@ -282,13 +282,11 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
     """
     place = effect_names(model).index(instance)
     texts, name = model.texts[place], instance.split("#")[0]
-    bounds = {v["name"]: (v["min"], v["max"]) for v in model.values()}
     found = []
     for p in catalogue_of(model)[name]["parameters"]:
         if texts and not any(p["name"] in words(text) for text in texts.values()):
             continue
         full = f"{instance}.{p['name']}"
-        low, high = bounds[full]
         strength = p["default"] - p["neutral"]
         value = p["default"] if fresh else model.get(full)
         found.append(
@@ -296,8 +294,8 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
                 name=full,
                 unit=p["unit"],
                 value=value,
-                min=low,
-                max=high,
+                min=p["min"],
+                max=p["max"],
                 usual=p["neutral"],
                 std=UNKNOWN * max(1.0, abs(value)) if texts else p["usual_size"],
                 step=EFFECT_STEP * abs(strength),

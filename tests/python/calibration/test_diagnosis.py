@@ -158,7 +158,8 @@ def test_what_can_do_all_that_another_does_stands_in_one_group_with_it(behind, t
             held_cost=cost,
             x=np.zeros(3),
             block_costs=lambda _: squares * factor,
-            without_blocks=lambda _=None: cost - squares,
+            own_block_costs=squares * factor,
+            without_own_blocks=cost - squares,
         )
 
     trials = [

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 from twinmill import chance
 from twinmill.filters import faded, filtered, swung
+from twinmill.fitting.dependence import held, wound
 
 
 @pytest.mark.parametrize(
@@ -145,3 +146,12 @@ def test_chances_are_those_of_the_distributions(free, value):
         expected = stats.t.ppf(share, free)
         assert chance.t_quantile(share, free) == pytest.approx(expected, abs=1e-12)
     assert chance.chi2_median(free) == pytest.approx(stats.chi2.median(free))
+
+
+def test_a_small_change_is_not_taken_until_it_is_large():
+    assert held(np.array([0.2, 0.5, 0.45, 0.1, 0.0]), 0.3).tolist() == [0.0, 0.5, 0.5, 0.1, 0.1]
+
+
+def test_what_is_wound_up_is_so_by_its_way_and_lets_go_at_once():
+    way_m = np.array([0.02, 0.02, 0.02, -0.01, -0.08])
+    assert wound(way_m, 0.04) == pytest.approx([0.5, 1.0, 1.0, 0.75, -1.0])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from twinmill.diagnosis import diagnose
+from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.rest import Products
 from twinmill.diagnosis.rivals import Rival, rival_of
 
@@ -17,7 +18,9 @@ NAME = "the formula"
 def outdoing(effect: np.ndarray, formula: np.ndarray, errors: np.ndarray) -> Rival | None:
     """What outdoes an effect that moves the rows by `effect`, all (R,)."""
     blocks = np.repeat(np.arange(BLOCKS), LONG)
-    products = Products(np.column_stack([effect, formula]), errors, blocks, np.ones(2, bool))
+    columns = np.column_stack([effect, formula])
+    alike = {"weight": np.ones(len(errors)), "free": np.zeros((len(errors), 0))}
+    products = Products(Columns([columns]), errors, blocks, **alike)
     formulas = SimpleNamespace(logs=[(0, None)], terms=[NAME], products=lambda *_: products)
     less, whole = (
         SimpleNamespace(fit=SimpleNamespace(state=([rows], None)))

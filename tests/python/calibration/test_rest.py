@@ -9,6 +9,7 @@ import pytest
 import twinmill_native as native
 
 from twinmill.diagnosis import rest
+from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.findings import with_stale_numbers
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
@@ -208,7 +209,8 @@ def test_a_round_wheel_is_not_named_for_what_an_oval_one_does():
     ]
     blocks = np.repeat(np.arange(16), 50)
     columns = np.column_stack([left, right])
-    products = Products(columns, left + 0.3 * noise, blocks, np.ones(2, bool))
+    alike = {"weight": np.ones(len(left)), "free": np.zeros((len(left), 0))}
+    products = Products(Columns([columns]), left + 0.3 * noise, blocks, **alike)
     assert {d.group: d.sure for d in _tested(terms, products)} == {
         "angle of the left wheels": True,
         "angle of the right wheels": False,
@@ -446,3 +448,23 @@ def test_errors_of_many_times_the_noise_are_not_called_noise(score, words):
     rest = Rest(0.9, False, [], far=score > SETTINGS.no_noise)
     sentence = VerdictInputs(6, 7, 5, score, found, rest, [], [], [], 1.0).sentence
     assert "90 % is left" in sentence and words in sentence
+
+
+def test_products_are_those_of_what_is_left_beside_what_is_free():
+    """Truth: residuals of a regression of all rows on what is free, block by block."""
+    rng = np.random.default_rng(6)
+    pieces, left = [rng.normal(size=(60, 3)), rng.normal(size=(60, 2))], rng.normal(size=60)
+    weight, free = rng.uniform(0.5, 2.0, 60), rng.normal(size=(60, 2))
+    pieces[1][:, 1] = free[:, 0] / weight  # of which nothing is left
+    blocks = np.repeat(np.arange(6), 10)
+    products = Products(Columns(pieces), left, blocks, weight=weight, free=free)
+    rows = weight[:, None] * np.hstack(pieces)
+    rows -= free @ np.linalg.lstsq(free, rows, rcond=None)[0]
+    assert products.seen.tolist() == [True] * 4 + [False]
+    own = np.array([True, False, True, True, False])
+    for k, grams in enumerate(products.grams(own).blocks):
+        here = blocks == k
+        assert grams == pytest.approx(rows[here][:, own].T @ rows[here][:, own])
+        assert products.moments[k, :4] == pytest.approx(left[here] @ rows[here][:, :4])
+        assert products.energy[k, :4] == pytest.approx((rows[here][:, :4] ** 2).sum(0))
+    assert not products.energy[:, 4].any() and not products.moments[:, 4].any()

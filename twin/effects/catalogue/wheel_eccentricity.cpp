@@ -48,6 +48,8 @@ void Roll(RollSignals &s, const Numbers &v, double *)
     const double ratio = v[2 * s.robot.wheels];
     for (int k = 0; k < s.robot.wheels; ++k)
     {
+        if (v[2 * k] == 0 && v[2 * k + 1] == 0)
+            continue;
         const double half_rad = s.mean_mps[k] * s.dt_s / (2 * s.robot.wheel_radius_m * ratio);
         const double chord = std::abs(half_rad) > 1e-6 ? std::sin(half_rad) / half_rad : 1;
         const double middle_rad = s.wheel_rad[k] / ratio + half_rad;

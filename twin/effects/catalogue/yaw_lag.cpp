@@ -52,10 +52,14 @@ void Step(WheelSignals &s, const Numbers &v, double *)
         turn_mps += s.robot.spin[k] * s.rim_mps[k];
         wanted_mps += s.robot.spin[k] * s.target_mps[k];
     }
+    double before = 0, after = 0;
     for (int k = 0; k < s.robot.wheels; ++k)
     {
-        const double before = Decay(s.dt_s, s.tau_s[k] + before_s);
-        const double after = Decay(s.dt_s, s.tau_s[k] + s.turn_extra_s);
+        if (k == 0 || s.tau_s[k] != s.tau_s[k - 1])  // most often all lag alike
+        {
+            before = Decay(s.dt_s, s.tau_s[k] + before_s);
+            after = Decay(s.dt_s, s.tau_s[k] + s.turn_extra_s);
+        }
         const double gap_mps = s.robot.spin[k] * (turn_mps - wanted_mps);
         s.target_mps[k] += gap_mps * (after - before) / (1 - before);
     }

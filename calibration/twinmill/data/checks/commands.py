@@ -363,10 +363,12 @@ def check_exchange(
     n = len(judged)
     if n < 2 or all(own.left < CHECKS.good for _, _, own in judged):
         return [], set()
-    from scipy.optimize import linear_sum_assignment  # most logs do not get here
-
     lates_s = sorted({round(own.late_s, 3) for _, _, own in judged} | {0.0, 0.06, 0.12})
     table = [[_explained(j, i, lates_s) for j in judged] for i in judged]
+    if not any(far_better(e, row[i]) for i, row in enumerate(table) for e in row):
+        return [], set()
+    from scipy.optimize import linear_sum_assignment  # most logs do not get here
+
     left = np.array([[e.left for e in row] for row in table])
     poses, commands = linear_sum_assignment(left)
     found, who = [], set()

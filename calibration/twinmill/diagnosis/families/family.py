@@ -3,6 +3,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -27,9 +28,10 @@ class Family:
         """(R, k) change of a log's rows, as (N, 3) `velocity` moves the robot."""
         values = self.values(own, np.where(np.abs(velocity) < STILL, 0.0, velocity))
         response = own.floor.response
-        change = sum(displaced(response, velocity, v, axis) for axis, v in values.items())
-        weight = np.nan_to_num(own.data.weight)[..., None]
-        return (change * weight).reshape(-1, len(self.terms))
+        parts = (displaced(response, velocity, v, axis) for axis, v in values.items())
+        change = reduce(np.add, parts)
+        change *= np.nan_to_num(own.data.weight)[..., None]
+        return change.reshape(-1, len(self.terms))
 
 
 @dataclass(frozen=True)

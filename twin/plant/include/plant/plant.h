@@ -4,6 +4,9 @@
 #ifndef PLANT_PLANT_H
 #define PLANT_PLANT_H
 
+#include <array>
+#include <bit>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -32,6 +35,28 @@ struct Command
 
 constexpr double kUntold = std::numeric_limits<double>::quiet_NaN();
 
+// exp(-dt / tau) of late: commands that come evenly ask for the same few again and again.
+class Decays
+{
+public:
+    double Over(double dt_s, double tau_s)
+    {
+        const uint64_t mixed = std::bit_cast<uint64_t>(dt_s) * 0x9E3779B97F4A7C15;
+        Decay &decay = known_[mixed >> (64 - kBits)];
+        if (dt_s != decay.dt_s || tau_s != decay.tau_s)
+            decay = {dt_s, tau_s, std::exp(-dt_s / tau_s)};
+        return decay.value;
+    }
+
+private:
+    struct Decay
+    {
+        double dt_s = 0, tau_s = 0, value = 1;
+    };
+    static constexpr int kBits = 5;
+    std::array<Decay, 1 << kBits> known_;
+};
+
 struct RobotState
 {
     Pose2 pose;
@@ -44,6 +69,7 @@ struct RobotState
     Wheels told{kUntold, kUntold, kUntold, kUntold}, asked_mps{};
     double asked_steering_rad = 0;
     std::array<double, 3> drive_noise{};  // velocity disturbance: forward, left, turn
+    Decays decays;
     std::vector<double> effect_state;
 };
 

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hundreds of columns over the rows of logs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Columns:
+    """T columns of R rows, in pieces.
+
+    All side by side would be a hundred megabytes, which the system clears before it gives them;
+    pieces fit into what was used before.
+
+    Attributes:
+        pieces: (R, t) some after the other.
+    """
+
+    pieces: Sequence[np.ndarray]
+
+    @classmethod
+    def beside(cls, logs: Sequence[Sequence[np.ndarray]]) -> "Columns":
+        """Of pieces of each log, as many of each; the logs' rows one after the other."""
+        if len(logs) == 1:
+            return cls(logs[0])
+        return cls([np.concatenate(own) for own in zip(*logs, strict=True)])
+
+    @cached_property
+    def _place(self) -> np.ndarray:
+        """(2, T) piece of each column, and which it is there."""
+        widths = [p.shape[1] for p in self.pieces]
+        piece = np.repeat(np.arange(len(widths)), widths)
+        return np.array([piece, np.concatenate([np.arange(w) for w in widths])])
+
+    def __len__(self) -> int:
+        return self._place.shape[1]
+
+    def some(self, wanted: np.ndarray, rows: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """(r, k) of some rows, the columns of these (k,) numbers."""
+        piece, place = self._place[:, wanted]
+        numbers = np.unique(piece)
+        if len(numbers) == 1:
+            return self.pieces[numbers[0]][rows][:, place]
+        found = np.empty((len(self.pieces[0][rows]), len(piece)))
+        for n in numbers:
+            own = piece == n
+            found[:, own] = self.pieces[n][rows][:, place[own]]
+        return found
