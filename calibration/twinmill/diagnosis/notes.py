@@ -13,7 +13,7 @@ from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import drives_sideways
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import ChannelNoise, Noise
-from twinmill.predict.windows import HORIZONS_S, rms
+from twinmill.predict.windows import HORIZONS_S
 
 MOST_TOLD = 3  # stretches
 NOTABLE = 0.01  # change of a gain that is worth a sentence
@@ -160,13 +160,31 @@ def marker_notes(logs: Sequence[ModelledLog]) -> list[str]:
     return notes
 
 
+def _ahead_m2(measured: np.ndarray) -> np.ndarray:
+    """(H, 2) square of the way that is still ahead, mean over time, of (W, H, 3) displacements.
+
+    Forward and left, seen from the start. A heading that wanders by dW at a time turns all the way
+    that is ahead then, so that the end goes astray by the integral of it. A third of the square on
+    a straight way; between two horizons the way is taken as straight.
+    """
+    times_s = np.array([0.0, *HORIZONS_S])
+    places = np.concatenate([np.zeros((len(measured), 1, 2)), measured[..., :2]], axis=1)
+    found = []
+    for end in range(1, len(times_s)):
+        ahead = places[:, [end]] - places[:, : end + 1]
+        a, b = ahead[:, :-1], ahead[:, 1:]
+        squares = np.nanmean((a * a + a * b + b * b) / 3, axis=0)
+        found.append(np.diff(times_s[: end + 1]) @ squares / times_s[end])
+    return np.array(found)
+
+
 def irregularity(own: Opened, noise: Noise, model: native.Model, known_mps: float = 0.0) -> float:
     """Floor of a log over what the sensor's noise and the model's disturbance make.
 
     The largest of the three channels, each the geometric mean over horizons, or at the longest
     one: beside a noisy sensor a disturbance shows there alone. The sensor's noise is the log's own.
-    A turn by the disturbance moves the robot sideways, by a third of its square. Wheels slip by a
-    share of their way: where the robot drives faster than at `known_mps`, at which the model's
+    A turn by the disturbance leads what is ahead of the robot's way aside. Wheels slip by a share
+    of their way: where the robot drives faster than at `known_mps`, at which the model's
     disturbance was told, more of it is usual.
     """
     faster = max(noise.speed_mps / known_mps, 1.0) if known_mps else 1.0
@@ -183,8 +201,8 @@ def irregularity(own: Opened, noise: Noise, model: native.Model, known_mps: floa
     )
     horizons_s = np.array(HORIZONS_S)
     along, turn = position.displaced(horizons_s), heading.displaced(horizons_s)
-    way_m = rms(own.data.measured)[:, 0]
-    usual = np.sqrt(np.column_stack([along, along + way_m**2 * turn / 3, turn]))
+    led = along[:, None] + turn[:, None] * _ahead_m2(own.data.measured)[:, ::-1]
+    usual = np.sqrt(np.column_stack([led, turn]))
     with np.errstate(invalid="ignore"):
         over = np.log(own.floor.rms / usual)
     known = np.isfinite(over).any(axis=0)

@@ -148,7 +148,7 @@ class Settings(Numbers):
     much: float = number(0.1, "share of the squared error that is much")
     worse: float = number(1.5, "score over the usual one, beyond which it is a finding")
     irregular: float = number(2.2, "noise floor over the model's noise, which is said ...")
-    random: float = number(3.5, "... and from which something random is there that was not ...")
+    random: float = number(3.0, "... and from which something random is there that was not ...")
     random_alone: float = number(4.5, "... and the same at a score at which nothing is left")
 
     def stricter(self, times: float) -> "Settings":

@@ -189,6 +189,32 @@ def test_what_grows_beside_a_noisy_sensor_shows_at_the_longest_horizon():
     assert np.exp(np.log(ahead / along).mean()) < SETTINGS.irregular < found
 
 
+@pytest.mark.parametrize("curved", [False, True])
+def test_a_heading_that_wanders_leads_the_robot_across_its_way_in_curves_too(curved):
+    """Half a turn ends where it began but for two radii aside: an error of the heading moves it on.
+
+    By brute force: many runs at one speed, with a heading that wanders as the model says.
+    """
+    model, random = native.Model.load("turbopi.toml"), np.random.default_rng(1)
+    model.set("noise.drive_mps", 1e-4)
+    position, heading = (
+        ChannelNoise(s, model.get(f"noise.{d}"), model.get(f"noise.{m}"))
+        for s, d, m in ((1e-4, "drive_mps", "drive_s"), (1e-4, "drive_radps", "drive_turn_s"))
+    )
+    step_s, count = 0.005, round(max(HORIZONS_S) / 0.005)
+    keep, wander = np.exp(-step_s / heading.memory_s), np.zeros(2000)
+    turned, place, found = np.zeros(2000), np.zeros((2, 2000)), {}
+    for k in range(count):
+        wander = keep * wander + np.sqrt(1 - keep**2) * heading.drive * random.normal(size=2000)
+        turned = turned + (wander + curved * np.pi / 2) * step_s
+        place = place + 0.3 * step_s * np.array([np.cos(turned), np.sin(turned)])
+        found[round((k + 1) * step_s, 3)] = (*place, turned)
+    ends = np.array([found[h] for h in HORIZONS_S])  # (H, 3, runs)
+    data = SimpleNamespace(measured=np.moveaxis(ends, 2, 0))
+    own = SimpleNamespace(data=data, floor=SimpleNamespace(rms=ends.std(axis=2)))
+    assert irregularity(own, Noise(position, heading), model) == pytest.approx(1.0, abs=0.35)
+
+
 @pytest.mark.parametrize(
     ("score", "scatter", "random"), [(1.1, 2.5, False), (1.1, 4.0, True), (1.0, 4.0, False)]
 )
