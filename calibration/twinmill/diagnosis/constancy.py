@@ -84,7 +84,11 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
     logs = [i for i, d in enumerate(fit.datasets) if isinstance(d, Trajectory)]
     instances = set(effect_names(trial.state.model))
     named = [(u.parameter.name.split(".")[0], u.parameter.role) for u in fit.unknowns]
-    late = {c for c, (_, role) in enumerate(named) if role == "lateness"}
+    late = {
+        c
+        for c, (name, role) in enumerate(named)
+        if role == "lateness" or name.split("#")[0] in needing("clocks")
+    }
     sizes = {
         c: name
         for c, (name, role) in enumerate(named)

@@ -353,7 +353,8 @@ def _concluded(
     usual = model_file.usual_score(hashes)
     news = findings or rest.moments or rest.proven or SETTINGS.common * last.held_score > usual
     rest = rest if news else rest.as_before()
-    if rest.firm and not rest.depends_on and all(f.certainty == "doubtful" for f in findings):
+    unsure = all(f.certainty == "doubtful" for f in findings if f.effect != REFIT)
+    if rest.firm and unsure and not rest.depends_on:
         rest = rest.most_likely(acted_on(findings, 0.0))
     disturbed = [] if rest.moments else disturbed_notes(after)
     noise = irregularity_notes(opened, scatters)
