@@ -132,12 +132,12 @@ std::vector<Publisher::Robot> DescribeRobots(const Options &options, const Setup
 bool OpenOutlet(const Options &options, Outlet &outlet)
 {
     if (!options.log.empty())
-        outlet.OpenLog(options.log);
+        outlet.OpenLog(options.log, options.force);
     if (!options.UsesBus())
         return false;
     try
     {
-        outlet.OpenBus(options.lcm_url.value_or(""));
+        outlet.OpenBus(options.lcm_url.value_or(""), options.force);
         return true;
     }
     catch (const std::runtime_error &error)
@@ -273,7 +273,8 @@ void Run(const Options &options)
     PrintHeader(options, swarm, on_bus, realtime_factor);
     Publisher publisher(outlet, swarm, setup.robots, std::move(described), options.channel_prefix,
                         options.pose_rate_hz, options.seed);
-    Views views(MakeViewOptions(options, setup.robots));
+    Pictures pictures(options);
+    Views views(MakeViewOptions(options, setup.robots, pictures));
     Loop loop(options, setup, duration_s, realtime_factor);
     Commands commands(outlet, swarm, publisher, script,
                       {options.channel_prefix, options.script_dir, options.wait,
@@ -281,6 +282,7 @@ void Run(const Options &options)
     loop.Turn(swarm, publisher, commands, views);
     const double wall_s = loop.WallS();
     views.Finish(swarm);
+    pictures.Finish();
     outlet.Finish();
     PrintSummary(options, {setup.command_line, swarm.Size(), swarm.PeriodS(), swarm.TimeS(), wall_s,
                            g_stop != 0, loop.Mean(publisher)});
