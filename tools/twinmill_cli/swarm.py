@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import sys
@@ -19,7 +18,7 @@ import typer
 from twinmill.defaults import URL
 from twinmill_cli.lazy import CommandGroup, working
 from twinmill_cli.options import Arm, KeyFile, LcmUrl, Prefix
-from twinmill_cli.output import AsJson, deliver
+from twinmill_cli.output import AsJson, deliver, print_object
 
 if working():  # not for --help
     from rich import box
@@ -28,7 +27,6 @@ if working():  # not for --help
     from rich.table import Table
     from rich.text import Text
 
-    from twinmill.files import plain
     from twinmill.robots import tell
     from twinmill.robots.fleet import RUN_PERIOD_S, Fleet, Robot
     from twinmill.robots.key import load
@@ -381,7 +379,7 @@ def _status(
         fleet.listen(RUN_PERIOD_S - 1, lambda: all(r.run for r in fleet.robots.values()))
         robots = [fleet.robots[i] for i in sorted(fleet.robots)]
         if as_json:
-            print(json.dumps(plain({"robots": [r.to_json() for r in robots]})))
+            print_object({"robots": [r.to_json() for r in robots]})
         else:
             Console().print(status_table(robots))
         return 0 if robots else 1
