@@ -243,6 +243,20 @@ def test_a_lone_robot_circles_at_the_speed_asked_for(v_mps: float, omega_degps: 
     assert np.hypot(*np.diff(pose[:, :2], axis=0).T) == pytest.approx(chord)
 
 
+@pytest.mark.parametrize(
+    ("axis", "sentence"),
+    [
+        ("n=0,1,2", r"^0 robots: from 1 to 1000 can run 'milling'"),
+        ("n=-1,3", "^-1 robots: from 1"),
+        ("n=1e30,2", "robots: from 1"),
+        ("spread_m=-1,1", "spread_m = -1 m: must be 0.01 m or more"),
+    ],
+)
+def test_a_value_that_no_swarm_can_have_is_told(axis: str, sentence: str):
+    with pytest.raises(ValueError, match=sentence):
+        request([axis])
+
+
 def test_the_first_species_takes_up_the_rest():
     mixed = request(["n=4:8:3"], behavior="milling:5,self_centering:1")
     for point in mixed.points:
