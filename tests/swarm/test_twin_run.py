@@ -261,16 +261,48 @@ def test_a_model_that_is_wrong_is_told_in_one_sentence_that_can_be_read(tmp_path
     assert ("nearest" in refused.stderr) == ("gian" in text)
 
 
-def test_a_model_that_grows_without_bound_ends_in_one_sentence_and_no_file(tmp_path):
-    """ds/dt = 5 s + 1: after 20 s s is e^100 / 5, by calculus."""
-    model = tmp_path / "m.toml"
-    paper = Path(__file__).parents[2] / "twin/models/paper.toml"
+@pytest.mark.parametrize("plant", ["planar", "mujoco"])
+def test_a_model_that_grows_without_bound_ends_in_one_sentence_and_no_file(tmp_path, plant):
+    """ds/dt = 5 s + 1: after 20 s s is e^100 / 5, by calculus; in MuJoCo wheels only slipped."""
     rates = 'adds_to = "vx_mps"\nformula = "p0*s"\nstate_rate = "p1*s + 1"\np0 = 1\np1 = 5\n'
-    model.write_text(paper.read_text() + "\n" + EQUATION + rates)
+    told = _refused(tmp_path, rates, plant)
+    assert "grows without bound" in told
+
+
+@pytest.mark.parametrize("plant", ["planar", "mujoco"])
+@pytest.mark.parametrize(
+    ("formula", "is_run"),
+    [("p0/(0*vx)", False), ("sqrt(-1 - vx*vx)", False), ("p0*vx/abs(vx)", True)],
+)
+def test_a_formula_that_never_has_a_value_is_no_part_of_a_run(tmp_path, plant, formula, is_run):
+    """It had been left out without a word; one that has none at rest alone is run."""
+    equation = f'adds_to = "vx_mps"\nformula = "{formula}"\np0 = 0.01\n'
+    if is_run:
+        model = _with_equation(tmp_path, equation, plant)
+        words = ("--n", 2, "--duration-s", 3, "--log", tmp_path / "a.lcmlog")
+        assert run(*words, model=model, plant=plant).returncode == 0
+        return
+    assert "no finite value" in _refused(tmp_path, equation, plant)
+
+
+def _with_equation(tmp_path, equation, plant):
+    """A model file: the paper's robot, for MuJoCo the installed one."""
+    models = Path(__file__).parents[2] / "twin/models"
+    known = models / ("paper.toml" if plant == "planar" else "turbopi/turbopi.toml")
+    model = tmp_path / "m.toml"
+    model.write_text(known.read_text() + "\n" + EQUATION + equation)
+    return model
+
+
+def _refused(tmp_path, equation, plant):
+    """What a run of that model says as it ends."""
     log = tmp_path / "a.lcmlog"
-    refused = run("--n", 2, "--duration-s", 20, "--log", log, model=model)
-    assert refused.returncode == 1 and "grows without bound" in refused.stderr
-    assert refused.stderr.count("\n") == 1 and not log.exists()
+    model = _with_equation(tmp_path, equation, plant)
+    refused = run("--n", 2, "--duration-s", 20, "--log", log, model=model, plant=plant)
+    assert refused.returncode == 1 and not log.exists()
+    *header, told = refused.stderr.splitlines()
+    assert all("does nothing here" in line for line in header)
+    return told
 
 
 RUN_S = ("--n", 2, "--duration-s", 1)

@@ -245,7 +245,10 @@ def _list(bag: Path, topics: list[Topic], as_json: bool) -> None:
     if as_json:
         print_object({"topics": [vars(t) for t in topics], "command": line})
         return
-    rows = [[Cell(text) for text in (t.name, t.kind, str(t.count), t.role or "-")] for t in topics]
+    rows = [
+        [Cell(text) for text in (t.name, t.kind, f"{'about ' * t.about}{t.count}", t.role or "-")]
+        for t in topics
+    ]
     table = Table(str(bag), ["topic", "type", "messages", "could be"], rows, words=(0, 1, 3))
     Console().print(show.table(table))
     typer.echo(f"Try: {line}" if line else _unpaired(topics))
