@@ -184,16 +184,25 @@ def folder_beside(out: Path) -> Iterator[Path]:
         ValueError: a folder cannot be made or written there.
     """
     check_new_folder(out)
-    missing = [above for above in out.parents if not above.exists()]
+    with (
+        _said_of(out),
+        made_folder(out.parent),
+        tempfile.TemporaryDirectory(prefix=f".{out.name}.", dir=out.parent) as folder,
+    ):
+        yield Path(folder)
+
+
+@contextmanager
+def made_folder(folder: Path) -> Iterator[None]:
+    """The folder is there, and those above it; those that were missing go if they stay empty."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
-        with _said_of(out):
-            out.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(prefix=f".{out.name}.", dir=out.parent) as folder:
-                yield Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
     finally:
-        for above in missing:
+        for path in missing:
             with suppress(OSError):  # it holds what was made
-                above.rmdir()
+                path.rmdir()
 
 
 REPORT = '<meta name="generator" content="twinmill">'  # in every report

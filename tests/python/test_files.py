@@ -103,6 +103,21 @@ def test_a_sweep_is_written_by_one_command_at_a_time(tmp_path):
     assert sweep(request, tmp_path)["worlds"] == 4
 
 
+def test_a_sweep_that_could_not_begin_leaves_nothing_and_can_begin(monkeypatch, tmp_path):
+    """An empty folder of parts was left, in which the next sweep was refused."""
+    request = make_request("milling", "paper.toml", ["v_mps=0.1,0.2"], seeds=2, duration_s=1.0)
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", full_disk)
+        with pytest.raises(ValueError, match=r"manifest\.json: .*No space left on device"):
+            sweep(request, tmp_path / "a" / "s")
+    assert not list(tmp_path.iterdir())
+    assert sweep(request, tmp_path / "a" / "s")["worlds"] == 4
+
+
+def full_disk(*_):
+    raise FULL
+
+
 def test_a_missing_folder_is_named(tmp_path):
     absent = tmp_path / "a"
     refused(rf"there is no folder {absent}; make the folder", replacing, absent / "b.toml")
@@ -213,6 +228,13 @@ def test_a_report_is_replaced_by_the_next_one(tmp_path):
     first = write_report(tmp_path, "first", source, [])
     assert write_report(tmp_path, "second", source, []) == first
     assert "second" in first.read_text()
+
+
+def test_a_report_that_cannot_be_written_leaves_no_folder(monkeypatch, tmp_path):
+    monkeypatch.setattr(os, "replace", full_disk)
+    with pytest.raises(ValueError, match="No space left on device"):
+        write_report(tmp_path / "a" / "b", "first", Provenance("twinmill", "twinmill 0", ""), [])
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_challenge_leaves_a_folder_of_other_things_alone(twinmill, tmp_path):

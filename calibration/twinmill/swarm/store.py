@@ -45,10 +45,11 @@ class Store:
                 )
         elif self.folder.exists() and any(self.folder.iterdir()):
             raise ValueError(f"{self.folder}: is not empty and holds no sweep; choose another.")
-        self._part(0).parent.mkdir(parents=True, exist_ok=True)
+        self.folder.mkdir(parents=True, exist_ok=True)
         manifest = {"sha256": request.sha256, "request": json.loads(request.to_json())}
         with replacing(self._manifest, force=True) as fresh:
             fresh.write_text(json.dumps(manifest, indent=1, sort_keys=True))
+        self._part(0).parent.mkdir(exist_ok=True)  # not before the folder says what it is for
 
     def read_manifest(self) -> dict:
         """What the folder was made for: the `request`, and its `sha256`."""

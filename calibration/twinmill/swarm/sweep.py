@@ -7,7 +7,7 @@ from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
-from twinmill.files import alone_in, check_new_folder
+from twinmill.files import alone_in, check_new_folder, made_folder
 from twinmill.model.model_file import ModelFile
 from twinmill.swarm.axes import parse_axis
 from twinmill.swarm.request import PLANTS, Request
@@ -107,8 +107,7 @@ def run_missing(
         How many parts were kept before.
     """
     store = Store(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    with alone_in(folder):
+    with made_folder(folder), alone_in(folder):
         store.open(request)
         parts = request.parts()
         todo = {} if store.result.exists() else {k: parts[k] for k in store.missing(len(parts))}

@@ -20,7 +20,7 @@ from ribs.emitters import EvolutionStrategyEmitter, GaussianEmitter
 from ribs.schedulers import Scheduler
 
 from twinmill.defaults import BATCH, PER_GENERATION
-from twinmill.files import alone_in, replacing
+from twinmill.files import alone_in, made_folder, replacing
 from twinmill.model.model_file import write_whole
 from twinmill.programs import available_cores
 from twinmill.swarm.discover.genes import GENES, Mix, decode
@@ -126,9 +126,9 @@ class GenerationStore:
                 )
         elif folder.exists() and any(folder.iterdir()):
             raise ValueError(f"{folder}: is not empty and holds no search; choose another --out.")
-        self._parts.mkdir(parents=True, exist_ok=True)
         text = json.dumps({"sha256": hunt.sha256, "hunt": asdict(hunt)}, indent=1, sort_keys=True)
         write_whole(manifest, text)
+        self._parts.mkdir(exist_ok=True)
 
     def rows(self, generation: int, genes: np.ndarray, run: Callable[[], np.ndarray]) -> np.ndarray:
         """What was kept of these candidates, else what they do now, which is then kept."""
@@ -159,8 +159,7 @@ def search(hunt: Hunt, folder: Path, generations: int, tell: Callable[[int, int]
     Raises:
         ValueError: the folder holds something else, or another search is at work in it.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    with alone_in(folder):
+    with made_folder(folder), alone_in(folder):
         return _searched(hunt, GenerationStore(folder, hunt), generations, tell)
 
 
