@@ -258,6 +258,49 @@ def test_a_log_that_cannot_be_judged_is_told_as_an_object(
     assert [path.name for path in tmp_path.iterdir()] == [log.name] * (kind in known)
 
 
+FAILING = {
+    "compare {log} --model nomodel.toml": 1,
+    "phase nofolder": 1,
+    "ask bogus": 2,
+    "set base.motor_lag_s -o q.toml": 1,
+    "set base.motor_lag_s=0.06 -o nofolder/q.toml": 1,
+    "export {log} --to csv -o .": 1,
+    "guide --robot twin -o .": 1,
+    "import --poses absent.csv --commands absent.csv -o q.lcmlog": 1,
+    "effects bogus": 1,
+    "compare": 2,
+    "bogus": 2,
+    "compare {log} --bogus": 2,
+    "swarm bogus": 2,
+}
+
+
+@pytest.mark.parametrize("words", FAILING)
+def test_every_failure_is_told_as_an_object(twinmill, coasting_robot, tmp_path, monkeypatch, words):
+    """Who asked for JSON had got an empty stdout, of most failures."""
+    monkeypatch.chdir(tmp_path)
+    code, out, err = twinmill(*words.format(log=coasting_robot.log).split(), "--json")
+    told = json.loads(out)
+    assert code == FAILING[words] and told["verdict"] == "bad_input" and told["input"] == []
+    assert err == f"twinmill: {told['sentence']}\n"
+    assert not list(tmp_path.iterdir())
+
+
+def test_of_what_failed_after_its_object_there_is_no_other(
+    twinmill, coasting_robot, tmp_path, monkeypatch
+):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("twinmill_cli.frame.write_report", full)
+    code, out, err = twinmill(
+        *("compare", coasting_robot.log, "--model", coasting_robot.model),
+        *("--out", tmp_path / "report", "--json"),
+    )
+    assert code == 1 and "there is no report" in err
+    assert json.loads(out)["score"] > 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "nearest"),
     [

@@ -524,8 +524,7 @@ def test_command_prints_one_json_object(put, tmp_path):
         (["--up", "x"], "--up x: must be y or z"),
     ],
 )
-def test_wrong_options_are_one_sentence_on_stderr(tmp_path, arguments, sentence):
-    result = run_command("--out", tmp_path / "o.lcmlog", *arguments)
-    assert result.exit_code == 1
-    assert sentence in result.stderr and result.stderr.count("\n") == 1
-    assert not result.stdout
+def test_wrong_options_are_one_sentence_on_stderr(twinmill, tmp_path, arguments, sentence):
+    code, out, err = twinmill("import", "--out", tmp_path / "o.lcmlog", *arguments)
+    assert code == 1 and not out
+    assert sentence in err and err.count("\n") == 1

@@ -144,6 +144,39 @@ def test_a_flipped_bit_in_a_stamp_or_a_kind_is_damage(hundred, channel, place):
     assert len(robot.pose) + len(robot.command) == 199
 
 
+@pytest.mark.parametrize("count", [40, 900])
+@pytest.mark.parametrize("by_s", [-134, 134, -9])
+def test_a_stamp_out_of_its_order_is_damage_and_moves_no_other(write_log, message, count, by_s):
+    """One early stamp had been the beginning of the log: all times told of it were minutes off."""
+    stamps_s = np.arange(count) * 90 / count
+    told_s = stamps_s.copy()
+    told_s[count // 2] += by_s
+    events = [
+        (f"R07_{kind.upper()}", message(kind, utime_us=int(1e15 + 1e6 * t_s), robot_id=7))
+        for t_s in told_s
+        for kind in ("pose", "drive", "detection")
+    ]
+    log = read_log(write_log(*events))
+    assert [w for w in log.warnings if "damaged" in w] == [
+        f"R07_{kind}: 1 of {count} messages are damaged; left out."
+        for kind in ("DRIVE", "POSE", "DETECTION")
+    ]
+    robot = log.robots[7]
+    for t_s in (robot.pose_t_s, robot.command_t_s, robot.seen_t_s):
+        np.testing.assert_allclose(t_s, np.delete(stamps_s, count // 2), atol=2e-6)
+
+
+def test_stamps_that_a_network_disorders_are_sorted(write_log, message):
+    """Two halves of a log that were joined in the wrong order, too: they are no damage."""
+    t_s = np.arange(0, 90, 0.1)
+    for told_s in (t_s + 0.4 * np.sin(7 * np.arange(900)), np.roll(t_s, 400)):
+        poses = [message("pose", utime_us=int(1e6 * t), robot_id=7) for t in told_s]
+        log = read_log(write_log(*[("R07_POSE", pose) for pose in poses]))
+        assert not any("damaged" in w for w in log.warnings)
+        assert any("sorted" in w for w in log.warnings)
+        assert len(log.robots[7].pose_t_s) == 900
+
+
 @pytest.mark.filterwarnings("error")
 def test_numbers_that_no_pose_has_are_lost_poses(write_log, message):
     poses = [

@@ -125,7 +125,7 @@ def test_two_runs_of_one_robot_are_no_two_robots(tmp_path):
 
 
 def test_a_quoted_pattern_stands_for_the_files_and_an_unquoted_one_is_explained(
-    tmp_path, monkeypatch
+    tmp_path, monkeypatch, twinmill
 ):
     monkeypatch.chdir(tmp_path)
     for k in range(2):
@@ -137,8 +137,8 @@ def test_a_quoted_pattern_stands_for_the_files_and_an_unquoted_one_is_explained(
     _are(read_log(tmp_path / "o.lcmlog").robots, [0, 1])
 
     spread = ["import", "--poses", "poses_R0.csv", "poses_R1.csv", "-o", "p.lcmlog"]
-    said = CliRunner().invoke(app, spread)
-    assert said.exit_code == 1
-    assert "poses_R1.csv: stands alone; write the option before each file" in said.output
-    none = CliRunner().invoke(app, ["import", "--poses", "no*.csv", "-o", "p.lcmlog"])
-    assert "--poses no*.csv: no file has such a name" in none.output
+    code, _, said = twinmill(*spread)
+    assert code == 1
+    assert "poses_R1.csv: stands alone; write the option before each file" in said
+    _, _, said = twinmill("import", "--poses", "no*.csv", "-o", "p.lcmlog")
+    assert "--poses no*.csv: no file has such a name" in said

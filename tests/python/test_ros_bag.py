@@ -558,6 +558,20 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 PICTURE_BYTES = 2_000_000
 
 
+def test_frames_of_a_long_bag_are_counted_as_about_so_many(tmp_path, monkeypatch):
+    """It had listed as many as were looked at, and no word of the others."""
+    rows = [
+        (START_S + t, _transforms(START_S + t, ("odom", "base_link", 0.1 * t, 0.5, 0.2)))
+        for t in TIMES_S
+    ]
+    tree = ("/tf", "tf2_msgs/msg/TFMessage", TF_TYPE, rows)
+    bag = _written(tmp_path / "tf.mcap", tree, _twists())
+    for looked_at in (20, 1000):
+        monkeypatch.setattr("twinmill.data.importers.ros_bag.LOOKED_AT", looked_at)
+        frames = [(t.count, t.about) for t in list_topics(bag) if ":" in t.name]
+        assert frames == [(len(TIMES_S), looked_at < len(TIMES_S))]
+
+
 def _with_pictures(path, pictures):
     """A bag with a camera's topic, as the largest ones are: written between the others."""
     image = T["sensor_msgs/msg/Image"]

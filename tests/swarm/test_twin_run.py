@@ -261,16 +261,48 @@ def test_a_model_that_is_wrong_is_told_in_one_sentence_that_can_be_read(tmp_path
     assert ("nearest" in refused.stderr) == ("gian" in text)
 
 
-def test_a_model_that_grows_without_bound_ends_in_one_sentence_and_no_file(tmp_path):
-    """ds/dt = 5 s + 1: after 20 s s is e^100 / 5, by calculus."""
-    model = tmp_path / "m.toml"
-    paper = Path(__file__).parents[2] / "twin/models/paper.toml"
+@pytest.mark.parametrize("plant", ["planar", "mujoco"])
+def test_a_model_that_grows_without_bound_ends_in_one_sentence_and_no_file(tmp_path, plant):
+    """ds/dt = 5 s + 1: after 20 s s is e^100 / 5, by calculus; in MuJoCo wheels only slipped."""
     rates = 'adds_to = "vx_mps"\nformula = "p0*s"\nstate_rate = "p1*s + 1"\np0 = 1\np1 = 5\n'
-    model.write_text(paper.read_text() + "\n" + EQUATION + rates)
+    told = _refused(tmp_path, rates, plant)
+    assert "grows without bound" in told
+
+
+@pytest.mark.parametrize("plant", ["planar", "mujoco"])
+@pytest.mark.parametrize(
+    ("formula", "is_run"),
+    [("p0/(0*vx)", False), ("sqrt(-1 - vx*vx)", False), ("p0*vx/abs(vx)", True)],
+)
+def test_a_formula_that_never_has_a_value_is_no_part_of_a_run(tmp_path, plant, formula, is_run):
+    """It had been left out without a word; one that has none at rest alone is run."""
+    equation = f'adds_to = "vx_mps"\nformula = "{formula}"\np0 = 0.01\n'
+    if is_run:
+        model = _with_equation(tmp_path, equation, plant)
+        words = ("--n", 2, "--duration-s", 3, "--log", tmp_path / "a.lcmlog")
+        assert run(*words, model=model, plant=plant).returncode == 0
+        return
+    assert "no finite value" in _refused(tmp_path, equation, plant)
+
+
+def _with_equation(tmp_path, equation, plant):
+    """A model file: the paper's robot, for MuJoCo the installed one."""
+    models = Path(__file__).parents[2] / "twin/models"
+    known = models / ("paper.toml" if plant == "planar" else "turbopi/turbopi.toml")
+    model = tmp_path / "m.toml"
+    model.write_text(known.read_text() + "\n" + EQUATION + equation)
+    return model
+
+
+def _refused(tmp_path, equation, plant):
+    """What a run of that model says as it ends."""
     log = tmp_path / "a.lcmlog"
-    refused = run("--n", 2, "--duration-s", 20, "--log", log, model=model)
-    assert refused.returncode == 1 and "grows without bound" in refused.stderr
-    assert refused.stderr.count("\n") == 1 and not log.exists()
+    model = _with_equation(tmp_path, equation, plant)
+    refused = run("--n", 2, "--duration-s", 20, "--log", log, model=model, plant=plant)
+    assert refused.returncode == 1 and not log.exists()
+    *header, told = refused.stderr.splitlines()
+    assert all("does nothing here" in line for line in header)
+    return told
 
 
 RUN_S = ("--n", 2, "--duration-s", 1)
@@ -323,14 +355,71 @@ def test_two_outputs_are_not_one_file(tmp_path):
     assert not log.exists()
 
 
-def test_what_a_killed_run_left_is_replaced_with_force_alone(tmp_path):
-    log, left = tmp_path / "a.lcmlog", tmp_path / "a.lcmlog.partial"
-    left.write_text("half a run")
-    refused = run(*RUN_S, "--log", log)
-    assert refused.returncode == 1 and str(left) in refused.stderr
-    assert left.read_text() == "half a run"
-    assert run(*RUN_S, "--log", log, "--force").returncode == 0
+def started(*arguments):
+    """A run of the same seconds in real time, so that others meet it."""
+    words = ("--duration-s", 2, "--realtime-factor", 1, *arguments)
+    command = [TWIN_RUN, "--plant", "planar", "--model", "paper.toml", *map(str, words)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(true):
+    end_s = time.monotonic() + 30
+    while not true():
+        assert time.monotonic() < end_s
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("force", [[], ["--force"]])
+def test_two_runs_that_write_one_log_leave_that_of_one(tmp_path, force):
+    """They had written into one file, of which no message was whole, and both ended with 0."""
+    log = tmp_path / "a.lcmlog"
+    first = started("--n", 3, "--log", log, *force)
+    wait_for(lambda: os.listdir(tmp_path))
+    second = started("--n", 6, "--log", log, *force)
+    codes = [first.wait(60), second.wait(60)]
+    assert codes == ([0, 0] if force else [0, 1])
+    if not force:
+        told = second.stderr.read()
+        assert f"--log {log}: exists" in told and told.count("\n") == 1
+    kept = 6 if force else 3
+    assert {f"R{i:02d}_POSE" for i in range(kept)} == {c for c in read(log)[0] if "POSE" in c}
     assert os.listdir(tmp_path) == ["a.lcmlog"]
+
+
+def test_what_a_killed_run_left_can_be_read_and_hinders_none(tmp_path):
+    log = tmp_path / "a.lcmlog"
+    killed = started("--n", 6, "--log", log)
+    wait_for(lambda: any(path.stat().st_size > 100_000 for path in tmp_path.iterdir()))
+    killed.kill()
+    killed.wait(60)
+    (left,) = tmp_path.iterdir()
+    assert left.name.startswith("a.lcmlog.") and left.name.endswith(".partial")
+    assert run(*RUN_S, "--log", log).returncode == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"a.lcmlog", left.name}
+    assert read(left)[0]["R00_POSE"]
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [(["--n", "0"], 2), (["--bogus"], 2), (["--log", "/nonexistent/a"], 1)],
+)
+def test_a_run_that_fails_says_why_in_json(words, code):
+    failed = run("--json", "--duration-s", 1, *words)
+    assert failed.returncode == code and failed.stderr.count("\n") == 1
+    told = json.loads(failed.stdout)
+    assert told["verdict"] == "bad_input" and told["input"] == []
+    assert failed.stderr == f"twin_run: {told['sentence']}\n"
+    assert words[0] in told["sentence"]
+
+
+@pytest.mark.parametrize("words", [["--json"], [], ["--help"]])
+def test_a_result_that_cannot_be_printed_is_a_failure(tmp_path, words):
+    with open("/dev/full", "w") as full:
+        command = [TWIN_RUN, "--plant", "planar", "--n", "1", "--duration-s", "1", *words]
+        command += ["--log", str(tmp_path / "a.lcmlog")]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert done.returncode == 1
+    assert "the output cannot be written: No space left on device" in done.stderr
 
 
 def test_camera_draws_frames_and_decides_by_them(tmp_path):

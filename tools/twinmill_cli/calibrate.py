@@ -93,7 +93,7 @@ def _fit(
     check_new_file(output, force, [model_file.path, *logs])
     with busy(f"fitting {model}"):
         measurements = load(logs, model_file)
-        result = fit(measurements, model_file, output, source.command, held=held)
+        result = fit(measurements, model_file, output, source.command, held=held, force=force)
     section = partial(fit_section, result)
     data = {**result.to_json(), **told(measurements)}
     finish(data, show.fit(result), source, section=section, as_json=as_json, out=out)
@@ -174,6 +174,7 @@ def _add(
             texts=texts,
             held=held,
             robot_id=robot,
+            force=force,
         )
     section = partial(added_section, result)
     data = {**result.to_json(), **told(measurements)}

@@ -34,7 +34,7 @@ if working():  # not for --help
     from twinmill.challenge.robots import Robot
     from twinmill.challenge.run import play, write_log
     from twinmill.challenge.scoring import scored, summary
-    from twinmill.files import check_holds, check_report
+    from twinmill.files import alone_in, check_holds, check_report
     from twinmill.model.model_file import write_whole
     from twinmill.report import challenge as page
     from twinmill.terminal import progress_bar
@@ -93,17 +93,24 @@ def _challenge(
     (out / DONE).mkdir(parents=True, exist_ok=True)
     workers = workers or os.cpu_count() or 1
     command = f"twinmill challenge --n {count} --seed {seed} --duration-s {duration_s:g}"
-    if intervals:
-        command += f" --intervals {intervals}"
-        return _intervals(
-            out=out,
-            count=intervals,
-            seed=seed,
-            duration_s=duration_s,
-            workers=workers,
-            command=command,
-            as_json=as_json,
-        )
+    how = {"seed": seed, "duration_s": duration_s, "workers": workers, "as_json": as_json}
+    with alone_in(out):
+        if intervals:
+            return _intervals(out, intervals, command=f"{command} --intervals {intervals}", **how)
+        return _exam(out, count, command=command, **how)
+
+
+def _exam(
+    out: Path,
+    count: int,
+    *,
+    command: str,
+    seed: int,
+    duration_s: float,
+    workers: int,
+    as_json: bool,
+) -> dict:
+    """Draws cases, seals their answers, diagnoses their logs, and scores what was said."""
     robots = draw_robots(seed)
     cases = [draw(number, seed, robots, duration_s) for number in range(count)]
     answers = seal(cases)
@@ -177,11 +184,11 @@ def diagnosed(folder: Path, base: Path, case: Case) -> tuple[dict, float]:
 def _intervals(
     out: Path,
     count: int,
+    *,
+    command: str,
     seed: int,
     duration_s: float,
-    *,
     workers: int,
-    command: str,
     as_json: bool,
 ) -> dict:
     """Fits drives whose numbers are known, and counts how often intervals cover them."""

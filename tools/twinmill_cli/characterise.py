@@ -34,7 +34,7 @@ if working():  # not for --help
 
     from twinmill.data.log import LogError
     from twinmill.data.measurement_table import read_header, read_table
-    from twinmill.data.recorder import Recorder, partial_of
+    from twinmill.data.recorder import Recorder
     from twinmill.experiment.played import Rows
     from twinmill.export.script import TwistScript
     from twinmill.files import check_new_file
@@ -117,14 +117,13 @@ def _characterise(
             force=force,
             as_json=as_json,
         )
-    for path in (out, partial_of(out)):  # of a recording that was killed
-        check_new_file(path, force, [Path(script)])
+    check_new_file(out, force, [Path(script)])
     end_s = check_script(Path(script), cap_pct)
     name = Path(script).name
     if host:
         copy_script(Remote(host, ssh_config), Path(script), name)
     fleet = Fleet(lcm_url, channel_prefix, key=load(key))
-    with Recorder(out) as recorder, any_key() as pressed:
+    with Recorder(out, force) as recorder, any_key() as pressed:
         why = Run(fleet, recorder, robot, channel_prefix, arm).drive(
             name, end_s, countdown_s, pressed
         )

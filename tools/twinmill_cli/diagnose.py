@@ -251,6 +251,7 @@ def _explain(
             progress=progress,
             formula=formula,
             stoppable=True,
+            force=force,
         )
     explained = str(result.path or model)
     settling = _settling(result.diagnosis, logs, explained)

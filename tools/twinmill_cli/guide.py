@@ -166,7 +166,7 @@ def _guide(
     """
     given = {"poses": poses, "robot": robot, "drive": drive, "wheels": wheels, "clocks": clocks}
     have = _have(given, number, not as_json and sys.stdin.isatty())
-    with replacing_folder(output, force=False) as folder:
+    with replacing_folder(output, force=None) as folder:
         folder.mkdir()
         text = _write(have, folder)
     blocks = re.findall(r"^```(\w*)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)

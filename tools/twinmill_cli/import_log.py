@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +10,7 @@ from typing import Annotated
 import typer
 
 from twinmill_cli.lazy import working
+from twinmill_cli.output import print_object
 
 if working():  # not for --help
     import numpy as np
@@ -177,63 +177,59 @@ def _command(
 
     Example: twinmill import --poses poses.csv --commands commands.csv -o run.lcmlog
     """
-    try:
-        if beside:
-            raise LogError(
-                f"{beside[0]}: stands alone; write the option before each file, or quote the "
-                "pattern, as in --poses 'poses_R*.csv'."
-            )
-        if explain_columns_to:
-            asked = {
-                "poses": files_of(poses, "--poses"),
-                "commands": files_of(commands, "--commands"),
-            }
-            explained = explain_columns(*(paths[0] if paths else None for paths in asked.values()))
-            _explain(asked, explained, explain_columns_to, robot_id, force=force)
-            return
-        if bag and not pose and not command:
-            _list(bag, list_topics(bag), as_json)
-            return
-        if out is None:
-            raise LogError("--out is missing: name the log to write.")
-        options = ImportOptions(
-            mapping=mapping,
-            flips=frozenset(flip or []),
-            pose_clock_ppm=pose_clock_ppm,
-            pose_topics=tuple(pose or []),
-            command_topics=tuple(command or []),
-            receive_stamps=receive_stamps,
-            wheelbase_m=wheelbase_m,
-            full_duty=full_duty,
-            robot_id=robot_id,
-            rename=dict(_pair(text, "--rename OLD=NEW") for text in rename or []),
-            robots={
-                name: _number(number)
-                for name, number in (_pair(text, "--robot NAME=ID") for text in robot or [])
-            },
-            up=up,
-            pose_shift_s=pose_shift_s,
-            path_heading=path_heading,
-            same_clock=same_clock,
-            force=force,
-            heading_offset_rad=float(np.radians(heading_offset_deg)),
+    if beside:
+        raise LogError(
+            f"{beside[0]}: stands alone; write the option before each file, or quote the "
+            "pattern, as in --poses 'poses_R*.csv'."
         )
-        summary = import_log(
-            poses,
-            commands,
-            out,
-            motive=motive,
-            vicon=vicon,
-            io_tsv=tuple(io_tsv or ()),
-            bag=bag,
-            detections=detections,
-            options=options,
-        )
-    except ValueError as error:
-        typer.echo(f"twinmill: {error}", err=True)
-        raise typer.Exit(1) from error
+    if explain_columns_to:
+        asked = {
+            "poses": files_of(poses, "--poses"),
+            "commands": files_of(commands, "--commands"),
+        }
+        explained = explain_columns(*(paths[0] if paths else None for paths in asked.values()))
+        _explain(asked, explained, explain_columns_to, robot_id, force=force)
+        return
+    if bag and not pose and not command:
+        _list(bag, list_topics(bag), as_json)
+        return
+    if out is None:
+        raise LogError("--out is missing: name the log to write.")
+    options = ImportOptions(
+        mapping=mapping,
+        flips=frozenset(flip or []),
+        pose_clock_ppm=pose_clock_ppm,
+        pose_topics=tuple(pose or []),
+        command_topics=tuple(command or []),
+        receive_stamps=receive_stamps,
+        wheelbase_m=wheelbase_m,
+        full_duty=full_duty,
+        robot_id=robot_id,
+        rename=dict(_pair(text, "--rename OLD=NEW") for text in rename or []),
+        robots={
+            name: _number(number)
+            for name, number in (_pair(text, "--robot NAME=ID") for text in robot or [])
+        },
+        up=up,
+        pose_shift_s=pose_shift_s,
+        path_heading=path_heading,
+        same_clock=same_clock,
+        force=force,
+        heading_offset_rad=float(np.radians(heading_offset_deg)),
+    )
+    summary = import_log(
+        poses,
+        commands,
+        out,
+        motive=motive,
+        vicon=vicon,
+        io_tsv=tuple(io_tsv or ()),
+        bag=bag,
+        detections=detections,
+        options=options,
+    )
     if as_json:
-        typer.echo(json.dumps(summary))
+        print_object(summary)
     else:
         _print(summary)
 
@@ -247,9 +243,12 @@ def _list(bag: Path, topics: list[Topic], as_json: bool) -> None:
     words += numbering(pairs) + (["--wheelbase-m", "METRES"] if steered else [])
     line = shlex.join([*words, "-o", f"{bag.stem}.lcmlog"]) if pairs else None
     if as_json:
-        typer.echo(json.dumps({"topics": [vars(t) for t in topics], "command": line}))
+        print_object({"topics": [vars(t) for t in topics], "command": line})
         return
-    rows = [[Cell(text) for text in (t.name, t.kind, str(t.count), t.role or "-")] for t in topics]
+    rows = [
+        [Cell(text) for text in (t.name, t.kind, f"{'about ' * t.about}{t.count}", t.role or "-")]
+        for t in topics
+    ]
     table = Table(str(bag), ["topic", "type", "messages", "could be"], rows, words=(0, 1, 3))
     Console().print(show.table(table))
     typer.echo(f"Try: {line}" if line else _unpaired(topics))

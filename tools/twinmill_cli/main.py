@@ -1,20 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command `twinmill`: all subcommands, and one sentence on what went wrong."""
 
-import errno
-import io
 import os
-import re
 import sys
 from typing import Annotated, Any
 
 import typer
 
+from twinmill_cli.ending import leave
 from twinmill_cli.lazy import CommandGroup, LazyCommand
-from twinmill_cli.output import STOPPED, deliver
-
-QUOTED = 80  # letters of what a sentence quotes
-OF_TABLES = ("import", "track", "track-calibrate", "track-check", "characterise")  # judge no log
 
 # Name, module and what it does, in the order of the help. The modules are imported when called.
 COMMANDS = (
@@ -240,57 +234,12 @@ def run(arguments: list[str]) -> Any:
     Raises:
         ValueError, OSError: it failed, in one sentence.
     """
-    try:
-        return app(arguments, prog_name="twinmill", standalone_mode=False)
-    except ValueError as error:
-        if "--json" in arguments and arguments[0] not in OF_TABLES:
-            _tell_bad_input(error)
-        raise
-
-
-def _tell_bad_input(error: ValueError) -> None:
-    """Prints the object of a log that cannot be judged; nothing of other errors."""
-    reading = sys.modules.get("twinmill.data.measurement")
-    if reading and isinstance(error, reading.LogError):
-        found = [finding.to_json() for finding in reading.findings_of(error)]
-        deliver({"verdict": "bad_input", "input": found}, "", as_json=True)
+    return app(arguments, prog_name="twinmill", standalone_mode=False)
 
 
 def main() -> None:
     """Entry point: leaves with the exit code."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a degree sign in ASCII is no reason to fail
-    try:
-        result = run(sys.argv[1:] or ["--help"])
-        code = result if isinstance(result, int) else 0
-    except typer.TyperException as error:
-        code = error.exit_code
-        sentence = error.format_message()  # empty where help was printed instead
-        if sentence:
-            _complain(f"{sentence} (--help lists what can be given)" if code == 2 else sentence)
-    except ModuleNotFoundError as error:  # `make demo` installs a part
-        if (error.name or "twinmill").startswith("twinmill"):
-            raise
-        code = 1
-        _complain(f"the Python package of '{error.name}' is not installed; `make build` does that.")
-    except KeyboardInterrupt:  # before the command, or after it
-        code = STOPPED
-    except OSError as error:
-        code = 1
-        full = "no space is left where the output goes; make room, then do it again."
-        told = full if error.errno == errno.ENOSPC else str(error)
-        _complain(f"{error.filename}: {error.strerror}." if error.filename else told)
-    except ValueError as error:
-        code = 1
-        _complain(str(error))
-    sys.exit(code)
-
-
-def _complain(sentence: str) -> None:
-    long = rf"(?<=[\s(=])'([^\s'][^']{{{QUOTED}}})[^']+'"  # an apostrophe stands behind a letter
-    short = re.sub(long, r"'\1...'", " ".join(sentence.split()))
-    print(f"twinmill: {short}", file=sys.stderr)
+    leave("twinmill", run)
 
 
 if __name__ == "__main__":

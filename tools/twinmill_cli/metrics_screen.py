@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import nullcontext
 
 from twinmill_cli.lazy import working
+from twinmill_cli.output import print_object
 
 if working():  # not for --help
     import twinmill_native as native
@@ -15,7 +15,6 @@ if working():  # not for --help
     from rich.table import Table
     from rich.text import Text
 
-    from twinmill.files import plain
     from twinmill.swarm.classes import COLORS, WORDS
     from twinmill.swarm.live_metrics import Question, SwarmSnapshot, look_around
     from twinmill.swarm.metrics import WINDOW_S, SwarmSeries
@@ -55,7 +54,7 @@ def follow(url: str, duration_s: float, question: Question, *, source: dict, as_
                     continue
                 swarms = [snapshot.to_json() for snapshot in snapshots]
                 data = {"utime_us": now_us, "swarms": swarms, "note": note or None, **source}
-                print(json.dumps(plain(data), allow_nan=False), flush=True)
+                print_object(data)
         except KeyboardInterrupt:
             pass  # the way to end it
     if live and not live.console.is_terminal:

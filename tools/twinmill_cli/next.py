@@ -104,7 +104,7 @@ def _next(
 
         swarm = make_request(behavior, model, [], n=n, seeds=seeds, duration_s=swarm_s, full=True)
         narrowing = _narrowing(load(logs, model_file), model_file, limits, swarm, draws=draws)
-        write_whole(output, csv_text(narrowing.rows))
+        write_whole(output, csv_text(narrowing.rows), force)
         how = _how(narrowing, logs, model, output, form=script_as)
         data = {"script": str(output), **narrowing.to_json(), **source.to_json()}
         if script_as:
@@ -116,7 +116,7 @@ def _next(
         return narrowing
     with telling(f"designing a run with {model}") as progress:
         plan = plan_run(load(logs, model_file), model_file, limits, progress)
-    write_whole(output, csv_text(plan.rows))
+    write_whole(output, csv_text(plan.rows), force)
     how = _how(plan, logs, model, output, form=script_as)
     data = {"script": str(output), **plan.to_json()}
     if script_as:

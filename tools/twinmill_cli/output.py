@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import json
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import typer
 
@@ -41,11 +42,30 @@ def unstopped() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
+_told_on: list[TextIO] = []  # where an object was printed
+
+
+def begin_telling() -> None:
+    """A command begins, and has printed no object."""
+    _told_on.clear()
+
+
+def has_told() -> bool:
+    """Whether an object was printed where objects go now."""
+    return any(stream is sys.stdout for stream in _told_on)
+
+
+def print_object(data: dict) -> None:
+    """One JSON object on stdout, in one line."""
+    print(json.dumps(plain(data), allow_nan=False), flush=True)
+    _told_on[:] = [sys.stdout]
+
+
 def deliver(data: dict, text: RenderableType, as_json: bool) -> None:
     """Prints the one or the other on stdout; text that must not wrap is not cut either."""
     with unstopped():
         if as_json:
-            print(json.dumps(plain(data), allow_nan=False), flush=True)
+            print_object(data)
         else:
             Console().print(text, crop=False)
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from twinmill.export.script import TwistScript, write_bag, write_publisher
-from twinmill.files import check_new_file, check_new_folder
+from twinmill.files import check_absent, check_new_file, check_new_folder
 from twinmill_cli.options import ScriptForm
 
 
@@ -22,8 +22,7 @@ def check_new_script(
     if form is not ScriptForm.BAG:
         check_new_file(path, force, inputs)
         return
-    if path.exists() and not force:
-        raise ValueError(f"{path}: exists; choose another name, or replace it with --force.")
+    check_absent(path, force)
     check_new_folder(path)
 
 

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import json
 import os
+import select
 import signal
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
@@ -19,7 +19,7 @@ import typer
 from twinmill.defaults import URL
 from twinmill_cli.lazy import CommandGroup, working
 from twinmill_cli.options import Arm, KeyFile, LcmUrl, Prefix
-from twinmill_cli.output import AsJson, deliver
+from twinmill_cli.output import AsJson, deliver, print_object
 
 if working():  # not for --help
     from rich import box
@@ -28,7 +28,6 @@ if working():  # not for --help
     from rich.table import Table
     from rich.text import Text
 
-    from twinmill.files import plain
     from twinmill.robots import tell
     from twinmill.robots.fleet import RUN_PERIOD_S, Fleet, Robot
     from twinmill.robots.key import load
@@ -235,21 +234,36 @@ def _stop(
     """
     asked = parse_robots(robots)
     operator_key, fault = _key_if_there(key)
-    with saying_nothing():
+    with saying_nothing() as say:
         fleet = Fleet(lcm_url, channel_prefix, key=operator_key)
-        given = tell.stop(fleet, asked, timeout_s, host or ())
+        given = tell.stop(
+            fleet,
+            asked,
+            timeout_s,
+            host or (),
+            waiting=lambda left: say(_waiting_words(left, timeout_s)),
+        )
     _tell_fault(fault)
     words = _stop_words(given, timeout_s)
     return _finish("stop", given, _all_stand(given), words, data={}, as_json=as_json)
 
 
 @contextmanager
-def saying_nothing() -> Iterator[None]:
-    """No library's message keeps a stop waiting, as on a full pipe or after Ctrl-S."""
+def saying_nothing() -> Iterator[Callable[[str], None]]:
+    """No library's message keeps a stop waiting, as on a full pipe or after Ctrl-S.
+
+    Gives a function that says a sentence where there is room for it, and else says nothing.
+    """
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
+
+    def say(sentence: str) -> None:
+        with suppress(OSError):
+            if select.select([], [kept], [], 0)[1]:
+                os.write(kept, f"twinmill: {sentence}\n".encode())
+
     try:
-        yield
+        yield say
     finally:
         os.dup2(kept, 2)
         os.close(kept)
@@ -276,6 +290,13 @@ def _all_stand(given: list[tell.Answer]) -> bool:
 def _moving(given: list[tell.Answer]) -> list[tell.Answer]:
     """Robots that have not signed that they stand, or of which there are two."""
     return [a for a in given if not (a.accepted and a.signed and a.stands) or a.is_double]
+
+
+def _waiting_words(left: set[int], timeout_s: float) -> str:
+    """What a stop waits for."""
+    names = ", ".join(f"R{i:02d}" for i in sorted(left))
+    whom = f"{names} to sign that they stand" if names else "a robot to be heard"
+    return f"stop is said all the time; waiting up to {timeout_s:g} s for {whom}."
 
 
 def _stop_words(given: list[tell.Answer], timeout_s: float) -> str:
@@ -381,7 +402,7 @@ def _status(
         fleet.listen(RUN_PERIOD_S - 1, lambda: all(r.run for r in fleet.robots.values()))
         robots = [fleet.robots[i] for i in sorted(fleet.robots)]
         if as_json:
-            print(json.dumps(plain({"robots": [r.to_json() for r in robots]})))
+            print_object({"robots": [r.to_json() for r in robots]})
         else:
             Console().print(status_table(robots))
         return 0 if robots else 1

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import Path
 from typing import Annotated
@@ -21,7 +20,7 @@ if working():  # not for --help
     from rich.table import Table
     from rich.text import Text
 
-    from twinmill.files import check_new_file
+    from twinmill.files import check_new_file, replacing
     from twinmill.robots.remote import Remote
     from twinmill.terminal import Fitting
     from twinmill.threshold import pictures as source
@@ -153,11 +152,9 @@ def write_settings(path: Path, settings: dict[str, int]) -> None:
     lines = path.read_text().splitlines() if path.exists() else []
     kept = [line for line in lines if line.partition("=")[0].strip() not in settings]
     kept += [f"{key} = {value}" for key, value in settings.items()]
-    new = path.with_name(path.name + ".new")
-    new.write_text("\n".join(kept) + "\n")
-    if path.exists():
-        os.chmod(new, path.stat().st_mode)
-    new.rename(path)
+    mode = path.stat().st_mode & 0o777 if path.exists() else 0o644
+    with replacing(path, force=True, mode=mode) as new:
+        new.write_text("\n".join(kept) + "\n")
 
 
 def _tell(

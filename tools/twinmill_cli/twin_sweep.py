@@ -2,7 +2,6 @@
 """The program twin_sweep. Python drives it, for tables, clusters and progress; C++ simulates."""
 
 import shlex
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -11,10 +10,10 @@ import typer
 import twinmill_cli.typer_options  # noqa: F401 changes Typer's options
 from twinmill.swarm.axes import ALIASES, QUANTITIES
 from twinmill.swarm.sweep import make_request, sweep
+from twinmill_cli.ending import leave
 from twinmill_cli.options import SpreadM, Start
 from twinmill_cli.output import AsJson, deliver
 
-INTERRUPTED = 130  # what typer makes of Ctrl-C
 AXIS_HELP = "name=from:to:count or name=value,value,..."
 app = typer.Typer(
     add_completion=False,
@@ -113,19 +112,11 @@ def _command(
 
 def main() -> None:
     """Entry point: leaves with the exit code."""
-    code = 0
-    try:
-        result = app(sys.argv[1:] or ["--help"], prog_name="twin_sweep", standalone_mode=False)
-        code = result if isinstance(result, int) else 0
-    except typer.TyperException as error:
-        code = error.exit_code
-        print(f"twin_sweep: {' '.join(error.format_message().split())}", file=sys.stderr)
-    except (ValueError, OSError) as error:
-        code = 1
-        print(f"twin_sweep: {' '.join(str(error).split())}", file=sys.stderr)
-    if code == INTERRUPTED:
-        print("twin_sweep: stopped; the same command goes on from here.", file=sys.stderr)
-    sys.exit(code)
+    leave("twin_sweep", _run, "stopped; the same command goes on from here.")
+
+
+def _run(words: list[str]) -> int:
+    return app(words, prog_name="twin_sweep", standalone_mode=False)
 
 
 if __name__ == "__main__":

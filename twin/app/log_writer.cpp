@@ -1,37 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "log_writer.h"
 
-#include <cerrno>
 #include <cstdio>
-#include <cstring>
-#include <filesystem>
-#include <stdexcept>
 
 namespace twin
 {
 
-std::string PartialPath(const std::string &path)
+LogWriter::LogWriter(const std::string &option, const std::string &path, bool force)
+    : file_(option, path, force), log_(lcm_eventlog_create(file_.Partial().c_str(), "w"))
 {
-    return path + ".partial";
-}
-
-LogWriter::LogWriter(const std::string &path) : path_(path)
-{
-    log_.reset(lcm_eventlog_create(PartialPath(path_).c_str(), "w"));
     if (!log_)
-        Fail("cannot be written");
-}
-
-LogWriter::~LogWriter()
-{
-    log_.reset();
-    std::error_code ignored;
-    std::filesystem::remove(PartialPath(path_), ignored);
-}
-
-void LogWriter::Fail(const char *what) const
-{
-    throw std::runtime_error("log " + path_ + ": " + what + ": " + std::strerror(errno));
+        file_.Fail("cannot be written");
 }
 
 void LogWriter::Write(int64_t utime_us, const std::string &channel, std::vector<uint8_t> &bytes)
@@ -44,15 +23,15 @@ void LogWriter::Write(int64_t utime_us, const std::string &channel, std::vector<
     event.datalen = static_cast<int32_t>(bytes.size());
     event.data = bytes.data();
     if (lcm_eventlog_write_event(log_.get(), &event) != 0)
-        Fail("writing failed");
+        file_.Fail("writing failed");
 }
 
 void LogWriter::Finish()
 {
     if (std::fflush(log_->f) != 0)
-        Fail("writing failed");
+        file_.Fail("writing failed");
     log_.reset();
-    std::filesystem::rename(PartialPath(path_), path_);
+    file_.Finish();
 }
 
 }  // namespace twin

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A log that stands under its name only once it is whole: written beside it, renamed at the end.
+// A log that stands under its name only once it is whole; what a killed program leaves is readable.
 #ifndef APP_LOG_WRITER_H
 #define APP_LOG_WRITER_H
 
@@ -10,24 +10,20 @@
 #include <string>
 #include <vector>
 
+#include "new_file.h"
+
 namespace twin
 {
-
-// What is not finished is written here.
-std::string PartialPath(const std::string &path);
 
 class LogWriter
 {
 public:
-    // Throws std::runtime_error in one sentence if the file cannot be made.
-    explicit LogWriter(const std::string &path);
-    // Removes what is not finished; a killed program leaves `path`.partial, which is readable.
-    ~LogWriter();
-    LogWriter(const LogWriter &) = delete;
-    LogWriter &operator=(const LogWriter &) = delete;
+    // As NewFile's constructor.
+    LogWriter(const std::string &option, const std::string &path, bool force);
 
     // Throws std::runtime_error if the disk is full.
     void Write(int64_t utime_us, const std::string &channel, std::vector<uint8_t> &bytes);
+    // As NewFile's.
     void Finish();
 
 private:
@@ -35,9 +31,8 @@ private:
     {
         void operator()(lcm_eventlog_t *log) const { lcm_eventlog_destroy(log); }
     };
-    [[noreturn]] void Fail(const char *what) const;
 
-    std::string path_;
+    NewFile file_;
     std::unique_ptr<lcm_eventlog_t, CloseLog> log_;
 };
 

@@ -163,7 +163,7 @@ Options ParseOptions(int argc, const char *const *argv)
     }
     catch (const CLI::ParseError &error)
     {
-        throw NoRun{"twin_run: " + FirstLine(error.what()) + " (--help lists the options)\n", 2};
+        throw NoRun{FirstLine(error.what()) + " (--help lists the options)", 2};
     }
     return options;
 }

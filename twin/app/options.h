@@ -40,7 +40,8 @@ struct Options
     bool UsesBus() const { return log.empty() || lcm_url.has_value(); }
 };
 
-// Thrown when the command line asks for no run: help, or a mistake. `text` is ready to print.
+// Thrown when the command line asks for no run: help, or a mistake. `text` is what to
+// print, or the sentence on the mistake.
 struct NoRun
 {
     std::string text;

@@ -22,12 +22,12 @@ std::string RecordingPath(const std::string &url)
     return url.substr(kFile.size(), url.size() - kFile.size() - kModeWrite.size());
 }
 
-void Outlet::OpenBus(const std::string &url)
+void Outlet::OpenBus(const std::string &url, bool force)
 {
     if (const std::string path = RecordingPath(url); !path.empty())
     {
-        recording_ =
-            std::make_unique<LogWriter>(path);  // liblcm's is silent where the disk is full
+        // liblcm's is silent where the disk is full.
+        recording_ = std::make_unique<LogWriter>("--lcm-url", path, force);
         return;
     }
     constexpr const char *kOwnMachine = "udpm://239.255.76.67:7667?ttl=0";

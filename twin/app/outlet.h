@@ -22,10 +22,14 @@ class Outlet
 {
 public:
     // Opens a bus; an empty `url` is LCM's default on this machine alone, and one of a file is a
-    // second log. Throws std::runtime_error in one sentence if messages cannot be sent there.
-    void OpenBus(const std::string &url);
+    // second log, which may replace one with `force`. Throws std::runtime_error in one sentence if
+    // messages cannot be sent there.
+    void OpenBus(const std::string &url, bool force);
     // As LogWriter's constructor.
-    void OpenLog(const std::string &path) { log_ = std::make_unique<LogWriter>(path); }
+    void OpenLog(const std::string &path, bool force)
+    {
+        log_ = std::make_unique<LogWriter>("--log", path, force);
+    }
     void Finish();
     // Empty if there is no bus.
     const std::string &BusUrl() const { return bus_url_; }

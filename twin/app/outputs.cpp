@@ -62,13 +62,16 @@ void CheckPlace(const NamedFile &file, bool force)
                                  folder.string());
     if (fs::exists(file.path) && !fs::is_regular_file(file.path))
         throw std::runtime_error(name + ": is no ordinary file; choose another name");
-    for (const std::string &there : {file.path, PartialPath(file.path)})
-        if (fs::exists(there) && !force)
-            throw std::runtime_error(file.option + " " + there +
-                                     ": exists; choose another name, or replace it with --force");
+    if (fs::exists(file.path) && !force)
+        throw std::runtime_error(Exists(file.option, file.path));
 }
 
 }  // namespace
+
+std::string Exists(const std::string &option, const std::string &path)
+{
+    return option + " " + path + ": exists; choose another name, or replace it with --force";
+}
 
 void CheckOutputs(const Options &options)
 {
@@ -77,7 +80,7 @@ void CheckOutputs(const Options &options)
     for (const NamedFile &file : Outputs(options))
     {
         for (const std::string &input : inputs)
-            if (IsSame(file.path, input) || IsSame(PartialPath(file.path), input))
+            if (IsSame(file.path, input))
                 throw std::runtime_error(file.option + " " + file.path +
                                          ": is read by this command (" + input +
                                          "), and what is read is never replaced; choose another "

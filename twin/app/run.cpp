@@ -8,6 +8,7 @@
 #include <fstream>
 #include <sstream>
 #include <thread>
+#include <vector>
 
 #include "behaviors.h"
 #include "commands.h"
@@ -38,6 +39,11 @@ constexpr double kRing = 1.5;
 constexpr double kFarthest_m = 1e9;
 // A fixed date, so that a log depends on nothing but its options: 2023-11-14 22:13:20 UTC.
 constexpr int64_t kLogEpoch_us = 1'700'000'000'000'000;
+
+// Below this, in m/s and rad/s, a robot stands.
+constexpr double kStands = 1e-3;
+// A formula that has no value at rest has one within this time of driving.
+constexpr double kTried_s = 1;
 
 volatile std::sig_atomic_t g_stop = 0;
 
@@ -132,12 +138,12 @@ std::vector<Publisher::Robot> DescribeRobots(const Options &options, const Setup
 bool OpenOutlet(const Options &options, Outlet &outlet)
 {
     if (!options.log.empty())
-        outlet.OpenLog(options.log);
+        outlet.OpenLog(options.log, options.force);
     if (!options.UsesBus())
         return false;
     try
     {
-        outlet.OpenBus(options.lcm_url.value_or(""));
+        outlet.OpenBus(options.lcm_url.value_or(""), options.force);
         return true;
     }
     catch (const std::runtime_error &error)
@@ -179,7 +185,7 @@ public:
                 KeepPace(swarm.TimeS());
                 publisher.PublishPoses(swarm);
             }
-            CheckNear(swarm);
+            Check(swarm);
             Observe(swarm);
             begin_ += ToClock(views.Show(swarm));
             if (views.Closed())
@@ -196,12 +202,24 @@ public:
     }
 
 private:
-    // Throws std::runtime_error in one sentence if a robot is nowhere; NaN compares false.
-    static void CheckNear(const Swarm &swarm)
+    // Throws std::runtime_error in one sentence if a robot is nowhere, or drives without a part of
+    // its model; NaN compares false.
+    void Check(const Swarm &swarm)
     {
+        driven_s_.resize(static_cast<size_t>(swarm.Size()));
         for (int robot = 0; robot < swarm.Size(); ++robot)
         {
-            const Pose2 &pose = swarm.State(robot).pose;
+            const RobotState &state = swarm.State(robot);
+            const Pose2 &pose = state.pose;
+            double &driven_s = driven_s_[static_cast<size_t>(robot)];
+            driven_s += std::hypot(state.vx_mps, state.vy_mps, state.omega_radps) > kStands
+                            ? swarm.PeriodS()
+                            : 0;
+            if (driven_s > kTried_s && swarm.IsSilent(robot))
+                throw std::runtime_error("robot " + std::to_string(robot) + " has driven for " +
+                                         std::to_string(driven_s) +
+                                         " s and a formula of its model has had no finite value; "
+                                         "correct the formula");
             if (!(std::hypot(pose.x_m, pose.y_m) < kFarthest_m))
                 throw std::runtime_error(
                     "robot " + std::to_string(robot) + " is out of any room after " +
@@ -232,6 +250,7 @@ private:
             std::chrono::duration<double>(duration_s));
     }
 
+    std::vector<double> driven_s_;
     Clock::time_point begin_ = Clock::now();
     std::optional<double> duration_s_;
     double realtime_factor_;
@@ -273,7 +292,8 @@ void Run(const Options &options)
     PrintHeader(options, swarm, on_bus, realtime_factor);
     Publisher publisher(outlet, swarm, setup.robots, std::move(described), options.channel_prefix,
                         options.pose_rate_hz, options.seed);
-    Views views(MakeViewOptions(options, setup.robots));
+    Pictures pictures(options);
+    Views views(MakeViewOptions(options, setup.robots, pictures));
     Loop loop(options, setup, duration_s, realtime_factor);
     Commands commands(outlet, swarm, publisher, script,
                       {options.channel_prefix, options.script_dir, options.wait,
@@ -281,6 +301,7 @@ void Run(const Options &options)
     loop.Turn(swarm, publisher, commands, views);
     const double wall_s = loop.WallS();
     views.Finish(swarm);
+    pictures.Finish();
     outlet.Finish();
     PrintSummary(options, {setup.command_line, swarm.Size(), swarm.PeriodS(), swarm.TimeS(), wall_s,
                            g_stop != 0, loop.Mean(publisher)});

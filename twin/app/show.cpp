@@ -4,9 +4,26 @@
 namespace twin
 {
 
-ViewOptions MakeViewOptions(const Options &options, const std::vector<Model> &robots)
+Pictures::Pictures(const Options &options)
 {
-    ViewOptions view{options.view, options.picture, options.video, FindModelFile(options.mjcf), {}};
+    if (!options.picture.empty())
+        picture_.emplace("--picture", options.picture, options.force);
+    if (!options.video.empty())
+        video_.emplace("--video", options.video, options.force);
+}
+
+void Pictures::Finish()
+{
+    for (std::optional<NewFile> *file : {&picture_, &video_})
+        if (*file)
+            (*file)->Finish();
+}
+
+ViewOptions MakeViewOptions(const Options &options, const std::vector<Model> &robots,
+                            const Pictures &pictures)
+{
+    ViewOptions view{
+        options.view, pictures.Picture(), pictures.Video(), FindModelFile(options.mjcf), {}};
     const CameraWorld world = MakeCameraWorld(options.camera, 0, 0);
     for (const Model &robot : robots)
     {

@@ -79,6 +79,16 @@ void PrintJson(const Options &options, const Result &result)
 
 }  // namespace
 
+void PrintFailure(const std::string &sentence)
+{
+    const nlohmann::ordered_json failure{
+        {"verdict", "bad_input"}, {"sentence", sentence}, {"input", nlohmann::json::array()}};
+    // File names may be of any bytes.
+    std::printf("%s\n",
+                failure.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::fflush(stdout);
+}
+
 void PrintHeader(const Options &options, const Swarm &swarm, bool on_bus, double realtime_factor)
 {
     std::FILE *out = options.json ? stderr : stdout;

@@ -38,6 +38,9 @@ private:
 // Text, or one JSON object, on stdout.
 void PrintSummary(const Options &options, const Result &result);
 
+// The object of a run that failed before it had one.
+void PrintFailure(const std::string &sentence);
+
 }  // namespace twin
 
 #endif

@@ -175,6 +175,11 @@ void DriveChain::Bind(const EffectInstance &instance)
     }
 }
 
+bool DriveChain::IsSilent() const
+{
+    return std::ranges::any_of(effects_, [](const auto &effect) { return effect->IsSilent(); });
+}
+
 RobotState DriveChain::Start(const Pose2 &pose) const
 {
     RobotState state;

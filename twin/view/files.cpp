@@ -10,7 +10,6 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
-#include <filesystem>
 #include <stdexcept>
 #include <utility>
 
@@ -21,29 +20,26 @@ namespace twin
 
 void WritePng(const std::string &path, const std::vector<uint8_t> &rgb, int width_px, int height_px)
 {
-    const std::string partial = path + ".partial";
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
     image.width = static_cast<png_uint_32>(width_px);
     image.height = static_cast<png_uint_32>(height_px);
     image.format = PNG_FORMAT_RGB;
     const int from_below = -3 * width_px;
-    if (!png_image_write_to_file(&image, partial.c_str(), 0, rgb.data(), from_below, nullptr))
-        throw std::runtime_error("--picture " + path + ": cannot be written: " + image.message);
-    std::filesystem::rename(partial, path);
+    if (!png_image_write_to_file(&image, path.c_str(), 0, rgb.data(), from_below, nullptr))
+        throw std::runtime_error(std::string("--picture: cannot be written: ") + image.message);
 }
 
 VideoWriter::VideoWriter(const std::string &path, int width_px, int height_px, int rate_Hz)
-    : path_(path), partial_path_(path + ".partial")
 {
     std::signal(SIGPIPE, SIG_IGN);  // a writer that ended is seen by write()
     const std::string size = std::to_string(width_px) + "x" + std::to_string(height_px);
     std::vector<std::string> words{
-        "ffmpeg",     "-loglevel", "error",     "-y",         "-f",       "rawvideo",
-        "-pix_fmt",   "rgb24",     "-s",        size,         "-r",       std::to_string(rate_Hz),
-        "-i",         "-",         "-vf",       "vflip",      "-pix_fmt", "yuv420p",
-        "-crf",       "20",        "-movflags", "+faststart", "-f",       "mp4",
-        partial_path_};
+        "ffmpeg",   "-loglevel", "error",     "-y",         "-f",       "rawvideo",
+        "-pix_fmt", "rgb24",     "-s",        size,         "-r",       std::to_string(rate_Hz),
+        "-i",       "-",         "-vf",       "vflip",      "-pix_fmt", "yuv420p",
+        "-crf",     "20",        "-movflags", "+faststart", "-f",       "mp4",
+        path};
     std::vector<char *> arguments;
     for (std::string &word : words)
         arguments.push_back(word.data());
@@ -74,11 +70,8 @@ VideoWriter::VideoWriter(const std::string &path, int width_px, int height_px, i
 
 VideoWriter::~VideoWriter()
 {
-    if (pid_ < 0)
-        return;
-    WaitForEnd();
-    std::error_code ignored;
-    std::filesystem::remove(partial_path_, ignored);
+    if (pid_ >= 0)
+        WaitForEnd();
 }
 
 int VideoWriter::WaitForEnd()
@@ -100,7 +93,7 @@ void VideoWriter::Add(const std::vector<uint8_t> &rgb)
         if (got < 0 && errno == EINTR)
             continue;
         if (got < 0)
-            throw std::runtime_error("--video " + path_ + ": ffmpeg ended early: see its message");
+            throw std::runtime_error("--video: ffmpeg ended early: see its message");
         sent += static_cast<size_t>(got);
     }
 }
@@ -108,12 +101,7 @@ void VideoWriter::Add(const std::vector<uint8_t> &rgb)
 void VideoWriter::Finish()
 {
     if (WaitForEnd() != 0)
-    {
-        std::error_code ignored;
-        std::filesystem::remove(partial_path_, ignored);
-        throw std::runtime_error("--video " + path_ + ": ffmpeg failed: see its message");
-    }
-    std::filesystem::rename(partial_path_, path_);
+        throw std::runtime_error("--video: ffmpeg failed: see its message");
 }
 
 }  // namespace twin

@@ -12,29 +12,26 @@
 namespace twin
 {
 
-// `rgb` has the lowest row first. Throws std::runtime_error in one sentence; then `path` is as it
-// was.
+// `rgb` has the lowest row first. Throws std::runtime_error in one sentence.
 void WritePng(const std::string &path, const std::vector<uint8_t> &rgb, int width_px,
               int height_px);
 
-// A video that stands under its name only once it is whole.
 class VideoWriter
 {
 public:
     // Starts ffmpeg. Throws std::runtime_error in one sentence if it is not there.
     VideoWriter(const std::string &path, int width_px, int height_px, int rate_Hz);
-    // Without Finish(): nothing is left.
     ~VideoWriter();
     VideoWriter(const VideoWriter &) = delete;
 
     // One frame, the lowest row first.
     void Add(const std::vector<uint8_t> &rgb);
+    // Throws std::runtime_error in one sentence if the file is not whole.
     void Finish();
 
 private:
     int WaitForEnd();
 
-    std::string path_, partial_path_;
     pid_t pid_ = -1;
     int fd_ = -1;
 };

@@ -21,6 +21,7 @@ import turbopi
 import twinmill_native as native
 
 FEW_BROKEN = 0.02  # of a channel: damage; more are messages of another type
+SHORT = 10  # messages of which a single one is damage, though it is a larger share
 
 # Fixed-size types of the LCM language, as they are on the wire.
 NUMBERS = {
@@ -137,7 +138,12 @@ def decode(
 
 def few_broken(count: int, of: int) -> bool:
     """Whether so many messages that cannot be read are damage, and no other type of message."""
-    return count <= FEW_BROKEN * of
+    return count <= most_broken(of)
+
+
+def most_broken(of: int) -> int:
+    """How many of so many messages may be damaged."""
+    return max(int(FEW_BROKEN * of), int(of >= SHORT))
 
 
 def broken(channel: str, count: int, of: int) -> str:

@@ -4,6 +4,7 @@
 import hashlib
 import re
 import tomllib
+from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,12 +14,12 @@ import numpy as np
 import turbopi
 
 from twinmill.data.lcm_log import (
-    FEW_BROKEN,
     Events,
     LogError,
     broken,
     decode,
     few_broken,
+    most_broken,
     split_events,
 )
 
@@ -28,6 +29,7 @@ CommandKind = Literal["duty", "wheel_speed", "twist", "none"]
 KINDS: tuple[CommandKind, ...] = ("duty", "wheel_speed", "twist")  # by drive_t.kind
 
 FAR_S = 60.0  # beside its span: no channel has single stamps so far away
+LATE_S = 1.0  # a network hands messages over late by less
 FARTHEST_M = 1e9  # no room is as large: such a place is damage
 
 _READ = ("TELEMETRY", "POSE", "DRIVE", "RUN", "DETECTION")
@@ -247,11 +249,11 @@ def _decode_robot(
 
 
 def _undamaged(messages: np.ndarray, channel: str, warnings: list[str]) -> np.ndarray:
-    """Without the few whose stamp or kind is none that its channel has, as after a flipped bit."""
-    t_s = messages["utime_us"].astype(float) / 1e6
-    first_s, last_s = np.quantile(t_s, (FEW_BROKEN, 1 - FEW_BROKEN))
-    far_s = last_s - first_s + FAR_S
-    strange = (t_s < first_s - far_s) | (t_s > last_s + far_s)
+    """Without the few whose stamp or kind is none that its channel has, as after a flipped bit.
+
+    One stamp that is minutes early would be the beginning of the log, and of all times told of it.
+    """
+    strange = _strays(messages["utime_us"].astype(float) / 1e6)
     if "kind" in messages.dtype.names:
         kinds, counts = np.unique(messages["kind"], return_counts=True)
         strange |= messages["kind"] != kinds[counts.argmax()]
@@ -260,6 +262,38 @@ def _undamaged(messages: np.ndarray, channel: str, warnings: list[str]) -> np.nd
         return messages
     warnings.append(broken(channel, count, len(messages)))
     return messages[~strange]
+
+
+def _strays(t_s: np.ndarray) -> np.ndarray:
+    """(K,) bool of stamps in file order: far beside all others, or far from their place among them.
+
+    Args:
+        t_s: (K,) stamps.
+    """
+    spared = most_broken(len(t_s))
+    first_s, last_s = np.sort(t_s)[[spared, -1 - spared]]
+    far_s = last_s - first_s + FAR_S
+    far = (t_s < first_s - far_s) | (t_s > last_s + far_s)
+    if (np.diff(t_s) >= -LATE_S).all():
+        return far
+    ordered = _longest_ascent(t_s)
+    before_s = np.maximum.accumulate(np.where(ordered, t_s, -np.inf))
+    after_s = np.minimum.accumulate(np.where(ordered, t_s, np.inf)[::-1])[::-1]
+    return far | (t_s < before_s - LATE_S) | (t_s > after_s + LATE_S)
+
+
+def _longest_ascent(values: np.ndarray) -> np.ndarray:
+    """(K,) bool, the most that can be kept in their order so that none is below one before it."""
+    ends: list[float] = []  # the lowest end of an ascent of each length
+    lengths = np.empty(len(values), int)
+    for k, value in enumerate(values.tolist()):
+        lengths[k] = bisect_right(ends, value)
+        ends[lengths[k] : lengths[k] + 1] = [value]
+    kept, length, above = np.zeros(len(values), bool), len(ends) - 1, np.inf
+    for k in range(len(values) - 1, -1, -1):
+        if lengths[k] == length and values[k] <= above:
+            kept[k], length, above = True, length - 1, values[k]
+    return kept
 
 
 def _in_order(messages: np.ndarray, channel: str, robot_id: int, warnings: list[str]) -> np.ndarray:
@@ -360,6 +394,7 @@ def _detection_series(
         return {}
     channel = f"R{robot_id:02d}_DETECTION"
     messages = decode(payloads, turbopi.detection_t, channel, warnings)
+    messages = _undamaged(messages, channel, warnings)
     messages = _in_order(messages, channel, robot_id, warnings)
     return {"seen_t_s": _seconds(messages, t0_us), "seen": messages["seen"] != 0}
 

@@ -3,6 +3,7 @@
 
 import errno
 import os
+import tempfile
 import time
 from bisect import bisect_right
 from pathlib import Path
@@ -10,27 +11,30 @@ from types import TracebackType
 
 import lcm
 
-
-def partial_of(path: Path) -> Path:
-    """Where a log is kept while it is not closed."""
-    return path.with_name(path.name + ".partial")
+from twinmill.files import put_in_place
 
 
 class Recorder:
     """A log that stands under its name only once it is closed: written beside it, then renamed.
 
+    What a killed recording leaves, `<name>.<letters>.partial`, can be read.
+
     Attributes:
         failed: why no more are, such as "No space left on device"; empty if all are.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, force: bool):
         """Opens the log.
 
         Args:
-            path: replaced if it exists, as what is there of one that was not closed.
+            path: of the log.
+            force: replace one that has come to be there.
         """
-        self._path = path
-        self._partial = partial_of(path)
+        self._path, self._force = path, force
+        handle, name = tempfile.mkstemp(".partial", f"{path.name}.", path.parent)
+        os.fchmod(handle, 0o644)
+        os.close(handle)
+        self._partial = Path(name)
         self._log = lcm.EventLog(str(self._partial), "w", overwrite=True)
         self._ends_bytes = [0]  # of whole events
         self.failed = ""
@@ -48,7 +52,7 @@ class Recorder:
         self._log.close()
         if kind is None or not issubclass(kind, ValueError):
             self._keep_whole_events()
-            self._partial.rename(self._path)
+            put_in_place(self._partial, self._path, self._force)
         else:
             self._partial.unlink()
 

@@ -82,6 +82,7 @@ def explain(
     progress: Callable[[str], None] = lambda _: None,
     formula: bool = True,
     stoppable: bool = False,
+    force: bool = True,
 ) -> Explanation:
     """Adds what helps on left-out data until nothing more does, and writes the model.
 
@@ -93,6 +94,7 @@ def explain(
         progress: told in words what is being done.
         formula: one that is proven for what no effect explains goes into the model as well.
         stoppable: see `diagnose`; the model then has what was found until then, as it was found.
+        force: replace a file that has come to be there.
 
     Raises:
         LogError: no measurement can be judged.
@@ -103,7 +105,9 @@ def explain(
         try:
             diagnosis = _with_stale_lag(diagnosis)
             fit, beyond = _whole(diagnosis, formula)
-            return _written(diagnosis, model_file, fit, beyond, out=out, command=command)
+            return _written(
+                diagnosis, model_file, fit, beyond, out=out, command=command, force=force
+            )
         except KeyboardInterrupt:
             if not stoppable:
                 raise
@@ -111,7 +115,7 @@ def explain(
     if not (diagnosis.found or diagnosis.robots_off):
         return Explanation(diagnosis, diagnosis.before, [], None)
     fit = diagnosis.search.last.fit
-    return _written(diagnosis, model_file, fit, None, out=out, command=command)
+    return _written(diagnosis, model_file, fit, None, out=out, command=command, force=force)
 
 
 def _with_stale_lag(diagnosis: Diagnosis) -> Diagnosis:
@@ -150,6 +154,7 @@ def _written(
     *,
     out: Path,
     command: str,
+    force: bool,
 ) -> Explanation:
     """Writes the model last of all: Ctrl-C before leaves no file of which nothing is said."""
     model = _with_found(diagnosis, model_file, beyond)
@@ -175,7 +180,7 @@ def _written(
     )
     child = child_of(model_file, told, Path(out), command)
     after = comparison(child, [o.with_model(child.model) for o in diagnosis.opened])
-    child.write()
+    child.write(force)
     return Explanation(diagnosis, after, estimates, child.path, beyond)
 
 

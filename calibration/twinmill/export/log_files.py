@@ -16,7 +16,7 @@ from twinmill.export.recording import Recording, read_recording
 from twinmill.export.rosbag2_file import left_out, write_rosbag2
 from twinmill.export.script import BAG_FILES
 from twinmill.export.tables import tables_of, write_csv, write_parquet
-from twinmill.files import folder_beside, replacing, replacing_folder
+from twinmill.files import check_absent, folder_beside, put_in_place, replacing, replacing_folder
 from twinmill.model.outlines import Body
 
 
@@ -100,13 +100,16 @@ def _write_tables(
     """One file per table: all are there in the end, or none is new."""
     tables = tables_of(recording, provenance)
     write: Callable[[pa.Table, Path], None] = write_csv if to is LogFormat.CSV else write_parquet
-    if folder.exists() and not force:
-        raise ValueError(f"{folder}: exists; choose another name, or replace it with --force.")
+    check_absent(folder, force)
     files = [folder / f"{name}.{to}" for name in tables]
     with folder_beside(folder) as temporary:
+        whole = temporary / folder.name
+        whole.mkdir()
         for table, file in zip(tables.values(), files, strict=True):
-            write(table, temporary / file.name)
-        folder.mkdir(exist_ok=True)
-        for file in files:
-            os.replace(temporary / file.name, file)
+            write(table, whole / file.name)
+        if force and folder.is_dir():
+            for file in files:
+                os.replace(whole / file.name, file)
+        else:
+            put_in_place(whole, folder, force)
     return files

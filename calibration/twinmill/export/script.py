@@ -107,4 +107,4 @@ def write_publisher(
     text = template.substitute(
         command=said, rows="\n".join(rows), end_s=f"{script.end_s:.6g}", period_s=f"{PERIOD_S:g}"
     )
-    write_whole(out, text)
+    write_whole(out, text, force)

@@ -134,6 +134,7 @@ def add(
     texts: dict[str, str] | None = None,
     held: Collection[str] = (),
     robot_id: int | None = None,
+    force: bool = True,
 ) -> AddResult:
     """Adds an effect and writes the new model.
 
@@ -147,6 +148,7 @@ def add(
         held: names of quantities that keep their values; beside an effect of the camera all of the
             motion do.
         robot_id: of the robot that alone has it; by default all have.
+        force: replace a file that has come to be there.
 
     Raises:
         ValueError: no such effect, it is made for another drive, or a text makes no sense; of the
@@ -157,7 +159,9 @@ def add(
     if is_of_camera(effect):
         if robot_id is not None:
             raise ValueError(f"{effect}: is of the camera, and is added to all robots alike.")
-        return _add_to_camera(effect, measurements, model_file, out, command=command, held=held)
+        return _add_to_camera(
+            effect, measurements, model_file, out, command=command, held=held, force=force
+        )
     richer, name, fresh = with_effect(model_file.model, effect, texts or {}, robot_id)
     opened = open_measurements(measurements, model_file)
     logs = {m.log_name: m.log_sha256 for m in measurements}
@@ -197,6 +201,7 @@ def add(
         ),
         out,
         command,
+        force=force,
     )
     estimates += own
     return AddResult(name, before.model_name, before, after, estimates, *held, Path(out), robot_id)
@@ -210,6 +215,7 @@ def _add_to_camera(
     *,
     command: str,
     held: Collection[str],
+    force: bool,
 ) -> AddResult:
     if effect in model_file.model.effects:
         raise ValueError(
@@ -234,7 +240,7 @@ def _add_to_camera(
     before, after = (compare_detections(cameras, m) for m in (model, fitted_model))
     logs = {m.log_name: m.log_sha256 for m in measurements}
     child = Fitted(fitted_model, found.estimates, logs, before.score, after.score)
-    write_child(model_file, child, out, command)
+    write_child(model_file, child, out, command, force=force)
     name = model_file.path.name
     return AddResult(effect, name, before, after, found.estimates, *heldout, Path(out))
 

@@ -264,6 +264,7 @@ def _warnings(measurements: Sequence[Measurement | SteadyTable]) -> list[str]:
     found = []
     for (log, words), labels in said.items():
         of_all = len(labels) == robots[log] > 1
+        words = words.removeprefix(f"{log}: ")  # of the file itself, which the label names
         found += [f"{log}: {words}"] if of_all else [f"{label}: {words}" for label in labels]
     return found
 

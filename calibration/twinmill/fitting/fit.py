@@ -137,6 +137,7 @@ def fit(
     command: str,
     *,
     held: Collection[str] = (),
+    force: bool = True,
 ) -> FitResult:
     """Fits all free quantities of the model to all measurements and writes the new model.
 
@@ -146,6 +147,7 @@ def fit(
         out: the new model file.
         command: recorded in it.
         held: names of quantities that keep their values.
+        force: replace a file that has come to be there.
 
     Raises:
         LogError: no measurement can be judged.
@@ -174,6 +176,7 @@ def fit(
         ),
         out,
         command,
+        force=force,
     )
     heldout = HeldOut.of(found)
     few = of_few_commands(judged(opened))

@@ -51,13 +51,13 @@ class ModelFile:
         except (ValueError, OSError) as error:
             raise ModelError(str(error)) from error
 
-    def write(self) -> None:
-        """Writes its file, whole or not at all.
+    def write(self, force: bool = True) -> None:
+        """Writes its file, whole or not at all; `force` replaces one that is there.
 
         Raises:
             ModelError: it cannot be written.
         """
-        write_whole(self.path, self.text)
+        write_whole(self.path, self.text, force)
 
     @cached_property
     def _document(self) -> dict:
@@ -219,13 +219,15 @@ class Fitted:
     covariance: Covariance | None = None
 
 
-def write_child(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> None:
-    """Writes the fitted model to a new file: whole or not at all.
+def write_child(
+    parent: ModelFile, fitted: Fitted, path: Path, command: str, *, force: bool = True
+) -> None:
+    """Writes the fitted model to a new file: whole or not at all; `force` replaces one.
 
     Raises:
         ModelError: the file cannot be written.
     """
-    child_of(parent, fitted, path, command).write()
+    child_of(parent, fitted, path, command).write(force)
 
 
 def child_of(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> ModelFile:
@@ -267,14 +269,14 @@ def child_of(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> Mod
     return ModelFile(Path(path), text, native.Model.from_toml(text, str(path)))
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Writes a file through a temporary one beside it.
+def write_whole(path: Path, text: str, force: bool = True) -> None:
+    """Writes a file through a temporary one beside it; `force` replaces one that is there.
 
     Raises:
         ModelError: the folder does not exist or cannot be written.
     """
     try:
-        with replacing(path, force=True) as temporary:
+        with replacing(path, force) as temporary:
             temporary.write_text(text)
     except ValueError as error:
         raise ModelError(str(error)) from error

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from markupsafe import Markup, escape
 
-from twinmill.files import REPORT, check_report
+from twinmill.files import REPORT, check_report, made_folder
 from twinmill.model.model_file import write_whole
 from twinmill.report.tables import Table, Tone
 
@@ -97,9 +97,9 @@ def write_report(
         ValueError: it cannot be written, or what is there is no report.
     """
     check_report(Path(folder))
-    Path(folder).mkdir(parents=True, exist_ok=True)
     path = Path(folder) / "index.html"
-    write_whole(path, render_page(title, source, sections, note))
+    with made_folder(Path(folder)):
+        write_whole(path, render_page(title, source, sections, note))
     return path
 
 

@@ -7,7 +7,7 @@ operator's signature for each robot and its session. Who is believed what: firmw
 
 import secrets
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,6 +21,7 @@ ALL = -1
 FIND_S = 1.0  # robots that speak 30 times a second are found, though half of it is lost
 # Before the common instant: time to call a start off that not all have acknowledged.
 CALL_OFF_S = 0.3
+TELL_S = 0.3  # most robots have signed by then; a person waits in silence no longer
 STOP_LEAST_S = 1.0  # a stop is said for so long at least, for robots not heard of yet
 VERBS = turbopi.swarm_command_t
 SIGNED_VERBS = turbopi.signed_command_t
@@ -150,7 +151,12 @@ def arm(fleet: Fleet, robots: set[int], timeout_s: float = 5.0) -> list[Answer]:
 
 
 def stop(
-    fleet: Fleet, robots: set[int], timeout_s: float = 10.0, hosts: Sequence[str] = ()
+    fleet: Fleet,
+    robots: set[int],
+    timeout_s: float = 10.0,
+    hosts: Sequence[str] = (),
+    *,
+    waiting: Callable[[set[int]], None] = lambda _: None,
 ) -> list[Answer]:
     """Says stop until all robots have signed that they stand.
 
@@ -162,6 +168,8 @@ def stop(
         robots: whom to stop; empty: all that are, or come to be, there.
         timeout_s: gives up after.
         hosts: machines to be told besides.
+        waiting: told once, soon after stop was first said, which of the robots that were asked or
+            heard have not signed; it must not block.
 
     Returns:
         What each answered.
@@ -173,18 +181,24 @@ def stop(
     fleet.held -= robots or set(fleet.held)
     begin_s = time.monotonic()
     error: OSError | None = None
-    was_said = False
+    was_said = was_told = False
+
+    def open_robots() -> set[int]:
+        return {
+            i
+            for i in robots or set(fleet.robots)
+            if not ((robot := fleet.robots.get(i)) and _says_that_it_stands(robot, command.seq))
+        }
 
     def stopped() -> bool:
-        asked = robots or set(fleet.robots)
-        return bool(asked) and all(
-            (robot := fleet.robots.get(i)) and _says_that_it_stands(robot, command.seq)
-            for i in asked
-        )
+        return bool(robots or fleet.robots) and not open_robots()
 
     while (passed_s := time.monotonic() - begin_s) < timeout_s:
         if stopped() and (robots or passed_s > STOP_LEAST_S):
             break
+        if passed_s > TELL_S and not (was_told or stopped()):
+            was_told = True
+            waiting(open_robots())
         try:
             for command.robot_id in sorted(robots or {ALL}):
                 fleet.send(command)

@@ -15,6 +15,7 @@ from twinmill.swarm.axes import QUANTITIES, Axis, set_speeds
 from twinmill.swarm.model_text import with_values
 
 MAX_ROBOTS = 1000
+LEAST_SPREAD_M = 0.01  # as of twin_run
 # Agent-steps in one part: about a second's work. The batched kernel is a hundred times faster, and
 # in MuJoCo a world of two minutes is a part.
 PART_BATCHED, PART_FULL, PART_MUJOCO = 50_000_000, 1_000_000, 5_000
@@ -101,8 +102,7 @@ class Request:
         The ring is of the most frequent species, of equally many the first. Where a mix is given
         and `n` differs from its sum, the first species takes up the rest.
         """
-        mixed = ":" in self.behavior
-        robots = native.species(self.behavior, None if mixed else n, self.tables)
+        robots = native.species(self.behavior, None, self.tables)
         counts, rows = Counter(name for name, _ in robots), dict(robots)
         first = robots[0][0]
         wanted = len(robots) if n is None else n
@@ -124,6 +124,8 @@ class Request:
         at = self._at(point)
         tables, ring = self.species(int(at["n"]) if "n" in at else self.n)
         spread_m = at.get("spread_m", self.spread_m)
+        if spread_m < LEAST_SPREAD_M:
+            raise ValueError(f"spread_m = {spread_m:g} m: must be {LEAST_SPREAD_M} m or more.")
         return native.Cell(self.cell_model(point), tables, ring, self.start, spread_m)
 
     def cell_model(self, point: tuple[float, ...]) -> native.Model:

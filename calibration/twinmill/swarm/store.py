@@ -2,7 +2,6 @@
 """A sweep's folder: parts while it runs, one Parquet file when it is done."""
 
 import json
-import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from twinmill.files import replacing
 from twinmill.swarm.request import Request
 
 
@@ -45,9 +45,11 @@ class Store:
                 )
         elif self.folder.exists() and any(self.folder.iterdir()):
             raise ValueError(f"{self.folder}: is not empty and holds no sweep; choose another.")
-        self._part(0).parent.mkdir(parents=True, exist_ok=True)
+        self.folder.mkdir(parents=True, exist_ok=True)
         manifest = {"sha256": request.sha256, "request": json.loads(request.to_json())}
-        self._replace(self._manifest, json.dumps(manifest, indent=1, sort_keys=True).encode())
+        with replacing(self._manifest, force=True) as fresh:
+            fresh.write_text(json.dumps(manifest, indent=1, sort_keys=True))
+        self._part(0).parent.mkdir(exist_ok=True)  # not before the folder says what it is for
 
     def read_manifest(self) -> dict:
         """What the folder was made for: the `request`, and its `sha256`."""
@@ -70,19 +72,8 @@ class Store:
 
     @staticmethod
     def _write(path: Path, table: pa.Table) -> None:
-        fresh = path.with_suffix(".tmp")
-        try:
+        with replacing(path, force=True) as fresh:
             pq.write_table(table, fresh, compression="zstd")
-        except OSError as error:  # Arrow's names no file
-            fresh.unlink(missing_ok=True)
-            raise OSError(error.errno, os.strerror(error.errno or 0), str(path)) from error
-        os.replace(fresh, path)
-
-    @staticmethod
-    def _replace(path: Path, data: bytes) -> None:
-        fresh = path.with_suffix(".tmp")
-        fresh.write_bytes(data)
-        os.replace(fresh, path)
 
 
 def read_sweep(folder: Path) -> tuple[Request, pa.Table]:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
-from twinmill.files import check_new_folder
+from twinmill.files import alone_in, check_new_folder, made_folder
 from twinmill.model.model_file import ModelFile
 from twinmill.swarm.axes import parse_axis
 from twinmill.swarm.request import PLANTS, Request
@@ -107,16 +107,17 @@ def run_missing(
         How many parts were kept before.
     """
     store = Store(folder)
-    store.open(request)
-    parts = request.parts()
-    todo = {} if store.result.exists() else {k: parts[k] for k in store.missing(len(parts))}
-    tell(request.world_count - sum(map(len, todo.values())))
-    run = run_on_dask(request, todo, dask) if dask else run_here(request, todo, workers)
-    for number, columns in run:
-        store.keep(number, columns)
-        tell(len(parts[number]))
-    if not store.result.exists():
-        store.finish(request, len(parts))
+    with made_folder(folder), alone_in(folder):
+        store.open(request)
+        parts = request.parts()
+        todo = {} if store.result.exists() else {k: parts[k] for k in store.missing(len(parts))}
+        tell(request.world_count - sum(map(len, todo.values())))
+        run = run_on_dask(request, todo, dask) if dask else run_here(request, todo, workers)
+        for number, columns in run:
+            store.keep(number, columns)
+            tell(len(parts[number]))
+        if not store.result.exists():
+            store.finish(request, len(parts))
     return len(parts) - len(todo)
 
 

@@ -115,7 +115,7 @@ def _written(plan: dict, path: str) -> None:
     path = (path or "").strip() or "script.csv"
     try:
         check_free(Path(path))
-        with replacing(Path(path), force=False) as temporary:
+        with replacing(Path(path), force=None) as temporary:
             temporary.write_text(plan["script"])
     except ValueError as error:
         ui.notify(str(error), type="negative")

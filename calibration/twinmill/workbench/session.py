@@ -384,7 +384,7 @@ class Session:
         if self.tree.current.number == 0:
             raise ModelError(f"{self.tree.name}: is the model as given; there is nothing to save.")
         commands, text = self.tree.written(self.tree.current.number, str(path))
-        with replacing(path, force=False) as temporary:
+        with replacing(path, force=None) as temporary:
             temporary.write_text(text)
         return commands
 

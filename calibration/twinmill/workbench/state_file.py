@@ -10,6 +10,8 @@ from typing import Any, TextIO
 
 from twinmill.files import replacing
 
+MARK = {"session_of": "twinmill open"}  # in every file that we wrote
+
 
 def state_path(name: str, key: str) -> Path:
     """Where a session is kept unless the user says: by the name of its log and its key."""
@@ -32,21 +34,12 @@ class StateFile:
         try:
             path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             self._lock = _locked(path)
-            text = path.read_text() if path.exists() else "{}"
+            kept = path.read_bytes() if path.exists() else None
         except OSError as error:
             raise ValueError(
                 f"{path}: cannot be used ({error.strerror}); name another file with --state."
             ) from error
-        try:
-            self._data = json.loads(text)
-        except ValueError as error:
-            raise ValueError(
-                f"{path}: holds no session of the workbench; name another file with --state, or "
-                "remove it."
-            ) from error
-        if not isinstance(self._data, dict):
-            raise ValueError(f"{path}: holds no session of the workbench; remove it.")
-        self._data.setdefault("token", secrets.token_urlsafe(16))
+        self._data = {"token": secrets.token_urlsafe(16)} if kept is None else _session(path, kept)
         self.write(json.dumps(self._data))
 
     def close(self) -> None:
@@ -69,7 +62,21 @@ class StateFile:
             ValueError: it cannot be written.
         """
         with replacing(self.path, force=True, mode=0o600) as temporary:
-            temporary.write_text(json.dumps({"token": self.token, **json.loads(text)}))
+            temporary.write_text(json.dumps({**MARK, "token": self.token, **json.loads(text)}))
+
+
+def _session(path: Path, kept: bytes) -> dict[str, Any]:
+    """What the file holds, which is replaced: so it has to be ours."""
+    try:
+        data = json.loads(kept)
+    except ValueError:  # of letters that are none, too
+        data = None
+    if not isinstance(data, dict) or not MARK.items() <= data.items() or "token" not in data:
+        raise ValueError(
+            f"{path}: holds no session of the workbench, and is left as it is; name another file "
+            "with --state."
+        )
+    return data
 
 
 def _locked(path: Path) -> TextIO:

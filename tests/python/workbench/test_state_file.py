@@ -48,3 +48,16 @@ def test_after_one_that_was_killed_the_session_goes_on(holder):
     assert state.token == json.loads(path.read_text())["token"]
     state.close()
     StateFile(path).close()
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [b'{"a": 1}', b'{"token": "of another program"}', b"{}", b"[1]", b"text", b"\xed\xa1\xda"],
+)
+def test_what_is_no_session_of_ours_is_not_replaced(tmp_path, kept):
+    """Any object of JSON had been taken for a session, and replaced by one."""
+    path = tmp_path / "state.json"
+    path.write_bytes(kept)
+    with pytest.raises(ValueError, match=rf"{path}: holds no session .* name another file"):
+        StateFile(path)
+    assert path.read_bytes() == kept

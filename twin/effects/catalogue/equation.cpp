@@ -33,11 +33,15 @@ public:
     // Takes the states of wheel k, or of axis k of the room, through a step, first all `s` and then
     // all `r`; the formula then has their means over the step.
     void Remember(double *states, int k, double dt_s);
-    double Evaluate() const { return formula_.Eval(); }
+    // Its value; where it is not finite, nothing.
+    double Evaluate() { return Finite(formula_.Eval()); }
     // Of a text with two values the one of axis k.
-    double EvaluateAlong(int k) const { return Along(formula_, k); }
+    double EvaluateAlong(int k) { return Finite(Along(formula_, k)); }
+    // It was asked, and no value was finite.
+    bool is_silent() const { return asked_ && !spoke_; }
 
 private:
+    double Finite(double value);
     static double Along(const mu::Parser &parser, int k);
     void Define(mu::Parser &parser, std::span<const char *const> names,
                 std::span<const double> parameters);
@@ -50,6 +54,7 @@ private:
     TwoStates states_{};
     mu::Parser formula_;
     std::vector<mu::Parser> rates_;
+    bool asked_ = false, spoke_ = false;
 };
 
 namespace
@@ -145,12 +150,6 @@ constexpr Name<ObservedPose> kPoseNames[] = {
     {"theta", [](const ObservedPose &p, int) { return p.theta_rad; }},
 };
 
-// A formula's value; where it is not finite, nothing.
-double Finite(double value)
-{
-    return std::isfinite(value) ? value : 0;
-}
-
 // Gives the formula what it names of wheel k, and its states the end of their step.
 template <class S>
 void Tell(std::span<const Name<S>> names, const S &s, int k, Formula &formula, double *state)
@@ -166,7 +165,7 @@ template <class S>
 double Value(std::span<const Name<S>> names, const S &s, int k, Formula &formula, double *state)
 {
     Tell(names, s, k, formula, state);
-    return Finite(formula.Evaluate());
+    return formula.Evaluate();
 }
 
 void AddToDuty(DutySignals &s, const Numbers &v, double *state)
@@ -210,7 +209,7 @@ void PushInRoom(GroundSignals &s, const Numbers &v, double *state)
     for (int axis = 0; axis < 2; ++axis)
     {
         Tell<GroundSignals>(kBodyNames, s, axis, *v.formula, state);
-        push_mps[axis] = Finite(v.formula->EvaluateAlong(axis));
+        push_mps[axis] = v.formula->EvaluateAlong(axis);
     }
     const auto [x_mps, y_mps] = push_mps;
     const double ahead = std::cos(s.theta_rad), left = std::sin(s.theta_rad);
@@ -222,7 +221,7 @@ double HeadingError(const ObservedPose &p, Formula &formula)
 {
     for (const size_t i : formula.used())
         formula[i] = kPoseNames[i].value(p, 0);
-    return Finite(formula.Evaluate());
+    return formula.Evaluate();
 }
 
 void AddToHeading(ObservedPose &p, const Numbers &v)
@@ -361,6 +360,14 @@ Formula::Formula(std::span<const char *const> names, std::span<const double> par
     }
 }
 
+double Formula::Finite(double value)
+{
+    const bool finite = std::isfinite(value);
+    asked_ = true;
+    spoke_ = spoke_ || finite;
+    return finite ? value : 0;
+}
+
 double Formula::Along(const mu::Parser &parser, int k)
 {
     int count = 0;
@@ -430,6 +437,11 @@ void Formula::Remember(double *states, int k, double dt_s)
     });
     own = both[0];
     second = both[1];
+}
+
+bool IsSilent(const Formula &formula)
+{
+    return formula.is_silent();
 }
 
 EFFECT(equation) = {

@@ -14,6 +14,7 @@ namespace twin
 namespace
 {
 
+constexpr double kFastest_mps = 1e6;     // nothing that drives comes near it
 constexpr double kDragSpeed_mps = 0.02;  // roller drag is fully there at about twice this speed
 
 int Id(const mjModel *m, mjtObj type, int robot, const char *name)
@@ -181,6 +182,7 @@ void MujocoPlant::Drive(Member &member, double dt_s)
     const double t_s = data_->time;
     const WheelMotion motion = member.chain.DriveWheels(member.command, t_s, dt_s, memory);
     const Twist wanted = member.chain.BodyTwist(motion, t_s, dt_s, memory, &member.random);
+    CheckBounded(member, wanted);
     const Twist rolled = kinematics_.Forward(motion);
     member.offset_mps = kinematics_
                             .Inverse({wanted.vx_mps - rolled.vx_mps, wanted.vy_mps - rolled.vy_mps,
@@ -232,6 +234,20 @@ void MujocoPlant::Sense(Member &member) const
     for (size_t k = 0; k < member.wheels.size(); ++k)
         state.rim_mps[k] =
             data_->qvel[member.wheels[k].dof] * wheel_radius_m_ - member.offset_mps[k];
+}
+
+// Wheels that slip would drive on, however fast they are told to turn; NaN compares false.
+void MujocoPlant::CheckBounded(const Member &member, const Twist &wanted) const
+{
+    const double fastest_mps =
+        std::max({std::abs(wanted.vx_mps), std::abs(wanted.vy_mps), std::abs(wanted.omega_radps)});
+    if (fastest_mps < kFastest_mps)
+        return;
+    throw std::invalid_argument("robot " + std::to_string(&member - robots_.data()) +
+                                " is told to drive faster than anything after " +
+                                std::to_string(data_->time) +
+                                " s: the model grows without bound; correct its formulas and "
+                                "numbers");
 }
 
 void MujocoPlant::CheckStable() const

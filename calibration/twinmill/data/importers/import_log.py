@@ -38,7 +38,7 @@ from twinmill.data.importers.vicon import read_vicon
 from twinmill.data.log import Log, LogError, RobotLog, read_log
 from twinmill.data.measurement_table import Table
 from twinmill.data.track import make_track
-from twinmill.files import replacing
+from twinmill.files import check_new_file, replacing
 
 TIME_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # of which a second has so many
 SAME_LENGTH = 0.1  # share by which poses and commands of one run differ in length
@@ -145,6 +145,10 @@ def import_log(
     check_renames(
         options.rename, tables + ([detections] if detections else []), KNOWN | OF_DETECTIONS
     )
+    paths = (*poses, motive, vicon, *commands, *io_tsv, detections)
+    sources = [path for path in paths if path is not None]
+    inputs = [*sources, bag, options.mapping]
+    check_new_file(out, options.force, inputs)
     if bag:
         topics = list(options.pose_topics), list(options.command_topics)
         how = BagOptions(
@@ -177,9 +181,7 @@ def import_log(
         for series in command_series
     ]
     seen = _detections(detections, options, by_robot) if detections else []
-    paths = (*poses, motive, vicon, *commands, *io_tsv, detections)
-    sources = [path for path in paths if path is not None]
-    with replacing(out, options.force, inputs=[*sources, bag, options.mapping]) as temporary:
+    with replacing(out, options.force, inputs=inputs) as temporary:
         provenance = _provenance(sources, options)
         write_log(temporary, pose_series, command_series, config_toml=provenance, detections=seen)
         warnings = [w for series in (*pose_series, *command_series, *seen) for w in series.warnings]

@@ -49,7 +49,7 @@ from twinmill.terminal import progress_bar
 
 WIDTH = 4  # wheels; velocity commands have a zero in the last place
 LONGEST_REASON = 200  # letters of what the library says
-LOOKED_AT = 5000  # messages of tf, to see which frames there are
+LOOKED_AT = 5000  # messages of tf, to see which frames there are; of more, counts are estimates
 STEP_BACK_S = 1.0  # messages are never exchanged by that much: a clock was set
 CLOCK_FROM_ZERO_S = 60.0  # the least stamp of a clock that began at 0, which is no missing stamp
 FULL_DUTIES = (1.0, 100.0, 255.0)
@@ -64,7 +64,8 @@ class Topic:
 
     Attributes:
         name, kind: its name and the type of its messages.
-        count: how many there are; of a fixed frame those of the frame that carries it.
+        count: how many there are, `about` if that was not counted to the end; of a fixed frame
+            those of the frame that carries it.
         role: `pose`, `command` or empty.
         fixed: whether it is a frame that never moves in its parent.
     """
@@ -74,6 +75,7 @@ class Topic:
     count: int
     role: str
     fixed: bool = False
+    about: bool = False
 
     @property
     def robot(self) -> str:
@@ -125,7 +127,12 @@ def list_topics(path: Path) -> list[Topic]:
     if not sum(counts.values()):
         raise LogError(f"{path}: has no messages; check that the recorder was subscribed.")
     topics = [Topic(name, kind, counts[name], role_of(kind)) for name, kind in kinds.items()]
-    moving = [Topic(name, kind, count, "pose") for (name, kind), count in parts.items()]
+    held = sum(counts[c.topic] for c in many)
+    scale, about = max(1.0, held / LOOKED_AT), held > LOOKED_AT
+    moving = [
+        Topic(name, kind, round(scale * count), "pose", about=about)
+        for (name, kind), count in parts.items()
+    ]
     return sorted([*topics, *moving, *_carried(frames, moving)], key=lambda t: t.name)
 
 

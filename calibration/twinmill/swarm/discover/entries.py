@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import twinmill_native as native
 
+from twinmill.files import replacing
 from twinmill.model.model_file import write_whole
 from twinmill.swarm.behaviors import NAME
 from twinmill.swarm.discover.genes import Mix, decode, table_text
@@ -217,9 +218,8 @@ def write_entries(folder: Path, hunt: Hunt, found: list[Entry]) -> None:
     """archive.parquet with everything; behaviors.toml and model.toml for twin_run."""
     write_whole(folder / MODEL, hunt.request.model_text)
     rows = [entry.to_json() for entry in found]
-    fresh = folder / "archive.tmp"
-    pq.write_table(pa.Table.from_pylist(rows), fresh, compression="zstd")
-    fresh.replace(folder / "archive.parquet")
+    with replacing(folder / "archive.parquet", force=True) as fresh:
+        pq.write_table(pa.Table.from_pylist(rows), fresh, compression="zstd")
     lines = ["# Found by twinmill discover: speed and turn for nothing seen, then for seen."]
     for entry in filter(lambda entry: entry.name, found):
         lines += [f'{name} = "{table_text(row)}"' for name, row in entry.mix.tables(entry.name)]

@@ -6,7 +6,6 @@ Fontaine et al. 2020 (arXiv 1912.02400) and Mouret and Clune 2015 (arXiv 1504.04
 
 import hashlib
 import json
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
@@ -21,6 +20,7 @@ from ribs.emitters import EvolutionStrategyEmitter, GaussianEmitter
 from ribs.schedulers import Scheduler
 
 from twinmill.defaults import BATCH, PER_GENERATION
+from twinmill.files import alone_in, made_folder, replacing
 from twinmill.model.model_file import write_whole
 from twinmill.programs import available_cores
 from twinmill.swarm.discover.genes import GENES, Mix, decode
@@ -126,9 +126,9 @@ class GenerationStore:
                 )
         elif folder.exists() and any(folder.iterdir()):
             raise ValueError(f"{folder}: is not empty and holds no search; choose another --out.")
-        self._parts.mkdir(parents=True, exist_ok=True)
         text = json.dumps({"sha256": hunt.sha256, "hunt": asdict(hunt)}, indent=1, sort_keys=True)
         write_whole(manifest, text)
+        self._parts.mkdir(exist_ok=True)
 
     def rows(self, generation: int, genes: np.ndarray, run: Callable[[], np.ndarray]) -> np.ndarray:
         """What was kept of these candidates, else what they do now, which is then kept."""
@@ -142,9 +142,8 @@ class GenerationStore:
                 )
         rows = run()
         columns = {name: rows[..., k].ravel() for k, name in enumerate(COLUMNS)}
-        fresh = path.with_suffix(".tmp")
-        pq.write_table(pa.table(columns).replace_schema_metadata({"genes": digest}), fresh)
-        os.replace(fresh, path)
+        with replacing(path, force=True) as fresh:
+            pq.write_table(pa.table(columns).replace_schema_metadata({"genes": digest}), fresh)
         return rows
 
 
@@ -156,8 +155,18 @@ def search(hunt: Hunt, folder: Path, generations: int, tell: Callable[[int, int]
         folder: of the generations that are kept.
         generations: in all, those that are kept included.
         tell: is given candidates tried and cells found after each.
+
+    Raises:
+        ValueError: the folder holds something else, or another search is at work in it.
     """
-    store, scheduler, kept = GenerationStore(folder, hunt), _scheduler(hunt.seed), []
+    with made_folder(folder), alone_in(folder):
+        return _searched(hunt, GenerationStore(folder, hunt), generations, tell)
+
+
+def _searched(
+    hunt: Hunt, store: GenerationStore, generations: int, tell: Callable[[int, int], None]
+) -> Elites:
+    scheduler, kept = _scheduler(hunt.seed), []
     seeds = range(hunt.request.first_seed, hunt.request.first_seed + hunt.request.seeds)
     for generation in range(generations):
         genes = scheduler.ask()

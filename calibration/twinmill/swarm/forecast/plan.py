@@ -6,7 +6,6 @@ import gzip
 import hashlib
 import io
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.log import read_log
+from twinmill.files import replacing
 from twinmill.model.model_file import write_whole
 from twinmill.swarm.forecast.draws import OUTCOMES, Forecast
 from twinmill.swarm.metrics import swarm_metrics
@@ -114,9 +114,8 @@ def write_plan(plan: Plan, folder: Path) -> str:
     folder.mkdir(parents=True, exist_ok=True)
     sealed = plan.to_bytes()
     digest = hashlib.sha256(sealed).hexdigest()
-    fresh = folder / f"{SEALED}.tmp"
-    fresh.write_bytes(sealed)
-    os.replace(fresh, folder / SEALED)
+    with replacing(folder / SEALED, force=None) as fresh:
+        fresh.write_bytes(sealed)
     write_whole(folder / MODEL, plan.request.model_text)
     write_whole(folder / STARTS, _starts(plan))
     write_whole(folder / FORM, _form(plan))

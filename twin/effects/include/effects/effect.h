@@ -25,6 +25,8 @@ namespace twin
 
 // A compiled formula, of those effects that have one.
 class Formula;
+// It was asked at steps, and had a finite value at none.
+bool IsSilent(const Formula &formula);
 
 // The numbers of one effect in one model, in the order of its parameters; per-wheel parameters
 // wheel by wheel.
@@ -140,6 +142,7 @@ public:
     const Act &act() const { return act_; }
     Numbers numbers() const { return {values_, formula_.get()}; }
     int StateSize() const { return spec_->state_size ? spec_->state_size(numbers()) : 0; }
+    bool IsSilent() const { return formula_ && twin::IsSilent(*formula_); }
     // What it does to a camera or a body; nothing if it acts elsewhere.
     void Set(DetectionModel &detection) const;
     void Set(Body &body) const;

@@ -67,6 +67,8 @@ public:
     // No effect of the ground reads where the robot is or heads, nor remembers anything: its
     // velocity in the body frame depends on its commands alone.
     bool IsHomogeneous() const { return homogeneous_; }
+    // Some formula has had no finite value so far.
+    bool IsSilent() const;
     // Some effect on the ground has a state.
     bool RemembersOnGround() const { return remembers_on_ground_; }
 

@@ -54,6 +54,10 @@ public:
     void SetCommand(int robot, const Command &command) override;
     void Step(double dt_s) override;
     const RobotState &State(int robot) const override;
+    bool IsSilent(int robot) const override
+    {
+        return robots_[static_cast<size_t>(robot)].chain.IsSilent();
+    }
     double TimeS() const override { return t_s_; }
 
     // Puts a robot elsewhere: bodies that overlap are pushed apart.

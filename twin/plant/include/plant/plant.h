@@ -82,6 +82,9 @@ public:
     // Moves all robots forward by `dt_s`.
     virtual void Step(double dt_s) = 0;
     virtual const RobotState &State(int robot) const = 0;
+    // Some formula of the robot's model has had no finite value at any step, so that it did
+    // nothing.
+    virtual bool IsSilent(int) const { return false; }
     virtual double TimeS() const = 0;
 };
 

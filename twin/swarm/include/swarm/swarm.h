@@ -71,6 +71,8 @@ public:
     // The robots' clock.
     int64_t UtimeUs() const;
     const RobotState &State(int robot) const { return plant_->State(robot); }
+    // As Plant::IsSilent.
+    bool IsSilent(int robot) const { return plant_->IsSilent(robot); }
     // What the firmware decided last.
     const fw_output &Output(int robot) const;
     double BatteryV(int robot) const;

@@ -50,11 +50,16 @@ public:
 
     int Size() const override { return static_cast<int>(robots_.size()); }
     void SetCommand(int robot, const Command &command) override;
-    // Throws std::runtime_error if the simulation became unstable.
+    // Throws std::runtime_error if the simulation became unstable, std::invalid_argument if the
+    // model grows without bound.
     void Step(double dt_s) override;
     // `rim_mps` is what wheel encoders would read: the hinges, less what gains and ground effects
     // ask of them so that the body moves as they say.
     const RobotState &State(int robot) const override;
+    bool IsSilent(int robot) const override
+    {
+        return robots_[static_cast<size_t>(robot)].chain.IsSilent();
+    }
     double TimeS() const override { return data_->time; }
 
     // For viewers, videos and external forces.
@@ -92,6 +97,7 @@ private:
     void Drive(Member &member, double dt_s);
     void DragRollers(const Member &member);
     void Sense(Member &member) const;
+    void CheckBounded(const Member &member, const Twist &wanted) const;
     void CheckStable() const;
 
     std::unique_ptr<mjModel, ModelDeleter> model_;

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill swarm stop` where nobody answers: a person sees at once what it waits for."""
+
+import os
+import time
+
+from twinmill_cli import swarm
+
+
+def test_a_stop_that_nobody_hears_says_at_once_what_it_waits_for(monkeypatch, tmp_path, twinmill):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    begin_s, said_s = time.monotonic(), []
+    words = swarm._waiting_words
+
+    def timed(*given):
+        said_s.append(time.monotonic() - begin_s)
+        return words(*given)
+
+    monkeypatch.setattr(swarm, "_waiting_words", timed)
+    url = "udpm://239.255.76.67:7999?ttl=0"
+    code, out, _ = twinmill("swarm", "stop", "--lcm-url", url, "--timeout-s", "2")
+    assert code == 1 and len(said_s) == 1 and said_s[0] < 1.5
+    assert "No robot was heard" in out
+
+
+def test_a_word_that_nobody_reads_keeps_no_stop_waiting():
+    """A pipe that is full, as of a pager, takes nothing more."""
+    reads, writes = os.pipe()
+    os.set_blocking(writes, False)
+    full = 0
+    while full < 2**20:
+        try:
+            full += os.write(writes, b"x" * 4096)
+        except BlockingIOError:
+            break
+    os.set_blocking(writes, True)
+    kept = os.dup(2)
+    os.dup2(writes, 2)
+    try:
+        with swarm.saying_nothing() as say:
+            say("stop is said")
+    finally:
+        os.dup2(kept, 2)
+    for handle in (reads, writes, kept):
+        os.close(handle)

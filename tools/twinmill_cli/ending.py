@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How our programs end: an exit code; where they fail a sentence, and an object with --json."""
+
+import errno
+import io
+import re
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, NoReturn
+
+import typer
+
+from twinmill_cli.output import STOPPED, begin_telling, has_told, print_object
+
+QUOTED = 80  # letters of what a sentence quotes
+OF_TABLES = ("import", "track", "track-calibrate", "track-check", "characterise")  # judge no log
+
+
+def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> NoReturn:
+    """Runs a program's command line and leaves with its exit code.
+
+    Args:
+        program: its name.
+        run: does what the words of the command line say; returns an exit code, if an int.
+        stopped: what to say after Ctrl-C.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a degree sign in ASCII is no reason to fail
+    begin_telling()
+    words = sys.argv[1:] or ["--help"]
+    try:
+        result = run(words)
+        code = result if isinstance(result, int) else 0
+    except KeyboardInterrupt:  # before the command, or after it
+        code = STOPPED
+    except (typer.TyperException, ModuleNotFoundError, OSError, ValueError) as error:
+        code, sentence = _told(error)
+        if sentence:
+            print(f"{program}: {sentence}", file=sys.stderr)
+            _print_failure(sentence, error, words)
+    if code == STOPPED and stopped:
+        print(f"{program}: {stopped}", file=sys.stderr)
+    sys.exit(code)
+
+
+def _told(error: Exception) -> tuple[int, str]:
+    """Exit code and sentence; this is empty where help was printed instead."""
+    if isinstance(error, typer.TyperException):
+        sentence, code = error.format_message(), error.exit_code
+        more = " (--help lists what can be given)" if sentence and code == 2 else ""
+        return code, _short(sentence + more)
+    if isinstance(error, ModuleNotFoundError):  # `make demo` installs a part
+        if (error.name or "twinmill").startswith("twinmill"):
+            raise error
+        return 1, f"the Python package of '{error.name}' is not installed; `make build` does that."
+    if isinstance(error, OSError) and error.filename:
+        return 1, _short(f"{error.filename}: {error.strerror}.")
+    if isinstance(error, OSError) and error.errno == errno.ENOSPC:
+        return 1, "no space is left where the output goes; make room, then do it again."
+    return 1, _short(str(error))
+
+
+def _short(sentence: str) -> str:
+    long = rf"(?<=[\s(=])'([^\s'][^']{{{QUOTED}}})[^']+'"  # an apostrophe stands behind a letter
+    return re.sub(long, r"'\1...'", " ".join(sentence.split()))
+
+
+def _print_failure(sentence: str, error: Exception, words: list[str]) -> None:
+    """The object of a command that failed before it had printed one."""
+    if "--json" not in words or has_told():
+        return
+    findings = [] if words[0] in OF_TABLES else _findings(error)
+    with suppress(OSError):  # stdout itself may be what failed
+        print_object({"verdict": "bad_input", "sentence": sentence, "input": findings})
+
+
+def _findings(error: Exception) -> list[dict]:
+    """What is wrong with a log that cannot be judged; empty for other errors."""
+    reading = sys.modules.get("twinmill.data.measurement")
+    if reading and isinstance(error, reading.LogError):
+        return [finding.to_json() for finding in reading.findings_of(error)]
+    return []
