@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isnan
 
 import twinmill_native as native
 from rich.console import Group, RenderableType
@@ -10,6 +11,7 @@ from rich.text import Text
 
 from twinmill.data.checks.settings import CHECKS
 from twinmill.diagnosis.explain import Explanation
+from twinmill.diagnosis.moments import did
 from twinmill.diagnosis.outliers import Outlier, in_words
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.settings import SETTINGS
@@ -198,17 +200,18 @@ def moments(diagnosis: Diagnosis) -> Table:
         [
             Cell(f"{m.log} R{m.robot_id:02d}"),
             Cell(f"{m.t_s:.1f}"),
-            Cell(f"{100 * m.way:.0f} %"),
+            Cell("-" if isnan(m.way) else f"{100 * m.way:.0f} %"),
+            Cell(did(m.what, m.way).removeprefix("it ")),
         ]
         for m in diagnosis.rest.moments
     ]
     return Table(
         "Single moments",
-        ["log", "time\ns", "of the\nway"],
+        ["log", "begins\ns", "of the\nway", "it"],
         rows,
-        "At these a robot did not do in the next half second what was predicted; of the way: how "
-        "much of the predicted way it went. About 100 %: it went elsewhere, or turned.",
-        words=(0,),
+        "From these on a robot did not do what was predicted; of the way: how much of the "
+        "predicted way it went in the half second that was farthest off; negative: backwards.",
+        words=(0, 3),
     )
 
 

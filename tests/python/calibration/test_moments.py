@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Single moments are told when they begin, and by what the robot did within them."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from twinmill.diagnosis.moments import Moment, _begin_s, _done, sentence
+from twinmill.predict.windows import EVERY_S, HORIZONS_S
+
+SPEED_MPS, NOISE_M = 0.2, 3e-4
+BEGINS_S, LASTS_S = 20.1, 0.8
+
+
+def log_of(event_mps: tuple[float, float]) -> SimpleNamespace:
+    """A minute of a robot told to go ahead, which for a while goes otherwise."""
+    random = np.random.default_rng(1)
+    start_s = np.arange(0.0, 58.0, EVERY_S)
+    end_s = start_s[:, None] + np.array(HORIZONS_S)
+    until_s = BEGINS_S + LASTS_S
+    within = np.clip(end_s, BEGINS_S, until_s) - np.clip(start_s, BEGINS_S, until_s)[:, None]
+    predicted = np.zeros((*end_s.shape, 3))
+    predicted[..., 0] = SPEED_MPS * (end_s - start_s[:, None])
+    off_mps = np.array([event_mps[0] - SPEED_MPS, event_mps[1], 0.0])
+    errors = within[..., None] * off_mps + random.normal(0, NOISE_M, predicted.shape)
+    floor = np.full((len(HORIZONS_S), 3), NOISE_M)
+    data = SimpleNamespace(start_s=start_s, measured=predicted + errors, floor=floor)
+    return SimpleNamespace(data=data, errors=errors, sees=np.flatnonzero(within.any(axis=1)))
+
+
+@pytest.mark.parametrize(
+    ("event_mps", "way", "what"),
+    [
+        ((0.0, 0.0), 0.0, "less"),
+        ((-0.2, 0.0), -1.0, "back"),
+        ((0.3, 0.0), 1.5, "more"),
+        ((0.2, 0.15), 1.0, "elsewhere"),
+        ((0.1, 0.2), 0.5, "elsewhere"),
+    ],
+)
+def test_a_moment_is_told_by_what_happens_within_it(event_mps, way, what):
+    """The half second within an event shows it; those that only see its end hardly do."""
+    own = log_of(event_mps)
+    begin_s = _begin_s(own.data, own.errors, own.sees)
+    assert begin_s == pytest.approx(BEGINS_S, abs=HORIZONS_S[1] / 2 + 0.01)
+    told_way, told = _done(own.data, own.errors, own.sees)
+    assert told_way == pytest.approx(way, abs=0.05) and told == what
+
+
+def test_where_a_robot_is_told_to_stand_no_share_of_its_way_is_told():
+    own = log_of((0.0, 0.0))
+    data = own.data
+    stands = (data.start_s > 15) & (data.start_s < 25)
+    data.measured[stands], own.errors[stands] = 0.0, 0.0
+    moves = stands & (data.start_s > 19.9) & (data.start_s < 20.7)
+    data.measured[moves, :, 0] = own.errors[moves, :, 0] = 0.05
+    way, what = _done(data, own.errors, np.flatnonzero(moves))
+    assert np.isnan(way) and what == "unasked"
+
+
+@pytest.mark.parametrize(
+    ("done", "words"),
+    [
+        ([(0.0, "less")] * 3, "it went 0 % of the predicted way"),
+        ([(-1.0, "back")] * 2 + [(0.5, "less")], "it drove backwards, 100 % of the predicted way"),
+        ([(1.0, "elsewhere")] * 3, "it went elsewhere, or turned"),
+        ([(0.1, "less"), (-1.0, "back"), (2.0, "more")], "it did something else each time"),
+    ],
+)
+def test_the_sentence_says_what_most_moments_have_in_common(done, words):
+    told = sentence([Moment("run", 1, 8.0 * k, way, what) for k, (way, what) in enumerate(done)])
+    assert words in told
