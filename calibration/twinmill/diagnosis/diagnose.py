@@ -9,6 +9,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
+from twinmill.diagnosis import moments
 from twinmill.diagnosis.cameras import with_detections
 from twinmill.diagnosis.doubts import (
     acted_on,
@@ -16,6 +17,7 @@ from twinmill.diagnosis.doubts import (
     beside_stale,
     of_another_form,
     of_many,
+    undetermined,
     undone,
     within_the_table,
 )
@@ -318,7 +320,7 @@ def _concluded(
     few = few_commands_notes(known)
     if few:
         findings = beside_stale(findings)
-    findings = without.doubted(undone(findings, last))
+    findings = without.doubted(undone(undetermined(findings), last))
     in_doubt = _doubted(findings, less, known)
     whole = [_with_all_starts(o, opened) for o in known]
     models = zip(whole, last.state.models, strict=True)
@@ -374,6 +376,7 @@ def _concluded(
     drives = drives_for(faint_names, _shown(done, faint), first.model.wheel_kind)
     same_clock = all(o.same_clock for o in known if o.floor)
     late = lateness(done, findings, same_clock)
+    to_look_at = moments.to_look_at(rest.moments)
     return Diagnosis(
         verdict=weighed.verdict,
         sentence=weighed.sentence,
@@ -397,8 +400,11 @@ def _concluded(
             *marker_notes(modelled),
             *few,
             *weighed.notes,
+            *([f"{to_look_at[0].upper()}{to_look_at[1:]}."] if to_look_at else []),
         ],
-        next_experiment=_next(findings, drives, faint, weighed.verdict, same_clock=same_clock),
+        next_experiment=_after_a_look(
+            _next(findings, drives, faint, weighed.verdict, same_clock=same_clock), to_look_at
+        ),
         robots_off=tuple(off),
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
         base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),
@@ -506,6 +512,13 @@ def drives_for(
     every = set().union(*asked.values())
     words = ", ".join(words for t, words in DRIVES.items() if t in every)
     return words, [name for name, drives in asked.items() if drives]
+
+
+def _after_a_look(drive: dict | None, look: str) -> dict | None:
+    """The next drive, once what is to be looked at first was."""
+    if not drive or not look:
+        return drive
+    return {**drive, "why": f"first {look}; then: {drive['why']}"}
 
 
 def _next(

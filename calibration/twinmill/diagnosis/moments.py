@@ -211,15 +211,29 @@ def _way(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
 
 def sentence(moments: Sequence[Moment]) -> str:
     """What happened, for people: what it did in most of them, if that is one thing."""
-    listed = ", ".join(f"{m.t_s:.1f}" for m in moments[:3])
-    more = f" s and {len(moments) - 3} more" if len(moments) > 3 else " s"
     most, count = Counter(m.what for m in moments).most_common(1)[0]
     told = "it did something else each time"
     if 2 * count > len(moments):
         way = float(np.median([m.way for m in moments if m.what == most]))
         told = f"{did(most, way)}, as where {AS_WHERE[most]}"
-    at = f"At {len(moments)} moments ({listed}{more})"
+    at = f"At {len(moments)} moments ({_listed(moments)})"
     return f"{at} the robot did not follow its commands: {told}."
+
+
+def to_look_at(moments: Sequence[Moment]) -> str:
+    """What to look at before another drive, in a clause; empty where the robot just went less."""
+    asked = [m for m in moments if m.what != "less"]
+    if 2 * len(asked) < max(len(moments), 1):
+        return ""
+    return (
+        "look into the robot's own record whether the commands about "
+        f"{_listed(asked)} arrived, and when: lost, late or mixed up they look like that"
+    )
+
+
+def _listed(moments: Sequence[Moment]) -> str:
+    listed = ", ".join(f"{m.t_s:.1f}" for m in moments[:3])
+    return listed + (f" s and {len(moments) - 3} more" if len(moments) > 3 else " s")
 
 
 def did(what: What, way: float) -> str:

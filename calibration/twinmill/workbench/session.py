@@ -176,7 +176,7 @@ class Session:
         self.measurements = before.excluding_wrong(
             [f for f in findings if f not in before.findings]
         )
-        if len(self.measurements) == len(before):
+        if [*map(id, self.measurements)] == [*map(id, before)]:
             return  # what is shown, or comes soon, stays
         places = {id(m): k for k, m in enumerate(self.measurements)}
         kept = {k: places[id(m)] for k, m in enumerate(before) if id(m) in places}

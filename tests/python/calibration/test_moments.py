@@ -6,7 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from twinmill.diagnosis.moments import Moment, _begin_s, _done, sentence
+from twinmill.diagnosis.diagnose import _after_a_look
+from twinmill.diagnosis.doubts import undetermined
+from twinmill.diagnosis.finding import Finding
+from twinmill.diagnosis.moments import Moment, _begin_s, _done, sentence, to_look_at
+from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.windows import EVERY_S, HORIZONS_S
 
 SPEED_MPS, NOISE_M = 0.2, 3e-4
@@ -71,3 +75,19 @@ def test_where_a_robot_is_told_to_stand_no_share_of_its_way_is_told():
 def test_the_sentence_says_what_most_moments_have_in_common(done, words):
     told = sentence([Moment("run", 1, 8.0 * k, way, what) for k, (way, what) in enumerate(done)])
     assert words in told
+
+
+@pytest.mark.parametrize(("what", "asked"), [("elsewhere", True), ("back", True), ("less", False)])
+def test_commands_that_may_not_have_arrived_are_looked_at_before_another_drive(what, asked):
+    look = to_look_at([Moment("run", 1, 8.0 + k, 0.2, what) for k in range(4)])
+    assert bool(look) == asked
+    drive = _after_a_look({"why": "drive on", "separates": []}, look)
+    assert drive["why"].startswith("first look") == asked and drive["why"].endswith("drive on")
+    assert _after_a_look(None, look) is None
+
+
+@pytest.mark.parametrize(("seen", "certainty"), [(False, "doubtful"), (True, "sure")])
+def test_an_effect_of_which_no_number_is_determined_is_not_sure(seen, certainty):
+    numbers = [ParameterEstimate(f"transient_loss.{n}", 1.0, 1.0, "1", False, seen) for n in "ab"]
+    (found,) = undetermined([Finding("transient_loss", None, numbers, 1.0, "sure")])
+    assert found.certainty == certainty
