@@ -348,7 +348,7 @@ def _concluded(
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
     rest = rest.with_findings(findings)
-    disturbed = [] if rest.moments else disturbed_notes(after)
+    disturbed = [] if rest.moments or rest.events.later else disturbed_notes(after)
     noise = irregularity_notes(opened, scatters)
     named = {name for f in findings for name in (f.effect, *(f.group or ()))}
     faint = [(name, why) for name, why in done.faint if name not in named]

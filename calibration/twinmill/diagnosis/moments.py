@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 import twinmill_native as native
 
+from twinmill.diagnosis.later import Later, later_from
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.floor import ARM_M, is_far
 from twinmill.fitting.opening import Opened
@@ -87,34 +88,63 @@ class Stretch:
         return f"{self.begin_s:.1f} to {self.end_s:.1f} s {did(self.what, self.way)}"
 
 
-def moments_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> list[Moment]:
-    """Events of all logs that have several, in the order of time.
+@dataclass(frozen=True)
+class Events:
+    """What the final model misses at some times alone.
+
+    Attributes:
+        moments: single ones, of all logs that have several, in the order of time.
+        later: lasting changes of when commands act, which only look like moments.
+    """
+
+    moments: tuple[Moment, ...] = ()
+    later: tuple[Later, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """What happened, for people; empty if nothing did."""
+        told = [change.sentence for change in self.later]
+        return " ".join([*told, *([sentence(self.moments)] if self.moments else [])])
+
+
+def events_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> Events:
+    """Events of all logs.
 
     Args:
         opened: measurements over their floors; tables have no moments.
         models: with what was found, one for each.
     """
-    found = []
+    moments, later = [], []
     for own, model in zip(opened, models, strict=True):
-        if own.floor is not None:
-            found += _of_log(own, model)
-    return found
+        if own.floor is None:
+            continue
+        errors = own.data.errors(model)
+        events = _several(own, errors)
+        if events and (change := later_from(own, model)) and not _several(own, change[1]):
+            later.append(change[0])
+        elif events:
+            moments += _of_log(own, model, errors, events)
+    return Events(tuple(moments), tuple(later))
 
 
-def _of_log(own: Opened, model: native.Model) -> list[Moment]:
+def _several(own: Opened, errors: np.ndarray) -> list[np.ndarray]:
+    """Windows of each event, where these are so many that they are no accident; else none."""
     data = own.data
-    errors = data.errors(model)
     missed = np.flatnonzero(
         is_far(errors, data.floor, SETTINGS.far)
         & (is_far(own.floor.across, data.floor, SETTINGS.far) | ~own.floor.keep)
     )
     events = _events(missed, data.start_s)
-    enough = _weight(events, data.start_s)
-    if enough < SETTINGS.several:
-        return []
+    return events if _weight(events, data.start_s) >= SETTINGS.several else []
+
+
+def _of_log(
+    own: Opened, model: native.Model, errors: np.ndarray, events: Sequence[np.ndarray]
+) -> list[Moment]:
+    data = own.data
     every = _ways(own, model)
     faint = all(abs(np.nanmedian(every[event]) - 1) < HARDLY for event in events)
-    if faint and enough < 2 * SETTINGS.several:
+    if faint and _weight(events, data.start_s) < 2 * SETTINGS.several:
         return []
     name, robot_id = data.measurement.log_name, data.measurement.track.robot_id
     return [

@@ -25,7 +25,7 @@ from twinmill.diagnosis.doubts import (
 )
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.finding import Finding
-from twinmill.diagnosis.moments import _events
+from twinmill.diagnosis.moments import Events, _events
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.screening import screen
 from twinmill.diagnosis.settings import SETTINGS
@@ -497,6 +497,26 @@ def test_moments_without_power_are_told_one_by_one(tanh_robot, measure, fitted):
     assert "4 moments" in found.sentence
 
 
+def test_commands_that_act_later_from_a_moment_on_are_no_single_moments(
+    tanh_robot, measure, fitted
+):
+    """A buffer of 0.15 s fills after half the log: it shows at changes of the command alone."""
+    from_s, later_s = 30.0, 0.15
+
+    class Buffered(tanh_robot):
+        def wheels_mps(self, duty):
+            at = np.arange(len(duty))
+            late = np.where(at * EULER_S > from_s, round(later_s / EULER_S), 0)
+            return super().wheels_mps(duty[np.maximum(at - late, 0)])
+
+    found = diagnose([measure(Buffered(), 21, 60.0)], fitted)
+    assert found.verdict == "outside_catalogue" and not found.rest.moments
+    (change,) = found.rest.events.later
+    assert change.later_s == pytest.approx(later_s, abs=0.03)
+    assert change.from_s == pytest.approx(from_s, abs=3.0)
+    assert "time" in found.rest.depends_on and "later than before" in found.sentence
+
+
 @pytest.mark.parametrize(
     ("count", "way", "windows", "told"),
     [
@@ -514,6 +534,7 @@ def test_moments_that_hardly_change_the_way_must_be_many(count, way, windows, to
     far[np.arange(count)[:, None] * 40 + 20 + np.arange(windows)] = True
     monkeypatch.setattr(moments, "is_far", lambda *_: far)
     monkeypatch.setattr(moments, "_ways", lambda *_: np.full(400, way))
+    monkeypatch.setattr(moments, "later_from", lambda *_: None)
     monkeypatch.setattr(moments, "_begin_s", lambda *_: 0.0)
     monkeypatch.setattr(moments, "_done", lambda *_: (way, "less"))
     measurement = SimpleNamespace(log_name="run", track=SimpleNamespace(robot_id=1))
@@ -521,8 +542,8 @@ def test_moments_that_hardly_change_the_way_must_be_many(count, way, windows, to
         measurement=measurement, start_s=0.25 * np.arange(400), floor=None, errors=lambda _: None
     )
     floor = SimpleNamespace(across=None, keep=np.ones(400, bool))
-    found = moments.moments_of([SimpleNamespace(data=data, floor=floor)], [None])
-    assert len(found) == told
+    found = moments.events_of([SimpleNamespace(data=data, floor=floor)], [None])
+    assert len(found.moments) == told
 
 
 def _weak_left_from(robot, from_s: float):
@@ -1159,7 +1180,7 @@ def test_a_lag_that_leaves_what_depends_on_the_past_has_another_form(effect, gro
 def test_a_small_place_beside_single_moments_may_be_some_of_them(effect, moments, certainty):
     """Ridges of a floor stop it here and there."""
     loss = ParameterEstimate(f"{effect}.strength", 0.6, 0.05, "", False, True)
-    rest = Rest(0.05, False, [], moments=(None,) * moments)
+    rest = Rest(0.05, False, [], events=Events((None,) * moments))
     (judged,) = of_another_form([Finding(effect, None, [loss], 0.9, "sure")], rest)
     assert judged.certainty == certainty
 
