@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
@@ -46,6 +47,8 @@ class Explanation:
         path: of the new model; None if it was stopped before anything was found, and none written.
         formula: that was proven for what is left, refitted with all; None if none was, or if it
             was not asked for.
+        gained: the new model predicts left-out data better than the given one; else it has the
+            numbers that were given.
     """
 
     diagnosis: Diagnosis
@@ -53,6 +56,7 @@ class Explanation:
     parameters: list[ParameterEstimate]
     path: Path | None
     formula: Taken | None = None
+    gained: bool = True
 
     @property
     def steps(self) -> list[tuple[str | None, float]]:
@@ -68,6 +72,7 @@ class Explanation:
             "steps": [{"effect": name, "score_heldout": score} for name, score in self.steps],
             "formula": self.formula.to_json() if self.formula else None,
             "score_after": self.after.score,
+            "gained": self.gained,
             "parameters": [e.to_json() for e in self.parameters],
             "model": str(self.path) if self.path else None,
         }
@@ -103,6 +108,8 @@ def explain(
         try:
             diagnosis = _with_stale_lag(diagnosis)
             fit, beyond = _whole(diagnosis, formula)
+            if not _gained(diagnosis, fit, beyond):
+                return _as_given(diagnosis, model_file, out=out, command=command)
             return _written(diagnosis, model_file, fit, beyond, out=out, command=command)
         except KeyboardInterrupt:
             if not stoppable:
@@ -140,6 +147,41 @@ def _whole(diagnosis: Diagnosis, formula: bool) -> tuple[ScoreFit, Taken | None]
     runs = len({own.measurement.log_sha256 for own in diagnosis.opened})
     beyond = _beyond(diagnosis, fit, proven, runs) if proven else None
     return (beyond.fit if beyond and beyond.kept else fit), beyond
+
+
+def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
+    """Whether a fit predicts left-out data better than the model as given.
+
+    Numbers that were fitted though nothing was found must predict most blocks better: a few that
+    follow no command pull them wherever they like.
+    """
+    start = diagnosis.search.rounds[0].before.fit
+    if not (diagnosis.findings or diagnosis.camera or diagnosis.robots_off or beyond):
+        falls = np.concatenate(
+            [
+                (old - new) / np.maximum(old + new, 1e-300)
+                for old, new in zip(start.block_squares, fit.block_squares, strict=True)
+            ]
+        )
+        if diagnosis.verdict == "outside_catalogue" or np.median(falls) < 0:
+            return False
+    # Where robots differ, or cameras do, the common numbers are not all that is new.
+    if diagnosis.camera or diagnosis.robots_off:
+        return True
+    return total_score(fit.held_scores) <= total_score(start.held_scores)
+
+
+def _as_given(
+    diagnosis: Diagnosis, model_file: ModelFile, *, out: Path, command: str
+) -> Explanation:
+    """Writes the model with the numbers that it had."""
+    logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
+    before = diagnosis.before
+    known = bool(model_file.known_from_other_logs(logs.values()))
+    told = Fitted(model_file.model.copy(), [], logs, before.score, before.score, base_told=known)
+    child = child_of(model_file, told, Path(out), command)
+    child.write()
+    return Explanation(diagnosis, before, [], child.path, gained=False)
 
 
 def _written(

@@ -281,7 +281,11 @@ def rest_of(
         proven = formula_of(fit, **vars(formulas))
     if found.likely and (again or proven):  # which are surer
         found = replace(found, depends_on=[], likely=False)
-    others = [*([TIME] if events.later else []), *([MOMENTS] if events.moments else []), *([PLACE] if again else [])]
+    others = [
+        *([TIME] if events.later else []),
+        *([MOMENTS] if events.moments else []),
+        *([PLACE] if again else []),
+    ]
     return replace(
         found,
         share=share,

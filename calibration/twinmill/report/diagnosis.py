@@ -31,6 +31,11 @@ TOO_FEW = (
     "its own."
 )
 
+NOTHING_GAINED = (
+    "Nothing could be gained: no numbers predict left-out data better than those of the model as "
+    "given, and the new file has these."
+)
+
 Commands = Sequence[tuple[str, str]]  # what for, and the line to type
 Steps = Sequence[tuple[str | None, float]]  # what came into the model, and the score then
 
@@ -294,6 +299,7 @@ def terminal_explanation(
         show.table(tables.steps(_labelled(result.steps))),
         show.table(tables.parameters(result.parameters)),
         *(Text(line) for line in formula.taken(result.formula)),
+        *([Text(NOTHING_GAINED)] if not result.gained else []),
         Text(not_written or f"Written: {result.path}"),
         *_next(result.diagnosis, commands),
     )
@@ -348,6 +354,7 @@ def explanation_section(
         notes=[
             *page.notes,
             *formula.taken(result.formula),
+            *([NOTHING_GAINED] if not result.gained else []),
             not_written or f"Written: `{result.path}`",
         ],
     )

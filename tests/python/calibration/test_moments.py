@@ -8,6 +8,7 @@ import pytest
 
 from twinmill.diagnosis.diagnose import _after_a_look
 from twinmill.diagnosis.doubts import undetermined
+from twinmill.diagnosis.explain import _gained
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.moments import Moment, _begin_s, _done, sentence, to_look_at
 from twinmill.model.parameters import ParameterEstimate
@@ -91,3 +92,24 @@ def test_an_effect_of_which_no_number_is_determined_is_not_sure(seen, certainty)
     numbers = [ParameterEstimate(f"transient_loss.{n}", 1.0, 1.0, "1", False, seen) for n in "ab"]
     (found,) = undetermined([Finding("transient_loss", None, numbers, 1.0, "sure")])
     assert found.certainty == certainty
+
+
+@pytest.mark.parametrize(
+    ("squares", "verdict", "gained"),
+    [
+        ((0.9,) * 8, "model_adequate", True),
+        ((0.9,) * 8, "outside_catalogue", False),  # single moments alone
+        ((1.1,) * 7 + (0.0,), "model_adequate", False),  # one block pulled the numbers
+        ((1.1,) * 8, "model_adequate", False),
+    ],
+)
+def test_numbers_that_gain_nothing_are_not_written(squares, verdict, gained):
+    def fit(own):
+        return SimpleNamespace(block_squares=[np.array(own)], held_scores=[np.sqrt(np.sum(own))])
+
+    start = SimpleNamespace(before=SimpleNamespace(fit=fit((1.0,) * 8)))
+    search = SimpleNamespace(rounds=[start])
+    diagnosis = SimpleNamespace(
+        search=search, verdict=verdict, findings=[], camera=(), robots_off=()
+    )
+    assert _gained(diagnosis, fit(squares), None) == gained
