@@ -59,6 +59,27 @@ class Explanation:
     gained: bool = True
 
     @property
+    def sentence(self) -> str:
+        """What the model has now, where that is a formula, before what was missing."""
+        return (
+            f"{self.now} Without it: {self.diagnosis.sentence}"
+            if self.now
+            else (self.diagnosis.sentence)
+        )
+
+    @property
+    def now(self) -> str:
+        """The formula that the model has now, and what it takes; empty if it has none."""
+        if not (self.formula and self.formula.kept):
+            return ""
+        own = self.formula
+        return (
+            f"The model now has the formula {own.added.equals}, which takes "
+            f"{100 * own.share:.0f} % of what was left (held-out score {own.before:.2f} without "
+            f"it, {own.after:.2f} with it)."
+        )
+
+    @property
     def steps(self) -> list[tuple[str | None, float]]:
         """Those of the diagnosis, and the formula if the model has it."""
         own = self.diagnosis.steps
@@ -69,6 +90,7 @@ class Explanation:
         """The interface's object."""
         return {
             **self.diagnosis.to_json(),
+            "sentence": self.sentence,
             "steps": [{"effect": name, "score_heldout": score} for name, score in self.steps],
             "formula": self.formula.to_json() if self.formula else None,
             "score_after": self.after.score,

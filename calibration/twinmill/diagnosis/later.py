@@ -40,8 +40,9 @@ class Later:
         """What changed, for people."""
         than = "later" if self.later_s > 0 else "sooner"
         return (
-            f"From {self.from_s:.1f} s on the robot followed its commands {abs(self.later_s):.2f} s "
-            f"{than} than before: look at what sent them, its buffers and its link."
+            f"From {self.from_s:.1f} s on the robot followed its commands "
+            f"{abs(self.later_s):.2f} s {than} than before: look at what sent them, its buffers "
+            "and its link."
         )
 
 

@@ -9,7 +9,7 @@ that it was not fitted to.
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import pairwise
 
@@ -93,7 +93,7 @@ class Rest:
     takes: float = 0.0
     left_over: Mapping[str, float] | None = None
     old: tuple[str, ...] = ()
-    events: Events = Events()
+    events: Events = field(default_factory=Events)
     again: float = 0.0
     proven: Formula | None = None
     far: bool = False

@@ -294,6 +294,7 @@ def terminal_explanation(
         not_written: said in the place of where the model was written.
     """
     return Group(
+        *([Text(result.now, show.STYLES["good"]), Text("Without it:")] if result.now else []),
         *_said(result.diagnosis),
         Text(),
         show.table(tables.steps(_labelled(result.steps))),
@@ -350,6 +351,7 @@ def explanation_section(
     page = section(result.diagnosis, commands, result.steps)
     return replace(
         page,
+        verdict="\n".join([*([f"{result.now} Without it:"] if result.now else []), page.verdict]),
         tables=[*page.tables, tables.parameters(result.parameters)],
         notes=[
             *page.notes,

@@ -6,10 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from twinmill.diagnosis import moments
 from twinmill.diagnosis.diagnose import _after_a_look
 from twinmill.diagnosis.doubts import undetermined
 from twinmill.diagnosis.explain import _gained
 from twinmill.diagnosis.finding import Finding
+from twinmill.diagnosis.later import later_from
 from twinmill.diagnosis.moments import Moment, _begin_s, _done, sentence, to_look_at
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.windows import EVERY_S, HORIZONS_S
@@ -113,3 +115,43 @@ def test_numbers_that_gain_nothing_are_not_written(squares, verdict, gained):
         search=search, verdict=verdict, findings=[], camera=(), robots_off=()
     )
     assert _gained(diagnosis, fit(squares), None) == gained
+
+
+@pytest.mark.parametrize(("later_s", "told"), [(0.15, True), (-0.1, True), (0.0, False)])
+def test_commands_that_act_later_from_a_moment_on_are_one_change(later_s, told, monkeypatch):
+    """A robot on another clock than its commands' is off where these change, each second window."""
+    count, from_s = 200, 30.0
+    start_s = EVERY_S * np.arange(count)
+    late_s = np.where(start_s >= from_s, later_s, 0.0)
+    changes = np.arange(count) % 2
+
+    def errors(clock_s):
+        off = SPEED_MPS * changes * np.abs(clock_s - late_s)
+        return np.broadcast_to(off[:, None, None], (count, len(HORIZONS_S), 3))
+
+    clock = {}
+    model = SimpleNamespace(get=lambda _: 0.0, copy=lambda: model, set=clock.__setitem__)
+    data = SimpleNamespace(
+        start_s=start_s,
+        keep=np.ones(count, bool),
+        floor=np.ones((len(HORIZONS_S), 3)),
+        over=lambda *_: data,
+        rows=lambda _, __, values: np.array([errors(v).ravel() for v in values[:, 0]]),
+        errors=lambda _: errors(clock["clock.offset_s"]),
+        measurement=SimpleNamespace(log_name="run", track=SimpleNamespace(robot_id=1)),
+    )
+    own = SimpleNamespace(data=data, floor=SimpleNamespace(across=None, keep=data.keep))
+    found = later_from(own, model)
+    assert bool(found) == told
+    if found:
+        change, left = found
+        assert change.later_s == pytest.approx(later_s) and np.abs(left).max() < 1e-9
+        assert change.from_s == pytest.approx(from_s, abs=2 * EVERY_S)
+    # Where that change takes the events away, no single moments are told.
+    data.errors = lambda _: np.ones(1)
+    seen = iter([[np.arange(3)], [] if told else [np.arange(3)]])
+    monkeypatch.setattr(moments, "_several", lambda *_: next(seen))
+    monkeypatch.setattr(moments, "_of_log", lambda *_: ["moment"])
+    monkeypatch.setattr(moments, "later_from", lambda *_: found)
+    events = moments.events_of([own], [model])
+    assert (len(events.later), len(events.moments)) == ((1, 0) if told else (0, 1))

@@ -497,26 +497,6 @@ def test_moments_without_power_are_told_one_by_one(tanh_robot, measure, fitted):
     assert "4 moments" in found.sentence
 
 
-def test_commands_that_act_later_from_a_moment_on_are_no_single_moments(
-    tanh_robot, measure, fitted
-):
-    """A buffer of 0.15 s fills after half the log: it shows at changes of the command alone."""
-    from_s, later_s = 30.0, 0.15
-
-    class Buffered(tanh_robot):
-        def wheels_mps(self, duty):
-            at = np.arange(len(duty))
-            late = np.where(at * EULER_S > from_s, round(later_s / EULER_S), 0)
-            return super().wheels_mps(duty[np.maximum(at - late, 0)])
-
-    found = diagnose([measure(Buffered(), 21, 60.0)], fitted)
-    assert found.verdict == "outside_catalogue" and not found.rest.moments
-    (change,) = found.rest.events.later
-    assert change.later_s == pytest.approx(later_s, abs=0.03)
-    assert change.from_s == pytest.approx(from_s, abs=3.0)
-    assert "time" in found.rest.depends_on and "later than before" in found.sentence
-
-
 @pytest.mark.parametrize(
     ("count", "way", "windows", "told"),
     [
@@ -575,6 +555,17 @@ def test_a_weakness_that_comes_later_is_told_with_its_moment(tanh_robot, measure
     for part in (loss, side):
         assert abs(part.value - 0.06) < 2 * part.std < 0.04
     assert from_s.value == pytest.approx(20.0, abs=0.5)
+
+
+def test_what_begins_while_nothing_is_measured_is_known_to_that_gap(tanh_robot, measure, fitted):
+    """From 12 to 20 s there are no poses: wherever within it begins, the rest is the same."""
+    log = measure(_weak_left_from(tanh_robot, 20.0), 22, 40.0)
+    at_s = log.track.command_t_s[0] + np.array([12.0, 20.0])
+    found = diagnose([log.without([tuple(at_s)], "not measured")], fitted)
+    finding = found.finding("abrupt_loss")
+    (from_s,) = [p for p in finding.parameters if p.name == "abrupt_loss.from_s"]
+    reach_s = 1.96 * from_s.std
+    assert from_s.value - reach_s < 12.1 and from_s.value + reach_s > 19.9
 
 
 def test_a_moment_of_one_log_is_not_looked_for_in_several(tanh_robot, measure, fitted):
