@@ -376,7 +376,9 @@ def _concluded(
     drives = drives_for(faint_names, _shown(done, faint), first.model.wheel_kind)
     same_clock = all(o.same_clock for o in known if o.floor)
     late = lateness(done, findings, same_clock)
+    drive = _next(findings, drives, faint, weighed.verdict, same_clock=same_clock)
     to_look_at = moments.to_look_at(rest.moments)
+    alone = to_look_at and not drive
     return Diagnosis(
         verdict=weighed.verdict,
         sentence=weighed.sentence,
@@ -400,11 +402,9 @@ def _concluded(
             *marker_notes(modelled),
             *few,
             *weighed.notes,
-            *([f"{to_look_at[0].upper()}{to_look_at[1:]}."] if to_look_at else []),
+            *([f"{to_look_at[0].upper()}{to_look_at[1:]}."] if alone else []),
         ],
-        next_experiment=_after_a_look(
-            _next(findings, drives, faint, weighed.verdict, same_clock=same_clock), to_look_at
-        ),
+        next_experiment=_after_a_look(drive, to_look_at),
         robots_off=tuple(off),
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
         base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),

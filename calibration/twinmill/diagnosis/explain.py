@@ -131,7 +131,7 @@ def explain(
             diagnosis = _with_stale_lag(diagnosis)
             fit, beyond = _whole(diagnosis, formula)
             if not _gained(diagnosis, fit, beyond):
-                return _as_given(diagnosis, model_file, out=out, command=command)
+                return _as_given(diagnosis, model_file, beyond, out=out, command=command)
             return _written(diagnosis, model_file, fit, beyond, out=out, command=command)
         except KeyboardInterrupt:
             if not stoppable:
@@ -178,7 +178,8 @@ def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
     follow no command pull them wherever they like.
     """
     start = diagnosis.search.rounds[0].before.fit
-    if not (diagnosis.findings or diagnosis.camera or diagnosis.robots_off or beyond):
+    formula = beyond and beyond.kept
+    if not (diagnosis.findings or diagnosis.camera or diagnosis.robots_off or formula):
         falls = np.concatenate(
             [
                 (old - new) / np.maximum(old + new, 1e-300)
@@ -194,16 +195,24 @@ def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
 
 
 def _as_given(
-    diagnosis: Diagnosis, model_file: ModelFile, *, out: Path, command: str
+    diagnosis: Diagnosis, model_file: ModelFile, beyond: Taken | None, *, out: Path, command: str
 ) -> Explanation:
-    """Writes the model with the numbers that it had."""
+    """Writes the model with the numbers that it had, and what the logs tell of clock and rest."""
     logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
     before = diagnosis.before
-    known = bool(model_file.known_from_other_logs(logs.values()))
-    told = Fitted(model_file.model.copy(), [], logs, before.score, before.score, base_told=known)
+    told = Fitted(
+        model=model_file.model.copy(),
+        estimates=[],
+        logs=logs,
+        score_before=before.score,
+        score_after=before.score,
+        clock=common_clock(diagnosis.search.rounds[0].before.fit),
+        base_told=bool(model_file.known_from_other_logs(logs.values())),
+        left_over=_left_over(diagnosis, beyond),
+    )
     child = child_of(model_file, told, Path(out), command)
     child.write()
-    return Explanation(diagnosis, before, [], child.path, gained=False)
+    return Explanation(diagnosis, before, [], child.path, beyond, gained=False)
 
 
 def _written(

@@ -298,7 +298,7 @@ def terminal_explanation(
         *_said(result.diagnosis),
         Text(),
         show.table(tables.steps(_labelled(result.steps))),
-        show.table(tables.parameters(result.parameters)),
+        *([show.table(tables.parameters(result.parameters))] if result.parameters else []),
         *(Text(line) for line in formula.taken(result.formula)),
         *([Text(NOTHING_GAINED)] if not result.gained else []),
         Text(not_written or f"Written: {result.path}"),

@@ -324,7 +324,7 @@ def check_foreign(checked: CheckedTrack, search: Search, own: Explained) -> list
     told = checked.finding(
         f"the commands {when} do not belong to the motion",
         "the robot moves, and by no share of what it is told",
-        "that is cut out; look whether these commands were recorded in the order and of the robot "
+        "it is not judged; look whether these commands were recorded in the order and of the robot "
         "that drove them",
         fatal=False,
     )
