@@ -177,9 +177,10 @@ def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
     Numbers that were fitted though nothing was found must predict most blocks better: a few that
     follow no command pull them wherever they like.
     """
+    if diagnosis.camera or len(diagnosis.robots) > 1:
+        return True  # common numbers are not all that is new
     start = diagnosis.search.rounds[0].before.fit
-    formula = beyond and beyond.kept
-    if not (diagnosis.findings or diagnosis.camera or diagnosis.robots_off or formula):
+    if not (diagnosis.findings or (beyond and beyond.kept)):
         falls = np.concatenate(
             [
                 (old - new) / np.maximum(old + new, 1e-300)
@@ -188,9 +189,6 @@ def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
         )
         if diagnosis.verdict == "outside_catalogue" or np.median(falls) < 0:
             return False
-    # Where robots differ, or cameras do, the common numbers are not all that is new.
-    if diagnosis.camera or diagnosis.robots_off:
-        return True
     return total_score(fit.held_scores) <= total_score(start.held_scores)
 
 

@@ -112,7 +112,7 @@ def test_numbers_that_gain_nothing_are_not_written(squares, verdict, gained):
     start = SimpleNamespace(before=SimpleNamespace(fit=fit((1.0,) * 8)))
     search = SimpleNamespace(rounds=[start])
     diagnosis = SimpleNamespace(
-        search=search, verdict=verdict, findings=[], camera=(), robots_off=()
+        search=search, verdict=verdict, findings=[], camera=(), robots=(None,)
     )
     assert _gained(diagnosis, fit(squares), None) == gained
 
