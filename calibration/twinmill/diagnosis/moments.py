@@ -158,9 +158,7 @@ def _begin_s(data: Trajectory, errors: np.ndarray, event: np.ndarray) -> float:
     Each is right up to one horizon and far at the next, so that it begins between these. Those two
     seconds ahead see it long before it begins, and those that start within it see only its end.
     """
-    far = np.stack(
-        [is_far(errors[:, [h]], data.floor[[h]], SETTINGS.far) for h in range(len(HORIZONS_S))], 1
-    )[event]
+    far = np.stack([_far_at(data, errors, h) for h in range(len(HORIZONS_S))], 1)[event]
     event, far = event[far.any(axis=1)], far[far.any(axis=1)]
     if not len(event):
         return float("nan")
@@ -170,6 +168,15 @@ def _begin_s(data: Trajectory, errors: np.ndarray, event: np.ndarray) -> float:
     agree = (after_s <= after_s[:, None]) & (after_s[:, None] < until_s)
     most = agree.sum(axis=1)
     return float(after_s[most == most.max()].min())
+
+
+def _far_at(data: Trajectory, errors: np.ndarray, horizon: int) -> np.ndarray:
+    """(W,) predictions that are far off at one horizon; none where it is not judged."""
+    floor = data.floor[[horizon]]
+    seen = np.isfinite(errors[:, horizon]).any(axis=0) & np.isfinite(floor[0]) & (floor[0] > 0)
+    if not seen.any():
+        return np.zeros(len(errors), bool)
+    return is_far(errors[:, [horizon]], floor, SETTINGS.far)
 
 
 def _done(data: Trajectory, errors: np.ndarray, event: np.ndarray) -> tuple[float, What]:

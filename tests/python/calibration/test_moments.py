@@ -155,3 +155,11 @@ def test_commands_that_act_later_from_a_moment_on_are_one_change(later_s, told, 
     monkeypatch.setattr(moments, "later_from", lambda *_: found)
     events = moments.events_of([own], [model])
     assert (len(events.later), len(events.moments)) == ((1, 0) if told else (0, 1))
+
+
+def test_a_horizon_that_is_not_judged_tells_nothing_of_the_begin(recwarn):
+    own = log_of((0.0, 0.0))
+    own.data.floor[-1] = np.inf
+    begin_s = _begin_s(own.data, own.errors, own.sees)
+    assert begin_s == pytest.approx(BEGINS_S, abs=HORIZONS_S[1] / 2 + 0.01)
+    assert not len(recwarn)
