@@ -481,3 +481,41 @@ def test_one_valid_pose_is_not_told_as_none(robot):
     valid[3] = True
     with pytest.raises(LogError, match=rf"1 of its {len(valid)} poses are valid"):
         make_track(replace(robot, valid=valid))
+
+
+def _mixed_up(robot: RobotLog, begin_s: float, end_s: float) -> RobotLog:
+    """The same with the commands of a while in another order than they were driven."""
+    legs = np.floor(robot.command_t_s / 0.7 + 1e-9).astype(int)
+    own = np.unique(legs[(robot.command_t_s >= begin_s) & (robot.command_t_s < end_s)])
+    command, driven = robot.command.copy(), np.random.default_rng(4).permutation(own)
+    for leg, other in zip(own, driven, strict=True):
+        command[legs == leg] = robot.command[np.flatnonzero(legs == other)[0]]
+    return replace(robot, command=command)
+
+
+def test_commands_that_were_mixed_up_for_a_while_are_told_and_cut():
+    """They are no physics: a loss had been found where none was, surely."""
+    (found,) = _findings([_mixed_up(_robot(duration_s=90.0), 30.0, 50.0)])
+    assert "do not belong to the motion" in found.what and not found.fatal
+    ((begin_s, end_s),) = found.cut_s
+    assert begin_s == pytest.approx(30.0, abs=1.5) and end_s == pytest.approx(50.0, abs=2.5)
+
+
+def _pose_held(robot: RobotLog, begin_s: float, end_s: float, share: float) -> RobotLog:
+    """The same, with a robot that goes a share of its way for a while."""
+    slow = (robot.pose_t_s >= begin_s) & (robot.pose_t_s < end_s)
+    heading = robot.pose[:, 2]
+    step = np.diff(robot.pose, axis=0, prepend=robot.pose[:1])
+    c, s = np.cos(heading), np.sin(heading)
+    body = np.column_stack([c * step[:, 0] + s * step[:, 1], c * step[:, 1] - s * step[:, 0]])
+    body, turn = (np.where(slow[:, None], share * b, b) for b in (body, step[:, 2:]))
+    heading = np.cumsum(turn[:, 0])
+    c, s = np.cos(heading), np.sin(heading)
+    way = np.column_stack([c * body[:, 0] - s * body[:, 1], s * body[:, 0] + c * body[:, 1]])
+    return replace(robot, pose=np.column_stack([np.cumsum(way, axis=0), heading]))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, -1.0])
+def test_a_robot_that_is_held_or_weak_or_turned_round_for_a_while_is_not_cut(share):
+    """It still goes by a share of its commands, or not at all."""
+    assert not _findings([_pose_held(_robot(duration_s=90.0), 30.0, 50.0, share)])

@@ -140,7 +140,7 @@ class Measurements(list[Measurement | SteadyTable]):
         found = [*self.findings, *findings]
         bad = {(f.log_name, f.robot_id) for f in found if f.fatal}
         left = [
-            m
+            _without_foreign(m, findings)
             for m in self
             if isinstance(m, SteadyTable) or (m.log_name, m.track.robot_id) not in bad
         ]
@@ -149,6 +149,19 @@ class Measurements(list[Measurement | SteadyTable]):
         reasons = [f"Left out: {f}" for f in findings if f.fatal]
         kept = [f for f in found if f.fatal or (f.log_name, f.robot_id) not in bad]
         return Measurements(left, [*self.excluded, *reasons], kept)
+
+
+def _without_foreign(
+    measurement: Measurement | SteadyTable, findings: Sequence[InputFinding]
+) -> Measurement | SteadyTable:
+    """Without the whiles whose commands do not belong to its motion."""
+    if isinstance(measurement, SteadyTable):
+        return measurement
+    own = (measurement.log_name, measurement.track.robot_id)
+    for f in findings:
+        if f.cut_s and (f.log_name, f.robot_id) == own:
+            measurement = measurement.without(list(f.cut_s), f"Cut: {f.what}.")
+    return measurement
 
 
 class BadInputError(LogError):

@@ -9,6 +9,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
+from twinmill.diagnosis import moments
 from twinmill.diagnosis.cameras import with_detections
 from twinmill.diagnosis.doubts import (
     acted_on,
@@ -16,6 +17,7 @@ from twinmill.diagnosis.doubts import (
     beside_stale,
     of_another_form,
     of_many,
+    undetermined,
     undone,
     within_the_table,
 )
@@ -320,7 +322,7 @@ def _concluded(
     few = few_commands_notes(known)
     if few:
         findings = beside_stale(findings)
-    findings = without.doubted(undone(findings, last))
+    findings = without.doubted(undone(undetermined(findings), last))
     in_doubt = _doubted(findings, less, known)
     whole = [_with_all_starts(o, opened) for o in known]
     models = zip(whole, last.state.models, strict=True)
@@ -351,12 +353,13 @@ def _concluded(
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
     rest = rest.with_findings(findings)
     usual = model_file.usual_score(hashes)
-    news = findings or rest.moments or rest.proven or SETTINGS.common * last.held_score > usual
+    events = rest.moments or rest.events.later
+    news = findings or events or rest.proven or SETTINGS.common * last.held_score > usual
     rest = rest if news else rest.as_before()
     unsure = all(f.certainty == "doubtful" for f in findings if f.effect != REFIT)
     if rest.firm and unsure and not rest.depends_on:
         rest = rest.most_likely(acted_on(findings, 0.0))
-    disturbed = [] if rest.moments else disturbed_notes(after)
+    disturbed = [] if events else disturbed_notes(after)
     noise = irregularity_notes(opened, scatters)
     named = {name for f in findings for name in (f.effect, *(f.group or ()))}
     faint = [(name, why) for name, why in done.faint if name not in named]
@@ -383,6 +386,9 @@ def _concluded(
     drives = drives_for(faint_names, _shown(done, faint), first.model.wheel_kind)
     same_clock = all(o.same_clock for o in known if o.floor)
     late = lateness(done, findings, same_clock)
+    drive = _next(findings, drives, faint, weighed.verdict, same_clock=same_clock)
+    to_look_at = moments.to_look_at(rest.moments)
+    alone = to_look_at and not drive
     return Diagnosis(
         verdict=weighed.verdict,
         sentence=weighed.sentence,
@@ -406,8 +412,9 @@ def _concluded(
             *marker_notes(modelled),
             *few,
             *weighed.notes,
+            *([f"{to_look_at[0].upper()}{to_look_at[1:]}."] if alone else []),
         ],
-        next_experiment=_next(findings, drives, faint, weighed.verdict, same_clock=same_clock),
+        next_experiment=_after_a_look(drive, to_look_at),
         robots_off=tuple(off),
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
         base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),
@@ -515,6 +522,13 @@ def drives_for(
     every = set().union(*asked.values())
     words = ", ".join(words for t, words in DRIVES.items() if t in every)
     return words, [name for name, drives in asked.items() if drives]
+
+
+def _after_a_look(drive: dict | None, look: str) -> dict | None:
+    """The next drive, once what is to be looked at first was."""
+    if not drive or not look:
+        return drive
+    return {**drive, "why": f"first {look}; then: {drive['why']}"}
 
 
 def _next(

@@ -168,6 +168,17 @@ def _in_a_place_of_its_own(last: Trial, name: str) -> bool:
     return bool(way_m[there] @ again < SETTINGS.comes_by * way_m[there].sum())
 
 
+def undetermined(findings: Sequence[Finding]) -> list[Finding]:
+    """Findings, those doubtful of which these logs determine none of the numbers."""
+    why = "none of its own numbers is determined by these logs"
+    return [
+        doubted(f, why)
+        if f.certainty == "sure" and f.parameters and not any(p.told for p in f.parameters)
+        else f
+        for f in findings
+    ]
+
+
 def within_the_table(
     found: Sequence[Finding], less: Mapping[str, Trial], last: Trial
 ) -> list[Finding]:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
@@ -46,6 +47,8 @@ class Explanation:
         path: of the new model; None if it was stopped before anything was found, and none written.
         formula: that was proven for what is left, refitted with all; None if none was, or if it
             was not asked for.
+        gained: the new model predicts left-out data better than the given one; else it has the
+            numbers that were given.
     """
 
     diagnosis: Diagnosis
@@ -53,6 +56,28 @@ class Explanation:
     parameters: list[ParameterEstimate]
     path: Path | None
     formula: Taken | None = None
+    gained: bool = True
+
+    @property
+    def sentence(self) -> str:
+        """What the model has now, where that is a formula, before what was missing."""
+        return (
+            f"{self.now} Without it: {self.diagnosis.sentence}"
+            if self.now
+            else (self.diagnosis.sentence)
+        )
+
+    @property
+    def now(self) -> str:
+        """The formula that the model has now, and what it takes; empty if it has none."""
+        if not (self.formula and self.formula.kept):
+            return ""
+        own = self.formula
+        return (
+            f"The model now has the formula {own.added.equals}, which takes "
+            f"{100 * own.share:.0f} % of what was left (held-out score {own.before:.2f} without "
+            f"it, {own.after:.2f} with it)."
+        )
 
     @property
     def steps(self) -> list[tuple[str | None, float]]:
@@ -65,9 +90,11 @@ class Explanation:
         """The interface's object."""
         return {
             **self.diagnosis.to_json(),
+            "sentence": self.sentence,
             "steps": [{"effect": name, "score_heldout": score} for name, score in self.steps],
             "formula": self.formula.to_json() if self.formula else None,
             "score_after": self.after.score,
+            "gained": self.gained,
             "parameters": [e.to_json() for e in self.parameters],
             "model": str(self.path) if self.path else None,
         }
@@ -105,6 +132,10 @@ def explain(
         try:
             diagnosis = _with_stale_lag(diagnosis)
             fit, beyond = _whole(diagnosis, formula)
+            if not _gained(diagnosis, fit, beyond):
+                return _as_given(
+                    diagnosis, model_file, beyond, out=out, command=command, force=force
+                )
             return _written(
                 diagnosis, model_file, fit, beyond, out=out, command=command, force=force
             )
@@ -144,6 +175,54 @@ def _whole(diagnosis: Diagnosis, formula: bool) -> tuple[ScoreFit, Taken | None]
     runs = len({own.measurement.log_sha256 for own in diagnosis.opened})
     beyond = _beyond(diagnosis, fit, proven, runs) if proven else None
     return (beyond.fit if beyond and beyond.kept else fit), beyond
+
+
+def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
+    """Whether a fit predicts left-out data better than the model as given.
+
+    Numbers that were fitted though nothing was found must predict most blocks better: a few that
+    follow no command pull them wherever they like.
+    """
+    if diagnosis.camera or len(diagnosis.robots) > 1:
+        return True  # common numbers are not all that is new
+    start = diagnosis.search.rounds[0].before.fit
+    if not (diagnosis.findings or (beyond and beyond.kept)):
+        falls = np.concatenate(
+            [
+                (old - new) / np.maximum(old + new, 1e-300)
+                for old, new in zip(start.block_squares, fit.block_squares, strict=True)
+            ]
+        )
+        if diagnosis.verdict == "outside_catalogue" or np.median(falls) < 0:
+            return False
+    return total_score(fit.held_scores) <= total_score(start.held_scores)
+
+
+def _as_given(
+    diagnosis: Diagnosis,
+    model_file: ModelFile,
+    beyond: Taken | None,
+    *,
+    out: Path,
+    command: str,
+    force: bool,
+) -> Explanation:
+    """Writes the model with the numbers that it had, and what the logs tell of clock and rest."""
+    logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
+    before = diagnosis.before
+    told = Fitted(
+        model=model_file.model.copy(),
+        estimates=[],
+        logs=logs,
+        score_before=before.score,
+        score_after=before.score,
+        clock=common_clock(diagnosis.search.rounds[0].before.fit),
+        base_told=bool(model_file.known_from_other_logs(logs.values())),
+        left_over=_left_over(diagnosis, beyond),
+    )
+    child = child_of(model_file, told, Path(out), command)
+    child.write(force)
+    return Explanation(diagnosis, before, [], child.path, beyond, gained=False)
 
 
 def _written(

@@ -6,23 +6,46 @@ something happened that is not there all the time: a push, or a drop-out. Such m
 by one, since no effect that acts all the time is like that.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import twinmill_native as native
 
+from twinmill.diagnosis.later import Later, later_from
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.floor import ARM_M, is_far
 from twinmill.fitting.opening import Opened
+from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
+ARM = (1.0, 1.0, ARM_M)  # of displacements: all as ways, m
 APART_S = 1.0  # between the starts of windows of two moments
 LEAST_S = 1.0  # between the first and the last window of a stretch that is worth a sentence
 SEEN = 2  # windows overlap, so that more than one sees what lasts
 HORIZON = HORIZONS_S.index(0.5)
 LESS, MORE = 0.9, 1.1  # of the predicted way
+BACK = -0.1  # of it: noise of a robot that is held is less
+STANDS = 0.1  # of the usual way: where less is predicted, no share of it means anything
 HARDLY = 0.05  # share of the way: events that all change it by less must be twice as many
+
+What = Literal["less", "back", "more", "elsewhere", "unasked"]
+DID: dict[What, str] = {
+    "less": "it went {way} of the predicted way in half a second",
+    "back": "it drove backwards, {way} of the predicted way in half a second",
+    "more": "it went {way} of the predicted way in half a second",
+    "elsewhere": "it went elsewhere, or turned",
+    "unasked": "it moved where it was told to stand",
+}
+AS_WHERE: dict[What, str] = {
+    "less": "a motor or the supply drops out, or wheels slip or are held",
+    "back": "it is pushed back, or a command was lost",
+    "more": "it is pushed or a command was not recorded",
+    "elsewhere": "a command was lost or came late",
+    "unasked": "it is pushed, or a command to stand was lost",
+}
 
 
 @dataclass(frozen=True)
@@ -32,54 +55,147 @@ class Moment:
     Attributes:
         log: its name.
         robot_id: of the robot.
-        t_s: capture's clock, about a quarter of a second before it.
-        way: share of the predicted way that was gone in half a second.
+        t_s: capture's clock, when it begins.
+        way: share of the predicted way that was gone in the half second within it that is farthest
+            off; negative if backwards, NaN where hardly any was predicted.
+        what: it went "less" or "more" of the way, "back", "elsewhere" if more of the miss is across
+            the way than along it, or moved "unasked".
     """
 
     log: str
     robot_id: int
     t_s: float
     way: float
+    what: What
 
     def to_json(self) -> dict:
         """Fields of JSON output."""
         return vars(self)
 
 
-def moments_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> list[Moment]:
-    """Events of all logs that have several, in the order of time.
+@dataclass(frozen=True)
+class Stretch:
+    """One that the floor left out as disturbed: from when to when, s, and what a moment says."""
+
+    begin_s: float
+    end_s: float
+    way: float
+    what: What
+
+    @property
+    def words(self) -> str:
+        """When, and what the robot did."""
+        return f"{self.begin_s:.1f} to {self.end_s:.1f} s {did(self.what, self.way)}"
+
+
+@dataclass(frozen=True)
+class Events:
+    """What the final model misses at some times alone.
+
+    Attributes:
+        moments: single ones, of all logs that have several, in the order of time.
+        later: lasting changes of when commands act, which only look like moments.
+    """
+
+    moments: tuple[Moment, ...] = ()
+    later: tuple[Later, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """What happened, for people; empty if nothing did."""
+        told = [change.sentence for change in self.later]
+        return " ".join([*told, *([sentence(self.moments)] if self.moments else [])])
+
+
+def events_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> Events:
+    """Events of all logs.
 
     Args:
         opened: measurements over their floors; tables have no moments.
         models: with what was found, one for each.
     """
-    found = []
+    moments, later = [], []
     for own, model in zip(opened, models, strict=True):
-        if own.floor is not None:
-            found += _of_log(own, model)
-    return found
+        if own.floor is None:
+            continue
+        errors = own.data.errors(model)
+        events = _several(own, errors)
+        if events and (change := later_from(own, model)) and not _several(own, change[1]):
+            later.append(change[0])
+        elif events:
+            moments += _of_log(own, model, errors, events)
+    return Events(tuple(moments), tuple(later))
 
 
-def _of_log(own: Opened, model: native.Model) -> list[Moment]:
+def _several(own: Opened, errors: np.ndarray) -> list[np.ndarray]:
+    """Windows of each event, where these are so many that they are no accident; else none."""
     data = own.data
     missed = np.flatnonzero(
-        is_far(data.errors(model), data.floor, SETTINGS.far)
+        is_far(errors, data.floor, SETTINGS.far)
         & (is_far(own.floor.across, data.floor, SETTINGS.far) | ~own.floor.keep)
     )
     events = _events(missed, data.start_s)
-    enough = _weight(events, data.start_s)
-    if enough < SETTINGS.several:
-        return []
+    return events if _weight(events, data.start_s) >= SETTINGS.several else []
+
+
+def _of_log(
+    own: Opened, model: native.Model, errors: np.ndarray, events: Sequence[np.ndarray]
+) -> list[Moment]:
+    data = own.data
     every = _ways(own, model)
-    ways = [float(np.nanmedian(every[event])) for event in events]
-    faint = all(abs(way - 1) < HARDLY for way in ways)
-    if faint and enough < 2 * SETTINGS.several:
+    faint = all(abs(np.nanmedian(every[event]) - 1) < HARDLY for event in events)
+    if faint and _weight(events, data.start_s) < 2 * SETTINGS.several:
         return []
     name, robot_id = data.measurement.log_name, data.measurement.track.robot_id
     return [
-        Moment(name, robot_id, float(data.start_s[event[-1]]), way)
-        for event, way in zip(events, ways, strict=True)
+        Moment(name, robot_id, _begin_s(data, errors, e), *_done(data, errors, e)) for e in events
     ]
+
+
+def _begin_s(data: Trajectory, errors: np.ndarray, event: np.ndarray) -> float:
+    """When an event begins: what most of the predictions that see it agree on.
+
+    Each is right up to one horizon and far at the next, so that it begins between these. Those two
+    seconds ahead see it long before it begins, and those that start within it see only its end.
+    """
+    far = np.stack([_far_at(data, errors, h) for h in range(len(HORIZONS_S))], 1)[event]
+    event, far = event[far.any(axis=1)], far[far.any(axis=1)]
+    if not len(event):
+        return float("nan")
+    edges_s = np.array([0.0, *HORIZONS_S])
+    first = far.argmax(axis=1)
+    after_s, until_s = (data.start_s[event] + edges_s[k] for k in (first, first + 1))
+    agree = (after_s <= after_s[:, None]) & (after_s[:, None] < until_s)
+    most = agree.sum(axis=1)
+    return float(after_s[most == most.max()].min())
+
+
+def _far_at(data: Trajectory, errors: np.ndarray, horizon: int) -> np.ndarray:
+    """(W,) predictions that are far off at one horizon; none where it is not judged."""
+    floor = data.floor[[horizon]]
+    seen = np.isfinite(errors[:, horizon]).any(axis=0) & np.isfinite(floor[0]) & (floor[0] > 0)
+    if not seen.any():
+        return np.zeros(len(errors), bool)
+    return is_far(errors[:, [horizon]], floor, SETTINGS.far)
+
+
+def _done(data: Trajectory, errors: np.ndarray, event: np.ndarray) -> tuple[float, What]:
+    """Way, and what the robot did, in the half second of an event that is farthest off."""
+    with np.errstate(invalid="ignore"):
+        over = np.nan_to_num(errors[event, HORIZON] / data.floor[HORIZON])
+    at = event[np.sum(over**2, axis=1).argmax()]
+    measured, missed = (np.nan_to_num(d[:, HORIZON]) * ARM for d in (data.measured, errors))
+    predicted = measured - missed
+    size = np.linalg.norm(predicted, axis=1)
+    usual = float(np.sqrt(np.mean(size**2)))
+    if size[at] < STANDS * usual:
+        return float("nan"), "unasked"
+    along = predicted[at] / size[at]
+    way = float(measured[at] @ along / size[at])
+    across = np.linalg.norm(missed[at] - (missed[at] @ along) * along) / size[at]
+    if across > abs(1 - way) or LESS <= way <= MORE:
+        return way, "elsewhere"
+    return way, "back" if way < BACK else "less" if way < LESS else "more"
 
 
 def _events(missed: np.ndarray, start_s: np.ndarray) -> list[np.ndarray]:
@@ -102,19 +218,20 @@ def _lasts(event: np.ndarray, start_s: np.ndarray) -> bool:
     return bool(start_s[event[-1]] - start_s[event[0]] >= LEAST_S)
 
 
-def left_out(own: Opened) -> list[tuple[float, float, float]]:
-    """Stretches that the floor left out as disturbed: starts of the first and the last window, s.
-
-    And the share of the predicted way that was gone there in half a second.
-    """
+def left_out(own: Opened) -> list[Stretch]:
+    """Stretches of a second or more that the floor left out as disturbed."""
     gone = np.flatnonzero(~own.floor.keep)
     if not len(gone):
         return []
-    start_s, way = own.data.start_s, _ways(own, own.model)
-    parts = [p for p in _events(gone, start_s) if _lasts(p, start_s)]
-    return [
-        (float(start_s[p[0]]), float(start_s[p[-1]]), float(np.nanmedian(way[p]))) for p in parts
-    ]
+    data = own.data
+    errors, found = data.errors(own.model), []
+    for part in _events(gone, data.start_s):
+        if _lasts(part, data.start_s):
+            first_s, end_s = data.start_s[part[[0, -1]]]
+            begin_s = _begin_s(data, errors, part)
+            begin_s = begin_s if begin_s < end_s else float(first_s)
+            found.append(Stretch(begin_s, float(end_s), *_done(data, errors, part)))
+    return found
 
 
 def _ways(own: Opened, model: native.Model) -> np.ndarray:
@@ -125,22 +242,37 @@ def _ways(own: Opened, model: native.Model) -> np.ndarray:
 
 def _way(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
     """(W,) measured way along the predicted one, over that, of (W, 3) displacements."""
-    m, p = (np.nan_to_num(d) * (1, 1, ARM_M) for d in (measured, predicted))
+    m, p = (np.nan_to_num(d) * ARM for d in (measured, predicted))
     return np.sum(m * p, axis=1) / np.maximum(np.sum(p * p, axis=1), 1e-12)
 
 
 def sentence(moments: Sequence[Moment]) -> str:
-    """What happened, for people."""
+    """What happened, for people: what it did in most of them, if that is one thing."""
+    most, count = Counter(m.what for m in moments).most_common(1)[0]
+    told = "it did something else each time"
+    if 2 * count > len(moments):
+        way = float(np.median([m.way for m in moments if m.what == most]))
+        told = f"{did(most, way)}, as where {AS_WHERE[most]}"
+    at = f"At {len(moments)} moments ({_listed(moments)})"
+    return f"{at} the robot did not follow its commands: {told}."
+
+
+def to_look_at(moments: Sequence[Moment]) -> str:
+    """What to look at before another drive, in a clause; empty where the robot just went less."""
+    asked = [m for m in moments if m.what != "less"]
+    if 2 * len(asked) < max(len(moments), 1):
+        return ""
+    return (
+        "look into the robot's own record whether the commands about "
+        f"{_listed(asked)} arrived, and when: lost, late or mixed up they look like that"
+    )
+
+
+def _listed(moments: Sequence[Moment]) -> str:
     listed = ", ".join(f"{m.t_s:.1f}" for m in moments[:3])
-    more = f" s and {len(moments) - 3} more" if len(moments) > 3 else " s"
-    way = float(np.median([m.way for m in moments]))
-    what = "it did something else"
-    if way < LESS:
-        what = (
-            f"it went {100 * max(way, 0):.0f} % of the predicted way in half a second, as where a "
-            "motor or the supply drops out, or wheels slip or are held"
-        )
-    elif way > MORE:
-        what = "it went further, as where it is pushed or a command was not recorded"
-    at = f"At {len(moments)} moments ({listed}{more})"
-    return f"{at} the robot did not follow its commands: {what}."
+    return listed + (f" s and {len(moments) - 3} more" if len(moments) > 3 else " s")
+
+
+def did(what: What, way: float) -> str:
+    """What a robot did, in a clause."""
+    return DID[what].format(way=f"{abs(100 * way):.0f} %")

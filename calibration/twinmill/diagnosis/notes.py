@@ -104,14 +104,11 @@ def disturbed_notes(opened: Sequence[Opened]) -> list[str]:
     """A sentence for each log of which something is judged nowhere, as a push would be."""
     notes = []
     for own in opened:
-        stretches = left_out(own) if own.floor and own.data is not None else []
-        told = [
-            f"{a:.1f} to {b:.1f} s ({100 * w:.0f} % of the predicted way)" for a, b, w in stretches
-        ]
+        told = [s.words for s in left_out(own)] if own.floor and own.data is not None else []
         if told:
             more = f" and {len(told) - MOST_TOLD} more" if len(told) > MOST_TOLD else ""
             notes.append(
-                f"{own.measurement.label}: at {', '.join(told[:MOST_TOLD])}{more} it moved unlike "
+                f"{own.measurement.label}: from {', from '.join(told[:MOST_TOLD])}{more}, unlike "
                 "all the rest. That is left out, as a push or a slip would be; if it was the floor "
                 "or the robot, drive there again, and longer."
             )

@@ -9,7 +9,7 @@ that it was not fitted to.
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import pairwise
 
@@ -20,10 +20,10 @@ from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.formula_search import formula_of
 from twinmill.diagnosis.library import LEFT_OVER, library
-from twinmill.diagnosis.moments import Moment, moments_of
+from twinmill.diagnosis.moments import Events, Moment, events_of
 from twinmill.diagnosis.place import comes_again
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import COUPLING, PLACE, Term
+from twinmill.diagnosis.term import COUPLING, PLACE, TIME, Term
 from twinmill.fitting.compare import GOOD
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
@@ -78,7 +78,7 @@ class Rest:
         little: no more than what is called good, however sure it is.
         left_over: fall of the cost per independent error by every group that brings any.
         old: groups that help no more than they did on other logs.
-        moments: events that neither commands nor findings explain.
+        events: single moments that neither commands nor findings explain, and the like.
         again: least share of the squared error of way that comes again at the same places. The
             floor counts it as noise, since it follows from no command.
         proven: a formula for it that blocks which neither chose nor fitted it bear out.
@@ -93,7 +93,7 @@ class Rest:
     takes: float = 0.0
     left_over: Mapping[str, float] | None = None
     old: tuple[str, ...] = ()
-    moments: tuple[Moment, ...] = ()
+    events: Events = field(default_factory=Events)
     again: float = 0.0
     proven: Formula | None = None
     far: bool = False
@@ -129,6 +129,11 @@ class Rest:
             return self
         kept = [g for g in self.depends_on if g not in STEADY and not g.startswith("command of")]
         return replace(self, depends_on=kept, likely=self.likely and bool(kept))
+
+    @property
+    def moments(self) -> tuple[Moment, ...]:
+        """Single moments that neither commands nor findings explain."""
+        return self.events.moments
 
     @property
     def least(self) -> float:
@@ -260,9 +265,9 @@ def rest_of(
     if fit.held_square <= SETTINGS.level**2 and not random:
         found = replace(found, depends_on=[], likely=False)
     own_logs, models = [whole[i] for i, _ in logs], [fit.models[i] for i, _ in logs]
-    moments = moments_of(own_logs, models)
+    events = events_of(own_logs, models)
     again = comes_again(own_logs, models)
-    something = bool(found.depends_on or moments or again)
+    something = bool(found.depends_on or events.moments or events.later or again)
     proven = None
     if without:
         proven = without.formula(fit)
@@ -270,7 +275,11 @@ def rest_of(
         proven = formula_of(fit, **vars(formulas))
     if found.likely and (again or proven):  # which are surer
         found = replace(found, depends_on=[], likely=False)
-    others = [*([MOMENTS] if moments else []), *([PLACE] if again else [])]
+    others = [
+        *([TIME] if events.later else []),
+        *([MOMENTS] if events.moments else []),
+        *([PLACE] if again else []),
+    ]
     return replace(
         found,
         share=share,
@@ -278,7 +287,7 @@ def rest_of(
         far=fit.held_square > SETTINGS.no_noise**2,
         little=fit.held_square <= GOOD**2,
         depends_on=_in_order(proven, found, others),
-        moments=tuple(moments),
+        events=events,
         again=again,
         proven=proven,
     )

@@ -135,6 +135,7 @@ class Diagnosis:
                 "likely": rest.likely,
                 "formula": rest.proven.equals if rest.proven else None,
                 "moments": [m.to_json() for m in rest.moments],
+                "later": [change.to_json() for change in rest.events.later],
                 "proven": rest.proven.to_json() if rest.proven else None,
             },
             "late": self.late.to_json() if self.late else None,

@@ -99,7 +99,7 @@ class Taken:
             "equation": self.formula.equation,
             "text": self.added.equals,
             "numbers": [n.to_json() for n in self.numbers],
-            "share": self.share,
+            "share": self.share if self.kept else None,
             "score_heldout_without": self.before,
             "score_heldout": self.after,
             "instead_of": list(self.formula.instead_of),

@@ -4,7 +4,6 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from twinmill.diagnosis import moments
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.rest import FEW, MOMENTS, NOISE, Rest
 from twinmill.diagnosis.settings import SETTINGS
@@ -249,7 +248,7 @@ class VerdictInputs:
     @property
     def _left(self) -> str:
         """What is left, where it is more than the noise."""
-        events = f" {moments.sentence(self.rest.moments)}" if self.rest.moments else ""
+        events = f" {self.rest.events.sentence}".rstrip()
         if self.last <= GOOD or self.rest.share < SETTINGS.nothing_left:
             return events
         on = self.rest.on
@@ -275,7 +274,7 @@ class VerdictInputs:
 
     @property
     def _outside_sentence(self) -> str:
-        events = moments.sentence(self.rest.moments) if self.rest.moments else ""
+        events = self.rest.events.sentence
         if events and not self._outside:
             return f"What is missing acts at single moments alone. {events}"
         named = [_plain(f) for f in self.effects]

@@ -24,15 +24,14 @@ from twinmill.fitting.fit import (
     with_estimates,
     without_held,
 )
+from twinmill.fitting.formula_start import sized, with_time_constants
 from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import Opened, judged, open_measurements, wide_gains
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child
 from twinmill.model.parameters import (
     CAMERA_STAGES,
-    EFFECT_STEP,
     GAINS,
-    UNKNOWN,
     Parameter,
     ParameterEstimate,
     all_effect_parameters,
@@ -124,6 +123,7 @@ class AddResult:
         }
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a state may grow at some numbers that are tried
 def add(
     effect: str,
     measurements: list[Measurement],
@@ -171,9 +171,10 @@ def add(
     old = without_held([*base, *all_effect_parameters(model_file.model)], held)
     enlarged = [o.with_model(richer) for o in opened]
     if texts:
+        fresh = with_time_constants(fresh, texts, enlarged)
         for own in judged(enlarged):
             check_states(own.data, _begun(own.model, fresh))
-        fresh = _sized(fresh, enlarged)
+        fresh = sized(fresh, enlarged)
     if robot_id is None:
         moved, found = fitted(enlarged, [*old, *fresh], fresh)
     else:
@@ -280,38 +281,6 @@ def _check_not_new(held: Collection[str], fresh: Sequence[Parameter]) -> None:
             f"{name}: is of what is added, and has no value yet that could be held; add it, put a "
             "value in with `twinmill set`, and hold that with `twinmill fit --hold`."
         )
-
-
-def _sized(fresh: Sequence[Parameter], opened: Sequence[Opened]) -> list[Parameter]:
-    """Numbers of a formula with priors and steps by what changes predictions as much as they err.
-
-    In what unit a formula has them, and how large they are, nobody but it knows.
-    """
-    known = judged(opened)
-    fit = ScoreFit([o.data for o in known], [o.model for o in known], fresh)
-    rows, slopes = fit.state
-    errors = np.linalg.norm(np.concatenate(rows))
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        reaches = [errors / np.linalg.norm(_slopes_by(fit, slopes, p.name)) for p in fresh]
-    return [
-        replace(
-            p,
-            value=min(p.value, reach),
-            std=max(p.std, UNKNOWN * reach),
-            step=min(p.step, EFFECT_STEP * reach),
-        )
-        if 0 < reach < np.inf
-        else p
-        for p, reach in zip(fresh, reaches, strict=True)
-    ]
-
-
-def _slopes_by(fit: ScoreFit, slopes: Sequence[np.ndarray], name: str) -> np.ndarray:
-    """(R,) slopes of all data sets by a parameter; those that lack it are left out."""
-    own = [
-        s[:, names.index(name)] for s, names in zip(slopes, fit.names, strict=True) if name in names
-    ]
-    return np.concatenate([np.zeros(0), *own])
 
 
 def _check_acts(found: ScoreFit, fresh: Sequence[Parameter], texts: dict[str, str]) -> None:

@@ -20,9 +20,7 @@ def check_states(data: ErrorDataset, model: native.Model) -> None:
     remembering = {name: t for name, t in _equations(model).items() if t.get("state_rate")}
     if not remembering:
         return
-    with np.errstate(all="ignore"):
-        rows = errors_of(data, model)
-    if np.isfinite(rows).all() and np.abs(rows).max(initial=0.0) < GROWN:
+    if finite(data, model):
         return
     for name, texts in remembering.items():
         second = texts.get("second_rate")
@@ -32,6 +30,13 @@ def check_states(data: ErrorDataset, model: native.Model) -> None:
             f"{name}: its {states} beyond all bounds in these logs ({rates}); write rates that "
             "bring it back, such as (vx - s)/0.5."
         )
+
+
+def finite(data: ErrorDataset, model: native.Model) -> bool:
+    """Whether a model predicts something, and nothing that is beyond all bounds."""
+    with np.errstate(all="ignore"):
+        rows = errors_of(data, model)
+    return bool(np.isfinite(rows).all() and np.abs(rows).max(initial=0.0) < GROWN)
 
 
 def idle(data: Sequence[ErrorDataset], models: Sequence[native.Model]) -> list[str]:

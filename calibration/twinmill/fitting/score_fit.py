@@ -16,6 +16,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.chance import f_above, t_quantile
+from twinmill.fitting.gaps import gaps_s, known_to_gap
 from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import (
     ALIGNMENT,
@@ -643,25 +644,24 @@ class ScoreFit:
     @cached_property
     def estimates(self) -> list[ParameterEstimate]:
         """Of all unknowns, shared ones first."""
-        found = []
+        found, gaps = [], gaps_s(self.datasets)
         alone = 1 / np.sqrt(np.diag(np.linalg.pinv(self._intervals)))  # were the others known
         for u, value, std, rest in zip(self.unknowns, self.x, self.stds, alone, strict=True):
             p, seen = u.parameter, bool(std < SEEN * u.parameter.std)
             near = AT_BOUND * (p.max - p.min)
             bounded = p.role != "moment"  # the end of time is none
             at_bound = bounded and bool(value - p.min < near or p.max - value < near)
-            found.append(
-                ParameterEstimate(
-                    p.name,
-                    float(value),
-                    float(std),
-                    p.unit,
-                    at_bound,
-                    seen,
-                    not seen and bool(rest < SEEN * p.std),
-                    p.words,
-                )
+            estimate = ParameterEstimate(
+                p.name,
+                float(value),
+                float(std),
+                p.unit,
+                at_bound,
+                seen,
+                not seen and bool(rest < SEEN * p.std),
+                p.words,
             )
+            found.append(known_to_gap(estimate, gaps) if p.role == "moment" else estimate)
         return found
 
     @property

@@ -104,6 +104,11 @@ class ParameterEstimate:
     words: str = ""
 
     @property
+    def told(self) -> bool:
+        """Whether the log tells it, by itself or together with others."""
+        return self.seen or self.together
+
+    @property
     def short(self) -> str:
         """For people: its words, or its name without the effect's before."""
         return self.words or self.name.split(".", 1)[-1]

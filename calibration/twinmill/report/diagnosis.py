@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isnan
 
 import twinmill_native as native
 from rich.console import Group, RenderableType
@@ -10,6 +11,7 @@ from rich.text import Text
 
 from twinmill.data.checks.settings import CHECKS
 from twinmill.diagnosis.explain import Explanation
+from twinmill.diagnosis.moments import did
 from twinmill.diagnosis.outliers import Outlier, in_words
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.settings import SETTINGS
@@ -27,6 +29,11 @@ TOO_FEW = (
     f"Of fewer than {SETTINGS.fewest_robots} robots none can be called the odd one, and what one "
     "has is looked for in all: where their scores differ (twinmill compare), give each a log of "
     "its own."
+)
+
+NOTHING_GAINED = (
+    "Nothing could be gained: no numbers predict left-out data better than those of the model as "
+    "given, and the new file has these."
 )
 
 Commands = Sequence[tuple[str, str]]  # what for, and the line to type
@@ -198,17 +205,18 @@ def moments(diagnosis: Diagnosis) -> Table:
         [
             Cell(f"{m.log} R{m.robot_id:02d}"),
             Cell(f"{m.t_s:.1f}"),
-            Cell(f"{100 * m.way:.0f} %"),
+            Cell("-" if isnan(m.way) else f"{100 * m.way:.0f} %"),
+            Cell(did(m.what, m.way).removeprefix("it ")),
         ]
         for m in diagnosis.rest.moments
     ]
     return Table(
         "Single moments",
-        ["log", "time\ns", "of the\nway"],
+        ["log", "begins\ns", "of the\nway", "it"],
         rows,
-        "At these a robot did not do in the next half second what was predicted; of the way: how "
-        "much of the predicted way it went. About 100 %: it went elsewhere, or turned.",
-        words=(0,),
+        "From these on a robot did not do what was predicted; of the way: how much of the "
+        "predicted way it went in the half second that was farthest off; negative: backwards.",
+        words=(0, 3),
     )
 
 
@@ -286,11 +294,13 @@ def terminal_explanation(
         not_written: said in the place of where the model was written.
     """
     return Group(
+        *([Text(result.now, show.STYLES["good"]), Text("Without it:")] if result.now else []),
         *_said(result.diagnosis),
         Text(),
         show.table(tables.steps(_labelled(result.steps))),
-        show.table(tables.parameters(result.parameters)),
+        *([show.table(tables.parameters(result.parameters))] if result.parameters else []),
         *(Text(line) for line in formula.taken(result.formula)),
+        *([Text(NOTHING_GAINED)] if not result.gained else []),
         Text(not_written or f"Written: {result.path}"),
         *_next(result.diagnosis, commands),
     )
@@ -341,10 +351,12 @@ def explanation_section(
     page = section(result.diagnosis, commands, result.steps)
     return replace(
         page,
+        verdict="\n".join([*([f"{result.now} Without it:"] if result.now else []), page.verdict]),
         tables=[*page.tables, tables.parameters(result.parameters)],
         notes=[
             *page.notes,
             *formula.taken(result.formula),
+            *([NOTHING_GAINED] if not result.gained else []),
             not_written or f"Written: `{result.path}`",
         ],
     )

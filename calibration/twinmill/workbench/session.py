@@ -176,15 +176,19 @@ class Session:
         self.measurements = before.excluding_wrong(
             [f for f in findings if f not in before.findings]
         )
-        if len(self.measurements) == len(before):
+        if [*map(id, self.measurements)] == [*map(id, before)]:
             return  # what is shown, or comes soon, stays
         places = {id(m): k for k, m in enumerate(self.measurements)}
         kept = {k: places[id(m)] for k, m in enumerate(before) if id(m) in places}
+        seen = {before[k].label for k in self.robots}
         self.robots = {kept[k]: view for k, view in self.robots.items() if k in kept}
         for known in (self._bits, self._settled, self._previews):
             known.clear()
         self.beside = None
         self.forget()
+        for k in self.unjudged:  # of which something was cut out
+            if self.measurements[k].label in seen:
+                self.judge(k)
 
     def conclude(self) -> None:
         """After the last robot: clocks that several share, and the score of all."""

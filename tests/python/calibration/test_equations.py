@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Formulas of one's own that make no sense: each is said in a sentence."""
 
+import numpy as np
 import pytest
 
+from twinmill.filters import filtered
 from twinmill.fitting.add import add
 from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.report import tables
+
+EULER_S = 1 / 480
+HEAT_S, LOSS_PER_HEAT = 6.0, 8.0  # of a robot that warms; s^2/m^2
 
 
 @pytest.fixture(scope="module")
@@ -94,3 +99,37 @@ def test_a_number_at_its_bound_is_told_as_such():
     cut = ParameterEstimate("equation.p0", -10.0, 20.0, "1", at_bound=True, seen=False)
     (row,) = tables.parameters([cut]).rows
     assert row[-1].text == "at its bound"
+
+
+@pytest.fixture(scope="module")
+def warming(tanh_robot, measure):
+    """Of a robot that loses speed with its heat, whose time constant is 6 s."""
+
+    class Warming(tanh_robot):
+        def hindered(self, motion):
+            keep = np.exp(-EULER_S / HEAT_S)
+            heat = filtered([1 - keep], [1, -keep], motion[:, :1] ** 2, axis=0)
+            return motion * np.hstack([1 - LOSS_PER_HEAT * heat, np.ones((len(heat), 2))])
+
+    return measure(Warming(), 6, 60.0)
+
+
+@pytest.mark.parametrize(
+    ("rate", "value"),
+    [
+        ("(vx*vx - s)*p1", 1 / HEAT_S),
+        ("(vx*vx - s)/p1", HEAT_S),
+        ("(s - vx*vx)*p1", -1 / HEAT_S),
+    ],
+)
+def test_a_number_in_a_rate_is_fitted_like_others(
+    rate, value, warming, one_clock_base, tmp_path, recwarn
+):
+    """However it is written, and whatever sign keeps the state from growing."""
+    texts = {"adds_to": "vx_mps", "formula": "p0*s*vx", "state_rate": rate}
+    out = tmp_path / "added.toml"
+    found = add("equation", [warming], one_clock_base, out=out, command="", texts=texts)
+    loss, own = (p for p in found.parameters if p.name in ("equation.p0", "equation.p1"))
+    assert own.value == pytest.approx(value, abs=max(3 * own.std, 0.1 * abs(value)))
+    assert loss.value == pytest.approx(-LOSS_PER_HEAT, abs=max(3 * loss.std, 0.1 * LOSS_PER_HEAT))
+    assert not [w for w in recwarn if issubclass(w.category, RuntimeWarning)]

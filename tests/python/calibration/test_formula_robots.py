@@ -159,10 +159,14 @@ def test_a_formula_of_the_moments_of_one_run_is_told_and_not_taken(explained):
     result = explained(switched, 101)
     assert result.diagnosis.rest.proven.names_time
     assert "one run" in result.formula.why_not and not result.formula.kept
+    assert result.formula.to_json()["share"] is None
+    assert result.sentence == result.diagnosis.sentence
     assert "equation" not in effect_names(ModelFile.load(str(result.path)).model)
 
 
 def test_moments_that_two_runs_share_are_taken(explained):
     result = explained(switched, 101, 102)
     assert result.formula.kept
+    assert result.sentence.startswith("The model now has the formula motion += ")
+    assert result.sentence.endswith(result.diagnosis.sentence)
     assert "equation" in effect_names(ModelFile.load(str(result.path)).model)

@@ -13,6 +13,7 @@ from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.findings import with_stale_numbers
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
+from twinmill.diagnosis.moments import Events
 from twinmill.diagnosis.notes import irregularity, is_random
 from twinmill.diagnosis.place import HORIZON, comes_again
 from twinmill.diagnosis.rest import FIRM, Dependence, Products, Rest, _standing_out, _tested
@@ -155,7 +156,7 @@ def test_what_is_no_more_than_the_noise_depends_on_nothing(score, random, told, 
     found = Rest(0.0, False, ["heading"])
     monkeypatch.setattr(rest, "_dependences", lambda *_, there: found)
     monkeypatch.setattr(rest, "_firm", lambda *_: False)
-    for name, nothing in (("moments_of", ()), ("comes_again", 0.0), ("formula_of", None)):
+    for name, nothing in (("events_of", Events()), ("comes_again", 0.0), ("formula_of", None)):
         monkeypatch.setattr(rest, name, lambda *_, nothing=nothing, **__: nothing)
     fit, first = SimpleNamespace(held_square=score**2, models=[]), SimpleNamespace(held_square=1.1)
     formulas = SimpleNamespace(logs=[])

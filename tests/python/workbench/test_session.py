@@ -207,6 +207,19 @@ def test_a_robot_that_the_checks_find_wrong_is_left_out_of_the_scores(session, c
         )
 
 
+def test_a_robot_of_which_a_while_is_cut_out_is_judged_without_it(session):
+    own = Session(session.paths, "model.toml")
+    own.read()
+    own.measure()
+    own.judge(0)
+    (run,) = own.measurements
+    cut_s = tuple(float(t) for t in run.track.pose_t_s[[400, 800]])
+    name, number = run.log_name, run.track.robot_id
+    own.exclude_wrong([InputFinding("mixed up", "so", "look", False, name, number, (cut_s,))])
+    starts_s = own.robots[0].opened.data.start_s
+    assert len(starts_s) and not ((starts_s > cut_s[0]) & (starts_s < cut_s[1])).any()
+
+
 def test_a_log_that_is_not_there_is_one_sentence(session):
     with pytest.raises(LogError, match="cannot be read"):
         Session([type(session.paths[0])("none.lcmlog")], "model.toml").read()

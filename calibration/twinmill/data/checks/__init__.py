@@ -15,6 +15,7 @@ from twinmill.data.checks.commands import (
     check_drift,
     check_drive,
     check_exchange,
+    check_foreign,
 )
 from twinmill.data.checks.finding import InputFinding
 from twinmill.data.checks.series import check_commanded, check_length, check_poses, check_track
@@ -82,6 +83,9 @@ def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFindin
             if checked.track.robot_id in who:
                 continue
             found += wrong
-            if not any(f.fatal for f in wrong) and not checked.track.same_clock:
+            if any(f.fatal for f in wrong):
+                continue
+            found += check_foreign(checked, search, explained)
+            if not checked.track.same_clock:
                 found += check_drift(checked, search, explained)
     return found

@@ -224,6 +224,12 @@ class Search:
         along = np.stack([self._sums(r * speeds[:, None]) for r in rows])
         return power, along, self._sums(np.sum(speeds**2, axis=1))
 
+    def beside(self, own: Explained) -> tuple[np.ndarray, np.ndarray]:
+        """(K, 3) measured and (K, SHAPES, 3) told velocities, of the columns as they are."""
+        begin_s, shapes = self.felt[own.lag_s]
+        told = begin_s, shapes @ self._weighted(self.wheels).T
+        return self._speeds(self.motion.body_mps(), 1), self.motion.at(told, own.late_s)
+
     def jump(self, own: Explained, fewest: int) -> Jump:
         """The two shifts that explain most, with a jump between two stretches.
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commands against poses: kind, signs, columns, axes, units, drifting clocks, exchanged names."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import twinmill_native as native
@@ -13,6 +13,7 @@ from twinmill.data.checks.alternatives import (
     wheel_alternatives,
 )
 from twinmill.data.checks.finding import InputFinding
+from twinmill.data.checks.foreign import foreign_stretches
 from twinmill.data.checks.motion import Motion
 from twinmill.data.checks.settings import CHECKS
 from twinmill.data.checks.words import described
@@ -312,6 +313,22 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
 
 def _pace(ratio: float) -> str:
     return f"the robot is {ratio:.3g} times as fast as its commands and its model say"
+
+
+def check_foreign(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
+    """Whiles whose commands are not those of the motion; they are to be cut out."""
+    found = foreign_stretches(checked.track, search, own)
+    if not found:
+        return []
+    when = " and ".join(f"from {begin_s:.1f} to {end_s:.1f} s" for begin_s, end_s in found)
+    told = checked.finding(
+        f"the commands {when} do not belong to the motion",
+        "the robot moves, and by no share of what it is told",
+        "it is not judged; look whether these commands were recorded in the order and of the robot "
+        "that drove them",
+        fatal=False,
+    )
+    return [replace(told, cut_s=tuple(found))]
 
 
 RATES_PPM = (-3000, -2000, -1000, -500, 0, 500, 1000, 2000, 3000)

@@ -14,6 +14,7 @@ class InputFinding:
         remedy: what to do.
         fatal: the log cannot be judged as it is; false where only something about it is lost.
         log_name, robot_id: whose; -1 where it is about all robots.
+        cut_s: stretches of capture's clock that are not to be judged.
     """
 
     what: str
@@ -22,6 +23,7 @@ class InputFinding:
     fatal: bool
     log_name: str = ""
     robot_id: int = -1
+    cut_s: tuple[tuple[float, float], ...] = ()
 
     def to_json(self) -> dict:
         """Fields of the interface."""

@@ -40,6 +40,14 @@ class CheckSettings(Numbers):
     least_ppm: float = number(870.0, "drift of clocks: less is for fits, robots imitate it ...")
     drift_sure: float = number(7.0, "... and so many standard errors")
 
+    # A while in which the motion has nothing to do with the commands.
+    foreign: float = number(0.7, "left by any share of the commands: they are not the motion's ...")
+    foreign_loses: float = number(0.5, "... left by the commands as elsewhere, in such a while ...")
+    foreign_moves: float = number(0.3, "... with so much of the squared motion that is told ...")
+    foreign_commands: int = number(6, "... and so many changes of the command ...")
+    foreign_s: float = number(6.0, "... in so long: a bump or a slip is shorter")
+    foreign_most: int = number(4, "whiles that are looked at")
+
     # Poses alone: axes, units, headings that are none, how much there is.
     leap_m: float = number(0.1, "from pose to pose, and soon back to a fifth of it ...")
     leaps: float = number(0.2, "... in so many of all: two robots under one number")

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the fit of a formula begins: its rates at the time constant that explains most.
+
+A number in a rate is a time constant or its inverse. Begun far off, or with the sign that lets the
+state grow, no fit finds it. So several are tried, and the sign that is stable is kept.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.fitting.equations import finite
+from twinmill.fitting.opening import Opened, judged
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.model.parameters import EFFECT_STEP, UNKNOWN, Parameter, words
+from twinmill.predict.datasets import Trajectory
+
+RATES = ("state_rate", "second_rate")
+TIMES_S = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+NEAR = 30.0  # times where it begins: beyond that a state is at once where it goes, or never
+ROUNDS = 3  # of the fit of the other numbers at each start
+
+
+def with_time_constants(
+    fresh: Sequence[Parameter], texts: dict[str, str], opened: Sequence[Opened]
+) -> list[Parameter]:
+    """A formula's numbers, those of its rates begun where the others then explain most.
+
+    As they were where there is no such number, or none of the starts keeps the state finite.
+
+    Args:
+        fresh: all numbers of the formula.
+        texts: of the formula.
+        opened: measurements with models that have it.
+    """
+    named = words(" ".join(texts.get(rate) or "" for rate in RATES))
+    timed = [p for p in fresh if p.name.rpartition(".")[2] in named]
+    others = [p for p in fresh if p not in timed]
+    known = judged(opened)
+    best, least = None, np.inf
+    for value in _starts() if timed else ():
+        begun = [_begun_at(p, value) for p in timed]
+        cost = _cost(known, begun, others)
+        if cost < least:
+            best, least = {p.name: p for p in begun}, cost
+    return [best.get(p.name, p) for p in fresh] if best else list(fresh)
+
+
+def _starts() -> list[float]:
+    """Rates and times, of both signs."""
+    sizes = sorted({*TIMES_S, *(1 / t for t in TIMES_S)})
+    return [sign * size for size in sizes for sign in (1.0, -1.0)]
+
+
+def _begun_at(p: Parameter, value: float) -> Parameter:
+    """The same, begun at a value, whose sign it keeps."""
+    ends = sorted((value / NEAR, value * NEAR))
+    size = abs(value)
+    return replace(
+        p,
+        value=value,
+        usual=value,
+        min=max(p.min, ends[0]),
+        max=min(p.max, ends[1]),
+        std=UNKNOWN * size,
+        step=EFFECT_STEP * size,
+    )
+
+
+def _cost(
+    known: Sequence[Opened], begun: Sequence[Parameter], others: Sequence[Parameter]
+) -> float:
+    """Of the data at these numbers, with the others fitted; infinite where a state grows."""
+    models = [o.model.copy() for o in known]
+    for model in models:
+        for p in (*begun, *others):
+            model.set(p.name, p.value)
+    data = [o.data for o in known]
+    if not all(finite(d, m) for d, m in zip(data, models, strict=True)):
+        return np.inf
+    fit = ScoreFit(data, models, _sized(data, models, others)).fit(ROUNDS)
+    cost = fit.cost(fit.state[0], fit.x)
+    return cost if np.isfinite(cost) else np.inf
+
+
+def sized(fresh: Sequence[Parameter], opened: Sequence[Opened]) -> list[Parameter]:
+    """Numbers of a formula with priors and steps by what changes predictions as much as they err.
+
+    In what unit a formula has them, and how large they are, nobody but it knows.
+    """
+    known = judged(opened)
+    return _sized([o.data for o in known], [o.model for o in known], fresh)
+
+
+def _sized(
+    data: Sequence[Trajectory], models: Sequence[native.Model], fresh: Sequence[Parameter]
+) -> list[Parameter]:
+    fit = ScoreFit(data, models, fresh)
+    rows, slopes = fit.state
+    errors = np.linalg.norm(np.concatenate(rows))
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        reaches = [errors / np.linalg.norm(_slopes_by(fit, slopes, p.name)) for p in fresh]
+    return [
+        replace(
+            p,
+            value=min(p.value, reach),
+            std=max(p.std, UNKNOWN * reach),
+            step=min(p.step, EFFECT_STEP * reach),
+        )
+        if 0 < reach < np.inf
+        else p
+        for p, reach in zip(fresh, reaches, strict=True)
+    ]
+
+
+def _slopes_by(fit: ScoreFit, slopes: Sequence[np.ndarray], name: str) -> np.ndarray:
+    """(R,) slopes of all data sets by a parameter; those that lack it are left out."""
+    own = [
+        s[:, names.index(name)] for s, names in zip(slopes, fit.names, strict=True) if name in names
+    ]
+    return np.concatenate([np.zeros(0), *own])
