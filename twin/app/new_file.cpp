@@ -13,8 +13,6 @@
 #include <string_view>
 #include <utility>
 
-#include "outputs.h"
-
 namespace twin
 {
 namespace
@@ -24,6 +22,11 @@ constexpr std::string_view kEnding = ".partial";
 constexpr mode_t kMode = 0644;
 
 }  // namespace
+
+std::string Exists(const std::string &option, const std::string &path)
+{
+    return option + " " + path + ": exists; choose another name, or replace it with --force";
+}
 
 NewFile::NewFile(std::string option, std::string path, bool force)
     : option_(std::move(option)),

@@ -8,6 +8,9 @@
 namespace twin
 {
 
+// The sentence on a file that is there and is not replaced.
+std::string Exists(const std::string &option, const std::string &path);
+
 class NewFile
 {
 public:

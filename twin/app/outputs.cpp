@@ -3,10 +3,12 @@
 
 #include <filesystem>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "behaviors.h"
 #include "key.h"
+#include "new_file.h"
 #include "outlet.h"
 
 namespace twin
@@ -67,11 +69,6 @@ void CheckPlace(const NamedFile &file, bool force)
 }
 
 }  // namespace
-
-std::string Exists(const std::string &option, const std::string &path)
-{
-    return option + " " + path + ": exists; choose another name, or replace it with --force";
-}
 
 void CheckOutputs(const Options &options)
 {

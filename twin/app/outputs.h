@@ -3,8 +3,6 @@
 #ifndef APP_OUTPUTS_H
 #define APP_OUTPUTS_H
 
-#include <string>
-
 #include "options.h"
 
 namespace twin
@@ -13,9 +11,6 @@ namespace twin
 // Before the long work. Throws std::runtime_error in one sentence if a file of the command line
 // cannot stand where it shall.
 void CheckOutputs(const Options &options);
-
-// The sentence on a file that is there and is not replaced.
-std::string Exists(const std::string &option, const std::string &path);
 
 }  // namespace twin
 
