@@ -14,7 +14,7 @@ import numpy as np
 from twinmill.diagnosis.acceptance import when_s
 from twinmill.diagnosis.constancy import Change, OneHeading
 from twinmill.diagnosis.finding import Finding, doubted
-from twinmill.diagnosis.rest import Rest
+from twinmill.diagnosis.rest import STEADY, Rest
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.search import PAUSE_S
 from twinmill.diagnosis.settings import SETTINGS
@@ -491,6 +491,16 @@ def _is_of_an_uneven_wheel(
     return doubted(finding, why, wrong_form=True)
 
 
+def _leaves_what_depends_on_speed(
+    finding: Finding, found: Sequence[Finding], rest: Rest
+) -> Finding | None:
+    """A weak wheel loses a share at all speeds: one that rubs leaves what depends on them."""
+    on = [g for g in rest.depends_on if g in STEADY and not rest.likely]
+    if finding.effect != "wheel_gain" or not on or rest.share <= SETTINGS.wheel_leaves:
+        return None
+    return doubted(finding, f"what is left depends on {on[0]}, as where a wheel rubs or slips")
+
+
 def _comes_and_goes(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
     """Losses come at several times, or as large ones at a place and at a moment."""
     losses = _alike_losses(found)
@@ -595,6 +605,7 @@ FORM_RULES = (
     _swings,
     _heading_is_late,
     _is_of_an_uneven_wheel,
+    _leaves_what_depends_on_speed,
     _comes_and_goes,
     _is_no_loss,
     _is_of_a_place_that_changes,

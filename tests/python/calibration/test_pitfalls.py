@@ -889,6 +889,18 @@ def test_a_rest_that_hardly_depends_on_what_an_effect_acts_by_leaves_it_its_form
 
 
 @pytest.mark.parametrize(
+    ("left", "on", "certainty"),
+    [(0.1, "speed", "doubtful"), (0.03, "speed", "sure"), (0.1, "heading", "sure")],
+)
+def test_a_weak_wheel_that_leaves_what_depends_on_speed_may_rub(left, on, certainty):
+    """A bearing takes the same speed at all speeds; a weak wheel is weak by a share."""
+    (judged,) = of_another_form(
+        [Finding("wheel_gain", None, [], 0.9, "sure")], Rest(left, True, [on])
+    )
+    assert judged.certainty == certainty
+
+
+@pytest.mark.parametrize(
     ("extra_s", "certainty"), [(-0.06, ["doubtful"] * 2), (0.06, ["sure", "doubtful"])]
 )
 def test_sooner_by_one_lag_and_later_by_another_is_no_lag(extra_s, certainty):
