@@ -417,6 +417,13 @@ def test_no_help_imports_what_only_work_needs():
         assert not set(modules) & {*HEAVY, "twinmill_native", "twinmill.model"}, words
 
 
+def test_a_diagnosis_begins_without_the_statistics_that_its_end_needs():
+    """They take as long to import as a log takes to read."""
+    code = "import sys, twinmill_cli.diagnose; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not set(done.stdout.split()) & {"scipy.stats", "scipy.optimize"}
+
+
 @pytest.mark.parametrize(
     ("typed", "completed"),
     [

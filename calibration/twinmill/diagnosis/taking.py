@@ -15,9 +15,10 @@ import twinmill_native as native
 from twinmill.diagnosis.forms import LEAST_DAMPED, MOST_DAMPED, MOST_NUMBERS, Form, tunable
 from twinmill.diagnosis.formula import Formula, Number
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.fitting.score_fit import NORMAL_95, ScoreFit
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import (
+    NORMAL_95,
     UNKNOWN,
     Parameter,
     ParameterEstimate,

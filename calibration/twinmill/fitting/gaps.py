@@ -10,8 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twinmill.model.parameters import ParameterEstimate
-from twinmill.model.ranges import NORMAL_95
+from twinmill.model.parameters import NORMAL_95, ParameterEstimate
 from twinmill.predict.datasets import Dataset, Trajectory
 from twinmill.predict.windows import EVERY_S, HORIZONS_S
 

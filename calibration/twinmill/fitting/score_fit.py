@@ -21,6 +21,7 @@ from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import (
     ALIGNMENT,
     NO_SIZE,
+    NORMAL_95,
     WHEEL_ANGLES,
     Parameter,
     ParameterEstimate,
@@ -41,7 +42,6 @@ LIMIT_STARTS = (np.geomspace(1 / 8, 8, 37), np.geomspace(1 / 1.1, 1.1, 7))  # fa
 ANGLES_RAD = np.radians(np.arange(-180.0, 180.0, 30.0))  # of wheels, where a fit may begin
 SEEN = 0.5  # times the prior's width: a wider estimate is the prior's
 AT_BOUND = 0.005  # share of the range
-NORMAL_95 = 1.96
 PASSING_S = 3.0  # of blocks, where all of an effect may lie within a usual one
 
 

@@ -16,6 +16,7 @@ CLOCK, CLOCK_RATE = "clock.offset_s", "clock.rate_ppm"
 HEADING = "frame.heading_rad"  # that a robot holds in a log that does not record it
 WHEEL_ANGLES = tuple(f"frame.wheel_{k}_rad" for k in range(4))  # at which the wheels begin a log
 ALIGNMENT = (CLOCK, CLOCK_RATE, HEADING, *WHEEL_ANGLES)  # of one log, not of a robot
+NORMAL_95 = 1.96  # standard errors to either side
 GAINS = ("theta_a1", "theta_a2")  # of one robot: speed, and rate of turn
 BASE_GAINS = ("base.forward_gain", "base.sideways_gain", "base.yaw_gain")
 LAG = "base.motor_lag_s"

@@ -9,9 +9,8 @@ import twinmill_native as native
 from scipy.stats import norm
 
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import effect_names
+from twinmill.model.parameters import NORMAL_95, effect_names
 
-NORMAL_95 = 1.96
 CUT = 0.005  # of a normal outside its bounds; less changes its mean by 1.5 % of its std, or less
 ROUNDS = 200  # of samples drawn anew because they were out of bounds
 SPREAD = {"theta_a1": "idiosyncrasy.theta_a1_std", "theta_a2": "idiosyncrasy.theta_a2_std"}

@@ -9,8 +9,8 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import NO_SIZE, catalogue_of, effect_names
-from twinmill.model.ranges import NORMAL_95, Quantity, ranges
+from twinmill.model.parameters import NO_SIZE, NORMAL_95, catalogue_of, effect_names
+from twinmill.model.ranges import Quantity, ranges
 from twinmill.swarm.matters.hidden import Hidden
 from twinmill.swarm.model_text import for_all_robots, with_effect, with_robot, with_values
 
