@@ -15,6 +15,7 @@ from twinmill.model.parameters import CLOCK
 REACH_S, STEP_S = 0.5, 0.025
 LEAST_S = 0.05  # two steps: a smaller change is no news
 FEWEST = 20  # predictions on either side
+LEAVES = 0.5  # of the squared error that one lateness of the whole log leaves: more is no change
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ class Later:
 def later_from(own: Opened, model: native.Model) -> tuple[Later, np.ndarray] | None:
     """The change of lateness that explains a log best, and the (W, H, 3) errors with it.
 
-    None where it changes by too little.
+    None where it changes by too little, or takes too little: an event that passes has a lateness
+    that suits it best, too.
     """
     data = own.data.over(own.data.floor, np.ones(len(own.data.keep), bool))
     clock_s = model.get(CLOCK)
@@ -63,7 +65,8 @@ def later_from(own: Opened, model: native.Model) -> tuple[Later, np.ndarray] | N
     k = FEWEST + int((before + after)[inside].argmin())
     first, then = squares[:, k].argmin(), (squares[:, -1] - squares[:, k]).argmin()
     later_s = float(shifts_s[then] - shifts_s[first])
-    if abs(later_s) < LEAST_S:
+    most = LEAVES * float(squares[:, -1].min())
+    if abs(later_s) < LEAST_S or (before + after)[k] > most:
         return None
     late, errors = model.copy(), []
     for shift_s in (shifts_s[first], shifts_s[then]):
