@@ -84,11 +84,6 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
     logs = [i for i, d in enumerate(fit.datasets) if isinstance(d, Trajectory)]
     instances = set(effect_names(trial.state.model))
     named = [(u.parameter.name.split(".")[0], u.parameter.role) for u in fit.unknowns]
-    late = {
-        c
-        for c, (name, role) in enumerate(named)
-        if role == "lateness" or name.split("#")[0] in needing("clocks")
-    }
     sizes = {
         c: name
         for c, (name, role) in enumerate(named)
@@ -98,7 +93,7 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
         return {}
     left, columns, blocks = fit.whitened(logs)
     basis = np.linalg.qr(np.vstack([columns, np.diag(1 / fit.std)]))[0]
-    doing = [_doing(fit.datasets[i]) | _rims(fit.datasets[i], fit.models[i]) for i in logs]
+    doing = [_doing(fit.datasets[i], fit.models[i]) for i in logs]
     found: dict[str, Change | OneHeading] = {}
     rows = [fit.datasets[i].measured[0].size for i in logs]
 
@@ -116,11 +111,8 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
             found[instance] = OneHeading()
     for on, way in [key for key in doing[0] if all(key in d for d in doing)]:
         values = done((on, way))
-        of_places = needing("places") if on == PLACE else ()
         for c, instance in sizes.items():
-            if instance.split("#")[0] in of_places or (c in late and on != TIME):
-                continue
-            if on == RIM and not fit.unknowns[c].parameter.name.endswith(f"{WHEELS}.{way}"):
+            if not _may_change(fit.unknowns[c].parameter, on, way):
                 continue
             change = _change(
                 trial=trial,
@@ -137,7 +129,18 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
     return found
 
 
-def _doing(data: Trajectory) -> dict[tuple[str, str], np.ndarray]:
+def _may_change(parameter: Parameter, on: str, way: str) -> bool:
+    """Whether a change of a number with something tells that it is not one number."""
+    instance, key = parameter.name.split(".", 1)
+    effect = instance.split("#")[0]
+    if on == RIM:
+        return (effect, key) == (WHEELS, way)
+    if on == PLACE and effect in needing("places"):
+        return False
+    return on == TIME or not (parameter.role == "lateness" or effect in needing("clocks"))
+
+
+def _doing(data: Trajectory, model: native.Model) -> dict[tuple[str, str], np.ndarray]:
     """(W,) of each thing that a parameter may change with, and of each way in which it may."""
     moved = np.nan_to_num(data.measured[:, HORIZON]) / HORIZONS_S[HORIZON]
     track = data.measurement.track
@@ -158,15 +161,10 @@ def _doing(data: Trajectory) -> dict[tuple[str, str], np.ndarray]:
         found["duty", ""] = np.abs(command_at(middle_s, track.command_t_s, track.command)).max(
             axis=1
         )
-    return found
-
-
-def _rims(data: Trajectory, model: native.Model) -> dict[tuple[str, str], np.ndarray]:
-    """(W,) of each wheel: how fast it turned, as the captured motion rolls it, rad/s."""
-    moved = np.nan_to_num(data.measured[:, HORIZON]) / HORIZONS_S[HORIZON]
     rates = np.array([model.wheel_speeds(*axis) for axis in np.eye(3)])
-    rims = np.abs(moved @ rates).T
-    return {(RIM, w["name"]): rim for w, rim in zip(model.wheels(), rims, strict=True)}
+    for wheel, rim in zip(model.wheels(), np.abs(moved @ rates).T, strict=True):
+        found[RIM, wheel["name"]] = rim  # as the captured motion rolls it, rad/s
+    return found
 
 
 def _change(
@@ -209,9 +207,7 @@ def _size(trial: Trial, parameter: Parameter) -> float:
     instance, away = parameter.name.split(".")[0], []
     for u, value in zip(trial.fit.unknowns, trial.fit.x, strict=True):
         p = u.parameter
-        if p.name.split(".")[0] == instance and (p.role, p.unit) == (
-            parameter.role,
-            parameter.unit,
-        ):
+        alike = (p.role, p.unit) == (parameter.role, parameter.unit)
+        if alike and p.name.split(".")[0] == instance:
             away.append(abs(value - p.usual))
     return max(away)

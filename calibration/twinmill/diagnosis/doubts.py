@@ -87,7 +87,7 @@ def of_one(
         return doubt
     if change:
         return change.why
-    if _is_as_good_as_stale_numbers(done, name):
+    if name != REFIT and any(t.names == (REFIT,) for t in done.imitators_of(name)):
         return "other numbers of the base take nearly as much, and the errors left are no noise"
     if (
         done.last.fit.chance_of_none(newest_instance(done.last.state.model, name))
@@ -315,16 +315,6 @@ def _beats(done: Search, one: Trial, other: Trial) -> bool:
     evidence, without_best, _ = one.fit.against(other.fit)
     least = done.settings
     return evidence > least.evidence and without_best > least.without_best
-
-
-def _is_as_good_as_stale_numbers(done: Search, name: str) -> bool:
-    """Whether the base's numbers alone took as much, and even the final model misses by far."""
-    this = done.round_of(name)
-    if done.last.held_score <= SETTINGS.misses or name == REFIT:
-        return False
-    before = this.before.held_score**2
-    least = before - SETTINGS.imitates * (before - this.accepted.held_score**2)
-    return any(t.names == (REFIT,) and t.held_score**2 < least for t in this.trials)
 
 
 def _same(

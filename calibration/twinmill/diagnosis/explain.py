@@ -61,11 +61,8 @@ class Explanation:
     @property
     def sentence(self) -> str:
         """What the model has now, where that is a formula, before what was missing."""
-        return (
-            f"{self.now} Without it: {self.diagnosis.sentence}"
-            if self.now
-            else (self.diagnosis.sentence)
-        )
+        missing = self.diagnosis.sentence
+        return f"{self.now} Without it: {missing}" if self.now else missing
 
     @property
     def now(self) -> str:

@@ -315,22 +315,14 @@ def _squared(trial: Trial) -> float:
 
 
 def _rivals(done: Search, name: str) -> list[Trial]:
-    """Trials that the data could not tell from this effect's, unless they were found besides.
-
-    Where even the final model misses by far, its errors are no noise, and a few percent between two
-    effects decide nothing.
-    """
+    """Trials that the data could not tell from this effect's, unless they were found besides."""
     this = done.round_of(name)
     rivals = list(this.tied)
-    if done.last.held_score > SETTINGS.misses and len(this.accepted.names) == 1 and name != REFIT:
-        fall = this.before.held_score**2 - this.accepted.held_score**2
+    if this.accepted.names == (name,) and name != REFIT:
         rivals += [
             t
-            for t in this.trials
-            if not any(t is r for r in (*this.tied, this.accepted))
-            and len(t.names) == 1
-            and t.names != (REFIT,)
-            and this.before.held_score**2 - t.held_score**2 > done.settings.imitates * fall
+            for t in done.imitators_of(name)
+            if not any(t is r for r in this.tied) and len(t.names) == 1 and t.names != (REFIT,)
         ]
     return [t for t in rivals if not set(t.names) & set(done.found)][: done.settings.group - 1]
 

@@ -123,7 +123,7 @@ def events_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> Event
         if events and (change := later_from(own, model)) and not _several(own, change[1]):
             later.append(change[0])
         elif events:
-            moments += _of_log(own, model, errors, events)
+            moments += _of_log(own, errors, events)
     return Events(tuple(moments), tuple(later))
 
 
@@ -138,11 +138,9 @@ def _several(own: Opened, errors: np.ndarray) -> list[np.ndarray]:
     return events if _weight(events, data.start_s) >= SETTINGS.several else []
 
 
-def _of_log(
-    own: Opened, model: native.Model, errors: np.ndarray, events: Sequence[np.ndarray]
-) -> list[Moment]:
+def _of_log(own: Opened, errors: np.ndarray, events: Sequence[np.ndarray]) -> list[Moment]:
     data = own.data
-    every = _ways(own, model)
+    every = _ways(data, errors)
     faint = all(abs(np.nanmedian(every[event]) - 1) < HARDLY for event in events)
     if faint and _weight(events, data.start_s) < 2 * SETTINGS.several:
         return []
@@ -234,16 +232,11 @@ def left_out(own: Opened) -> list[Stretch]:
     return found
 
 
-def _ways(own: Opened, model: native.Model) -> np.ndarray:
-    """(W,) share of the predicted way that was gone in half a second."""
-    predicted = own.data.windows.predicted(own.measurement, model)
-    return _way(own.data.measured[:, HORIZON], predicted[:, HORIZON])
-
-
-def _way(measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
-    """(W,) measured way along the predicted one, over that, of (W, 3) displacements."""
-    m, p = (np.nan_to_num(d) * ARM for d in (measured, predicted))
-    return np.sum(m * p, axis=1) / np.maximum(np.sum(p * p, axis=1), 1e-12)
+def _ways(data: Trajectory, errors: np.ndarray) -> np.ndarray:
+    """(W,) share of the predicted way that was gone along it in half a second."""
+    measured, missed = (np.nan_to_num(d[:, HORIZON]) * ARM for d in (data.measured, errors))
+    predicted = measured - missed
+    return np.sum(measured * predicted, axis=1) / np.maximum(np.sum(predicted**2, axis=1), 1e-12)
 
 
 def sentence(moments: Sequence[Moment]) -> str:

@@ -49,6 +49,19 @@ class Search:
         """The last round in which an effect was accepted."""
         return next(r for r in reversed(self.rounds) if r.accepted and name in r.accepted.names)
 
+    def imitators_of(self, name: str) -> list[Trial]:
+        """Other trials of its round that took nearly as much, where the final model misses by far.
+
+        Then its errors are no noise, and a few percent between two trials decide nothing.
+        """
+        this = self.round_of(name)
+        if self.last.held_score <= self.settings.misses:
+            return []
+        before = this.before.held_score**2
+        least = self.settings.imitates * (before - this.accepted.held_score**2)
+        others = [t for t in this.trials if t is not this.accepted]
+        return [t for t in others if before - t.held_score**2 > least]
+
     @property
     def faint(self) -> list[tuple[str, str]]:
         """Effects that could be there and not be seen, and why; none that a trial made likely."""
