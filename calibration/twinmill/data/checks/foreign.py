@@ -69,7 +69,7 @@ def _largest_rise(values: np.ndarray) -> slice:
 
 def foreign_stretches(track: Track, search: Search, own: Explained) -> list[tuple[float, float]]:
     """From the first command that is not followed to one that is again, s of capture's clock."""
-    compared = Compared.of(search, own)
+    compared, changes_s = Compared.of(search, own), _changes_s(track) + own.late_s  # as felt
     t_s, free, found = compared.t_s, np.ones(len(compared.t_s), bool), []
     for _ in range(CHECKS.foreign_most):
         part = compared.worst(free)
@@ -77,8 +77,9 @@ def foreign_stretches(track: Track, search: Search, own: Explained) -> list[tupl
             break
         free[part] = False
         begin_s, end_s = t_s[part.start], t_s[part.stop - 1]
-        if _is_foreign(compared, part, _changes(track, begin_s - own.late_s, end_s - own.late_s)):
-            found.append(_between_commands(track, begin_s, end_s, own.late_s))
+        within = np.count_nonzero((changes_s > begin_s) & (changes_s < end_s))
+        if _is_foreign(compared, part, within):
+            found.append(_between_commands(changes_s, begin_s, end_s))
     follows = np.ones(len(t_s), bool)
     for begin_s, end_s in found:
         follows &= (t_s < begin_s) | (t_s > end_s)
@@ -97,20 +98,14 @@ def _is_foreign(compared: Compared, part: slice, changes: int) -> bool:
     )
 
 
-def _changes(track: Track, begin_s: float, end_s: float) -> int:
-    """How many commands within a time are not the one before."""
-    changed = (np.diff(track.command, axis=0) != 0).any(axis=1)
-    at_s = track.command_t_s[1:][changed]
-    return int(np.sum((at_s > begin_s) & (at_s < end_s)))
+def _changes_s(track: Track) -> np.ndarray:
+    """Robot's clock, when a command is not the one before."""
+    return track.command_t_s[1:][(np.diff(track.command, axis=0) != 0).any(axis=1)]
 
 
-def _between_commands(
-    track: Track, begin_s: float, end_s: float, late_s: float
-) -> tuple[float, float]:
+def _between_commands(changes_s: np.ndarray, begin_s: float, end_s: float) -> tuple[float, float]:
     """From the change of the command at or before a stretch to the one at or after it."""
-    changed = (np.diff(track.command, axis=0) != 0).any(axis=1)
-    at_s = track.command_t_s[1:][changed] + late_s
-    before, after = at_s[at_s <= begin_s], at_s[at_s >= end_s]
+    before, after = changes_s[changes_s <= begin_s], changes_s[changes_s >= end_s]
     first_s = before[-1] if len(before) else begin_s
     last_s = after[0] if len(after) else end_s
     return float(first_s), float(last_s + FEEL_S)
