@@ -113,6 +113,19 @@ def seen_once(done: Search, name: str, less: Trial | None) -> list[str] | None:
     return [n for n in _same(done, name) if with_role(n, "moment")]
 
 
+def instead_over_time(done: Search, name: str) -> list[str]:
+    """Effects that change with the time as one does that is of no moment, and might do more.
+
+    They end at their bound, and something is left beside the one that was found: with a larger
+    size, or in another form, they may leave less.
+    """
+    if not _is_timed(name) or with_role(name, "moment") or done.last.held_score < SETTINGS.level:
+        return []
+    this = done.round_of(name)
+    bounded = {t.names[0] for t in this.trials if any(e.at_bound for e in estimates_of(t, t.names[0]))}
+    return [n for n in _same(done, name) if n in bounded and _is_timed(n)]
+
+
 def instead_of_moment(done: Search, name: str) -> list[str]:
     """Effects that do the same as one of a moment.
 

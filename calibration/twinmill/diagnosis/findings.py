@@ -9,7 +9,14 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.constancy import Change, OneHeading, changes_of
-from twinmill.diagnosis.doubts import beside_larger, instead_of_moment, of_one, seen_once, stand_in
+from twinmill.diagnosis.doubts import (
+    beside_larger,
+    instead_of_moment,
+    instead_over_time,
+    of_one,
+    seen_once,
+    stand_in,
+)
 from twinmill.diagnosis.finding import Finding, Late, Ranked, doubted
 from twinmill.diagnosis.rounds import Round, Search
 from twinmill.diagnosis.search import comes_again
@@ -345,7 +352,7 @@ def _finding(
     instance = newest_instance(done.last.state.model, name)
     instead = seen_once(done, name, less)
     tied = [n for t in _rivals(done, name) for n in t.names]
-    tied += [*(instead or ()), *instead_of_moment(done, name)]
+    tied += [*(instead or ()), *instead_of_moment(done, name), *instead_over_time(done, name)]
     tied = list(dict.fromkeys(tied))[: done.settings.group - 1]
     group = (name, *tied) if tied else None
     doubt = of_one(done, name, own, changes.get(instance))
