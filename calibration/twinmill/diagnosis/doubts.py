@@ -121,8 +121,8 @@ def instead_over_time(done: Search, name: str) -> list[str]:
     """
     if not _is_timed(name) or with_role(name, "moment") or done.last.held_score < SETTINGS.level:
         return []
-    this = done.round_of(name)
-    bounded = {t.names[0] for t in this.trials if any(e.at_bound for e in estimates_of(t, t.names[0]))}
+    named = [(t, t.names[0]) for t in done.round_of(name).trials]
+    bounded = {n for t, n in named if any(e.at_bound for e in estimates_of(t, n))}
     return [n for n in _same(done, name) if n in bounded and _is_timed(n)]
 
 

@@ -130,9 +130,10 @@ def events_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> Event
 def _several(own: Opened, errors: np.ndarray) -> list[np.ndarray]:
     """Windows of each event, where these are so many that they are no accident; else none."""
     data = own.data
+    moved = data.measured - errors
     missed = np.flatnonzero(
-        is_far(errors, data.floor, SETTINGS.far)
-        & (is_far(own.floor.across, data.floor, SETTINGS.far) | ~own.floor.keep)
+        is_far(errors, data.floor, SETTINGS.far, moved)
+        & (is_far(own.floor.across, data.floor, SETTINGS.far, moved) | ~own.floor.keep)
     )
     events = _events(missed, data.start_s)
     return events if _weight(events, data.start_s) >= SETTINGS.several else []
@@ -174,7 +175,7 @@ def _far_at(data: Trajectory, errors: np.ndarray, horizon: int) -> np.ndarray:
     seen = np.isfinite(errors[:, horizon]).any(axis=0) & np.isfinite(floor[0]) & (floor[0] > 0)
     if not seen.any():
         return np.zeros(len(errors), bool)
-    return is_far(errors[:, [horizon]], floor, SETTINGS.far)
+    return is_far(errors[:, [horizon]], floor, SETTINGS.far, (data.measured - errors)[:, [horizon]])
 
 
 def _done(data: Trajectory, errors: np.ndarray, event: np.ndarray) -> tuple[float, What]:
@@ -217,14 +218,15 @@ def _lasts(event: np.ndarray, start_s: np.ndarray) -> bool:
 
 
 def left_out(own: Opened) -> list[Stretch]:
-    """Stretches of a second or more that the floor left out as disturbed."""
+    """Stretches of a second or more that the floor left out as disturbed, and the model misses."""
     gone = np.flatnonzero(~own.floor.keep)
     if not len(gone):
         return []
     data = own.data
     errors, found = data.errors(own.model), []
+    missed = is_far(errors, data.floor, SETTINGS.far, data.measured - errors)
     for part in _events(gone, data.start_s):
-        if _lasts(part, data.start_s):
+        if _lasts(part, data.start_s) and missed[part].any():
             first_s, end_s = data.start_s[part[[0, -1]]]
             begin_s = _begin_s(data, errors, part)
             begin_s = begin_s if begin_s < end_s else float(first_s)

@@ -39,6 +39,8 @@ from twinmill.predict.windows import HORIZONS_S, rms
 HORIZON = HORIZONS_S.index(0.5)
 PAUSE_S = 2.5  # between the starts of windows of two disturbances; a robot may rest meanwhile
 ARM_M = 0.1  # a turn counts as the way of a point so far from the middle
+LOOKS = 3  # at most, for what a disturbance hides
+WAYS = 5  # parts of the windows by their way, of each of which the median error is taken
 REACH_S = 1.0  # delays and offsets that are looked for
 
 
@@ -90,10 +92,8 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     offset_s = base.get(CLOCK)
     response = Response(data, velocity, base.get(LAG), offset_s)
     response.boost(list(place_gains(response.motion)))
-    far = is_far(response.across, response.errors, FLOOR_SETTINGS.bump_part)
-    calm = _without_bumps(data, response, far)
-    if not calm.all():
-        response = response.of_windows(calm)
+    moved = data.measured - data.errors(base)
+    response, calm, far = _calm(data, response, moved)
     points = response.points
     known = known_physics(base, velocity[points], lambda m: body_velocities_at(data, m, points))
     response.find_wheels(base)
@@ -110,7 +110,7 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     moves = rms(data.measured) > 1e-9
     return NoiseFloor(
         rms=np.where(moves, np.maximum(floor, 1e-9), np.nan),
-        keep=calm | _lasting(data, base, ~calm | far),
+        keep=calm | _lasting(data, moved, ~calm | far),
         kind="response",
         reason="",
         offset_s=offset_s,
@@ -224,53 +224,109 @@ def _acts(data: Trajectory, name: str) -> bool:
     return bool(track.command[:, BASE_GAINS.index(name)].any())
 
 
-def _without_bumps(data: Trajectory, response: Response, far: np.ndarray) -> np.ndarray:
+def _calm(
+    data: Trajectory, response: Response, moved: np.ndarray
+) -> tuple[Response, np.ndarray, np.ndarray]:
+    """The response without disturbances, (W,) windows that hold none, and those that are far off.
+
+    Large errors hide smaller ones, such as of a prediction that just reaches into a disturbance:
+    what is far off beside it is looked for again.
+    """
+    far = is_far(response.across, response.errors, FLOOR_SETTINGS.bump_part, moved)
+    calm = _without_bumps(data, response, far, moved)
+    if calm.all():
+        return response, calm, far
+    near, response = _near(data, ~calm), response.of_windows(calm)
+    for _ in range(LOOKS):
+        hidden = is_far(response.across, response.errors, FLOOR_SETTINGS.bump_part, moved)
+        hidden &= calm & near
+        if not hidden.any() or (hidden | ~calm).mean() >= FLOOR_SETTINGS.rare_bumps:
+            break
+        calm, far = calm & ~hidden, far | hidden
+        response = response.of_windows(calm)
+    return response, calm, far
+
+
+def _without_bumps(
+    data: Trajectory, response: Response, far: np.ndarray, moved: np.ndarray
+) -> np.ndarray:
     """(W,) windows without disturbances, nor a part of one, which is `far` (W,) off.
 
     A robot that is disturbed often is so by itself: the parts are left in.
     """
-    disturbed = is_far(response.across, response.errors, FLOOR_SETTINGS.bump)
+    disturbed = is_far(response.across, response.errors, FLOOR_SETTINGS.bump, moved)
     if not disturbed.any() or disturbed.mean() > FLOOR_SETTINGS.most_bumps:
         return np.ones(len(disturbed), bool)
-    apart_s = np.abs(data.start_s[:, None] - data.start_s[disturbed]).min(axis=1)
-    parts = far & (apart_s < HORIZONS_S[-1])
+    parts = far & _near(data, disturbed)
     rare = (disturbed | parts).mean() < FLOOR_SETTINGS.rare_bumps
     return ~disturbed & ~parts if rare else ~disturbed
 
 
-def _lasting(data: Trajectory, base: native.Model, far: np.ndarray) -> np.ndarray:
+def _near(data: Trajectory, disturbed: np.ndarray) -> np.ndarray:
+    """(W,) windows that may overlap one of those that are disturbed."""
+    apart_s = np.abs(data.start_s[:, None] - data.start_s[disturbed])
+    return apart_s.min(axis=1) < HORIZONS_S[-1]
+
+
+def _lasting(data: Trajectory, moved: np.ndarray, far: np.ndarray) -> np.ndarray:
     """(W,) windows that are off by no bump: for a while all of the motion is less, or more.
 
     Disturbed ones tell nothing of the noise, and are judged. `far` (W,) are off at all.
     """
     found = np.zeros(len(far), bool)
-    measured, errors = (e[:, HORIZON] * (1, 1, ARM_M) for e in (data.measured, data.errors(base)))
+    measured, predicted = (d[:, HORIZON] * (1, 1, ARM_M) for d in (data.measured, moved))
+    missed = measured - predicted
     index = np.flatnonzero(far & np.isfinite(measured).all(axis=1))
     for part in np.split(index, 1 + np.flatnonzero(np.diff(data.start_s[index]) > PAUSE_S)):
         if len(part) and np.ptp(data.start_s[part]) >= FLOOR_SETTINGS.lasts_s:
-            own, missed = measured[part], errors[part]
-            predicted = own - missed
-            share = np.sum(own * predicted) / max(np.sum(predicted**2), 1e-12)
-            left = np.sum((own - share * predicted) ** 2) / max(np.sum(missed**2), 1e-12)
+            own, told = measured[part], predicted[part]
+            share = np.sum(own * told) / max(np.sum(told**2), 1e-12)
+            left = np.sum((own - share * told) ** 2) / max(np.sum(missed[part] ** 2), 1e-12)
             low, high = FLOOR_SETTINGS.least_way, 2 - FLOOR_SETTINGS.least_way
             found[part] = low < share < high and left < FLOOR_SETTINGS.uneven
     return found
 
 
-def is_far(errors: np.ndarray, floor: np.ndarray, times: float) -> np.ndarray:
-    """(W,) windows whose mean squared error over the floor is so many times the median.
+def is_far(errors: np.ndarray, floor: np.ndarray, times: float, moved: np.ndarray) -> np.ndarray:
+    """(W,) windows whose mean squared error over the floor is so many times the usual one.
+
+    A robot that stands most of the time is not disturbed whenever it drives: of those that move
+    farther more is usual, where more is missed by most of them.
 
     Args:
         errors: (W, H, 3); NaN where nothing was measured.
         floor: (H, 3); not judged where it is 0, NaN or infinite.
         times: the limit.
+        moved: (W, H, 3) predicted displacements.
     """
-    judged = np.isfinite(floor) & (floor > 1e-9)
-    with np.errstate(all="ignore"):
-        over = np.where(judged, (errors / floor) ** 2, np.nan)
-        counts = np.isfinite(over).sum(axis=(1, 2))
-        mean = np.nansum(over, axis=(1, 2)) / np.where(counts, counts, np.nan)
-    return mean > times * np.nanmedian(mean)
+    floor = np.where(np.isfinite(floor) & (floor > 1e-9), floor, np.nan)
+    size = np.where(rms(moved) > 0, rms(moved), np.nan)
+    missed, ways = errors / floor, moved / size
+    ways = np.where(np.isfinite(missed), ways, np.nan)
+    missed, way = _mean_square(missed), _mean_square(ways)
+    return missed > times * _usual(missed, way)
+
+
+def _mean_square(over: np.ndarray) -> np.ndarray:
+    """(W,) of what is finite; NaN where nothing is."""
+    counts = np.isfinite(over).sum(axis=(1, 2))
+    return np.nansum(over**2, axis=(1, 2)) / np.where(counts, counts, np.nan)
+
+
+def _usual(missed: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """(W,) of the squares that are usual at such squares of the way: medians, in a line.
+
+    Nowhere less than the median of all.
+    """
+    usual = np.full(len(missed), np.nanmedian(missed))
+    both = np.flatnonzero(np.isfinite(missed) & np.isfinite(way))
+    if len(both) < FLOOR_SETTINGS.fewest_windows:
+        return usual
+    parts = np.array_split(both[np.argsort(way[both])], WAYS)
+    at, medians = np.array([(way[p].mean(), np.median(missed[p])) for p in parts]).T
+    away = at - at.mean()
+    slope = away @ medians / max(away @ away, 1e-12)
+    return np.fmax(usual, medians.mean() + slope * (way - at.mean())) if slope > 0 else usual
 
 
 def too_poor(data: Trajectory) -> str:

@@ -12,6 +12,7 @@ import pytest
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import make_track
 from twinmill.fitting.compare import compare
+from twinmill.fitting.floor import is_far
 from twinmill.fitting.opening import open_measurements
 from twinmill.predict.windows import difference, rms
 
@@ -134,6 +135,42 @@ def test_what_lasts_is_judged(until_s, share, judged, tanh_robot, measure, model
     (opened,) = open_measurements([measure(Tired(), 2, 100.0)], model_file())
     inside = (opened.data.start_s > 39.5) & (opened.data.start_s < until_s)
     assert opened.floor.keep[inside].all() == judged
+
+
+@pytest.mark.parametrize("held_s", [1.0, 2.0, 5.0])
+def test_a_robot_that_is_held_once_has_no_higher_floor_than_one_that_is_not(
+    held_s, tanh_robot, measure, model_file
+):
+    """Predictions that just reach into what happens are no noise of the robot either."""
+
+    class Held(tanh_robot):
+        def hindered(self, motion):
+            at_s = np.arange(len(motion)) * EULER_S
+            held = (at_s > 40) & (at_s < 40 + held_s)
+            return np.where(held[:, None], 0.0, motion)
+
+    floors = [
+        open_measurements([measure(robot, 2, 100.0)], model_file())[0].floor.rms
+        for robot in (Held(), tanh_robot())
+    ]
+    assert np.all(floors[0] < 1.4 * floors[1])
+
+
+@pytest.mark.parametrize(("share", "far"), [(0.15, False), (0.0, True)])
+def test_only_what_is_unlike_the_other_ways_is_a_disturbance(share, far):
+    """A robot that stands four fifths of the time, and misses a share of its way while it drives.
+
+    A miss of 15 mm is usual where it misses a share of 0.15, and far where all is noise of 1 mm;
+    one of all of the way is far in both.
+    """
+    random = np.random.default_rng(3)
+    moved, noise_m = np.zeros((200, 1, 3)), 1e-3
+    moved[::5, 0, 0] = random.uniform(0.05, 0.15, 40)
+    errors = random.normal(0, noise_m, moved.shape) + random.normal(0, share, moved.shape) * moved
+    errors[5, 0, 0], errors[10, 0, 0] = 0.015, moved[10, 0, 0]
+    found = is_far(errors, np.full((1, 3), noise_m), 20.0, moved)
+    assert found[10] and found[5] == far
+    assert found.sum() == 1 + far
 
 
 def test_the_right_model_scores_one_and_a_wrong_one_more(drive, true_model, model_file):

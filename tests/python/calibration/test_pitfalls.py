@@ -519,8 +519,13 @@ def test_moments_that_hardly_change_the_way_must_be_many(count, way, windows, to
     monkeypatch.setattr(moments, "_begin_s", lambda *_: 0.0)
     monkeypatch.setattr(moments, "_done", lambda *_: (way, "less"))
     measurement = SimpleNamespace(log_name="run", track=SimpleNamespace(robot_id=1))
+    nothing = np.zeros((400, 5, 3))
     data = SimpleNamespace(
-        measurement=measurement, start_s=0.25 * np.arange(400), floor=None, errors=lambda _: None
+        measurement=measurement,
+        start_s=0.25 * np.arange(400),
+        floor=None,
+        measured=nothing,
+        errors=lambda _: nothing,
     )
     floor = SimpleNamespace(across=None, keep=np.ones(400, bool))
     found = moments.events_of([SimpleNamespace(data=data, floor=floor)], [None])

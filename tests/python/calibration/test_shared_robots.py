@@ -163,10 +163,12 @@ def test_robots_told_velocities_are_slow_and_late(hera):
     """README: gain 0.72 of all, lag and delay 0.33 s in all, under one turn of the frame.
 
     Regressions with a turn for each robot and run, by quarters of the runs: gain 0.74 to 0.82, lag
-    and delay 0.20 to 0.34 s.
+    and delay 0.20 to 0.34 s. A ramp up to their limit of 0.4 m/s is late by half the time it takes.
     """
     assert hera.verdict in ("effect_missing", "ambiguous", "refit_enough")
-    assert 0.2 <= hera.late.sum_s <= 0.4
+    ramp = "acceleration_limit.pace_s2_per_m"
+    ramp_s = hera.model.get(ramp) * 0.4 / 2 if "acceleration_limit" in hera.found else 0.0
+    assert 0.2 <= hera.late.sum_s + ramp_s <= 0.4
     assert {"motor_lag", "input_delay"} & set(hera.found)
     gains = [hera.model.get(f"base.{k}_gain") for k in ("forward", "sideways")]
     assert all(0.6 < g < 0.85 for g in gains)
