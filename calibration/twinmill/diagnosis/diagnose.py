@@ -348,7 +348,8 @@ def _concluded(
     rest = rest.at_few_commands() if few else rest
     findings = _beside_formula(findings, last, rest, len(set(hashes)))
     cards = catalogue_of(last.state.model)
-    findings = of_many(beside_more(of_another_form(findings, rest), rest, cards))
+    findings = beside_more(of_another_form(findings, rest), rest, cards, last.held_score)
+    findings = of_many(findings)
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
     rest = rest.with_findings(findings)

@@ -663,7 +663,9 @@ def _when_s(finding: Finding) -> list[float]:
     return [e.value for e in finding.parameters if e.name.split(".", 1)[1] in keys]
 
 
-def beside_more(found: Sequence[Finding], rest: Rest, cards: Mapping[str, dict]) -> list[Finding]:
+def beside_more(
+    found: Sequence[Finding], rest: Rest, cards: Mapping[str, dict], score: float
+) -> list[Finding]:
     """Findings, doubtful where much is left, or more than all of them take, and it is no noise.
 
     A lag is doubtful where much is left at all: something else at changes of the command is late,
@@ -673,6 +675,7 @@ def beside_more(found: Sequence[Finding], rest: Rest, cards: Mapping[str, dict])
         found: in the order of worth.
         rest: what is left.
         cards: of effects, with the parameters that this robot's wheels have.
+        score: held out, of the model with all of them.
     """
     alone = all(f.effect == REFIT for f in found)
     effects = [f for f in found if f.effect != REFIT]
@@ -699,6 +702,9 @@ def beside_more(found: Sequence[Finding], rest: Rest, cards: Mapping[str, dict])
             return doubted(finding, why, wrong_form=not rest.moments)
         if rest.share > SETTINGS.much_left:
             return doubted(finding, "much is left, so that it may be a part of something else")
+        if score > SETTINGS.no_right_model and rest.share > SETTINGS.left_by_right:
+            why = f"the score that it leaves is {score:.2f}, and that of a right model is 1"
+            return doubted(finding, why) if finding.certainty == "sure" else finding
         return finding
 
     return [judged(f) for f in found]
