@@ -19,6 +19,7 @@ from twinmill.diagnosis.doubts import (
     acted_on,
     beside_more,
     beside_stale,
+    instead_over_time,
     of_another_form,
     of_many,
     undone,
@@ -1248,6 +1249,48 @@ def test_two_curves_of_the_speed_over_the_command_may_be_one():
     judged = of_another_form(found, NOTHING_LEFT)
     assert [f.certainty for f in judged] == ["sure", "doubtful", "sure"]
     assert "dead_zone" in judged[1].why
+
+
+@pytest.mark.parametrize(
+    ("left", "at_bound", "found"),
+    [(1.15, True, ["heat_gain"]), (1.15, False, []), (1.0, True, [])],
+)
+def test_heat_that_might_do_more_stands_beside_a_battery_that_sags(
+    left, at_bound, found, monkeypatch
+):
+    """In a drive sorted by its commands voltage and heat run alike: heat at its bound had lost."""
+
+    def trial(name, score, bound=False):
+        return SimpleNamespace(
+            names=(name,), held_score=score, own=[SimpleNamespace(at_bound=bound)]
+        )
+
+    monkeypatch.setattr(doubts, "estimates_of", lambda one, _: one.own)
+    monkeypatch.setattr(doubts, "in_common", lambda *_: 0.9)
+    sag, heat = trial("battery_sag", left), trial("heat_gain", 1.05 * left, at_bound)
+    this = SimpleNamespace(
+        before=trial("", 1.94), accepted=sag, trials=[sag, heat, trial("dead_zone", left, True)]
+    )
+    done = SimpleNamespace(last=sag, round_of=lambda _: this)
+    assert instead_over_time(done, "battery_sag") == found
+
+
+def test_a_stretch_in_which_the_model_is_right_is_not_told():
+    """What an effect explains that was found later is no push, though the floor left it out."""
+    random = np.random.default_rng(5)
+    start_s = 0.25 * np.arange(400)
+    missed = random.normal(0, 1e-3, (400, 5, 3))
+    floor, keep = np.full((5, 3), 1e-3), np.ones(400, bool)
+    keep[100:120] = False
+    errors = {"right": missed, "wrong": np.where(keep[:, None, None], missed, 0.05)}
+    data = SimpleNamespace(
+        start_s=start_s, measured=missed + 0.1, floor=floor, errors=errors.__getitem__
+    )
+    told = [
+        len(moments.left_out(SimpleNamespace(data=data, model=m, floor=SimpleNamespace(keep=keep))))
+        for m in errors
+    ]
+    assert told == [0, 1]
 
 
 def test_a_stretch_that_is_left_out_is_told(tanh_robot, measure, fitted):
