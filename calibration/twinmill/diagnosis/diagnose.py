@@ -17,6 +17,7 @@ from twinmill.diagnosis.doubts import (
     beside_stale,
     of_another_form,
     of_many,
+    of_no_right_model,
     undetermined,
     undone,
     within_the_table,
@@ -348,8 +349,8 @@ def _concluded(
     rest = rest.at_few_commands() if few else rest
     findings = _beside_formula(findings, last, rest, len(set(hashes)))
     cards = catalogue_of(last.state.model)
-    findings = beside_more(of_another_form(findings, rest), rest, cards, last.held_score)
-    findings = of_many(findings)
+    findings = of_many(beside_more(of_another_form(findings, rest), rest, cards))
+    findings = of_no_right_model(findings, rest, last.held_score)
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
     rest = rest.with_findings(findings)

@@ -663,9 +663,7 @@ def _when_s(finding: Finding) -> list[float]:
     return [e.value for e in finding.parameters if e.name.split(".", 1)[1] in keys]
 
 
-def beside_more(
-    found: Sequence[Finding], rest: Rest, cards: Mapping[str, dict], score: float
-) -> list[Finding]:
+def beside_more(found: Sequence[Finding], rest: Rest, cards: Mapping[str, dict]) -> list[Finding]:
     """Findings, doubtful where much is left, or more than all of them take, and it is no noise.
 
     A lag is doubtful where much is left at all: something else at changes of the command is late,
@@ -675,7 +673,6 @@ def beside_more(
         found: in the order of worth.
         rest: what is left.
         cards: of effects, with the parameters that this robot's wheels have.
-        score: held out, of the model with all of them.
     """
     alone = all(f.effect == REFIT for f in found)
     effects = [f for f in found if f.effect != REFIT]
@@ -702,12 +699,23 @@ def beside_more(
             return doubted(finding, why, wrong_form=not rest.moments)
         if rest.share > SETTINGS.much_left:
             return doubted(finding, "much is left, so that it may be a part of something else")
-        if score > SETTINGS.no_right_model and rest.share > SETTINGS.left_by_right:
-            why = f"the score that it leaves is {score:.2f}, and that of a right model is 1"
-            return doubted(finding, why) if finding.certainty == "sure" else finding
         return finding
 
     return [judged(f) for f in found]
+
+
+def of_no_right_model(found: Sequence[Finding], rest: Rest, score: float) -> list[Finding]:
+    """Findings, doubtful where the model with all of them is none that is right.
+
+    Args:
+        found: of which many that are doubtful were judged.
+        rest: what is left.
+        score: held out, of that model.
+    """
+    if score <= SETTINGS.no_right_model or rest.share <= SETTINGS.left_by_right:
+        return list(found)
+    why = f"the score that is left is {score:.2f}, and that of a right model is 1"
+    return [doubted(f, why) if f.certainty == "sure" and f.effect != REFIT else f for f in found]
 
 
 def of_many(found: Sequence[Finding]) -> list[Finding]:

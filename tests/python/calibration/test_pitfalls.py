@@ -22,6 +22,7 @@ from twinmill.diagnosis.doubts import (
     instead_over_time,
     of_another_form,
     of_many,
+    of_no_right_model,
     undone,
 )
 from twinmill.diagnosis.explain import explain
@@ -964,7 +965,7 @@ def test_what_is_found_beside_one_of_two_hangs_on_which_it_is(group, certainty):
 )
 def test_beside_a_rest_that_is_no_noise_a_name_is_doubtful(effect, left, firm, certainty):
     found = [Finding(effect, None, [], 0.6, "sure")]
-    assert [f.certainty for f in beside_more(found, Rest(left, firm, []), catalogue(), 1.0)] == [
+    assert [f.certainty for f in beside_more(found, Rest(left, firm, []), catalogue())] == [
         certainty
     ]
 
@@ -975,15 +976,14 @@ def test_beside_a_rest_that_is_no_noise_a_name_is_doubtful(effect, left, firm, c
 )
 def test_a_score_that_no_right_model_has_leaves_no_name_sure(score, left, certainty):
     """Of eleven such names of strangers' and own cases five were wrong, of 384 others nine."""
-    (judged,) = beside_more(
-        [Finding("heading_bias", None, [], 0.9, "sure")], Rest(left, False, []), catalogue(), score
-    )
+    found = [Finding("heading_bias", None, [], 0.9, "sure")]
+    (judged,) = of_no_right_model(found, Rest(left, False, []), score)
     assert judged.certainty == certainty
 
 
 def test_beside_much_that_depends_on_something_a_name_is_doubtful():
     found = [Finding("turn_asymmetry", None, [], 0.1, "sure")]
-    (judged,) = beside_more(found, Rest(0.3, False, ["time"]), catalogue(), 1.0)
+    (judged,) = beside_more(found, Rest(0.3, False, ["time"]), catalogue())
     assert judged.certainty == "doubtful"
 
 
@@ -1000,7 +1000,7 @@ def test_numbers_that_alone_were_stale_may_stand_for_what_is_left(effects, rest,
     """Friction of turning takes a share of most turns, and gains that are free take that."""
     found = [Finding(REFIT, None, [], 0.8, "sure")]
     found += [Finding(e, None, [], 0.1, "sure") for e in effects]
-    assert beside_more(found, rest, catalogue(), 1.0)[0].certainty == certainty
+    assert beside_more(found, rest, catalogue())[0].certainty == certainty
 
 
 @pytest.mark.parametrize(
@@ -1154,7 +1154,7 @@ def test_two_doubtful_effects_of_one_kind_are_none_of_them(second, outside):
 def test_an_effect_that_takes_less_than_is_left_or_doubtful_is_not_sure(doubtful, left, certainty):
     found = [Finding("yaw_lever", None, [], 0.45, "sure")]
     found += [Finding("yaw_lag", None, [], doubtful, "doubtful")]
-    first, _ = beside_more(found, Rest(left, False, ["past motion"]), catalogue(), 1.0)
+    first, _ = beside_more(found, Rest(left, False, ["past motion"]), catalogue())
     assert first.certainty == certainty
 
 
@@ -1176,7 +1176,7 @@ def test_a_size_beyond_what_is_usual_is_not_sure_beside_a_rest(
     found = [Finding("wheel_gain", None, [weak], 0.8, "sure")]
     rest = Rest(left, True, ["coupling of the axes"])
     cards = catalogue_of(ModelFile.load(str(path)).model)
-    (judged,) = beside_more(found, rest, cards, 1.0)
+    (judged,) = beside_more(found, rest, cards)
     assert judged.certainty == certainty
 
 
